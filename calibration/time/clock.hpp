@@ -1,0 +1,43 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+
+namespace birdseye {
+
+/// A span of time, ns. One type for both clocks: their rates differ by parts per million, which clock lines estimate.
+struct Duration {
+  std::int64_t ns = 0;
+  auto operator<=>(const Duration&) const = default;
+  [[nodiscard]] double seconds() const { return static_cast<double>(ns) * 1e-9; }
+  static Duration from_seconds(double seconds) { return {static_cast<std::int64_t>(seconds * 1e9)}; }
+  static constexpr Duration from_ms(std::int64_t ms) { return {ms * 1'000'000}; }
+  Duration operator+(Duration other) const { return {ns + other.ns}; }
+  Duration operator-(Duration other) const { return {ns - other.ns}; }
+};
+
+/// An instant on one machine's CLOCK_MONOTONIC. Clock is a tag: instants of different clocks do not mix.
+template <typename Clock>
+struct Instant {
+  std::int64_t ns = 0;
+  auto operator<=>(const Instant&) const = default;
+  Duration operator-(Instant other) const { return {ns - other.ns}; }
+  Instant operator+(Duration span) const { return {ns + span.ns}; }
+  Instant operator-(Duration span) const { return {ns - span.ns}; }
+};
+
+struct DeviceClock;  ///< the appliance's CLOCK_MONOTONIC
+struct HostClock;    ///< the host's CLOCK_MONOTONIC
+using DeviceTime = Instant<DeviceClock>;
+using HostTime = Instant<HostClock>;
+
+/// A sample with the time at which the world was as it says (acquisition), how sure we are of that, and when we got it.
+template <typename T>
+struct Stamped {
+  T value;
+  DeviceTime acquired;
+  Duration acquired_sigma;
+  DeviceTime arrived;
+};
+
+}  // namespace birdseye

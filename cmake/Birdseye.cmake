@@ -1,0 +1,41 @@
+# birdseye_library(name SOURCES ... PUBLIC libs... PRIVATE libs...), birdseye_executable(...), birdseye_test(...):
+# our own targets, with the warnings and sanitizers that all of them share. Libraries are static.
+
+add_library(birdseye_options INTERFACE)
+target_compile_options(birdseye_options INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Werror
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
+target_include_directories(birdseye_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(BIRDSEYE_SANITIZE)
+  target_compile_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE})
+endif()
+
+function(birdseye_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} birdseye_options)
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+endfunction()
+
+function(birdseye_executable name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PRIVATE" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options)
+endfunction()
+
+# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. DATA: the tests read real recordings and skip without them.
+function(birdseye_test name)
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options GTest::gmock_main)
+  if(NOT ARG_LABEL)
+    set(ARG_LABEL unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
+    PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
+      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR};BIRDSEYE_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+endfunction()
