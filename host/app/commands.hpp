@@ -1,0 +1,21 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+enum class ExitCode : int { success = 0, unusable_input = 2, verdict_fail = 3 };
+
+/// What the command that ran came to. A command's callback sets it; main() prints the error and returns the code.
+struct CommandStatus {
+  ExitCode code = ExitCode::success;
+
+  /// Takes the outcome of a command that has no verdict.
+  void take(const Result<void>& outcome);
+  /// Prints `birdseye: <what>` on standard error and turns the exit code to 2.
+  void refuse(const Error& error);
+};
+
+}  // namespace birdseye::host

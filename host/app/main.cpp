@@ -1,0 +1,15 @@
+#include "host/app/commands.hpp"
+
+int main(int argc, char** argv) {
+  using namespace birdseye::host;
+  CLI::App app{"birdseye: a registered, deformable CT over live laparoscopic video"};
+  app.require_subcommand(1);
+  CommandStatus status;
+  // One file per command: declare add_<command> in commands.hpp and call it here.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::unusable_input);
+  }
+  return static_cast<int>(status.code);
+}
