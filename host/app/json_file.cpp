@@ -15,8 +15,8 @@ Result<void> write_file(const std::filesystem::path& path, const std::string& te
     out << text;
     out.flush();
     if (!out) {
-      return Error{Errc::unreadable, fmt::format("{}: cannot be written; check the folder and its permissions",
-                                                 path.string())};
+      return Error{Errc::unreadable,
+                   fmt::format("{}: cannot be written; check the folder and its permissions", path.string())};
     }
   }
   std::error_code error;
