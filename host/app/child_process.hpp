@@ -1,0 +1,48 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// A program we started and own: it is asked to end (SIGTERM), then made to (SIGKILL), when this goes out of scope.
+class ChildProcess {
+ public:
+  enum class Pipe { none, stdin_to_child, stdout_from_child };
+
+  /// command: program and arguments; its standard error goes to log (appended).
+  static Result<ChildProcess> start(const std::vector<std::string>& command, const std::filesystem::path& log,
+                                    Pipe pipe = Pipe::none);
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&& other) noexcept;
+  ~ChildProcess();
+
+  /// The next whole line of the child's standard output; empty at the deadline; Errc::disconnected at its end.
+  Result<std::optional<std::string>> read_line(std::chrono::steady_clock::time_point deadline);
+  /// All of bytes to the child's standard input, or why not.
+  Result<void> write(const void* bytes, std::size_t size, std::chrono::steady_clock::time_point deadline);
+  void close_input();
+
+  /// The exit code (128 + signal if it was killed); empty if it still runs at the deadline.
+  std::optional<int> wait(std::chrono::steady_clock::time_point deadline);
+  void stop();
+
+ private:
+  ChildProcess(pid_t pid, int fd, std::string name) : pid_(pid), fd_(fd), name_(std::move(name)) {}
+  void close_fd();
+
+  pid_t pid_ = -1;
+  int fd_ = -1;
+  std::string name_;
+  std::string buffer_;
+  std::optional<int> exit_code_;
+};
+
+}  // namespace birdseye::host
