@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// The error of the tumour's centre in one frame, against the simulator's truth.
+struct FrameError {
+  double time_s = 0;  ///< since the first overlaid frame
+  double target_mm = 0;
+  double overlay_px = 0;
+};
+
+/// All that the demo measured and its report says.
+struct DemoFigures {
+  std::string title;
+  std::vector<FrameError> errors;
+  std::vector<double> fiducial_residuals_mm;
+  double fre_mm = 0;
+  double camera_rms_px = 0;
+  double hand_eye_rms_px = 0;
+  int board_views = 0;
+  double tracker_rate_hz = 0;
+  int frames = 0;
+  int frames_dropped = 0;
+  int frames_without_overlay = 0;
+  double position_noise_mm = 0;
+  double angle_noise_deg = 0;
+  double wall_s = 0;
+  std::string verdict;
+  std::vector<std::string> reasons;
+};
+
+/// p in [0, 1]; the nearest-rank percentile; NaN of nothing.
+double percentile(std::vector<double> values, double p);
+
+/// Writes report.json and report.html into folder; the page shows overlay.png, video.png and overlay.mp4 beside it and
+/// loads nothing from a network.
+Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFigures& figures);
+
+}  // namespace birdseye::host

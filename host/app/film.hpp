@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "calibration/base/result.hpp"
+#include "host/app/child_process.hpp"
+
+namespace birdseye::host {
+
+/// An H.264 film in an MP4 file, encoded by the ffmpeg program. The file appears under its name when the film is whole.
+class Film {
+ public:
+  static Result<Film> open(const std::filesystem::path& path, int width_px, int height_px, double rate_hz);
+
+  /// rgb: width * height * 3 bytes, rows from the top.
+  Result<void> add(std::span<const std::uint8_t> rgb);
+  Result<void> finish();
+
+ private:
+  Film(ChildProcess encoder, std::filesystem::path path, std::filesystem::path temporary, std::size_t frame_bytes)
+      : encoder_(std::move(encoder)),
+        path_(std::move(path)),
+        temporary_(std::move(temporary)),
+        frame_bytes_(frame_bytes) {}
+
+  ChildProcess encoder_;
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  std::size_t frame_bytes_;
+};
+
+}  // namespace birdseye::host
