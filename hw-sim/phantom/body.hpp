@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/phantom/grid.hpp"
+
+namespace birdseye::hw_sim {
+
+/// A CT of a patient with a liver, before vessels, tumour and markers are put in.
+struct Body {
+  Grid grid;
+  std::vector<std::int16_t> hu;
+  Field skin_mm;   ///< signed distance to the skin
+  Field liver_mm;  ///< signed distance to the liver's surface
+};
+
+/// A procedural torso: wall of fat and muscle, ribs, spine, kidneys, spleen, great vessels and a liver of two lobes.
+Body procedural_body(std::uint64_t seed);
+
+/// A CT of the user's own (any file that ITK reads), resampled to axes along the patient and at most 2 mm. The liver is
+/// taken from labels where given (label value), else found as the largest thick region of soft tissue on the right.
+Result<Body> body_from_ct(const std::filesystem::path& ct, const std::filesystem::path& labels, int liver_label);
+
+}  // namespace birdseye::hw_sim

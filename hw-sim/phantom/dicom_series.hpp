@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/phantom/grid.hpp"
+
+namespace birdseye::hw_sim {
+
+/// Writes hu as a CT series of one file per slice into folder (made, or emptied of a former series), with identifiers
+/// that follow from seed alone.
+Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
+                                std::uint64_t seed);
+/// Labels on the same grid as a compressed NIfTI file.
+Result<void> write_labels(const std::filesystem::path& path, const Grid& grid, std::span<const std::uint8_t> labels);
+
+}  // namespace birdseye::hw_sim

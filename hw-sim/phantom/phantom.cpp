@@ -1,0 +1,165 @@
+#include "hw-sim/phantom/phantom.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "hw-sim/phantom/body.hpp"
+#include "hw-sim/phantom/dicom_series.hpp"
+#include "hw-sim/phantom/implants.hpp"
+#include "hw-sim/phantom/mesh.hpp"
+#include "hw-sim/phantom/shapes.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+using Eigen::Vector3d;
+
+nlohmann::json json_of(const Vector3d& v) {
+  return nlohmann::json::array({v.x(), v.y(), v.z()});
+}
+
+Result<Vector3d> vector_of(const nlohmann::json& json) {
+  if (!json.is_array() || json.size() != 3) return Error{Errc::bad_format, "needs three numbers"};
+  return Vector3d(json[0].get<double>(), json[1].get<double>(), json[2].get<double>());
+}
+
+/// The surface of a field within the box that holds it, with a border that is outside, so that the surface closes.
+Mesh closed_surface(const Field& field, const Vector3d& low, const Vector3d& high, double spacing_mm) {
+  ScalarGrid sampled = ScalarGrid::sample(field, Grid::around(low, high, spacing_mm));
+  const Grid& grid = sampled.grid;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const bool border =
+            i < 2 || j < 2 || k < 2 || i > grid.size[0] - 3 || j > grid.size[1] - 3 || k > grid.size[2] - 3;
+        float& value = sampled.values[grid.index(i, j, k)];
+        if (border) value = std::max(value, static_cast<float>(spacing_mm));
+      }
+    }
+  }
+  return surface_of(sampled);
+}
+
+Result<void> write_surfaces(const std::filesystem::path& folder, const Body& body, const Implants& implants) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const Vector3d low = body.grid.origin_mm;
+  const Vector3d high = body.grid.last_mm();
+  const auto write = [&](const char* name, const Field& field, const Vector3d& from, const Vector3d& to, double mm) {
+    return write_ply(folder / name, closed_surface(field, from, to, mm));
+  };
+  const auto tree_box = [](const VesselTree& tree) {
+    std::pair<Vector3d, Vector3d> box{Vector3d::Constant(1e9), Vector3d::Constant(-1e9)};
+    for (const Rod& rod : tree) {
+      box.first = box.first.cwiseMin(rod.a.cwiseMin(rod.b));
+      box.second = box.second.cwiseMax(rod.a.cwiseMax(rod.b));
+    }
+    box.first -= Vector3d::Constant(10);
+    box.second += Vector3d::Constant(10);
+    return box;
+  };
+  const Vector3d reach = implants.tumour_radii_mm + Vector3d::Constant(5);
+  const auto markers = [&](const Vector3d& p) {
+    double nearest = std::numeric_limits<double>::max();
+    for (const Vector3d& m : implants.markers_mm) nearest = std::min(nearest, (p - m).norm() - kMarkerRadiusMm);
+    return nearest;
+  };
+  const auto portal_box = tree_box(implants.portal);
+  const auto hepatic_box = tree_box(implants.hepatic);
+  for (const Result<void>& written : {
+           write("liver.ply", body.liver_mm, low, high, 2.5),
+           write("skin.ply", body.skin_mm, low, high, 4.0),
+           write(
+               "portal.ply", [&](const Vector3d& p) { return distance_mm(implants.portal, p); }, portal_box.first,
+               portal_box.second, 1.0),
+           write(
+               "hepatic.ply", [&](const Vector3d& p) { return distance_mm(implants.hepatic, p); }, hepatic_box.first,
+               hepatic_box.second, 1.0),
+           write(
+               "tumour.ply",
+               [&](const Vector3d& p) { return ellipsoid_mm(p, implants.tumour_centre_mm, implants.tumour_radii_mm); },
+               implants.tumour_centre_mm - reach, implants.tumour_centre_mm + reach, 1.0),
+           write("markers.ply", markers, low, high, 2.0),
+       }) {
+    if (!written) return written.error();
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> write_phantom(const PhantomSettings& settings) {
+  std::error_code error;
+  std::filesystem::create_directories(settings.folder, error);
+  if (error) {
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", settings.folder.string())};
+  }
+  Result<Body> body = settings.ct.empty() ? Result<Body>(procedural_body(settings.seed))
+                                          : body_from_ct(settings.ct, settings.labels, settings.liver_label);
+  if (!body) return body.error();
+  const Result<Implants> implants = choose_implants(*body, settings.seed);
+  if (!implants) {
+    return Error{implants.error().code, fmt::format("{}: {}", settings.ct.string(), implants.error().what)};
+  }
+  const std::vector<std::uint8_t> labels = implant(*body, *implants, settings.seed);
+
+  // The series is one file after another through one codec; the surfaces are sums. They take each other's time.
+  Result<void> series;
+  std::jthread writer([&] {
+    series = write_dicom_series(settings.folder / "ct", body->grid, body->hu, settings.seed);
+    if (series) series = write_labels(settings.folder / "segmentation.nii.gz", body->grid, labels);
+  });
+  const Result<void> surfaces = write_surfaces(settings.folder / "surfaces", *body, *implants);
+  writer.join();
+  if (!series) return series;
+  if (!surfaces) return surfaces;
+
+  nlohmann::json truth;
+  truth["seed"] = settings.seed;
+  truth["frame"] = "patient LPS, mm";
+  truth["liver_centre_mm"] = json_of(implants->liver_centre_mm);
+  truth["tumour_centre_mm"] = json_of(implants->tumour_centre_mm);
+  truth["tumour_radii_mm"] = json_of(implants->tumour_radii_mm);
+  truth["labels"] = {{"liver", kLiver}, {"portal", kPortal}, {"hepatic", kHepatic}, {"tumour", kTumour}};
+  for (const Vector3d& marker : implants->markers_mm) truth["fiducials_mm"].push_back(json_of(marker));
+  std::ofstream out(settings.folder / "truth.json");
+  out << truth.dump(2) << '\n';
+  out.close();
+  if (!out) return Error{Errc::unreadable, fmt::format("{}/truth.json: cannot be written", settings.folder.string())};
+  return {};
+}
+
+Result<PhantomTruth> read_phantom_truth(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "truth.json";
+  std::ifstream in(path);
+  if (!in) {
+    return Error{Errc::not_found,
+                 fmt::format("{}: no phantom here; make one with `birdseye-sim phantom`", path.string())};
+  }
+  try {
+    const nlohmann::json json = nlohmann::json::parse(in);
+    PhantomTruth truth;
+    const auto liver = vector_of(json.at("liver_centre_mm"));
+    const auto tumour = vector_of(json.at("tumour_centre_mm"));
+    if (!liver || !tumour)
+      return Error{Errc::bad_format, fmt::format("{}: a point needs three numbers", path.string())};
+    truth.liver_centre_mm = *liver;
+    truth.tumour_centre_mm = *tumour;
+    for (const auto& item : json.at("fiducials_mm")) {
+      const auto point = vector_of(item);
+      if (!point) return Error{Errc::bad_format, fmt::format("{}: a point needs three numbers", path.string())};
+      truth.fiducials_mm.push_back(*point);
+    }
+    return truth;
+  } catch (const nlohmann::json::exception& problem) {
+    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), problem.what())};
+  }
+}
+
+}  // namespace birdseye::hw_sim
