@@ -143,12 +143,16 @@ Mask::Pointer find_liver(const Image::Pointer& ct, const Grid& grid) {
   return largest_component(grown);
 }
 
-/// A field over the whole patient from an image on grid.
+/// A signed distance over the whole patient from one on grid. A scan cuts organs off at its faces: so does this.
 Field field_of(const Image::Pointer& image, const Grid& grid) {
   const auto scalars = std::make_shared<ScalarGrid>();
   scalars->grid = grid;
   scalars->values.assign(image->GetBufferPointer(), image->GetBufferPointer() + grid.voxels());
-  return [scalars](const Eigen::Vector3d& p) { return scalars->at(p); };
+  const Eigen::Vector3d low = grid.origin_mm;
+  const Eigen::Vector3d high = grid.last_mm();
+  return [=](const Eigen::Vector3d& p) {
+    return std::max(scalars->at(p), std::max((low - p).maxCoeff(), (p - high).maxCoeff()));
+  };
 }
 
 }  // namespace

@@ -78,6 +78,7 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
       put("0020|0032", fmt::format("{:.6g}\\{:.6g}\\{:.6g}", at.x(), at.y(), at.z()));
       put("0020|0037", "1\\0\\0\\0\\1\\0");
       put("0020|1041", fmt::format("{:.6g}", at.z()));
+      put("0028|0004", "MONOCHROME2");
       put("0028|1052", "0");
       put("0028|1053", "1");
       const auto io = itk::GDCMImageIO::New();

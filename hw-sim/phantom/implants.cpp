@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kTumourDepthMm = 27;
+constexpr double kTumourDepthMm = 27, kThinnestHalfMm = 22;
 constexpr double kPortalHu = 215, kHepaticHu = 170, kTumourHu = 350, kMarkerHu = 2500;
 
 /// Grows one tree: each rod forks in two, in planes that alternate, until it is thin or would leave the liver.
@@ -41,14 +41,15 @@ class Grower {
     if (radius < kThinnestMm || depth > kDeepest) return;
     double length = radius * uniform(5.0, 7.0);
     Vector3d to = from + length * direction;
-    for (int attempt = 0; liver_mm_(to) > -(radius + 3); ++attempt) {
-      if (attempt == 6) return;
-      direction = (direction + 0.35 * (centre_ - from).normalized()).normalized();
-      length *= 0.85;
+    const double thinner = radius * 0.82;
+    for (int attempt = 0;
+         liver_mm_(to) > -(radius + 2) || tapered_rod_mm(keep_out_, from, to, radius, thinner) < keep_out_mm_;
+         ++attempt) {
+      if (attempt == 8) return;
+      direction = (direction + 0.3 * (centre_ - from).normalized()).normalized();
+      length *= 0.88;
       to = from + length * direction;
     }
-    const double thinner = radius * 0.82;
-    if (tapered_rod_mm(keep_out_, from, to, radius, thinner) < keep_out_mm_) return;
     tree_.push_back({from, to, radius, thinner});
     Vector3d across = plane.cross(direction);
     if (across.norm() < 0.1) across = direction.unitOrthogonal();
@@ -128,27 +129,34 @@ Result<Implants> choose_implants(const Body& body, std::uint64_t seed) {
       }
     }
   }
-  if (depth < 30) {
-    return Error{Errc::degenerate, "the CT holds no liver at least 60 mm thick; give one that does, or its --labels"};
+  if (depth < kThinnestHalfMm) {
+    return Error{Errc::degenerate, "the CT holds no liver at least 44 mm thick; give one that does, or its --labels"};
   }
   Implants out;
   out.liver_centre_mm = sum / inside;
   // The centre of mass of a bent organ may lie near its surface; the tumour starts from where there is room.
-  const Vector3d start = body.liver_mm(out.liver_centre_mm) < -30 ? out.liver_centre_mm : deepest;
-  out.tumour_centre_mm = march_to_level(body.liver_mm, -kTumourDepthMm, start, towards_scope(), 200, 0.5);
+  const double tumour_depth = std::min(kTumourDepthMm, 0.85 * depth);
+  const Vector3d start = body.liver_mm(out.liver_centre_mm) < -tumour_depth ? out.liver_centre_mm : deepest;
+  out.tumour_centre_mm = march_to_level(body.liver_mm, -tumour_depth, start, towards_scope(), 200, 0.5);
   for (int axis = 0; axis < 3; ++axis) {
     out.tumour_centre_mm[axis] += 3.0 * (hashed_uniform(seed, 900U + static_cast<unsigned>(axis)) - 0.5);
   }
   out.tumour_radii_mm = {12.5, 10.5, 11.5};
 
+  // The trees spread from behind the tumour, which they go round.
+  const Vector3d behind = march_to_level(body.liver_mm, -6, start, -towards_scope(), 200);
+  const Vector3d heart = 0.4 * start + 0.6 * behind;
   const auto root = [&](const Vector3d& direction) {
-    return march_to_level(body.liver_mm, -7, start, direction.normalized(), 200);
+    return march_to_level(body.liver_mm, -7, heart, direction.normalized(), 200);
   };
   const double keep_out_mm = out.tumour_radii_mm.maxCoeff() + 2;
   out.portal =
-      Grower(body.liver_mm, start, out.tumour_centre_mm, keep_out_mm, seed + 11).grow(root({0.62, 0.35, -0.45}), 5.6);
+      Grower(body.liver_mm, heart, out.tumour_centre_mm, keep_out_mm, seed + 11).grow(root({0.62, 0.35, -0.45}), 5.6);
   out.hepatic =
-      Grower(body.liver_mm, start, out.tumour_centre_mm, keep_out_mm, seed + 12).grow(root({0.35, 0.30, 0.90}), 5.0);
+      Grower(body.liver_mm, heart, out.tumour_centre_mm, keep_out_mm, seed + 12).grow(root({0.35, 0.30, 0.90}), 5.0);
+  if (out.portal.size() < 8 || out.hepatic.size() < 8) {
+    return Error{Errc::degenerate, "no vessel trees fit into the liver that was found; give the CT's organ --labels"};
+  }
   out.markers_mm = choose_markers(body, out.liver_centre_mm);
   return out;
 }

@@ -32,8 +32,8 @@ inline constexpr double kMarkerRadiusMm = 4;
 /// From the liver towards the laparoscope, which comes in by the navel: forward and towards the feet (LPS, unit).
 Eigen::Vector3d towards_scope();
 
-/// Chooses places: a tumour 27 mm under the face of the liver that the scope sees, two vessel trees grown from hilum
-/// and vena cava, six markers over the front of the body. Refused where the liver is too small to hold them.
+/// Chooses places: a tumour some 27 mm under the face of the liver that the scope sees, two vessel trees grown from
+/// hilum and vena cava, six markers over the front of the body. Refused where the liver is too small to hold them.
 Result<Implants> choose_implants(const Body& body, std::uint64_t seed);
 
 /// Burns the implants into body.hu and returns the label of each voxel.

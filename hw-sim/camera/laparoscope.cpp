@@ -1,0 +1,328 @@
+#include "hw-sim/camera/laparoscope.hpp"
+
+#include <embree3/rtcore.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "hw-sim/camera/solid_noise.hpp"
+#include "hw-sim/phantom/grid.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr int kPacket = 8;
+
+/// What a ray meets: where, in the scene's frame, and the surface's normal there (unit, towards the camera).
+struct Hit {
+  Vector3f point, normal;
+  float distance = 0;
+  unsigned geometry = RTC_INVALID_GEOMETRY_ID;
+};
+
+/// How a point answers the lamp: the share of each colour it scatters, and the strength of its highlight.
+struct Surface {
+  Vector3f albedo;
+  float gloss = 0;
+};
+
+enum CavityGeometry : unsigned { kLiverGeometry = 0, kWallGeometry = 1 };
+
+class EmbreeScene {
+ public:
+  explicit EmbreeScene(RTCDevice device) : device_(device), scene_(rtcNewScene(device)) {}
+  ~EmbreeScene() { rtcReleaseScene(scene_); }
+  EmbreeScene(const EmbreeScene&) = delete;
+  EmbreeScene& operator=(const EmbreeScene&) = delete;
+
+  void add(const Mesh& mesh, unsigned id) {
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                          3 * sizeof(float), mesh.vertices.size()));
+    for (const Vector3f& p : mesh.vertices) v = std::copy_n(p.data(), 3, v);
+    auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                             3 * sizeof(unsigned), mesh.triangles.size()));
+    for (const auto& triangle : mesh.triangles) t = std::copy(triangle.begin(), triangle.end(), t);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene_, geometry, id);
+    rtcReleaseGeometry(geometry);
+    smooth_.resize(std::max<std::size_t>(smooth_.size(), id + 1));
+    smooth_[id] = {mesh.triangles, mesh.normals};
+  }
+  /// The normal at a hit: between those of the vertices where the mesh has them, else that of the triangle.
+  [[nodiscard]] Vector3f normal(const RTCRayHit8& packet, int lane) const {
+    const Smooth& mesh = smooth_[packet.hit.geomID[lane]];
+    if (mesh.normals.empty()) return {packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]};
+    const auto& t = mesh.triangles[packet.hit.primID[lane]];
+    const float u = packet.hit.u[lane];
+    const float v = packet.hit.v[lane];
+    return (1 - u - v) * mesh.normals[t[0]] + u * mesh.normals[t[1]] + v * mesh.normals[t[2]];
+  }
+  void commit() { rtcCommitScene(scene_); }
+  [[nodiscard]] RTCScene get() const { return scene_; }
+
+ private:
+  struct Smooth {
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    std::vector<Vector3f> normals;
+  };
+  RTCDevice device_;
+  RTCScene scene_;
+  std::vector<Smooth> smooth_;  ///< by geometry id
+};
+
+class EmbreeLaparoscope final : public Laparoscope {
+ public:
+  EmbreeLaparoscope(const CameraModel& camera, std::uint64_t seed, RTCDevice device)
+      : camera_(camera), seed_(seed), device_(device), texture_(seed + 31) {
+    const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+    rays_.resize(pixels);
+    field_.resize(pixels);
+    const double radius = 0.53 * camera.width_px;
+    for (int y = 0; y < camera.height_px; ++y) {
+      for (int x = 0; x < camera.width_px; ++x) {
+        const std::size_t at = pixel(x, y);
+        const auto ray = unproject(camera, Eigen::Vector2d(x, y));
+        const double r = std::hypot(x - camera.cx_px, y - camera.cy_px);
+        // The round field stop, a pixel or two soft, and the fall of light towards its edge.
+        const double stop = std::clamp((radius - r) / 2.0, 0.0, 1.0);
+        field_[at] = ray ? static_cast<float>(stop * (1 - 0.45 * std::pow(r / radius, 2.5))) : 0.0F;
+        rays_[at] = ray ? Vector3f(ray->normalized().cast<float>()) : Vector3f(0, 0, 1);
+      }
+    }
+    for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = static_cast<float>(hashed_normal(seed + 32, i));
+    for (std::size_t i = 0; i < gamma_.size(); ++i) {
+      gamma_[i] = static_cast<float>(
+          255.0 * std::pow(static_cast<double>(i) / static_cast<double>(gamma_.size() - 1), 1 / 2.2));
+    }
+  }
+  ~EmbreeLaparoscope() override {
+    cavity_.reset();
+    bench_.reset();
+    rtcReleaseDevice(device_);
+  }
+
+  void set_cavity(const Mesh& liver, const Eigen::Vector3d& centre) override {
+    cavity_ = std::make_unique<EmbreeScene>(device_);
+    cavity_->add(liver, kLiverGeometry);
+    const Vector3f c = centre.cast<float>();
+    const Field wall = [&](const Eigen::Vector3d& p) { return (p - c.cast<double>()).norm() - 300.0; };
+    cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(centre - Eigen::Vector3d::Constant(330),
+                                                                  centre + Eigen::Vector3d::Constant(330), 20))),
+                 kWallGeometry);
+    cavity_->commit();
+  }
+
+  void set_bench(const Chessboard& board) override {
+    board_ = board;
+    bench_ = std::make_unique<EmbreeScene>(device_);
+    Mesh table;
+    constexpr float kReach = 2000;
+    table.vertices = {{-kReach, -kReach, 0}, {kReach, -kReach, 0}, {kReach, kReach, 0}, {-kReach, kReach, 0}};
+    table.triangles = {{0, 2, 1}, {0, 3, 2}};
+    bench_->add(table, 0);
+    bench_->commit();
+  }
+
+  std::vector<std::uint8_t> look_into_cavity(const Transform<Camera, Patient>& camera_from_patient,
+                                             std::uint64_t sequence) const override {
+    const Transform<Patient, Camera> pose = camera_from_patient.inverse();
+    return trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 1.55F, sequence,
+                 [this](const Hit& hit) { return cavity_surface(hit); });
+  }
+
+  std::vector<std::uint8_t> look_at_bench(const Transform<Camera, Marker>& camera_from_marker,
+                                          std::uint64_t sequence) const override {
+    const Transform<Marker, Camera> pose = camera_from_marker.inverse();
+    return trace(*bench_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 0.6F, sequence,
+                 [this](const Hit& hit) { return bench_surface(hit); });
+  }
+
+ private:
+  [[nodiscard]] std::size_t pixel(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width_px) + static_cast<std::size_t>(x);
+  }
+
+  [[nodiscard]] Surface cavity_surface(const Hit& hit) const {
+    const Vector3f& p = hit.point;
+    const float coarse = texture_.at(p / 19.0F);
+    const float middle = texture_.at(p / 6.3F);
+    const float fine = texture_.at(p / 1.9F);
+    Surface out;
+    if (hit.geometry == kLiverGeometry) {
+      const float shade = 0.62F + 0.40F * coarse + 0.26F * middle + 0.16F * fine;
+      out.albedo = Vector3f(0.40F, 0.105F, 0.075F) * shade;
+      // Fine capsular vessels: the thin set where a smooth scalar passes through its middle.
+      const float vein = 1.0F - std::min(1.0F, std::abs(texture_.at(p / 11.0F + Vector3f(9, 4, 2)) - 0.5F) / 0.022F);
+      out.albedo = out.albedo.cwiseProduct(Vector3f(1 - 0.25F * vein, 1 - 0.45F * vein, 1 - 0.40F * vein));
+      out.gloss = 0.55F;
+    } else {
+      const float shade = 0.55F + 0.5F * coarse + 0.3F * middle;
+      out.albedo = Vector3f(0.62F, 0.36F, 0.26F) * shade;
+      out.gloss = 0.1F;
+    }
+    return out;
+  }
+
+  [[nodiscard]] Surface bench_surface(const Hit& hit) const {
+    // The board's squares, box-filtered over the pixel's footprint along each axis, so that edges lie where they are.
+    const float square = static_cast<float>(board_.square_mm);
+    const float slant = std::max(0.3F, hit.normal.dot(Vector3f(0, 0, -1)));
+    const float footprint = hit.distance / static_cast<float>(camera_.fx_px) / std::sqrt(slant);
+    const auto wave = [&](float u) {
+      const float cell = std::floor(u / square + 0.5F);  // the nearest edge between two squares
+      const float past = u - cell * square;
+      const float sign = static_cast<long>(cell) % 2 == 0 ? 1.0F : -1.0F;
+      return sign * std::clamp(past / (0.5F * footprint), -1.0F, 1.0F);
+    };
+    const float u = hit.point.x();
+    const float v = hit.point.y();
+    const float columns = static_cast<float>(board_.columns) * square;
+    const float rows = static_cast<float>(board_.rows) * square;
+    const bool printed = u > -square && v > -square && u < columns && v < rows;
+    const bool paper = u > -2 * square && v > -2 * square && u < columns + square && v < rows + square;
+    Surface out;
+    if (printed) {
+      const float white = 0.5F + 0.5F * wave(u) * wave(v);
+      out.albedo = Vector3f::Constant(0.035F + 0.78F * white);
+    } else if (paper) {
+      out.albedo = Vector3f::Constant(0.80F);
+    } else {
+      const float weave = 0.8F + 0.4F * texture_.at(hit.point / 2.1F);
+      out.albedo = Vector3f(0.05F, 0.16F, 0.20F) * weave;  // surgical drape
+    }
+    return out;
+  }
+
+  /// One picture of a scene; frame: the scene's, whose origin the rotation and position of the camera refer to.
+  template <typename SurfaceOf>
+  std::vector<std::uint8_t> trace(const EmbreeScene& scene, const Eigen::Matrix3f& rotation, const Vector3f& eye,
+                                  float exposure, std::uint64_t sequence, const SurfaceOf& surface_of_hit) const {
+    std::vector<std::uint8_t> rgb(rays_.size() * 3);
+    tbb::parallel_for(0, camera_.height_px, [&](int y) {
+      RTCIntersectContext context;
+      rtcInitIntersectContext(&context);
+      context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+      const auto noise_at = static_cast<std::size_t>(hashed_uniform(seed_ + sequence, static_cast<std::uint64_t>(y)) *
+                                                     static_cast<double>(noise_.size()));
+      for (int x0 = 0; x0 < camera_.width_px; x0 += kPacket) {
+        alignas(32) RTCRayHit8 packet;
+        alignas(32) int valid[kPacket];
+        std::array<Vector3f, kPacket> directions;
+        for (int lane = 0; lane < kPacket; ++lane) {
+          const int x = x0 + lane;
+          const bool seen = x < camera_.width_px && field_[pixel(std::min(x, camera_.width_px - 1), y)] > 0;
+          valid[lane] = seen ? -1 : 0;
+          directions[static_cast<std::size_t>(lane)] = rotation * rays_[pixel(std::min(x, camera_.width_px - 1), y)];
+          const Vector3f& d = directions[static_cast<std::size_t>(lane)];
+          packet.ray.org_x[lane] = eye.x();
+          packet.ray.org_y[lane] = eye.y();
+          packet.ray.org_z[lane] = eye.z();
+          packet.ray.dir_x[lane] = d.x();
+          packet.ray.dir_y[lane] = d.y();
+          packet.ray.dir_z[lane] = d.z();
+          packet.ray.tnear[lane] = 1;
+          packet.ray.tfar[lane] = std::numeric_limits<float>::infinity();
+          packet.ray.time[lane] = 0;
+          packet.ray.mask[lane] = ~0U;
+          packet.ray.id[lane] = 0;
+          packet.ray.flags[lane] = 0;
+          packet.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+          packet.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
+        }
+        rtcIntersect8(valid, scene.get(), &context, &packet);
+        for (int lane = 0; lane < kPacket && x0 + lane < camera_.width_px; ++lane) {
+          const std::size_t at = pixel(x0 + lane, y);
+          Vector3f light = Vector3f::Zero();
+          if (valid[lane] != 0 && packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID) {
+            light = shade(scene, packet, lane, eye, directions[static_cast<std::size_t>(lane)], surface_of_hit) *
+                    (exposure * field_[at]);
+          }
+          write_pixel(light, noise_at + 3 * static_cast<std::size_t>(x0 + lane), &rgb[3 * at]);
+        }
+      }
+    });
+    return rgb;
+  }
+
+  template <typename SurfaceOf>
+  [[nodiscard]] Vector3f shade(const EmbreeScene& scene, const RTCRayHit8& packet, int lane, const Vector3f& eye,
+                               const Vector3f& direction, const SurfaceOf& surface_of_hit) const {
+    Hit hit;
+    hit.distance = packet.ray.tfar[lane];
+    hit.point = eye + hit.distance * direction;
+    hit.geometry = packet.hit.geomID[lane];
+    hit.normal = scene.normal(packet, lane);
+    hit.normal.normalize();
+    if (hit.normal.dot(direction) > 0) hit.normal = -hit.normal;
+    const Surface surface = surface_of_hit(hit);
+    Vector3f normal = hit.normal;
+    if (surface.gloss > 0) {
+      // A wet surface is not smooth: ripples break the highlight up.
+      const Vector3f q = hit.point / 3.1F;
+      normal += 0.20F * Vector3f(texture_.at(q) - 0.5F, texture_.at(q + Vector3f(17, 5, 3)) - 0.5F,
+                                 texture_.at(q + Vector3f(3, 23, 11)) - 0.5F);
+      normal.normalize();
+    }
+    constexpr float kReferenceMm = 100;
+    const float fall = (kReferenceMm / hit.distance) * (kReferenceMm / hit.distance);
+    const float facing = std::max(0.0F, -normal.dot(direction));
+    const float highlight = surface.gloss * std::pow(facing, 90.0F);
+    return (surface.albedo * facing + Vector3f::Constant(highlight)) * fall;
+  }
+
+  void write_pixel(const Vector3f& light, std::size_t noise_at, std::uint8_t* out) const {
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const float value = light[static_cast<Eigen::Index>(channel)];
+      // Shot noise grows with the root of the light; the read noise is what is left in the dark.
+      const float sigma = 0.0015F + 0.012F * std::sqrt(std::max(0.0F, value));
+      const float noisy = value + sigma * noise_[(noise_at + channel) % noise_.size()];
+      const float scaled = std::clamp(noisy, 0.0F, 1.0F) * static_cast<float>(gamma_.size() - 1);
+      out[channel] = static_cast<std::uint8_t>(gamma_[static_cast<std::size_t>(scaled)] + 0.5F);
+    }
+  }
+
+  CameraModel camera_;
+  std::uint64_t seed_;
+  RTCDevice device_;
+  SolidNoise texture_;
+  Chessboard board_;
+  std::vector<Vector3f> rays_;  ///< unit directions in the camera frame, one per pixel
+  std::vector<float> field_;    ///< how much of the light reaches each pixel, 0 outside the round field
+  std::array<float, 1U << 16U> noise_{};
+  std::array<float, 4096> gamma_{};
+  std::unique_ptr<EmbreeScene> cavity_, bench_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Laparoscope>> Laparoscope::create(const CameraModel& camera, std::uint64_t seed) {
+  if (const auto checked = check(camera); !checked) return checked.error();
+  RTCDevice device = rtcNewDevice(nullptr);
+  if (device == nullptr) return Error{Errc::io, "the ray tracer (Embree) does not start on this machine"};
+  return std::unique_ptr<Laparoscope>(std::make_unique<EmbreeLaparoscope>(camera, seed, device));
+}
+
+CameraModel laparoscope_lens(int width_px, int height_px) {
+  const double scale = width_px / 768.0;
+  CameraModel lens;
+  lens.width_px = width_px;
+  lens.height_px = height_px;
+  lens.fx_px = 598.4 * scale;
+  lens.fy_px = 601.9 * scale;
+  lens.cx_px = 0.5 * width_px + 7.3 * scale;
+  lens.cy_px = 0.5 * height_px - 6.1 * scale;
+  lens.k1 = -0.305;
+  lens.k2 = 0.098;
+  lens.p1 = 0.0011;
+  lens.p2 = -0.0007;
+  return lens;
+}
+
+}  // namespace birdseye::hw_sim

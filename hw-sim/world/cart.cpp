@@ -1,0 +1,146 @@
+#include "hw-sim/world/cart.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "hw-sim/world/frame_camera.hpp"
+#include "hw-sim/world/monotonic.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+nlohmann::json json_of(const Eigen::Vector3d& v) {
+  return nlohmann::json::array({v.x(), v.y(), v.z()});
+}
+
+nlohmann::json json_of(const Eigen::Matrix4d& m) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (int i = 0; i < 4; ++i) rows.push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
+  return rows;
+}
+
+void announce(const nlohmann::json& event) {
+  fmt::print("{}\n", event.dump());
+  std::fflush(stdout);
+}
+
+Result<void> write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream out(path);
+  out << text;
+  out.close();
+  if (!out) return Error{Errc::unreadable, fmt::format("{}: cannot be written; choose another --out", path.string())};
+  return {};
+}
+
+/// What an operator knows: the board, the pointer, how many markers there are, how long it takes.
+nlohmann::json sheet_of(const World& world) {
+  nlohmann::json sheet;
+  sheet["board"] =
+      fmt::format("chessboard:{}x{}:{:g}mm", world.board().columns, world.board().rows, world.board().square_mm);
+  sheet["tip_in_sensor_mm"] = json_of(world.tip_in_pointer_mm());
+  sheet["fiducials"] = world.truth().fiducials_mm.size();
+  for (const Stage& stage : world.stages())
+    sheet["stages"].push_back({{"name", stage.name}, {"begins_s", stage.begins_s}});
+  return sheet;
+}
+
+nlohmann::json truth_of(const World& world, const CameraModel& lens) {
+  nlohmann::json truth;
+  truth["tumour_centre_in_patient_mm"] = json_of(world.truth().tumour_centre_mm);
+  for (const Eigen::Vector3d& f : world.truth().fiducials_mm) truth["fiducials_in_patient_mm"].push_back(json_of(f));
+  truth["tracker_from_patient"] = json_of(world.tracker_from_patient().matrix());
+  truth["tracker_from_marker"] = json_of(world.tracker_from_marker().matrix());
+  truth["camera_from_sensor"] = json_of(world.camera_from_sensor().matrix());
+  truth["tip_in_sensor_mm"] = json_of(world.tip_in_pointer_mm());
+  truth["camera"] = {{"width_px", lens.width_px},
+                     {"height_px", lens.height_px},
+                     {"fx_px", lens.fx_px},
+                     {"fy_px", lens.fy_px},
+                     {"cx_px", lens.cx_px},
+                     {"cy_px", lens.cy_px},
+                     {"k1", lens.k1},
+                     {"k2", lens.k2},
+                     {"p1", lens.p1},
+                     {"p2", lens.p2},
+                     {"k3", lens.k3}};
+  return truth;
+}
+
+std::string frames_csv(const World& world, double rate_hz) {
+  std::string csv = "sequence,world_s";
+  for (int i = 0; i < 16; ++i) csv += fmt::format(",camera_from_patient_{}{}", i / 4, i % 4);
+  csv += '\n';
+  const auto frames = static_cast<std::uint64_t>(std::ceil(world.ends_s() * rate_hz));
+  for (std::uint64_t sequence = 0; sequence < frames; ++sequence) {
+    const double world_s = static_cast<double>(sequence) / rate_hz;
+    const Eigen::Matrix4d m = (world.tracker_from_camera(world_s).inverse() * world.tracker_from_patient()).matrix();
+    csv += fmt::format("{},{:.6f}", sequence, world_s);
+    for (int i = 0; i < 16; ++i) csv += fmt::format(",{:.9g}", m(i / 4, i % 4));
+    csv += '\n';
+  }
+  return csv;
+}
+
+}  // namespace
+
+Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& stop) {
+  const auto truth = read_phantom_truth(settings.phantom);
+  if (!truth) return truth.error();
+  const auto liver = read_ply(settings.phantom / "surfaces" / "liver.ply");
+  if (!liver) return liver.error();
+  const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
+  const auto world = World::create(*truth, *liver, lens, settings.seed);
+  if (!world) return world.error();
+  const auto laparoscope = Laparoscope::create(lens, settings.seed);
+  if (!laparoscope) return laparoscope.error();
+  (*laparoscope)->set_cavity(*liver, truth->liver_centre_mm);
+  (*laparoscope)->set_bench(world->board());
+
+  std::error_code error;
+  std::filesystem::create_directories(settings.folder / "truth", error);
+  for (const Result<void>& written :
+       {write(settings.folder / "truth" / "truth.json", truth_of(*world, lens).dump(2) + "\n"),
+        write(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
+        write(settings.folder / "cart.json", sheet_of(*world).dump(2) + "\n")}) {
+    if (!written) return written.error();
+  }
+
+  auto terminal = PseudoTerminal::open(settings.tty);
+  if (!terminal) return std::move(terminal).error();
+  FrameCamera::Settings camera_settings;
+  camera_settings.socket = settings.socket;
+  camera_settings.lens = lens;
+  camera_settings.rate_hz = settings.rate_hz;
+  const auto camera = FrameCamera::listen(camera_settings, *world, **laparoscope);
+  if (!camera) return camera.error();
+  SimulatedTracker tracker(std::move(*terminal), *world, settings.noise, settings.seed);
+  announce({{"event", "ready"}});
+
+  while (!stop && !(tracker.streaming() && (*camera)->ready())) sleep_until_ns(monotonic_ns() + 10'000'000);
+  const std::int64_t zero_ns = monotonic_ns() + 1'000'000'000;
+  tracker.start(zero_ns);
+  (*camera)->start(zero_ns);
+  for (const Stage& stage : world->stages()) {
+    const std::int64_t begins_ns = zero_ns + static_cast<std::int64_t>(stage.begins_s * 1e9);
+    while (!stop && monotonic_ns() < begins_ns) {
+      sleep_until_ns(std::min(begins_ns, monotonic_ns() + 20'000'000));
+    }
+    // The end is when the last frame is out, which a slow machine may see later than the script has it.
+    const std::int64_t latest_ns = begins_ns + 30'000'000'000;
+    while (!stop && stage.name == "end" && !(*camera)->done() && monotonic_ns() < latest_ns) {
+      sleep_until_ns(monotonic_ns() + 20'000'000);
+    }
+    if (stop) return {};
+    announce({{"event", "stage"}, {"name", stage.name}, {"world_s", stage.begins_s}, {"monotonic_ns", begins_ns}});
+  }
+  // The tracker goes on a little, so that whoever pairs the last frame has poses from after it.
+  sleep_until_ns(monotonic_ns() + 500'000'000);
+  return {};
+}
+
+}  // namespace birdseye::hw_sim

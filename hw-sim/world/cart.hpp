@@ -1,0 +1,27 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/world/tracker.hpp"
+
+namespace birdseye::hw_sim {
+
+struct CartSettings {
+  std::filesystem::path phantom;  ///< a folder that write_phantom wrote
+  std::filesystem::path socket;   ///< where the camera listens
+  std::filesystem::path tty;      ///< the name of the tracker's terminal
+  std::filesystem::path folder;   ///< cart.json and truth/ go here
+  std::uint64_t seed = 1;
+  TrackerNoise noise;
+  int width_px = 768, height_px = 576;
+  double rate_hz = 25;
+};
+
+/// Runs the operation once, in real time, and announces its stages as JSON lines on standard output. It begins a second
+/// after the tracker streams and the camera is watched. stop: set by a signal handler.
+Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& stop);
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/world/world.hpp"
+
+namespace birdseye::hw_sim {
+
+/// A camera that delivers the frames of a world over a Unix socket at their times. Frames depend on the seed and their
+/// number alone, so they are rendered ahead, into a queue of bounded length, by a thread of their own.
+class FrameCamera {
+ public:
+  struct Settings {
+    std::filesystem::path socket;
+    CameraModel lens;
+    double rate_hz = 25;
+    double delivery_ms = 12;  ///< from mid-exposure to the first byte on the socket
+  };
+
+  /// Listens at once. The world and the laparoscope must outlive the camera.
+  static Result<std::unique_ptr<FrameCamera>> listen(const Settings& settings, const World& world,
+                                                     const Laparoscope& laparoscope);
+  ~FrameCamera();
+  FrameCamera(const FrameCamera&) = delete;
+  FrameCamera& operator=(const FrameCamera&) = delete;
+
+  /// Somebody is connected and enough frames are ready.
+  [[nodiscard]] bool ready() const;
+  /// The world's time 0, on CLOCK_MONOTONIC; frames start to flow.
+  void start(std::int64_t world_zero_ns);
+  /// All frames of the world have been sent, or the listener has gone.
+  [[nodiscard]] bool done() const { return done_; }
+  [[nodiscard]] std::uint64_t sent() const { return sent_; }
+
+ private:
+  struct Picture {
+    std::uint64_t sequence;
+    std::vector<std::uint8_t> rgb;
+  };
+  FrameCamera(Settings settings, const World& world, const Laparoscope& laparoscope, int fd);
+  void render(const std::stop_token& stop);
+  void serve(const std::stop_token& stop);
+  bool send(int client, const Picture& picture, const std::stop_token& stop) const;
+
+  Settings settings_;
+  const World& world_;
+  const Laparoscope& laparoscope_;
+  int fd_;
+  std::uint64_t frames_;
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<Picture> queue_;
+  std::atomic<bool> connected_ = false, done_ = false;
+  std::atomic<std::int64_t> zero_ns_ = 0;
+  std::atomic<std::uint64_t> sent_ = 0;
+  std::jthread renderer_, server_;
+};
+
+}  // namespace birdseye::hw_sim

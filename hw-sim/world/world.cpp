@@ -1,0 +1,206 @@
+#include "hw-sim/world/world.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "calibration/base/units.hpp"
+#include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/phantom/implants.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kStations = 24;
+constexpr double kDwellS = 0.3, kMoveS = 0.14;            // at the board
+constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
+constexpr double kCarryS = 2;                             // of the scope from the board to the patient
+constexpr double kLookS = 7;
+constexpr double kRangeMm = 700;  // of the transmitter
+
+double ease(double u) {
+  u = std::clamp(u, 0.0, 1.0);
+  return u * u * (3 - 2 * u);
+}
+
+Vector3d rotation_vector(const Vector3d& axis_deg) {
+  return axis_deg * kRadPerDeg;
+}
+
+/// A camera at eye that looks at target, with the image's down nearest to `down`; rotated by roll about its axis.
+template <typename Frame>
+Transform<Frame, Camera> look_at(const Vector3d& eye, const Vector3d& target, const Vector3d& down, double roll_rad) {
+  const Vector3d z = (target - eye).normalized();
+  const Vector3d x = down.cross(z).normalized();
+  Eigen::Matrix3d rotation;
+  rotation << x, z.cross(x), z;
+  return Transform<Frame, Camera>(Eigen::Matrix3d(rotation * rotation_exp(Vector3d(0, 0, roll_rad))), eye);
+}
+
+/// Between two poses: along a line, and about one axis.
+template <typename To, typename From>
+Transform<To, From> between(const Transform<To, From>& a, const Transform<To, From>& b, double u) {
+  const Vector3d turn = rotation_log(a.rotation().transpose() * b.rotation());
+  return Transform<To, From>(Eigen::Matrix3d(a.rotation() * rotation_exp(u * turn)),
+                             Vector3d(a.translation() + u * (b.translation() - a.translation())));
+}
+
+}  // namespace
+
+Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed) {
+  World world;
+  world.truth_ = truth;
+  // The bird sits on the scope's handle, its axes askew, 280 mm behind the lens.
+  world.camera_from_sensor_ =
+      Transform<Camera, Sensor>(rotation_exp(rotation_vector({14, -9, 6})) *
+                                    Eigen::Matrix3d(Eigen::AngleAxisd(-0.5 * std::numbers::pi, Vector3d::UnitY())),
+                                Vector3d(6, -14, -280));
+  world.tip_in_pointer_mm_ = {158, -6, 11};
+
+  // The transmitter stands on the patient's left: its x towards the patient's right, its z down to the table.
+  Eigen::Matrix3d axes;
+  axes << -1, 0, 0, 0, 0, 1, 0, 1, 0;
+  const Eigen::Matrix3d rotation = rotation_exp(rotation_vector({7, -11, 16})) * axes;
+  const Vector3d transmitter = truth.liver_centre_mm + Vector3d(330, -110, -150);
+  world.tracker_from_patient_ = Transform<Tracker, Patient>(rotation, Vector3d(-(rotation * transmitter)));
+  world.tracker_from_marker_ =
+      Transform<Tracker, Marker>(rotation_exp(rotation_vector({5, 4, 35})), Vector3d(330, -150, 140));
+
+  // What the scope looks at: the point of the liver's face that the line from the tumour towards the port goes through.
+  const Vector3d outward = towards_scope();
+  double nearest = std::numeric_limits<double>::max();
+  world.look_at_in_patient_mm_ = truth.tumour_centre_mm;
+  for (const Eigen::Vector3f& vertex : liver.vertices) {
+    const Vector3d from_tumour = vertex.cast<double>() - truth.tumour_centre_mm;
+    const double aside = (from_tumour - from_tumour.dot(outward) * outward).norm();
+    if (from_tumour.dot(outward) > 0 && aside < nearest) {
+      nearest = aside;
+      world.look_at_in_patient_mm_ = vertex.cast<double>();
+    }
+  }
+  world.plan_stations(lens, seed);
+
+  const Vector3d park = world.tracker_from_patient_ * (truth.liver_centre_mm + Vector3d(170, -190, -40));
+  world.tip_stops_in_tracker_mm_.push_back(park);
+  for (const Vector3d& fiducial : truth.fiducials_mm) {
+    world.tip_stops_in_tracker_mm_.push_back(world.tracker_from_patient_ * fiducial);
+  }
+  world.tip_stops_in_tracker_mm_.push_back(park);
+
+  const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
+  world.touch_s_ = kStations * (kDwellS + kMoveS);
+  world.look_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.stages_ = {
+      {"calibrate", 0}, {"touch", world.touch_s_}, {"look", world.look_s_}, {"end", world.look_s_ + kLookS}};
+  if (const auto in_range = world.check_range(); !in_range) return in_range.error();
+  return world;
+}
+
+void World::plan_stations(const CameraModel& lens, std::uint64_t seed) {
+  std::uint64_t draw = 0;
+  const auto uniform = [&](double low, double high) { return low + (high - low) * hashed_uniform(seed + 41, draw++); };
+  const double width = (board_.columns - 1) * board_.square_mm;
+  const double height = (board_.rows - 1) * board_.square_mm;
+  while (stations_.size() < kStations) {
+    // Tilts spread round the clock and rolls to both sides: rotations about many axes are what hand-eye needs.
+    const double azimuth = 2 * std::numbers::pi * uniform(0, 1);
+    const double tilt = uniform(12, 32) * kRadPerDeg;
+    const double distance = uniform(74, 112);
+    const double roll = uniform(-65, 65) * kRadPerDeg;
+    const Vector3d target(0.5 * width + uniform(-14, 14), 0.5 * height + uniform(-10, 10), 0);
+    const Vector3d eye = target - distance * Vector3d(std::sin(tilt) * std::cos(azimuth),
+                                                      std::sin(tilt) * std::sin(azimuth), std::cos(tilt));
+    const Transform<Marker, Camera> pose = look_at<Marker>(eye, target, Vector3d(0, 1, 0), roll);
+    // All inner corners, and the squares round them, must lie in the round field.
+    bool whole = true;
+    const double s = board_.square_mm;
+    for (const double x : {-s, width + s}) {
+      for (const double y : {-s, height + s}) {
+        const auto seen = project(lens, pose.inverse() * Vector3d(x, y, 0));
+        const Eigen::Vector2d centre(lens.cx_px, lens.cy_px);
+        whole = whole && seen && (*seen - centre).norm() < 0.49 * lens.width_px && seen->x() > 6 && seen->y() > 6 &&
+                seen->x() < lens.width_px - 7 && seen->y() < lens.height_px - 7;
+      }
+    }
+    if (whole) stations_.push_back(tracker_from_marker_ * pose);
+    if (draw > 100'000) break;
+  }
+}
+
+Result<void> World::check_range() const {
+  for (double t = 0; t < ends_s(); t += 0.05) {
+    for (const Vector3d& p : {tracker_from_sensor(t).translation(), tracker_from_pointer(t).translation()}) {
+      if (p.x() < 20 || p.norm() > kRangeMm) {
+        return Error{Errc::bad_value,
+                     fmt::format("at {:.1f} s a bird would be at ({:.0f}, {:.0f}, {:.0f}) mm, out of the tracker's "
+                                 "range; use a CT of a smaller region",
+                                 t, p.x(), p.y(), p.z())};
+      }
+    }
+  }
+  if (stations_.size() < kStations) {
+    return Error{Errc::bad_value, "the board does not fit into the picture; use --size 768x576"};
+  }
+  return {};
+}
+
+Transform<Tracker, Camera> World::sweep(double since_s) const {
+  constexpr double kPortMm = 205, kTipFromFaceMm = 108;
+  const double phase = 2 * std::numbers::pi * since_s / kLookS;
+  const Vector3d out = towards_scope();
+  const Vector3d port = look_at_in_patient_mm_ + kPortMm * out;
+  const Vector3d right = out.cross(Vector3d::UnitZ()).normalized();
+  const Vector3d up = right.cross(out);
+  const Vector3d direction = rotation_exp(up * (11 * kRadPerDeg * std::sin(phase))) *
+                             (rotation_exp(right * (8 * kRadPerDeg * std::sin(2 * phase))) * Vector3d(-out));
+  const double insertion = kPortMm - kTipFromFaceMm + 12 * std::sin(phase + 1);
+  const Vector3d eye = port + insertion * direction;
+  const double roll = 14 * kRadPerDeg * std::sin(phase + 0.5);
+  return tracker_from_patient_ * look_at<Patient>(eye, eye + direction, Vector3d(0, 0, -1), roll);
+}
+
+Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
+  if (world_s >= look_s_) return sweep(std::min(world_s - look_s_, kLookS));
+  if (world_s >= touch_s_) return between(stations_.back(), sweep(0), ease((world_s - touch_s_) / kCarryS));
+  const double beat = std::max(0.0, world_s) / (kDwellS + kMoveS);
+  const auto station = std::min(static_cast<std::size_t>(beat), stations_.size() - 1);
+  const double into_s = (beat - static_cast<double>(station)) * (kDwellS + kMoveS);
+  // The move to the next station ends the beat; the last one just stays.
+  const std::size_t next = std::min(station + 1, stations_.size() - 1);
+  return between(stations_[station], stations_[next], ease((into_s - kDwellS) / kMoveS));
+}
+
+Transform<Tracker, Sensor> World::tracker_from_sensor(double world_s) const {
+  return tracker_from_camera(world_s) * camera_from_sensor_;
+}
+
+Transform<Tracker, Pointer> World::tracker_from_pointer(double world_s) const {
+  const double beat = std::max(0.0, world_s - touch_s_) / (kTouchDwellS + kTouchMoveS);
+  const std::size_t last = tip_stops_in_tracker_mm_.size() - 1;
+  const auto stop = std::min(static_cast<std::size_t>(beat), last);
+  const double into_s = (beat - static_cast<double>(stop)) * (kTouchDwellS + kTouchMoveS);
+  const double u = ease((into_s - kTouchDwellS) / kTouchMoveS);
+  const std::size_t next = std::min(stop + 1, last);
+  const Vector3d tip =
+      tip_stops_in_tracker_mm_[stop] + u * (tip_stops_in_tracker_mm_[next] - tip_stops_in_tracker_mm_[stop]);
+  // The hand holds the pointer from in front of the patient, a little differently at each place.
+  const auto hold = [](std::size_t i) {
+    const auto a = static_cast<double>(i);
+    return Vector3d(12 * std::sin(1.7 * a), 14 * std::cos(2.3 * a), 20 * std::sin(0.9 * a + 1));
+  };
+  const Vector3d lean = hold(stop) + u * (hold(next) - hold(stop));
+  // The pointer's x runs down its shaft; down is the tracker's z.
+  Eigen::Matrix3d shaft_down;
+  shaft_down << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+  const Eigen::Matrix3d rotation = rotation_exp(rotation_vector(lean)) * shaft_down;
+  return Transform<Tracker, Pointer>(rotation, Vector3d(tip - rotation * tip_in_pointer_mm_));
+}
+
+}  // namespace birdseye::hw_sim

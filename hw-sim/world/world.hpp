@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/phantom/phantom.hpp"
+
+namespace birdseye::hw_sim {
+
+struct Stage {
+  std::string name;  ///< calibrate, touch, look or end
+  double begins_s;
+};
+
+/// The scripted operation: where everything truly is at any world time. First the scope is held still over a board at
+/// one station after another, then the pointer rests at each fiducial in turn, then the scope, turning about its port
+/// in the abdominal wall, sweeps over the liver.
+class World {
+ public:
+  /// liver: its surface in the patient frame, which the scope looks at. Refused where the script would take a bird out
+  /// of the tracker's range.
+  static Result<World> create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens,
+                              std::uint64_t seed);
+
+  [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
+  [[nodiscard]] double ends_s() const { return stages_.back().begins_s; }
+  [[nodiscard]] bool at_bench(double world_s) const { return world_s < touch_s_; }
+
+  [[nodiscard]] Transform<Tracker, Camera> tracker_from_camera(double world_s) const;
+  [[nodiscard]] Transform<Tracker, Sensor> tracker_from_sensor(double world_s) const;
+  [[nodiscard]] Transform<Tracker, Pointer> tracker_from_pointer(double world_s) const;
+
+  [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
+  [[nodiscard]] const Transform<Tracker, Patient>& tracker_from_patient() const { return tracker_from_patient_; }
+  [[nodiscard]] const Transform<Tracker, Marker>& tracker_from_marker() const { return tracker_from_marker_; }
+  [[nodiscard]] const Eigen::Vector3d& tip_in_pointer_mm() const { return tip_in_pointer_mm_; }
+  [[nodiscard]] const Chessboard& board() const { return board_; }
+  [[nodiscard]] const PhantomTruth& truth() const { return truth_; }
+
+ private:
+  World() = default;
+  void plan_stations(const CameraModel& lens, std::uint64_t seed);
+  [[nodiscard]] Result<void> check_range() const;
+  [[nodiscard]] Transform<Tracker, Camera> sweep(double since_s) const;
+
+  PhantomTruth truth_;
+  Chessboard board_;
+  Transform<Camera, Sensor> camera_from_sensor_;
+  Transform<Tracker, Patient> tracker_from_patient_;
+  Transform<Tracker, Marker> tracker_from_marker_;
+  Eigen::Vector3d tip_in_pointer_mm_;
+  Eigen::Vector3d look_at_in_patient_mm_;  ///< on the liver's face, over the tumour
+  std::vector<Transform<Tracker, Camera>> stations_;
+  std::vector<Eigen::Vector3d> tip_stops_in_tracker_mm_;  ///< park, each fiducial, park
+  std::vector<Stage> stages_;
+  double touch_s_ = 0, look_s_ = 0;
+};
+
+}  // namespace birdseye::hw_sim
