@@ -273,7 +273,10 @@ class EmbreeLaparoscope final : public Laparoscope {
     constexpr float kReferenceMm = 100;
     const float fall = (kReferenceMm / hit.distance) * (kReferenceMm / hit.distance);
     const float facing = std::max(0.0F, -normal.dot(direction));
-    const float highlight = surface.gloss * std::pow(facing, 90.0F);
+    const float facing2 = facing * facing;
+    const float facing8 = facing2 * facing2 * facing2 * facing2;
+    const float facing32 = facing8 * facing8 * facing8 * facing8;
+    const float highlight = surface.gloss * facing32 * facing32 * facing32;  // a Phong exponent of 96
     return (surface.albedo * facing + Vector3f::Constant(highlight)) * fall;
   }
 
