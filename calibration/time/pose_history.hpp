@@ -1,0 +1,60 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "calibration/geometry/transform.hpp"
+#include "calibration/time/clock.hpp"
+
+namespace birdseye {
+
+enum class PoseKind {
+  exact,         ///< a sample was taken at this very time
+  interpolated,  ///< between samples before and after
+  predicted,     ///< past the newest sample, within the limit
+  refused,       ///< no pose: the reason says why
+};
+const char* to_string(PoseKind kind);
+
+/// The pose at a time that was asked for, and how it was come by.
+struct PoseAnswer {
+  PoseKind kind = PoseKind::refused;
+  std::optional<Transform<Tracker, Sensor>> tracker_from_sensor;  ///< empty exactly when refused
+  double position_sigma_mm = 0;  ///< per axis, from the scatter of the samples about the fit; 0 without smoothing
+  Duration age;                  ///< from the newest sample to the time asked for; negative where samples are newer
+  std::string reason;            ///< why refused or predicted, in words
+};
+
+/// The recent poses of one bird, asked for at a time. Bounded; samples come in order of time.
+class PoseHistory {
+ public:
+  struct Settings {
+    std::size_t capacity = 1024;
+    Duration max_gap = Duration::from_ms(60);          ///< wider holes are not bridged
+    Duration max_prediction = Duration::from_ms(100);  ///< further ahead is refused
+    /// Half the width of a window of samples to which a line is fitted (position along it, rotation about one axis), to
+    /// average the tracker's noise. 0 interpolates between the two neighbours.
+    Duration smoothing{0};
+  };
+
+  PoseHistory() = default;
+  explicit PoseHistory(const Settings& settings) : settings_(settings) {}
+
+  /// False, and nothing kept, where acquired is not after the newest sample's.
+  bool push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  [[nodiscard]] PoseAnswer at(DeviceTime time) const;
+  [[nodiscard]] std::optional<DeviceTime> newest() const;
+
+ private:
+  struct Sample {
+    DeviceTime acquired;
+    Transform<Tracker, Sensor> pose;
+  };
+  void fit(DeviceTime time, PoseAnswer& answer) const;
+
+  Settings settings_;
+  std::deque<Sample> samples_;
+};
+
+}  // namespace birdseye

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "drivers/minibird/protocol.hpp"
+
+namespace birdseye::drivers::minibird {
+
+/// One whole record as it came off the line.
+struct Record {
+  std::vector<std::int16_t> words;
+  std::uint8_t button = 0;     ///< 0 where the records carry none
+  std::uint8_t address = 0;    ///< the unit that sent it; 0 where the records carry none
+  std::size_t end_offset = 0;  ///< bytes of the pushed chunk after this record's last byte
+};
+
+/// The receiver: finds records in a stream of bytes by the phase bit, which only the first byte of a record has set.
+/// What it cannot know, for the wire does not say: a corrupted byte with that bit clear. decode_pose() checks the
+/// sense.
+class RecordParser {
+ public:
+  /// The formats of the units, in the order of their addresses; one unit without group mode: one format. A record's
+  /// length follows from the format of the unit whose turn it is.
+  RecordParser(std::vector<RecordFormat> formats, bool button_mode, bool group_mode);
+
+  std::vector<Record> push(std::span<const std::uint8_t> bytes);
+  /// Drops a partial record, as after a line error whose place is not known.
+  void reset();
+
+  [[nodiscard]] std::uint64_t phase_errors() const { return phase_errors_; }
+  [[nodiscard]] std::uint64_t discarded_bytes() const { return discarded_bytes_; }
+
+ private:
+  [[nodiscard]] std::size_t record_bytes() const;
+  [[nodiscard]] Record take();
+
+  std::vector<RecordFormat> formats_;
+  bool button_mode_, group_mode_;
+  std::size_t turn_ = 0;
+  std::vector<std::uint8_t> partial_;
+  bool expect_start_ = false;  ///< a record has just ended: the next byte must begin one
+  std::uint64_t phase_errors_ = 0, discarded_bytes_ = 0;
+};
+
+}  // namespace birdseye::drivers::minibird
