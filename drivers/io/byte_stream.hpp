@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/clock.hpp"
+
+namespace birdseye::drivers {
+
+/// A line to an instrument that carries bytes both ways, and perhaps the modem line RTS.
+class ByteStream {
+ public:
+  virtual ~ByteStream() = default;
+
+  /// At least one byte, as soon as there is one; 0 at the deadline. Errc::disconnected when the line is gone.
+  virtual Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) = 0;
+  /// All bytes, or Errc::timeout.
+  virtual Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime deadline) = 0;
+  virtual void discard_input() = 0;
+  /// False where the line has no RTS (a pseudo-terminal, a three-wire cable's adapter).
+  virtual bool set_rts(bool asserted) = 0;
+  /// For messages: the device's path.
+  [[nodiscard]] virtual const std::string& name() const = 0;
+};
+
+}  // namespace birdseye::drivers

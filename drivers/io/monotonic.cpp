@@ -1,0 +1,26 @@
+#include "drivers/io/monotonic.hpp"
+
+#include <algorithm>
+#include <ctime>
+
+namespace birdseye::drivers {
+
+DeviceTime now() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return {time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec};
+}
+
+int poll_ms(DeviceTime deadline) {
+  const std::int64_t left_ns = (deadline - now()).ns;
+  return static_cast<int>(std::clamp<std::int64_t>((left_ns + 999'999) / 1'000'000, 0, 60'000));
+}
+
+void sleep_for(Duration span) {
+  timespec time{};
+  time.tv_sec = span.ns / 1'000'000'000;
+  time.tv_nsec = span.ns % 1'000'000'000;
+  nanosleep(&time, nullptr);
+}
+
+}  // namespace birdseye::drivers

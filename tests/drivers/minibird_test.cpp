@@ -1,0 +1,170 @@
+#include "drivers/minibird/minibird.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "calibration/geometry/transform.hpp"
+#include "drivers/io/monotonic.hpp"
+#include "hw-sim/minibird/unit.hpp"
+
+namespace birdseye::drivers::minibird {
+namespace {
+
+/// A line with the simulator's electronics at its other end. The stream moves on when it is read, so no clock matters.
+class UnitLine final : public ByteStream {
+ public:
+  explicit UnitLine(int birds)
+      : unit_([&] {
+          hw_sim::UnitSettings settings;
+          settings.birds = birds;
+          return settings;
+        }()) {
+    poses.resize(static_cast<std::size_t>(birds));
+  }
+
+  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime /*deadline*/) override {
+    if (unplugged) return Error{Errc::disconnected, "test: unplugged"};
+    if (pending_.empty()) {
+      for (const std::uint8_t byte : unit_.measure(poses)) pending_.push_back(byte);
+      if (lose_bytes > 0 && !pending_.empty()) {
+        pending_.erase(pending_.begin() + 5);
+        --lose_bytes;
+      }
+    }
+    std::size_t n = 0;
+    while (n < into.size() && !pending_.empty()) {
+      into[n++] = pending_.front();
+      pending_.pop_front();
+    }
+    return n;
+  }
+  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime /*deadline*/) override {
+    if (silent) return {};
+    for (const std::uint8_t byte : bytes) {
+      for (const std::uint8_t reply : unit_.receive(byte)) pending_.push_back(reply);
+    }
+    return {};
+  }
+  void discard_input() override { pending_.clear(); }
+  bool set_rts(bool asserted) override {
+    if (asserted) unit_.reset();
+    return has_rts;
+  }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+
+  std::vector<hw_sim::BirdPose> poses;
+  bool silent = false, unplugged = false, has_rts = true;
+  int lose_bytes = 0;
+
+ private:
+  hw_sim::Unit unit_;
+  std::string name_ = "/dev/test";
+  std::deque<std::uint8_t> pending_;
+};
+
+MiniBirdSettings quick(int birds) {
+  MiniBirdSettings settings;
+  settings.birds = birds;
+  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.run_wait = {};
+  settings.reply_timeout = settings.answer_within = Duration::from_ms(20);
+  return settings;
+}
+
+hw_sim::BirdPose pose(double x, double y, double z, double turn) {
+  return {rotation_exp(Eigen::Vector3d(0.3, -0.5, turn)), Eigen::Vector3d(x, y, z)};
+}
+
+TEST(MiniBird, StreamsTheTruePosesInEveryFormat) {
+  for (const char* name : {"position_angles", "position_matrix", "position_quaternion"}) {
+    auto line = std::make_unique<UnitLine>(2);
+    line->poses = {pose(300, -50, 120, 0.4), pose(210, 90, -60, -1.1)};
+    const auto truth = line->poses;
+    MiniBirdSettings settings = quick(2);
+    settings.format = *record_format_of(name);
+    const auto bird = MiniBird::start(std::move(line), settings);
+    ASSERT_TRUE(bird) << bird.error().what;
+    EXPECT_EQ((*bird)->info().model, "6DFOB");
+    EXPECT_EQ((*bird)->info().latched_error, "");
+    for (int cycle = 0; cycle < 5; ++cycle) {
+      const auto read = (*bird)->read(now() + Duration::from_ms(100));
+      ASSERT_TRUE(read);
+      ASSERT_EQ(read->size(), 1U);
+      for (std::size_t i = 0; i < 2; ++i) {
+        ASSERT_TRUE(read->front().birds[i]) << name;
+        // Four counts of position; of a matrix word, four counts are 0.007 degrees, of an angle 0.09.
+        EXPECT_LT((*read->front().birds[i]->position_mm - truth[i].position_mm).cwiseAbs().maxCoeff(), 0.12);
+        EXPECT_LT(rotation_angle_between(*read->front().birds[i]->rotation, truth[i].rotation), 2e-3) << name;
+      }
+    }
+  }
+}
+
+TEST(MiniBird, WorksOnALineWithoutReset) {
+  auto line = std::make_unique<UnitLine>(1);
+  line->has_rts = false;
+  line->poses = {pose(300, 0, 0, 0)};
+  const auto bird = MiniBird::start(std::move(line), quick(1));
+  ASSERT_TRUE(bird) << bird.error().what;
+  EXPECT_FALSE((*bird)->info().has_reset_line);
+  EXPECT_EQ((*bird)->read(now() + Duration::from_ms(100))->size(), 1U);
+}
+
+TEST(MiniBird, ASilentTrackerIsAnErrorThatNamesPortAndRemedy) {
+  auto line = std::make_unique<UnitLine>(1);
+  line->silent = true;
+  const auto bird = MiniBird::start(std::move(line), quick(1));
+  ASSERT_FALSE(bird);
+  EXPECT_EQ(bird.error().code, Errc::timeout);
+  EXPECT_NE(bird.error().what.find("/dev/test"), std::string::npos);
+  EXPECT_NE(bird.error().what.find("power, cable"), std::string::npos);
+}
+
+TEST(MiniBird, AMissingBirdIsNamed) {
+  const auto bird = MiniBird::start(std::make_unique<UnitLine>(2), quick(3));
+  ASSERT_FALSE(bird);
+  EXPECT_NE(bird.error().what.find("bird 3 of 3"), std::string::npos) << bird.error().what;
+}
+
+TEST(MiniBird, ALostByteCostsOneRecordNotTheStream) {
+  auto owned = std::make_unique<UnitLine>(2);
+  UnitLine& line = *owned;
+  line.poses = {pose(300, 0, 0, 0), pose(250, 0, 0, 0)};
+  const auto bird = MiniBird::start(std::move(owned), quick(2));
+  ASSERT_TRUE(bird) << bird.error().what;
+  line.lose_bytes = 1;
+  int whole = 0, cycles = 0;
+  while (cycles < 20) {
+    const auto read = (*bird)->read(now() + Duration::from_ms(100));
+    ASSERT_TRUE(read);
+    for (const Measurement& m : *read) {
+      ++cycles;
+      if (m.birds[0] && m.birds[1]) ++whole;
+    }
+  }
+  EXPECT_EQ((*bird)->counters().phase_errors, 1U);
+  EXPECT_GE(whole, 18);
+}
+
+TEST(MiniBird, ASaturatedSensorGivesNoPose) {
+  auto line = std::make_unique<UnitLine>(1);
+  line->poses = {{Eigen::Matrix3d::Zero(), Eigen::Vector3d(100, 0, 0)}};
+  const auto bird = MiniBird::start(std::move(line), quick(1));
+  ASSERT_TRUE(bird) << bird.error().what;
+  const auto read = (*bird)->read(now() + Duration::from_ms(100));
+  ASSERT_TRUE(read);
+  EXPECT_FALSE(read->front().birds[0]);
+  EXPECT_EQ((*bird)->counters().senseless_records, 1U);
+}
+
+TEST(MiniBird, ALostLineIsAnError) {
+  auto owned = std::make_unique<UnitLine>(1);
+  UnitLine& line = *owned;
+  const auto bird = MiniBird::start(std::move(owned), quick(1));
+  ASSERT_TRUE(bird) << bird.error().what;
+  line.unplugged = true;
+  EXPECT_EQ((*bird)->read(now() + Duration::from_ms(100)).error().code, Errc::disconnected);
+}
+
+}  // namespace
+}  // namespace birdseye::drivers::minibird
