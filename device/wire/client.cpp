@@ -1,0 +1,98 @@
+#include "device/wire/client.hpp"
+
+#include <fmt/format.h>
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <thread>
+
+namespace birdseye::wire {
+
+namespace {
+
+int remaining_ms(Client::Clock::time_point deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Client::Clock::now()).count();
+  return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
+}
+
+/// A connected socket, or -1.
+int try_connect(const addrinfo& address, Client::Clock::time_point deadline) {
+  const int fd = ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0) return -1;
+  if (::connect(fd, address.ai_addr, address.ai_addrlen) == 0) return fd;
+  pollfd entry{fd, POLLOUT, 0};
+  int failed = 0;
+  socklen_t size = sizeof failed;
+  if (errno == EINPROGRESS && ::poll(&entry, 1, remaining_ms(deadline)) > 0 &&
+      ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &failed, &size) == 0 && failed == 0) {
+    return fd;
+  }
+  ::close(fd);
+  return -1;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Client>> Client::connect(const std::string& host, int port, Clock::time_point deadline) {
+  const std::string name = fmt::format("{}:{}", host, port);
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found) != 0) {
+    return Error{Errc::not_found, fmt::format("{}: no such host", name)};
+  }
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owner(found, ::freeaddrinfo);
+  for (;;) {
+    if (const int fd = try_connect(*found, deadline); fd >= 0) return std::unique_ptr<Client>(new Client(fd, name));
+    if (Clock::now() >= deadline) {
+      return Error{Errc::not_found, fmt::format("{}: no appliance answers; is birdseyed running there?", name)};
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+Client::~Client() {
+  ::close(fd_);
+}
+
+Result<bool> Client::fill(std::size_t size, Clock::time_point deadline) {
+  buffer_.resize(std::max(buffer_.size(), size));
+  while (have_ < size) {
+    pollfd entry{fd_, POLLIN, 0};
+    const int ready = ::poll(&entry, 1, remaining_ms(deadline));
+    if (ready == 0 && Clock::now() >= deadline) return false;
+    if (ready <= 0) continue;
+    const ssize_t got = ::recv(fd_, buffer_.data() + have_, size - have_, 0);
+    if (got > 0) {
+      have_ += static_cast<std::size_t>(got);
+    } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
+      return Error{Errc::disconnected, fmt::format("{}: the appliance has gone", name_)};
+    }
+  }
+  return true;
+}
+
+Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
+  for (;;) {
+    auto whole = fill(kHeaderBytes, deadline);
+    if (!whole) return whole.error();
+    if (!*whole) return std::optional<Event>();
+    const auto body = body_bytes(std::span(buffer_).first(kHeaderBytes));
+    if (!body) return Error{body.error().code, fmt::format("{}: {}", name_, body.error().what)};
+    const std::size_t size = kHeaderBytes + *body;
+    whole = fill(size, deadline);
+    if (!whole) return whole.error();
+    if (!*whole) return std::optional<Event>();
+    have_ = 0;
+    auto event = unpacker_.push(std::span(buffer_).first(size));
+    if (!event) return Error{event.error().code, fmt::format("{}: {}", name_, event.error().what)};
+    if (*event) return event;
+  }
+}
+
+}  // namespace birdseye::wire

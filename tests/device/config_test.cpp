@@ -1,0 +1,74 @@
+#include "device/birdseyed/config.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+
+namespace birdseye::device {
+namespace {
+
+constexpr const char* kSound = R"([tracker]
+device = "/dev/ttyUSB0"
+birds = 2
+names = ["scope", "pointer"]
+rate_hz = 100
+delay_ms = 7.5
+[camera]
+source = "v4l2:/dev/video0"
+[wire]
+port = 18945
+[pose]
+smoothing_ms = 40
+)";
+
+Result<Config> read(const std::string& text) {
+  const auto path =
+      std::filesystem::temp_directory_path() / ("birdseye-config-" + std::to_string(::getpid()) + ".toml");
+  std::ofstream(path) << text;
+  auto config = read_config(path);
+  std::filesystem::remove(path);
+  return config;
+}
+
+std::string replaced(const std::string& from, const std::string& to) {
+  std::string text = kSound;
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
+  const auto config = read(kSound);
+  ASSERT_TRUE(config) << config.error().what;
+  EXPECT_EQ(config->tracker_device, "/dev/ttyUSB0");
+  EXPECT_EQ(config->tracker.birds, 2);
+  EXPECT_EQ(config->tracker.delay.ns, 7'500'000);
+  EXPECT_EQ(config->port, 18945);
+  EXPECT_EQ(config->bind, "127.0.0.1");
+  EXPECT_EQ(config->pose.smoothing.ns, 40'000'000);
+  EXPECT_EQ(config->camera.width_px, 768);
+}
+
+TEST(Config, EveryMistakeIsNamed) {
+  const std::pair<std::string, std::string> cases[] = {
+      {replaced("rate_hz", "rate_herz"), "rate_herz: unknown key"},
+      {replaced("[pose]", "[poses]"), "poses: unknown section"},
+      {replaced("birds = 2", "birds = \"two\""), "[tracker] birds: needs a whole number"},
+      {replaced("rate_hz = 100", "rate_hz = 500"), "[tracker] rate_hz: 500 is not within"},
+      {replaced("port = 18945", "port = 99999"), "[wire] port"},
+      {replaced("device = \"/dev/ttyUSB0\"", ""), "[tracker] device: is missing"},
+      {replaced("birds = 2", "birds = 3"), "2 names for 3 birds"},
+      {replaced("birds = 2", "birds = 2\nbaud = 9600"), "does not fit into 9600 baud"},
+      {replaced("birds = 2", "birds = 2\nrecord = \"matrix\""), "record"},
+      {replaced("[wire]", "[wire"), "is not TOML"},
+  };
+  for (const auto& [text, expected] : cases) {
+    const auto config = read(text);
+    ASSERT_FALSE(config) << expected;
+    EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
+    EXPECT_EQ(config.error().what.find('\n'), std::string::npos) << config.error().what;
+  }
+  EXPECT_EQ(read_config("/nonexistent.toml").error().code, Errc::not_found);
+}
+
+}  // namespace
+}  // namespace birdseye::device
