@@ -18,4 +18,8 @@ struct CommandStatus {
   void refuse(const Error& error);
 };
 
+// One file per command: each adds its subcommand, whose callback sets status.
+void add_register(CLI::App& app, CommandStatus& status);
+void add_volume(CLI::App& app, CommandStatus& status);
+
 }  // namespace birdseye::host

@@ -5,7 +5,8 @@ int main(int argc, char** argv) {
   CLI::App app{"birdseye: a registered, deformable CT over live laparoscopic video"};
   app.require_subcommand(1);
   CommandStatus status;
-  // One file per command: declare add_<command> in commands.hpp and call it here.
+  add_register(app, status);
+  add_volume(app, status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

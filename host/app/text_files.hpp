@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+
+namespace birdseye::host {
+
+/// Points, three numbers a line, mm; lines that are blank or begin with # are passed over. A line of anything else is
+/// an error that names file and line.
+Result<std::vector<Eigen::Vector3d>> read_points(const std::filesystem::path& path);
+
+/// A rigid transform as a 4x4 matrix, four numbers a line, mm. Refuses a missing row, a last row that is not 0 0 0 1
+/// and an upper left block that is no rotation (to 1e-3).
+Result<Eigen::Matrix4d> read_pose(const std::filesystem::path& path);
+Result<void> write_pose(const std::filesystem::path& path, const Eigen::Matrix4d& matrix);
+
+/// OpenCV YAML: image_width, image_height, camera_matrix (3x3), distortion_coefficients (4 or 5: k1 k2 p1 p2 [k3]).
+Result<CameraModel> read_camera(const std::filesystem::path& path);
+Result<void> write_camera(const std::filesystem::path& path, const CameraModel& camera);
+
+}  // namespace birdseye::host

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+
+#include "calibration/base/result.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// Reads a CT: a folder of one DICOM series, one DICOM file (a volume of one slice), or a NIfTI, NRRD, MHA or MHD file.
+/// Refuses, with the reason and the remedy in one line that names the path: what is missing, unreadable or no image;
+/// folders of several series; slices that are doubled, missing, unevenly spaced or sheared by a tilted gantry; voxels
+/// that are not finite or beyond 16 bits; images that are not three-dimensional.
+Result<Volume> import_volume(const std::filesystem::path& path);
+
+}  // namespace birdseye::host

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "calibration/base/result.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// Reads a label volume of any format that import_volume reads, on the same grid as ct, or says that it is not.
+Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct);
+
+/// ct where labels has one of values or a neighbour (of 26) that has, -1024 HU elsewhere: the neighbours keep the soft
+/// edge that partial volume gives an organ.
+Volume keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values);
+
+/// The mean position of the voxels with this label, patient LPS mm; Errc::not_found where there are none.
+Result<Eigen::Vector3d> label_centroid_mm(const Volume& labels, int value);
+
+}  // namespace birdseye::host

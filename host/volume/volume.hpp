@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace birdseye::host {
+
+/// A CT: Hounsfield units on a regular grid. x fastest; voxel centres at integers; patient frame is DICOM LPS, mm.
+struct Volume {
+  std::array<int, 3> size{};
+  std::vector<std::int16_t> hu;
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
+  Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
+
+  [[nodiscard]] std::size_t index(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(size[0]) +
+           static_cast<std::size_t>(i);
+  }
+  [[nodiscard]] std::int16_t at(int i, int j, int k) const { return hu[index(i, j, k)]; }
+};
+
+/// Which way each voxel axis mostly points, as three letters of R/L, A/P, I/S: "LPS" for DICOM's own axes.
+std::string orientation_letters(const Eigen::Affine3d& patient_from_voxel);
+
+}  // namespace birdseye::host

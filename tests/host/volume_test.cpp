@@ -1,0 +1,314 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <numeric>
+
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+#include "host/volume/marker_finder.hpp"
+#include "hw-sim/phantom/dicom_series.hpp"
+#include "hw-sim/phantom/grid.hpp"
+#include "tests/support/data.hpp"
+
+namespace birdseye::host {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own for one test, removed after it.
+class Scratch {
+ public:
+  Scratch() : path_(fs::temp_directory_path() / ("birdseye-volume-" + std::to_string(::getpid()))) {
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~Scratch() { fs::remove_all(path_); }
+  [[nodiscard]] fs::path operator/(const std::string& name) const { return path_ / name; }
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+hw_sim::Grid grid() {
+  hw_sim::Grid g;
+  g.size = {6, 5, 4};
+  g.origin_mm = {-20, 30, -100};
+  g.spacing_mm = {1.5, 1.25, 2};
+  return g;
+}
+
+std::vector<std::int16_t> values() {
+  std::vector<std::int16_t> hu(grid().voxels());
+  std::iota(hu.begin(), hu.end(), std::int16_t{-60});
+  return hu;
+}
+
+void write_mha(const fs::path& path, const char* type, const void* data, std::size_t bytes,
+               const char* matrix = "1 0 0 0 1 0 0 0 1") {
+  std::ofstream out(path, std::ios::binary);
+  out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = "
+      << matrix << "\nOffset = -20 30 -100\nElementSpacing = 1.5 1.25 2\nDimSize = 6 5 4\nElementType = " << type
+      << "\nElementDataFile = LOCAL\n";
+  out.write(static_cast<const char*>(data), static_cast<std::streamsize>(bytes));
+}
+
+void expect_the_grid(const Result<Volume>& volume) {
+  ASSERT_TRUE(volume) << volume.error().what;
+  EXPECT_EQ(volume->size, (std::array<int, 3>{6, 5, 4}));
+  EXPECT_EQ(volume->hu, values());
+  EXPECT_LT((volume->spacing_mm - Eigen::Vector3d(1.5, 1.25, 2)).norm(), 1e-5);
+  EXPECT_LT((volume->patient_from_voxel * Eigen::Vector3d(5, 4, 3) - grid().last_mm()).norm(), 1e-4);
+}
+
+TEST(Import, EveryFormatGivesTheSameVolume) {
+  const Scratch scratch;
+  const auto hu = values();
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), hu, 1));
+  expect_the_grid(import_volume(scratch / "ct"));
+  write_mha(scratch / "a.mha", "MET_SHORT", hu.data(), hu.size() * 2);
+  expect_the_grid(import_volume(scratch / "a.mha"));
+  {
+    std::ofstream out(scratch / "a.nrrd", std::ios::binary);
+    out << "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 6 5 4\nspace directions: "
+           "(1.5,0,0) "
+           "(0,1.25,0) (0,0,2)\nendian: little\nencoding: raw\nspace origin: (-20,30,-100)\n\n";
+    out.write(reinterpret_cast<const char*>(hu.data()), static_cast<std::streamsize>(hu.size() * 2));
+  }
+  expect_the_grid(import_volume(scratch / "a.nrrd"));
+}
+
+TEST(Import, SlicesAreStackedByPlaceNotByName) {
+  const Scratch scratch;
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
+  fs::rename(scratch / "ct/0001.dcm", scratch / "ct/z.dcm");
+  expect_the_grid(import_volume(scratch / "ct"));
+}
+
+void expect_refused(const fs::path& path, const std::string& why) {
+  const auto volume = import_volume(path);
+  ASSERT_FALSE(volume) << path;
+  EXPECT_NE(volume.error().what.find(path.string()), std::string::npos) << volume.error().what;
+  EXPECT_NE(volume.error().what.find(why), std::string::npos) << volume.error().what;
+  EXPECT_EQ(volume.error().what.find('\n'), std::string::npos) << volume.error().what;
+}
+
+TEST(Import, RefusesWithAReason) {
+  const Scratch scratch;
+  expect_refused(scratch / "nothing", "no such file");
+  fs::create_directory(scratch / "empty");
+  expect_refused(scratch / "empty", "is empty");
+  std::ofstream(scratch / "text.nii") << "not an image";
+  expect_refused(scratch / "text.nii", "no image");
+
+  std::vector<float> voxels(grid().voxels(), 10.0F);
+  voxels[7] = NAN;
+  write_mha(scratch / "nan.mha", "MET_FLOAT", voxels.data(), voxels.size() * 4);
+  expect_refused(scratch / "nan.mha", "not finite");
+  voxels[7] = 1e6F;
+  write_mha(scratch / "big.mha", "MET_FLOAT", voxels.data(), voxels.size() * 4);
+  expect_refused(scratch / "big.mha", "no Hounsfield unit");
+  write_mha(scratch / "cut.mha", "MET_SHORT", voxels.data(), 20);
+  expect_refused(scratch / "cut.mha", "damaged");
+  const std::vector<std::uint8_t> labels(grid().voxels(), 3);
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "cut.nii", grid(), labels));
+  fs::resize_file(scratch / "cut.nii", fs::file_size(scratch / "cut.nii") - 30);
+  expect_refused(scratch / "cut.nii", "damaged");
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "cut.nii.gz", grid(), labels));
+  fs::resize_file(scratch / "cut.nii.gz", fs::file_size(scratch / "cut.nii.gz") - 12);
+  expect_refused(scratch / "cut.nii.gz", "damaged");
+  {
+    std::ofstream out(scratch / "cut.nrrd", std::ios::binary);
+    out << "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 6 5 4\nspace directions: "
+           "(1,0,0) "
+           "(0,1,0) (0,0,1)\nendian: little\nencoding: raw\nspace origin: (0,0,0)\n\nshort";
+  }
+  expect_refused(scratch / "cut.nrrd", "damaged");
+}
+
+TEST(Import, RefusesFoldersThatAreNoStack) {
+  const Scratch scratch;
+  const auto make = [&](const char* name, std::uint64_t seed) {
+    ASSERT_TRUE(hw_sim::write_dicom_series(scratch / name, grid(), values(), seed));
+  };
+  make("a", 1);
+  make("b", 2);
+  fs::copy_file(scratch / "b/0001.dcm", scratch / "a/other.dcm");
+  expect_refused(scratch / "a", "2 series");
+  make("missing", 1);
+  fs::remove(scratch / "missing/0002.dcm");
+  expect_refused(scratch / "missing", "missing or unevenly spaced");
+  make("doubled", 1);
+  fs::copy_file(scratch / "doubled/0002.dcm", scratch / "doubled/again.dcm");
+  expect_refused(scratch / "doubled", "same place");
+}
+
+TEST(Import, TheAbdomenIsAsItsReadmeSays) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto nifti = import_volume(*data / "ct_abdomen/example_ct.nii.gz");
+  ASSERT_TRUE(nifti) << nifti.error().what;
+  EXPECT_EQ(nifti->size, (std::array<int, 3>{122, 101, 112}));
+  // The file's frame is RAS, diag(3, 3, 3) from (-177.956, 11.319, 94.302).
+  EXPECT_LT((nifti->patient_from_voxel * Eigen::Vector3d(0, 0, 0) - Eigen::Vector3d(177.956, -11.319, 94.302)).norm(),
+            2e-3);
+  EXPECT_LT((nifti->patient_from_voxel * Eigen::Vector3d(1, 1, 1) - Eigen::Vector3d(174.956, -14.319, 97.302)).norm(),
+            2e-3);
+  EXPECT_EQ(*std::min_element(nifti->hu.begin(), nifti->hu.end()), -1207);
+  EXPECT_EQ(*std::max_element(nifti->hu.begin(), nifti->hu.end()), 3382);
+  EXPECT_EQ(orientation_letters(nifti->patient_from_voxel), "RAS");
+
+  const auto dicom = import_volume(*data / "ct_abdomen/example_ct_dicom");
+  ASSERT_TRUE(dicom) << dicom.error().what;
+  EXPECT_EQ(dicom->size, (std::array<int, 3>{512, 512, 20}));
+  EXPECT_NEAR(dicom->spacing_mm.z(), 2, 1e-6);
+  EXPECT_LT((dicom->patient_from_voxel.translation() - Eigen::Vector3d(-249.512, -437.512, -804.5)).norm(), 1e-3);
+}
+
+TEST(Import, TheLiverOfTheAbdomenHasItsPublishedDensity) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto ct = import_volume(*data / "ct_abdomen/example_ct_sm.nii.gz");
+  const auto labels = import_labels(*data / "ct_abdomen/example_seg.nii.gz", *ct);
+  ASSERT_TRUE(labels) << labels.error().what;
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < ct->hu.size(); ++i) {
+    if (labels->hu[i] != 5) continue;
+    sum += ct->hu[i];
+    ++count;
+  }
+  EXPECT_EQ(count, 38634);
+  EXPECT_NEAR(sum / count, 45.3, 0.05);
+  // Orientation: the liver lies to the patient's right of the spleen, in LPS at smaller x.
+  EXPECT_LT(label_centroid_mm(*labels, 5)->x(), label_centroid_mm(*labels, 1)->x());
+  // And the kidney labelled right to the right of the one labelled left.
+  EXPECT_LT(label_centroid_mm(*labels, 2)->x(), label_centroid_mm(*labels, 3)->x());
+}
+
+TEST(Import, TheLabelsOfTheDicomFolderLieOnItsGrid) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  // The labels' own file has its axes the other way round: same places, other order of voxels.
+  const auto ct = import_volume(*data / "ct_abdomen/example_ct_dicom");
+  const auto labels = import_volume(*data / "ct_abdomen/example_seg_dicom.nii.gz");
+  ASSERT_TRUE(labels) << labels.error().what;
+  const Eigen::Affine3d ct_from_labels = ct->patient_from_voxel.inverse() * labels->patient_from_voxel;
+  double sum = 0;
+  int count = 0;
+  for (int k = 0; k < 20; ++k) {
+    for (int j = 0; j < 512; ++j) {
+      for (int i = 0; i < 512; ++i) {
+        if (labels->at(i, j, k) != 5) continue;
+        const Eigen::Vector3d v = ct_from_labels * Eigen::Vector3d(i, j, k);
+        sum += ct->at(static_cast<int>(std::lround(v.x())), static_cast<int>(std::lround(v.y())),
+                      static_cast<int>(std::lround(v.z())));
+        ++count;
+      }
+    }
+  }
+  EXPECT_NEAR(count * 0.9765625 * 0.9765625 * 2 / 1000, 699.4, 1.0);
+  EXPECT_GT(sum / count, 30);
+  EXPECT_LT(sum / count, 200);
+}
+
+TEST(Import, OdditiesDecodeOrAreRefused) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const fs::path folder = *data / "ct_dicom_oddities";
+  const auto j2k = import_volume(folder / "J2K_pixelrep_mismatch.dcm");
+  ASSERT_TRUE(j2k) << j2k.error().what;
+  EXPECT_EQ(j2k->at(0, 0, 0), -2000);
+  const std::int16_t down[] = {621, 412, 138, -193, -520, -767, -907, -966, -988, -995};
+  const std::int16_t up[] = {-377, -121, 141, 383, 633, 910, 1198, 1455, 1638, 1732};
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(j2k->at(279, 47 + i, 0), down[i]);
+    EXPECT_EQ(j2k->at(106, 328 + i, 0), up[i]);
+  }
+  const auto pelvis = import_volume(folder / "pelvis_rescale10_55332681.dcm");
+  ASSERT_TRUE(pelvis) << pelvis.error().what;
+  EXPECT_NEAR(pelvis->at(256, 20, 0), 920 * 10 - 10240, 60);
+  EXPECT_EQ(pelvis->at(256, 20, 0) % 10, 0);
+  for (const char* name : {"CT_small.dcm", "bad_sequence.dcm", "explicit_VR-UN.dcm"}) {
+    const auto slice = import_volume(folder / name);
+    ASSERT_TRUE(slice) << slice.error().what;
+    const auto [low, high] = std::minmax_element(slice->hu.begin(), slice->hu.end());
+    EXPECT_GE(*low, -1100) << name;
+    EXPECT_GT(*high, 200) << name;
+    EXPECT_LT(*high, 3100) << name;
+  }
+  expect_refused(*data / "ct_gantry_tilt", "tilted by 18.5 degrees");
+
+  const Scratch scratch;
+  const std::string unpack =
+      "cd " + scratch.path().string() + " && cmake -E tar xf " + (folder / "dupe-positions.zip").string();
+  ASSERT_EQ(std::system(unpack.c_str()), 0);
+  fs::path slices;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch.path())) {
+    if (entry.path().extension() == ".dcm") slices = entry.path().parent_path();
+  }
+  const auto doubled = import_volume(slices);
+  ASSERT_FALSE(doubled);
+  EXPECT_EQ(doubled.error().code, Errc::unsupported);
+}
+
+TEST(Markers, AreFoundToASmallPartOfAVoxel) {
+  Volume ct;
+  ct.size = {80, 70, 60};
+  ct.spacing_mm = {1.5, 1.5, 2};
+  ct.patient_from_voxel.linear() = ct.spacing_mm.asDiagonal();
+  ct.patient_from_voxel.translation() = Eigen::Vector3d(-60, -50, -55);
+  ct.hu.assign(80 * 70 * 60, 40);
+  const std::vector<Eigen::Vector3d> truth{{-20.3, -11.7, 3.1}, {15.25, 22.8, -17.6}, {31.1, -2.4, 24.9}};
+  const auto burn = [&](const Eigen::Vector3d& centre, const Eigen::Vector3d& radii, double hu) {
+    for (int k = 0; k < 60; ++k) {
+      for (int j = 0; j < 70; ++j) {
+        for (int i = 0; i < 80; ++i) {
+          int filled = 0;
+          for (int part = 0; part < 125; ++part) {
+            const Eigen::Vector3d offset((part % 5 + 0.5) / 5 - 0.5, (part / 5 % 5 + 0.5) / 5 - 0.5,
+                                         (part / 25 + 0.5) / 5 - 0.5);
+            const Eigen::Vector3d p = ct.patient_from_voxel * Eigen::Vector3d(Eigen::Vector3d(i, j, k) + offset);
+            if ((p - centre).cwiseQuotient(radii).norm() < 1) ++filled;
+          }
+          if (filled > 0) ct.hu[ct.index(i, j, k)] = static_cast<std::int16_t>(40 + filled / 125.0 * (hu - 40));
+        }
+      }
+    }
+  };
+  for (const Eigen::Vector3d& centre : truth) burn(centre, Eigen::Vector3d::Constant(4), 2500);
+  burn({0, 0, 0}, {20, 4, 4}, 2500);     // a rod: not a ball
+  burn({-40, 30, 20}, {2, 2, 2}, 2500);  // a clip: too small
+  const auto found = find_markers(ct);
+  ASSERT_EQ(found.size(), truth.size());
+  for (const Eigen::Vector3d& centre : truth) {
+    double nearest = 1e9;
+    for (const Eigen::Vector3d& f : found) nearest = std::min(nearest, (f - centre).norm());
+    EXPECT_LT(nearest, 0.1);
+  }
+}
+
+TEST(Labels, KeepTheirVoxelsAndASoftEdge) {
+  Volume ct;
+  ct.size = {5, 5, 5};
+  ct.hu.assign(125, 100);
+  Volume labels = ct;
+  std::fill(labels.hu.begin(), labels.hu.end(), std::int16_t{0});
+  labels.hu[labels.index(2, 2, 2)] = 4;
+  labels.hu[labels.index(0, 0, 0)] = 3;
+  const int values[] = {4};
+  const Volume kept = keep_labels(ct, labels, values);
+  EXPECT_EQ(kept.at(2, 2, 2), 100);
+  EXPECT_EQ(kept.at(1, 1, 1), 100);
+  EXPECT_EQ(kept.at(0, 0, 0), -1024);
+  EXPECT_EQ(std::count(kept.hu.begin(), kept.hu.end(), 100), 27);
+  EXPECT_EQ(*label_centroid_mm(labels, 4), Eigen::Vector3d(2, 2, 2));
+  EXPECT_FALSE(label_centroid_mm(labels, 9));
+}
+
+}  // namespace
+}  // namespace birdseye::host
