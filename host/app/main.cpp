@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CommandStatus status;
   add_register(app, status);
+  add_render(app, status);
   add_volume(app, status);
   try {
     app.parse(argc, argv);

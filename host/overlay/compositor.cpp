@@ -1,0 +1,25 @@
+#include "host/overlay/compositor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace birdseye::host {
+
+std::vector<std::uint8_t> composite(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength) {
+  // Eight bits of fraction: 256 is all of it.
+  const int w = static_cast<int>(std::lround(std::clamp(strength, 0.0, 1.0) * 256));
+  std::vector<std::uint8_t> out(video.begin(), video.end());
+  const std::size_t pixels = std::min(video.size() / 3, overlay.rgba.size() / 4);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const std::uint8_t* const rgba = &overlay.rgba[4 * i];
+    if (rgba[3] == 0) continue;
+    const int keep = 255 * 256 - rgba[3] * w;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const int value = rgba[c] * w * 255 + video[3 * i + c] * keep;
+      out[3 * i + c] = static_cast<std::uint8_t>(std::min(255, (value + 255 * 128) / (255 * 256)));
+    }
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

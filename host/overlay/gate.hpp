@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "calibration/time/pose_history.hpp"
+
+namespace birdseye::host {
+
+/// Decides whether an overlay may be drawn. A wrong overlay is worse than none: where the pose is not to be believed it
+/// fades out and says why, and the video goes on.
+class OverlayGate {
+ public:
+  struct Settings {
+    Duration most_predicted = Duration::from_ms(40);  ///< how far ahead of its newest sample a pose may be
+    double most_sigma_mm = 1.5;                       ///< of the pose's position
+    Duration fade = Duration::from_ms(200);
+  };
+  struct Decision {
+    double strength = 0;  ///< of the overlay, 0 to 1
+    std::string reason;   ///< why it is not whole; empty where it is
+    /// The pose to draw with, where there is one that may be drawn with. Without one nothing is drawn: a fading overlay
+    /// keeps to poses of the frames it is drawn on.
+    std::optional<Transform<Tracker, Sensor>> tracker_from_sensor;
+  };
+
+  OverlayGate() = default;
+  explicit OverlayGate(const Settings& settings) : settings_(settings) {}
+
+  /// The decision for a frame acquired at time, with the pose that came with it. Times must not go back.
+  Decision decide(DeviceTime time, const PoseAnswer& pose);
+
+ private:
+  [[nodiscard]] std::string doubt(const PoseAnswer& pose) const;
+
+  Settings settings_;
+  std::optional<DeviceTime> last_;
+  double strength_ = 0;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,215 @@
+#include "host/render/cpu/ray_caster.hpp"
+
+#include <tbb/blocked_range2d.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace birdseye::host {
+
+namespace {
+
+using Eigen::Vector3f;
+
+constexpr float kOpaque = 1.0F / 512;
+
+std::uint8_t byte_of(float value) {
+  return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
+}
+
+}  // namespace
+
+LensRays::LensRays(const CameraModel& camera) : camera_(camera) {
+  directions_.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px));
+  tbb::parallel_for(0, camera.height_px, [&](int y) {
+    for (int x = 0; x < camera.width_px; ++x) {
+      const auto ray = unproject(camera, Eigen::Vector2d(x, y));
+      directions_[static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width_px) +
+                  static_cast<std::size_t>(x)] =
+          ray ? Vector3f(ray->normalized().cast<float>()) : Vector3f(Vector3f::Zero());
+    }
+  });
+}
+
+RayCaster::RayCaster(const Volume& volume, const TransferFunction& transfer) : volume_(volume), transfer_(transfer) {
+  const auto& n = volume.size;
+  last_ = Vector3f(static_cast<float>(n[0] - 1), static_cast<float>(n[1] - 1), static_cast<float>(n[2] - 1));
+  patient_gradient_from_voxel_ = volume.patient_from_voxel.linear().inverse().transpose().cast<float>();
+  for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = std::max(1, (n[axis] - 1 + kBrick - 1) / kBrick);
+  seen_.resize(static_cast<std::size_t>(bricks_[0]) * static_cast<std::size_t>(bricks_[1]) *
+               static_cast<std::size_t>(bricks_[2]));
+  tbb::parallel_for(0, bricks_[2], [&](int bk) {
+    for (int bj = 0; bj < bricks_[1]; ++bj) {
+      for (int bi = 0; bi < bricks_[0]; ++bi) {
+        // A brick's cells reach one voxel into the next brick.
+        std::int16_t low = std::numeric_limits<std::int16_t>::max();
+        std::int16_t high = std::numeric_limits<std::int16_t>::min();
+        for (int k = bk * kBrick; k <= std::min(bk * kBrick + kBrick, n[2] - 1); ++k) {
+          for (int j = bj * kBrick; j <= std::min(bj * kBrick + kBrick, n[1] - 1); ++j) {
+            for (int i = bi * kBrick; i <= std::min(bi * kBrick + kBrick, n[0] - 1); ++i) {
+              low = std::min(low, volume.at(i, j, k));
+              high = std::max(high, volume.at(i, j, k));
+            }
+          }
+        }
+        const auto at =
+            (static_cast<std::size_t>(bk) * static_cast<std::size_t>(bricks_[1]) + static_cast<std::size_t>(bj)) *
+                static_cast<std::size_t>(bricks_[0]) +
+            static_cast<std::size_t>(bi);
+        seen_[at] = transfer_.any_seen(low, high) ? 1 : 0;
+      }
+    }
+  });
+}
+
+float RayCaster::trilinear(const Vector3f& x) const {
+  const int i = std::min(static_cast<int>(x.x()), std::max(0, volume_.size[0] - 2));
+  const int j = std::min(static_cast<int>(x.y()), std::max(0, volume_.size[1] - 2));
+  const int k = std::min(static_cast<int>(x.z()), std::max(0, volume_.size[2] - 2));
+  const float u = x.x() - static_cast<float>(i);
+  const float v = x.y() - static_cast<float>(j);
+  const float w = x.z() - static_cast<float>(k);
+  const std::size_t dx = volume_.size[0] > 1 ? 1 : 0;
+  const std::size_t dy = volume_.size[1] > 1 ? static_cast<std::size_t>(volume_.size[0]) : 0;
+  const std::size_t dz =
+      volume_.size[2] > 1 ? static_cast<std::size_t>(volume_.size[0]) * static_cast<std::size_t>(volume_.size[1]) : 0;
+  const std::int16_t* p = volume_.hu.data() + volume_.index(i, j, k);
+  const auto along_x = [&](const std::int16_t* q) {
+    const float a = q[0];
+    return a + u * (static_cast<float>(q[dx]) - a);
+  };
+  const float a = along_x(p);
+  const float b = along_x(p + dy);
+  const float c = along_x(p + dz);
+  const float d = along_x(p + dy + dz);
+  const float ab = a + v * (b - a);
+  const float cd = c + v * (d - c);
+  return ab + w * (cd - ab);
+}
+
+Vector3f RayCaster::gradient(const Vector3f& x) const {
+  Vector3f g;
+  for (int axis = 0; axis < 3; ++axis) {
+    Vector3f after = x;
+    Vector3f before = x;
+    after[axis] = std::min(x[axis] + 1, last_[axis]);
+    before[axis] = std::max(x[axis] - 1, 0.0F);
+    g[axis] = 0.5F * (trilinear(after) - trilinear(before));
+  }
+  return patient_gradient_from_voxel_ * g;
+}
+
+bool RayCaster::brick_is_seen(const Vector3f& x) const {
+  const int bi = std::min(static_cast<int>(x.x()) / kBrick, bricks_[0] - 1);
+  const int bj = std::min(static_cast<int>(x.y()) / kBrick, bricks_[1] - 1);
+  const int bk = std::min(static_cast<int>(x.z()) / kBrick, bricks_[2] - 1);
+  return seen_[(static_cast<std::size_t>(bk) * static_cast<std::size_t>(bricks_[1]) + static_cast<std::size_t>(bj)) *
+                   static_cast<std::size_t>(bricks_[0]) +
+               static_cast<std::size_t>(bi)] != 0;
+}
+
+/// A ray in voxel coordinates: x(s) = origin + s * step, s in mm; direction is its unit direction in the patient.
+struct RayCaster::Ray {
+  Vector3f origin, step, direction;
+  float enter_mm, leave_mm;
+};
+
+Eigen::Array4f RayCaster::march(const Ray& ray, const RenderSettings& settings) const {
+  const auto h = static_cast<float>(settings.step_mm);
+  const auto ambient = static_cast<float>(settings.ambient);
+  const auto diffuse = static_cast<float>(settings.diffuse);
+  const auto specular = static_cast<float>(settings.specular);
+  const auto shininess = static_cast<float>(settings.shininess);
+  const float per_g0 = 1.0F / static_cast<float>(settings.surface_gradient_hu_per_mm);
+  Eigen::Array3f colour = Eigen::Array3f::Zero();
+  float transmittance = 1;
+  // Whole numbers of steps, so that every ray samples the same distances.
+  auto i = static_cast<long>(std::ceil(ray.enter_mm / h - 0.5F));
+  const auto end = static_cast<long>(std::floor(ray.leave_mm / h - 0.5F));
+  while (i <= end && transmittance >= kOpaque) {
+    const float s = (static_cast<float>(i) + 0.5F) * h;
+    const Vector3f x = (ray.origin + s * ray.step).cwiseMax(0.0F).cwiseMin(last_);
+    if (!brick_is_seen(x)) {
+      // To the first sample past this brick.
+      float exit = std::numeric_limits<float>::max();
+      for (int axis = 0; axis < 3; ++axis) {
+        const float brick = std::floor(x[axis] / kBrick);
+        const float face = (ray.step[axis] > 0 ? brick + 1 : brick) * kBrick;
+        if (std::abs(ray.step[axis]) > 1e-12F) exit = std::min(exit, (face - x[axis]) / ray.step[axis]);
+      }
+      i += std::max(1L, static_cast<long>(exit / h));
+      continue;
+    }
+    ++i;
+    const float f = trilinear(x);
+    const TransferFunction::Entry& entry = transfer_.at(static_cast<int>(std::lround(f)));
+    if (entry.extinction_per_mm <= 0) continue;
+    const float opacity = 1.0F - std::exp(-entry.extinction_per_mm * h);
+    const Vector3f g = gradient(x);
+    const float length = g.norm();
+    const float surface = std::min(1.0F, length * per_g0);
+    const float facing = length > 0 ? std::abs(g.dot(ray.direction)) / length : 0.0F;
+    const float shade = (1 - surface) + surface * (ambient + diffuse * facing);
+    const float highlight = surface * specular * std::pow(facing, shininess);
+    const Eigen::Array3f lit = (Eigen::Array3f(entry.r, entry.g, entry.b) * shade + highlight).min(1.0F);
+    colour += transmittance * opacity * lit;
+    transmittance *= 1 - opacity;
+  }
+  return {colour[0], colour[1], colour[2], 1 - transmittance};
+}
+
+ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patient>& camera_from_patient,
+                            const RenderSettings& settings) const {
+  const CameraModel& camera = rays.camera();
+  ImageRgba image{camera.width_px, camera.height_px, {}};
+  image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
+  const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
+  const Eigen::Affine3d voxel_from_patient = volume_.patient_from_voxel.inverse();
+  const Vector3f origin = (voxel_from_patient * patient_from_camera.translation()).cast<float>();
+  const Eigen::Matrix3f step_from_camera = (voxel_from_patient.linear() * patient_from_camera.rotation()).cast<float>();
+  const Eigen::Matrix3f patient_rotation = patient_from_camera.rotation().cast<float>();
+
+  const auto cast = [&](std::size_t pixel) {
+    const Vector3f& in_camera = rays.at(pixel);
+    if (in_camera.z() == 0) return;
+    Ray ray{origin, step_from_camera * in_camera, patient_rotation * in_camera, static_cast<float>(settings.near_mm),
+            std::numeric_limits<float>::max()};
+    for (int axis = 0; axis < 3; ++axis) {
+      const float a = -ray.origin[axis] / ray.step[axis];
+      const float b = (last_[axis] - ray.origin[axis]) / ray.step[axis];
+      if (std::abs(ray.step[axis]) > 1e-12F) {
+        ray.enter_mm = std::max(ray.enter_mm, std::min(a, b));
+        ray.leave_mm = std::min(ray.leave_mm, std::max(a, b));
+      } else if (ray.origin[axis] < 0 || ray.origin[axis] > last_[axis]) {
+        return;
+      }
+    }
+    if (settings.clip) {
+      const double along = settings.clip->normal.dot(ray.direction.cast<double>());
+      const double before = settings.clip->offset_mm - settings.clip->normal.dot(patient_from_camera.translation());
+      const auto at = static_cast<float>(before / (std::abs(along) > 1e-12 ? along : 1e-12));
+      (along > 0 ? ray.enter_mm = std::max(ray.enter_mm, at) : ray.leave_mm = std::min(ray.leave_mm, at));
+    }
+    if (!(ray.enter_mm < ray.leave_mm)) return;
+    const Eigen::Array4f rgba = march(ray, settings);
+    for (std::size_t channel = 0; channel < 4; ++channel) {
+      image.rgba[4 * pixel + channel] = byte_of(rgba[static_cast<Eigen::Index>(channel)]);
+    }
+  };
+  constexpr int kTile = 16;
+  tbb::parallel_for(
+      tbb::blocked_range2d<int>(0, camera.height_px, kTile, 0, camera.width_px, kTile),
+      [&](const tbb::blocked_range2d<int>& tile) {
+        for (int y = tile.rows().begin(); y != tile.rows().end(); ++y) {
+          for (int x = tile.cols().begin(); x != tile.cols().end(); ++x) {
+            cast(static_cast<std::size_t>(y) * static_cast<std::size_t>(camera.width_px) + static_cast<std::size_t>(x));
+          }
+        }
+      });
+  return image;
+}
+
+}  // namespace birdseye::host

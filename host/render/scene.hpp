@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace birdseye::host {
+
+/// The part of the volume that is kept: normal . p >= offset_mm, p in the patient frame.
+struct ClipPlane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitY();
+  double offset_mm = 0;
+};
+
+/// docs/image-formation.md names each of these.
+struct RenderSettings {
+  double step_mm = 0.7;
+  double near_mm = 1;
+  double ambient = 0.35, diffuse = 0.65, specular = 0.18, shininess = 20;
+  double surface_gradient_hu_per_mm = 40;  ///< g0
+  std::optional<ClipPlane> clip;
+};
+
+/// Premultiplied RGBA, 8 bits, rows from the top.
+struct ImageRgba {
+  int width_px = 0, height_px = 0;
+  std::vector<std::uint8_t> rgba;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,197 @@
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "host/overlay/compositor.hpp"
+#include "host/overlay/gate.hpp"
+#include "host/render/cpu/ray_caster.hpp"
+#include "tests/support/reference_renderer.hpp"
+
+namespace birdseye::host {
+namespace {
+
+/// A blob with a dense core and a rod, smooth, on an oblique anisotropic grid.
+Volume scene() {
+  Volume v;
+  v.size = {40, 36, 30};
+  v.spacing_mm = {1.4, 1.6, 2.1};
+  v.patient_from_voxel.linear() = rotation_exp(Eigen::Vector3d(0.3, -0.4, 0.2)) * v.spacing_mm.asDiagonal();
+  v.patient_from_voxel.translation() = Eigen::Vector3d(-30, -20, 60);
+  for (int k = 0; k < 30; ++k) {
+    for (int j = 0; j < 36; ++j) {
+      for (int i = 0; i < 40; ++i) {
+        const double blob =
+            std::exp(-(std::pow((i - 18) / 9.0, 2) + std::pow((j - 17) / 8.0, 2) + std::pow((k - 15) / 7.0, 2)));
+        const double rod = std::exp(-(std::pow((i - 30) / 3.0, 2) + std::pow((j - 12) / 3.0, 2)));
+        v.hu.push_back(static_cast<std::int16_t>(std::lround(-900 + 1300 * blob + 1100 * rod)));
+      }
+    }
+  }
+  return v;
+}
+
+TransferFunction soft() {
+  return TransferFunction(
+      {{-400, {0.5, 0.1, 0.1}, 0}, {0, {0.9, 0.4, 0.2}, 0.05}, {200, {0.9, 0.8, 0.6}, 0.2}, {600, {1, 1, 0.9}, 0.4}});
+}
+
+CameraModel lens() {
+  CameraModel c;
+  c.width_px = 96;
+  c.height_px = 72;
+  c.fx_px = 90;
+  c.fy_px = 94;
+  c.cx_px = 49;
+  c.cy_px = 33;
+  c.k1 = -0.25;
+  c.k2 = 0.08;
+  c.p1 = 0.002;
+  return c;
+}
+
+/// A camera that looks at the scene's middle from 110 mm.
+Transform<Camera, Patient> pose(const Volume& v) {
+  const Eigen::Vector3d middle = v.patient_from_voxel * Eigen::Vector3d(20, 18, 15);
+  const Eigen::Matrix3d r = rotation_exp(Eigen::Vector3d(0.4, 0.7, -0.2));
+  return {r, Eigen::Vector3d(0, 0, 110) - r * middle};
+}
+
+void expect_agreement(const Volume& volume, const RenderSettings& settings) {
+  const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), settings);
+  const std::vector<double> reference = testing::render_reference(volume, soft(), lens(), pose(volume), settings);
+  double sum = 0, worst = 0, brightest = 0;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    const double error = std::abs(picture.rgba[i] - 255 * reference[i]);
+    sum += error;
+    worst = std::max(worst, error);
+    brightest = std::max(brightest, 255 * reference[i]);
+  }
+  EXPECT_GT(brightest, 100);
+  EXPECT_LT(sum / static_cast<double>(reference.size()), 0.3);
+  EXPECT_LT(worst, 3);
+}
+
+TEST(RayCaster, AgreesWithTheReference) {
+  RenderSettings settings;
+  settings.step_mm = 0.8;
+  expect_agreement(scene(), settings);
+}
+
+TEST(RayCaster, AgreesWithTheReferenceWhenClippedAndFromInside) {
+  const Volume volume = scene();
+  RenderSettings settings;
+  settings.near_mm = 95;
+  settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
+  settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
+  expect_agreement(volume, settings);
+}
+
+TEST(RayCaster, AnEmptyVolumeIsTransparent) {
+  Volume volume = scene();
+  std::fill(volume.hu.begin(), volume.hu.end(), std::int16_t{-1000});
+  const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), {});
+  EXPECT_EQ(std::count(picture.rgba.begin(), picture.rgba.end(), 0), static_cast<std::ptrdiff_t>(picture.rgba.size()));
+}
+
+TEST(RayCaster, IsTheSameToTheBitForAnyNumberOfThreads) {
+  const Volume volume = scene();
+  const RayCaster caster(volume, soft());
+  const LensRays rays(lens());
+  const ImageRgba many = caster.render(rays, pose(volume), {});
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(caster.render(rays, pose(volume), {}).rgba, many.rgba);
+}
+
+TEST(RayCaster, DoesNotCareWhereThePatientLies) {
+  const Volume volume = scene();
+  Volume moved = volume;
+  const Transform<Patient, Patient> move(rotation_exp(Eigen::Vector3d(1, -2, 0.5)), Eigen::Vector3d(40, -70, 15));
+  moved.patient_from_voxel.matrix() = move.matrix() * volume.patient_from_voxel.matrix();
+  const LensRays rays(lens());
+  const ImageRgba a = RayCaster(volume, soft()).render(rays, pose(volume), {});
+  const ImageRgba b = RayCaster(moved, soft()).render(rays, pose(volume) * move.inverse(), {});
+  int differ = 0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i) {
+    EXPECT_LE(std::abs(a.rgba[i] - b.rgba[i]), 2);
+    if (a.rgba[i] != b.rgba[i]) ++differ;
+  }
+  EXPECT_LT(differ, static_cast<int>(a.rgba.size() / 20));
+}
+
+TEST(RayCaster, PutsAVoxelWhereTheLensProjectsIt) {
+  Volume volume = scene();
+  std::fill(volume.hu.begin(), volume.hu.end(), std::int16_t{-1000});
+  for (int d = 0; d < 8; ++d) volume.hu[volume.index(30 + (d & 1), 8 + (d >> 1 & 1), 20 + (d >> 2))] = 3000;
+  const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), {});
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double weight = 0;
+  for (int y = 0; y < 72; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const double w = picture.rgba[static_cast<std::size_t>(y * 96 + x) * 4 + 3];
+      sum += w * Eigen::Vector2d(x, y);
+      weight += w;
+    }
+  }
+  ASSERT_GT(weight, 0);
+  const auto expected = project(lens(), pose(volume) * (volume.patient_from_voxel * Eigen::Vector3d(30.5, 8.5, 20.5)));
+  EXPECT_LT((sum / weight - *expected).norm(), 0.1);
+}
+
+TEST(TransferFunction, ReadsPresetsAndNamesWhatItDoesNotKnow) {
+  for (const std::string& name : transfer_presets()) EXPECT_TRUE(load_transfer_function(name)) << name;
+  const auto unknown = load_transfer_function("livre");
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().what.find("liver"), std::string::npos);
+  EXPECT_NEAR(static_cast<double>(soft().at(100).extinction_per_mm), 0.125, 1e-6);
+  EXPECT_FALSE(soft().any_seen(-1024, -400));
+  EXPECT_TRUE(soft().any_seen(-1024, -399));
+}
+
+TEST(Compositor, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
+  const std::vector<std::uint8_t> video{10, 20, 30, 200, 100, 50, 7, 8, 9};
+  const ImageRgba overlay{3, 1, {0, 0, 0, 0, 64, 0, 0, 128, 255, 255, 255, 255}};
+  const auto full = composite(video, overlay, 1);
+  EXPECT_EQ(full, (std::vector<std::uint8_t>{10, 20, 30, 164, 50, 25, 255, 255, 255}));
+  EXPECT_EQ(composite(video, overlay, 0), video);
+}
+
+PoseAnswer sound() {
+  PoseAnswer pose;
+  pose.kind = PoseKind::interpolated;
+  pose.tracker_from_sensor = Transform<Tracker, Sensor>();
+  pose.position_sigma_mm = 0.1;
+  return pose;
+}
+
+TEST(OverlayGate, DrawsWithASoundPoseAndNeverWithout) {
+  OverlayGate gate;
+  EXPECT_EQ(gate.decide({0}, sound()).strength, 1);
+  PoseAnswer none;
+  none.reason = "the newest pose is 300 ms old";
+  const auto refused = gate.decide({40'000'000}, none);
+  EXPECT_EQ(refused.strength, 0);
+  EXPECT_EQ(refused.reason, none.reason);
+}
+
+TEST(OverlayGate, FadesWhilePosesAreDoubtfulAndSaysWhy) {
+  OverlayGate gate;
+  gate.decide({0}, sound());
+  PoseAnswer shaky = sound();
+  shaky.position_sigma_mm = 5;
+  const auto first = gate.decide({40'000'000}, shaky);
+  EXPECT_NEAR(first.strength, 0.8, 1e-9);
+  EXPECT_NE(first.reason.find("scatters by 5.0 mm"), std::string::npos);
+  for (int i = 2; i < 6; ++i) gate.decide({i * 40'000'000}, shaky);
+  EXPECT_EQ(gate.decide({240'000'000}, shaky).strength, 0);
+  EXPECT_NEAR(gate.decide({280'000'000}, sound()).strength, 0.2, 1e-9);
+  PoseAnswer ahead = sound();
+  ahead.kind = PoseKind::predicted;
+  ahead.age = Duration::from_ms(70);
+  EXPECT_NE(gate.decide({320'000'000}, ahead).reason.find("70 ms"), std::string::npos);
+  shaky.position_sigma_mm = NAN;
+  EXPECT_FALSE(gate.decide({360'000'000}, shaky).reason.empty());
+}
+
+}  // namespace
+}  // namespace birdseye::host
