@@ -9,7 +9,7 @@
 
 #include "host/app/commands.hpp"
 #include "host/app/json_file.hpp"
-#include "host/app/png.hpp"
+#include "host/app/picture.hpp"
 #include "host/app/text_files.hpp"
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/volume/import.hpp"

@@ -80,7 +80,7 @@ port = {}
 [pose]
 max_age_ms = 100
 max_gap_ms = 60
-smoothing_ms = 60
+smoothing_ms = 40
 )",
                                       tty.string(), socket.string(), settings.width_px, settings.height_px,
                                       settings.video_rate_hz, port));

@@ -1,0 +1,58 @@
+#include "host/app/event_stream.hpp"
+
+#include <algorithm>
+
+namespace birdseye::host {
+
+EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
+    : client_(std::move(client)), most_frames_(most_frames) {
+  thread_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
+}
+
+void EventStream::read(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    auto event = client_->next(wire::Client::Clock::now() + std::chrono::milliseconds(100));
+    {
+      const std::lock_guard lock(mutex_);
+      if (!event) {
+        ended_ = event.error();
+      } else if (*event) {
+        if (std::holds_alternative<wire::VideoFrame>(**event)) {
+          if (frames_ == most_frames_) {
+            events_.erase(std::find_if(events_.begin(), events_.end(), [](const wire::Event& e) {
+              return std::holds_alternative<wire::VideoFrame>(e);
+            }));
+            ++dropped_;
+          } else {
+            ++frames_;
+          }
+        }
+        // Everything else is small, and comes a hundred times a second: a minute of it is bound enough.
+        constexpr std::size_t kMostEvents = 8192;
+        if (events_.size() < kMostEvents) events_.push_back(**std::move(event));
+      }
+    }
+    changed_.notify_one();
+    if (!event) return;
+  }
+}
+
+Result<std::optional<wire::Event>> EventStream::next(wire::Client::Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_until(lock, deadline, [this] { return !events_.empty() || ended_.has_value(); });
+  if (events_.empty()) {
+    if (ended_) return *ended_;
+    return std::optional<wire::Event>();
+  }
+  std::optional<wire::Event> event = std::move(events_.front());
+  events_.pop_front();
+  if (std::holds_alternative<wire::VideoFrame>(*event)) --frames_;
+  return event;
+}
+
+std::uint64_t EventStream::frames_dropped() const {
+  const std::lock_guard lock(mutex_);
+  return dropped_;
+}
+
+}  // namespace birdseye::host

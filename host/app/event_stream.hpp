@@ -1,0 +1,39 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "device/wire/client.hpp"
+
+namespace birdseye::host {
+
+/// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
+/// past most_frames waiting, the oldest frame is dropped and counted.
+class EventStream {
+ public:
+  EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames);
+
+  /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
+  Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline);
+  [[nodiscard]] std::uint64_t frames_dropped() const;
+
+ private:
+  void read(const std::stop_token& stop);
+
+  std::unique_ptr<wire::Client> client_;
+  std::size_t most_frames_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<wire::Event> events_;
+  std::size_t frames_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::optional<Error> ended_;
+  std::jthread thread_;
+};
+
+}  // namespace birdseye::host

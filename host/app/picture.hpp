@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// RGB, 8 bits, rows from the top.
+struct Picture {
+  int width_px = 0, height_px = 0;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// channels: 3 (RGB) or 4 (RGBA, not premultiplied), 8 bits, rows from the top. Appears under its name when it is
+/// whole.
+Result<void> write_png(const std::filesystem::path& path, std::span<const std::uint8_t> pixels, int width_px,
+                       int height_px, int channels);
+
+/// Pictures of one size side by side, scaled by scale, in rows of columns.
+Picture tile(std::span<const Picture> pictures, int columns, double scale);
+
+void draw_cross(Picture& picture, const Eigen::Vector2d& centre_px);
+void draw_circle(Picture& picture, const Eigen::Vector2d& centre_px);
+
+/// Grey of an RGB picture, by the luma weights of BT.601.
+std::vector<std::uint8_t> grey_of(std::span<const std::uint8_t> rgb, int width_px, int height_px);
+
+}  // namespace birdseye::host
