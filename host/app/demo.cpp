@@ -41,18 +41,22 @@ constexpr int kKeepEvery = 20;  // of the overlaid frames, for the pictures of t
 class Progress {
  public:
   void operator()(const std::string& what) {
+    if (what == last_) return;
+    last_ = what;
     const double s = std::chrono::duration<double>(Clock::now() - began_).count();
     fmt::print("{}[{:5.1f} s] {}{}", terminal_ ? "\r\x1b[K" : "", s, what, terminal_ ? "" : "\n");
     std::fflush(stdout);
   }
   void keep(const std::string& what) {
     (*this)(what);
+    last_.clear();
     if (terminal_) fmt::print("\n");
   }
   [[nodiscard]] double seconds() const { return std::chrono::duration<double>(Clock::now() - began_).count(); }
 
  private:
   Clock::time_point began_ = Clock::now();
+  std::string last_;
   bool terminal_ = ::isatty(STDOUT_FILENO) == 1;
 };
 
@@ -134,7 +138,7 @@ class Session {
   OverlayGate gate_;
   std::unique_ptr<LensRays> rays_;
   std::unique_ptr<RayCaster> caster_;
-  DeviceTime last_frame_;
+  std::optional<std::uint64_t> first_sequence_;
 };
 
 std::string Session::stage_at(DeviceTime time) const {
@@ -192,7 +196,7 @@ Result<void> Session::overlay(const wire::VideoFrame& frame) {
     const Transform<Camera, Patient> camera_from_patient =
         setup->camera_from_sensor * decision.tracker_from_sensor->inverse() * setup->tracker_from_patient;
     RenderSettings settings;
-    settings.step_mm = 0.9;
+    settings.step_mm = 1.2;
     out = composite(*frame.rgb, caster_->render(*rays_, camera_from_patient, settings), decision.strength);
     overlaid.push_back({frame.info.sequence, frame.info.acquired, camera_from_patient});
   } else {
@@ -202,14 +206,15 @@ Result<void> Session::overlay(const wire::VideoFrame& frame) {
     kept.push_back(
         {frame.info.sequence, {frame.width_px, frame.height_px, *frame.rgb}, {frame.width_px, frame.height_px, out}});
   }
-  progress_(fmt::format("overlaid {} frames", overlaid.size()));
+  if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
   return film_.add(out);
 }
 
 Result<void> Session::take(const wire::VideoFrame& frame) {
   ++figures.frames;
-  last_frame_ = frame.info.acquired;
-  figures.frames_dropped = static_cast<int>(frame.info.frames_dropped);
+  // By the camera's own count, whoever lost them.
+  if (!first_sequence_) first_sequence_ = frame.info.sequence;
+  figures.frames_dropped = static_cast<int>(frame.info.sequence - *first_sequence_ + 1) - figures.frames;
   const std::string stage = stage_at(frame.info.acquired);
   if (stage == "calibrate") {
     stations_.push(frame);
@@ -247,10 +252,10 @@ Result<void> Session::run(EventStream& stream) {
       heard = Clock::now();
     } else if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
       taken = take(*birds);
+      // After the script's end the tracker goes on a little; the last frames may still be on their way.
       const auto stages = cart_.stages();
-      const bool ended = !stages.empty() && stages.back().name == "end" &&
-                         birds->acquired - stages.back().begins > Duration::from_ms(300);
-      if (ended) return {};
+      const bool ended = !stages.empty() && stages.back().name == "end" && stages.back().begins < birds->acquired;
+      if (ended && Clock::now() - heard > std::chrono::milliseconds(400)) return {};
     } else if (const auto* health = std::get_if<wire::Health>(&**event)) {
       figures.tracker_rate_hz = health->tracker_rate_hz;
     }
@@ -353,7 +358,6 @@ Result<ExitCode> demo(const Options& options) {
   session.figures.position_noise_mm = settings.position_noise_mm;
   session.figures.angle_noise_deg = settings.angle_noise_deg;
   if (auto ran = session.run(stream); !ran) return ran.error();
-  session.figures.frames_dropped += static_cast<int>(stream.frames_dropped());
   if (auto ended = (*cart)->finish(Clock::now() + std::chrono::seconds(10)); !ended) return ended.error();
   if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
   if (auto filmed = session.finish(); !filmed) return filmed.error();

@@ -83,6 +83,7 @@ class EmbreeLaparoscope final : public Laparoscope {
       : camera_(camera), seed_(seed), device_(device), texture_(seed + 31) {
     const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
     rays_.resize(pixels);
+    light_.resize(pixels, Vector3f::Zero());
     field_.resize(pixels);
     const double radius = 0.53 * camera.width_px;
     for (int y = 0; y < camera.height_px; ++y) {
@@ -109,6 +110,7 @@ class EmbreeLaparoscope final : public Laparoscope {
   }
 
   void set_cavity(const Mesh& liver, const Eigen::Vector3d& centre) override {
+    traced_scene_ = nullptr;
     cavity_ = std::make_unique<EmbreeScene>(device_);
     cavity_->add(liver, kLiverGeometry);
     const Vector3f c = centre.cast<float>();
@@ -121,6 +123,7 @@ class EmbreeLaparoscope final : public Laparoscope {
 
   void set_bench(const Chessboard& board) override {
     board_ = board;
+    traced_scene_ = nullptr;
     bench_ = std::make_unique<EmbreeScene>(device_);
     Mesh table;
     constexpr float kReach = 2000;
@@ -131,17 +134,23 @@ class EmbreeLaparoscope final : public Laparoscope {
   }
 
   std::vector<std::uint8_t> look_into_cavity(const Transform<Camera, Patient>& camera_from_patient,
-                                             std::uint64_t sequence) const override {
+                                             std::uint64_t sequence) override {
     const Transform<Patient, Camera> pose = camera_from_patient.inverse();
-    return trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 1.55F, sequence,
-                 [this](const Hit& hit) { return cavity_surface(hit); });
+    if (is_new(*cavity_, pose.matrix())) {
+      trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 1.55F,
+            [this](const Hit& hit) { return cavity_surface(hit); });
+    }
+    return expose(sequence);
   }
 
   std::vector<std::uint8_t> look_at_bench(const Transform<Camera, Marker>& camera_from_marker,
-                                          std::uint64_t sequence) const override {
+                                          std::uint64_t sequence) override {
     const Transform<Marker, Camera> pose = camera_from_marker.inverse();
-    return trace(*bench_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 0.6F, sequence,
-                 [this](const Hit& hit) { return bench_surface(hit); });
+    if (is_new(*bench_, pose.matrix())) {
+      trace(*bench_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 0.6F,
+            [this](const Hit& hit) { return bench_surface(hit); });
+    }
+    return expose(sequence);
   }
 
  private:
@@ -200,17 +209,23 @@ class EmbreeLaparoscope final : public Laparoscope {
     return out;
   }
 
-  /// One picture of a scene; frame: the scene's, whose origin the rotation and position of the camera refer to.
+  /// Whether the light that reaches the sensor is not what was traced last: a scope at rest sees the same frame after
+  /// frame, but for the sensor's noise.
+  bool is_new(const EmbreeScene& scene, const Eigen::Matrix4d& pose) {
+    if (traced_scene_ == &scene && traced_pose_ == pose) return false;
+    traced_scene_ = &scene;
+    traced_pose_ = pose;
+    return true;
+  }
+
+  /// The light at every pixel, into light_. rotation, eye: of the camera in the scene's frame.
   template <typename SurfaceOf>
-  std::vector<std::uint8_t> trace(const EmbreeScene& scene, const Eigen::Matrix3f& rotation, const Vector3f& eye,
-                                  float exposure, std::uint64_t sequence, const SurfaceOf& surface_of_hit) const {
-    std::vector<std::uint8_t> rgb(rays_.size() * 3);
+  void trace(const EmbreeScene& scene, const Eigen::Matrix3f& rotation, const Vector3f& eye, float exposure,
+             const SurfaceOf& surface_of_hit) {
     tbb::parallel_for(0, camera_.height_px, [&](int y) {
       RTCIntersectContext context;
       rtcInitIntersectContext(&context);
       context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-      const auto noise_at = static_cast<std::size_t>(hashed_uniform(seed_ + sequence, static_cast<std::uint64_t>(y)) *
-                                                     static_cast<double>(noise_.size()));
       for (int x0 = 0; x0 < camera_.width_px; x0 += kPacket) {
         alignas(32) RTCRayHit8 packet;
         alignas(32) int valid[kPacket];
@@ -244,8 +259,21 @@ class EmbreeLaparoscope final : public Laparoscope {
             light = shade(scene, packet, lane, eye, directions[static_cast<std::size_t>(lane)], surface_of_hit) *
                     (exposure * field_[at]);
           }
-          write_pixel(light, noise_at + 3 * static_cast<std::size_t>(x0 + lane), &rgb[3 * at]);
+          light_[at] = light;
         }
+      }
+    });
+  }
+
+  /// The sensor: noise that is new with every frame, and the camera's gamma.
+  [[nodiscard]] std::vector<std::uint8_t> expose(std::uint64_t sequence) const {
+    std::vector<std::uint8_t> rgb(rays_.size() * 3);
+    tbb::parallel_for(0, camera_.height_px, [&](int y) {
+      const double row = hashed_uniform(seed_ + sequence, static_cast<std::uint64_t>(y));
+      auto noise_at = static_cast<std::size_t>(row * static_cast<double>(noise_.size()));
+      for (int x = 0; x < camera_.width_px; ++x, noise_at += 3) {
+        const std::size_t at = pixel(x, y);
+        write_pixel(light_[at], noise_at, &rgb[3 * at]);
       }
     });
     return rgb;
@@ -266,8 +294,9 @@ class EmbreeLaparoscope final : public Laparoscope {
     if (surface.gloss > 0) {
       // A wet surface is not smooth: ripples break the highlight up.
       const Vector3f q = hit.point / 3.1F;
-      normal += 0.20F * Vector3f(texture_.at(q) - 0.5F, texture_.at(q + Vector3f(17, 5, 3)) - 0.5F,
-                                 texture_.at(q + Vector3f(3, 23, 11)) - 0.5F);
+      const float ripple = texture_.at(q) - 0.5F;
+      const float other = texture_.at(q + Vector3f(17, 5, 3)) - 0.5F;
+      normal += 0.22F * Vector3f(ripple, other, ripple * other * 2);
       normal.normalize();
     }
     constexpr float kReferenceMm = 100;
@@ -301,6 +330,9 @@ class EmbreeLaparoscope final : public Laparoscope {
   std::array<float, 1U << 16U> noise_{};
   std::array<float, 4096> gamma_{};
   std::unique_ptr<EmbreeScene> cavity_, bench_;
+  const EmbreeScene* traced_scene_ = nullptr;
+  Eigen::Matrix4d traced_pose_ = Eigen::Matrix4d::Zero();
+  std::vector<Vector3f> light_;  ///< of the last trace
 };
 
 }  // namespace

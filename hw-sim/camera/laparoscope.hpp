@@ -31,11 +31,11 @@ class Laparoscope {
   virtual void set_cavity(const Mesh& liver_in_patient, const Eigen::Vector3d& centre_in_patient_mm) = 0;
   virtual void set_bench(const Chessboard& board) = 0;
 
-  /// RGB, width * height * 3 bytes. The same pose and sequence give the same bytes.
+  /// RGB, width * height * 3 bytes. The same pose and sequence give the same bytes. Not for two threads at once.
   virtual std::vector<std::uint8_t> look_into_cavity(const Transform<Camera, Patient>& camera_from_patient,
-                                                     std::uint64_t sequence) const = 0;
+                                                     std::uint64_t sequence) = 0;
   virtual std::vector<std::uint8_t> look_at_bench(const Transform<Camera, Marker>& camera_from_marker,
-                                                  std::uint64_t sequence) const = 0;
+                                                  std::uint64_t sequence) = 0;
 };
 
 /// The lens of the simulated laparoscope for a picture of this size: a wide rod lens with the barrel distortion such

@@ -5,7 +5,8 @@
 namespace birdseye::hw_sim {
 
 SolidNoise::SolidNoise(std::uint64_t seed) : lattice_(std::size_t{kPeriod} * kPeriod * kPeriod) {
-  for (std::size_t i = 0; i < lattice_.size(); ++i) lattice_[i] = static_cast<float>(hashed_uniform(seed, i));
+  for (std::size_t i = 0; i < lattice_.size(); ++i)
+    lattice_[i] = static_cast<std::uint8_t>(256 * hashed_uniform(seed, i));
 }
 
 float SolidNoise::at(const Eigen::Vector3f& point) const {
@@ -21,14 +22,14 @@ float SolidNoise::at(const Eigen::Vector3f& point) const {
   const auto lattice = [&](int i, int j, int k) {
     constexpr int kMask = kPeriod - 1;
     const int at = (((base[2] + k) & kMask) * kPeriod + ((base[1] + j) & kMask)) * kPeriod + ((base[0] + i) & kMask);
-    return lattice_[static_cast<std::size_t>(at)];
+    return static_cast<float>(lattice_[static_cast<std::size_t>(at)]);
   };
   const auto mix = [](float a, float b, float u) { return a + (b - a) * u; };
   const float low =
       mix(mix(lattice(0, 0, 0), lattice(1, 0, 0), t[0]), mix(lattice(0, 1, 0), lattice(1, 1, 0), t[0]), t[1]);
   const float high =
       mix(mix(lattice(0, 0, 1), lattice(1, 0, 1), t[0]), mix(lattice(0, 1, 1), lattice(1, 1, 1), t[0]), t[1]);
-  return mix(low, high, t[2]);
+  return mix(low, high, t[2]) * (1.0F / 255);
 }
 
 }  // namespace birdseye::hw_sim

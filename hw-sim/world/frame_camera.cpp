@@ -17,8 +17,8 @@ namespace birdseye::hw_sim {
 
 namespace {
 
-constexpr std::size_t kQueueFrames = 60;
-constexpr std::size_t kReadyFrames = 25;
+constexpr std::size_t kQueueFrames = 160;
+constexpr std::size_t kReadyFrames = 60;
 
 template <typename T>
 void put(std::array<std::uint8_t, 64>& header, std::size_t offset, T value) {
@@ -28,7 +28,7 @@ void put(std::array<std::uint8_t, 64>& header, std::size_t offset, T value) {
 }  // namespace
 
 Result<std::unique_ptr<FrameCamera>> FrameCamera::listen(const Settings& settings, const World& world,
-                                                         const Laparoscope& laparoscope) {
+                                                         Laparoscope& laparoscope) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string path = settings.socket.string();
@@ -46,7 +46,7 @@ Result<std::unique_ptr<FrameCamera>> FrameCamera::listen(const Settings& setting
   return std::unique_ptr<FrameCamera>(new FrameCamera(settings, world, laparoscope, fd));
 }
 
-FrameCamera::FrameCamera(Settings settings, const World& world, const Laparoscope& laparoscope, int fd)
+FrameCamera::FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope, int fd)
     : settings_(std::move(settings)),
       world_(world),
       laparoscope_(laparoscope),

@@ -29,7 +29,7 @@ class FrameCamera {
 
   /// Listens at once. The world and the laparoscope must outlive the camera.
   static Result<std::unique_ptr<FrameCamera>> listen(const Settings& settings, const World& world,
-                                                     const Laparoscope& laparoscope);
+                                                     Laparoscope& laparoscope);
   ~FrameCamera();
   FrameCamera(const FrameCamera&) = delete;
   FrameCamera& operator=(const FrameCamera&) = delete;
@@ -47,14 +47,14 @@ class FrameCamera {
     std::uint64_t sequence;
     std::vector<std::uint8_t> rgb;
   };
-  FrameCamera(Settings settings, const World& world, const Laparoscope& laparoscope, int fd);
+  FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope, int fd);
   void render(const std::stop_token& stop);
   void serve(const std::stop_token& stop);
   bool send(int client, const Picture& picture, const std::stop_token& stop) const;
 
   Settings settings_;
   const World& world_;
-  const Laparoscope& laparoscope_;
+  Laparoscope& laparoscope_;
   int fd_;
   std::uint64_t frames_;
   mutable std::mutex mutex_;

@@ -158,8 +158,8 @@ Transform<Tracker, Camera> World::sweep(double since_s) const {
   const Vector3d port = look_at_in_patient_mm_ + kPortMm * out;
   const Vector3d right = out.cross(Vector3d::UnitZ()).normalized();
   const Vector3d up = right.cross(out);
-  const Vector3d direction = rotation_exp(up * (11 * kRadPerDeg * std::sin(phase))) *
-                             (rotation_exp(right * (8 * kRadPerDeg * std::sin(2 * phase))) * Vector3d(-out));
+  const Vector3d direction = rotation_exp(up * (9 * kRadPerDeg * std::sin(phase))) *
+                             (rotation_exp(right * (5.5 * kRadPerDeg * std::sin(2 * phase))) * Vector3d(-out));
   const double insertion = kPortMm - kTipFromFaceMm + 12 * std::sin(phase + 1);
   const Vector3d eye = port + insertion * direction;
   const double roll = 14 * kRadPerDeg * std::sin(phase + 0.5);

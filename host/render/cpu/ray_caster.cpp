@@ -39,8 +39,9 @@ RayCaster::RayCaster(const Volume& volume, const TransferFunction& transfer) : v
   last_ = Vector3f(static_cast<float>(n[0] - 1), static_cast<float>(n[1] - 1), static_cast<float>(n[2] - 1));
   patient_gradient_from_voxel_ = volume.patient_from_voxel.linear().inverse().transpose().cast<float>();
   for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = std::max(1, (n[axis] - 1 + kBrick - 1) / kBrick);
-  seen_.resize(static_cast<std::size_t>(bricks_[0]) * static_cast<std::size_t>(bricks_[1]) *
-               static_cast<std::size_t>(bricks_[2]));
+  constexpr std::uint8_t kFar = 255;
+  empty_.resize(static_cast<std::size_t>(bricks_[0]) * static_cast<std::size_t>(bricks_[1]) *
+                static_cast<std::size_t>(bricks_[2]));
   tbb::parallel_for(0, bricks_[2], [&](int bk) {
     for (int bj = 0; bj < bricks_[1]; ++bj) {
       for (int bi = 0; bi < bricks_[0]; ++bi) {
@@ -59,10 +60,41 @@ RayCaster::RayCaster(const Volume& volume, const TransferFunction& transfer) : v
             (static_cast<std::size_t>(bk) * static_cast<std::size_t>(bricks_[1]) + static_cast<std::size_t>(bj)) *
                 static_cast<std::size_t>(bricks_[0]) +
             static_cast<std::size_t>(bi);
-        seen_[at] = transfer_.any_seen(low, high) ? 1 : 0;
+        empty_[at] = transfer_.any_seen(low, high) ? 0 : kFar;
       }
     }
   });
+  measure_empty_bricks();
+}
+
+void RayCaster::measure_empty_bricks() {
+  // Chessboard distance is separable into two sweeps over the 13 neighbours that come before, and after, in memory.
+  const auto [nx, ny, nz] = bricks_;
+  const auto index = [nx = nx, ny = ny](int i, int j, int k) {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(ny) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(nx) +
+           static_cast<std::size_t>(i);
+  };
+  for (const int way : {1, -1}) {
+    for (int kk = 0; kk < nz; ++kk) {
+      for (int jj = 0; jj < ny; ++jj) {
+        for (int ii = 0; ii < nx; ++ii) {
+          const int i = way > 0 ? ii : nx - 1 - ii;
+          const int j = way > 0 ? jj : ny - 1 - jj;
+          const int k = way > 0 ? kk : nz - 1 - kk;
+          int nearest = empty_[index(i, j, k)];
+          for (int n = 0; n < 13 && nearest > 0; ++n) {
+            const int a = i + way * (n % 3 - 1);
+            const int b = j + way * (n / 3 % 3 - 1);
+            const int c = k + way * (n / 9 - 1);
+            if (a < 0 || b < 0 || c < 0 || a >= nx || b >= ny || c >= nz) continue;
+            nearest = std::min(nearest, empty_[index(a, b, c)] + 1);
+          }
+          empty_[index(i, j, k)] = static_cast<std::uint8_t>(nearest);
+        }
+      }
+    }
+  }
 }
 
 float RayCaster::trilinear(const Vector3f& x) const {
@@ -102,27 +134,40 @@ Vector3f RayCaster::gradient(const Vector3f& x) const {
   return patient_gradient_from_voxel_ * g;
 }
 
-bool RayCaster::brick_is_seen(const Vector3f& x) const {
-  const int bi = std::min(static_cast<int>(x.x()) / kBrick, bricks_[0] - 1);
-  const int bj = std::min(static_cast<int>(x.y()) / kBrick, bricks_[1] - 1);
-  const int bk = std::min(static_cast<int>(x.z()) / kBrick, bricks_[2] - 1);
-  return seen_[(static_cast<std::size_t>(bk) * static_cast<std::size_t>(bricks_[1]) + static_cast<std::size_t>(bj)) *
-                   static_cast<std::size_t>(bricks_[0]) +
-               static_cast<std::size_t>(bi)] != 0;
-}
-
 /// A ray in voxel coordinates: x(s) = origin + s * step, s in mm; direction is its unit direction in the patient.
 struct RayCaster::Ray {
   Vector3f origin, step, direction;
   float enter_mm, leave_mm;
 };
 
-Eigen::Array4f RayCaster::march(const Ray& ray, const RenderSettings& settings) const {
+/// What one picture's samples share: powers and exponentials, which cost more than all else of a sample.
+struct RayCaster::Tables {
+  static constexpr int kFacings = 2048;
+  std::array<float, kFacings + 1> highlight;
+  std::array<float, TransferFunction::kHighestHu - TransferFunction::kLowestHu + 1> opacity;
+
+  Tables(const TransferFunction& transfer, const RenderSettings& settings) {
+    for (int i = 0; i <= kFacings; ++i) {
+      const double facing = static_cast<double>(i) / kFacings;
+      highlight[static_cast<std::size_t>(i)] =
+          static_cast<float>(settings.specular * std::pow(facing, settings.shininess));
+    }
+    for (int hu = TransferFunction::kLowestHu; hu <= TransferFunction::kHighestHu; ++hu) {
+      const auto extinction = static_cast<double>(transfer.at(hu).extinction_per_mm);
+      opacity[static_cast<std::size_t>(hu - TransferFunction::kLowestHu)] =
+          static_cast<float>(1 - std::exp(-extinction * settings.step_mm));
+    }
+  }
+  [[nodiscard]] float opacity_at(int hu) const {
+    return opacity[static_cast<std::size_t>(std::clamp(hu, TransferFunction::kLowestHu, TransferFunction::kHighestHu) -
+                                            TransferFunction::kLowestHu)];
+  }
+};
+
+Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const RenderSettings& settings) const {
   const auto h = static_cast<float>(settings.step_mm);
   const auto ambient = static_cast<float>(settings.ambient);
   const auto diffuse = static_cast<float>(settings.diffuse);
-  const auto specular = static_cast<float>(settings.specular);
-  const auto shininess = static_cast<float>(settings.shininess);
   const float per_g0 = 1.0F / static_cast<float>(settings.surface_gradient_hu_per_mm);
   Eigen::Array3f colour = Eigen::Array3f::Zero();
   float transmittance = 1;
@@ -132,28 +177,37 @@ Eigen::Array4f RayCaster::march(const Ray& ray, const RenderSettings& settings) 
   while (i <= end && transmittance >= kOpaque) {
     const float s = (static_cast<float>(i) + 0.5F) * h;
     const Vector3f x = (ray.origin + s * ray.step).cwiseMax(0.0F).cwiseMin(last_);
-    if (!brick_is_seen(x)) {
-      // To the first sample past this brick.
+    int brick[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      brick[axis] = std::min(static_cast<int>(x[axis]) / kBrick, bricks_[static_cast<std::size_t>(axis)] - 1);
+    }
+    const int empty = empty_[(static_cast<std::size_t>(brick[2]) * static_cast<std::size_t>(bricks_[1]) +
+                              static_cast<std::size_t>(brick[1])) *
+                                 static_cast<std::size_t>(bricks_[0]) +
+                             static_cast<std::size_t>(brick[0])];
+    if (empty > 0) {
+      // To the first sample past the cube of empty bricks around this one.
       float exit = std::numeric_limits<float>::max();
       for (int axis = 0; axis < 3; ++axis) {
-        const float brick = std::floor(x[axis] / kBrick);
-        const float face = (ray.step[axis] > 0 ? brick + 1 : brick) * kBrick;
-        if (std::abs(ray.step[axis]) > 1e-12F) exit = std::min(exit, (face - x[axis]) / ray.step[axis]);
+        const int face = (ray.step[axis] > 0 ? brick[axis] + empty : brick[axis] - empty + 1) * kBrick;
+        if (std::abs(ray.step[axis]) > 1e-12F)
+          exit = std::min(exit, (static_cast<float>(face) - x[axis]) / ray.step[axis]);
       }
       i += std::max(1L, static_cast<long>(exit / h));
       continue;
     }
     ++i;
     const float f = trilinear(x);
-    const TransferFunction::Entry& entry = transfer_.at(static_cast<int>(std::lround(f)));
-    if (entry.extinction_per_mm <= 0) continue;
-    const float opacity = 1.0F - std::exp(-entry.extinction_per_mm * h);
+    const int hu = static_cast<int>(f + (f < 0 ? -0.5F : 0.5F));
+    const float opacity = tables.opacity_at(hu);
+    if (opacity <= 0) continue;
+    const TransferFunction::Entry& entry = transfer_.at(hu);
     const Vector3f g = gradient(x);
     const float length = g.norm();
     const float surface = std::min(1.0F, length * per_g0);
-    const float facing = length > 0 ? std::abs(g.dot(ray.direction)) / length : 0.0F;
+    const float facing = length > 0 ? std::min(1.0F, std::abs(g.dot(ray.direction)) / length) : 0.0F;
     const float shade = (1 - surface) + surface * (ambient + diffuse * facing);
-    const float highlight = surface * specular * std::pow(facing, shininess);
+    const float highlight = surface * tables.highlight[static_cast<std::size_t>(facing * Tables::kFacings + 0.5F)];
     const Eigen::Array3f lit = (Eigen::Array3f(entry.r, entry.g, entry.b) * shade + highlight).min(1.0F);
     colour += transmittance * opacity * lit;
     transmittance *= 1 - opacity;
@@ -172,6 +226,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   const Eigen::Matrix3f step_from_camera = (voxel_from_patient.linear() * patient_from_camera.rotation()).cast<float>();
   const Eigen::Matrix3f patient_rotation = patient_from_camera.rotation().cast<float>();
 
+  const Tables tables(transfer_, settings);
   const auto cast = [&](std::size_t pixel) {
     const Vector3f& in_camera = rays.at(pixel);
     if (in_camera.z() == 0) return;
@@ -194,7 +249,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
       (along > 0 ? ray.enter_mm = std::max(ray.enter_mm, at) : ray.leave_mm = std::min(ray.leave_mm, at));
     }
     if (!(ray.enter_mm < ray.leave_mm)) return;
-    const Eigen::Array4f rgba = march(ray, settings);
+    const Eigen::Array4f rgba = march(ray, tables, settings);
     for (std::size_t channel = 0; channel < 4; ++channel) {
       image.rgba[4 * pixel + channel] = byte_of(rgba[static_cast<Eigen::Index>(channel)]);
     }

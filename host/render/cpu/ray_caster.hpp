@@ -25,7 +25,8 @@ class LensRays {
 };
 
 /// Renders a volume by casting rays, on all cores, in single precision. Bricks of the volume that the transfer function
-/// does not show are stepped over. The picture is the same to the bit for any number of threads.
+/// does not show are leapt over, all that lie between a sample and the nearest brick it does show at once. The picture
+/// is the same to the bit for any number of threads.
 class RayCaster {
  public:
   /// Keeps a reference to volume, which must outlive it.
@@ -36,18 +37,20 @@ class RayCaster {
 
  private:
   struct Ray;
+  struct Tables;
   [[nodiscard]] float trilinear(const Eigen::Vector3f& x) const;
   [[nodiscard]] Eigen::Vector3f gradient(const Eigen::Vector3f& x) const;
-  [[nodiscard]] Eigen::Array4f march(const Ray& ray, const RenderSettings& settings) const;
-  [[nodiscard]] bool brick_is_seen(const Eigen::Vector3f& x) const;
+  [[nodiscard]] Eigen::Array4f march(const Ray& ray, const Tables& tables, const RenderSettings& settings) const;
+  void measure_empty_bricks();
 
-  static constexpr int kBrick = 8;
+  static constexpr int kBrick = 4;
   const Volume& volume_;
   TransferFunction transfer_;
   Eigen::Vector3f last_;  ///< n - 1 on each axis
   Eigen::Matrix3f patient_gradient_from_voxel_;
   std::array<int, 3> bricks_{};
-  std::vector<std::uint8_t> seen_;  ///< per brick of kBrick^3 cells
+  /// Per brick of kBrick^3 cells: how many bricks away, along any axis or diagonal, the nearest one is that is seen.
+  std::vector<std::uint8_t> empty_;
 };
 
 }  // namespace birdseye::host
