@@ -86,17 +86,17 @@ Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path
 }
 
 Result<std::size_t> SerialPort::read(std::span<std::uint8_t> into, DeviceTime deadline) {
+  bool hung_up = false;
   for (;;) {
     const ssize_t got = ::read(fd_.get(), into.data(), into.size());
     if (got > 0) return static_cast<std::size_t>(got);
-    const int failed = errno;
-    pollfd entry{fd_.get(), POLLIN, 0};
-    const bool gone = got < 0 && failed != EAGAIN && failed != EINTR;
-    if (gone) return Error{Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), failed};
-    const int ready = ::poll(&entry, 1, poll_ms(deadline));
-    if (ready > 0 && (entry.revents & POLLIN) == 0) {
-      return Error{Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_)};
+    // A line that has hung up is always ready to be read, and what is read is nothing.
+    if (hung_up || (got < 0 && errno != EAGAIN && errno != EINTR)) {
+      return Error{Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), errno};
     }
+    pollfd entry{fd_.get(), POLLIN, 0};
+    const int ready = ::poll(&entry, 1, poll_ms(deadline));
+    hung_up = ready > 0 && (entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
     if (ready == 0 && now() >= deadline) return std::size_t{0};
   }
 }

@@ -139,6 +139,8 @@ class Session {
   std::unique_ptr<LensRays> rays_;
   std::unique_ptr<RayCaster> caster_;
   std::optional<std::uint64_t> first_sequence_;
+  DeviceTime first_measurement_;
+  int measurements_ = 0;
 };
 
 std::string Session::stage_at(DeviceTime time) const {
@@ -150,6 +152,9 @@ std::string Session::stage_at(DeviceTime time) const {
 }
 
 Result<void> Session::take(const wire::Birds& birds) {
+  if (measurements_++ == 0) first_measurement_ = birds.acquired;
+  const double since_s = (birds.acquired - first_measurement_).seconds();
+  if (since_s > 0) figures.tracker_rate_hz = (measurements_ - 1) / since_s;
   const std::string stage = stage_at(birds.acquired);
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name == "scope" && stage == "calibrate") stations_.push(birds.acquired, bird.tracker_from_sensor);
@@ -256,8 +261,6 @@ Result<void> Session::run(EventStream& stream) {
       const auto stages = cart_.stages();
       const bool ended = !stages.empty() && stages.back().name == "end" && stages.back().begins < birds->acquired;
       if (ended && Clock::now() - heard > std::chrono::milliseconds(400)) return {};
-    } else if (const auto* health = std::get_if<wire::Health>(&**event)) {
-      figures.tracker_rate_hz = health->tracker_rate_hz;
     }
     if (!taken) return taken;
   }

@@ -19,20 +19,41 @@ Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct
 }
 
 Volume keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values) {
-  Volume out = ct;
-  std::fill(out.hu.begin(), out.hu.end(), std::int16_t{-1024});
   const auto wanted = [&](std::int16_t label) {
     return std::find(values.begin(), values.end(), label) != values.end();
   };
-  const auto [nx, ny, nz] = ct.size;
-  for (int k = 0; k < nz; ++k) {
-    for (int j = 0; j < ny; ++j) {
-      for (int i = 0; i < nx; ++i) {
+  const Eigen::Array3i size(ct.size[0], ct.size[1], ct.size[2]);
+  Eigen::Array3i low = size;
+  Eigen::Array3i high(-1, -1, -1);
+  for (int k = 0; k < size[2]; ++k) {
+    for (int j = 0; j < size[1]; ++j) {
+      for (int i = 0; i < size[0]; ++i) {
         if (!wanted(labels.at(i, j, k))) continue;
-        for (int kk = std::max(0, k - 1); kk <= std::min(nz - 1, k + 1); ++kk) {
-          for (int jj = std::max(0, j - 1); jj <= std::min(ny - 1, j + 1); ++jj) {
-            for (int ii = std::max(0, i - 1); ii <= std::min(nx - 1, i + 1); ++ii) {
-              out.hu[ct.index(ii, jj, kk)] = ct.at(ii, jj, kk);
+        low = low.min(Eigen::Array3i(i, j, k));
+        high = high.max(Eigen::Array3i(i, j, k));
+      }
+    }
+  }
+  // The kept voxels, their neighbours, and a border of nothing.
+  low = (low - 2).max(0);
+  high = (high + 2).min(size - 1).max(low);
+  const Eigen::Array3i box = high - low + 1;
+  Volume out;
+  out.size = {box[0], box[1], box[2]};
+  out.spacing_mm = ct.spacing_mm;
+  out.patient_from_voxel = ct.patient_from_voxel * Eigen::Translation3d(low.cast<double>().matrix());
+  out.hu.assign(static_cast<std::size_t>(box[0]) * static_cast<std::size_t>(box[1]) * static_cast<std::size_t>(box[2]),
+                std::int16_t{-1024});
+  for (int k = low[2]; k <= high[2]; ++k) {
+    for (int j = low[1]; j <= high[1]; ++j) {
+      for (int i = low[0]; i <= high[0]; ++i) {
+        if (!wanted(labels.at(i, j, k))) continue;
+        const Eigen::Array3i from = (Eigen::Array3i(i, j, k) - 1).max(low);
+        const Eigen::Array3i to = (Eigen::Array3i(i, j, k) + 1).min(high);
+        for (int kk = from[2]; kk <= to[2]; ++kk) {
+          for (int jj = from[1]; jj <= to[1]; ++jj) {
+            for (int ii = from[0]; ii <= to[0]; ++ii) {
+              out.hu[out.index(ii - low[0], jj - low[1], kk - low[2])] = ct.at(ii, jj, kk);
             }
           }
         }

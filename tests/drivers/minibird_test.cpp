@@ -1,11 +1,16 @@
 #include "drivers/minibird/minibird.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
 #include <deque>
+#include <filesystem>
 
 #include "calibration/geometry/transform.hpp"
 #include "drivers/io/monotonic.hpp"
+#include "drivers/io/serial_port.hpp"
+#include "hw-sim/minibird/pseudo_terminal.hpp"
 #include "hw-sim/minibird/unit.hpp"
 
 namespace birdseye::drivers::minibird {
@@ -164,6 +169,30 @@ TEST(MiniBird, ALostLineIsAnError) {
   ASSERT_TRUE(bird) << bird.error().what;
   line.unplugged = true;
   EXPECT_EQ((*bird)->read(now() + Duration::from_ms(100)).error().code, Errc::disconnected);
+}
+
+TEST(SerialPort, CarriesBytesAndSeesTheLineGo) {
+  const auto link = std::filesystem::temp_directory_path() / ("birdseye-serial-" + std::to_string(::getpid()));
+  auto terminal = std::make_unique<hw_sim::PseudoTerminal>(*hw_sim::PseudoTerminal::open(link));
+  const auto port = SerialPort::open(link, 115200);
+  ASSERT_TRUE(port) << port.error().what;
+  EXPECT_FALSE((*port)->set_rts(true));
+  EXPECT_EQ(SerialPort::open(link, 115200).error().code, Errc::in_use);
+  const Bytes sent{0x11, 0x13, 0x00, 0xFF, 0x0D, 0x0A};  // what a line discipline would eat or change
+  terminal->write(sent);
+  std::array<std::uint8_t, 16> got;
+  const auto count = (*port)->read(got, now() + Duration::from_ms(1000));
+  ASSERT_TRUE(count);
+  EXPECT_EQ(Bytes(got.begin(), got.begin() + static_cast<std::ptrdiff_t>(*count)), sent);
+  EXPECT_EQ(*(*port)->read(got, now() + Duration::from_ms(10)), 0U);
+  terminal.reset();
+  EXPECT_EQ((*port)->read(got, now() + Duration::from_ms(1000)).error().code, Errc::disconnected);
+}
+
+TEST(SerialPort, NamesWhatCannotBeOpened) {
+  EXPECT_EQ(SerialPort::open("/nonexistent", 115200).error().code, Errc::not_found);
+  EXPECT_EQ(SerialPort::open("/dev/null", 115200).error().code, Errc::bad_value);
+  EXPECT_NE(SerialPort::open("/dev/null", 1234).error().what.find("1234"), std::string::npos);
 }
 
 }  // namespace

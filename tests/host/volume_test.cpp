@@ -294,19 +294,23 @@ TEST(Markers, AreFoundToASmallPartOfAVoxel) {
 
 TEST(Labels, KeepTheirVoxelsAndASoftEdge) {
   Volume ct;
-  ct.size = {5, 5, 5};
-  ct.hu.assign(125, 100);
+  ct.size = {9, 9, 9};
+  ct.spacing_mm = {2, 2, 2};
+  ct.patient_from_voxel.linear() *= 2;
+  ct.hu.assign(729, 100);
   Volume labels = ct;
   std::fill(labels.hu.begin(), labels.hu.end(), std::int16_t{0});
-  labels.hu[labels.index(2, 2, 2)] = 4;
+  labels.hu[labels.index(5, 4, 4)] = 4;
   labels.hu[labels.index(0, 0, 0)] = 3;
   const int values[] = {4};
   const Volume kept = keep_labels(ct, labels, values);
+  EXPECT_EQ(kept.size, (std::array<int, 3>{5, 5, 5}));
+  EXPECT_EQ(kept.patient_from_voxel * Eigen::Vector3d(2, 2, 2), Eigen::Vector3d(10, 8, 8));
   EXPECT_EQ(kept.at(2, 2, 2), 100);
   EXPECT_EQ(kept.at(1, 1, 1), 100);
   EXPECT_EQ(kept.at(0, 0, 0), -1024);
   EXPECT_EQ(std::count(kept.hu.begin(), kept.hu.end(), 100), 27);
-  EXPECT_EQ(*label_centroid_mm(labels, 4), Eigen::Vector3d(2, 2, 2));
+  EXPECT_EQ(*label_centroid_mm(labels, 4), Eigen::Vector3d(10, 8, 8));
   EXPECT_FALSE(label_centroid_mm(labels, 9));
 }
 
