@@ -24,7 +24,7 @@ function(birdseye_executable name)
   target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options)
 endfunction()
 
-# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. DATA: the tests read real recordings and skip without them.
+# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. Those of e2e run the cart in real time, each alone.
 function(birdseye_test name)
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -35,7 +35,13 @@ function(birdseye_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
+  # Not in the environment, where gtest_discover_tests keeps only the first of several.
+  target_compile_definitions(${name} PRIVATE BIRDSEYE_BIN="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+  set(alone "")
+  if(ARG_LABEL STREQUAL "e2e")
+    set(alone RUN_SERIAL TRUE)
+  endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
-      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR};BIRDSEYE_BIN=${CMAKE_RUNTIME_OUTPUT_DIRECTORY}")
+    PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT} ${alone}
+      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}")
 endfunction()

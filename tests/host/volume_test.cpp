@@ -13,26 +13,14 @@
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for one test, removed after it.
-class Scratch {
- public:
-  Scratch() : path_(fs::temp_directory_path() / ("birdseye-volume-" + std::to_string(::getpid()))) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~Scratch() { fs::remove_all(path_); }
-  [[nodiscard]] fs::path operator/(const std::string& name) const { return path_ / name; }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
+using testing::Scratch;
 
 hw_sim::Grid grid() {
   hw_sim::Grid g;

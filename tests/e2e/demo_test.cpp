@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+using testing::run;
+using testing::Scratch;
+
+/// The bytes of every file under a folder, by name.
+std::map<std::string, std::string> contents(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> out;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    out[entry.path().lexically_relative(folder).string()] = std::string(std::istreambuf_iterator<char>(in), {});
+  }
+  return out;
+}
+
+TEST(Phantom, TheSameSeedGivesTheSameBytesAndAnotherDoesNot) {
+  const Scratch scratch;
+  for (const auto& [name, seed] : {std::pair{"a", 5}, {"b", 5}, {"c", 6}}) {
+    const auto made =
+        run("birdseye-sim", "phantom --out " + (scratch / name).string() + " --seed " + std::to_string(seed));
+    ASSERT_EQ(made.code, 0) << made.output;
+    EXPECT_EQ(made.output, "");
+  }
+  const auto a = contents(scratch / "a");
+  EXPECT_GT(a.size(), 100U);
+  EXPECT_TRUE(a == contents(scratch / "b"));
+  EXPECT_FALSE(a == contents(scratch / "c"));
+}
+
+nlohmann::json demo(const Scratch& scratch, const std::string& options) {
+  const std::string out = (scratch / "demo").string();
+  const auto result = run("birdseye", "demo --out " + out + " " + options);
+  EXPECT_EQ(result.code, 0) << result.output;
+  std::ifstream in(scratch / "demo/report.json");
+  nlohmann::json report = nlohmann::json::parse(in, nullptr, false);
+  EXPECT_TRUE(report.is_object()) << result.output;
+  for (const char* name : {"report.html", "overlay.png", "video.png", "overlay.mp4"}) {
+    EXPECT_GT(std::filesystem::file_size(scratch / "demo" / name), 2000U) << name;
+  }
+  return report;
+}
+
+TEST(Demo, PutsTheTumourWhereItIsDespiteTheTrackersNoise) {
+  const Scratch scratch;
+  const nlohmann::json report = demo(scratch, "");
+  EXPECT_LE(report.value("target_error_mm_p95", 1e9), 3.0);
+  EXPECT_GT(report.value("target_error_mm_p50", 0.0), 0.0);
+  EXPECT_LE(report.value("fre_mm", 1e9), 1.0);
+  EXPECT_NEAR(report.value("tracker_rate_hz", 0.0), 103.3, 1.0);
+  EXPECT_GT(report.value("frames", 0), 600);
+  EXPECT_EQ(report.value("verdict", ""), "pass");
+  EXPECT_LT(report.value("frames_without_overlay", 1000), 10);
+}
+
+TEST(Demo, IsLimitedByTheRecordsStepsWithoutNoise) {
+  const Scratch scratch;
+  EXPECT_LE(demo(scratch, "--noise none --seed 2").value("target_error_mm_p95", 1e9), 0.8);
+}
+
+}  // namespace
+}  // namespace birdseye
