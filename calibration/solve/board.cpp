@@ -13,7 +13,9 @@ namespace {
 
 /// Mean grey in the middle of the square whose first corner is corner (column, row).
 double square_grey(const cv::Mat& grey, const std::vector<cv::Point2f>& corners, int columns, int column, int row) {
-  const auto at = [&](int c, int r) { return corners[static_cast<std::size_t>(r * columns + c)]; };
+  const auto at = [&](int c, int r) {
+    return corners[static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c)];
+  };
   const cv::Point2f middle =
       0.25F * (at(column, row) + at(column + 1, row) + at(column, row + 1) + at(column + 1, row + 1));
   cv::Mat patch;

@@ -118,6 +118,12 @@ Result<HandEye> solve_hand_eye(std::span<const Eigen::Vector3d> points_mm, std::
     return Error{Errc::degenerate,
                  fmt::format("{} stations with board and pose: hand-eye needs at least three", stations)};
   }
+  for (const BoardView& view : views) {
+    if (points_mm.empty() || view.corners_px.size() != points_mm.size()) {
+      return Error{Errc::bad_value,
+                   fmt::format("a view of {} corners for a board of {}", view.corners_px.size(), points_mm.size())};
+    }
+  }
   if (auto turns = check_turns(tracker_from_sensor); !turns) return turns.error();
   Transform<Camera, Sensor> start;
   try {
@@ -164,7 +170,10 @@ Result<HandEye> solve_hand_eye(std::span<const Eigen::Vector3d> points_mm, std::
     double squares = 0;
     for (std::size_t k = 0; k < points_mm.size(); ++k) {
       const auto seen = project(camera, camera_from_board * points_mm[k]);
-      if (seen) squares += (*seen - views[i].corners_px[k]).squaredNorm();
+      if (!seen)
+        return Error{Errc::degenerate,
+                     "hand-eye puts the board behind the camera: are poses and pictures of the same moments?"};
+      squares += (*seen - views[i].corners_px[k]).squaredNorm();
     }
     out.view_tracked_rms_px.push_back(std::sqrt(squares / static_cast<double>(points_mm.size())));
     all += squares;

@@ -34,14 +34,14 @@ constexpr FormatRow kFormats[] = {
 };
 
 struct HemisphereRow {
-  Hemisphere hemisphere;
   std::string_view name;
+  Hemisphere hemisphere;
   std::uint8_t axis, sign;
 };
 constexpr HemisphereRow kHemispheres[] = {
-    {Hemisphere::forward, "forward", 0x00, 0}, {Hemisphere::aft, "aft", 0x00, 1},
-    {Hemisphere::right, "right", 0x06, 0},     {Hemisphere::left, "left", 0x06, 1},
-    {Hemisphere::lower, "lower", 0x0C, 0},     {Hemisphere::upper, "upper", 0x0C, 1},
+    {"forward", Hemisphere::forward, 0x00, 0}, {"aft", Hemisphere::aft, 0x00, 1},
+    {"right", Hemisphere::right, 0x06, 0},     {"left", Hemisphere::left, 0x06, 1},
+    {"lower", Hemisphere::lower, 0x0C, 0},     {"upper", Hemisphere::upper, 0x0C, 1},
 };
 
 void put_word(Bytes& bytes, std::int32_t word) {

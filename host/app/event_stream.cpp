@@ -12,9 +12,10 @@ EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_
 void EventStream::read(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     auto event = client_->next(wire::Client::Clock::now() + std::chrono::milliseconds(100));
+    const bool ended = !event;
     {
       const std::lock_guard lock(mutex_);
-      if (!event) {
+      if (ended) {
         ended_ = event.error();
       } else if (*event) {
         if (std::holds_alternative<wire::VideoFrame>(**event)) {
@@ -33,7 +34,7 @@ void EventStream::read(const std::stop_token& stop) {
       }
     }
     changed_.notify_one();
-    if (!event) return;
+    if (ended) return;
   }
 }
 

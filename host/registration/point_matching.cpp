@@ -52,6 +52,7 @@ Result<MatchedFit> match_and_fit(std::span<const Eigen::Vector3d> ct_in_patient_
                              best, second)};
   }
   std::vector<Eigen::Vector3d> ct;
+  ct.reserve(n);
   for (const std::size_t i : best_order) ct.push_back(ct_in_patient_mm[i]);
   auto fit = calibration::fit_points<Patient, Tracker>(ct, touched_in_tracker_mm);
   if (!fit) return fit.error();

@@ -65,7 +65,7 @@ TransferPoint between(const Points& points, double hu) {
 
 }  // namespace
 
-TransferFunction::TransferFunction(std::vector<TransferPoint> points) {
+TransferFunction::TransferFunction(const std::vector<TransferPoint>& points) {
   table_.reserve(kEntries);
   seen_up_to_.reserve(kEntries + 1);
   seen_up_to_.push_back(0);
@@ -118,7 +118,7 @@ Result<TransferFunction> load_transfer_function(const std::string& name_or_path)
       if (points.size() > 1 && !(p.hu > points[points.size() - 2].hu)) return wrong("points must ascend in hu");
     }
     if (points.empty()) return wrong("holds no points");
-    return TransferFunction(std::move(points));
+    return TransferFunction(points);
   } catch (const nlohmann::json::exception&) {
     return wrong("is not a transfer function in JSON");
   }

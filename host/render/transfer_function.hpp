@@ -20,7 +20,7 @@ struct TransferPoint {
 class TransferFunction {
  public:
   /// Points in ascending order of HU; at least one.
-  explicit TransferFunction(std::vector<TransferPoint> points);
+  explicit TransferFunction(const std::vector<TransferPoint>& points);
 
   static constexpr int kLowestHu = -1024, kHighestHu = 3071;
   struct Entry {

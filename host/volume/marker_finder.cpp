@@ -92,6 +92,7 @@ std::vector<Eigen::Vector3d> find_markers(const Volume& ct, const MarkerShape& s
   }
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.weight > b.weight; });
   std::vector<Eigen::Vector3d> centres;
+  centres.reserve(found.size());
   for (const Found& f : found) centres.push_back(f.centre_mm);
   return centres;
 }

@@ -99,8 +99,8 @@ class EmbreeLaparoscope final : public Laparoscope {
     }
     for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = static_cast<float>(hashed_normal(seed + 32, i));
     for (std::size_t i = 0; i < gamma_.size(); ++i) {
-      gamma_[i] = static_cast<float>(
-          255.0 * std::pow(static_cast<double>(i) / static_cast<double>(gamma_.size() - 1), 1 / 2.2));
+      const double share = static_cast<double>(i) / static_cast<double>(gamma_.size() - 1);
+      gamma_[i] = static_cast<std::uint8_t>(std::lround(255.0 * std::pow(share, 1 / 2.2)));
     }
   }
   ~EmbreeLaparoscope() override {
@@ -316,7 +316,7 @@ class EmbreeLaparoscope final : public Laparoscope {
       const float sigma = 0.0015F + 0.012F * std::sqrt(std::max(0.0F, value));
       const float noisy = value + sigma * noise_[(noise_at + channel) % noise_.size()];
       const float scaled = std::clamp(noisy, 0.0F, 1.0F) * static_cast<float>(gamma_.size() - 1);
-      out[channel] = static_cast<std::uint8_t>(gamma_[static_cast<std::size_t>(scaled)] + 0.5F);
+      out[channel] = gamma_[static_cast<std::size_t>(scaled)];
     }
   }
 
@@ -328,7 +328,7 @@ class EmbreeLaparoscope final : public Laparoscope {
   std::vector<Vector3f> rays_;  ///< unit directions in the camera frame, one per pixel
   std::vector<float> field_;    ///< how much of the light reaches each pixel, 0 outside the round field
   std::array<float, 1U << 16U> noise_{};
-  std::array<float, 4096> gamma_{};
+  std::array<std::uint8_t, 4096> gamma_{};
   std::unique_ptr<EmbreeScene> cavity_, bench_;
   const EmbreeScene* traced_scene_ = nullptr;
   Eigen::Matrix4d traced_pose_ = Eigen::Matrix4d::Zero();

@@ -75,10 +75,11 @@ Eigen::Vector3d gradient(const Field& field, const Eigen::Vector3d& point_mm, do
 Eigen::Vector3d march_to_level(const Field& field, double level, const Eigen::Vector3d& start_mm,
                                const Eigen::Vector3d& direction, double length_mm, double step_mm) {
   const bool above_at_start = field(start_mm) > level;
-  double before = 0;
-  for (double s = step_mm; s <= length_mm; s += step_mm) {
+  const int steps = static_cast<int>(length_mm / step_mm);
+  for (int step = 1; step <= steps; ++step) {
+    const double s = step * step_mm;
     if ((field(start_mm + s * direction) > level) != above_at_start) {
-      double low = before;
+      double low = s - step_mm;
       double high = s;
       for (int i = 0; i < 30; ++i) {
         const double middle = 0.5 * (low + high);
@@ -86,7 +87,6 @@ Eigen::Vector3d march_to_level(const Field& field, double level, const Eigen::Ve
       }
       return start_mm + 0.5 * (low + high) * direction;
     }
-    before = s;
   }
   return start_mm + length_mm * direction;
 }

@@ -194,8 +194,8 @@ std::vector<std::uint8_t> implant(Body& body, const Implants& implants, std::uin
           constexpr int kParts = 7;
           int filled = 0;
           for (int part = 0; part < kParts * kParts * kParts; ++part) {
-            const Vector3d offset((part % kParts + 0.5) / kParts - 0.5, (part / kParts % kParts + 0.5) / kParts - 0.5,
-                                  (part / (kParts * kParts) + 0.5) / kParts - 0.5);
+            const Eigen::Array3i cell(part % kParts, part / kParts % kParts, part / (kParts * kParts));
+            const Vector3d offset = ((cell.cast<double>() + 0.5) / kParts - 0.5).matrix();
             if ((p + offset.cwiseProduct(body.grid.spacing_mm) - marker).norm() < kMarkerRadiusMm) ++filled;
           }
           blend(hu, filled / static_cast<double>(kParts * kParts * kParts), kMarkerHu);

@@ -115,7 +115,7 @@ Result<void> write_phantom(const PhantomSettings& settings) {
     series = write_dicom_series(settings.folder / "ct", body->grid, body->hu, settings.seed);
     if (series) series = write_labels(settings.folder / "segmentation.nii.gz", body->grid, labels);
   });
-  const Result<void> surfaces = write_surfaces(settings.folder / "surfaces", *body, *implants);
+  Result<void> surfaces = write_surfaces(settings.folder / "surfaces", *body, *implants);
   writer.join();
   if (!series) return series;
   if (!surfaces) return surfaces;

@@ -135,7 +135,9 @@ void World::plan_stations(const CameraModel& lens, std::uint64_t seed) {
 }
 
 Result<void> World::check_range() const {
-  for (double t = 0; t < ends_s(); t += 0.05) {
+  constexpr double kEveryS = 0.05;
+  for (int i = 0; i * kEveryS < ends_s(); ++i) {
+    const double t = i * kEveryS;
     for (const Vector3d& p : {tracker_from_sensor(t).translation(), tracker_from_pointer(t).translation()}) {
       if (p.x() < 20 || p.norm() > kRangeMm) {
         return Error{Errc::bad_value,

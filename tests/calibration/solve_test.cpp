@@ -201,6 +201,14 @@ TEST(HandEye, AveragesTheTrackersNoise) {
   EXPECT_LT((solved->camera_from_sensor * target - Eigen::Vector3d(0, 0, 100)).norm(), 0.25);
 }
 
+TEST(HandEye, RefusesViewsThatAreNotOfTheBoard) {
+  Bench bench(8, 0, 0, 0);
+  bench.views[3].corners_px.pop_back();
+  const auto solved = solve_hand_eye(bench.points, bench.views, bench.poses, bench.camera_from_marker, bench.camera);
+  ASSERT_FALSE(solved);
+  EXPECT_EQ(solved.error().code, Errc::bad_value);
+}
+
 TEST(HandEye, RefusesTurnsAboutOneAxis) {
   const Bench bench(8, 0, 0, 0, true);
   const auto solved = solve_hand_eye(bench.points, bench.views, bench.poses, bench.camera_from_marker, bench.camera);

@@ -16,8 +16,13 @@ using Eigen::Vector3f;
 
 constexpr float kOpaque = 1.0F / 512;
 
+/// To the nearest whole number, of a value that is not negative: std::lround is a call, and this runs for every sample.
+std::size_t nearest(float value) {
+  return static_cast<std::size_t>(value + 0.5F);  // NOLINT(bugprone-incorrect-roundings)
+}
+
 std::uint8_t byte_of(float value) {
-  return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 1.0F) * 255.0F + 0.5F);
+  return static_cast<std::uint8_t>(nearest(std::clamp(value, 0.0F, 1.0F) * 255.0F));
 }
 
 }  // namespace
@@ -207,7 +212,7 @@ Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const Rend
     const float surface = std::min(1.0F, length * per_g0);
     const float facing = length > 0 ? std::min(1.0F, std::abs(g.dot(ray.direction)) / length) : 0.0F;
     const float shade = (1 - surface) + surface * (ambient + diffuse * facing);
-    const float highlight = surface * tables.highlight[static_cast<std::size_t>(facing * Tables::kFacings + 0.5F)];
+    const float highlight = surface * tables.highlight[nearest(facing * Tables::kFacings)];
     const Eigen::Array3f lit = (Eigen::Array3f(entry.r, entry.g, entry.b) * shade + highlight).min(1.0F);
     colour += transmittance * opacity * lit;
     transmittance *= 1 - opacity;
