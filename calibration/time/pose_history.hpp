@@ -30,7 +30,7 @@ struct PoseAnswer {
 class PoseHistory {
  public:
   struct Settings {
-    std::size_t capacity = 1024;
+    std::size_t capacity = 4096;                       ///< 40 s of a miniBIRD: a frame may come late from a busy camera
     Duration max_gap = Duration::from_ms(60);          ///< wider holes are not bridged
     Duration max_prediction = Duration::from_ms(100);  ///< further ahead is refused
     /// Half the width of a window of samples to which a line is fitted (position along it, rotation about one axis), to
