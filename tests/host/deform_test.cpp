@@ -1,0 +1,125 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <random>
+
+#include "host/deform/patch_octree.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<Vector3d> random_displacements(const PatchOctree& tree, double amount, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> uniform(-amount, amount);
+  std::vector<Vector3d> out;
+  for (std::size_t i = 0; i < tree.free_vertices(); ++i) out.emplace_back(uniform(rng), uniform(rng), uniform(rng));
+  return out;
+}
+
+/// Level 3 in one half of the cube, level 1 in the other.
+PatchOctree mixed() {
+  return *PatchOctree::adaptive(
+      [](const Vector3d& low, const Vector3d&, int level) { return level < 1 || low.x() < 0.49; }, 3);
+}
+
+TEST(PatchOctree, HasThePapersFreeVertices) {
+  const std::size_t expected[] = {0, 1, 27, 343, 3375, 29791};
+  for (int level = 0; level <= 5; ++level) {
+    const auto tree = PatchOctree::uniform(level);
+    ASSERT_TRUE(tree);
+    EXPECT_EQ(tree->free_vertices(), expected[level]);
+    EXPECT_EQ(tree->patches().size(), std::size_t{1} << (3 * level));
+  }
+  EXPECT_FALSE(PatchOctree::uniform(6));
+  EXPECT_FALSE(PatchOctree::uniform(-1));
+}
+
+TEST(PatchOctree, AtRestNothingMoves) {
+  const PatchOctree tree = mixed();
+  EXPECT_EQ(tree.displacement({0.3, 0.7, 0.2}), Vector3d::Zero());
+  EXPECT_EQ(tree.jacobian({0.3, 0.7, 0.2}), Eigen::Matrix3d::Identity());
+  for (const double d : tree.least_determinants()) EXPECT_DOUBLE_EQ(d, 1);
+}
+
+TEST(PatchOctree, IsContinuousWhereLevelsMeet) {
+  PatchOctree tree = mixed();
+  // Vertices of the small patches in the face between the halves hang on the large ones: only its corners are free.
+  std::size_t in_face = 0;
+  for (std::size_t i = 0; i < tree.free_vertices(); ++i) in_face += std::abs(tree.vertex(i).x() - 0.5) < 1e-9 ? 1 : 0;
+  EXPECT_EQ(in_face, 1U);
+  tree.set_displacements(random_displacements(tree, 0.05, 4));
+  constexpr double kStep = 1e-9;
+  double largest = 0;
+  for (int i = 1; i < 40; ++i) {
+    for (int j = 1; j < 40; ++j) {
+      const Vector3d below(0.5 - kStep, i / 40.0, j / 40.0);
+      const Vector3d above(0.5 + kStep, i / 40.0, j / 40.0);
+      EXPECT_LT((tree.displacement(below) - tree.displacement(above)).norm(), 1e-7);
+      largest = std::max(largest, tree.displacement(below).norm());
+    }
+  }
+  EXPECT_GT(largest, 0.01);
+}
+
+TEST(PatchOctree, InterpolatesItsVerticesAndHoldsTheSurface) {
+  PatchOctree tree = *PatchOctree::uniform(2);
+  const auto moved = random_displacements(tree, 0.04, 8);
+  tree.set_displacements(moved);
+  for (std::size_t i = 0; i < moved.size(); ++i)
+    EXPECT_LT((tree.displacement(tree.vertex(i)) - moved[i]).norm(), 1e-12);
+  EXPECT_EQ(tree.displacements().size(), moved.size());
+  EXPECT_EQ(tree.displacement({0, 0.3, 0.6}), Vector3d::Zero());
+  EXPECT_EQ(tree.displacement({0.4, 1, 0.6}), Vector3d::Zero());
+  EXPECT_EQ(tree.displacement({1.2, 0.5, 0.5}), Vector3d::Zero());
+}
+
+TEST(PatchOctree, JacobianIsWhatCentralDifferencesSay) {
+  PatchOctree tree = mixed();
+  tree.set_displacements(random_displacements(tree, 0.02, 15));
+  for (const Vector3d& x : {Vector3d(0.31, 0.42, 0.77), Vector3d(0.8, 0.2, 0.3), Vector3d(0.13, 0.9, 0.55)}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3d e = 1e-6 * Vector3d::Unit(axis);
+      const Vector3d numeric = (2 * e + tree.displacement(x + e) - tree.displacement(x - e)) / 2e-6;
+      EXPECT_LT((tree.jacobian(x).col(axis) - numeric).norm(), 1e-8);
+    }
+  }
+}
+
+TEST(PatchOctree, InverseUndoesTheMap) {
+  for (const int level : {1, 3, 5}) {
+    PatchOctree tree = *PatchOctree::uniform(level);
+    tree.set_displacements(random_displacements(tree, 0.18 / (1 << level), 21));
+    for (const double d : tree.least_determinants()) ASSERT_GT(d, 0);
+    std::mt19937 rng(3);
+    std::uniform_real_distribution<double> uniform(0.02, 0.98);
+    for (int i = 0; i < 300; ++i) {
+      const Vector3d x(uniform(rng), uniform(rng), uniform(rng));
+      const auto back = tree.inverse(x + tree.displacement(x), 1e-9);
+      ASSERT_TRUE(back) << level;
+      EXPECT_LT((*back - x).norm(), 1e-7);
+    }
+  }
+}
+
+TEST(PatchOctree, BoundsTheDeterminantAndFindsFolds) {
+  PatchOctree tree = *PatchOctree::uniform(2);
+  tree.set_displacements(random_displacements(tree, 0.06, 33));
+  const auto bound = tree.least_determinants();
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (int i = 0; i < 3000; ++i) {
+    const Vector3d x(uniform(rng), uniform(rng), uniform(rng));
+    EXPECT_GE(tree.jacobian(x).determinant(), bound[tree.patch_at(x)] - 1e-12);
+  }
+  auto folded = tree.displacements();
+  folded[13] += Vector3d(0.4, 0, 0);
+  tree.set_displacements(folded);
+  const auto after = tree.least_determinants();
+  EXPECT_LT(*std::min_element(after.begin(), after.end()), 0);
+}
+
+}  // namespace
+}  // namespace birdseye::host
