@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "host/deform/bezier_patch.hpp"
 #include "host/deform/patch_octree.hpp"
 
 namespace birdseye::host {
@@ -119,6 +120,33 @@ TEST(PatchOctree, BoundsTheDeterminantAndFindsFolds) {
   tree.set_displacements(folded);
   const auto after = tree.least_determinants();
   EXPECT_LT(*std::min_element(after.begin(), after.end()), 0);
+}
+
+TEST(BezierPatch, OneInnerPointOfDegreeTwoIsTheProductOfItsPolynomials) {
+  BezierPatch patch = *BezierPatch::create({2, 2, 2});
+  EXPECT_EQ(patch.free_points(), 1U);
+  patch.set_displacements({Vector3d(0.1, -0.2, 0.05)});
+  const Vector3d x(0.3, 0.6, 0.8);
+  const auto b = [](double t) { return 2 * t * (1 - t); };
+  EXPECT_LT((patch.displacement(x) - b(0.3) * b(0.6) * b(0.8) * Vector3d(0.1, -0.2, 0.05)).norm(), 1e-15);
+  EXPECT_EQ(patch.displacement({0, 0.5, 0.5}), Vector3d::Zero());
+}
+
+TEST(BezierPatch, AnyDegreePerAxisSumsToOneAndDrivesTheVertices) {
+  BezierPatch patch = *BezierPatch::create({3, 5, 16});
+  EXPECT_EQ(patch.free_points(), 2U * 4U * 15U);
+  std::vector<Vector3d> displacements(patch.free_points(), Vector3d(0.02, 0, 0));
+  patch.set_displacements(displacements);
+  // All inner points alike: short of the whole displacement by the share of the points of the surface.
+  EXPECT_GT(patch.displacement({0.5, 0.5, 0.5}).x(), 0.012);
+  EXPECT_LT(patch.displacement({0.5, 0.5, 0.5}).x(), 0.02);
+  PatchOctree tree = *PatchOctree::uniform(3);
+  patch.drive(tree);
+  for (std::size_t i = 0; i < tree.free_vertices(); ++i) {
+    EXPECT_LT((tree.displacement(tree.vertex(i)) - patch.displacement(tree.vertex(i))).norm(), 1e-12);
+  }
+  EXPECT_FALSE(BezierPatch::create({0, 2, 2}));
+  EXPECT_FALSE(BezierPatch::create({2, 2, 17}));
 }
 
 }  // namespace
