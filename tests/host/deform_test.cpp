@@ -5,7 +5,9 @@
 #include <random>
 
 #include "host/deform/bezier_patch.hpp"
+#include "host/deform/displacement_field.hpp"
 #include "host/deform/patch_octree.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -147,6 +149,61 @@ TEST(BezierPatch, AnyDegreePerAxisSumsToOneAndDrivesTheVertices) {
   }
   EXPECT_FALSE(BezierPatch::create({0, 2, 2}));
   EXPECT_FALSE(BezierPatch::create({2, 2, 17}));
+}
+
+Eigen::Affine3d oblique_box() {
+  Eigen::Affine3d box = Eigen::Affine3d::Identity();
+  box.rotate(Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()));
+  box.scale(Vector3d(120, 90, 150));
+  box.translation() = Vector3d(-40, 10, 200);
+  return box;
+}
+
+TEST(DisplacementField, IsTheOctreeExactly) {
+  PatchOctree tree = mixed();
+  tree.set_displacements(random_displacements(tree, 0.03, 2));
+  const Eigen::Affine3d box = oblique_box();
+  const DisplacementField field = field_of(tree, box);
+  std::mt19937 rng(9);
+  std::uniform_real_distribution<double> uniform(0.001, 0.999);
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d x(uniform(rng), uniform(rng), uniform(rng));
+    EXPECT_LT((field.displacement(box * x) - box.linear() * tree.displacement(x)).norm(), 2e-6);
+  }
+  EXPECT_EQ(field.displacement(box * Vector3d(1.2, 0.5, 0.5)), Vector3d::Zero());
+}
+
+TEST(DisplacementField, ComesBackFromItsFileInEveryFormat) {
+  const testing::Scratch scratch;
+  PatchOctree tree = *PatchOctree::uniform(2);
+  tree.set_displacements(random_displacements(tree, 0.02, 6));
+  const DisplacementField field = field_of(tree, oblique_box());
+  for (const char* name : {"f.mha", "f.nrrd", "f.nii.gz"}) {
+    ASSERT_TRUE(write_field(scratch / name, field)) << name;
+    const auto back = read_field(scratch / name);
+    ASSERT_TRUE(back) << back.error().what;
+    EXPECT_EQ(back->size, field.size);
+    for (const Vector3d& x : {Vector3d(0.3, 0.4, 0.7), Vector3d(0.9, 0.1, 0.5)}) {
+      const Vector3d p = oblique_box() * x;
+      EXPECT_LT((back->displacement(p) - field.displacement(p)).norm(), 1e-3) << name;
+    }
+  }
+}
+
+TEST(DisplacementField, RefusesWhatIsNoSoundField) {
+  const testing::Scratch scratch;
+  EXPECT_EQ(read_field(scratch / "none.mha").error().code, Errc::not_found);
+  EXPECT_EQ(read_field(scratch.file("text.mha", "no field")).error().code, Errc::bad_format);
+  PatchOctree tree = *PatchOctree::uniform(1);
+  tree.set_displacements({Vector3d(0.8, 0, 0)});
+  ASSERT_TRUE(write_field(scratch / "fold.mha", field_of(tree, oblique_box())));
+  const auto folded = read_field(scratch / "fold.mha");
+  ASSERT_FALSE(folded);
+  EXPECT_NE(folded.error().what.find("folds"), std::string::npos);
+  tree.set_displacements({Vector3d(NAN, 0, 0)});
+  ASSERT_TRUE(write_field(scratch / "nan.mha", field_of(tree, oblique_box())));
+  EXPECT_NE(read_field(scratch / "nan.mha").error().what.find("not finite"), std::string::npos);
+  EXPECT_FALSE(write_field(scratch / "field.txt", field_of(tree, oblique_box())));
 }
 
 }  // namespace

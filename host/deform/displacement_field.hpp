@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <filesystem>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/deform/patch_octree.hpp"
+
+namespace birdseye::host {
+
+/// Displacements on a regular lattice over a box of the patient, trilinear between its points, zero outside: what is
+/// seen at a static point p is what the undeformed volume has at p + u(p). Every octree of patches is exactly such a
+/// field.
+struct DisplacementField {
+  std::array<int, 3> size{};
+  std::vector<Eigen::Vector3f> displacement_mm;  ///< patient LPS, x fastest
+  Eigen::Affine3d patient_from_lattice = Eigen::Affine3d::Identity();
+
+  [[nodiscard]] const Eigen::Vector3f& at(int i, int j, int k) const {
+    return displacement_mm[(static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) +
+                            static_cast<std::size_t>(j)) *
+                               static_cast<std::size_t>(size[0]) +
+                           static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] Eigen::Vector3d displacement(const Eigen::Vector3d& point_in_patient_mm) const;
+};
+
+/// tree over the box whose unit cube patient_from_cube gives.
+DisplacementField field_of(const PatchOctree& tree, const Eigen::Affine3d& patient_from_cube);
+
+/// As an ITK displacement field: a vector image, LPS mm, which any program on ITK reads (.mha, .nrrd, .nii.gz). Reading
+/// refuses, naming the file: what is no such image, numbers that are not finite, and fields that fold.
+Result<void> write_field(const std::filesystem::path& path, const DisplacementField& field);
+Result<DisplacementField> read_field(const std::filesystem::path& path);
+
+/// The least Jacobian determinant of p + u(p) over the corners of the lattice's cells.
+double least_determinant(const DisplacementField& field);
+
+}  // namespace birdseye::host
