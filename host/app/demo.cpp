@@ -332,8 +332,9 @@ Result<ExitCode> demo(const Options& options) {
   std::error_code error;
   fs::create_directories(out, error);
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", out.string())};
-  if (!settings.ct.empty() && !fs::exists(settings.ct, error)) {
-    return Error{Errc::not_found, fmt::format("{}: no such file", settings.ct.string())};
+  if (!settings.ct.empty()) {
+    // With the host's own checks: what would be stacked wrongly is refused here, with the reason.
+    if (const auto sound = import_volume(settings.ct); !sound) return sound.error();
   }
   for (const char* name :
        {"report.json", "report.html", "overlay.png", "video.png", "overlay.mp4", "simulator.log", "birdseyed.log"}) {

@@ -30,7 +30,8 @@ int main(int argc, char** argv) {
   CLI::App& make = *app.add_subcommand("phantom", "write a patient: DICOM series, labels, surfaces, truth");
   make.add_option("--out", phantom.folder, "folder to write")->required();
   make.add_option("--seed", phantom.seed, "everything random follows from it");
-  make.add_option("--ct", phantom.ct, "a CT to build on (NIfTI, NRRD, MHA) in place of the procedural body");
+  make.add_option("--ct", phantom.ct,
+                  "a CT to build on (DICOM folder, NIfTI, NRRD, MHA) in place of the procedural body");
   make.add_option("--labels", phantom.labels, "organ labels of that CT")->needs("--ct");
   make.add_option("--liver-label", phantom.liver_label, "the liver's value in the labels");
   make.callback([&] { take(hw_sim::write_phantom(phantom)); });

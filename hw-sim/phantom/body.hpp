@@ -20,8 +20,9 @@ struct Body {
 /// A procedural torso: wall of fat and muscle, ribs, spine, kidneys, spleen, great vessels and a liver of two lobes.
 Body procedural_body(std::uint64_t seed);
 
-/// A CT of the user's own (any file that ITK reads), resampled to axes along the patient and at most 2 mm. The liver is
-/// taken from labels where given (label value), else found as the largest thick region of soft tissue on the right.
+/// A CT of the user's own (a folder of one DICOM series, NIfTI, NRRD or MHA), resampled to axes along the patient and
+/// at most 2 mm. The liver is taken from labels where given (label value), else found as the largest thick region of
+/// soft tissue on the right.
 Result<Body> body_from_ct(const std::filesystem::path& ct, const std::filesystem::path& labels, int liver_label);
 
 }  // namespace birdseye::hw_sim

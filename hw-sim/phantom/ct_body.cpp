@@ -1,9 +1,11 @@
+#include <fmt/format.h>
 #include <itkBinaryThresholdImageFilter.h>
 #include <itkConnectedComponentImageFilter.h>
-#include <itkIdentityTransform.h>
+#include <itkGDCMImageIO.h>
 #include <itkImage.h>
 #include <itkImageFileReader.h>
 #include <itkImageRegionIterator.h>
+#include <itkImageSeriesReader.h>
 #include <itkLinearInterpolateImageFunction.h>
 #include <itkMetaImageIOFactory.h>
 #include <itkNearestNeighborInterpolateImageFunction.h>
@@ -14,14 +16,15 @@
 #include <itkSignedMaurerDistanceMapImageFilter.h>
 #include <itkSmoothingRecursiveGaussianImageFilter.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "hw-sim/phantom/body.hpp"
-
-#include <fmt/format.h>
 
 namespace birdseye::hw_sim {
 
@@ -31,7 +34,34 @@ using Image = itk::Image<float, 3>;
 using Mask = itk::Image<unsigned char, 3>;
 using Components = itk::Image<unsigned int, 3>;
 
+/// A folder of one straight, even DICOM series (the host refuses others before it comes here), ordered by place.
+Image::Pointer read_series(const std::filesystem::path& folder) {
+  std::vector<std::pair<double, std::string>> slices;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const auto io = itk::GDCMImageIO::New();
+    if (!entry.is_regular_file() || !io->CanReadFile(entry.path().c_str())) continue;
+    io->SetFileName(entry.path().string());
+    io->ReadImageInformation();
+    const auto row = io->GetDirection(0);
+    const auto column = io->GetDirection(1);
+    const Eigen::Vector3d normal =
+        Eigen::Vector3d(row[0], row[1], row[2]).cross(Eigen::Vector3d(column[0], column[1], column[2]));
+    slices.emplace_back(normal.dot(Eigen::Vector3d(io->GetOrigin(0), io->GetOrigin(1), io->GetOrigin(2))),
+                        entry.path().string());
+  }
+  std::sort(slices.begin(), slices.end());
+  itk::ImageSeriesReader<Image>::FileNamesContainer names;
+  for (const auto& [along, name] : slices) names.push_back(name);
+  const auto reader = itk::ImageSeriesReader<Image>::New();
+  reader->SetImageIO(itk::GDCMImageIO::New());
+  reader->SetFileNames(names);
+  reader->ForceOrthogonalDirectionOff();
+  reader->Update();
+  return reader->GetOutput();
+}
+
 Image::Pointer read(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) return read_series(path);
   const auto reader = itk::ImageFileReader<Image>::New();
   reader->SetFileName(path.string());
   reader->Update();
@@ -190,7 +220,7 @@ Result<Body> body_from_ct(const std::filesystem::path& ct, const std::filesystem
   } catch (const std::exception&) {
     // ITK's own message is many lines of its source places; the file and the remedy are what a user needs.
     return Error{Errc::unreadable,
-                 fmt::format("{}: cannot be read as a CT; give a NIfTI, NRRD or MHA file", at_work.string())};
+                 fmt::format("{}: cannot be read as a CT; give a DICOM folder, NIfTI, NRRD or MHA", at_work.string())};
   }
 }
 
