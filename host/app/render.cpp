@@ -19,7 +19,7 @@ namespace birdseye::host {
 namespace {
 
 struct Options {
-  std::filesystem::path volume, camera, pose, out, json;
+  std::filesystem::path volume, camera, pose, deformation, out, json;
   std::string transfer = "abdomen", size = "900x900";
   double clip = 0.5;
   double step_mm = 0.7;
@@ -100,13 +100,19 @@ Result<void> render(const Options& options) {
   if (!volume) return volume.error();
   const auto view = view_of(*volume, options);
   if (!view) return view.error();
+  std::optional<DisplacementField> deformation;
+  if (!options.deformation.empty()) {
+    auto field = read_field(options.deformation);
+    if (!field) return field.error();
+    deformation = *std::move(field);
+  }
   RenderSettings settings;
   settings.step_mm = options.step_mm;
   settings.clip = view->clip;
   const LensRays rays(view->camera);
   const RayCaster caster(*volume, *transfer);
   const auto began = std::chrono::steady_clock::now();
-  ImageRgba image = caster.render(rays, view->camera_from_patient, settings);
+  ImageRgba image = caster.render(rays, view->camera_from_patient, settings, deformation ? &*deformation : nullptr);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
   std::size_t covered = 0;
   for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
@@ -135,6 +141,7 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--volume", options->volume, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
   command.add_option("--camera", options->camera, "lens, OpenCV YAML; without it a view that shows the whole volume");
   command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
+  command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
   command.add_option("--out", options->out, "PNG to write, RGBA")->required();
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");

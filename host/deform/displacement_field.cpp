@@ -7,28 +7,54 @@
 
 namespace birdseye::host {
 
-Eigen::Vector3d DisplacementField::displacement(const Eigen::Vector3d& point_in_patient_mm) const {
-  const Eigen::Vector3d x = patient_from_lattice.inverse() * point_in_patient_mm;
-  int base[3];
-  double part[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const int last = size[static_cast<std::size_t>(axis)] - 1;
-    if (x[axis] < 0 || x[axis] > last) return Eigen::Vector3d::Zero();
-    base[axis] = std::min(static_cast<int>(x[axis]), std::max(0, last - 1));
-    part[axis] = x[axis] - base[axis];
+namespace {
+
+/// The cell of a point in lattice coordinates and where in it; false outside the lattice.
+bool cell_of(const std::array<int, 3>& size, const Eigen::Vector3d& x, std::array<int, 3>& base,
+             Eigen::Vector3d& part) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int last = size[axis] - 1;
+    const double v = x[static_cast<Eigen::Index>(axis)];
+    if (!(v >= 0 && v <= last)) return false;
+    base[axis] = std::min(static_cast<int>(v), std::max(0, last - 1));
+    part[static_cast<Eigen::Index>(axis)] = v - base[axis];
   }
+  return true;
+}
+
+}  // namespace
+
+Eigen::Vector3d DisplacementField::displacement(const Eigen::Vector3d& point_in_patient_mm) const {
+  std::array<int, 3> base{};
+  Eigen::Vector3d t;
+  if (!cell_of(size, patient_from_lattice.inverse() * point_in_patient_mm, base, t)) return Eigen::Vector3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int c = 0; c < 8; ++c) {
-    double w = 1;
-    int v[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int bit = c >> axis & 1;
-      w *= bit != 0 ? part[axis] : 1 - part[axis];
-      v[axis] = std::min(base[axis] + bit, size[static_cast<std::size_t>(axis)] - 1);
-    }
-    sum += w * at(v[0], v[1], v[2]).cast<double>();
+    const int i = c & 1, j = c >> 1 & 1, k = c >> 2;
+    const double w = (i != 0 ? t.x() : 1 - t.x()) * (j != 0 ? t.y() : 1 - t.y()) * (k != 0 ? t.z() : 1 - t.z());
+    sum += w * at(base[0] + i, base[1] + j, base[2] + k).cast<double>();
   }
   return sum;
+}
+
+Eigen::Matrix3d DisplacementField::gradient(const Eigen::Vector3d& point_in_patient_mm) const {
+  std::array<int, 3> base{};
+  Eigen::Vector3d t;
+  const Eigen::Affine3d lattice_from_patient = patient_from_lattice.inverse();
+  if (!cell_of(size, lattice_from_patient * point_in_patient_mm, base, t)) return Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d by_lattice = Eigen::Matrix3d::Zero();
+  for (int c = 0; c < 8; ++c) {
+    const int bit[] = {c & 1, c >> 1 & 1, c >> 2};
+    const Eigen::Vector3d u = at(base[0] + bit[0], base[1] + bit[1], base[2] + bit[2]).cast<double>();
+    for (int axis = 0; axis < 3; ++axis) {
+      double w = bit[axis] != 0 ? 1 : -1;
+      for (int other = 0; other < 3; ++other) {
+        if (other != axis) w *= bit[other] != 0 ? t[other] : 1 - t[other];
+      }
+      by_lattice.col(axis) += w * u;
+    }
+  }
+  return by_lattice * lattice_from_patient.linear();
 }
 
 DisplacementField field_of(const PatchOctree& tree, const Eigen::Affine3d& patient_from_cube) {

@@ -26,6 +26,8 @@ struct DisplacementField {
                            static_cast<std::size_t>(i)];
   }
   [[nodiscard]] Eigen::Vector3d displacement(const Eigen::Vector3d& point_in_patient_mm) const;
+  /// du/dp within the lattice cell of the point; zero outside the box.
+  [[nodiscard]] Eigen::Matrix3d gradient(const Eigen::Vector3d& point_in_patient_mm) const;
 };
 
 /// tree over the box whose unit cube patient_from_cube gives.

@@ -2,6 +2,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <random>
 
 #include "host/overlay/compositor.hpp"
 #include "host/overlay/gate.hpp"
@@ -57,9 +58,11 @@ Transform<Camera, Patient> pose(const Volume& v) {
   return {r, Eigen::Vector3d(0, 0, 110) - r * middle};
 }
 
-void expect_agreement(const Volume& volume, const RenderSettings& settings) {
-  const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), settings);
-  const std::vector<double> reference = testing::render_reference(volume, soft(), lens(), pose(volume), settings);
+void expect_agreement(const Volume& volume, const RenderSettings& settings,
+                      const DisplacementField* deformation = nullptr) {
+  const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), settings, deformation);
+  const std::vector<double> reference =
+      testing::render_reference(volume, soft(), lens(), pose(volume), settings, deformation);
   double sum = 0, worst = 0, brightest = 0;
   for (std::size_t i = 0; i < reference.size(); ++i) {
     const double error = std::abs(picture.rgba[i] - 255 * reference[i]);
@@ -85,6 +88,36 @@ TEST(RayCaster, AgreesWithTheReferenceWhenClippedAndFromInside) {
   settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
   settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
   expect_agreement(volume, settings);
+}
+
+/// Patches over the whole volume, their vertices moved at random, in part by more than a brick.
+DisplacementField bent(const Volume& volume, int level, double amount, unsigned seed) {
+  PatchOctree tree = *PatchOctree::uniform(level);
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> uniform(-amount, amount);
+  std::vector<Eigen::Vector3d> moves;
+  for (std::size_t i = 0; i < tree.free_vertices(); ++i) moves.emplace_back(uniform(rng), uniform(rng), uniform(rng));
+  tree.set_displacements(moves);
+  const Eigen::Vector3d last(volume.size[0] - 1, volume.size[1] - 1, volume.size[2] - 1);
+  return field_of(tree, volume.patient_from_voxel * Eigen::Scaling(last));
+}
+
+TEST(RayCaster, AgreesWithTheReferenceWhenDeformed) {
+  const Volume volume = scene();
+  RenderSettings settings;
+  settings.step_mm = 0.8;
+  const DisplacementField coarse = bent(volume, 1, 0.2, 3);
+  const DisplacementField fine = bent(volume, 3, 0.03, 4);
+  expect_agreement(volume, settings, &coarse);
+  expect_agreement(volume, settings, &fine);
+}
+
+TEST(RayCaster, ADeformationOfNothingChangesNothing) {
+  const Volume volume = scene();
+  const DisplacementField nothing = bent(volume, 2, 0, 1);
+  const RayCaster caster(volume, soft());
+  const LensRays rays(lens());
+  EXPECT_EQ(caster.render(rays, pose(volume), {}, &nothing).rgba, caster.render(rays, pose(volume), {}).rgba);
 }
 
 TEST(RayCaster, AnEmptyVolumeIsTransparent) {

@@ -36,7 +36,7 @@ double value(const host::Volume& v, const Vector3d& x) {
 
 std::vector<double> render_reference(const host::Volume& volume, const host::TransferFunction& transfer,
                                      const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
-                                     const host::RenderSettings& settings) {
+                                     const host::RenderSettings& settings, const host::DisplacementField* deformation) {
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
   const Eigen::Affine3d voxel_from_patient = volume.patient_from_voxel.inverse();
   const Vector3d last(volume.size[0] - 1, volume.size[1] - 1, volume.size[2] - 1);
@@ -59,7 +59,10 @@ std::vector<double> render_reference(const host::Volume& volume, const host::Tra
       for (int i = 0; (i + 0.5) * h <= reach; ++i) {
         const double s = (i + 0.5) * h;
         const Vector3d p = o + s * d;
-        const Vector3d x = voxel_from_patient * p;
+        const Vector3d still = voxel_from_patient * p;
+        if (still.minCoeff() < 0 || (last - still).minCoeff() < 0) continue;
+        const Vector3d moved = deformation != nullptr ? Vector3d(p + deformation->displacement(p)) : p;
+        const Vector3d x = voxel_from_patient * moved;
         if (x.minCoeff() < 0 || (last - x).minCoeff() < 0 || s < settings.near_mm) continue;
         if (settings.clip && settings.clip->normal.dot(p) < settings.clip->offset_mm) continue;
         const auto& entry = transfer.at(static_cast<int>(std::lround(value(volume, x))));
@@ -69,7 +72,8 @@ std::vector<double> render_reference(const host::Volume& volume, const host::Tra
           const Vector3d e = Vector3d::Unit(axis);
           g_voxel[axis] = 0.5 * (value(volume, (x + e).cwiseMin(last)) - value(volume, (x - e).cwiseMax(0.0)));
         }
-        const Vector3d g = voxel_from_patient.linear().transpose() * g_voxel;
+        Vector3d g = voxel_from_patient.linear().transpose() * g_voxel;
+        if (deformation != nullptr) g += deformation->gradient(p).transpose() * Vector3d(g);
         const double facing = g.norm() > 0 ? std::abs(g.dot(d)) / g.norm() : 0;
         const double m = std::min(1.0, g.norm() / settings.surface_gradient_hu_per_mm);
         const double shade = (1 - m) + m * (settings.ambient + settings.diffuse * facing);

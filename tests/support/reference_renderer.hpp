@@ -4,6 +4,7 @@
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "host/deform/displacement_field.hpp"
 #include "host/render/scene.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
@@ -14,6 +15,7 @@ namespace birdseye::testing {
 /// Premultiplied RGBA in [0, 1], four doubles a pixel.
 std::vector<double> render_reference(const host::Volume& volume, const host::TransferFunction& transfer,
                                      const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
-                                     const host::RenderSettings& settings);
+                                     const host::RenderSettings& settings,
+                                     const host::DisplacementField* deformation = nullptr);
 
 }  // namespace birdseye::testing

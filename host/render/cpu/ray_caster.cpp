@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace birdseye::host {
 
@@ -136,7 +137,7 @@ Vector3f RayCaster::gradient(const Vector3f& x) const {
     before[axis] = std::max(x[axis] - 1, 0.0F);
     g[axis] = 0.5F * (trilinear(after) - trilinear(before));
   }
-  return patient_gradient_from_voxel_ * g;
+  return g;
 }
 
 /// A ray in voxel coordinates: x(s) = origin + s * step, s in mm; direction is its unit direction in the patient.
@@ -169,7 +170,74 @@ struct RayCaster::Tables {
   }
 };
 
-Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const RenderSettings& settings) const {
+/// A displacement field as samples need it: in voxels of the volume, with how far it moves anything at most.
+class RayCaster::Warp {
+ public:
+  Warp(const DisplacementField& field, const Volume& volume) : size_(field.size) {
+    const Eigen::Affine3d voxel_from_patient = volume.patient_from_voxel.inverse();
+    const Eigen::Affine3d lattice_from_voxel = field.patient_from_lattice.inverse() * volume.patient_from_voxel;
+    lattice_from_voxel_ = lattice_from_voxel.linear().cast<float>();
+    offset_ = lattice_from_voxel.translation().cast<float>();
+    const Eigen::Matrix3f to_voxels = voxel_from_patient.linear().cast<float>();
+    moves_.reserve(field.displacement_mm.size());
+    for (const Vector3f& u : field.displacement_mm) {
+      moves_.emplace_back(to_voxels * u);
+      most_ = std::max(most_, moves_.back().cwiseAbs().maxCoeff());
+    }
+  }
+  /// The largest displacement along any voxel axis, voxels.
+  [[nodiscard]] float most() const { return most_; }
+  /// u(x) and du/dx in voxels; both zero outside the field.
+  void at(const Vector3f& x, Vector3f& u, Eigen::Matrix3f& gradient) const {
+    const Vector3f lattice = lattice_from_voxel_ * x + offset_;
+    u.setZero();
+    gradient.setZero();
+    int base[3];
+    float t[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const int last = size_[static_cast<std::size_t>(axis)] - 1;
+      if (!(lattice[axis] >= 0 && lattice[axis] <= static_cast<float>(last))) return;
+      base[axis] = std::min(static_cast<int>(lattice[axis]), std::max(0, last - 1));
+      t[axis] = lattice[axis] - static_cast<float>(base[axis]);
+    }
+    const auto row = static_cast<std::size_t>(size_[0]);
+    const std::size_t slice = row * static_cast<std::size_t>(size_[1]);
+    const Vector3f* const p = &moves_[static_cast<std::size_t>(base[2]) * slice +
+                                      static_cast<std::size_t>(base[1]) * row + static_cast<std::size_t>(base[0])];
+    // Along x, then y, then z; the differences on the way are the derivatives.
+    Vector3f value[4], slope[4];
+    for (std::size_t n = 0; n < 4; ++n) {
+      const Vector3f* const q = p + (n & 1U) * row + (n >> 1U) * slice;
+      slope[n] = q[1] - q[0];
+      value[n] = q[0] + t[0] * slope[n];
+    }
+    const Vector3f low = value[0] + t[1] * (value[1] - value[0]);
+    const Vector3f high = value[2] + t[1] * (value[3] - value[2]);
+    u = low + t[2] * (high - low);
+    const Vector3f low_x = slope[0] + t[1] * (slope[1] - slope[0]);
+    const Vector3f high_x = slope[2] + t[1] * (slope[3] - slope[2]);
+    Eigen::Matrix3f by_lattice;
+    by_lattice.col(0) = low_x + t[2] * (high_x - low_x);
+    by_lattice.col(1) = (value[1] - value[0]) + t[2] * ((value[3] - value[2]) - (value[1] - value[0]));
+    by_lattice.col(2) = high - low;
+    gradient = by_lattice * lattice_from_voxel_;
+  }
+
+ private:
+  std::array<int, 3> size_;
+  Eigen::Matrix3f lattice_from_voxel_;
+  Vector3f offset_;
+  std::vector<Vector3f> moves_;
+  float most_ = 0;
+};
+
+Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const Warp* warp,
+                                const RenderSettings& settings) const {
+  // What a sample reads may lie this many bricks from where the sample is: that much nearer, emptiness is not to be
+  // had.
+  const int margin = warp == nullptr ? 0 : static_cast<int>(std::ceil(warp->most() / kBrick));
+  Vector3f move = Vector3f::Zero();
+  Eigen::Matrix3f move_gradient = Eigen::Matrix3f::Zero();
   const auto h = static_cast<float>(settings.step_mm);
   const auto ambient = static_cast<float>(settings.ambient);
   const auto diffuse = static_cast<float>(settings.diffuse);
@@ -189,7 +257,8 @@ Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const Rend
     const int empty = empty_[(static_cast<std::size_t>(brick[2]) * static_cast<std::size_t>(bricks_[1]) +
                               static_cast<std::size_t>(brick[1])) *
                                  static_cast<std::size_t>(bricks_[0]) +
-                             static_cast<std::size_t>(brick[0])];
+                             static_cast<std::size_t>(brick[0])] -
+                      margin;
     if (empty > 0) {
       // To the first sample past the cube of empty bricks around this one.
       float exit = std::numeric_limits<float>::max();
@@ -202,12 +271,20 @@ Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const Rend
       continue;
     }
     ++i;
-    const float f = trilinear(x);
+    Vector3f y = x;
+    if (warp != nullptr) {
+      warp->at(x, move, move_gradient);
+      y += move;
+      if (y.minCoeff() < 0 || (last_ - y).minCoeff() < 0) continue;
+    }
+    const float f = trilinear(y);
     const int hu = static_cast<int>(f + (f < 0 ? -0.5F : 0.5F));
     const float opacity = tables.opacity_at(hu);
     if (opacity <= 0) continue;
     const TransferFunction::Entry& entry = transfer_.at(hu);
-    const Vector3f g = gradient(x);
+    Vector3f in_voxels = gradient(y);
+    if (warp != nullptr) in_voxels += move_gradient.transpose() * in_voxels.eval();
+    const Vector3f g = patient_gradient_from_voxel_ * in_voxels;
     const float length = g.norm();
     const float surface = std::min(1.0F, length * per_g0);
     const float facing = length > 0 ? std::min(1.0F, std::abs(g.dot(ray.direction)) / length) : 0.0F;
@@ -221,8 +298,10 @@ Eigen::Array4f RayCaster::march(const Ray& ray, const Tables& tables, const Rend
 }
 
 ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patient>& camera_from_patient,
-                            const RenderSettings& settings) const {
+                            const RenderSettings& settings, const DisplacementField* deformation) const {
   const CameraModel& camera = rays.camera();
+  std::optional<Warp> warp;
+  if (deformation != nullptr) warp.emplace(*deformation, volume_);
   ImageRgba image{camera.width_px, camera.height_px, {}};
   image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
@@ -254,7 +333,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
       (along > 0 ? ray.enter_mm = std::max(ray.enter_mm, at) : ray.leave_mm = std::min(ray.leave_mm, at));
     }
     if (!(ray.enter_mm < ray.leave_mm)) return;
-    const Eigen::Array4f rgba = march(ray, tables, settings);
+    const Eigen::Array4f rgba = march(ray, tables, warp ? &*warp : nullptr, settings);
     for (std::size_t channel = 0; channel < 4; ++channel) {
       image.rgba[4 * pixel + channel] = byte_of(rgba[static_cast<Eigen::Index>(channel)]);
     }

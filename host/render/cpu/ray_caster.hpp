@@ -5,6 +5,7 @@
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "host/deform/displacement_field.hpp"
 #include "host/render/scene.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
@@ -32,15 +33,18 @@ class RayCaster {
   /// Keeps a reference to volume, which must outlive it.
   RayCaster(const Volume& volume, const TransferFunction& transfer);
 
+  /// deformation: null for the volume as it was scanned.
   [[nodiscard]] ImageRgba render(const LensRays& rays, const Transform<Camera, Patient>& camera_from_patient,
-                                 const RenderSettings& settings) const;
+                                 const RenderSettings& settings, const DisplacementField* deformation = nullptr) const;
 
  private:
   struct Ray;
   struct Tables;
+  class Warp;
   [[nodiscard]] float trilinear(const Eigen::Vector3f& x) const;
   [[nodiscard]] Eigen::Vector3f gradient(const Eigen::Vector3f& x) const;
-  [[nodiscard]] Eigen::Array4f march(const Ray& ray, const Tables& tables, const RenderSettings& settings) const;
+  [[nodiscard]] Eigen::Array4f march(const Ray& ray, const Tables& tables, const Warp* warp,
+                                     const RenderSettings& settings) const;
   void measure_empty_bricks();
 
   static constexpr int kBrick = 4;
