@@ -1,0 +1,89 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "device/wire/messages.hpp"
+#include "host/app/board_stations.hpp"
+#include "host/app/demo_report.hpp"
+#include "host/app/event_stream.hpp"
+#include "host/app/film.hpp"
+#include "host/app/picture.hpp"
+#include "host/app/progress.hpp"
+#include "host/app/simulated_cart.hpp"
+#include "host/overlay/gate.hpp"
+#include "host/registration/touch_detector.hpp"
+#include "host/render/cpu/ray_caster.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// What is read of the CT before the operation: all that the appliance does not send.
+struct Plan {
+  Volume shown;
+  Eigen::Vector3d tumour_centre_in_patient_mm;
+  std::vector<Eigen::Vector3d> markers_in_patient_mm;
+};
+/// patient: a folder that the simulator made; its CT must show at least this many fiducials.
+Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials);
+
+/// What calibration and registration found; with it a frame's pose gives where the CT lies before the camera.
+struct Setup {
+  CameraModel camera;
+  Transform<Camera, Sensor> camera_from_sensor;
+  Transform<Tracker, Patient> tracker_from_patient;
+};
+
+struct OverlaidFrame {
+  std::uint64_t sequence;
+  DeviceTime acquired;
+  Transform<Camera, Patient> camera_from_patient;
+};
+
+struct KeptFrame {
+  std::uint64_t sequence;
+  Picture video, overlay;
+};
+
+/// One run of the demo: takes the appliance's events in order and does what the stage asks for.
+class DemoSession {
+ public:
+  DemoSession(SimulatedCart& cart, const calibration::BoardSpec& board, const Plan& plan, Film film, Progress& progress)
+      : cart_(cart), board_(board), plan_(plan), film_(std::move(film)), progress_(progress), stations_(board) {}
+
+  /// Until the operation has ended and its last frame has come.
+  Result<void> run(EventStream& stream);
+  Result<void> finish() { return film_.finish(); }
+
+  DemoFigures figures;
+  std::vector<OverlaidFrame> overlaid;
+  std::vector<KeptFrame> kept;
+  std::optional<Setup> setup;
+
+ private:
+  [[nodiscard]] std::string stage_at(DeviceTime time) const;
+  Result<void> take(const wire::Birds& birds);
+  Result<void> take(const wire::VideoFrame& frame);
+  Result<void> calibrate_and_register(const CameraModel& size);
+  Result<void> overlay(const wire::VideoFrame& frame);
+
+  SimulatedCart& cart_;
+  calibration::BoardSpec board_;
+  const Plan& plan_;
+  Film film_;
+  Progress& progress_;
+  BoardStations stations_;
+  TouchDetector touch_detector_;
+  std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
+  OverlayGate gate_;
+  std::unique_ptr<LensRays> rays_;
+  std::unique_ptr<RayCaster> caster_;
+  std::optional<std::uint64_t> first_sequence_;
+  DeviceTime first_measurement_;
+  int measurements_ = 0;
+};
+
+}  // namespace birdseye::host
