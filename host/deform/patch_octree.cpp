@@ -14,6 +14,11 @@ namespace {
 using Eigen::Vector3d;
 constexpr int kSide = PatchOctree::kLattice + 1;
 
+std::size_t cell_index(int i, int j, int k) {
+  constexpr std::size_t kCells = PatchOctree::kLattice;
+  return (static_cast<std::size_t>(k) * kCells + static_cast<std::size_t>(j)) * kCells + static_cast<std::size_t>(i);
+}
+
 /// Trilinear weights' derivatives and values share this: corner c of a cell, at local coordinates t in [0, 1].
 double weight(int corner, const Vector3d& t) {
   double w = 1;
@@ -60,7 +65,7 @@ Result<PatchOctree> PatchOctree::adaptive(const std::function<bool(const Vector3
       const int i = patch.low[0] + cell % n;
       const int j = patch.low[1] + cell / n % n;
       const int k = patch.low[2] + cell / (n * n);
-      tree.patch_of_cell_[static_cast<std::size_t>((k * kLattice + j) * kLattice + i)] = static_cast<std::uint16_t>(p);
+      tree.patch_of_cell_[cell_index(i, j, k)] = static_cast<std::uint16_t>(p);
     }
   }
   tree.displacement_.assign(static_cast<std::size_t>(kSide) * kSide * kSide, Vector3d::Zero());
@@ -107,7 +112,7 @@ void PatchOctree::classify_vertices() {
         const int i = v[0] - (side & 1);
         const int j = v[1] - (side >> 1 & 1);
         const int k = v[2] - (side >> 2);
-        const std::size_t p = patch_of_cell_[static_cast<std::size_t>((k * kLattice + j) * kLattice + i)];
+        const std::size_t p = patch_of_cell_[cell_index(i, j, k)];
         bool corner = true;
         for (std::size_t axis = 0; axis < 3; ++axis)
           corner = corner && (v[axis] - patches_[p].low[axis]) % patches_[p].size() == 0;
@@ -150,7 +155,7 @@ std::size_t PatchOctree::patch_at(const Vector3d& point) const {
     cell[static_cast<std::size_t>(axis)] =
         std::clamp(static_cast<int>(std::floor(point[axis] * kLattice)), 0, kLattice - 1);
   }
-  return patch_of_cell_[static_cast<std::size_t>((cell[2] * kLattice + cell[1]) * kLattice + cell[0])];
+  return patch_of_cell_[cell_index(cell[0], cell[1], cell[2])];
 }
 
 Vector3d PatchOctree::vertex(std::size_t i) const {
@@ -200,15 +205,16 @@ std::optional<Vector3d> PatchOctree::inverse(const Vector3d& point, double toler
     const Eigen::Matrix3d j = jacobian(x);
     if (!(j.determinant() > 1e-6)) return std::nullopt;
     const Vector3d move = -(j.inverse() * miss);
-    double share = 1;
+    constexpr int kMostHalvings = 13;
     Vector3d next = x;
     Vector3d next_miss = miss;
-    for (; share > 1e-4; share *= 0.5) {
-      next = (x + share * move).cwiseMax(0.0).cwiseMin(1.0);
+    int halvings = 0;
+    for (; halvings <= kMostHalvings; ++halvings) {
+      next = (x + std::ldexp(1.0, -halvings) * move).cwiseMax(0.0).cwiseMin(1.0);
       next_miss = next + displacement(next) - point;
       if (next_miss.norm() < miss.norm()) break;
     }
-    if (!(share > 1e-4)) return std::nullopt;
+    if (halvings > kMostHalvings) return std::nullopt;
     x = next;
     miss = next_miss;
   }
