@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <utility>
+
 #include "drivers/io/monotonic.hpp"
 #include "drivers/io/serial_port.hpp"
 
@@ -14,6 +16,7 @@ using drivers::now;
 
 constexpr Duration kTick = Duration::from_ms(200);        // how soon a loop sees that it shall stop
 constexpr Duration kLookAgain = Duration::from_ms(1000);  // for an instrument that has gone
+constexpr Duration kSilent = Duration::from_ms(1000);     // of an instrument that is there
 constexpr std::size_t kFramesWaiting = 32;
 
 void wait(Duration span, const std::stop_token& stop) {
@@ -66,14 +69,33 @@ Appliance::~Appliance() {
   }
 }
 
-void Appliance::tell(bool ok, const std::string& text) {
+void Appliance::tell(const char* instrument, bool ok, const std::string& text) {
   spdlog::log(ok ? spdlog::level::info : spdlog::level::warn, "{}", text);
-  server_->publish(wire::pack(wire::Status{ok, text}, now()));
+  {
+    const std::lock_guard lock(faults_mutex_);
+    faults_.erase(instrument);
+    if (!ok) faults_[instrument] = text;
+  }
+  server_->publish(wire::pack(status(), now()));
+}
+
+wire::Status Appliance::status() const {
+  const std::lock_guard lock(faults_mutex_);
+  wire::Status status;
+  status.ok = faults_.empty();
+  for (const auto& [instrument, text] : faults_) status.text += (status.text.empty() ? "" : "; ") + text;
+  return status;
 }
 
 void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<drivers::minibird::MiniBird> tracker) {
+  DeviceTime heard = now();
   while (!stop.stop_requested()) {
-    const auto read = tracker->read(now() + kTick);
+    auto read = tracker->read(now() + kTick);
+    if (read && !read->empty()) heard = now();
+    if (read && now() - heard > kSilent) {
+      read = Error{Errc::timeout, fmt::format("{}: the tracker has fallen silent; check its power and cable",
+                                              config_.tracker_device.string())};
+    }
     if (read) {
       for (const auto& measurement : *read) publish(measurement);
       const auto counters = tracker->counters();
@@ -81,13 +103,14 @@ void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<driver
       senseless_records_ = counters.senseless_records;
       continue;
     }
-    tell(false, read.error().what);
+    tell("tracker", false, read.error().what);
     tracker.reset();
     while (!stop.stop_requested() && !tracker) {
       wait(kLookAgain, stop);
       if (auto again = open_tracker(config_, stop)) {
         tracker = *std::move(again);
-        tell(true, "the tracker is back");
+        tell("tracker", true, "the tracker is back");
+        heard = now();
       }
     }
   }
@@ -108,25 +131,38 @@ void Appliance::publish(const drivers::minibird::Measurement& measurement) {
 }
 
 void Appliance::video_loop(const std::stop_token& stop, std::unique_ptr<drivers::FrameSource> camera) {
-  std::optional<std::uint64_t> last;
+  std::uint64_t next_sequence = 0;  // 0: no frame yet, or none since the camera came back
+  DeviceTime heard = now();
+  bool silent = false;
   while (!stop.stop_requested()) {
     auto frame = camera->next(now() + kTick);
     if (frame) {
-      if (!*frame) continue;
-      if (last && (*frame)->sequence > *last + 1) frames_lost_by_camera_ += (*frame)->sequence - *last - 1;
-      last = (*frame)->sequence;
+      if (!*frame) {
+        // Said, not mended: a camera may pause, and one that is still there need not be opened again.
+        if (!silent && now() - heard > kSilent) {
+          silent = true;
+          tell("camera", false, fmt::format("{}: the camera sends no frames", camera->name()));
+        }
+        continue;
+      }
+      heard = now();
+      if (std::exchange(silent, false)) tell("camera", true, "the camera sends frames again");
+      const std::uint64_t sequence = (*frame)->sequence;
+      if (next_sequence != 0 && sequence > next_sequence) frames_lost_by_camera_ += sequence - next_sequence;
+      next_sequence = sequence + 1;
       ++frames_seen_;
       frames_.push(**std::move(frame));
       continue;
     }
-    tell(false, frame.error().what);
+    tell("camera", false, frame.error().what);
     camera.reset();
-    last.reset();
+    next_sequence = 0;
     while (!stop.stop_requested() && !camera) {
       wait(kLookAgain, stop);
       if (auto again = drivers::open_camera(config_.camera)) {
         camera = *std::move(again);
-        tell(true, "the camera is back");
+        tell("camera", true, "the camera is back");
+        heard = now();
       }
     }
   }
@@ -169,6 +205,7 @@ void Appliance::health_loop(const std::stop_token& stop) {
     before = count;
     began = ended;
     server_->publish(wire::pack(health, ended));
+    server_->publish(wire::pack(status(), ended));
   }
 }
 

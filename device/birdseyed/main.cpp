@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
     }
   });
   const auto appliance = device::Appliance::start(*config, stop.get_token());
-  if (!appliance) return refuse(appliance.error());
+  if (!appliance) return stop.stop_requested() ? 0 : refuse(appliance.error());
   while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   spdlog::info("ending");
   return 0;

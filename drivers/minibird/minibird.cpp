@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -17,6 +18,12 @@ std::uint16_t word_of(const Bytes& bytes) {
 
 Duration byte_time(int baud) {
   return {std::int64_t{10} * 1'000'000'000 / baud};
+}
+
+/// Sleeps for span, or until stop is requested.
+void wait(Duration span, const std::stop_token& stop) {
+  const DeviceTime until = now() + span;
+  while (now() < until && !stop.stop_requested()) sleep_for(std::min(until - now(), Duration::from_ms(20)));
 }
 
 ClockLine::Settings line_settings(double rate_hz) {
@@ -88,9 +95,9 @@ Result<Bytes> MiniBird::ask_parameter(std::uint8_t parameter) {
 Result<void> MiniBird::reset(const std::stop_token& stop) {
   info_.has_reset_line = line_->set_rts(true);
   if (info_.has_reset_line) {
-    sleep_for(settings_.reset_hold);
+    wait(settings_.reset_hold, stop);
     line_->set_rts(false);
-    sleep_for(settings_.reset_settle);
+    wait(settings_.reset_settle, stop);
   }
   // A unit that streams stops on POINT, with one more record; one that boots says nothing until it is ready.
   const DeviceTime deadline = now() + settings_.answer_within;
@@ -208,13 +215,14 @@ Result<std::vector<Measurement>> MiniBird::read(DeviceTime deadline) {
     const DeviceTime arrived = now();
     for (const Record& record : parser_.push(std::span(chunk).first(*got))) {
       const std::size_t address = birds > 1 ? record.address : 1;
-      if (partial_ && address <= partial_->last_address) finish(out);  // the rest of that cycle was lost
+      // The rest of that cycle was lost; after a loss, who knows which cycle a record is of.
+      if (partial_ && (address <= partial_->last_address || record.phase_errors != partial_->phase_errors)) finish(out);
       if (!partial_) {
         // The bytes after this record in the chunk, the record itself and those of the birds before it had yet to come
         // when the cycle's first byte began.
         const std::int64_t bytes =
             static_cast<std::int64_t>(record.end_offset) + record_bytes * static_cast<std::int64_t>(address);
-        partial_ = Partial{{arrived.ns - bytes * byte_ns}, arrived, {}, 0};
+        partial_ = Partial{{arrived.ns - bytes * byte_ns}, arrived, {}, 0, record.phase_errors};
         partial_->birds.resize(birds);
       }
       partial_->arrived = arrived;

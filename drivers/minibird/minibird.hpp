@@ -86,6 +86,7 @@ class MiniBird {
     DeviceTime arrived;
     std::vector<std::optional<RecordPose>> birds;
     std::size_t last_address = 0;
+    std::uint64_t phase_errors = 0;  ///< of the parser when the cycle's first record was whole
   };
 
   std::unique_ptr<ByteStream> line_;

@@ -50,6 +50,7 @@ std::vector<Record> RecordParser::push(std::span<const std::uint8_t> bytes) {
     if (partial_.size() < record_bytes()) continue;
     Record record = take();
     record.end_offset = bytes.size() - 1 - i;
+    record.phase_errors = phase_errors_;
     partial_.clear();
     expect_start_ = true;
     if (group_mode_) {

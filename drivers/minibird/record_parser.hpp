@@ -11,8 +11,10 @@ namespace birdseye::drivers::minibird {
 /// One whole record as it came off the line.
 struct Record {
   std::vector<std::int16_t> words;
-  std::uint8_t button = 0;     ///< 0 where the records carry none
-  std::uint8_t address = 0;    ///< the unit that sent it; 0 where the records carry none
+  std::uint8_t button = 0;   ///< 0 where the records carry none
+  std::uint8_t address = 0;  ///< the unit that sent it; 0 where the records carry none
+  std::uint64_t phase_errors =
+      0;                       ///< of the parser when the record was whole: a step between two means bytes were lost
   std::size_t end_offset = 0;  ///< bytes of the pushed chunk after this record's last byte
 };
 

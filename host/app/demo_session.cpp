@@ -82,6 +82,7 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   figures.board_views = static_cast<int>(stations_.views().size());
   figures.fre_mm = fit->fit.fre_rms_mm;
   figures.fiducial_residuals_mm = fit->fit.residuals_mm;
+  gate_.set_calibration({lens->rms_px, hand_eye->tracked_rms_px, fit->fit.fre_rms_mm});
   setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();

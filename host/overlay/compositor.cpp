@@ -9,7 +9,8 @@ std::vector<std::uint8_t> composite(std::span<const std::uint8_t> video, const I
   // Eight bits of fraction: 256 is all of it.
   const int w = static_cast<int>(std::lround(std::clamp(strength, 0.0, 1.0) * 256));
   std::vector<std::uint8_t> out(video.begin(), video.end());
-  const std::size_t pixels = std::min(video.size() / 3, overlay.rgba.size() / 4);
+  const std::size_t pixels = overlay.rgba.size() / 4;
+  if (video.size() != 3 * pixels) return out;  // an overlay of another size would lie somewhere else
   for (std::size_t i = 0; i < pixels; ++i) {
     const std::uint8_t* const rgba = &overlay.rgba[4 * i];
     if (rgba[3] == 0) continue;

@@ -8,6 +8,12 @@ namespace birdseye::host {
 
 std::string OverlayGate::doubt(const PoseAnswer& pose) const {
   if (!pose.tracker_from_sensor) return pose.reason.empty() ? "no pose" : pose.reason;
+  const Calibration& c = calibration_;
+  if (!(c.camera_rms_px <= settings_.most_camera_rms_px))
+    return fmt::format("the camera is calibrated to {:.1f} px only", c.camera_rms_px);
+  if (!(c.tracked_rms_px <= settings_.most_tracked_rms_px))
+    return fmt::format("hand-eye is off by {:.1f} px", c.tracked_rms_px);
+  if (!(c.fre_mm <= settings_.most_fre_mm)) return fmt::format("the fiducials fit to {:.1f} mm only", c.fre_mm);
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
     return fmt::format("the pose is predicted {:.0f} ms ahead", pose.age.seconds() * 1e3);
   }

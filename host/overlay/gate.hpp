@@ -15,6 +15,11 @@ class OverlayGate {
     Duration most_predicted = Duration::from_ms(40);  ///< how far ahead of its newest sample a pose may be
     double most_sigma_mm = 1.5;                       ///< of the pose's position
     Duration fade = Duration::from_ms(200);
+    double most_camera_rms_px = 1.5, most_tracked_rms_px = 12, most_fre_mm = 5;
+  };
+  /// How well camera, hand-eye and patient are known. Zeros are perfect; what is not known must not be drawn with.
+  struct Calibration {
+    double camera_rms_px = 0, tracked_rms_px = 0, fre_mm = 0;
   };
   struct Decision {
     double strength = 0;  ///< of the overlay, 0 to 1
@@ -27,6 +32,8 @@ class OverlayGate {
   OverlayGate() = default;
   explicit OverlayGate(const Settings& settings) : settings_(settings) {}
 
+  void set_calibration(const Calibration& calibration) { calibration_ = calibration; }
+
   /// The decision for a frame acquired at time, with the pose that came with it. Times must not go back.
   Decision decide(DeviceTime time, const PoseAnswer& pose);
 
@@ -34,6 +41,7 @@ class OverlayGate {
   [[nodiscard]] std::string doubt(const PoseAnswer& pose) const;
 
   Settings settings_;
+  Calibration calibration_;
   std::optional<DeviceTime> last_;
   double strength_ = 0;
 };

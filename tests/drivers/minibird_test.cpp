@@ -32,6 +32,12 @@ class UnitLine final : public ByteStream {
     if (unplugged) return Error{Errc::disconnected, "test: unplugged"};
     if (pending_.empty()) {
       for (const std::uint8_t byte : unit_.measure(poses)) pending_.push_back(byte);
+      if (cut_to > 0 && !pending_.empty()) {
+        for (auto& p : poses) p.position_mm.x() += 5;
+        for (const std::uint8_t byte : unit_.measure(poses)) pending_.push_back(byte);
+        pending_.erase(pending_.begin() + cut_from, pending_.begin() + cut_to);
+        cut_to = 0;
+      }
       if (lose_bytes > 0 && !pending_.empty()) {
         pending_.erase(pending_.begin() + 5);
         --lose_bytes;
@@ -61,6 +67,7 @@ class UnitLine final : public ByteStream {
   std::vector<hw_sim::BirdPose> poses;
   bool silent = false, unplugged = false, has_rts = true;
   int lose_bytes = 0;
+  int cut_from = 0, cut_to = 0;  ///< bytes cut out of the next two cycles
 
  private:
   hw_sim::Unit unit_;
@@ -91,6 +98,10 @@ TEST(MiniBird, StreamsTheTruePosesInEveryFormat) {
     ASSERT_TRUE(bird) << bird.error().what;
     EXPECT_EQ((*bird)->info().model, "6DFOB");
     EXPECT_EQ((*bird)->info().latched_error, "");
+    EXPECT_EQ((*bird)->info().revision_major, 3);  // 03 43
+    EXPECT_EQ((*bird)->info().revision_minor, 67);
+    EXPECT_EQ((*bird)->info().crystal_mhz, 40);             // 28 00
+    EXPECT_DOUBLE_EQ((*bird)->info().rate_hz, 103.296875);  // 4C 67
     for (int cycle = 0; cycle < 5; ++cycle) {
       const auto read = (*bird)->read(now() + Duration::from_ms(100));
       ASSERT_TRUE(read);
@@ -149,6 +160,31 @@ TEST(MiniBird, ALostByteCostsOneRecordNotTheStream) {
   }
   EXPECT_EQ((*bird)->counters().phase_errors, 1U);
   EXPECT_GE(whole, 18);
+}
+
+TEST(MiniBird, RecordsOfTwoCyclesAreNotTakenForOne) {
+  auto owned = std::make_unique<UnitLine>(2);
+  UnitLine& line = *owned;
+  line.poses = {pose(300, 0, 0, 0), pose(250, 0, 0, 0)};
+  const auto bird = MiniBird::start(std::move(owned), quick(2));
+  ASSERT_TRUE(bird) << bird.error().what;
+  // Cut from within the second record of one cycle to within the first of the next: what is left is the first bird of
+  // one cycle and the second bird of another.
+  line.cut_from = 30;
+  line.cut_to = 60;
+  for (int cycles = 0; cycles < 8;) {
+    const auto read = (*bird)->read(now() + Duration::from_ms(100));
+    ASSERT_TRUE(read);
+    for (const Measurement& m : *read) {
+      ++cycles;
+      if (m.birds[0] && m.birds[1]) {
+        EXPECT_LT(std::abs((m.birds[0]->position_mm->x() - m.birds[1]->position_mm->x()) - 50), 0.3);
+      }
+    }
+    // The scene moves on with every cycle, both birds alike: a pair of two cycles would show.
+    for (auto& p : line.poses) p.position_mm.x() += 5;
+  }
+  EXPECT_GE((*bird)->counters().phase_errors, 1U);
 }
 
 TEST(MiniBird, ASaturatedSensorGivesNoPose) {

@@ -156,6 +156,23 @@ TEST(Commands, RenderDrawsThroughALens) {
   EXPECT_GT(fs::file_size(scratch / "front.png"), 200U);
 }
 
+TEST(Commands, RenderShowsTheRealAbdomen) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const Scratch scratch;
+  // The body fills most of the frontal view, and of the slab seen from the feet about a third.
+  for (const auto& [name, least, most] :
+       {std::tuple{"example_ct.nii.gz", 0.5, 0.95}, std::tuple{"example_ct_dicom", 0.2, 0.5}}) {
+    const auto result =
+        run("birdseye", "render --volume " + (*data / "ct_abdomen" / name).string() + " --size 300x300 --out " +
+                            (scratch / "a.png").string() + " --json " + (scratch / "a.json").string());
+    ASSERT_EQ(result.code, 0) << result.output;
+    const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "a.json"));
+    EXPECT_GT(json["coverage"].get<double>(), least) << name;
+    EXPECT_LT(json["coverage"].get<double>(), most) << name;
+  }
+}
+
 TEST(Commands, RenderRefusesBadInputInOneLine) {
   const Scratch scratch;
   const std::string ct = small_ct(scratch);

@@ -187,6 +187,8 @@ TEST(Compositor, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
   const auto full = composite(video, overlay, 1);
   EXPECT_EQ(full, (std::vector<std::uint8_t>{10, 20, 30, 164, 50, 25, 255, 255, 255}));
   EXPECT_EQ(composite(video, overlay, 0), video);
+  const ImageRgba other{2, 1, {255, 255, 255, 255, 255, 255, 255, 255}};
+  EXPECT_EQ(composite(video, other, 1), video);
 }
 
 PoseAnswer sound() {
@@ -205,6 +207,18 @@ TEST(OverlayGate, DrawsWithASoundPoseAndNeverWithout) {
   const auto refused = gate.decide({40'000'000}, none);
   EXPECT_EQ(refused.strength, 0);
   EXPECT_EQ(refused.reason, none.reason);
+}
+
+TEST(OverlayGate, DrawsNothingOverABadCalibration) {
+  OverlayGate gate;
+  OverlayGate::Calibration calibration;
+  calibration.fre_mm = 9;
+  gate.set_calibration(calibration);
+  const auto decision = gate.decide({0}, sound());
+  EXPECT_EQ(decision.strength, 0);
+  EXPECT_NE(decision.reason.find("9.0 mm"), std::string::npos);
+  gate.set_calibration({});
+  EXPECT_EQ(gate.decide({1'000'000'000}, sound()).strength, 1);
 }
 
 TEST(OverlayGate, FadesWhilePosesAreDoubtfulAndSaysWhy) {
