@@ -11,6 +11,11 @@ Result<void> check(const CameraModel& c) {
   if (c.width_px <= 0 || c.height_px <= 0) {
     return Error{Errc::bad_value, fmt::format("camera: image size {}x{} is not positive", c.width_px, c.height_px)};
   }
+  constexpr int kLargestSide = 16384;
+  if (c.width_px > kLargestSide || c.height_px > kLargestSide) {
+    return Error{Errc::bad_value,
+                 fmt::format("camera: image size {}x{} is over {} a side", c.width_px, c.height_px, kLargestSide)};
+  }
   if (!(c.fx_px > 0) || !(c.fy_px > 0)) {
     return Error{Errc::bad_value, fmt::format("camera: focal lengths {}, {} px must be positive", c.fx_px, c.fy_px)};
   }

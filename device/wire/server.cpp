@@ -66,7 +66,7 @@ void Server::publish(const Packet& packet) {
   {
     const std::lock_guard lock(mutex_);
     for (ClientQueue& client : clients_) {
-      if (client.bytes + packet->size() > kMostQueuedBytes) {
+      if (!client.packets.empty() && client.bytes + packet->size() > kMostQueuedBytes) {
         ++shed_;
         continue;
       }

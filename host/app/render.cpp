@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -94,6 +95,9 @@ Result<View> view_of(const Volume& volume, const Options& options) {
 }
 
 Result<void> render(const Options& options) {
+  if (!std::isfinite(options.step_mm) || !std::isfinite(options.clip)) {
+    return Error{Errc::bad_value, "--step-mm and --clip need finite numbers"};
+  }
   const auto transfer = load_transfer_function(options.transfer);
   if (!transfer) return transfer.error();
   const auto volume = import_volume(options.volume);

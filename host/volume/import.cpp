@@ -11,7 +11,9 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -188,7 +190,11 @@ Result<Volume> import_dicom_folder(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
+    if (!entry.is_regular_file()) continue;
+    if (entry.file_size() == 0) {
+      return refused(Errc::unreadable, entry.path(), "is an empty file in the series; copy the series again");
+    }
+    files.push_back(entry.path());
   }
   if (error) return refused(Errc::unreadable, folder, "cannot be listed; check its permissions");
   if (files.empty()) return refused(Errc::not_found, folder, "is empty; give the folder that holds the DICOM files");
@@ -235,6 +241,43 @@ bool nifti_is_cut(const fs::path& path, std::uint64_t image_bytes) {
   return !sound || got < 0 || count < kLeastHeader + image_bytes;
 }
 
+/// Its reader turns what is not finite into zeros, so the file's own floating-point voxels are looked at.
+bool nifti_has_non_finite(const fs::path& path) {
+  const gzFile file = gzopen(path.c_str(), "rb");
+  if (file == nullptr) return false;
+  std::array<char, 348> header{};
+  bool found = false;
+  if (gzread(file, header.data(), header.size()) == static_cast<int>(header.size())) {
+    std::int32_t header_size = 0;
+    std::int16_t type = 0;
+    float offset = 0;
+    std::memcpy(&header_size, header.data(), sizeof header_size);
+    std::memcpy(&type, header.data() + 70, sizeof type);
+    std::memcpy(&offset, header.data() + 108, sizeof offset);
+    // Files of the other byte order are rare; theirs are left to the check after reading.
+    const bool ours = header_size == 348 && offset >= 348 && offset < 1e6F;
+    const int bytes = ours && type == 16 ? 4 : ours && type == 64 ? 8 : 0;
+    if (bytes != 0 && gzseek(file, static_cast<z_off_t>(offset), SEEK_SET) >= 0) {
+      std::vector<char> chunk(1U << 18U);
+      int got = 0;
+      while (!found && (got = gzread(file, chunk.data(), static_cast<unsigned>(chunk.size()))) > 0) {
+        for (int at = 0; at + bytes <= got && !found; at += bytes) {
+          float single = 0;
+          double twice = 0;
+          if (bytes == 4) {
+            std::memcpy(&single, chunk.data() + at, sizeof single);
+          } else {
+            std::memcpy(&twice, chunk.data() + at, sizeof twice);
+          }
+          found = !std::isfinite(single) || !std::isfinite(twice);
+        }
+      }
+    }
+  }
+  gzclose_r(file);
+  return found;
+}
+
 itk::ImageIOBase::Pointer reader_for(const fs::path& path) {
   const std::string name = path.string();
   for (const itk::ImageIOBase::Pointer& io :
@@ -268,6 +311,9 @@ Result<Volume> import_image_file(const fs::path& path) {
     if ((kind == "MetaImageIO" && meta_image_is_cut(path, image_bytes)) ||
         (single_nifti && nifti_is_cut(path, image_bytes))) {
       return refused(Errc::bad_format, path, "is cut short or damaged; export it again");
+    }
+    if (single_nifti && nifti_has_non_finite(path)) {
+      return refused(Errc::bad_value, path, "has voxels that are not finite numbers; export it again");
     }
     const auto reader = itk::ImageFileReader<Image>::New();
     reader->SetImageIO(io);

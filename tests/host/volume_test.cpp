@@ -2,8 +2,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <numeric>
 
@@ -95,6 +97,21 @@ TEST(Import, RefusesWithAReason) {
 
   std::vector<float> voxels(grid().voxels(), 10.0F);
   voxels[7] = NAN;
+  {
+    std::array<char, 352> header{};
+    const auto put = [&header](std::size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof value); };
+    put(0, std::int32_t{348});
+    for (std::size_t i = 0; i < 4; ++i) put(40 + 2 * i, std::int16_t{std::array<std::int16_t, 4>{3, 6, 5, 4}[i]});
+    put(70, std::int16_t{16});
+    put(72, std::int16_t{32});
+    for (std::size_t i = 0; i < 4; ++i) put(76 + 4 * i, 1.0F);
+    put(108, 352.0F);
+    std::memcpy(header.data() + 344, "n+1", 4);
+    std::ofstream out(scratch / "nan.nii", std::ios::binary);
+    out.write(header.data(), static_cast<std::streamsize>(header.size()));
+    out.write(reinterpret_cast<const char*>(voxels.data()), static_cast<std::streamsize>(voxels.size() * 4));
+  }
+  expect_refused(scratch / "nan.nii", "not finite");
   write_mha(scratch / "nan.mha", "MET_FLOAT", voxels.data(), voxels.size() * 4);
   expect_refused(scratch / "nan.mha", "not finite");
   voxels[7] = 1e6F;
