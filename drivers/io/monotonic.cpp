@@ -16,6 +16,13 @@ int poll_ms(DeviceTime deadline) {
   return static_cast<int>(std::clamp<std::int64_t>((left_ns + 999'999) / 1'000'000, 0, 60'000));
 }
 
+void sleep_until(DeviceTime time) {
+  timespec until{};
+  until.tv_sec = time.ns / 1'000'000'000;
+  until.tv_nsec = time.ns % 1'000'000'000;
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+}
+
 void sleep_for(Duration span) {
   timespec time{};
   time.tv_sec = span.ns / 1'000'000'000;

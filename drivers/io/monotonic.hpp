@@ -9,5 +9,6 @@ DeviceTime now();
 /// Milliseconds until deadline for poll(): at least 0, rounded up.
 int poll_ms(DeviceTime deadline);
 void sleep_for(Duration span);
+void sleep_until(DeviceTime time);
 
 }  // namespace birdseye::drivers

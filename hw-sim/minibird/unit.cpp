@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+
+#include "calibration/base/units.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
 
-constexpr double kMmPerInch = 25.4;
 constexpr std::uint8_t kErrorInvalidCommand = 6;
 
 enum Parameter : std::uint8_t {
@@ -21,7 +23,6 @@ enum Parameter : std::uint8_t {
   kError = 10,
   kModel = 15,
   kExpandedError = 16,
-  kAddressing = 19,
   kLineFrequency = 20,
   kAddress = 21,
   kHemisphere = 22,
@@ -30,81 +31,36 @@ enum Parameter : std::uint8_t {
   kAutoConfiguration = 50,
 };
 
+struct Lengths {
+  std::string_view bytes;
+  std::size_t length;
+};
+
+/// The length that a table gives a byte; 0 for one that it does not name.
+std::size_t length_of(std::uint8_t byte, std::span<const Lengths> table) {
+  for (const Lengths& row : table) {
+    if (row.bytes.find(static_cast<char>(byte)) != std::string_view::npos) return row.length;
+  }
+  return 0;
+}
+
 /// Bytes of a CHANGE VALUE after the parameter number; 0 for one that cannot be changed.
 std::size_t change_bytes(std::uint8_t parameter) {
-  switch (parameter) {
-    case kScale:
-    case kFilters:
-    case kRateCount:
-    case kRate:
-    case kHemisphere:
-    case 32:
-      return 2;
-    case 8:
-    case 9:
-    case 11:
-    case 14:
-    case 17:
-    case 18:
-    case kAddressing:
-    case kLineFrequency:
-    case kAddress:
-    case kGroupMode:
-    case kAutoConfiguration:
-      return 1;
-    case 5:
-    case 12:
-    case 13:
-      return 14;
-    case 23:
-    case 24:
-      return 6;
-    default:
-      return 0;
-  }
+  static constexpr Lengths kTable[] = {
+      {"\x08\x09\x0B\x0E\x11\x12\x13\x14\x15\x23\x32", 1},
+      {"\x03\x04\x06\x07\x16\x20", 2},
+      {"\x17\x18", 6},
+      {"\x05\x0C\x0D", 14},
+  };
+  return length_of(parameter, kTable);
 }
 
 /// Whole length of a command by its first byte; 0 for a byte that is no command. CHANGE grows with its parameter.
 std::size_t command_bytes(std::uint8_t byte) {
-  switch (byte) {
-    case 'V':
-    case 'W':
-    case 'X':
-    case 'Y':
-    case 'Z':
-    case '\\':
-    case ']':
-    case 'B':
-    case '@':
-    case '?':
-    case 'F':
-    case 'G':
-    case 'Q':
-    case 'R':
-    case 'S':
-    case 'T':
-    case 'N':
-    case '/':
-    case 0x11:
-    case 0x13:
-      return 1;
-    case 'M':
-    case 'A':
-    case '0':
-    case 'O':
-    case 'P':
-      return 2;
-    case 'L':
-      return 3;
-    case 'q':
-    case 'r':
-      return 7;
-    case 'J':
-    case 'H':
-      return 13;
-    default:
-      return 0;
-  }
+  static constexpr Lengths kTable[] = {
+      {"VWXYZ\\]B@?FGQRSTN/\x11\x13", 1}, {"MA0OP", 2}, {"L", 3}, {"qr", 7}, {"JH", 13},
+  };
+  return length_of(byte, kTable);
 }
 
 }  // namespace
@@ -310,18 +266,13 @@ void Unit::examine(std::uint8_t parameter, std::vector<std::uint8_t>& reply) {
       put_word(all & ~2U);
       break;
     }
-    case 8:
-    case 9:
-    case 11:
-    case 14:
-    case 17:
-    case 18:
-    case kAddressing:
-    case kLineFrequency:
-      reply = {parameters_[parameter]};
-      break;
     default:
-      bird.error = kErrorInvalidCommand;
+      // The rest that can be set is only stored.
+      if (change_bytes(parameter) == 1) {
+        reply = {parameters_[parameter]};
+      } else {
+        bird.error = kErrorInvalidCommand;
+      }
   }
 }
 

@@ -11,6 +11,7 @@
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/implants.hpp"
+#include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/phantom/mesh.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 
@@ -19,10 +20,6 @@ namespace birdseye::hw_sim {
 namespace {
 
 using Eigen::Vector3d;
-
-nlohmann::json json_of(const Vector3d& v) {
-  return nlohmann::json::array({v.x(), v.y(), v.z()});
-}
 
 Result<Vector3d> vector_of(const nlohmann::json& json) {
   if (!json.is_array() || json.size() != 3) return Error{Errc::bad_format, "needs three numbers"};
@@ -128,11 +125,7 @@ Result<void> write_phantom(const PhantomSettings& settings) {
   truth["tumour_radii_mm"] = json_of(implants->tumour_radii_mm);
   truth["labels"] = {{"liver", kLiver}, {"portal", kPortal}, {"hepatic", kHepatic}, {"tumour", kTumour}};
   for (const Vector3d& marker : implants->markers_mm) truth["fiducials_mm"].push_back(json_of(marker));
-  std::ofstream out(settings.folder / "truth.json");
-  out << truth.dump(2) << '\n';
-  out.close();
-  if (!out) return Error{Errc::unreadable, fmt::format("{}/truth.json: cannot be written", settings.folder.string())};
-  return {};
+  return write_json(settings.folder / "truth.json", truth);
 }
 
 Result<PhantomTruth> read_phantom_truth(const std::filesystem::path& folder) {

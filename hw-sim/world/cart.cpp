@@ -4,37 +4,19 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "drivers/io/monotonic.hpp"
+#include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/world/frame_camera.hpp"
-#include "hw-sim/world/monotonic.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
 
-nlohmann::json json_of(const Eigen::Vector3d& v) {
-  return nlohmann::json::array({v.x(), v.y(), v.z()});
-}
-
-nlohmann::json json_of(const Eigen::Matrix4d& m) {
-  nlohmann::json rows = nlohmann::json::array();
-  for (int i = 0; i < 4; ++i) rows.push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
-  return rows;
-}
-
 void announce(const nlohmann::json& event) {
   fmt::print("{}\n", event.dump());
   std::fflush(stdout);
-}
-
-Result<void> write(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream out(path);
-  out << text;
-  out.close();
-  if (!out) return Error{Errc::unreadable, fmt::format("{}: cannot be written; choose another --out", path.string())};
-  return {};
 }
 
 /// What an operator knows: the board, the pointer, how many markers there are, how long it takes.
@@ -104,9 +86,9 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   std::error_code error;
   std::filesystem::create_directories(settings.folder / "truth", error);
   for (const Result<void>& written :
-       {write(settings.folder / "truth" / "truth.json", truth_of(*world, lens).dump(2) + "\n"),
-        write(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
-        write(settings.folder / "cart.json", sheet_of(*world).dump(2) + "\n")}) {
+       {write_json(settings.folder / "truth" / "truth.json", truth_of(*world, lens)),
+        write_text(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
+        write_json(settings.folder / "cart.json", sheet_of(*world))}) {
     if (!written) return written.error();
   }
 
@@ -121,25 +103,25 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   SimulatedTracker tracker(std::move(*terminal), *world, settings.noise, settings.seed);
   announce({{"event", "ready"}});
 
-  while (!stop && !(tracker.streaming() && (*camera)->ready())) sleep_until_ns(monotonic_ns() + 10'000'000);
-  const std::int64_t zero_ns = monotonic_ns() + 1'000'000'000;
+  while (!stop && !(tracker.streaming() && (*camera)->ready())) drivers::sleep_until({drivers::now().ns + 10'000'000});
+  const std::int64_t zero_ns = drivers::now().ns + 1'000'000'000;
   tracker.start(zero_ns);
   (*camera)->start(zero_ns);
   for (const Stage& stage : world->stages()) {
     const std::int64_t begins_ns = zero_ns + static_cast<std::int64_t>(stage.begins_s * 1e9);
-    while (!stop && monotonic_ns() < begins_ns) {
-      sleep_until_ns(std::min(begins_ns, monotonic_ns() + 20'000'000));
+    while (!stop && drivers::now().ns < begins_ns) {
+      drivers::sleep_until({std::min(begins_ns, drivers::now().ns + 20'000'000)});
     }
     // The end is when the last frame is out, which a slow machine may see later than the script has it.
     const std::int64_t latest_ns = begins_ns + 30'000'000'000;
-    while (!stop && stage.name == "end" && !(*camera)->done() && monotonic_ns() < latest_ns) {
-      sleep_until_ns(monotonic_ns() + 20'000'000);
+    while (!stop && stage.name == "end" && !(*camera)->done() && drivers::now().ns < latest_ns) {
+      drivers::sleep_until({drivers::now().ns + 20'000'000});
     }
     if (stop) return {};
     announce({{"event", "stage"}, {"name", stage.name}, {"world_s", stage.begins_s}, {"monotonic_ns", begins_ns}});
   }
   // The tracker goes on a little, so that whoever pairs the last frame has poses from after it.
-  sleep_until_ns(monotonic_ns() + 500'000'000);
+  drivers::sleep_until({drivers::now().ns + 500'000'000});
   return {};
 }
 

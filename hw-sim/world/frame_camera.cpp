@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "hw-sim/world/monotonic.hpp"
+#include "drivers/io/monotonic.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -104,7 +104,7 @@ void FrameCamera::serve(const std::stop_token& stop) {
     if (::poll(&entry, 1, 50) > 0) client = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   }
   connected_ = client >= 0;
-  while (!stop.stop_requested() && zero_ns_ == 0) sleep_until_ns(monotonic_ns() + 5'000'000);
+  while (!stop.stop_requested() && zero_ns_ == 0) drivers::sleep_until({drivers::now().ns + 5'000'000});
   while (!stop.stop_requested() && sent_ < frames_) {
     Picture picture;
     {
@@ -115,7 +115,7 @@ void FrameCamera::serve(const std::stop_token& stop) {
     }
     changed_.notify_all();
     const double due_s = static_cast<double>(picture.sequence) / settings_.rate_hz + settings_.delivery_ms * 1e-3;
-    sleep_until_ns(zero_ns_ + static_cast<std::int64_t>(due_s * 1e9));
+    drivers::sleep_until({zero_ns_ + static_cast<std::int64_t>(due_s * 1e9)});
     if (!send(client, picture, stop)) break;
     ++sent_;
   }

@@ -3,8 +3,8 @@
 #include <array>
 
 #include "calibration/base/units.hpp"
+#include "drivers/io/monotonic.hpp"
 #include "hw-sim/phantom/grid.hpp"
-#include "hw-sim/world/monotonic.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -44,7 +44,7 @@ void SimulatedTracker::run(const std::stop_token& stop) {
   Unit unit(settings);
   bool started = false;
   std::int64_t cycle = -1'000'000;  // before the world starts; from 0 on, its measurements
-  auto measured_ns = static_cast<double>(monotonic_ns());
+  auto measured_ns = static_cast<double>(drivers::now().ns);
   while (!stop.stop_requested()) {
     const double period_ns = 1e9 / unit.rate_hz();
     measured_ns += period_ns;
@@ -59,12 +59,12 @@ void SimulatedTracker::run(const std::stop_token& stop) {
     const std::vector<std::uint8_t> bytes = unit.measure(poses(world_s, cycle));
     const auto due_ns =
         static_cast<std::int64_t>(measured_ns + kDelayMs * 1e6 + kNsPerByte * static_cast<double>(bytes.size()));
-    for (std::int64_t now = monotonic_ns(); now < due_ns && !stop.stop_requested(); now = monotonic_ns()) {
+    for (std::int64_t now = drivers::now().ns; now < due_ns && !stop.stop_requested(); now = drivers::now().ns) {
       for (const std::uint8_t byte : terminal_.read()) {
         if (const auto reply = unit.receive(byte); !reply.empty()) terminal_.write(reply);
       }
       streaming_ = unit.streaming();
-      sleep_until_ns(std::min(due_ns, now + kListenEveryNs));
+      drivers::sleep_until({std::min(due_ns, now + kListenEveryNs)});
     }
     if (!bytes.empty()) terminal_.write(bytes);
   }

@@ -10,25 +10,12 @@
 
 #include "calibration/geometry/transform.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/lens.hpp"
 
 namespace birdseye {
 namespace {
 
-CameraModel wide() {
-  CameraModel c;
-  c.width_px = 768;
-  c.height_px = 576;
-  c.fx_px = 598.4;
-  c.fy_px = 611.9;
-  c.cx_px = 391.3;
-  c.cy_px = 281.9;
-  c.k1 = -0.305;
-  c.k2 = 0.098;
-  c.p1 = 0.0011;
-  c.p2 = -0.0007;
-  c.k3 = 0.004;
-  return c;
-}
+using testing::wide_lens;
 
 double* parameter(CameraModel& c, int i) {
   double* const all[] = {&c.fx_px, &c.fy_px, &c.cx_px, &c.cy_px, &c.k1, &c.k2, &c.p1, &c.p2, &c.k3};
@@ -36,7 +23,7 @@ double* parameter(CameraModel& c, int i) {
 }
 
 TEST(CameraModel, UnprojectUndoesProjectOverTheWholePicture) {
-  const CameraModel c = wide();
+  const CameraModel c = wide_lens();
   for (int y = 0; y < c.height_px; y += 23) {
     for (int x = 0; x < c.width_px; x += 23) {
       const auto ray = unproject(c, Eigen::Vector2d(x, y));
@@ -47,7 +34,7 @@ TEST(CameraModel, UnprojectUndoesProjectOverTheWholePicture) {
 }
 
 TEST(CameraModel, JacobiansAreWhatCentralDifferencesSay) {
-  const CameraModel c = wide();
+  const CameraModel c = wide_lens();
   std::mt19937 rng(9);
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int trial = 0; trial < 50; ++trial) {
@@ -80,7 +67,7 @@ TEST(CameraModel, JacobiansAreWhatCentralDifferencesSay) {
 }
 
 TEST(CameraModel, AgreesWithOpenCv) {
-  const CameraModel c = wide();
+  const CameraModel c = wide_lens();
   const cv::Matx33d k(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
   const std::vector<double> d{c.k1, c.k2, c.p1, c.p2, c.k3};
   std::vector<cv::Point3d> points;
@@ -94,7 +81,7 @@ TEST(CameraModel, AgreesWithOpenCv) {
 }
 
 TEST(CameraModel, GivesNoRayWhereTheLensFolds) {
-  CameraModel c = wide();
+  CameraModel c = wide_lens();
   c.k1 = -0.6;
   c.k2 = c.k3 = 0;
   EXPECT_FALSE(unproject(c, Eigen::Vector2d(c.cx_px + 900, c.cy_px)));
@@ -103,13 +90,13 @@ TEST(CameraModel, GivesNoRayWhereTheLensFolds) {
 }
 
 TEST(CameraModel, RefusesWhatIsNoCamera) {
-  CameraModel c = wide();
+  CameraModel c = wide_lens();
   c.width_px = 0;
   EXPECT_FALSE(check(c));
-  c = wide();
+  c = wide_lens();
   c.fy_px = -1;
   EXPECT_FALSE(check(c));
-  c = wide();
+  c = wide_lens();
   c.k2 = NAN;
   EXPECT_FALSE(check(c));
 }

@@ -7,6 +7,7 @@
 #include "host/overlay/compositor.hpp"
 #include "host/overlay/gate.hpp"
 #include "host/render/cpu/ray_caster.hpp"
+#include "tests/support/lens.hpp"
 #include "tests/support/reference_renderer.hpp"
 
 namespace birdseye::host {
@@ -38,17 +39,7 @@ TransferFunction soft() {
 }
 
 CameraModel lens() {
-  CameraModel c;
-  c.width_px = 96;
-  c.height_px = 72;
-  c.fx_px = 90;
-  c.fy_px = 94;
-  c.cx_px = 49;
-  c.cy_px = 33;
-  c.k1 = -0.25;
-  c.k2 = 0.08;
-  c.p1 = 0.002;
-  return c;
+  return testing::wide_lens(128, 96);
 }
 
 /// A camera that looks at the scene's middle from 110 mm.
@@ -159,9 +150,9 @@ TEST(RayCaster, PutsAVoxelWhereTheLensProjectsIt) {
   const ImageRgba picture = RayCaster(volume, soft()).render(LensRays(lens()), pose(volume), {});
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double weight = 0;
-  for (int y = 0; y < 72; ++y) {
-    for (int x = 0; x < 96; ++x) {
-      const double w = picture.rgba[static_cast<std::size_t>(y * 96 + x) * 4 + 3];
+  for (int y = 0; y < lens().height_px; ++y) {
+    for (int x = 0; x < lens().width_px; ++x) {
+      const double w = picture.rgba[static_cast<std::size_t>(y * lens().width_px + x) * 4 + 3];
       sum += w * Eigen::Vector2d(x, y);
       weight += w;
     }
