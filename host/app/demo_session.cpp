@@ -28,7 +28,9 @@ Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials) {
   if (!labels) return labels.error();
   Plan plan;
   const int shown[] = {kPortal, kHepatic, kTumour};
-  plan.shown = keep_labels(*ct, *labels, shown);
+  auto kept = keep_labels(*ct, *labels, shown);
+  if (!kept) return kept.error();
+  plan.shown = *std::move(kept);
   const auto centre = label_centroid_mm(*labels, kTumour);
   if (!centre) return centre.error();
   plan.tumour_centre_in_patient_mm = *centre;

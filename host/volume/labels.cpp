@@ -1,6 +1,7 @@
 #include "host/volume/labels.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -11,14 +12,22 @@ namespace birdseye::host {
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct) {
   auto labels = import_volume(path);
   if (!labels) return labels;
-  if (labels->size != ct.size || !labels->patient_from_voxel.matrix().isApprox(ct.patient_from_voxel.matrix(), 1e-4)) {
+  // Corners, not matrices: what matters is where the voxels lie, however far from the origin the patient is.
+  const double allowed_mm = 0.2 * ct.spacing_mm.minCoeff();
+  bool same = labels->size == ct.size;
+  for (int corner = 0; same && corner < 8; ++corner) {
+    const Eigen::Vector3d voxel((corner & 1) != 0 ? ct.size[0] - 1 : 0, (corner & 2) != 0 ? ct.size[1] - 1 : 0,
+                                (corner & 4) != 0 ? ct.size[2] - 1 : 0);
+    same = (labels->patient_from_voxel * voxel - ct.patient_from_voxel * voxel).norm() <= allowed_mm;
+  }
+  if (!same) {
     return Error{Errc::bad_value,
                  fmt::format("{}: is not on the grid of the CT; resample the labels to it", path.string())};
   }
   return labels;
 }
 
-Volume keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values) {
+Result<Volume> keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values) {
   const auto wanted = [&](std::int16_t label) {
     return std::find(values.begin(), values.end(), label) != values.end();
   };
@@ -33,6 +42,9 @@ Volume keep_labels(const Volume& ct, const Volume& labels, std::span<const int> 
         high = high.max(Eigen::Array3i(i, j, k));
       }
     }
+  }
+  if (high[0] < 0) {
+    return Error{Errc::not_found, fmt::format("the labels hold none of {}", fmt::join(values, ", "))};
   }
   // The kept voxels, their neighbours, and a border of nothing.
   low = (low - 2).max(0);

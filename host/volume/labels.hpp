@@ -13,7 +13,8 @@ Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct
 
 /// ct where labels has one of values or a neighbour (of 26) that has, -1024 HU elsewhere: the neighbours keep the soft
 /// edge that partial volume gives an organ. Cut to the box that holds them, so patient_from_voxel is another.
-Volume keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values);
+/// Errc::not_found where no voxel has one of values.
+Result<Volume> keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values);
 
 /// The mean position of the voxels with this label, patient LPS mm; Errc::not_found where there are none.
 Result<Eigen::Vector3d> label_centroid_mm(const Volume& labels, int value);

@@ -9,6 +9,8 @@
 #include <itkNiftiImageIO.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace birdseye::hw_sim {
 
@@ -37,7 +39,7 @@ typename itk::Image<Pixel, 3>::Pointer image_of(const Grid& grid, std::span<cons
 }  // namespace
 
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
-                                std::uint64_t seed) {
+                                std::uint64_t seed, double gantry_tilt_deg) {
   std::error_code error;
   std::filesystem::remove_all(folder, error);
   std::filesystem::create_directories(folder, error);
@@ -50,6 +52,7 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
       Grid one = grid;
       one.size[2] = 1;
       one.origin_mm = grid.point(0, 0, k);
+      one.origin_mm.y() += std::tan(gantry_tilt_deg * std::numbers::pi / 180) * k * grid.spacing_mm.z();
       const auto slice = image_of<std::int16_t>(one, hu.subspan(grid.index(0, 0, k), one.voxels()));
       itk::MetaDataDictionary& tags = slice->GetMetaDataDictionary();
       const auto put = [&](const char* tag, const std::string& value) {

@@ -152,6 +152,69 @@ TEST(Import, RefusesFoldersThatAreNoStack) {
   expect_refused(scratch / "doubled", "same place");
 }
 
+TEST(Import, SlicesThatEndEarlyAreNamedAndNothingDies) {
+  const Scratch scratch;
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
+  for (const char* name : {"0001.dcm", "0004.dcm"}) {
+    const fs::path slice = scratch / "ct" / name;
+    fs::copy_file(slice, scratch / "whole");
+    const auto whole = fs::file_size(slice);
+    for (std::uintmax_t bytes = 0; bytes < whole; bytes += 37) {
+      fs::resize_file(slice, bytes);
+      const auto volume = import_volume(scratch / "ct");
+      ASSERT_FALSE(volume) << name << " cut to " << bytes << " of " << whole;
+      EXPECT_NE(volume.error().what.find(name), std::string::npos) << volume.error().what;
+      EXPECT_EQ(volume.error().what.find('\n'), std::string::npos) << volume.error().what;
+      fs::copy_file(scratch / "whole", slice, fs::copy_options::overwrite_existing);
+    }
+    fs::remove(scratch / "whole");
+  }
+  expect_the_grid(import_volume(scratch / "ct"));
+}
+
+TEST(Import, StrangersInASeriesAreNamedBystandersAreNot) {
+  const Scratch scratch;
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
+  std::ofstream(scratch / "ct/README.txt") << "of the ward";
+  std::ofstream(scratch / "ct/.hidden") << "of the disk";
+  expect_the_grid(import_volume(scratch / "ct"));
+  std::ofstream(scratch / "ct/IM0007") << "what was a slice";
+  expect_refused(scratch / "ct/IM0007", "no image that can be read");
+  const auto volume = import_volume(scratch / "ct");
+  ASSERT_FALSE(volume);
+  EXPECT_NE(volume.error().what.find("IM0007"), std::string::npos) << volume.error().what;
+}
+
+TEST(Import, ASmallTiltOfATallStackIsRefused) {
+  // Half a degree: each step is 17 um aside, less than a series is written to; sixty of them are 1 mm.
+  const Scratch scratch;
+  hw_sim::Grid tall = grid();
+  tall.size = {6, 5, 60};
+  const std::vector<std::int16_t> hu(tall.voxels(), 40);
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", tall, hu, 1));
+  ASSERT_TRUE(import_volume(scratch / "ct"));
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "tilted", tall, hu, 1, 0.5));
+  expect_refused(scratch / "tilted", "tilted by 0.5 degrees");
+}
+
+TEST(Labels, AreOfTheSameGridOrRefused) {
+  const Scratch scratch;
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
+  const auto ct = import_volume(scratch / "ct");
+  ASSERT_TRUE(ct);
+  const std::vector<std::uint8_t> labels(grid().voxels(), 3);
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "same.nii.gz", grid(), labels));
+  EXPECT_TRUE(import_labels(scratch / "same.nii.gz", *ct));
+  hw_sim::Grid other = grid();
+  other.origin_mm.x() += 0.5;
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "moved.nii.gz", other, labels));
+  EXPECT_FALSE(import_labels(scratch / "moved.nii.gz", *ct));
+  other = grid();
+  other.spacing_mm.z() += 0.15;
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "stretched.nii.gz", other, labels));
+  EXPECT_FALSE(import_labels(scratch / "stretched.nii.gz", *ct));
+}
+
 TEST(Import, TheAbdomenIsAsItsReadmeSays) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
@@ -308,7 +371,9 @@ TEST(Labels, KeepTheirVoxelsAndASoftEdge) {
   labels.hu[labels.index(5, 4, 4)] = 4;
   labels.hu[labels.index(0, 0, 0)] = 3;
   const int values[] = {4};
-  const Volume kept = keep_labels(ct, labels, values);
+  const auto result = keep_labels(ct, labels, values);
+  ASSERT_TRUE(result);
+  const Volume& kept = *result;
   EXPECT_EQ(kept.size, (std::array<int, 3>{5, 5, 5}));
   EXPECT_EQ(kept.patient_from_voxel * Eigen::Vector3d(2, 2, 2), Eigen::Vector3d(10, 8, 8));
   EXPECT_EQ(kept.at(2, 2, 2), 100);
@@ -317,6 +382,8 @@ TEST(Labels, KeepTheirVoxelsAndASoftEdge) {
   EXPECT_EQ(std::count(kept.hu.begin(), kept.hu.end(), 100), 27);
   EXPECT_EQ(*label_centroid_mm(labels, 4), Eigen::Vector3d(10, 8, 8));
   EXPECT_FALSE(label_centroid_mm(labels, 9));
+  const int absent[] = {9, 12};
+  EXPECT_NE(keep_labels(ct, labels, absent).error().what.find("9, 12"), std::string::npos);
 }
 
 }  // namespace
