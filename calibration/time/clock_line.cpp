@@ -53,6 +53,9 @@ ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost) {
   tick.time = {origin_ns_ + index_ * period + lowest};
   tick.sigma = {sorted[static_cast<std::size_t>(twentieth)] - lowest};
   tick.late_by = {offset - lowest};
+  // So late, and not yet confirmed: the machine was busy and the time is right, or measurements were lost and it is
+  // wrong by what it is late. Who uses it must know.
+  if (tick.late_by.ns > period * 3 / 2) tick.sigma = tick.late_by;
   return tick;
 }
 

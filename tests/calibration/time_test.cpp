@@ -141,6 +141,27 @@ TEST(ClockLine, SurvivesLostMeasurementsKnownAndUnknown) {
   }
 }
 
+TEST(ClockLine, NeverHidesThatMeasurementsMayBeMissing) {
+  for (const std::int64_t lost : {2, 3, 5, 20}) {
+    Arrivals arrivals;
+    ClockLine line(period_of(kPeriodNs));
+    int doubted = 0;
+    for (std::int64_t n = 0; n < 1000; ++n) {
+      if (n >= 500 && n < 500 + lost) continue;
+      const auto tick = line.push({arrivals.at(n)});
+      const auto error_ns = std::abs(tick.time.ns - 5'000'000 - n * kPeriodNs);
+      if (tick.sigma.ns > kPeriodNs) {
+        ++doubted;
+        EXPECT_GT(tick.sigma.ns, error_ns - kPeriodNs / 20);
+      } else if (n > 200) {
+        EXPECT_LT(error_ns, 600'000) << lost << " lost, " << n;
+      }
+    }
+    EXPECT_GE(doubted, 5) << lost;
+    EXPECT_LE(doubted, 9) << lost;
+  }
+}
+
 TEST(ClockLine, BeginsAnewAfterAJumpBack) {
   ClockLine line(period_of(kPeriodNs));
   for (std::int64_t n = 0; n < 100; ++n) line.push({n * kPeriodNs});
