@@ -89,6 +89,7 @@ wire::Status Appliance::status() const {
 
 void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<drivers::minibird::MiniBird> tracker) {
   DeviceTime heard = now();
+  drivers::minibird::MiniBirdCounters before;  // of the times before the tracker was last lost
   while (!stop.stop_requested()) {
     auto read = tracker->read(now() + kTick);
     if (read && !read->empty()) heard = now();
@@ -99,11 +100,13 @@ void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<driver
     if (read) {
       for (const auto& measurement : *read) publish(measurement);
       const auto counters = tracker->counters();
-      phase_errors_ = counters.phase_errors;
-      senseless_records_ = counters.senseless_records;
+      phase_errors_ = before.phase_errors + counters.phase_errors;
+      senseless_records_ = before.senseless_records + counters.senseless_records;
       continue;
     }
     tell("tracker", false, read.error().what);
+    before.phase_errors = phase_errors_;
+    before.senseless_records = senseless_records_;
     tracker.reset();
     while (!stop.stop_requested() && !tracker) {
       wait(kLookAgain, stop);

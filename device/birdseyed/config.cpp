@@ -7,6 +7,8 @@
 #include <set>
 #include <toml.hpp>
 
+#include "drivers/io/serial_port.hpp"
+
 namespace birdseye::device {
 
 namespace {
@@ -97,6 +99,9 @@ void read_tracker(Section& section, Config& config) {
   std::string device, record = "position_matrix", hemisphere = "forward";
   section.text("device", device, true);
   section.integer("baud", config.tracker.baud, 2400, 115200);
+  if (!drivers::is_serial_speed(config.tracker.baud)) {
+    section.fail("baud", fmt::format("{} is none of {}", config.tracker.baud, drivers::kSerialSpeeds));
+  }
   section.integer("birds", config.tracker.birds, 1, 14);
   section.texts("names", config.bird_names);
   section.number("rate_hz", config.tracker.rate_hz, 14, 144);
@@ -141,6 +146,9 @@ void read_camera(Section& section, Config& config) {
   section.integer("width", config.camera.width_px, 16, 8192);
   section.integer("height", config.camera.height_px, 16, 8192);
   section.number("rate_hz", config.camera.rate_hz, 1, 1000);
+  if (std::int64_t{config.camera.width_px} * config.camera.height_px > drivers::kMostPixels) {
+    section.fail("width", "over 16 megapixels a frame, more than the wire carries");
+  }
 }
 
 void read_wire(Section& section, Config& config) {

@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <thread>
 
+#include "calibration/base/program.hpp"
 #include "device/birdseyed/appliance.hpp"
 
 namespace {
@@ -18,20 +19,8 @@ int refuse(const birdseye::Error& error) {
   return 2;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int serve(const std::filesystem::path& config_path, bool check_only) {
   using namespace birdseye;
-  CLI::App app{"birdseyed: tracker and camera of a laparoscope cart, on one clock, over OpenIGTLink"};
-  std::filesystem::path config_path;
-  bool check_only = false;
-  app.add_option("--config", config_path, "configuration file (TOML)")->required();
-  app.add_flag("--check", check_only, "read the configuration, say whether it is sound, and end");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
   const auto config = device::read_config(config_path);
   if (!config) return refuse(config.error());
   if (check_only) {
@@ -58,4 +47,15 @@ int main(int argc, char** argv) {
   while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   spdlog::info("ending");
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"birdseyed: tracker and camera of a laparoscope cart, on one clock, over OpenIGTLink", "birdseyed"};
+  std::filesystem::path config_path;
+  bool check_only = false;
+  app.add_option("--config", config_path, "configuration file (TOML)")->required();
+  app.add_flag("--check", check_only, "read the configuration, say whether it is sound, and end");
+  return birdseye::run_program(app, argc, argv, [&] { return serve(config_path, check_only); });
 }

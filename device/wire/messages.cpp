@@ -6,6 +6,7 @@
 #include <igtlStatusMessage.h>
 #include <igtlStringMessage.h>
 #include <igtlTrackingDataMessage.h>
+#include <igtl_image.h>
 
 #include <algorithm>
 #include <cstring>
@@ -115,6 +116,25 @@ typename M::Pointer unpacked(igtl::MessageHeader::Pointer header, std::span<cons
   return message;
 }
 
+/// The library believes the lengths inside a body, and a checksum is no proof of them. These are the bytes that they
+/// may speak of: in version 2 after an extended header, whose own size comes first.
+std::size_t content_bytes(std::span<const std::uint8_t> bytes) {
+  const std::span<const std::uint8_t> body = bytes.subspan(kHeaderBytes);
+  const bool extended = bytes[1] >= 2;
+  if (!extended) return body.size();
+  const std::size_t header = body.size() < 2 ? body.size() : static_cast<std::size_t>(body[0] << 8 | body[1]);
+  return body.size() - std::min(header, body.size());
+}
+
+/// A STRING's body: encoding, length, text.
+bool string_is_whole(std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t kFixed = 4;
+  const std::size_t content = content_bytes(bytes);
+  if (content < kFixed) return false;
+  const std::uint8_t* const at = bytes.data() + (bytes.size() - content);
+  return kFixed + static_cast<std::size_t>(at[2] << 8 | at[3]) <= content;
+}
+
 }  // namespace
 
 Packet pack(const VideoFrame& frame) {
@@ -203,6 +223,7 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
   const std::string device = header->GetDeviceName();
   try {
     if (type == "STRING" && (device == kFrameInfoDevice || device == kHealthDevice)) {
+      if (!string_is_whole(bytes)) return unpack_failed("STRING");
       const auto message = unpacked<igtl::StringMessage>(header, bytes);
       if (message == nullptr) return unpack_failed("STRING");
       const nlohmann::json json = nlohmann::json::parse(message->GetString());
@@ -227,8 +248,10 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
       int depth = 0;
       message->GetDimensions(frame.width_px, frame.height_px, depth);
       const auto size = static_cast<std::int64_t>(frame.width_px) * frame.height_px * 3;
+      const auto carried = static_cast<std::int64_t>(content_bytes(bytes)) - IGTL_IMAGE_HEADER_SIZE;
       if (frame.width_px <= 0 || frame.height_px <= 0 || depth != 1 || message->GetNumComponents() != 3 ||
-          message->GetScalarType() != igtl::ImageMessage::TYPE_UINT8 || message->GetImageSize() != size) {
+          message->GetScalarType() != igtl::ImageMessage::TYPE_UINT8 || message->GetImageSize() != size ||
+          carried < size) {
         return unpack_failed("IMAGE");
       }
       const auto* pixels = static_cast<const std::uint8_t*>(message->GetScalarPointer());

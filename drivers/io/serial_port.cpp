@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <optional>
+#include <utility>
 
 #include "drivers/io/monotonic.hpp"
 
@@ -17,24 +18,12 @@ namespace birdseye::drivers {
 namespace {
 
 std::optional<speed_t> speed_of(int baud) {
-  switch (baud) {
-    case 2400:
-      return B2400;
-    case 4800:
-      return B4800;
-    case 9600:
-      return B9600;
-    case 19200:
-      return B19200;
-    case 38400:
-      return B38400;
-    case 57600:
-      return B57600;
-    case 115200:
-      return B115200;
-    default:
-      return std::nullopt;
+  constexpr std::pair<int, speed_t> kSpeeds[] = {{2400, B2400},   {4800, B4800},   {9600, B9600},    {19200, B19200},
+                                                 {38400, B38400}, {57600, B57600}, {115200, B115200}};
+  for (const auto& [known, speed] : kSpeeds) {
+    if (known == baud) return speed;
   }
+  return std::nullopt;
 }
 
 Error open_error(const std::string& name, int failed) {
@@ -56,12 +45,15 @@ Error open_error(const std::string& name, int failed) {
 
 }  // namespace
 
+bool is_serial_speed(int baud) {
+  return speed_of(baud).has_value();
+}
+
 Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path& device, int baud) {
   const std::string name = device.string();
   const auto speed = speed_of(baud);
   if (!speed) {
-    return Error{Errc::bad_value,
-                 fmt::format("{}: baud {} is not one of 2400 4800 9600 19200 38400 57600 115200", name, baud)};
+    return Error{Errc::bad_value, fmt::format("{}: baud {} is none of {}", name, baud, kSerialSpeeds)};
   }
   UniqueFd fd(::open(name.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   if (!fd) return open_error(name, errno);

@@ -8,10 +8,13 @@
 
 namespace birdseye::drivers {
 
+inline constexpr const char* kSerialSpeeds = "2400, 4800, 9600, 19200, 38400, 57600, 115200";
+bool is_serial_speed(int baud);
+
 /// A serial port of the operating system: 8N1, raw, no flow control of either kind.
 class SerialPort final : public ByteStream {
  public:
-  /// baud: 2400 to 115200, one of the usual. RTS is released at once: opening asserts it, and some instruments take it
+  /// baud: one of kSerialSpeeds. RTS is released at once: opening asserts it, and some instruments take it
   /// for a reset. Refuses what is not there, is no terminal, or is held by another program.
   static Result<std::unique_ptr<SerialPort>> open(const std::filesystem::path& device, int baud);
 

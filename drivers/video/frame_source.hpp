@@ -21,6 +21,9 @@ struct Frame {
   DeviceTime arrived;
 };
 
+/// Of one frame. More than any laparoscope's; three bytes each are less than the largest message of the wire.
+inline constexpr std::int64_t kMostPixels = 4096 * 4096;
+
 class FrameSource {
  public:
   virtual ~FrameSource() = default;

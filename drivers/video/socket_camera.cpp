@@ -67,7 +67,8 @@ Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
   const auto height = get<std::uint32_t>(header_, 12);
   const auto format = pixel_format_of_fourcc(get<std::uint32_t>(header_, 16));
   const auto payload = get<std::uint64_t>(header_, 48);
-  const bool sized = width > 0 && height > 0 && width <= kLargestSide && height <= kLargestSide;
+  const bool sized = width > 0 && height > 0 && width <= kLargestSide && height <= kLargestSide &&
+                     std::int64_t{width} * height <= kMostPixels;
   if (std::memcmp(header_.data(), "BEFRAME1", 8) != 0 || !format || !sized ||
       payload != std::uint64_t{width} * height * bytes_per_pixel(*format)) {
     return Error{Errc::bad_format,

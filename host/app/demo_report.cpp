@@ -8,7 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host/app/json_file.hpp"
+#include "host/app/write_files.hpp"
 
 namespace birdseye::host {
 
@@ -30,10 +30,15 @@ std::string plot(const std::vector<FrameError>& errors, double FrameError::*fiel
   const double end_s = std::max(1e-9, errors.back().time_s);
   const double plot_width = kWidth - kLeft - 10;
   const double plot_height = kHeight - kBottom - kTop;
-  std::string points;
+  // A line for each run of frames: where the overlay was hidden there is nothing to draw.
+  constexpr double kGap_s = 0.2;
+  std::string lines;
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    points += fmt::format("{:.1f},{:.1f} ", kLeft + plot_width * errors[i].time_s / end_s,
-                          kTop + plot_height * (1 - values[i] / top));
+    if (i == 0 || errors[i].time_s - errors[i - 1].time_s > kGap_s) {
+      lines += std::string(i == 0 ? "" : "'/>") + "<polyline points='";
+    }
+    lines += fmt::format("{:.1f},{:.1f} ", kLeft + plot_width * errors[i].time_s / end_s,
+                         kTop + plot_height * (1 - values[i] / top));
   }
   std::string svg = fmt::format("<svg viewBox='0 0 {} {}' role='img'>", kWidth, kHeight);
   for (int i = 0; i <= 4; ++i) {
@@ -44,7 +49,7 @@ std::string plot(const std::vector<FrameError>& errors, double FrameError::*fiel
   svg += fmt::format("<text x='{}' y='{}'>0 s</text><text x='{}' y='{}' text-anchor='end'>{:.1f} s</text>", kLeft,
                      kHeight - 8, kWidth - 10, kHeight - 8, end_s);
   svg += fmt::format("<text x='14' y='{}' transform='rotate(-90 14 {})'>{}</text>", kHeight / 2, kHeight / 2, unit);
-  return svg + "<polyline points='" + points + "'/></svg>";
+  return svg + lines + "'/></svg>";
 }
 
 constexpr const char* kStyle =
@@ -73,8 +78,10 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"reasons", f.reasons},
       {"overlay_error_px_p50", percentile(px, 0.50)},
       {"overlay_error_px_p95", percentile(px, 0.95)},
+      {"overlay_error_px_max", percentile(px, 1)},
       {"target_error_mm_p50", percentile(mm, 0.50)},
       {"target_error_mm_p95", percentile(mm, 0.95)},
+      {"target_error_mm_max", percentile(mm, 1)},
       {"fre_mm", f.fre_mm},
       {"fiducial_residuals_mm", f.fiducial_residuals_mm},
       {"camera_rms_px", f.camera_rms_px},
@@ -88,16 +95,15 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"frames_without_overlay", f.frames_without_overlay},
       {"wall_s", f.wall_s},
   };
-  if (auto written = write_json(folder / "report.json", json); !written) return written;
 
   std::string rows;
   const auto row = [&rows](const std::string& name, const std::string& value) {
     rows += fmt::format("<tr><th>{}</th><td class='n'>{}</td></tr>\n", name, value);
   };
-  row("tumour centre, 3-D error, median / p95",
-      fmt::format("{:.2f} / {:.2f} mm", percentile(mm, 0.5), percentile(mm, 0.95)));
-  row("tumour centre, in the picture, median / p95",
-      fmt::format("{:.1f} / {:.1f} px", percentile(px, 0.5), percentile(px, 0.95)));
+  row("tumour centre, 3-D error, median / p95 / worst",
+      fmt::format("{:.2f} / {:.2f} / {:.2f} mm", percentile(mm, 0.5), percentile(mm, 0.95), percentile(mm, 1)));
+  row("tumour centre, in the picture, median / p95 / worst",
+      fmt::format("{:.1f} / {:.1f} / {:.1f} px", percentile(px, 0.5), percentile(px, 0.95), percentile(px, 1)));
   row("fiducial registration error (RMS)", fmt::format("{:.2f} mm", f.fre_mm));
   row("residual per fiducial", fmt::format("{:.2f} mm", fmt::join(f.fiducial_residuals_mm, ", ")));
   row("camera calibration (RMS)", fmt::format("{:.2f} px, {} views", f.camera_rms_px, f.board_views));
@@ -125,7 +131,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       "</body></html>\n",
       f.title, kStyle, f.verdict, reasons, rows, plot(f.errors, &FrameError::target_mm, "mm"),
       plot(f.errors, &FrameError::overlay_px, "px"));
-  return write_file(folder / "report.html", html);
+  return write_files({{folder / "report.json", text_of(json)}, {folder / "report.html", html}});
 }
 
 }  // namespace birdseye::host

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "calibration/solve/intrinsics.hpp"
+#include "host/app/interrupt.hpp"
 #include "host/overlay/compositor.hpp"
 #include "host/registration/point_matching.hpp"
 #include "host/volume/import.hpp"
@@ -104,15 +105,15 @@ Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
     RenderSettings settings;
     settings.step_mm = 1.2;
     out = composite(*frame.rgb, caster_->render(*rays_, camera_from_patient, settings), decision.strength);
+    if (overlaid.size() % kKeepEvery == 0) {
+      kept.push_back(
+          {frame.info.sequence, {frame.width_px, frame.height_px, *frame.rgb}, {frame.width_px, frame.height_px, out}});
+    }
     overlaid.push_back({frame.info.sequence, frame.info.acquired, camera_from_patient});
+    if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
   } else {
     ++figures.frames_without_overlay;
   }
-  if (overlaid.size() % kKeepEvery == 1) {
-    kept.push_back(
-        {frame.info.sequence, {frame.width_px, frame.height_px, *frame.rgb}, {frame.width_px, frame.height_px, out}});
-  }
-  if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
   return film_.add(out);
 }
 
@@ -140,6 +141,7 @@ Result<void> DemoSession::run(EventStream& stream) {
   constexpr auto kPatience = std::chrono::seconds(15);
   auto heard = Clock::now();
   for (;;) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
     if (const std::string failure = cart_.failure(); !failure.empty()) return Error{Errc::disconnected, failure};
     auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
     if (!event) return event.error();

@@ -18,24 +18,26 @@ void EventStream::read(const std::stop_token& stop) {
       if (ended) {
         ended_ = event.error();
       } else if (*event) {
-        if (std::holds_alternative<wire::VideoFrame>(**event)) {
-          if (frames_ == most_frames_) {
-            events_.erase(std::find_if(events_.begin(), events_.end(), [](const wire::Event& e) {
-              return std::holds_alternative<wire::VideoFrame>(e);
-            }));
-            ++dropped_;
-          } else {
-            ++frames_;
-          }
-        }
-        // Everything else is small, and comes a hundred times a second: a minute of it is bound enough.
-        constexpr std::size_t kMostEvents = 8192;
-        if (events_.size() < kMostEvents) events_.push_back(**std::move(event));
+        keep(**std::move(event));
       }
     }
     changed_.notify_one();
     if (ended) return;
   }
+}
+
+void EventStream::keep(wire::Event event) {
+  const auto is_frame = [](const wire::Event& e) { return std::holds_alternative<wire::VideoFrame>(e); };
+  if (is_frame(event)) {
+    if (frames_ == most_frames_) {
+      events_.erase(std::find_if(events_.begin(), events_.end(), is_frame));
+      --frames_;
+    }
+    ++frames_;
+  } else if (events_.size() - frames_ >= kMostOthers) {
+    return;
+  }
+  events_.push_back(std::move(event));
 }
 
 Result<std::optional<wire::Event>> EventStream::next(wire::Client::Clock::time_point deadline) {
@@ -50,10 +52,4 @@ Result<std::optional<wire::Event>> EventStream::next(wire::Client::Clock::time_p
   if (std::holds_alternative<wire::VideoFrame>(*event)) --frames_;
   return event;
 }
-
-std::uint64_t EventStream::frames_dropped() const {
-  const std::lock_guard lock(mutex_);
-  return dropped_;
-}
-
 }  // namespace birdseye::host

@@ -13,17 +13,20 @@
 namespace birdseye::host {
 
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
-/// past most_frames waiting, the oldest frame is dropped and counted.
+/// past most_frames waiting, the oldest frame is dropped; the frames' own sequence numbers show the gap.
 class EventStream {
  public:
   EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames);
 
   /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
   Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline);
-  [[nodiscard]] std::uint64_t frames_dropped() const;
 
  private:
   void read(const std::stop_token& stop);
+  void keep(wire::Event event);
+
+  /// Everything that is no frame is small, and comes a hundred times a second: a minute of it is bound enough.
+  static constexpr std::size_t kMostOthers = 8192;
 
   std::unique_ptr<wire::Client> client_;
   std::size_t most_frames_;
@@ -31,7 +34,6 @@ class EventStream {
   std::condition_variable changed_;
   std::deque<wire::Event> events_;
   std::size_t frames_ = 0;
-  std::uint64_t dropped_ = 0;
   std::optional<Error> ended_;
   std::jthread thread_;
 };

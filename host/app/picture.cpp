@@ -1,11 +1,7 @@
 #include "host/app/picture.hpp"
 
-#include <fmt/format.h>
-
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "host/app/json_file.hpp"
 
 namespace birdseye::host {
 
@@ -24,15 +20,13 @@ cv::Point point_of(const Eigen::Vector2d& p) {
 
 }  // namespace
 
-Result<void> write_png(const std::filesystem::path& path, std::span<const std::uint8_t> pixels, int width_px,
-                       int height_px, int channels) {
+std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels) {
   const cv::Mat image(height_px, width_px, channels == 4 ? CV_8UC4 : CV_8UC3, const_cast<std::uint8_t*>(pixels.data()));
   cv::Mat swapped;
   cv::cvtColor(image, swapped, channels == 4 ? cv::COLOR_RGBA2BGRA : cv::COLOR_RGB2BGR);
   std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", swapped, bytes))
-    return Error{Errc::io, fmt::format("{}: cannot be encoded", path.string())};
-  return write_file(path, std::string(bytes.begin(), bytes.end()));
+  cv::imencode(".png", swapped, bytes);
+  return {bytes.begin(), bytes.end()};
 }
 
 Picture tile(std::span<const Picture> pictures, int columns, double scale) {

@@ -16,10 +16,8 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
-/// channels: 3 (RGB) or 4 (RGBA, not premultiplied), 8 bits, rows from the top. Appears under its name when it is
-/// whole.
-Result<void> write_png(const std::filesystem::path& path, std::span<const std::uint8_t> pixels, int width_px,
-                       int height_px, int channels);
+/// channels: 3 (RGB) or 4 (RGBA, not premultiplied), 8 bits, rows from the top. The bytes of a PNG file.
+std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels);
 
 /// Pictures of one size side by side, scaled by scale, in rows of columns.
 Picture tile(std::span<const Picture> pictures, int columns, double scale);

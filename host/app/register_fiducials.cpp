@@ -6,8 +6,8 @@
 
 #include "calibration/solve/point_fit.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/json_file.hpp"
 #include "host/app/text_files.hpp"
+#include "host/app/write_files.hpp"
 
 namespace birdseye::host {
 
@@ -41,24 +41,24 @@ Result<ExitCode> register_fiducials(const Options& options) {
                  fmt::format("{}, {}: {}", options.ct.string(), options.tracker.string(), fit.error().what)};
   }
   const auto [verdict, reason] = verdict_of(fit->fre_rms_mm);
+  nlohmann::json json;
+  json["fre_rms_mm"] = fit->fre_rms_mm;
+  json["residuals_mm"] = fit->residuals_mm;
+  json["leave_one_out_mm"] = fit->leave_one_out_mm;
+  const Eigen::Matrix4d m = fit->to_from.matrix();
+  for (int i = 0; i < 4; ++i) json["patient_from_tracker"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
+  json["verdict"] = verdict;
+  json["reasons"] = {reason};
+  if (auto written = write_files({{options.out, pose_text(fit->to_from.matrix())}, {options.json, text_of(json)}});
+      !written) {
+    return written.error();
+  }
   for (std::size_t i = 0; i < ct->size(); ++i) {
     fmt::print("fiducial {:2}  residual {:6.3f} mm", i + 1, fit->residuals_mm[i]);
     if (!fit->leave_one_out_mm.empty()) fmt::print("  left out {:6.3f} mm", fit->leave_one_out_mm[i]);
     fmt::print("\n");
   }
   fmt::print("FRE {:.4f} mm rms: {} ({})\n", fit->fre_rms_mm, verdict, reason);
-  if (auto written = write_pose(options.out, fit->to_from.matrix()); !written) return written.error();
-  if (!options.json.empty()) {
-    nlohmann::json json;
-    json["fre_rms_mm"] = fit->fre_rms_mm;
-    json["residuals_mm"] = fit->residuals_mm;
-    json["leave_one_out_mm"] = fit->leave_one_out_mm;
-    const Eigen::Matrix4d m = fit->to_from.matrix();
-    for (int i = 0; i < 4; ++i) json["patient_from_tracker"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
-    json["verdict"] = verdict;
-    json["reasons"] = {reason};
-    if (auto written = write_json(options.json, json); !written) return written.error();
-  }
   return verdict == "fail" ? ExitCode::verdict_fail : ExitCode::success;
 }
 

@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host/app/commands.hpp"
-#include "host/app/json_file.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/text_files.hpp"
+#include "host/app/write_files.hpp"
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/volume/import.hpp"
 
@@ -127,14 +127,20 @@ Result<void> render(const Options& options) {
       image.rgba[i + c] = static_cast<std::uint8_t>(std::min(255, (image.rgba[i + c] * 255 + alpha / 2) / alpha));
     }
   }
-  if (auto written = write_png(options.out, image.rgba, image.width_px, image.height_px, 4); !written) return written;
   const double coverage = static_cast<double>(covered) / (static_cast<double>(image.rgba.size()) / 4);
+  const bool seen = covered > 0;
+  const nlohmann::json json = {
+      {"width_px", image.width_px},
+      {"height_px", image.height_px},
+      {"render_ms", ms},
+      {"coverage", coverage},
+      {"verdict", seen ? "pass" : "marginal"},
+      {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
+  const std::string png = png_of(image.rgba, image.width_px, image.height_px, 4);
+  if (auto written = write_files({{options.out, png}, {options.json, text_of(json)}}); !written) return written;
   fmt::print("{}: {}x{}, {:.0f} % covered, {:.0f} ms\n", options.out.string(), image.width_px, image.height_px,
              100 * coverage, ms);
-  if (options.json.empty()) return {};
-  return write_json(
-      options.json,
-      {{"width_px", image.width_px}, {"height_px", image.height_px}, {"render_ms", ms}, {"coverage", coverage}});
+  return {};
 }
 
 }  // namespace

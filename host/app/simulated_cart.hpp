@@ -61,9 +61,15 @@ class SimulatedCart {
   Result<void> finish(std::chrono::steady_clock::time_point deadline);
 
  private:
+  /// For the socket and the pseudo-terminal's name; removed with its owner.
+  struct TemporaryFolder {
+    std::filesystem::path path;
+    ~TemporaryFolder();
+  };
   SimulatedCart(ChildProcess simulator, CartSheet sheet, int port);
   void listen(const std::stop_token& stop);
 
+  std::unique_ptr<TemporaryFolder> rendezvous_;
   ChildProcess simulator_;
   std::unique_ptr<ChildProcess> appliance_;
   CartSheet sheet_;

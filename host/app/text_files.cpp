@@ -7,8 +7,6 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
-#include "host/app/json_file.hpp"
-
 namespace birdseye::host {
 
 namespace {
@@ -94,11 +92,11 @@ Result<Eigen::Matrix4d> read_pose(const fs::path& path) {
   return m;
 }
 
-Result<void> write_pose(const fs::path& path, const Eigen::Matrix4d& m) {
+std::string pose_text(const Eigen::Matrix4d& m) {
   std::string text;
   for (int i = 0; i < 4; ++i)
     text += fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}\n", m(i, 0), m(i, 1), m(i, 2), m(i, 3));
-  return write_file(path, text);
+  return text;
 }
 
 Result<CameraModel> read_camera(const fs::path& path) {
@@ -130,6 +128,11 @@ Result<CameraModel> read_camera(const fs::path& path) {
     return Error{Errc::unsupported, fmt::format("{}: has {} distortion_coefficients; 4 or 5 are read (k1 k2 p1 p2 k3)",
                                                 path.string(), distortion.total())};
   }
+  const cv::Mat_<double> k = matrix;
+  if (k(0, 1) != 0 || k(1, 0) != 0 || k(2, 0) != 0 || k(2, 1) != 0 || k(2, 2) != 1) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: camera_matrix has a skew, or a last row other than 0 0 1", path.string())};
+  }
   camera.fx_px = matrix.at<double>(0, 0);
   camera.fy_px = matrix.at<double>(1, 1);
   camera.cx_px = matrix.at<double>(0, 2);
@@ -142,14 +145,14 @@ Result<CameraModel> read_camera(const fs::path& path) {
   return camera;
 }
 
-Result<void> write_camera(const fs::path& path, const CameraModel& c) {
-  return write_file(
-      path, fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n"
-                        "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
-                        "   data: [ {:.17g}, 0., {:.17g}, 0., {:.17g}, {:.17g}, 0., 0., 1. ]\n"
-                        "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
-                        "   data: [ {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g} ]\n",
-                        c.width_px, c.height_px, c.fx_px, c.cx_px, c.fy_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3));
+std::string camera_text(const CameraModel& c) {
+  return fmt::format(
+      "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n"
+      "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+      "   data: [ {:.17g}, 0., {:.17g}, 0., {:.17g}, {:.17g}, 0., 0., 1. ]\n"
+      "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n"
+      "   data: [ {:.17g}, {:.17g}, {:.17g}, {:.17g}, {:.17g} ]\n",
+      c.width_px, c.height_px, c.fx_px, c.cx_px, c.fy_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3);
 }
 
 }  // namespace birdseye::host

@@ -16,10 +16,12 @@ Result<std::vector<Eigen::Vector3d>> read_points(const std::filesystem::path& pa
 /// A rigid transform as a 4x4 matrix, four numbers a line, mm. Refuses a missing row, a last row that is not 0 0 0 1
 /// and an upper left block that is no rotation (to 1e-3).
 Result<Eigen::Matrix4d> read_pose(const std::filesystem::path& path);
-Result<void> write_pose(const std::filesystem::path& path, const Eigen::Matrix4d& matrix);
+/// The text that read_pose reads back exactly.
+std::string pose_text(const Eigen::Matrix4d& matrix);
 
 /// OpenCV YAML: image_width, image_height, camera_matrix (3x3), distortion_coefficients (4 or 5: k1 k2 p1 p2 [k3]).
 Result<CameraModel> read_camera(const std::filesystem::path& path);
-Result<void> write_camera(const std::filesystem::path& path, const CameraModel& camera);
+/// The text that read_camera reads back exactly.
+std::string camera_text(const CameraModel& camera);
 
 }  // namespace birdseye::host

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "host/app/commands.hpp"
-#include "host/app/json_file.hpp"
+#include "host/app/write_files.hpp"
 #include "host/volume/import.hpp"
 
 namespace birdseye::host {
@@ -31,7 +31,6 @@ Result<void> volume_info(const std::filesystem::path& path, const std::filesyste
   fmt::print("orientation  {} (voxel axes point to the patient's)\n", letters);
   fmt::print("first voxel  ({:.3f}, {:.3f}, {:.3f}) mm, patient LPS\n", m(0, 3), m(1, 3), m(2, 3));
   fmt::print("HU           {} to {}, mean {:.1f}\n", *low, *high, mean);
-  if (json_path.empty()) return {};
   nlohmann::json json;
   json["size"] = {size[0], size[1], size[2]};
   json["spacing_mm"] = {spacing.x(), spacing.y(), spacing.z()};
@@ -40,7 +39,7 @@ Result<void> volume_info(const std::filesystem::path& path, const std::filesyste
   json["hu_min"] = *low;
   json["hu_max"] = *high;
   json["hu_mean"] = mean;
-  return write_json(json_path, json);
+  return write_file(json_path, text_of(json));
 }
 
 }  // namespace

@@ -37,8 +37,7 @@ const std::map<std::string, Points>& presets() {
       {"skin", {{-600, {0.85, 0.66, 0.55}, 0}, {-300, {0.88, 0.70, 0.58}, 1}, {3071, {0.95, 0.80, 0.70}, 1}}},
       {"vessel", {{130, {0.75, 0.15, 0.15}, 0}, {180, {0.85, 0.20, 0.20}, 0.4}, {350, {1.0, 0.55, 0.45}, 1}}},
       // Portal veins blue, hepatic veins violet, a tumour that has taken up contrast medium green: told apart by HU,
-      // once
-      // all but their labels is left out.
+      // once all but their labels is left out.
       {"tumour-and-vessels",
        {{80, {0.55, 0.35, 0.95}, 0},
         {140, {0.60, 0.38, 0.98}, 0.16},
@@ -106,7 +105,16 @@ Result<TransferFunction> load_transfer_function(const std::string& name_or_path)
   try {
     const nlohmann::json json = nlohmann::json::parse(in);
     Points points;
+    constexpr auto kUnknown = [](const nlohmann::json& object, std::initializer_list<const char*> known) {
+      for (const auto& [key, value] : object.items()) {
+        if (std::find(known.begin(), known.end(), key) == known.end()) return key;
+      }
+      return std::string();
+    };
+    if (const std::string key = kUnknown(json, {"points"}); !key.empty()) return wrong(key + ": unknown key");
     for (const auto& item : json.at("points")) {
+      if (const std::string key = kUnknown(item, {"hu", "rgb", "extinction_per_mm"}); !key.empty())
+        return wrong(key + ": unknown key");
       const auto rgb = item.at("rgb").get<std::vector<double>>();
       if (rgb.size() != 3) return wrong("rgb needs three numbers");
       points.push_back(

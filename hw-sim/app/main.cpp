@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 
+#include "calibration/base/program.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
 
@@ -17,7 +18,8 @@ std::atomic<bool> g_stop = false;
 
 int main(int argc, char** argv) {
   using namespace birdseye;
-  CLI::App app{"birdseye-sim: a patient, a tracker and a laparoscope for the appliance, with known truth"};
+  CLI::App app{"birdseye-sim: a patient, a tracker and a laparoscope for the appliance, with known truth",
+               "birdseye-sim"};
   app.require_subcommand(1);
   int code = 0;
   const auto take = [&](const Result<void>& outcome) {
@@ -33,7 +35,7 @@ int main(int argc, char** argv) {
   make.add_option("--ct", phantom.ct,
                   "a CT to build on (DICOM folder, NIfTI, NRRD, MHA) in place of the procedural body");
   make.add_option("--labels", phantom.labels, "organ labels of that CT")->needs("--ct");
-  make.add_option("--liver-label", phantom.liver_label, "the liver's value in the labels");
+  make.add_option("--liver-label", phantom.liver_label, "the liver's value in the labels")->needs("--labels");
   make.callback([&] { take(hw_sim::write_phantom(phantom)); });
 
   hw_sim::CartSettings cart;
@@ -59,10 +61,5 @@ int main(int argc, char** argv) {
     take(hw_sim::run_cart(cart, g_stop));
   });
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return code;
+  return run_program(app, argc, argv, [&code] { return code; });
 }

@@ -59,6 +59,8 @@ TEST(Config, EveryMistakeIsNamed) {
       {replaced("birds = 2", "birds = 3"), "2 names for 3 birds"},
       {replaced("birds = 2", "birds = 2\nbaud = 9600"), "does not fit into 9600 baud"},
       {replaced("birds = 2", "birds = 2\nrecord = \"matrix\""), "record"},
+      {replaced("birds = 2", "birds = 2\nbaud = 31250"), "31250 is none of 2400"},
+      {replaced("[wire]", "width = 8000\nheight = 8000\n[wire]"), "[camera] width: over 16 megapixels"},
       {replaced("[wire]", "[wire"), "is not TOML"},
   };
   for (const auto& [text, expected] : cases) {

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <igtl_util.h>
 
 #include <chrono>
 #include <thread>
@@ -141,6 +142,35 @@ TEST(Unpacker, DamageIsRefusedNotBelieved) {
     bytes[at] ^= 0x10;
     EXPECT_FALSE(Unpacker().push(bytes));
   }
+}
+
+/// The n-th message of a packet, its checksum made right again: damage that only the lengths inside can show.
+std::vector<std::uint8_t> with_right_checksum(std::vector<std::uint8_t> message) {
+  const std::uint64_t crc = crc64(message.data() + kHeaderBytes, message.size() - kHeaderBytes, 0);
+  for (std::size_t i = 0; i < 8; ++i) message[50 + i] = static_cast<std::uint8_t>(crc >> (56 - 8 * i));
+  return message;
+}
+
+TEST(Unpacker, LengthsInsideABodyAreNotBelieved) {
+  const Packet packet = pack(frame(1));
+  const std::size_t info_bytes = kHeaderBytes + *body_bytes(*packet);
+  const std::vector<std::uint8_t> info(packet->begin(), packet->begin() + static_cast<std::ptrdiff_t>(info_bytes));
+  std::vector<std::uint8_t> image(packet->begin() + static_cast<std::ptrdiff_t>(info_bytes), packet->end());
+  Unpacker sound;
+  ASSERT_TRUE(sound.push(with_right_checksum(info)));
+  ASSERT_TRUE(sound.push(with_right_checksum(image)));
+
+  std::vector<std::uint8_t> longer = info;
+  longer[kHeaderBytes + 2] = 0xFF;  // the text's length
+  EXPECT_FALSE(Unpacker().push(with_right_checksum(longer)));
+
+  // Pixels left away, and the body's length with them; the width and height still promise them.
+  image.resize(image.size() - 1000);
+  const std::uint64_t body = image.size() - kHeaderBytes;
+  for (std::size_t i = 0; i < 8; ++i) image[42 + i] = static_cast<std::uint8_t>(body >> (56 - 8 * i));
+  Unpacker unpacker;
+  ASSERT_TRUE(unpacker.push(info));
+  EXPECT_FALSE(unpacker.push(with_right_checksum(image)));
 }
 
 TEST(Unpacker, AHeaderMayNotAskForMoreThanTheLargestBody) {

@@ -130,6 +130,20 @@ TEST(Commands, RegisterFiducialsRefusesBadInputInOneLine) {
   refuse(scratch.file("short.txt", "0 0 0\n1 2\n"), four, {"short.txt", "line 2"});
 }
 
+TEST(Commands, WritesAllItsFilesOrNone) {
+  const Scratch scratch;
+  const std::string four = scratch.file("four.txt", kFour);
+  const std::string common = "register fiducials --ct " + four + " --tracker " + four + " --out ";
+  expect_refused("birdseye", common + (scratch / "m.txt").string() + " --json /nonexistent/r.json",
+                 {"/nonexistent/r.json", "permissions"}, scratch / "m.txt");
+  EXPECT_FALSE(fs::exists(scratch / "m.txt.part"));
+  expect_refused("birdseye", common + scratch.path().string(), {scratch.path().string(), "is a folder"});
+  // A pipe or a device takes the text and stays what it is.
+  EXPECT_EQ(run("birdseye", common + "/dev/null --json " + (scratch / "r.json").string()).code, 0);
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_TRUE(fs::exists(scratch / "r.json"));
+}
+
 TEST(Commands, AWrongOrderOfFiducialsFailsWithCode3) {
   const Scratch scratch;
   const auto result = run("birdseye", "register fiducials --ct " + scratch.file("a.txt", kFour) + " --tracker " +
@@ -189,16 +203,21 @@ TEST(Commands, RenderRefusesBadInputInOneLine) {
   refuse("--camera " + camera + " --pose " + scratch.file("shear.txt", "1 1 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"),
          {"shear.txt", "no rigid"});
   refuse("--camera " + camera, {"--pose"});
+  std::string skew = kCamera;
+  skew.replace(skew.find("60., 0."), 7, "60., 1.");
+  refuse("--camera " + scratch.file("skew.yaml", skew) + " --pose " + pose, {"skew.yaml", "skew"});
+  refuse("--transfer " + scratch.file("t.json", R"({"points": [{"hu": 1, "rgb": [1, 1, 1], "extinction": 2}]})"),
+         {"t.json", "extinction: unknown key"});
   refuse("--transfer livre", {"livre", "liver"});
   refuse("--size big", {"--size"});
 }
 
 TEST(Commands, WrongUsageIsCode2) {
-  EXPECT_EQ(run("birdseye", "").code, 2);
-  EXPECT_EQ(run("birdseye", "volume info").code, 2);
+  for (const auto& [program, arguments] :
+       {std::pair{"birdseye", ""}, {"birdseye", "volume info"}, {"birdseyed", ""}, {"birdseye-sim", "cart"}}) {
+    expect_refused(program, arguments, {program, "--help"});
+  }
   EXPECT_EQ(run("birdseye", "--help").code, 0);
-  EXPECT_EQ(run("birdseyed", "").code, 2);
-  EXPECT_EQ(run("birdseye-sim", "cart").code, 2);
 }
 
 TEST(Commands, BirdseyedRefusesWhatItCannotUseInOneLine) {
