@@ -8,10 +8,10 @@
 namespace birdseye::host {
 
 /// Reads a CT: a folder of one DICOM series, one DICOM file (a volume of one slice), or a NIfTI, NRRD, MHA or MHD file.
-/// Refuses, with the reason and the remedy in one line that names the path: what is missing, unreadable, cut short or no
-/// image; folders of several series, or with a file that is no slice of it (texts and the like beside them are passed
-/// over); slices that are doubled, missing, unevenly spaced or sheared by a tilted gantry; voxels that are not finite or
-/// beyond 16 bits; images that are not three-dimensional.
+/// Refuses, with the reason and the remedy in one line that names the path: what is missing, unreadable, cut short or
+/// no image; folders of several series, or with a file that is no slice of it (texts and the like beside them are
+/// passed over); slices that are doubled, missing, unevenly spaced or sheared by a tilted gantry; voxels that are not
+/// finite or beyond 16 bits; images that are not three-dimensional.
 Result<Volume> import_volume(const std::filesystem::path& path);
 
 }  // namespace birdseye::host
