@@ -5,9 +5,18 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <string>
 
 namespace birdseye {
+
+/// Prints "program: what" as the one line on standard error that an error is, whatever names it holds.
+inline void print_error(const std::string& program, std::string what) {
+  for (char& c : what) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  std::fprintf(stderr, "%s: %s\n", program.c_str(), what.c_str());
+}
 
 /// What every program's main() ends in: parses, runs the callbacks, then `finish`, whose value is the exit code. Wrong
 /// usage, and whatever a library throws, becomes one line on standard error, "name: what", and exit code 2.
@@ -22,15 +31,17 @@ int run_program(CLI::App& app, int argc, char** argv, const Finish& finish) {
   });
   try {
     app.parse(argc, argv);
-    return finish();
+    const int code = finish();
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+    print_error(name, "standard output: cannot be written; is the disk full?");
+    return kUnusable;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kUnusable;
+  } catch (const std::bad_alloc&) {
+    print_error(name, "there is not enough memory for this; close other programs, or give it less");
+    return kUnusable;
   } catch (const std::exception& error) {
-    std::string what = error.what();
-    for (char& c : what) {
-      if (c == '\n') c = ' ';
-    }
-    std::fprintf(stderr, "%s: %s\n", name.c_str(), what.c_str());
+    print_error(name, error.what());
     return kUnusable;
   }
 }

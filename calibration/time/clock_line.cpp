@@ -17,6 +17,7 @@ ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost) {
     index_ += 1 + lost;
   }
   const std::int64_t period = settings_.period.ns;
+  const std::int64_t late = period * 7 / 10;  // by so much, measurements may be missing
   const auto envelope = [this] { return *std::min_element(offsets_ns_.begin(), offsets_ns_.end()); };
   std::int64_t offset = offset_of(arrived);
   if (!offsets_ns_.empty()) {
@@ -26,7 +27,7 @@ ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost) {
       offsets_ns_.clear();
       late_in_a_row_ = 0;
       ++restarts_;
-    } else if (over > period * 7 / 10) {
+    } else if (over > late) {
       if (++late_in_a_row_ >= settings_.slip_confirms) {
         // Late once is a busy machine; late every time is a measurement that never came.
         const auto recent = std::min(offsets_ns_.size(), settings_.slip_confirms - 1);
@@ -55,7 +56,7 @@ ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost) {
   tick.late_by = {offset - lowest};
   // So late, and not yet confirmed: the machine was busy and the time is right, or measurements were lost and it is
   // wrong by what it is late. Who uses it must know.
-  if (tick.late_by.ns > period * 3 / 2) tick.sigma = tick.late_by;
+  if (tick.late_by.ns > late) tick.sigma = tick.late_by;
   return tick;
 }
 

@@ -18,7 +18,7 @@ class ClockLine {
   };
   struct Tick {
     DeviceTime time;   ///< on the line
-    Duration sigma;    ///< how well the fastest arrivals agree on the line; late_by, where that is over 1.5 periods
+    Duration sigma;    ///< how well the fastest arrivals agree on the line; late_by, where that is over 0.7 periods
     Duration late_by;  ///< this arrival behind its tick
   };
 

@@ -17,6 +17,8 @@ using drivers::now;
 constexpr Duration kTick = Duration::from_ms(200);        // how soon a loop sees that it shall stop
 constexpr Duration kLookAgain = Duration::from_ms(1000);  // for an instrument that has gone
 constexpr Duration kSilent = Duration::from_ms(1000);     // of an instrument that is there
+// A laparoscope moves a millimetre in that: a pose whose time is known no better is not passed on.
+constexpr Duration kMostTimeSigma = Duration::from_ms(10);
 constexpr std::size_t kFramesWaiting = 32;
 
 void wait(Duration span, const std::stop_token& stop) {
@@ -120,16 +122,17 @@ void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<driver
 }
 
 void Appliance::publish(const drivers::minibird::Measurement& measurement) {
+  ++measurements_;
+  if (measurement.acquired_sigma > kMostTimeSigma) return;
   wire::Birds birds;
   birds.acquired = measurement.acquired;
   for (std::size_t i = 0; i < measurement.birds.size(); ++i) {
     const auto& bird = measurement.birds[i];
     if (!bird || !bird->position_mm || !bird->rotation) continue;
     const Transform<Tracker, Sensor> pose(*bird->rotation, *bird->position_mm);
-    if (i == 0) scope_poses_.push(measurement.acquired, measurement.acquired_sigma, pose);
+    if (i == 0) scope_poses_.push(measurement.acquired, pose);
     birds.birds.push_back({config_.bird_names[i], pose});
   }
-  ++measurements_;
   server_->publish(wire::pack(birds));
 }
 

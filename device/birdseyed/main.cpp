@@ -15,7 +15,7 @@
 namespace {
 
 int refuse(const birdseye::Error& error) {
-  fmt::print(stderr, "birdseyed: {}\n", error.what);
+  birdseye::print_error("birdseyed", error.what);
   return 2;
 }
 

@@ -6,10 +6,7 @@
 
 namespace birdseye::device {
 
-void ScopePoses::push(DeviceTime acquired, Duration acquired_sigma,
-                      const Transform<Tracker, Sensor>& tracker_from_sensor) {
-  constexpr Duration kMostSigma = Duration::from_ms(10);
-  if (acquired_sigma > kMostSigma) return;
+void ScopePoses::push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   {
     const std::lock_guard lock(mutex_);
     history_.push(acquired, tracker_from_sensor);

@@ -13,8 +13,7 @@ class ScopePoses {
  public:
   explicit ScopePoses(const PoseHistory::Settings& settings) : settings_(settings), history_(settings) {}
 
-  /// Keeps no pose whose time is not known to 10 ms: a laparoscope moves a millimetre in that.
-  void push(DeviceTime acquired, Duration acquired_sigma, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  void push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   /// The pose at `time`. Waits, no longer than `deadline`, for the samples after it that its smoothing wants.
   PoseAnswer at(DeviceTime time, DeviceTime deadline, const std::stop_token& stop);
 

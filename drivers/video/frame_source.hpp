@@ -22,7 +22,7 @@ struct Frame {
 };
 
 /// Of one frame. More than any laparoscope's; three bytes each are less than the largest message of the wire.
-inline constexpr std::int64_t kMostPixels = 4096 * 4096;
+inline constexpr std::int64_t kMostPixels = std::int64_t{4096} * 4096;
 
 class FrameSource {
  public:

@@ -1,6 +1,6 @@
 #include "host/app/commands.hpp"
 
-#include <fmt/core.h>
+#include "calibration/base/program.hpp"
 
 namespace birdseye::host {
 
@@ -9,7 +9,7 @@ void CommandStatus::take(const Result<void>& outcome) {
 }
 
 void CommandStatus::refuse(const Error& error) {
-  fmt::print(stderr, "birdseye: {}\n", error.what);
+  print_error("birdseye", error.what);
   code = ExitCode::unusable_input;
 }
 

@@ -113,7 +113,6 @@ struct Options {
 };
 
 Result<ExitCode> demo(const Options& options) {
-  note_interrupts();
   Progress progress;
   SimulatedCartSettings settings = options.cart;
   if (options.noise == "none") settings.position_noise_mm = settings.angle_noise_deg = 0;
@@ -129,9 +128,9 @@ Result<ExitCode> demo(const Options& options) {
        {"report.json", "report.html", "overlay.png", "video.png", "overlay.mp4", "simulator.log", "birdseyed.log"}) {
     fs::remove(out / name, error);
   }
+  note_interrupts();
   progress(settings.ct.empty() ? "making the patient" : "making the patient from " + settings.ct.string());
   if (auto made = SimulatedCart::make_patient(settings); !made) return made.error();
-  if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
   progress("starting tracker, camera and appliance");
   const auto cart = SimulatedCart::start(settings);
   if (!cart) return cart.error();

@@ -31,6 +31,7 @@ std::pair<std::string, std::string> verdict_of(double fre_rms_mm) {
 }
 
 Result<ExitCode> register_fiducials(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the file to write"};
   const auto ct = read_points(options.ct);
   if (!ct) return ct.error();
   const auto tracker = read_points(options.tracker);

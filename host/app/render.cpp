@@ -51,8 +51,10 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
 Result<View> default_view(const Volume& volume, const Options& options) {
   View view;
   CameraModel& c = view.camera;
-  if (std::sscanf(options.size.c_str(), "%dx%d", &c.width_px, &c.height_px) != 2 || c.width_px < 16 ||
-      c.height_px < 16 || c.width_px > 8192 || c.height_px > 8192) {
+  int read = 0;
+  if (std::sscanf(options.size.c_str(), "%dx%d%n", &c.width_px, &c.height_px, &read) != 2 ||
+      static_cast<std::size_t>(read) != options.size.size() || c.width_px < 16 || c.height_px < 16 ||
+      c.width_px > 8192 || c.height_px > 8192) {
     return Error{Errc::bad_value, fmt::format("--size {}: give WIDTHxHEIGHT of 16 to 8192 pixels", options.size)};
   }
   const auto [low, high] = bounds(volume);
@@ -95,6 +97,7 @@ Result<View> view_of(const Volume& volume, const Options& options) {
 }
 
 Result<void> render(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the PNG to write"};
   if (!std::isfinite(options.step_mm) || !std::isfinite(options.clip)) {
     return Error{Errc::bad_value, "--step-mm and --clip need finite numbers"};
   }

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "host/app/interrupt.hpp"
 #include "host/app/write_files.hpp"
 
 namespace birdseye::host {
@@ -96,8 +97,13 @@ Result<void> SimulatedCart::make_patient(const SimulatedCartSettings& settings) 
   const std::filesystem::path log = settings.folder / "simulator.log";
   auto child = ChildProcess::start(command, log);
   if (!child) return std::move(child).error();
-  const std::optional<int> code = child->wait(Clock::now() + std::chrono::seconds(60));
+  std::optional<int> code;
+  for (const auto deadline = Clock::now() + std::chrono::seconds(60);
+       !code && Clock::now() < deadline && !interrupted();) {
+    code = child->wait(Clock::now() + std::chrono::milliseconds(200));
+  }
   if (code == 0) return {};
+  if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
   std::ifstream in(log);
   std::string line, last;
   while (std::getline(in, line)) {

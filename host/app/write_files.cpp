@@ -34,6 +34,13 @@ Result<void> write_files(const std::vector<FileText>& files) {
     for (const FileText* file : replaced) fs::remove(part_of(file->path), ignored);
     return error;
   };
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!files[i].path.empty() && files[i].path == files[j].path) {
+        return Error{Errc::bad_value, fmt::format("{}: is named twice; give two files", files[i].path.string())};
+      }
+    }
+  }
   for (const FileText& file : files) {
     if (file.path.empty() || fs::is_other(file.path, ignored)) continue;
     if (fs::is_directory(file.path, ignored)) {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <itkImage.h>
-#include <itkImageFileReader.h>
 #include <itkImageFileWriter.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
@@ -11,6 +10,7 @@
 #include <cmath>
 
 #include "host/deform/displacement_field.hpp"
+#include "host/volume/image_file.hpp"
 
 namespace birdseye::host {
 
@@ -18,11 +18,11 @@ namespace {
 
 using FieldImage = itk::Image<itk::Vector<float, 3>, 3>;
 
-itk::ImageIOBase::Pointer io_for(const std::filesystem::path& path, bool writing) {
+itk::ImageIOBase::Pointer writer_for(const std::filesystem::path& path) {
   for (const itk::ImageIOBase::Pointer& io :
        {itk::ImageIOBase::Pointer(itk::MetaImageIO::New()), itk::ImageIOBase::Pointer(itk::NrrdImageIO::New()),
         itk::ImageIOBase::Pointer(itk::NiftiImageIO::New())}) {
-    if (writing ? io->CanWriteFile(path.c_str()) : io->CanReadFile(path.c_str())) return io;
+    if (io->CanWriteFile(path.c_str())) return io;
   }
   return nullptr;
 }
@@ -30,7 +30,7 @@ itk::ImageIOBase::Pointer io_for(const std::filesystem::path& path, bool writing
 }  // namespace
 
 Result<void> write_field(const std::filesystem::path& path, const DisplacementField& field) {
-  const itk::ImageIOBase::Pointer io = io_for(path, true);
+  const itk::ImageIOBase::Pointer io = writer_for(path);
   if (io == nullptr) return Error{Errc::bad_value, fmt::format("{}: name it .mha, .nrrd or .nii.gz", path.string())};
   const auto image = FieldImage::New();
   FieldImage::SizeType size;
@@ -65,43 +65,15 @@ Result<void> write_field(const std::filesystem::path& path, const DisplacementFi
 }
 
 Result<DisplacementField> read_field(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored))
-    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
-  const itk::ImageIOBase::Pointer io = io_for(path, false);
-  if (io == nullptr)
-    return Error{Errc::bad_format,
-                 fmt::format("{}: is no displacement field; give .mha, .nrrd or .nii.gz", path.string())};
+  const auto image = read_image(path, 3);
+  if (!image) return image.error();
   DisplacementField field;
-  try {
-    io->SetFileName(path.string());
-    io->ReadImageInformation();
-    if (io->GetNumberOfComponents() != 3) {
-      return Error{Errc::bad_format, fmt::format("{}: has {} values a point where a displacement has three",
-                                                 path.string(), io->GetNumberOfComponents())};
-    }
-    const auto reader = itk::ImageFileReader<FieldImage>::New();
-    reader->SetImageIO(io);
-    reader->SetFileName(path.string());
-    reader->Update();
-    const FieldImage& image = *reader->GetOutput();
-    const auto size = image.GetLargestPossibleRegion().GetSize();
-    Eigen::Matrix3d axes;
-    for (unsigned row = 0; row < 3; ++row) {
-      field.size[row] = static_cast<int>(size[row]);
-      field.patient_from_lattice.translation()[row] = image.GetOrigin()[row];
-      for (unsigned column = 0; column < 3; ++column)
-        axes(row, column) = image.GetDirection()(row, column) * image.GetSpacing()[column];
-    }
-    field.patient_from_lattice.linear() = axes;
-    const std::size_t count = size[0] * size[1] * size[2];
-    field.displacement_mm.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto& v = image.GetBufferPointer()[i];
-      field.displacement_mm.emplace_back(v[0], v[1], v[2]);
-    }
-  } catch (const std::exception&) {
-    return Error{Errc::unreadable, fmt::format("{}: is cut short or damaged", path.string())};
+  field.size = image->size;
+  field.patient_from_lattice.linear() = image->axes * image->spacing_mm.asDiagonal();
+  field.patient_from_lattice.translation() = image->origin_mm;
+  field.displacement_mm.reserve(image->values.size() / 3);
+  for (std::size_t i = 0; i < image->values.size(); i += 3) {
+    field.displacement_mm.emplace_back(image->values[i], image->values[i + 1], image->values[i + 2]);
   }
   for (const Eigen::Vector3f& u : field.displacement_mm) {
     if (!u.allFinite())

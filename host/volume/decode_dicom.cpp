@@ -8,11 +8,14 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <new>
 #include <numbers>
+#include <sstream>
 
 #include "host/volume/decode.hpp"
 
@@ -43,7 +46,7 @@ std::string text_of(const itk::GDCMImageIO& io, const char* tag) {
 /// GDCM fills pixels that the file no longer holds with zeros, and says nothing. Looks for the pixel data element
 /// (DICOM PS3.5, 7.1 and A.4), the last of its tag since an icon may come before, and whether the file holds all of it.
 /// Of what it does not find (deflated or big-endian files) it says nothing either.
-bool is_cut(const fs::path& path) {
+bool is_cut(const fs::path& path, std::size_t pixel_bytes) {
   std::ifstream in(path, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(in), {}};
   using namespace std::string_literals;
@@ -57,7 +60,56 @@ bool is_cut(const fs::path& path) {
   std::memcpy(&length, bytes.data() + values - 4, sizeof length);
   constexpr std::uint32_t kEncapsulated = 0xFFFFFFFF;
   if (length == kEncapsulated) return bytes.find("\xFE\xFF\xDD\xE0"s, values) == std::string::npos;
-  return bytes.size() - values < length;
+  return bytes.size() - values < length || length < pixel_bytes;
+}
+
+/// The numbers of a tag, as "1\\0.5"; empty where one of them is none, or is not finite.
+std::vector<double> numbers_of(const itk::GDCMImageIO& io, const char* tag) {
+  std::vector<double> numbers;
+  std::istringstream words(text_of(io, tag));
+  for (std::string word; std::getline(words, word, '\\');) {
+    char* end = nullptr;
+    const double number = std::strtod(word.c_str(), &end);
+    if (end == word.c_str() ||
+        word.find_first_not_of(' ', static_cast<std::size_t>(end - word.c_str())) != std::string::npos ||
+        !std::isfinite(number)) {
+      return {};
+    }
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+/// GDCM makes up what is missing or makes no sense: an origin of zero, axes of LPS, millimetres, no rescaling.
+Result<void> check_tags(const fs::path& path, const itk::GDCMImageIO& io) {
+  const auto spacing = numbers_of(io, "0028|0030");
+  if (spacing.size() != 2 || !(spacing[0] > 0) || !(spacing[1] > 0)) {
+    return refused(Errc::bad_value, path, "has no sound Pixel Spacing (0028,0030); export it again");
+  }
+  if (numbers_of(io, "0020|0032").size() != 3) {
+    return refused(Errc::bad_value, path, "has no sound Image Position (0020,0032); export it again");
+  }
+  const auto axes = numbers_of(io, "0020|0037");
+  if (axes.size() == 6) {
+    const Eigen::Vector3d row(axes[0], axes[1], axes[2]), column(axes[3], axes[4], axes[5]);
+    if (std::abs(row.norm() - 1) < 0.01 && std::abs(column.norm() - 1) < 0.01 && std::abs(row.dot(column)) < 0.01) {
+      for (const char* tag : {"0028|1052", "0028|1053"}) {
+        std::string text;
+        const bool there = itk::ExposeMetaData<std::string>(io.GetMetaDataDictionary(), tag, text);
+        const auto numbers = numbers_of(io, tag);
+        const bool slope = std::string(tag) == "0028|1053";
+        if (there && (numbers.size() != 1 || (slope && !(numbers[0] > 0)))) {
+          return refused(Errc::bad_value, path,
+                         "has no sound Rescale Intercept and Slope (0028,1052); export it again");
+        }
+      }
+      if (text_of(io, "0028|0004") != "MONOCHROME2") {
+        return refused(Errc::unsupported, path, "is not MONOCHROME2, as a CT is; export it again");
+      }
+      return {};
+    }
+  }
+  return refused(Errc::bad_value, path, "has no sound Image Orientation (0020,0037); export it again");
 }
 
 Result<Slice> read_slice_header(const fs::path& path, const Announce& announce) {
@@ -79,7 +131,12 @@ Result<Slice> read_slice_header(const fs::path& path, const Announce& announce) 
   if (io->GetNumberOfDimensions() > 2 && io->GetDimensions(2) > 1) {
     return refused(Errc::unsupported, path, "holds several frames; give a series of one slice a file");
   }
-  if (is_cut(path)) return refused(Errc::bad_format, path, "is cut short; copy it again");
+  if (auto sound = check_tags(path, *io); !sound) return sound.error();
+  const auto bits = numbers_of(*io, "0028|0100");
+  const std::size_t pixel_bytes = bits.size() != 1 || bits[0] < 8 ? 0
+                                                                  : io->GetDimensions(0) * io->GetDimensions(1) *
+                                                                        static_cast<std::size_t>(bits[0]) / 8;
+  if (is_cut(path, pixel_bytes)) return refused(Errc::bad_format, path, "is cut short; copy it again");
   Slice slice;
   slice.path = path;
   slice.series = text_of(*io, "0020|000e");
@@ -145,39 +202,45 @@ Result<double> sort_and_check_steps(const fs::path& folder, std::vector<Slice>& 
   }
   const Eigen::Vector3d whole = slices.back().position_mm - slices.front().position_mm;
   const double drift_mm = (whole - whole.dot(normal) * normal).norm();
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < slices.size(); ++i) steps.push_back(along(i) - along(i - 1));
   const double step = (along(slices.size() - 1) - along(0)) / static_cast<double>(slices.size() - 1);
   for (std::size_t i = 1; i < slices.size(); ++i) {
-    const std::string here = slices[i].path.filename().string();
-    const std::string before = slices[i - 1].path.filename().string();
     const Eigen::Vector3d move = slices[i].position_mm - slices[i - 1].position_mm;
     const double forward = move.dot(normal);
     const double sideways = (move - forward * normal).norm();
     if (sideways > 0.02 * forward + 0.01) return tilted(folder, sideways, forward);
-    if (std::abs(forward - step) > 0.02 * step + 0.01) {
-      return refused(Errc::unsupported, folder,
-                     fmt::format("the step from {} to {} is {:.2f} mm where the mean is {:.2f}: "
-                                 "slices are missing or unevenly spaced; export the whole series",
-                                 before, here, forward, step));
-    }
+  }
+  // Against the median, which a hole does not move.
+  std::vector<double> sorted = steps;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  const auto worst = std::max_element(steps.begin(), steps.end(),
+                                      [&](double a, double b) { return std::abs(a - usual) < std::abs(b - usual); });
+  if (std::abs(*worst - usual) > 0.02 * usual + 0.01) {
+    const auto at = static_cast<std::size_t>(worst - steps.begin());
+    return refused(
+        Errc::unsupported, folder,
+        fmt::format("the step from {} to {} is {:.2f} mm where {:.2f} is usual: slices are missing or "
+                    "unevenly spaced; export the whole series",
+                    slices[at].path.filename().string(), slices[at + 1].path.filename().string(), *worst, usual));
   }
   // Each step may look straight, and the far end still lie beside where a straight stack puts it.
   if (drift_mm > 0.5 * slices.front().spacing_mm.minCoeff()) return tilted(folder, drift_mm, whole.dot(normal));
   return step;
 }
 
-Result<Volume> stack(const fs::path& named, std::vector<Slice> slices, const Announce& announce) {
+Result<ImageFile> stack(const fs::path& named, std::vector<Slice> slices, const Announce& announce) {
   if (auto same = check_same_stack(named, slices); !same) return same.error();
   const auto step = sort_and_check_steps(named, slices);
   if (!step) return step.error();
   const Slice& first = slices.front();
-  Volume volume;
-  volume.size = {static_cast<int>(first.size[0]), static_cast<int>(first.size[1]), static_cast<int>(slices.size())};
-  volume.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), *step};
-  Eigen::Matrix3d axes;
-  axes << first.row, first.column, first.row.cross(first.column).normalized();
-  volume.patient_from_voxel.linear() = axes * volume.spacing_mm.asDiagonal();
-  volume.patient_from_voxel.translation() = first.position_mm;
-  volume.hu.reserve(first.size[0] * first.size[1] * slices.size());
+  ImageFile image;
+  image.size = {static_cast<int>(first.size[0]), static_cast<int>(first.size[1]), static_cast<int>(slices.size())};
+  image.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), *step};
+  image.origin_mm = first.position_mm;
+  image.axes << first.row, first.column, first.row.cross(first.column).normalized();
+  image.values.reserve(first.size[0] * first.size[1] * slices.size());
   for (const Slice& slice : slices) {
     announce(slice.path);
     try {
@@ -189,16 +252,15 @@ Result<Volume> stack(const fs::path& named, std::vector<Slice> slices, const Ann
       if (region[0] != first.size[0] || region[1] != first.size[1] || region[2] != 1) {
         return refused(Errc::unsupported, slice.path, "holds several frames; give a series of one slice a file");
       }
-      if (auto done =
-              append_voxels(slice.path, reader->GetOutput()->GetBufferPointer(), region[0] * region[1], volume.hu);
-          !done) {
-        return done.error();
-      }
+      const double* const pixels = reader->GetOutput()->GetBufferPointer();
+      image.values.insert(image.values.end(), pixels, pixels + region[0] * region[1]);
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception&) {
       return refused(Errc::unreadable, slice.path, "its pixels cannot be decoded; export it again, uncompressed");
     }
   }
-  return volume;
+  return image;
 }
 
 /// Files that lie beside the slices of many series and are none.
@@ -219,7 +281,7 @@ bool is_dicom(const fs::path& path) {
   return itk::GDCMImageIO::New()->CanReadFile(path.c_str());
 }
 
-Result<Volume> decode_dicom_folder(const fs::path& folder, const Announce& announce) {
+Result<ImageFile> decode_dicom_folder(const fs::path& folder, const Announce& announce) {
   std::vector<fs::path> files;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -245,7 +307,7 @@ Result<Volume> decode_dicom_folder(const fs::path& folder, const Announce& annou
   return stack(folder, std::move(slices), announce);
 }
 
-Result<Volume> decode_dicom_file(const fs::path& path, const Announce& announce) {
+Result<ImageFile> decode_dicom_file(const fs::path& path, const Announce& announce) {
   auto slice = read_slice_header(path, announce);
   if (!slice) return slice.error();
   return stack(path, {*std::move(slice)}, announce);

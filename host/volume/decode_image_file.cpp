@@ -1,116 +1,125 @@
 #include <fmt/format.h>
-#include <itkImage.h>
-#include <itkImageFileReader.h>
+#include <itkImageIOBase.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <limits>
+#include <new>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "host/volume/decode.hpp"
 
 namespace birdseye::host {
 
-Error refused(Errc code, const std::filesystem::path& path, const std::string& why) {
-  return {code, fmt::format("{}: {}", path.string(), why)};
-}
-
-/// Appends the voxels of an image to hu; refuses those that are no Hounsfield units.
-Result<void> append_voxels(const std::filesystem::path& path, const double* voxels, std::size_t count,
-                           std::vector<std::int16_t>& hu) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const double value = voxels[i];
-    if (!std::isfinite(value)) {
-      return refused(Errc::bad_value, path, "has voxels that are not finite numbers; export it again");
-    }
-    if (value < std::numeric_limits<std::int16_t>::min() || value > std::numeric_limits<std::int16_t>::max()) {
-      return refused(Errc::bad_value, path,
-                     fmt::format("has a value of {:g}, which is no Hounsfield unit; is it a CT?", value));
-    }
-    hu.push_back(static_cast<std::int16_t>(std::lround(value)));
-  }
-  return {};
-}
-
 namespace {
 
 namespace fs = std::filesystem;
-using Image = itk::Image<double, 3>;
 
-/// MetaImage's reader takes a file that is cut short for one that ends in zeros. Uncompressed voxels need their bytes.
-bool meta_image_is_cut(const fs::path& path, std::uint64_t image_bytes) {
-  std::ifstream in(path, std::ios::binary);
-  std::string line;
-  fs::path voxels = path;
-  while (std::getline(in, line) && line.size() < 4096) {
-    if (line.find("CompressedData = True") != std::string::npos) return false;
-    const auto at = line.find("ElementDataFile = ");
-    if (at == std::string::npos) continue;
-    const std::string name = line.substr(at + 18);
-    if (name != "LOCAL") voxels = path.parent_path() / name;
-    break;
+/// The parts of a NIfTI-1 header that the toolkit believes unseen: it turns voxels that are not finite into zeros, and
+/// ends a file that is cut short in zeros too.
+class NiftiFile {
+ public:
+  /// Empty where the file is no single-file or paired NIfTI-1.
+  static std::optional<NiftiFile> open(const fs::path& path) {
+    NiftiFile file;
+    if (!read(path, 0, file.header_.data(), file.header_.size())) return std::nullopt;
+    const auto size = file.number<std::int32_t>(0);
+    file.swapped_ = size != kHeaderBytes;
+    if (file.number<std::int32_t>(0) != kHeaderBytes) return std::nullopt;
+    const bool pair = std::memcmp(file.header_.data() + 344, "ni1", 3) == 0;
+    file.voxels_ = path;
+    if (pair) file.voxels_ = image_of(path);
+    const float offset = file.number<float>(108);
+    file.offset_ = pair ? 0 : 352;
+    if (offset > static_cast<float>(file.offset_) && offset < 1e9F) file.offset_ = static_cast<std::size_t>(offset);
+    file.offset_is_sound_ = offset >= 0 && offset < 1e9F;
+    return file;
   }
-  const std::uint64_t header_bytes = voxels == path ? static_cast<std::uint64_t>(in.tellg()) : 0;
-  std::error_code error;
-  const std::uint64_t file_bytes = fs::file_size(voxels, error);
-  return !error && file_bytes < header_bytes + image_bytes;
-}
 
-/// The NIfTI reader does too. zlib counts what is there, compressed or not.
-bool nifti_is_cut(const fs::path& path, std::uint64_t image_bytes) {
-  const gzFile file = gzopen(path.c_str(), "rb");
-  if (file == nullptr) return true;
-  std::vector<char> chunk(1U << 18U);
-  std::uint64_t count = 0;
-  int got = 0;
-  while ((got = gzread(file, chunk.data(), static_cast<unsigned>(chunk.size()))) > 0)
-    count += static_cast<std::uint64_t>(got);
-  const bool sound = gzclose_r(file) == Z_OK;
-  constexpr std::uint64_t kLeastHeader = 348;
-  return !sound || got < 0 || count < kLeastHeader + image_bytes;
-}
+  [[nodiscard]] bool header_is_finite() const {
+    // pixdim, vox_offset, scl_slope, scl_inter, quaternion and offsets, the three rows of the affine map.
+    for (const auto& [begin, end] : {std::pair{76UL, 120UL}, {256UL, 328UL}}) {
+      for (std::size_t at = begin; at < end; at += 4) {
+        if (!std::isfinite(number<float>(at))) return false;
+      }
+    }
+    return true;
+  }
 
-/// Its reader turns what is not finite into zeros, so the file's own floating-point voxels are looked at.
-bool nifti_has_non_finite(const fs::path& path) {
-  const gzFile file = gzopen(path.c_str(), "rb");
-  if (file == nullptr) return false;
-  std::array<char, 348> header{};
-  bool found = false;
-  if (gzread(file, header.data(), header.size()) == static_cast<int>(header.size())) {
-    std::int32_t header_size = 0;
-    std::int16_t type = 0;
-    float offset = 0;
-    std::memcpy(&header_size, header.data(), sizeof header_size);
-    std::memcpy(&type, header.data() + 70, sizeof type);
-    std::memcpy(&offset, header.data() + 108, sizeof offset);
-    // Files of the other byte order are rare; theirs are left to the check after reading.
-    const bool ours = header_size == 348 && offset >= 348 && offset < 1e6F;
-    const int bytes = ours && type == 16 ? 4 : ours && type == 64 ? 8 : 0;
-    if (bytes != 0 && gzseek(file, static_cast<z_off_t>(offset), SEEK_SET) >= 0) {
-      std::vector<char> chunk(1U << 18U);
-      int got = 0;
-      while (!found && (got = gzread(file, chunk.data(), static_cast<unsigned>(chunk.size()))) > 0) {
-        for (int at = 0; at + bytes <= got && !found; at += bytes) {
-          float single = 0;
-          double twice = 0;
-          if (bytes == 4) {
-            std::memcpy(&single, chunk.data() + at, sizeof single);
-          } else {
-            std::memcpy(&twice, chunk.data() + at, sizeof twice);
-          }
-          found = !std::isfinite(single) || !std::isfinite(twice);
+  /// Of so many numbers, by bitpix.
+  [[nodiscard]] std::size_t bytes_of(std::size_t count) const {
+    return count * static_cast<std::size_t>(std::max<std::int16_t>(8, number<std::int16_t>(72))) / 8;
+  }
+
+  /// What is wrong with the voxels, of so many bytes; empty where they are whole and finite.
+  [[nodiscard]] std::string fault(std::size_t image_bytes) const {
+    if (!offset_is_sound_) return "is damaged in its header; export it again";
+    const gzFile file = gzopen(voxels_.c_str(), "rb");
+    if (file == nullptr) return "lacks the file of its voxels; copy both";
+    const auto type = number<std::int16_t>(70);
+    const std::size_t step = type == 16 ? 4 : type == 64 ? 8 : 0;
+    std::vector<char> chunk(1U << 18U);
+    std::size_t count = 0;
+    bool finite = true;
+    int got = 0;
+    if (gzseek(file, static_cast<z_off_t>(offset_), SEEK_SET) >= 0) {
+      while ((got = gzread(file, chunk.data(), static_cast<unsigned>(chunk.size()))) > 0) {
+        count += static_cast<std::size_t>(got);
+        for (std::size_t at = 0; step != 0 && at + step <= static_cast<std::size_t>(got) && finite; at += step) {
+          finite = step == 4 ? std::isfinite(ordered<float>(chunk.data() + at))
+                             : std::isfinite(ordered<double>(chunk.data() + at));
         }
       }
     }
+    const bool sound = gzclose_r(file) == Z_OK && got == 0;
+    if (!sound || count < image_bytes) return "is cut short or damaged; export it again";
+    if (!finite) return "has voxels that are not finite numbers; export it again";
+    return {};
   }
-  gzclose_r(file);
-  return found;
-}
+
+ private:
+  static constexpr std::int32_t kHeaderBytes = 348;
+
+  static bool read(const fs::path& path, std::size_t offset, char* to, std::size_t bytes) {
+    const gzFile file = gzopen(path.c_str(), "rb");
+    if (file == nullptr) return false;
+    const bool whole = gzseek(file, static_cast<z_off_t>(offset), SEEK_SET) >= 0 &&
+                       gzread(file, to, static_cast<unsigned>(bytes)) == static_cast<int>(bytes);
+    gzclose_r(file);
+    return whole;
+  }
+  static fs::path image_of(fs::path header) {
+    const bool zipped = header.extension() == ".gz";
+    if (zipped) header.replace_extension();
+    header.replace_extension(zipped ? ".img.gz" : ".img");
+    return header;
+  }
+  template <typename T>
+  [[nodiscard]] T ordered(const char* at) const {
+    std::array<char, sizeof(T)> bytes{};
+    std::memcpy(bytes.data(), at, sizeof(T));
+    if (swapped_) std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+  }
+  template <typename T>
+  [[nodiscard]] T number(std::size_t at) const {
+    return ordered<T>(header_.data() + at);
+  }
+
+  std::array<char, kHeaderBytes> header_{};
+  bool swapped_ = false, offset_is_sound_ = true;
+  std::size_t offset_ = 0;
+  fs::path voxels_;
+};
 
 itk::ImageIOBase::Pointer reader_for(const fs::path& path) {
   const std::string name = path.string();
@@ -122,15 +131,81 @@ itk::ImageIOBase::Pointer reader_for(const fs::path& path) {
   return nullptr;
 }
 
+template <typename T>
+void convert(const std::vector<char>& bytes, std::vector<float>& values) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    T value;
+    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
+    values[i] = static_cast<float>(value);
+  }
+}
+
+/// False for types that hold no numbers.
+bool convert(itk::ImageIOBase::IOComponentType type, const std::vector<char>& bytes, std::vector<float>& values) {
+  using Type = itk::IOComponentEnum;
+  switch (type) {
+    case Type::UCHAR:
+      convert<unsigned char>(bytes, values);
+      return true;
+    case Type::CHAR:
+      convert<signed char>(bytes, values);
+      return true;
+    case Type::USHORT:
+      convert<unsigned short>(bytes, values);
+      return true;
+    case Type::SHORT:
+      convert<short>(bytes, values);
+      return true;
+    case Type::UINT:
+      convert<unsigned>(bytes, values);
+      return true;
+    case Type::INT:
+      convert<int>(bytes, values);
+      return true;
+    case Type::ULONG:
+      convert<unsigned long>(bytes, values);
+      return true;
+    case Type::LONG:
+      convert<long>(bytes, values);
+      return true;
+    case Type::FLOAT:
+      convert<float>(bytes, values);
+      return true;
+    case Type::DOUBLE:
+      convert<double>(bytes, values);
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// The voxels as the file has them. The readers leave what a damaged or missing file does not give as it was, and some
+/// say nothing: what differs after two readings over two fillings was never read.
+std::optional<std::vector<char>> read_voxels(itk::ImageIOBase& io) {
+  itk::ImageIORegion whole(io.GetNumberOfDimensions());
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) whole.SetSize(axis, io.GetDimensions(axis));
+  io.SetIORegion(whole);
+  std::vector<char> first(static_cast<std::size_t>(io.GetImageSizeInBytes()), '\x55');
+  io.Read(first.data());
+  std::vector<char> second(first.size(), '\xAA');
+  io.Read(second.data());
+  if (first != second) return std::nullopt;
+  return first;
+}
+
 }  // namespace
 
-Result<Volume> decode_image_file(const fs::path& path, const Announce& announce) {
-  announce(path);
+Result<ImageFile> decode_image_file(const fs::path& path, int components) {
   const itk::ImageIOBase::Pointer io = reader_for(path);
   if (io == nullptr) {
     return refused(Errc::bad_format, path, "is no image that can be read; give DICOM, NIfTI, NRRD, MHA or MHD");
   }
+  const std::string cut = "is cut short or damaged; export it again";
   try {
+    const auto nifti = std::string(io->GetNameOfClass()) == "NiftiImageIO" ? NiftiFile::open(path) : std::nullopt;
+    if (nifti && !nifti->header_is_finite()) {
+      return refused(Errc::bad_value, path, "has numbers in its header that are not finite; export it again");
+    }
     io->SetFileName(path.string());
     io->ReadImageInformation();
     for (unsigned axis = 3; axis < io->GetNumberOfDimensions(); ++axis) {
@@ -140,45 +215,39 @@ Result<Volume> decode_image_file(const fs::path& path, const Announce& announce)
     if (io->GetNumberOfDimensions() < 3 || io->GetDimensions(2) < 2) {
       return refused(Errc::unsupported, path, "is a picture, not a volume; give the whole stack");
     }
-    if (io->GetNumberOfComponents() != 1)
-      return refused(Errc::unsupported, path, "has several values a voxel; give a CT");
-    const std::string kind = io->GetNameOfClass();
-    const auto image_bytes = static_cast<std::uint64_t>(io->GetImageSizeInBytes());
-    const bool single_nifti = kind == "NiftiImageIO" && path.extension() != ".hdr" && path.extension() != ".img";
-    if ((kind == "MetaImageIO" && meta_image_is_cut(path, image_bytes)) ||
-        (single_nifti && nifti_is_cut(path, image_bytes))) {
-      return refused(Errc::bad_format, path, "is cut short or damaged; export it again");
+    if (static_cast<int>(io->GetNumberOfComponents()) != components) {
+      return refused(Errc::unsupported, path,
+                     fmt::format("has {} values a voxel where {} is due; give {}", io->GetNumberOfComponents(),
+                                 components, components == 1 ? "a CT" : "a displacement field"));
     }
-    if (single_nifti && nifti_has_non_finite(path)) {
-      return refused(Errc::bad_value, path, "has voxels that are not finite numbers; export it again");
+    ImageFile image;
+    image.components = components;
+    std::size_t count = static_cast<std::size_t>(components);
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      if (io->GetDimensions(axis) > 65535) return refused(Errc::bad_value, path, "is too large to be a scan");
+      image.size[axis] = static_cast<int>(io->GetDimensions(axis));
+      count *= io->GetDimensions(axis);
+      image.spacing_mm[axis] = io->GetSpacing(axis);
+      image.origin_mm[axis] = io->GetOrigin(axis);
+      for (unsigned row = 0; row < 3; ++row) image.axes(row, axis) = io->GetDirection(axis)[row];
     }
-    const auto reader = itk::ImageFileReader<Image>::New();
-    reader->SetImageIO(io);
-    reader->SetFileName(path.string());
-    reader->Update();
-    const Image& image = *reader->GetOutput();
-    Volume volume;
-    const auto size = image.GetLargestPossibleRegion().GetSize();
-    Eigen::Matrix3d axes;
-    for (unsigned row = 0; row < 3; ++row) {
-      volume.size[row] = static_cast<int>(size[row]);
-      volume.spacing_mm[row] = image.GetSpacing()[row];
-      volume.patient_from_voxel.translation()[row] = image.GetOrigin()[row];
-      for (unsigned column = 0; column < 3; ++column) axes(row, column) = image.GetDirection()(row, column);
+    const auto bytes_expected = static_cast<std::size_t>(io->GetImageSizeInBytes());
+    if (nifti) {
+      // By the file's own type: a slope makes the reader give floats where the file holds integers.
+      const std::string fault = nifti->fault(nifti->bytes_of(count));
+      if (!fault.empty()) return refused(Errc::bad_format, path, fault);
     }
-    if (!volume.patient_from_voxel.translation().allFinite() || !volume.spacing_mm.allFinite()) {
-      return refused(Errc::bad_value, path, "has no finite place in the patient; export it again");
+    const auto bytes = read_voxels(*io);
+    if (!bytes || bytes->size() != bytes_expected) return refused(Errc::bad_format, path, cut);
+    image.values.resize(count);
+    if (!convert(io->GetComponentType(), *bytes, image.values)) {
+      return refused(Errc::unsupported, path, "holds no plain numbers; export it as 16-bit integers");
     }
-    if (!(volume.spacing_mm.minCoeff() > 0) || !axes.allFinite() || !(axes.transpose() * axes).isIdentity(1e-3)) {
-      return refused(Errc::unsupported, path, "its axes are sheared or have no length; resample it first");
-    }
-    volume.patient_from_voxel.linear() = axes * volume.spacing_mm.asDiagonal();
-    const std::size_t voxels = size[0] * size[1] * size[2];
-    volume.hu.reserve(voxels);
-    if (auto done = append_voxels(path, image.GetBufferPointer(), voxels, volume.hu); !done) return done.error();
-    return volume;
+    return image;
+  } catch (const std::bad_alloc&) {
+    return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   } catch (const std::exception&) {
-    return refused(Errc::unreadable, path, "is cut short or damaged; export it again");
+    return refused(Errc::unreadable, path, cut);
   }
 }
 

@@ -29,16 +29,21 @@ using Clock = std::chrono::steady_clock;
     ::dup2(nowhere, STDOUT_FILENO);
     ::dup2(nowhere, STDERR_FILENO);
   }
-  work([fd](const void* data, std::size_t size) {
-    const auto* bytes = static_cast<const char*>(data);
-    while (size > 0) {
-      const ssize_t put = ::write(fd, bytes, size);
-      if (put < 0 && errno == EINTR) continue;
-      if (put <= 0) ::_exit(1);
-      bytes += put;
-      size -= static_cast<std::size_t>(put);
-    }
-  });
+  // What work throws must not unwind into the copied stack: the objects on it are not ours to end.
+  try {
+    work([fd](const void* data, std::size_t size) {
+      const auto* bytes = static_cast<const char*>(data);
+      while (size > 0) {
+        const ssize_t put = ::write(fd, bytes, size);
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) ::_exit(1);
+        bytes += put;
+        size -= static_cast<std::size_t>(put);
+      }
+    });
+  } catch (...) {
+    ::_exit(1);
+  }
   ::_exit(0);
 }
 

@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   int code = 0;
   const auto take = [&](const Result<void>& outcome) {
     if (outcome) return;
-    fmt::print(stderr, "birdseye-sim: {}\n", outcome.error().what);
+    print_error("birdseye-sim", outcome.error().what);
     code = 2;
   };
 

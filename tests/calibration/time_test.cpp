@@ -142,7 +142,7 @@ TEST(ClockLine, SurvivesLostMeasurementsKnownAndUnknown) {
 }
 
 TEST(ClockLine, NeverHidesThatMeasurementsMayBeMissing) {
-  for (const std::int64_t lost : {2, 3, 5, 20}) {
+  for (const std::int64_t lost : {1, 2, 3, 5, 20}) {
     Arrivals arrivals;
     ClockLine line(period_of(kPeriodNs));
     int doubted = 0;
@@ -150,15 +150,15 @@ TEST(ClockLine, NeverHidesThatMeasurementsMayBeMissing) {
       if (n >= 500 && n < 500 + lost) continue;
       const auto tick = line.push({arrivals.at(n)});
       const auto error_ns = std::abs(tick.time.ns - 5'000'000 - n * kPeriodNs);
-      if (tick.sigma.ns > kPeriodNs) {
-        ++doubted;
+      if (tick.sigma.ns > kPeriodNs * 7 / 10) {
+        if (n >= 500 && n < 540) ++doubted;
         EXPECT_GT(tick.sigma.ns, error_ns - kPeriodNs / 20);
       } else if (n > 200) {
         EXPECT_LT(error_ns, 600'000) << lost << " lost, " << n;
       }
     }
     EXPECT_GE(doubted, 5) << lost;
-    EXPECT_LE(doubted, 9) << lost;
+    EXPECT_LE(doubted, 12) << lost;
   }
 }
 

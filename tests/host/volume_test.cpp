@@ -112,6 +112,24 @@ TEST(Import, RefusesWithAReason) {
     out.write(reinterpret_cast<const char*>(voxels.data()), static_cast<std::streamsize>(voxels.size() * 4));
   }
   expect_refused(scratch / "nan.nii", "not finite");
+  {
+    std::fstream file(scratch / "nan.nii", std::ios::binary | std::ios::in | std::ios::out);
+    const float nan = NAN;
+    file.seekp(112);  // the slope of its values
+    file.write(reinterpret_cast<const char*>(&nan), sizeof nan);
+  }
+  expect_refused(scratch / "nan.nii", "header that are not finite");
+  {
+    // What the reader leaves as it was must not be taken for voxels.
+    std::ofstream out(scratch / "garbled.mha", std::ios::binary);
+    out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = True\nCompressedDataSize = 9\n"
+           "ElementSpacing = 1 1 1\nDimSize = 6 5 4\nElementType = MET_SHORT\nElementDataFile = LOCAL\nno stream";
+    std::ofstream(scratch / "list.mhd") << "ObjectType = Image\nNDims = 3\nBinaryData = True\nElementSpacing = 1 1 1\n"
+                                           "DimSize = 6 5 2\nElementType = MET_SHORT\nElementDataFile = LIST\n"
+                                           "nowhere1.raw\nnowhere2.raw\n";
+  }
+  expect_refused(scratch / "garbled.mha", "damaged");
+  expect_refused(scratch / "list.mhd", "damaged");
   write_mha(scratch / "nan.mha", "MET_FLOAT", voxels.data(), voxels.size() * 4);
   expect_refused(scratch / "nan.mha", "not finite");
   voxels[7] = 1e6F;

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// A three-dimensional image as its file has it: values on a regular grid, x fastest, in the patient frame (LPS, mm).
+struct ImageFile {
+  std::array<int, 3> size{};
+  int components = 1;                     ///< values a voxel
+  std::vector<float> values;              ///< those of a voxel side by side
+  Eigen::Vector3d spacing_mm, origin_mm;  ///< origin: the centre of the first voxel
+  Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
+};
+
+/// Reads a folder of one DICOM series, a DICOM file, or a NIfTI, NRRD, MHA or MHD file, with so many values a voxel.
+/// The decoders run in a process of their own (docs/decisions/0012-isolated-import.md), for no longer than five
+/// minutes. Refuses in one line that names the path whatever is missing, unreadable, cut short, or has no sound
+/// geometry.
+Result<ImageFile> read_image(const std::filesystem::path& path, int components);
+
+}  // namespace birdseye::host
