@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
   CLI::App app{"birdseye: a registered, deformable CT over live laparoscopic video", "birdseye"};
   app.require_subcommand(1);
   CommandStatus status;
+  add_bench(app, status);
   add_demo(app, status);
   add_register(app, status);
   add_render(app, status);

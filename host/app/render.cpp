@@ -117,9 +117,10 @@ Result<void> render(const Options& options) {
   settings.step_mm = options.step_mm;
   settings.clip = view->clip;
   const LensRays rays(view->camera);
-  const RayCaster caster(*volume, *transfer);
+  RayCaster caster(*volume, *transfer);
+  if (deformation) caster.deform(*deformation);
   const auto began = std::chrono::steady_clock::now();
-  ImageRgba image = caster.render(rays, view->camera_from_patient, settings, deformation ? &*deformation : nullptr);
+  ImageRgba image = caster.render(rays, view->camera_from_patient, settings);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
   std::size_t covered = 0;
   for (std::size_t i = 0; i < image.rgba.size(); i += 4) {

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <memory>
+#include <cstdint>
 #include <vector>
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/render/cpu/voxel_grid.hpp"
 #include "host/render/scene.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
@@ -13,48 +14,43 @@
 namespace birdseye::host {
 
 /// The ray of every pixel of a camera, unit, camera frame; zero where the lens does not see. Takes a while to make, so
-/// it is made once per camera.
+/// it is made once per camera. In blocks of 4x4 pixels: 16 x, 16 y, 16 z.
 class LensRays {
  public:
   explicit LensRays(const CameraModel& camera);
   [[nodiscard]] const CameraModel& camera() const { return camera_; }
-  [[nodiscard]] const Eigen::Vector3f& at(std::size_t pixel) const { return directions_[pixel]; }
+  [[nodiscard]] int blocks_per_row() const { return (camera_.width_px + 3) / 4; }
+  [[nodiscard]] int blocks() const { return blocks_per_row() * ((camera_.height_px + 3) / 4); }
+  [[nodiscard]] const float* directions() const { return directions_.data(); }
 
  private:
   CameraModel camera_;
-  std::vector<Eigen::Vector3f> directions_;
+  std::vector<float> directions_;
 };
 
-/// Renders a volume by casting rays, on all cores, in single precision. Bricks of the volume that the transfer function
-/// does not show are leapt over, all that lie between a sample and the nearest brick it does show at once. The picture
-/// is the same to the bit for any number of threads.
+/// Renders a volume by casting rays, in packets, on all cores. Whatever the transfer function does not show is leapt
+/// over. The picture is the same to the bit for any number of threads; between instruction sets it differs by rounding.
 class RayCaster {
  public:
-  /// Keeps a reference to volume, which must outlive it.
-  RayCaster(const Volume& volume, const TransferFunction& transfer);
+  /// Keeps a reference to volume, which must outlive it. prune: see VoxelGrid.
+  RayCaster(const Volume& volume, const TransferFunction& transfer, cpu::Isa isa = cpu::supported_isas().back(),
+            bool prune = true);
+  RayCaster(const RayCaster&) = delete;
+  RayCaster& operator=(const RayCaster&) = delete;
 
-  /// deformation: null for the volume as it was scanned.
+  /// Until the next call, or undeform(), pictures show the volume deformed; every axis of it has two voxels or more.
+  void deform(const DisplacementField& field) { grid_.deform(field); }
+  void undeform() { grid_.undeform(); }
   [[nodiscard]] ImageRgba render(const LensRays& rays, const Transform<Camera, Patient>& camera_from_patient,
-                                 const RenderSettings& settings, const DisplacementField* deformation = nullptr) const;
+                                 const RenderSettings& settings);
+  /// Memory beyond the volume's own.
+  [[nodiscard]] std::size_t bytes() const { return grid_.bytes(); }
 
  private:
-  struct Ray;
-  struct Tables;
-  class Warp;
-  [[nodiscard]] float trilinear(const Eigen::Vector3f& x) const;
-  [[nodiscard]] Eigen::Vector3f gradient(const Eigen::Vector3f& x) const;
-  [[nodiscard]] Eigen::Array4f march(const Ray& ray, const Tables& tables, const Warp* warp,
-                                     const RenderSettings& settings) const;
-  void measure_empty_bricks();
-
-  static constexpr int kBrick = 4;
   const Volume& volume_;
   TransferFunction transfer_;
-  Eigen::Vector3f last_;  ///< n - 1 on each axis
-  Eigen::Matrix3f patient_gradient_from_voxel_;
-  std::array<int, 3> bricks_{};
-  /// Per brick of kBrick^3 cells: how many bricks away, along any axis or diagonal, the nearest one is that is seen.
-  std::vector<std::uint8_t> empty_;
+  const cpu::Kernels& kernels_;
+  cpu::VoxelGrid grid_;
 };
 
 }  // namespace birdseye::host

@@ -1,0 +1,282 @@
+#pragma once
+
+// The inner loops, over packets of rays or voxels. Packet is one of packet_{portable,avx2,avx512}.hpp, and includes
+// this into a translation unit of its own that is compiled for that instruction set. Nothing of the standard library
+// here: see kernels.hpp.
+
+#include "host/render/cpu/kernels.hpp"
+
+namespace birdseye::host::cpu {
+
+/// Samples between two looks at the bricks and at the transmittance: their loads need not wait for one another.
+inline constexpr int kRun = 4;
+/// Below this, a pixel counts as opaque.
+inline constexpr float kOpaque = 1.0F / 64;
+
+template <typename P>
+struct Vector {
+  typename P::F x, y, z;
+};
+
+/// m v for a matrix given row by row.
+template <typename P>
+inline Vector<P> times(const float* m, const Vector<P>& v) {
+  return {P::f(m[0]) * v.x + P::f(m[1]) * v.y + P::f(m[2]) * v.z,
+          P::f(m[3]) * v.x + P::f(m[4]) * v.y + P::f(m[5]) * v.z,
+          P::f(m[6]) * v.x + P::f(m[7]) * v.y + P::f(m[8]) * v.z};
+}
+
+template <typename P>
+inline typename P::F dot(const Vector<P>& a, const Vector<P>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+/// 1 / d, of a d that is kept from zero.
+template <typename P>
+inline typename P::F reciprocal(typename P::F d) {
+  constexpr float kLeast = 1e-9F;
+  return P::f(1) / P::select(P::lt(P::abs(d), P::f(kLeast)), P::f(kLeast), d);
+}
+
+/// Narrows [near, far] to where a + s * rate >= 0.
+template <typename P>
+inline void keep_positive(typename P::F a, typename P::F rate, typename P::F& near, typename P::F& far) {
+  const typename P::F s = (P::f(0) - a) * reciprocal<P>(rate);
+  const typename P::M rises = P::lt(P::f(0), rate);
+  near = P::select(rises, P::max(near, s), near);
+  far = P::select(rises, far, P::min(far, s));
+}
+
+template <typename P>
+void cast_packet(const CastJob& job, int block, int part) {
+  using F = typename P::F;
+  using I = typename P::I;
+  using M = typename P::M;
+  const GridView& grid = job.grid;
+  const float* const at = job.directions + 48 * block + part;
+  const Vector<P> in_camera{P::load(at), P::load(at + 16), P::load(at + 32)};
+  const Vector<P> d = times<P>(job.voxels_from_camera, in_camera);
+  const Vector<P> o{P::f(job.origin[0]), P::f(job.origin[1]), P::f(job.origin[2])};
+
+  F near = P::f(job.near_mm);
+  F far = P::f(1e30F);
+  const F* const axis_o[3] = {&o.x, &o.y, &o.z};
+  const F* const axis_d[3] = {&d.x, &d.y, &d.z};
+  F inverse[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    inverse[axis] = reciprocal<P>(*axis_d[axis]);
+    const F a = (P::f(0) - *axis_o[axis]) * inverse[axis];
+    const F b = (P::f(static_cast<float>(grid.size[axis] - 1)) - *axis_o[axis]) * inverse[axis];
+    near = P::max(near, P::min(a, b));
+    far = P::min(far, P::max(a, b));
+  }
+  const Vector<P> normal{P::f(job.clip_normal[0]), P::f(job.clip_normal[1]), P::f(job.clip_normal[2])};
+  if (job.clip_normal[0] != 0 || job.clip_normal[1] != 0 || job.clip_normal[2] != 0) {
+    keep_positive<P>(P::f(job.clip_at_origin_mm), dot(normal, in_camera), near, far);
+  }
+  // Whole numbers of steps, so that every ray samples the same distances.
+  const F h = P::f(job.step_mm);
+  const F per_h = P::f(1.0F / job.step_mm);
+  F i = P::max(P::f(0), P::ceil(near * per_h - P::f(0.5F)));
+  const F end = P::floor(far * per_h - P::f(0.5F));
+  M active = P::both(P::lt(P::f(0), in_camera.z), P::le(i, end));
+
+  F red = P::f(0), green = P::f(0), blue = P::f(0), through = P::f(1);
+  const I row = P::i(grid.row), slice = P::i(grid.slice);
+  const I brick_row = P::i(grid.bricks[0]), brick_slice = P::i(grid.bricks[0] * grid.bricks[1]);
+  const auto place = [&](F index) {
+    const F s = (index + P::f(0.5F)) * h;
+    return Vector<P>{o.x + s * d.x, o.y + s * d.y, o.z + s * d.z};
+  };
+  while (P::any(active)) {
+    // Leap from empty brick to the end of all that is empty around it, until every ray is where something is seen.
+    for (;;) {
+      const Vector<P> x = place(i);
+      const I bx = P::min(P::template shift_right<2>(P::truncate(x.x)), P::i(grid.bricks[0] - 1));
+      const I by = P::min(P::template shift_right<2>(P::truncate(x.y)), P::i(grid.bricks[1] - 1));
+      const I bz = P::min(P::template shift_right<2>(P::truncate(x.z)), P::i(grid.bricks[2] - 1));
+      const I brick = P::add(bx, P::add(P::multiply(by, brick_row), P::multiply(bz, brick_slice)));
+      const F empty = P::to_float(P::gather_byte(grid.distance, brick, active));
+      const M leaps = P::both(active, P::lt(P::f(0), empty));
+      if (!P::any(leaps)) break;
+      const auto exit = [&](I b, F xa, F da, F inverse_d) {
+        const F low = P::to_float(b);
+        const F face = P::select(P::lt(P::f(0), da), low + empty, low - empty + P::f(1)) * P::f(kBrick);
+        return (face - xa) * inverse_d;
+      };
+      const F mm = P::min(exit(bx, x.x, d.x, inverse[0]),
+                          P::min(exit(by, x.y, d.y, inverse[1]), exit(bz, x.z, d.z, inverse[2])));
+      // To the first sample past the face; one that lies on it belongs to the brick beyond.
+      const F steps = P::floor(P::max(P::f(0), mm) * per_h * P::f(1 - 1e-5F)) + P::f(1);
+      i = P::select(leaps, i + steps, i);
+      active = P::both(active, P::le(i, end));
+      if (!P::any(active)) break;
+    }
+    if (!P::any(active)) break;
+    for (int run = 0; run < kRun; ++run) {
+      const M now = P::both(active, P::le(i, end));
+      const Vector<P> x = place(i);
+      i = i + P::f(1);
+      const I jx = P::truncate(x.x), jy = P::truncate(x.y), jz = P::truncate(x.z);
+      const I index = P::add(jx, P::add(P::multiply(jy, row), P::multiply(jz, slice)));
+      F value, shade, highlight;
+      P::sample(grid, index, x.x - P::to_float(jx), x.y - P::to_float(jy), x.z - P::to_float(jz), now, value, shade,
+                highlight);
+      const I hu = P::add(P::round(value), P::i(1024));
+      I opacity_bits, colour;
+      P::gather_pair(job.transfer, P::min(P::max(hu, P::i(0)), P::i(4095)), now, opacity_bits, colour);
+      const F opacity = P::as_float(opacity_bits);  // 0 where the ray is not here
+      constexpr float kColour = 1.0F / 1023;
+      shade = shade * P::f(kColour);
+      const I bits = P::i(1023);
+      const F r = P::to_float(P::intersect(colour, bits));
+      const F g = P::to_float(P::intersect(P::template shift_right<10>(colour), bits));
+      const F b = P::to_float(P::template shift_right<20>(colour));
+      const F weight = through * opacity;
+      red = red + weight * P::min(r * shade + highlight, P::f(1));
+      green = green + weight * P::min(g * shade + highlight, P::f(1));
+      blue = blue + weight * P::min(b * shade + highlight, P::f(1));
+      through = through - weight;
+    }
+    active = P::both(active, P::both(P::le(i, end), P::le(P::f(kOpaque), through)));
+  }
+  const M opaque = P::lt(through, P::f(kOpaque));
+  const F full = P::select(opaque, P::f(1) / (P::f(1) - through), P::f(1)) * P::f(255);
+  const F alpha = P::select(opaque, P::f(255), (P::f(1) - through) * P::f(255));
+  const auto byte = [](F value) { return P::min(P::round(value), P::i(255)); };
+  const I pixels =
+      P::unite(P::unite(byte(red * full), P::template shift_left<8>(byte(green * full))),
+               P::unite(P::template shift_left<16>(byte(blue * full)), P::template shift_left<24>(byte(alpha))));
+  alignas(64) std::uint32_t out[P::kLanes];
+  P::store(out, pixels);
+  const int x0 = block % job.blocks_per_row * 4;
+  const int y0 = block / job.blocks_per_row * 4;
+  for (int lane = 0; lane < P::kLanes; ++lane) {
+    const int x = x0 + (part + lane) % 4;
+    const int y = y0 + (part + lane) / 4;
+    if (x >= job.width_px || y >= job.height_px) continue;
+    std::uint8_t* const pixel = job.rgba + 4 * (static_cast<std::int64_t>(y) * job.width_px + x);
+    __builtin_memcpy(pixel, &out[lane], 4);
+  }
+}
+
+template <typename P>
+void cast(const CastJob& job, int first_block, int last_block) {
+  static_assert(16 % P::kLanes == 0);
+  for (int block = first_block; block < last_block; ++block) {
+    for (int part = 0; part < 16; part += P::kLanes) cast_packet<P>(job, block, part);
+  }
+}
+
+template <typename P>
+void light(const LightJob& job, int x_begin, int x_end, int y, int z) {
+  using F = typename P::F;
+  using I = typename P::I;
+  const GridView& grid = job.grid;
+  std::uint32_t* const row =
+      grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row;
+  const auto hu = [](const std::uint32_t* at) {
+    return P::to_float(P::template shift_right<16>(P::template shift_left<16>(P::load_bits(at))));
+  };
+  const float* const m = job.patient_from_voxel;
+  for (int x = x_begin; x < x_end; x += P::kLanes) {
+    std::uint32_t* const at = row + x;
+    const Vector<P> difference{hu(at + 1) - hu(at - 1), hu(at + grid.row) - hu(at - grid.row),
+                               hu(at + grid.slice) - hu(at - grid.slice)};
+    const Vector<P> g = times<P>(job.patient_gradient, difference);
+    const F fx = P::f(static_cast<float>(x)) + P::iota();
+    const auto from_eye = [&](int axis) {
+      const float fixed = job.first_from_eye_mm[axis] + m[3 * axis + 1] * static_cast<float>(y) +
+                          m[3 * axis + 2] * static_cast<float>(z);
+      return P::f(fixed) + P::f(m[3 * axis]) * fx;
+    };
+    const Vector<P> d{from_eye(0), from_eye(1), from_eye(2)};
+    const F steep = P::sqrt(dot(g, g));
+    constexpr float kNone = 1e-6F;
+    const F facing = P::min(P::f(1), P::abs(dot(g, d)) / P::max(steep * P::sqrt(dot(d, d)), P::f(kNone)));
+    const F surface = P::min(P::f(1), steep * P::f(job.per_surface_gradient));
+    const F shade = P::f(1) - surface + surface * (P::f(job.ambient) + P::f(job.diffuse) * facing);
+    const F highlight = surface * P::gather(job.highlight, P::round(facing * P::f(kFacings)));
+    const auto byte = [](F value) { return P::round(P::min(value, P::f(1)) * P::f(255)); };
+    const I voxel =
+        P::unite(P::intersect(P::load_bits(at), P::i(0xFFFF)),
+                 P::unite(P::template shift_left<16>(byte(shade)), P::template shift_left<24>(byte(highlight))));
+    P::store_first(at, voxel, x_end - x);
+  }
+}
+
+template <typename P>
+void warp(const WarpJob& job, int x_begin, int x_end, int y, int z) {
+  using F = typename P::F;
+  using I = typename P::I;
+  using M = typename P::M;
+  const GridView& grid = job.grid;
+  std::uint32_t* const row =
+      grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row;
+  const float* const m = job.lattice_from_voxel;
+  const auto lerp = [](F a, F b, F t) { return a + t * (b - a); };
+  for (int x = x_begin; x < x_end; x += P::kLanes) {
+    const F fx = P::f(static_cast<float>(x)) + P::iota();
+    // The cell of the field, and where in it.
+    M inside = P::lt(fx, P::f(static_cast<float>(x_end)));
+    I base[3];
+    F t[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const float fixed =
+          job.lattice_origin[axis] + m[3 * axis + 1] * static_cast<float>(y) + m[3 * axis + 2] * static_cast<float>(z);
+      const F at = P::f(fixed) + P::f(m[3 * axis]) * fx;
+      const float last = static_cast<float>(job.field_size[axis] - 1);
+      constexpr float kRounding = 1e-4F;
+      inside = P::both(inside, P::both(P::le(P::f(-kRounding), at), P::le(at, P::f(last + kRounding))));
+      const F within = P::min(P::max(at, P::f(0)), P::f(last));
+      base[axis] = P::min(P::truncate(within), P::i(job.field_size[axis] - 2));
+      t[axis] = within - P::to_float(base[axis]);
+    }
+    const int field_row = job.field_size[0];
+    const int field_slice = job.field_size[0] * job.field_size[1];
+    const I at =
+        P::add(base[0], P::add(P::multiply(base[1], P::i(field_row)), P::multiply(base[2], P::i(field_slice))));
+    F to[3] = {fx, P::f(static_cast<float>(y)), P::f(static_cast<float>(z))};
+    M there = P::lt(fx, P::f(static_cast<float>(x_end)));
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* const u = job.moves[axis];
+      const auto along_x = [&](int offset) {
+        return lerp(P::gather(u + offset, at), P::gather(u + offset + 1, at), t[0]);
+      };
+      const F move = lerp(lerp(along_x(0), along_x(field_row), t[1]),
+                          lerp(along_x(field_slice), along_x(field_slice + field_row), t[1]), t[2]);
+      to[axis] = to[axis] + P::select(inside, move, P::f(0));
+      const float last = static_cast<float>(grid.size[axis] - 1);
+      there = P::both(there, P::both(P::le(P::f(0), to[axis]), P::le(to[axis], P::f(last))));
+      to[axis] = P::min(P::max(to[axis], P::f(0)), P::f(last));
+    }
+    // Trilinear in the volume as it was scanned. At its far faces the last cell is used, at its end.
+    I from[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      from[axis] = P::min(P::truncate(to[axis]), P::i(grid.size[axis] - 2));
+      to[axis] = to[axis] - P::to_float(from[axis]);
+    }
+    const int source_row = grid.size[0];
+    const int source_slice = grid.size[0] * grid.size[1];
+    const I voxel =
+        P::add(from[0], P::add(P::multiply(from[1], P::i(source_row)), P::multiply(from[2], P::i(source_slice))));
+    const auto pair = [&](int offset) {
+      const I two = P::gather_halves(job.source + offset, voxel, there);
+      const F a = P::to_float(P::template shift_right<16>(P::template shift_left<16>(two)));
+      const F b = P::to_float(P::template shift_right<16>(two));
+      return lerp(a, b, to[0]);
+    };
+    const F value = lerp(lerp(pair(0), pair(source_row), to[1]),
+                         lerp(pair(source_slice), pair(source_slice + source_row), to[1]), to[2]);
+    constexpr int kAir = -1024;
+    const I hu = P::intersect(P::round(P::select(there, value, P::f(kAir))), P::i(0xFFFF));
+    P::store_first(row + x, hu, x_end - x);
+  }
+}
+
+template <typename P>
+constexpr Kernels make_kernels() {
+  return {cast<P>, light<P>, warp<P>};
+}
+
+}  // namespace birdseye::host::cpu

@@ -1,0 +1,374 @@
+#include "host/render/cpu/voxel_grid.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace birdseye::host::cpu {
+
+namespace {
+
+constexpr int kAir = -1024;
+
+std::size_t index_of(const std::array<int, 3>& size, int i, int j, int k) {
+  return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+             static_cast<std::size_t>(size[0]) +
+         static_cast<std::size_t>(i);
+}
+
+std::size_t count_of(const std::array<int, 3>& size) {
+  return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
+}
+
+void copy(const Eigen::Matrix3f& m, float* row_by_row) {
+  for (int i = 0; i < 9; ++i) row_by_row[i] = m(i / 3, i % 3);
+}
+
+void copy(const Eigen::Vector3f& v, float* to) {
+  std::copy_n(v.data(), 3, to);
+}
+
+/// Of each element and its two neighbours along an axis of this stride, the least.
+void least_of_three(std::vector<std::uint8_t>& values, std::size_t stride, std::size_t line) {
+  std::vector<std::uint8_t> old = values;
+  const std::size_t count = values.size();
+  // Lines of `line` elements `stride` apart lie one after the other; their ends have one neighbour.
+  for (std::size_t block = 0; block < count; block += line * stride) {
+    for (std::size_t n = 0; n < line; ++n) {
+      std::uint8_t* const to = &values[block + n * stride];
+      const std::uint8_t* const before = n > 0 ? &old[block + (n - 1) * stride] : nullptr;
+      const std::uint8_t* const after = n + 1 < line ? &old[block + (n + 1) * stride] : nullptr;
+      for (std::size_t i = 0; i < stride; ++i) {
+        if (before != nullptr) to[i] = std::min(to[i], before[i]);
+        if (after != nullptr) to[i] = std::min(to[i], after[i]);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+VoxelGrid::VoxelGrid(const Volume& volume, const TransferFunction& transfer, const Kernels& kernels, bool prune)
+    : volume_(volume), transfer_(transfer), kernels_(kernels), prune_(prune) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    view_.size[axis] = volume.size[axis];
+    bricks_[axis] = std::max(1, (volume.size[axis] - 1 + kBrick - 1) / kBrick);
+    tiles_[axis] = (volume.size[axis] + kBrick - 1) / kBrick;
+    view_.bricks[axis] = bricks_[axis];
+  }
+  view_.row = volume.size[0] + 2;
+  view_.slice = view_.row * (volume.size[1] + 2);
+  constexpr std::size_t kPastTheEnd = 64;  // packets read past the last voxel, and use nothing of it
+  voxels_.resize(static_cast<std::size_t>(view_.slice) * static_cast<std::size_t>(volume.size[2] + 2) + kPastTheEnd);
+  view_.voxels = voxels_.data() + view_.slice + view_.row + 1;
+  find_seen_of_scan();
+  undeform();
+}
+
+std::uint32_t* VoxelGrid::voxel_row(int y, int z) {
+  return view_.voxels + static_cast<std::ptrdiff_t>(z) * view_.slice + static_cast<std::ptrdiff_t>(y) * view_.row;
+}
+
+void VoxelGrid::find_seen_of_scan() {
+  const auto& n = volume_.size;
+  scan_seen_.resize(count_of(bricks_));
+  tbb::parallel_for(0, bricks_[2], [&](int bk) {
+    for (int bj = 0; bj < bricks_[1]; ++bj) {
+      for (int bi = 0; bi < bricks_[0]; ++bi) {
+        std::int16_t low = std::numeric_limits<std::int16_t>::max();
+        std::int16_t high = std::numeric_limits<std::int16_t>::min();
+        for (int k = bk * kBrick; k <= std::min(bk * kBrick + kBrick, n[2] - 1); ++k) {
+          for (int j = bj * kBrick; j <= std::min(bj * kBrick + kBrick, n[1] - 1); ++j) {
+            for (int i = bi * kBrick; i <= std::min(bi * kBrick + kBrick, n[0] - 1); ++i) {
+              low = std::min(low, volume_.at(i, j, k));
+              high = std::max(high, volume_.at(i, j, k));
+            }
+          }
+        }
+        scan_seen_[index_of(bricks_, bi, bj, bk)] = !prune_ || transfer_.any_seen(low, high) ? 1 : 0;
+      }
+    }
+  });
+  const Counts sums{bricks_[0] + 1, bricks_[1] + 1, bricks_[2] + 1};
+  scan_seen_before_.assign(count_of(sums), 0);
+  for (int k = 1; k < sums[2]; ++k) {
+    for (int j = 1; j < sums[1]; ++j) {
+      int line = 0;
+      for (int i = 1; i < sums[0]; ++i) {
+        line += scan_seen_[index_of(bricks_, i - 1, j - 1, k - 1)];
+        scan_seen_before_[index_of(sums, i, j, k)] = line + scan_seen_before_[index_of(sums, i, j - 1, k)] +
+                                                     scan_seen_before_[index_of(sums, i, j, k - 1)] -
+                                                     scan_seen_before_[index_of(sums, i, j - 1, k - 1)];
+      }
+    }
+  }
+}
+
+void VoxelGrid::undeform() {
+  if (!holds_scan_) {
+    const auto& n = volume_.size;
+    tbb::parallel_for(0, n[2], [&](int z) {
+      for (int y = 0; y < n[1]; ++y) {
+        const std::int16_t* const from = &volume_.hu[volume_.index(0, y, z)];
+        std::uint32_t* const to = voxel_row(y, z);
+        for (int x = 0; x < n[0]; ++x) to[x] = static_cast<std::uint16_t>(from[x]);
+      }
+    });
+    copy_border();
+    holds_scan_ = true;
+  }
+  seen_ = scan_seen_;
+  measure_distances();
+}
+
+void VoxelGrid::copy_border() {
+  const auto& n = volume_.size;
+  tbb::parallel_for(0, n[2], [&](int z) {
+    for (int y = 0; y < n[1]; ++y) {
+      std::uint32_t* const row = voxel_row(y, z);
+      row[-1] = row[0];
+      row[n[0]] = row[n[0] - 1];
+    }
+    std::copy_n(voxel_row(0, z) - 1, view_.row, voxel_row(-1, z) - 1);
+    std::copy_n(voxel_row(n[1] - 1, z) - 1, view_.row, voxel_row(n[1], z) - 1);
+  });
+  std::copy_n(voxel_row(-1, 0) - 1, view_.slice, voxel_row(-1, -1) - 1);
+  std::copy_n(voxel_row(-1, n[2] - 1) - 1, view_.slice, voxel_row(-1, n[2]) - 1);
+}
+
+/// The tiles of voxels that bricks which are seen touch, widened by so many tiles on either side.
+std::vector<std::uint8_t> VoxelGrid::tiles_about_seen(int before, int after) const {
+  std::vector<std::uint8_t> wanted(count_of(tiles_), 0);
+  tbb::parallel_for(0, tiles_[2], [&](int tk) {
+    for (int bk = std::max(0, tk - after); bk <= std::min(bricks_[2] - 1, tk + before); ++bk) {
+      for (int bj = 0; bj < bricks_[1]; ++bj) {
+        for (int bi = 0; bi < bricks_[0]; ++bi) {
+          if (seen_[index_of(bricks_, bi, bj, bk)] == 0) continue;
+          for (int tj = std::max(0, bj - before); tj <= std::min(tiles_[1] - 1, bj + after); ++tj) {
+            for (int ti = std::max(0, bi - before); ti <= std::min(tiles_[0] - 1, bi + after); ++ti) {
+              wanted[index_of(tiles_, ti, tj, tk)] = 1;
+            }
+          }
+        }
+      }
+    }
+  });
+  return wanted;
+}
+
+/// Calls rows for the rows of voxels of all tiles that are set, joined along x. apart: no two neighbours at once.
+void VoxelGrid::for_rows(const std::vector<std::uint8_t>& tiles, bool apart, const Rows& rows) const {
+  const auto slab = [&](int tk) {
+    for (int tj = 0; tj < tiles_[1]; ++tj) {
+      const std::uint8_t* const line = &tiles[index_of(tiles_, 0, tj, tk)];
+      for (int begin = 0; begin < tiles_[0];) {
+        if (line[begin] == 0) {
+          ++begin;
+          continue;
+        }
+        int end = begin;
+        while (end < tiles_[0] && line[end] != 0) ++end;
+        for (int z = tk * kBrick; z < std::min(tk * kBrick + kBrick, volume_.size[2]); ++z) {
+          for (int y = tj * kBrick; y < std::min(tj * kBrick + kBrick, volume_.size[1]); ++y) {
+            rows(begin * kBrick, std::min(end * kBrick, volume_.size[0]), y, z);
+          }
+        }
+        begin = end;
+      }
+    }
+  };
+  if (!apart) {
+    tbb::parallel_for(0, tiles_[2], slab);
+    return;
+  }
+  for (const int first : {0, 1}) {
+    tbb::parallel_for(0, (tiles_[2] - first + 1) / 2, [&](int n) { slab(first + 2 * n); });
+  }
+}
+
+void VoxelGrid::mark_seen_after(const DisplacementField& field, const Eigen::Affine3d& lattice_from_voxel) {
+  // The field's bounds over blocks of bricks tell from where the values of each brick may come.
+  constexpr int kBlock = 4;
+  constexpr float kMargin = 1e-3F;
+  const Counts sums{bricks_[0] + 1, bricks_[1] + 1, bricks_[2] + 1};
+  const Counts blocks{(bricks_[0] + kBlock - 1) / kBlock, (bricks_[1] + kBlock - 1) / kBlock,
+                      (bricks_[2] + kBlock - 1) / kBlock};
+  const Eigen::Array3i last_voxel(volume_.size[0] - 1, volume_.size[1] - 1, volume_.size[2] - 1);
+  const Eigen::Array3i last_point(field.size[0] - 1, field.size[1] - 1, field.size[2] - 1);
+  const auto block = [&](const Eigen::Array3i& at) {
+    const Eigen::Array3i low_voxel = at * (kBlock * kBrick);
+    const Eigen::Array3i high_voxel = (low_voxel + kBlock * kBrick).min(last_voxel);
+    Eigen::Array3d low = Eigen::Array3d::Constant(1e30), high = -low;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Array3d pick(corner & 1, corner >> 1 & 1, corner >> 2);
+      const Eigen::Array3d voxel = low_voxel.cast<double>() + pick * (high_voxel - low_voxel).cast<double>();
+      const Eigen::Array3d lattice = (lattice_from_voxel * Eigen::Vector3d(voxel)).array();
+      low = low.min(lattice);
+      high = high.max(lattice);
+    }
+    const bool beyond = (low < 0).any() || (high > last_point.cast<double>()).any();
+    const Eigen::Array3i first = low.max(0).min(last_point.cast<double>()).floor().cast<int>();
+    const Eigen::Array3i last = high.max(0).min(last_point.cast<double>()).ceil().cast<int>();
+    Eigen::Array3f least = Eigen::Array3f::Constant(beyond ? 0 : 1e30F);
+    Eigen::Array3f most = -least;
+    for (int k = first[2]; k <= last[2]; ++k) {
+      for (int j = first[1]; j <= last[1]; ++j) {
+        for (int i = first[0]; i <= last[0]; ++i) {
+          const std::size_t point = index_of(field.size, i, j, k);
+          const Eigen::Array3f move(moves_[0][point], moves_[1][point], moves_[2][point]);
+          least = least.min(move);
+          most = most.max(move);
+        }
+      }
+    }
+    const Eigen::Array3i end = ((at + 1) * kBlock).min(Eigen::Array3i(bricks_[0], bricks_[1], bricks_[2]));
+    for (int bk = at[2] * kBlock; bk < end[2]; ++bk) {
+      for (int bj = at[1] * kBlock; bj < end[1]; ++bj) {
+        for (int bi = at[0] * kBlock; bi < end[0]; ++bi) {
+          const Eigen::Array3i brick(bi, bj, bk);
+          const Eigen::Array3f from = (brick * kBrick).cast<float>() + least - kMargin;
+          const Eigen::Array3f to = (brick * kBrick + kBrick).min(last_voxel).cast<float>() + most + kMargin;
+          const bool past = (from < -2 * kMargin).any() || (to > last_voxel.cast<float>() + 2 * kMargin).any();
+          const auto brick_of = [&](const Eigen::Array3f& voxel) {
+            return Eigen::Array3i((voxel / static_cast<float>(kBrick)).floor().cast<int>());
+          };
+          const Eigen::Array3i most_brick(bricks_[0] - 1, bricks_[1] - 1, bricks_[2] - 1);
+          const Eigen::Array3i a = brick_of(from.max(0.0F)).min(most_brick);
+          const Eigen::Array3i b = brick_of(to.max(0.0F)).min(most_brick) + 1;
+          const auto sum = [&](int i, int j, int k) { return scan_seen_before_[index_of(sums, i, j, k)]; };
+          const int count = sum(b[0], b[1], b[2]) - sum(a[0], b[1], b[2]) - sum(b[0], a[1], b[2]) -
+                            sum(b[0], b[1], a[2]) + sum(a[0], a[1], b[2]) + sum(a[0], b[1], a[2]) +
+                            sum(b[0], a[1], a[2]) - sum(a[0], a[1], a[2]);
+          // Where values come from past the volume's faces there is air, and what lies between it and tissue.
+          seen_[index_of(bricks_, bi, bj, bk)] = count > 0 || past ? 1 : 0;
+        }
+      }
+    }
+  };
+  tbb::parallel_for(0, blocks[1] * blocks[2], [&](int n) {
+    for (int i = 0; i < blocks[0]; ++i) block({i, n % blocks[1], n / blocks[1]});
+  });
+}
+
+void VoxelGrid::deform(const DisplacementField& field) {
+  assert(*std::min_element(volume_.size.begin(), volume_.size.end()) >= 2);
+  const Eigen::Affine3d lattice_from_voxel = field.patient_from_lattice.inverse() * volume_.patient_from_voxel;
+  const Eigen::Matrix3f voxel_from_patient = volume_.patient_from_voxel.linear().inverse().cast<float>();
+  for (std::vector<float>& axis : moves_) axis.resize(field.displacement_mm.size());
+  for (std::size_t i = 0; i < field.displacement_mm.size(); ++i) {
+    const Eigen::Vector3f move = voxel_from_patient * field.displacement_mm[i];
+    for (int axis = 0; axis < 3; ++axis) moves_[axis][i] = move[axis];
+  }
+  mark_seen_after(field, lattice_from_voxel);
+
+  WarpJob job;
+  job.grid = view_;
+  job.source = volume_.hu.data();
+  copy(Eigen::Matrix3f(lattice_from_voxel.linear().cast<float>()), job.lattice_from_voxel);
+  copy(Eigen::Vector3f(lattice_from_voxel.translation().cast<float>()), job.lattice_origin);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    job.field_size[axis] = field.size[axis];
+    job.moves[axis] = moves_[axis].data();
+  }
+  // A cell's corners, and the neighbours from which their light is computed.
+  const std::vector<std::uint8_t> wanted = tiles_about_seen(1, 1);
+  std::vector<std::uint8_t> cleared(wanted.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    cleared[i] = wanted[i] == 0 && (holds_scan_ || resampled_[i] != 0) ? 1 : 0;
+  }
+  for_rows(cleared, false, [&](int x_begin, int x_end, int y, int z) {
+    std::fill(voxel_row(y, z) + x_begin, voxel_row(y, z) + x_end, static_cast<std::uint32_t>(kAir) & 0xFFFFU);
+  });
+  for_rows(wanted, false, [&](int x_begin, int x_end, int y, int z) { kernels_.warp(job, x_begin, x_end, y, z); });
+  resampled_ = wanted;
+  holds_scan_ = false;
+  copy_border();
+  refine_seen();
+  measure_distances();
+}
+
+void VoxelGrid::refine_seen() {
+  const auto& n = volume_.size;
+  tbb::parallel_for(0, bricks_[2], [&](int bk) {
+    for (int bj = 0; bj < bricks_[1]; ++bj) {
+      for (int bi = 0; bi < bricks_[0]; ++bi) {
+        std::uint8_t& seen = seen_[index_of(bricks_, bi, bj, bk)];
+        if (seen == 0) continue;
+        std::int16_t low = std::numeric_limits<std::int16_t>::max();
+        std::int16_t high = std::numeric_limits<std::int16_t>::min();
+        for (int z = bk * kBrick; z <= std::min(bk * kBrick + kBrick, n[2] - 1); ++z) {
+          for (int y = bj * kBrick; y <= std::min(bj * kBrick + kBrick, n[1] - 1); ++y) {
+            const std::uint32_t* const row = voxel_row(y, z);
+            for (int x = bi * kBrick; x <= std::min(bi * kBrick + kBrick, n[0] - 1); ++x) {
+              const auto hu = static_cast<std::int16_t>(row[x] & 0xFFFFU);
+              low = std::min(low, hu);
+              high = std::max(high, hu);
+            }
+          }
+        }
+        seen = !prune_ || transfer_.any_seen(low, high) ? 1 : 0;
+      }
+    }
+  });
+}
+
+void VoxelGrid::measure_distances() {
+  constexpr std::uint8_t kFar = 255;
+  constexpr std::uint8_t kFurthest = 24;  // bricks: leaps of 96 voxels are far enough
+  const std::size_t count = seen_.size();
+  distance_.assign(count + 4, kFar);  // a byte is loaded with the three after it
+  std::vector<std::uint8_t> near(count);
+  for (std::size_t i = 0; i < count; ++i) near[i] = distance_[i] = seen_[i] != 0 ? 0 : kFar;
+  const auto along = [](int n) { return static_cast<std::size_t>(n); };
+  for (std::uint8_t step = 1; step <= kFurthest; ++step) {
+    // What is seen, grown by one brick along all three axes in turn: a cube.
+    least_of_three(near, 1, along(bricks_[0]));
+    least_of_three(near, along(bricks_[0]), along(bricks_[1]));
+    least_of_three(near, along(bricks_[0]) * along(bricks_[1]), along(bricks_[2]));
+    bool left = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (distance_[i] == kFar && near[i] == 0) distance_[i] = step;
+      left = left || distance_[i] == kFar;
+    }
+    if (!left) break;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (distance_[i] == kFar) distance_[i] = kFurthest + 1;
+  }
+  view_.distance = distance_.data();
+}
+
+void VoxelGrid::light(const Eigen::Vector3d& eye_in_patient_mm, const RenderSettings& settings) {
+  std::array<float, kFacings + 1> highlight;
+  for (int i = 0; i <= kFacings; ++i) {
+    highlight[static_cast<std::size_t>(i)] =
+        static_cast<float>(settings.specular * std::pow(static_cast<double>(i) / kFacings, settings.shininess));
+  }
+  LightJob job;
+  job.grid = view_;
+  const Eigen::Affine3d& patient_from_voxel = volume_.patient_from_voxel;
+  copy(Eigen::Matrix3f(patient_from_voxel.linear().cast<float>()), job.patient_from_voxel);
+  copy(Eigen::Vector3f((patient_from_voxel.translation() - eye_in_patient_mm).cast<float>()), job.first_from_eye_mm);
+  copy(Eigen::Matrix3f((0.5 * patient_from_voxel.linear().inverse().transpose()).cast<float>()), job.patient_gradient);
+  job.per_surface_gradient = static_cast<float>(1 / settings.surface_gradient_hu_per_mm);
+  job.ambient = static_cast<float>(settings.ambient);
+  job.diffuse = static_cast<float>(settings.diffuse);
+  job.highlight = highlight.data();
+  // A row's light is written into the words that the rows beside it read their HU from.
+  for_rows(tiles_about_seen(0, 1), true,
+           [&](int x_begin, int x_end, int y, int z) { kernels_.light(job, x_begin, x_end, y, z); });
+  copy_border();
+}
+
+std::size_t VoxelGrid::bytes() const {
+  std::size_t bytes = voxels_.capacity() * sizeof(std::uint32_t) + scan_seen_before_.capacity() * sizeof(int);
+  for (const auto* flags : {&seen_, &distance_, &scan_seen_, &resampled_}) bytes += flags->capacity();
+  for (const std::vector<float>& axis : moves_) bytes += axis.capacity() * sizeof(float);
+  return bytes;
+}
+
+}  // namespace birdseye::host::cpu
