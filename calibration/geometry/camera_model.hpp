@@ -20,6 +20,7 @@ struct CameraModel {
   int width_px = 0, height_px = 0;
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  bool operator==(const CameraModel&) const = default;
 
   /// Number of parameters in the Jacobians below: fx fy cx cy k1 k2 p1 p2 k3, in that order.
   static constexpr int kParameters = 9;

@@ -26,6 +26,8 @@ struct Options {
   std::filesystem::path json;
   int frames = 15;
   bool large = false;
+  std::vector<int> levels{0, 1, 2, 3, 4, 5};
+  std::vector<std::string> phantoms{"liver", "torso"};
 };
 
 struct Timing {
@@ -85,7 +87,7 @@ void bench_case(const Case& c, const Options& options, nlohmann::json& rows) {
   const LensRays rays(bench_camera(768, 576));
   RenderSettings settings;
   settings.step_mm = c.step_mm;
-  for (int level = 0; level <= 5; ++level) {
+  for (const int level : options.levels) {
     std::optional<DisplacementField> field;
     std::size_t free_vertices = 0;
     if (level > 0) {
@@ -130,7 +132,7 @@ void bench_case(const Case& c, const Options& options, nlohmann::json& rows) {
 Result<void> bench_render(const Options& options) {
   nlohmann::json rows = nlohmann::json::array();
   std::vector<Case> cases;
-  for (const char* phantom : {"liver", "torso"}) {
+  for (const std::string& phantom : options.phantoms) {
     for (const int depth : {64, 32}) cases.push_back({phantom, {256, 256, depth}, kStep_mm});
   }
   if (options.large) cases.push_back({"liver", {512, 512, 128}, 0.5});
@@ -156,6 +158,9 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");
   render.add_option("--frames", options->frames, "frames a row (default 15)")->check(CLI::Range(3, 1000));
+  render.add_option("--level", options->levels, "only these levels, 0 (not deformed) to 5")->check(CLI::Range(0, 5));
+  render.add_option("--phantom", options->phantoms, "only these: liver, torso")
+      ->check(CLI::IsMember({"liver", "torso"}));
   render.add_flag("--large", options->large, "also 512x512x128 voxels at 0.5 mm");
   render.callback([options, &status] { status.take(bench_render(*options)); });
 }

@@ -56,7 +56,9 @@ struct WarpJob {
   const float* moves[3] = {};  ///< of the field's points, in voxels of the volume
   float lattice_from_voxel[9] = {};
   float lattice_origin[3] = {};  ///< of voxel (0, 0, 0)
+  bool aligned = false;          ///< the field's axes are the volume's, and it is no longer than kLongestAligned
 };
+inline constexpr int kLongestAligned = 1024;
 
 enum class Isa { portable, avx2, avx512 };
 
@@ -66,6 +68,9 @@ struct Kernels {
   /// Voxels x_begin to x_end (excluded) of a row.
   void (*light)(const LightJob& job, int x_begin, int x_end, int y, int z);
   void (*warp)(const WarpJob& job, int x_begin, int x_end, int y, int z);
+  /// The least and the greatest HU over the rows y, z of a box, for each x of it.
+  void (*bounds)(const GridView& grid, int x_begin, int x_end, int y_begin, int y_end, int z_begin, int z_end, int* low,
+                 int* high);
 };
 
 const Kernels& kernels_of(Isa isa);

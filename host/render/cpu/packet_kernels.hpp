@@ -205,6 +205,104 @@ void light(const LightJob& job, int x_begin, int x_end, int y, int z) {
   }
 }
 
+/// A place along one axis of a field: the point before it and how far past that it is.
+template <typename P>
+struct LatticePlace {
+  typename P::I base;
+  typename P::F t;
+};
+
+template <typename P>
+inline LatticePlace<P> lattice_place(typename P::F at, int size, typename P::M& inside) {
+  constexpr float kRounding = 1e-4F;
+  const auto last = P::f(static_cast<float>(size - 1));
+  inside = P::both(inside, P::both(P::le(P::f(-kRounding), at), P::le(at, last + P::f(kRounding))));
+  const typename P::F within = P::min(P::max(at, P::f(0)), last);
+  const typename P::I base = P::min(P::truncate(within), P::i(size - 2));
+  return {base, within - P::to_float(base)};
+}
+
+/// The volume's value at `to`, written to the voxels of a packet.
+template <typename P>
+inline void store_resampled(const WarpJob& job, typename P::F* to, int x, int x_end, std::uint32_t* row) {
+  using F = typename P::F;
+  using I = typename P::I;
+  const GridView& grid = job.grid;
+  typename P::M there = P::lt(P::f(static_cast<float>(x)) + P::iota(), P::f(static_cast<float>(x_end)));
+  I from[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto last = P::f(static_cast<float>(grid.size[axis] - 1));
+    there = P::both(there, P::both(P::le(P::f(0), to[axis]), P::le(to[axis], last)));
+    const F within = P::min(P::max(to[axis], P::f(0)), last);
+    // At its far faces the last cell is used, at its end.
+    from[axis] = P::min(P::truncate(within), P::i(grid.size[axis] - 2));
+    to[axis] = within - P::to_float(from[axis]);
+  }
+  const auto lerp = [](F a, F b, F t) { return a + t * (b - a); };
+  const int source_row = grid.size[0];
+  const int source_slice = grid.size[0] * grid.size[1];
+  const I voxel =
+      P::add(from[0], P::add(P::multiply(from[1], P::i(source_row)), P::multiply(from[2], P::i(source_slice))));
+  const auto pair = [&](int offset) {
+    const I two = P::gather_halves(job.source + offset, voxel, there);
+    const F a = P::to_float(P::template shift_right<16>(P::template shift_left<16>(two)));
+    const F b = P::to_float(P::template shift_right<16>(two));
+    return lerp(a, b, to[0]);
+  };
+  const F value = lerp(lerp(pair(0), pair(source_row), to[1]),
+                       lerp(pair(source_slice), pair(source_slice + source_row), to[1]), to[2]);
+  constexpr int kAir = -1024;
+  const I hu = P::intersect(P::round(P::select(there, value, P::f(kAir))), P::i(0xFFFF));
+  P::store_first(row + x, hu, x_end - x);
+}
+
+/// Where the field's axes are the volume's, all of a row of voxels lies between the same four rows of the field: they
+/// are blended into one first.
+template <typename P>
+void warp_aligned(const WarpJob& job, int x_begin, int x_end, int y, int z, std::uint32_t* row) {
+  using F = typename P::F;
+  using M = typename P::M;
+  const float* const m = job.lattice_from_voxel;
+  const int voxel[3] = {0, y, z};
+  int base[3] = {};
+  float t[3] = {};
+  bool row_inside = true;
+  for (int axis = 1; axis < 3; ++axis) {
+    const float at = job.lattice_origin[axis] + m[4 * axis] * static_cast<float>(voxel[axis]);
+    const float last = static_cast<float>(job.field_size[axis] - 1);
+    constexpr float kRounding = 1e-4F;
+    row_inside = row_inside && at >= -kRounding && at <= last + kRounding;
+    const float within = at < 0 ? 0 : at > last ? last : at;
+    const int whole = static_cast<int>(within);
+    base[axis] = whole < job.field_size[axis] - 2 ? whole : job.field_size[axis] - 2;
+    t[axis] = within - static_cast<float>(base[axis]);
+  }
+  const int field_row = job.field_size[0];
+  const int field_slice = job.field_size[0] * job.field_size[1];
+  const auto first = static_cast<std::int64_t>(base[2]) * field_slice + static_cast<std::int64_t>(base[1]) * field_row;
+  float blended[3][kLongestAligned];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float* const u = job.moves[axis] + first;
+    for (int i = 0; i < field_row; ++i) {
+      const float low = u[i] + t[1] * (u[i + field_row] - u[i]);
+      const float high = u[i + field_slice] + t[1] * (u[i + field_slice + field_row] - u[i + field_slice]);
+      blended[axis][i] = row_inside ? low + t[2] * (high - low) : 0;
+    }
+  }
+  for (int x = x_begin; x < x_end; x += P::kLanes) {
+    const F fx = P::f(static_cast<float>(x)) + P::iota();
+    M inside = P::lt(fx, P::f(static_cast<float>(x_end)));
+    const auto place = lattice_place<P>(P::f(job.lattice_origin[0]) + P::f(m[0]) * fx, job.field_size[0], inside);
+    F to[3] = {fx, P::f(static_cast<float>(y)), P::f(static_cast<float>(z))};
+    for (int axis = 0; axis < 3; ++axis) {
+      const F a = P::gather(blended[axis], place.base);
+      const F b = P::gather(blended[axis] + 1, place.base);
+      to[axis] = to[axis] + P::select(inside, a + place.t * (b - a), P::f(0));
+    }
+    store_resampled<P>(job, to, x, x_end, row);
+  }
+}
+
 template <typename P>
 void warp(const WarpJob& job, int x_begin, int x_end, int y, int z) {
   using F = typename P::F;
@@ -213,70 +311,60 @@ void warp(const WarpJob& job, int x_begin, int x_end, int y, int z) {
   const GridView& grid = job.grid;
   std::uint32_t* const row =
       grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row;
+  if (job.aligned) return warp_aligned<P>(job, x_begin, x_end, y, z, row);
   const float* const m = job.lattice_from_voxel;
   const auto lerp = [](F a, F b, F t) { return a + t * (b - a); };
+  const int field_row = job.field_size[0];
+  const int field_slice = job.field_size[0] * job.field_size[1];
   for (int x = x_begin; x < x_end; x += P::kLanes) {
     const F fx = P::f(static_cast<float>(x)) + P::iota();
-    // The cell of the field, and where in it.
     M inside = P::lt(fx, P::f(static_cast<float>(x_end)));
-    I base[3];
-    F t[3];
+    LatticePlace<P> place[3];
     for (int axis = 0; axis < 3; ++axis) {
       const float fixed =
           job.lattice_origin[axis] + m[3 * axis + 1] * static_cast<float>(y) + m[3 * axis + 2] * static_cast<float>(z);
-      const F at = P::f(fixed) + P::f(m[3 * axis]) * fx;
-      const float last = static_cast<float>(job.field_size[axis] - 1);
-      constexpr float kRounding = 1e-4F;
-      inside = P::both(inside, P::both(P::le(P::f(-kRounding), at), P::le(at, P::f(last + kRounding))));
-      const F within = P::min(P::max(at, P::f(0)), P::f(last));
-      base[axis] = P::min(P::truncate(within), P::i(job.field_size[axis] - 2));
-      t[axis] = within - P::to_float(base[axis]);
+      place[axis] = lattice_place<P>(P::f(fixed) + P::f(m[3 * axis]) * fx, job.field_size[axis], inside);
     }
-    const int field_row = job.field_size[0];
-    const int field_slice = job.field_size[0] * job.field_size[1];
-    const I at =
-        P::add(base[0], P::add(P::multiply(base[1], P::i(field_row)), P::multiply(base[2], P::i(field_slice))));
+    const I at = P::add(place[0].base, P::add(P::multiply(place[1].base, P::i(field_row)),
+                                              P::multiply(place[2].base, P::i(field_slice))));
     F to[3] = {fx, P::f(static_cast<float>(y)), P::f(static_cast<float>(z))};
-    M there = P::lt(fx, P::f(static_cast<float>(x_end)));
     for (int axis = 0; axis < 3; ++axis) {
       const float* const u = job.moves[axis];
       const auto along_x = [&](int offset) {
-        return lerp(P::gather(u + offset, at), P::gather(u + offset + 1, at), t[0]);
+        return lerp(P::gather(u + offset, at), P::gather(u + offset + 1, at), place[0].t);
       };
-      const F move = lerp(lerp(along_x(0), along_x(field_row), t[1]),
-                          lerp(along_x(field_slice), along_x(field_slice + field_row), t[1]), t[2]);
+      const F move = lerp(lerp(along_x(0), along_x(field_row), place[1].t),
+                          lerp(along_x(field_slice), along_x(field_slice + field_row), place[1].t), place[2].t);
       to[axis] = to[axis] + P::select(inside, move, P::f(0));
-      const float last = static_cast<float>(grid.size[axis] - 1);
-      there = P::both(there, P::both(P::le(P::f(0), to[axis]), P::le(to[axis], P::f(last))));
-      to[axis] = P::min(P::max(to[axis], P::f(0)), P::f(last));
     }
-    // Trilinear in the volume as it was scanned. At its far faces the last cell is used, at its end.
-    I from[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      from[axis] = P::min(P::truncate(to[axis]), P::i(grid.size[axis] - 2));
-      to[axis] = to[axis] - P::to_float(from[axis]);
+    store_resampled<P>(job, to, x, x_end, row);
+  }
+}
+
+template <typename P>
+void bounds(const GridView& grid, int x_begin, int x_end, int y_begin, int y_end, int z_begin, int z_end, int* low,
+            int* high) {
+  const int count = x_end - x_begin;
+  for (int i = 0; i < count; ++i) {
+    low[i] = 32767;
+    high[i] = -32768;
+  }
+  for (int z = z_begin; z < z_end; ++z) {
+    for (int y = y_begin; y < y_end; ++y) {
+      const std::uint32_t* const row =
+          grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row + x_begin;
+      for (int i = 0; i < count; ++i) {
+        const int hu = static_cast<std::int16_t>(row[i]);
+        low[i] = hu < low[i] ? hu : low[i];
+        high[i] = hu > high[i] ? hu : high[i];
+      }
     }
-    const int source_row = grid.size[0];
-    const int source_slice = grid.size[0] * grid.size[1];
-    const I voxel =
-        P::add(from[0], P::add(P::multiply(from[1], P::i(source_row)), P::multiply(from[2], P::i(source_slice))));
-    const auto pair = [&](int offset) {
-      const I two = P::gather_halves(job.source + offset, voxel, there);
-      const F a = P::to_float(P::template shift_right<16>(P::template shift_left<16>(two)));
-      const F b = P::to_float(P::template shift_right<16>(two));
-      return lerp(a, b, to[0]);
-    };
-    const F value = lerp(lerp(pair(0), pair(source_row), to[1]),
-                         lerp(pair(source_slice), pair(source_slice + source_row), to[1]), to[2]);
-    constexpr int kAir = -1024;
-    const I hu = P::intersect(P::round(P::select(there, value, P::f(kAir))), P::i(0xFFFF));
-    P::store_first(row + x, hu, x_end - x);
   }
 }
 
 template <typename P>
 constexpr Kernels make_kernels() {
-  return {cast<P>, light<P>, warp<P>};
+  return {cast<P>, light<P>, warp<P>, bounds<P>};
 }
 
 }  // namespace birdseye::host::cpu

@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -30,24 +31,6 @@ void copy(const Eigen::Matrix3f& m, float* row_by_row) {
 
 void copy(const Eigen::Vector3f& v, float* to) {
   std::copy_n(v.data(), 3, to);
-}
-
-/// Of each element and its two neighbours along an axis of this stride, the least.
-void least_of_three(std::vector<std::uint8_t>& values, std::size_t stride, std::size_t line) {
-  std::vector<std::uint8_t> old = values;
-  const std::size_t count = values.size();
-  // Lines of `line` elements `stride` apart lie one after the other; their ends have one neighbour.
-  for (std::size_t block = 0; block < count; block += line * stride) {
-    for (std::size_t n = 0; n < line; ++n) {
-      std::uint8_t* const to = &values[block + n * stride];
-      const std::uint8_t* const before = n > 0 ? &old[block + (n - 1) * stride] : nullptr;
-      const std::uint8_t* const after = n + 1 < line ? &old[block + (n + 1) * stride] : nullptr;
-      for (std::size_t i = 0; i < stride; ++i) {
-        if (before != nullptr) to[i] = std::min(to[i], before[i]);
-        if (after != nullptr) to[i] = std::min(to[i], after[i]);
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -140,53 +123,38 @@ void VoxelGrid::copy_border() {
   std::copy_n(voxel_row(-1, n[2] - 1) - 1, view_.slice, voxel_row(-1, n[2]) - 1);
 }
 
-/// The tiles of voxels that bricks which are seen touch, widened by so many tiles on either side.
-std::vector<std::uint8_t> VoxelGrid::tiles_about_seen(int before, int after) const {
-  std::vector<std::uint8_t> wanted(count_of(tiles_), 0);
-  tbb::parallel_for(0, tiles_[2], [&](int tk) {
-    for (int bk = std::max(0, tk - after); bk <= std::min(bricks_[2] - 1, tk + before); ++bk) {
-      for (int bj = 0; bj < bricks_[1]; ++bj) {
-        for (int bi = 0; bi < bricks_[0]; ++bi) {
-          if (seen_[index_of(bricks_, bi, bj, bk)] == 0) continue;
-          for (int tj = std::max(0, bj - before); tj <= std::min(tiles_[1] - 1, bj + after); ++tj) {
-            for (int ti = std::max(0, bi - before); ti <= std::min(tiles_[0] - 1, bi + after); ++ti) {
-              wanted[index_of(tiles_, ti, tj, tk)] = 1;
-            }
-          }
-        }
+/// Of a row of voxels, the tiles that seen bricks need when a brick needs its voxels and `margin` more on either side.
+void VoxelGrid::tiles_of_row(int y, int z, int margin, std::uint8_t* tiles) const {
+  const int nx = tiles_[0];
+  std::fill(tiles, tiles + nx, std::uint8_t{0});
+  // Brick b has voxels 4b to 4b + 4.
+  const auto first = [margin](int voxel) { return std::max(0, (voxel - margin - 1) / kBrick); };
+  const auto last = [margin](int voxel, int bricks) { return std::min(bricks - 1, (voxel + margin) / kBrick); };
+  for (int bk = first(z); bk <= last(z, bricks_[2]); ++bk) {
+    for (int bj = first(y); bj <= last(y, bricks_[1]); ++bj) {
+      const std::uint8_t* const bricks = &seen_[index_of(bricks_, 0, bj, bk)];
+      for (int bi = 0; bi < bricks_[0]; ++bi) {
+        if (bricks[bi] == 0) continue;
+        if (margin > 0 && bi > 0) tiles[bi - 1] = 1;
+        tiles[bi] = 1;
+        if (bi + 1 < nx) tiles[bi + 1] = 1;
       }
     }
-  });
-  return wanted;
+  }
 }
 
-/// Calls rows for the rows of voxels of all tiles that are set, joined along x. apart: no two neighbours at once.
-void VoxelGrid::for_rows(const std::vector<std::uint8_t>& tiles, bool apart, const Rows& rows) const {
-  const auto slab = [&](int tk) {
-    for (int tj = 0; tj < tiles_[1]; ++tj) {
-      const std::uint8_t* const line = &tiles[index_of(tiles_, 0, tj, tk)];
-      for (int begin = 0; begin < tiles_[0];) {
-        if (line[begin] == 0) {
-          ++begin;
-          continue;
-        }
-        int end = begin;
-        while (end < tiles_[0] && line[end] != 0) ++end;
-        for (int z = tk * kBrick; z < std::min(tk * kBrick + kBrick, volume_.size[2]); ++z) {
-          for (int y = tj * kBrick; y < std::min(tj * kBrick + kBrick, volume_.size[1]); ++y) {
-            rows(begin * kBrick, std::min(end * kBrick, volume_.size[0]), y, z);
-          }
-        }
-        begin = end;
-      }
+/// Calls run for each run of tiles that are set.
+template <typename Run>
+void VoxelGrid::for_runs(const std::uint8_t* tiles, const Run& run) const {
+  for (int begin = 0; begin < tiles_[0];) {
+    if (tiles[begin] == 0) {
+      ++begin;
+      continue;
     }
-  };
-  if (!apart) {
-    tbb::parallel_for(0, tiles_[2], slab);
-    return;
-  }
-  for (const int first : {0, 1}) {
-    tbb::parallel_for(0, (tiles_[2] - first + 1) / 2, [&](int n) { slab(first + 2 * n); });
+    int end = begin;
+    while (end < tiles_[0] && tiles[end] != 0) ++end;
+    run(begin * kBrick, std::min(end * kBrick, volume_.size[0]));
+    begin = end;
   }
 }
 
@@ -268,23 +236,40 @@ void VoxelGrid::deform(const DisplacementField& field) {
   WarpJob job;
   job.grid = view_;
   job.source = volume_.hu.data();
-  copy(Eigen::Matrix3f(lattice_from_voxel.linear().cast<float>()), job.lattice_from_voxel);
+  const Eigen::Matrix3f linear = lattice_from_voxel.linear().cast<float>();
+  copy(linear, job.lattice_from_voxel);
+  const Eigen::Matrix3f turned = linear - Eigen::Matrix3f(linear.diagonal().asDiagonal());
+  // A drift of a thousandth of a lattice cell from end to end of the volume is nothing.
+  const Eigen::Vector3f extent(static_cast<float>(volume_.size[0]), static_cast<float>(volume_.size[1]),
+                               static_cast<float>(volume_.size[2]));
+  job.aligned = (turned.cwiseAbs() * extent).maxCoeff() < 1e-3F && field.size[0] <= kLongestAligned;
   copy(Eigen::Vector3f(lattice_from_voxel.translation().cast<float>()), job.lattice_origin);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     job.field_size[axis] = field.size[axis];
     job.moves[axis] = moves_[axis].data();
   }
-  // A cell's corners, and the neighbours from which their light is computed.
-  const std::vector<std::uint8_t> wanted = tiles_about_seen(1, 1);
-  std::vector<std::uint8_t> cleared(wanted.size());
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    cleared[i] = wanted[i] == 0 && (holds_scan_ || resampled_[i] != 0) ? 1 : 0;
-  }
-  for_rows(cleared, false, [&](int x_begin, int x_end, int y, int z) {
-    std::fill(voxel_row(y, z) + x_begin, voxel_row(y, z) + x_end, static_cast<std::uint32_t>(kAir) & 0xFFFFU);
+  // What is not resampled is air: samples between two looks at the bricks may stray into it.
+  const auto nx = static_cast<std::size_t>(tiles_[0]);
+  if (holds_scan_)
+    resampled_.assign(nx * static_cast<std::size_t>(volume_.size[1]) * static_cast<std::size_t>(volume_.size[2]), 1);
+  tbb::parallel_for(0, volume_.size[2], [&](int z) {
+    std::vector<std::uint8_t> wanted(nx), stale(nx);
+    for (int y = 0; y < volume_.size[1]; ++y) {
+      // A cell's corners, and the neighbours from which their light is computed.
+      tiles_of_row(y, z, 1, wanted.data());
+      std::uint8_t* const held = &resampled_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(volume_.size[1]) +
+                                              static_cast<std::size_t>(y)) *
+                                             nx];
+      for (std::size_t i = 0; i < nx; ++i) {
+        stale[i] = held[i] != 0 && wanted[i] == 0 ? 1 : 0;
+        held[i] = wanted[i];
+      }
+      for_runs(stale.data(), [&](int x_begin, int x_end) {
+        std::fill(voxel_row(y, z) + x_begin, voxel_row(y, z) + x_end, static_cast<std::uint32_t>(kAir) & 0xFFFFU);
+      });
+      for_runs(wanted.data(), [&](int x_begin, int x_end) { kernels_.warp(job, x_begin, x_end, y, z); });
+    }
   });
-  for_rows(wanted, false, [&](int x_begin, int x_end, int y, int z) { kernels_.warp(job, x_begin, x_end, y, z); });
-  resampled_ = wanted;
   holds_scan_ = false;
   copy_border();
   refine_seen();
@@ -294,50 +279,84 @@ void VoxelGrid::deform(const DisplacementField& field) {
 void VoxelGrid::refine_seen() {
   const auto& n = volume_.size;
   tbb::parallel_for(0, bricks_[2], [&](int bk) {
+    std::vector<int> low(static_cast<std::size_t>(n[0])), high(static_cast<std::size_t>(n[0]));
     for (int bj = 0; bj < bricks_[1]; ++bj) {
-      for (int bi = 0; bi < bricks_[0]; ++bi) {
-        std::uint8_t& seen = seen_[index_of(bricks_, bi, bj, bk)];
-        if (seen == 0) continue;
-        std::int16_t low = std::numeric_limits<std::int16_t>::max();
-        std::int16_t high = std::numeric_limits<std::int16_t>::min();
-        for (int z = bk * kBrick; z <= std::min(bk * kBrick + kBrick, n[2] - 1); ++z) {
-          for (int y = bj * kBrick; y <= std::min(bj * kBrick + kBrick, n[1] - 1); ++y) {
-            const std::uint32_t* const row = voxel_row(y, z);
-            for (int x = bi * kBrick; x <= std::min(bi * kBrick + kBrick, n[0] - 1); ++x) {
-              const auto hu = static_cast<std::int16_t>(row[x] & 0xFFFFU);
-              low = std::min(low, hu);
-              high = std::max(high, hu);
-            }
-          }
+      std::uint8_t* const seen = &seen_[index_of(bricks_, 0, bj, bk)];
+      for (int begin = 0; begin < bricks_[0];) {
+        if (seen[begin] == 0) {
+          ++begin;
+          continue;
         }
-        seen = !prune_ || transfer_.any_seen(low, high) ? 1 : 0;
+        int end = begin;
+        while (end < bricks_[0] && seen[end] != 0) ++end;
+        const int x_begin = begin * kBrick;
+        const int x_end = std::min(end * kBrick + 1, n[0]);
+        kernels_.bounds(view_, x_begin, x_end, bj * kBrick, std::min(bj * kBrick + kBrick + 1, n[1]), bk * kBrick,
+                        std::min(bk * kBrick + kBrick + 1, n[2]), low.data(), high.data());
+        for (int bi = begin; bi < end; ++bi) {
+          const auto from = static_cast<std::ptrdiff_t>((bi - begin) * kBrick);
+          const auto to = static_cast<std::ptrdiff_t>(std::min(bi * kBrick + kBrick + 1, n[0]) - x_begin);
+          seen[bi] = !prune_ || transfer_.any_seen(*std::min_element(low.begin() + from, low.begin() + to),
+                                                   *std::max_element(high.begin() + from, high.begin() + to))
+                         ? 1
+                         : 0;
+        }
+        begin = end;
       }
     }
   });
 }
 
 void VoxelGrid::measure_distances() {
-  constexpr std::uint8_t kFar = 255;
-  constexpr std::uint8_t kFurthest = 24;  // bricks: leaps of 96 voxels are far enough
-  const std::size_t count = seen_.size();
-  distance_.assign(count + 4, kFar);  // a byte is loaded with the three after it
-  std::vector<std::uint8_t> near(count);
-  for (std::size_t i = 0; i < count; ++i) near[i] = distance_[i] = seen_[i] != 0 ? 0 : kFar;
-  const auto along = [](int n) { return static_cast<std::size_t>(n); };
-  for (std::uint8_t step = 1; step <= kFurthest; ++step) {
-    // What is seen, grown by one brick along all three axes in turn: a cube.
-    least_of_three(near, 1, along(bricks_[0]));
-    least_of_three(near, along(bricks_[0]), along(bricks_[1]));
-    least_of_three(near, along(bricks_[0]) * along(bricks_[1]), along(bricks_[2]));
-    bool left = false;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (distance_[i] == kFar && near[i] == 0) distance_[i] = step;
-      left = left || distance_[i] == kFar;
+  // What is seen, one bit a brick, grown by a brick along all three axes at a time: a cube. The step at which it
+  // reaches a brick is that brick's distance.
+  constexpr std::uint8_t kFurthest = 24;  // leaps of 96 voxels are far enough
+  const auto nx = static_cast<std::size_t>(bricks_[0]), ny = static_cast<std::size_t>(bricks_[1]),
+             nz = static_cast<std::size_t>(bricks_[2]);
+  const std::size_t words = (nx + 63) / 64;
+  const std::size_t slice = words * ny;
+  distance_.assign(seen_.size() + 4, kFurthest + 1);  // a byte is loaded with the three after it
+  std::vector<std::uint64_t> grown(slice * nz, 0), next(grown.size());
+  for (std::size_t row = 0; row < ny * nz; ++row) {
+    for (std::size_t i = 0; i < nx; ++i) {
+      if (seen_[row * nx + i] == 0) continue;
+      grown[row * words + i / 64] |= std::uint64_t{1} << i % 64;
+      distance_[row * nx + i] = 0;
     }
-    if (!left) break;
   }
-  for (std::size_t i = 0; i < count; ++i) {
-    if (distance_[i] == kFar) distance_[i] = kFurthest + 1;
+  // A word or'ed with those that lie `stride` before and after it in a line of `line` words.
+  const auto spread = [&](std::size_t stride, std::size_t line) {
+    for (std::size_t at = 0; at < grown.size(); ++at) {
+      const std::size_t place = at / stride % line;
+      std::uint64_t word = grown[at];
+      if (place > 0) word |= grown[at - stride];
+      if (place + 1 < line) word |= grown[at + stride];
+      next[at] = word;
+    }
+    grown.swap(next);
+  };
+  for (std::uint8_t step = 1; step <= kFurthest; ++step) {
+    const std::vector<std::uint64_t> before = grown;
+    for (std::size_t at = 0; at < grown.size(); ++at) {
+      const std::uint64_t word = grown[at];
+      std::uint64_t more = word | word << 1U | word >> 1U;
+      if (at % words > 0) more |= grown[at - 1] >> 63U;
+      if (at % words + 1 < words) more |= grown[at + 1] << 63U;
+      next[at] = more;
+    }
+    grown.swap(next);
+    spread(words, ny);
+    spread(slice, nz);
+    bool changed = false;
+    for (std::size_t at = 0; at < grown.size(); ++at) {
+      for (std::uint64_t fresh = grown[at] & ~before[at]; fresh != 0; fresh &= fresh - 1) {
+        const std::size_t i = at % words * 64 + static_cast<std::size_t>(std::countr_zero(fresh));
+        if (i >= nx) break;
+        distance_[at / words * nx + i] = step;
+        changed = true;
+      }
+    }
+    if (!changed) break;
   }
   view_.distance = distance_.data();
 }
@@ -358,9 +377,20 @@ void VoxelGrid::light(const Eigen::Vector3d& eye_in_patient_mm, const RenderSett
   job.ambient = static_cast<float>(settings.ambient);
   job.diffuse = static_cast<float>(settings.diffuse);
   job.highlight = highlight.data();
-  // A row's light is written into the words that the rows beside it read their HU from.
-  for_rows(tiles_about_seen(0, 1), true,
-           [&](int x_begin, int x_end, int y, int z) { kernels_.light(job, x_begin, x_end, y, z); });
+  // A row's light is written into the words that the rows beside it read their HU from: slabs that touch take turns.
+  const int slabs = (volume_.size[2] + kBrick - 1) / kBrick;
+  for (const int turn : {0, 1}) {
+    tbb::parallel_for(0, (slabs - turn + 1) / 2, [&](int n) {
+      std::vector<std::uint8_t> wanted(static_cast<std::size_t>(tiles_[0]));
+      const int begin = (2 * n + turn) * kBrick;
+      for (int z = begin; z < std::min(begin + kBrick, volume_.size[2]); ++z) {
+        for (int y = 0; y < volume_.size[1]; ++y) {
+          tiles_of_row(y, z, 0, wanted.data());
+          for_runs(wanted.data(), [&](int x_begin, int x_end) { kernels_.light(job, x_begin, x_end, y, z); });
+        }
+      }
+    });
+  }
   copy_border();
 }
 

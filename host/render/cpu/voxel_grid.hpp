@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "host/deform/displacement_field.hpp"
@@ -34,9 +33,9 @@ class VoxelGrid {
 
  private:
   using Counts = std::array<int, 3>;
-  using Rows = std::function<void(int x_begin, int x_end, int y, int z)>;
-  [[nodiscard]] std::vector<std::uint8_t> tiles_about_seen(int before, int after) const;
-  void for_rows(const std::vector<std::uint8_t>& tiles, bool apart, const Rows& rows) const;
+  void tiles_of_row(int y, int z, int margin, std::uint8_t* tiles) const;
+  template <typename Run>
+  void for_runs(const std::uint8_t* tiles, const Run& run) const;
   [[nodiscard]] std::uint32_t* voxel_row(int y, int z);
   void copy_border();
   void find_seen_of_scan();
@@ -52,7 +51,7 @@ class VoxelGrid {
   std::vector<std::uint8_t> distance_;   ///< GridView::distance
   std::vector<std::uint8_t> scan_seen_;  ///< of each brick of cells, as the volume was scanned
   std::vector<int> scan_seen_before_;    ///< how many of them lie before each brick along all three axes
-  std::vector<std::uint8_t> resampled_;  ///< of each tile of voxels: holds a deformation's values
+  std::vector<std::uint8_t> resampled_;  ///< of each row's tiles of voxels: hold a deformation's values
   std::vector<float> moves_[3];
   bool prune_;
   bool holds_scan_ = false;
