@@ -16,7 +16,7 @@ inline constexpr int kBrick = 4;  ///< cells of a brick along an axis
 struct GridView {
   std::uint32_t* voxels = nullptr;  ///< voxel (0, 0, 0)
   int size[3] = {};
-  int row = 0, slice = 0;                  ///< voxels from one to the next along y and z
+  std::int64_t row = 0, slice = 0;         ///< voxels from one to the next along y and z
   const std::uint8_t* distance = nullptr;  ///< of each brick to the nearest that is seen, in bricks; 0: it is seen
   int bricks[3] = {};
 };
@@ -27,10 +27,10 @@ struct CastJob {
   /// Blocks of 4x4 pixels: 16 x, 16 y, 16 z; unit, camera frame; zero where the lens does not see.
   const float* directions = nullptr;
   int width_px = 0, height_px = 0, blocks_per_row = 0;
-  float origin[3] = {};              ///< of the rays, voxels
-  float voxels_from_camera[9] = {};  ///< row by row
-  float clip_normal[3] = {};         ///< camera frame; zero for no clip plane
-  float clip_at_origin_mm = 0;       ///< normal . p - offset at the rays' origin
+  float origin[3] = {};                 ///< of the rays, voxels
+  float voxels_from_camera[3][3] = {};  ///< row by row
+  float clip_normal[3] = {};            ///< camera frame; zero for no clip plane
+  float clip_at_origin_mm = 0;          ///< normal . p - offset at the rays' origin
   float near_mm = 0, step_mm = 0;
   const std::uint64_t* transfer = nullptr;  ///< per HU from -1024: opacity as float, colour in 3 x 10 bits above it
   std::uint8_t* rgba = nullptr;
@@ -39,10 +39,10 @@ struct CastJob {
 /// Shade and highlight of voxels, from their neighbours.
 struct LightJob {
   GridView grid;
-  float patient_from_voxel[9] = {};  ///< linear part, row by row, mm
-  float first_from_eye_mm[3] = {};   ///< from the eye to voxel (0, 0, 0), patient frame
-  float patient_gradient[9] = {};    ///< from the difference of a voxel's two neighbours on each axis, HU per mm
-  float per_surface_gradient = 0;    ///< 1 / g0
+  float patient_from_voxel[3][3] = {};  ///< linear part, row by row, mm
+  float first_from_eye_mm[3] = {};      ///< from the eye to voxel (0, 0, 0), patient frame
+  float patient_gradient[3][3] = {};    ///< from the difference of a voxel's two neighbours on each axis, HU per mm
+  float per_surface_gradient = 0;       ///< 1 / g0
   float ambient = 0, diffuse = 0;
   const float* highlight = nullptr;  ///< specular * t^shininess at t = i / kFacings
 };
@@ -54,7 +54,7 @@ struct WarpJob {
   const std::int16_t* source = nullptr;
   int field_size[3] = {};
   const float* moves[3] = {};  ///< of the field's points, in voxels of the volume
-  float lattice_from_voxel[9] = {};
+  float lattice_from_voxel[3][3] = {};
   float lattice_origin[3] = {};  ///< of voxel (0, 0, 0)
   bool aligned = false;          ///< the field's axes are the volume's, and it is no longer than kLongestAligned
 };

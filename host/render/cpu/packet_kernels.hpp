@@ -20,10 +20,10 @@ struct Vector {
 
 /// m v for a matrix given row by row.
 template <typename P>
-inline Vector<P> times(const float* m, const Vector<P>& v) {
-  return {P::f(m[0]) * v.x + P::f(m[1]) * v.y + P::f(m[2]) * v.z,
-          P::f(m[3]) * v.x + P::f(m[4]) * v.y + P::f(m[5]) * v.z,
-          P::f(m[6]) * v.x + P::f(m[7]) * v.y + P::f(m[8]) * v.z};
+inline Vector<P> times(const float (*m)[3], const Vector<P>& v) {
+  return {P::f(m[0][0]) * v.x + P::f(m[0][1]) * v.y + P::f(m[0][2]) * v.z,
+          P::f(m[1][0]) * v.x + P::f(m[1][1]) * v.y + P::f(m[1][2]) * v.z,
+          P::f(m[2][0]) * v.x + P::f(m[2][1]) * v.y + P::f(m[2][2]) * v.z};
 }
 
 template <typename P>
@@ -53,7 +53,7 @@ void cast_packet(const CastJob& job, int block, int part) {
   using I = typename P::I;
   using M = typename P::M;
   const GridView& grid = job.grid;
-  const float* const at = job.directions + 48 * block + part;
+  const float* const at = job.directions + std::int64_t{48} * block + part;
   const Vector<P> in_camera{P::load(at), P::load(at + 16), P::load(at + 32)};
   const Vector<P> d = times<P>(job.voxels_from_camera, in_camera);
   const Vector<P> o{P::f(job.origin[0]), P::f(job.origin[1]), P::f(job.origin[2])};
@@ -82,7 +82,7 @@ void cast_packet(const CastJob& job, int block, int part) {
   M active = P::both(P::lt(P::f(0), in_camera.z), P::le(i, end));
 
   F red = P::f(0), green = P::f(0), blue = P::f(0), through = P::f(1);
-  const I row = P::i(grid.row), slice = P::i(grid.slice);
+  const I row = P::i(static_cast<int>(grid.row)), slice = P::i(static_cast<int>(grid.slice));
   const I brick_row = P::i(grid.bricks[0]), brick_slice = P::i(grid.bricks[0] * grid.bricks[1]);
   const auto place = [&](F index) {
     const F s = (index + P::f(0.5F)) * h;
@@ -173,12 +173,11 @@ void light(const LightJob& job, int x_begin, int x_end, int y, int z) {
   using F = typename P::F;
   using I = typename P::I;
   const GridView& grid = job.grid;
-  std::uint32_t* const row =
-      grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row;
+  std::uint32_t* const row = grid.voxels + z * grid.slice + y * grid.row;
   const auto hu = [](const std::uint32_t* at) {
     return P::to_float(P::template shift_right<16>(P::template shift_left<16>(P::load_bits(at))));
   };
-  const float* const m = job.patient_from_voxel;
+  const float(*const m)[3] = job.patient_from_voxel;
   for (int x = x_begin; x < x_end; x += P::kLanes) {
     std::uint32_t* const at = row + x;
     const Vector<P> difference{hu(at + 1) - hu(at - 1), hu(at + grid.row) - hu(at - grid.row),
@@ -186,9 +185,9 @@ void light(const LightJob& job, int x_begin, int x_end, int y, int z) {
     const Vector<P> g = times<P>(job.patient_gradient, difference);
     const F fx = P::f(static_cast<float>(x)) + P::iota();
     const auto from_eye = [&](int axis) {
-      const float fixed = job.first_from_eye_mm[axis] + m[3 * axis + 1] * static_cast<float>(y) +
-                          m[3 * axis + 2] * static_cast<float>(z);
-      return P::f(fixed) + P::f(m[3 * axis]) * fx;
+      const float fixed =
+          job.first_from_eye_mm[axis] + m[axis][1] * static_cast<float>(y) + m[axis][2] * static_cast<float>(z);
+      return P::f(fixed) + P::f(m[axis][0]) * fx;
     };
     const Vector<P> d{from_eye(0), from_eye(1), from_eye(2)};
     const F steep = P::sqrt(dot(g, g));
@@ -240,10 +239,10 @@ inline void store_resampled(const WarpJob& job, typename P::F* to, int x, int x_
   }
   const auto lerp = [](F a, F b, F t) { return a + t * (b - a); };
   const int source_row = grid.size[0];
-  const int source_slice = grid.size[0] * grid.size[1];
+  const int source_slice = source_row * grid.size[1];
   const I voxel =
       P::add(from[0], P::add(P::multiply(from[1], P::i(source_row)), P::multiply(from[2], P::i(source_slice))));
-  const auto pair = [&](int offset) {
+  const auto pair = [&](std::int64_t offset) {
     const I two = P::gather_halves(job.source + offset, voxel, there);
     const F a = P::to_float(P::template shift_right<16>(P::template shift_left<16>(two)));
     const F b = P::to_float(P::template shift_right<16>(two));
@@ -262,13 +261,13 @@ template <typename P>
 void warp_aligned(const WarpJob& job, int x_begin, int x_end, int y, int z, std::uint32_t* row) {
   using F = typename P::F;
   using M = typename P::M;
-  const float* const m = job.lattice_from_voxel;
+  const float(*const m)[3] = job.lattice_from_voxel;
   const int voxel[3] = {0, y, z};
   int base[3] = {};
   float t[3] = {};
   bool row_inside = true;
   for (int axis = 1; axis < 3; ++axis) {
-    const float at = job.lattice_origin[axis] + m[4 * axis] * static_cast<float>(voxel[axis]);
+    const float at = job.lattice_origin[axis] + m[axis][axis] * static_cast<float>(voxel[axis]);
     const float last = static_cast<float>(job.field_size[axis] - 1);
     constexpr float kRounding = 1e-4F;
     row_inside = row_inside && at >= -kRounding && at <= last + kRounding;
@@ -278,21 +277,22 @@ void warp_aligned(const WarpJob& job, int x_begin, int x_end, int y, int z, std:
     t[axis] = within - static_cast<float>(base[axis]);
   }
   const int field_row = job.field_size[0];
-  const int field_slice = job.field_size[0] * job.field_size[1];
+  const int field_slice = field_row * job.field_size[1];
   const auto first = static_cast<std::int64_t>(base[2]) * field_slice + static_cast<std::int64_t>(base[1]) * field_row;
   float blended[3][kLongestAligned];
   for (int axis = 0; axis < 3; ++axis) {
     const float* const u = job.moves[axis] + first;
     for (int i = 0; i < field_row; ++i) {
       const float low = u[i] + t[1] * (u[i + field_row] - u[i]);
-      const float high = u[i + field_slice] + t[1] * (u[i + field_slice + field_row] - u[i + field_slice]);
+      const float* const v = u + field_slice;
+      const float high = v[i] + t[1] * (v[i + field_row] - v[i]);
       blended[axis][i] = row_inside ? low + t[2] * (high - low) : 0;
     }
   }
   for (int x = x_begin; x < x_end; x += P::kLanes) {
     const F fx = P::f(static_cast<float>(x)) + P::iota();
     M inside = P::lt(fx, P::f(static_cast<float>(x_end)));
-    const auto place = lattice_place<P>(P::f(job.lattice_origin[0]) + P::f(m[0]) * fx, job.field_size[0], inside);
+    const auto place = lattice_place<P>(P::f(job.lattice_origin[0]) + P::f(m[0][0]) * fx, job.field_size[0], inside);
     F to[3] = {fx, P::f(static_cast<float>(y)), P::f(static_cast<float>(z))};
     for (int axis = 0; axis < 3; ++axis) {
       const F a = P::gather(blended[axis], place.base);
@@ -309,28 +309,27 @@ void warp(const WarpJob& job, int x_begin, int x_end, int y, int z) {
   using I = typename P::I;
   using M = typename P::M;
   const GridView& grid = job.grid;
-  std::uint32_t* const row =
-      grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row;
+  std::uint32_t* const row = grid.voxels + z * grid.slice + y * grid.row;
   if (job.aligned) return warp_aligned<P>(job, x_begin, x_end, y, z, row);
-  const float* const m = job.lattice_from_voxel;
+  const float(*const m)[3] = job.lattice_from_voxel;
   const auto lerp = [](F a, F b, F t) { return a + t * (b - a); };
   const int field_row = job.field_size[0];
-  const int field_slice = job.field_size[0] * job.field_size[1];
+  const int field_slice = field_row * job.field_size[1];
   for (int x = x_begin; x < x_end; x += P::kLanes) {
     const F fx = P::f(static_cast<float>(x)) + P::iota();
     M inside = P::lt(fx, P::f(static_cast<float>(x_end)));
     LatticePlace<P> place[3];
     for (int axis = 0; axis < 3; ++axis) {
       const float fixed =
-          job.lattice_origin[axis] + m[3 * axis + 1] * static_cast<float>(y) + m[3 * axis + 2] * static_cast<float>(z);
-      place[axis] = lattice_place<P>(P::f(fixed) + P::f(m[3 * axis]) * fx, job.field_size[axis], inside);
+          job.lattice_origin[axis] + m[axis][1] * static_cast<float>(y) + m[axis][2] * static_cast<float>(z);
+      place[axis] = lattice_place<P>(P::f(fixed) + P::f(m[axis][0]) * fx, job.field_size[axis], inside);
     }
     const I at = P::add(place[0].base, P::add(P::multiply(place[1].base, P::i(field_row)),
                                               P::multiply(place[2].base, P::i(field_slice))));
     F to[3] = {fx, P::f(static_cast<float>(y)), P::f(static_cast<float>(z))};
     for (int axis = 0; axis < 3; ++axis) {
       const float* const u = job.moves[axis];
-      const auto along_x = [&](int offset) {
+      const auto along_x = [&](std::int64_t offset) {
         return lerp(P::gather(u + offset, at), P::gather(u + offset + 1, at), place[0].t);
       };
       const F move = lerp(lerp(along_x(0), along_x(field_row), place[1].t),
@@ -351,8 +350,7 @@ void bounds(const GridView& grid, int x_begin, int x_end, int y_begin, int y_end
   }
   for (int z = z_begin; z < z_end; ++z) {
     for (int y = y_begin; y < y_end; ++y) {
-      const std::uint32_t* const row =
-          grid.voxels + static_cast<std::int64_t>(z) * grid.slice + static_cast<std::int64_t>(y) * grid.row + x_begin;
+      const std::uint32_t* const row = grid.voxels + z * grid.slice + y * grid.row + x_begin;
       for (int i = 0; i < count; ++i) {
         const int hu = static_cast<std::int16_t>(row[i]);
         low[i] = hu < low[i] ? hu : low[i];

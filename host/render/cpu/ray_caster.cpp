@@ -59,7 +59,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   ImageRgba image{camera.width_px, camera.height_px, {}};
   image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
-  const Eigen::Vector3d eye = patient_from_camera.translation();
+  const Eigen::Vector3d& eye = patient_from_camera.translation();
   const Eigen::Affine3d voxel_from_patient = volume_.patient_from_voxel.inverse();
   grid_.light(eye, settings);
 
@@ -72,7 +72,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   job.blocks_per_row = rays.blocks_per_row();
   copy(voxel_from_patient * eye, job.origin);
   const Eigen::Matrix3d voxels_from_camera = voxel_from_patient.linear() * patient_from_camera.rotation();
-  for (int row = 0; row < 3; ++row) copy(voxels_from_camera.row(row), job.voxels_from_camera + 3 * row);
+  for (int row = 0; row < 3; ++row) copy(voxels_from_camera.row(row), job.voxels_from_camera[row]);
   if (settings.clip) {
     copy(patient_from_camera.rotation().transpose() * settings.clip->normal, job.clip_normal);
     job.clip_at_origin_mm = static_cast<float>(settings.clip->normal.dot(eye) - settings.clip->offset_mm);

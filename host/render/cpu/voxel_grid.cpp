@@ -25,8 +25,10 @@ std::size_t count_of(const std::array<int, 3>& size) {
   return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
 }
 
-void copy(const Eigen::Matrix3f& m, float* row_by_row) {
-  for (int i = 0; i < 9; ++i) row_by_row[i] = m(i / 3, i % 3);
+void copy(const Eigen::Matrix3f& m, float (*rows)[3]) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) rows[row][column] = m(row, column);
+  }
 }
 
 void copy(const Eigen::Vector3f& v, float* to) {
@@ -294,7 +296,7 @@ void VoxelGrid::refine_seen() {
         kernels_.bounds(view_, x_begin, x_end, bj * kBrick, std::min(bj * kBrick + kBrick + 1, n[1]), bk * kBrick,
                         std::min(bk * kBrick + kBrick + 1, n[2]), low.data(), high.data());
         for (int bi = begin; bi < end; ++bi) {
-          const auto from = static_cast<std::ptrdiff_t>((bi - begin) * kBrick);
+          const std::ptrdiff_t from = std::ptrdiff_t{bi - begin} * kBrick;
           const auto to = static_cast<std::ptrdiff_t>(std::min(bi * kBrick + kBrick + 1, n[0]) - x_begin);
           seen[bi] = !prune_ || transfer_.any_seen(*std::min_element(low.begin() + from, low.begin() + to),
                                                    *std::max_element(high.begin() + from, high.begin() + to))
