@@ -8,46 +8,16 @@
 #include "host/overlay/gate.hpp"
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/reference/reference_renderer.hpp"
-#include "tests/support/lens.hpp"
+#include "tests/support/render_scene.hpp"
 
 namespace birdseye::host {
 namespace {
 
-/// A blob with a dense core and a rod, smooth, on an oblique anisotropic grid.
-Volume scene() {
-  Volume v;
-  v.size = {40, 36, 30};
-  v.spacing_mm = {1.4, 1.6, 2.1};
-  v.patient_from_voxel.linear() = rotation_exp(Eigen::Vector3d(0.3, -0.4, 0.2)) * v.spacing_mm.asDiagonal();
-  v.patient_from_voxel.translation() = Eigen::Vector3d(-30, -20, 60);
-  for (int k = 0; k < 30; ++k) {
-    for (int j = 0; j < 36; ++j) {
-      for (int i = 0; i < 40; ++i) {
-        const double blob =
-            std::exp(-(std::pow((i - 18) / 9.0, 2) + std::pow((j - 17) / 8.0, 2) + std::pow((k - 15) / 7.0, 2)));
-        const double rod = std::exp(-(std::pow((i - 30) / 3.0, 2) + std::pow((j - 12) / 3.0, 2)));
-        v.hu.push_back(static_cast<std::int16_t>(std::lround(-900 + 1300 * blob + 1100 * rod)));
-      }
-    }
-  }
-  return v;
-}
-
-TransferFunction soft() {
-  return TransferFunction(
-      {{-400, {0.5, 0.1, 0.1}, 0}, {0, {0.9, 0.4, 0.2}, 0.05}, {200, {0.9, 0.8, 0.6}, 0.2}, {600, {1, 1, 0.9}, 0.4}});
-}
-
-CameraModel lens() {
-  return testing::wide_lens(128, 96);
-}
-
-/// A camera that looks at the scene's middle from 110 mm.
-Transform<Camera, Patient> pose(const Volume& v) {
-  const Eigen::Vector3d middle = v.patient_from_voxel * Eigen::Vector3d(20, 18, 15);
-  const Eigen::Matrix3d r = rotation_exp(Eigen::Vector3d(0.4, 0.7, -0.2));
-  return {r, Eigen::Vector3d(0, 0, 110) - r * middle};
-}
+using testing::bent;
+using testing::lens;
+using testing::pose;
+using testing::scene;
+using testing::soft;
 
 void expect_agreement(const Volume& volume, const RenderSettings& settings,
                       const DisplacementField* deformation = nullptr,
@@ -59,14 +29,9 @@ void expect_agreement(const Volume& volume, const RenderSettings& settings,
     RayCaster caster(volume, soft(), isa);
     if (deformation != nullptr) caster.deform(*deformation);
     const ImageRgba picture = caster.render(LensRays(lens()), from, settings);
-    double sum = 0, worst = 0;
-    for (std::size_t i = 0; i < reference.size(); ++i) {
-      const double error = std::abs(picture.rgba[i] - 255 * reference[i]);
-      sum += error;
-      worst = std::max(worst, error);
-    }
-    EXPECT_LT(sum / static_cast<double>(reference.size()), 0.1) << cpu::name_of(isa);
-    EXPECT_LT(worst, 3) << cpu::name_of(isa);
+    const auto d = testing::difference(picture, reference);
+    EXPECT_LT(d.mean, 0.1) << cpu::name_of(isa);
+    EXPECT_LT(d.worst, 3) << cpu::name_of(isa);
   }
 }
 
@@ -83,18 +48,6 @@ TEST(RayCaster, AgreesWithTheReferenceWhenClippedAndFromInside) {
   settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
   settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
   expect_agreement(volume, settings);
-}
-
-/// Patches over the whole volume, their vertices moved at random, in part by more than a brick.
-DisplacementField bent(const Volume& volume, int level, double amount, unsigned seed) {
-  PatchOctree tree = *PatchOctree::uniform(level);
-  std::mt19937 rng(seed);
-  std::uniform_real_distribution<double> uniform(-amount, amount);
-  std::vector<Eigen::Vector3d> moves;
-  for (std::size_t i = 0; i < tree.free_vertices(); ++i) moves.emplace_back(uniform(rng), uniform(rng), uniform(rng));
-  tree.set_displacements(moves);
-  const Eigen::Vector3d last(volume.size[0] - 1, volume.size[1] - 1, volume.size[2] - 1);
-  return field_of(tree, volume.patient_from_voxel * Eigen::Scaling(last));
 }
 
 TEST(RayCaster, AgreesWithTheReferenceWhenDeformed) {

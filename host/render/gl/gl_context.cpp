@@ -1,0 +1,69 @@
+#include "host/render/gl/gl_context.hpp"
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+
+#include <array>
+
+namespace birdseye::host {
+
+namespace {
+
+Error missing(const std::string& what) {
+  return {Errc::unsupported, "OpenGL: " + what + "; install libegl1 and libgl1-mesa-dri, or use --engine cpu"};
+}
+
+void note(GLenum /*source*/, GLenum type, GLuint /*id*/, GLenum severity, GLsizei /*length*/, const GLchar* message,
+          const void* fault) {
+  if (type != GL_DEBUG_TYPE_ERROR && severity != GL_DEBUG_SEVERITY_HIGH) return;
+  auto* const first = static_cast<std::string*>(const_cast<void*>(fault));
+  if (first->empty()) *first = message;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<GlContext>> GlContext::offscreen() {
+  if (!epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless") ||
+      !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base")) {
+    return missing("no EGL with a surfaceless platform");
+  }
+  std::unique_ptr<GlContext> made(new GlContext);
+  EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr);
+  if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) == EGL_FALSE) {
+    return missing("EGL finds no driver");
+  }
+  made->display_ = display;
+  if (eglBindAPI(EGL_OPENGL_API) == EGL_FALSE) return missing("EGL has OpenGL ES only");
+  constexpr std::array<EGLint, 5> kConfig{EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, 0, EGL_NONE};
+  EGLConfig config = nullptr;
+  EGLint count = 0;
+  eglChooseConfig(display, kConfig.data(), &config, 1, &count);
+  constexpr std::array<EGLint, 9> kContext{EGL_CONTEXT_MAJOR_VERSION,
+                                           4,
+                                           EGL_CONTEXT_MINOR_VERSION,
+                                           5,
+                                           EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                           EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                           EGL_CONTEXT_OPENGL_DEBUG,
+                                           EGL_TRUE,
+                                           EGL_NONE};
+  made->context_ = count > 0 ? eglCreateContext(display, config, EGL_NO_CONTEXT, kContext.data()) : EGL_NO_CONTEXT;
+  if (made->context_ == EGL_NO_CONTEXT) return missing("the driver has no OpenGL 4.5 core");
+  if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, made->context_) == EGL_FALSE) {
+    return missing("the driver needs a window");
+  }
+  made->renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  glEnable(GL_DEBUG_OUTPUT);
+  glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageCallback(note, &made->fault_);
+  return made;
+}
+
+GlContext::~GlContext() {
+  if (display_ == nullptr) return;
+  eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  if (context_ != nullptr) eglDestroyContext(display_, context_);
+  eglTerminate(display_);
+}
+
+}  // namespace birdseye::host

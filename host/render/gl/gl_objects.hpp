@@ -1,0 +1,60 @@
+#pragma once
+
+#include <epoxy/gl.h>
+
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// Owns one OpenGL object; Delete ends it.
+template <typename Delete>
+class GlObject {
+ public:
+  GlObject() = default;
+  explicit GlObject(GLuint id) : id_(id) {}
+  GlObject(GlObject&& other) noexcept : id_(std::exchange(other.id_, 0)) {}
+  GlObject& operator=(GlObject&& other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
+  ~GlObject() {
+    if (id_ != 0) Delete()(id_);
+  }
+  [[nodiscard]] GLuint id() const { return id_; }
+
+ private:
+  GLuint id_ = 0;
+};
+
+struct DeleteTexture {
+  void operator()(GLuint id) const { glDeleteTextures(1, &id); }
+};
+struct DeleteBuffer {
+  void operator()(GLuint id) const { glDeleteBuffers(1, &id); }
+};
+struct DeleteFramebuffer {
+  void operator()(GLuint id) const { glDeleteFramebuffers(1, &id); }
+};
+struct DeleteVertexArray {
+  void operator()(GLuint id) const { glDeleteVertexArrays(1, &id); }
+};
+struct DeleteProgram {
+  void operator()(GLuint id) const { glDeleteProgram(id); }
+};
+using GlTexture = GlObject<DeleteTexture>;
+using GlBuffer = GlObject<DeleteBuffer>;
+using GlFramebuffer = GlObject<DeleteFramebuffer>;
+using GlVertexArray = GlObject<DeleteVertexArray>;
+using GlProgram = GlObject<DeleteProgram>;
+
+/// Compiles and links; a failure is a bug of ours and carries the compiler's words.
+Result<GlProgram> make_program(std::initializer_list<std::pair<GLenum, std::string>> shaders);
+/// Nearest, clamped, of one level.
+GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei height, GLsizei depth);
+GlBuffer make_buffer(GLsizeiptr bytes, const void* data);
+
+}  // namespace birdseye::host

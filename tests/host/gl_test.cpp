@@ -1,0 +1,59 @@
+#include <gtest/gtest.h>
+
+#include "host/render/cpu/ray_caster.hpp"
+#include "host/render/gl/gl_ray_caster.hpp"
+#include "tests/support/render_scene.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using testing::bent;
+using testing::difference;
+using testing::lens;
+using testing::pose;
+using testing::scene;
+using testing::soft;
+
+TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
+  auto context = GlContext::offscreen();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const Volume volume = scene();
+  auto caster = GlRayCaster::create(**context, volume, soft());
+  ASSERT_TRUE(caster) << caster.error().what;
+  RenderSettings settings;
+  settings.step_mm = 0.8;
+  const auto check = [&](const DisplacementField* field) {
+    const auto d = difference((*caster)->render(lens(), pose(volume), settings),
+                              render_reference(volume, soft(), lens(), pose(volume), settings, field));
+    EXPECT_LT(d.mean, 0.5);
+    EXPECT_LT(d.worst, 6);
+  };
+  check(nullptr);
+  for (const auto& [level, amount] : {std::pair{1, 0.2}, {3, 0.03}}) {
+    const DisplacementField field = bent(volume, level, amount, 3);
+    (*caster)->deform(field);
+    check(&field);
+  }
+  (*caster)->undeform();
+  check(nullptr);
+  settings.near_mm = 95;
+  settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
+  settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
+  check(nullptr);
+  EXPECT_EQ((*context)->fault(), "");
+}
+
+TEST(GlRayCaster, DrawsNothingOfAnEmptyVolume) {
+  auto context = GlContext::offscreen();
+  if (!context) GTEST_SKIP() << context.error().what;
+  Volume volume = scene();
+  std::fill(volume.hu.begin(), volume.hu.end(), std::int16_t{-1000});
+  auto caster = GlRayCaster::create(**context, volume, soft());
+  ASSERT_TRUE(caster) << caster.error().what;
+  const ImageRgba picture = (*caster)->render(lens(), pose(volume), {});
+  EXPECT_EQ(std::count(picture.rgba.begin(), picture.rgba.end(), 0), static_cast<std::ptrdiff_t>(picture.rgba.size()));
+  EXPECT_EQ((*context)->fault(), "");
+}
+
+}  // namespace
+}  // namespace birdseye::host
