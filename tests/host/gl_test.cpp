@@ -2,6 +2,7 @@
 
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/gl/gl_ray_caster.hpp"
+#include "host/render/gl/gl_slice_renderer.hpp"
 #include "tests/support/render_scene.hpp"
 
 namespace birdseye::host {
@@ -25,6 +26,7 @@ TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
   const auto check = [&](const DisplacementField* field) {
     const auto d = difference((*caster)->render(lens(), pose(volume), settings),
                               render_reference(volume, soft(), lens(), pose(volume), settings, field));
+    std::printf("rays: mean %.3f worst %.2f\n", d.mean, d.worst);
     EXPECT_LT(d.mean, 0.5);
     EXPECT_LT(d.worst, 6);
   };
@@ -40,6 +42,29 @@ TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
   settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
   settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
   check(nullptr);
+  EXPECT_EQ((*context)->fault(), "");
+}
+
+TEST(GlSliceRenderer, IsLikeTheReferenceScannedAndDeformed) {
+  auto context = GlContext::offscreen();
+  if (!context) GTEST_SKIP() << context.error().what;
+  const Volume volume = scene();
+  auto slices = GlSliceRenderer::create(**context, volume, soft());
+  ASSERT_TRUE(slices) << slices.error().what;
+  RenderSettings settings;
+  settings.step_mm = 0.5;
+  const auto check = [&](const DisplacementField* field) {
+    const auto d = difference((*slices)->render(lens(), pose(volume), settings),
+                              render_reference(volume, soft(), lens(), pose(volume), settings, field));
+    std::printf("slices: mean %.2f worst %.1f, %zu of %zu patches\n", d.mean, d.worst, (*slices)->patches_drawn(),
+                (*slices)->patches());
+    EXPECT_LT(d.mean, 3);
+  };
+  check(nullptr);
+  const DisplacementField field = bent(volume, 1, 0.2, 3);
+  (*slices)->deform(field);
+  check(&field);
+  EXPECT_LT((*slices)->patches_drawn(), (*slices)->patches() / 2);
   EXPECT_EQ((*context)->fault(), "");
 }
 

@@ -21,10 +21,6 @@ std::size_t index_of(const std::array<int, 3>& size, int i, int j, int k) {
          static_cast<std::size_t>(i);
 }
 
-std::size_t count_of(const std::array<int, 3>& size) {
-  return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
-}
-
 void copy(const Eigen::Matrix3f& m, float (*rows)[3]) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rows[row][column] = m(row, column);
@@ -38,10 +34,11 @@ void copy(const Eigen::Vector3f& v, float* to) {
 }  // namespace
 
 VoxelGrid::VoxelGrid(const Volume& volume, const TransferFunction& transfer, const Kernels& kernels, bool prune)
-    : volume_(volume), transfer_(transfer), kernels_(kernels), prune_(prune) {
+    : volume_(volume), transfer_(transfer), kernels_(kernels), scan_seen_(volume, transfer), prune_(prune) {
+  static_assert(SeenBricks::kBrick == kBrick);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     view_.size[axis] = volume.size[axis];
-    bricks_[axis] = std::max(1, (volume.size[axis] - 1 + kBrick - 1) / kBrick);
+    bricks_[axis] = scan_seen_.size()[axis];
     tiles_[axis] = (volume.size[axis] + kBrick - 1) / kBrick;
     view_.bricks[axis] = bricks_[axis];
   }
@@ -50,47 +47,11 @@ VoxelGrid::VoxelGrid(const Volume& volume, const TransferFunction& transfer, con
   constexpr std::size_t kPastTheEnd = 64;  // packets read past the last voxel, and use nothing of it
   voxels_.resize(static_cast<std::size_t>(view_.slice) * static_cast<std::size_t>(volume.size[2] + 2) + kPastTheEnd);
   view_.voxels = voxels_.data() + view_.slice + view_.row + 1;
-  find_seen_of_scan();
   undeform();
 }
 
 std::uint32_t* VoxelGrid::voxel_row(int y, int z) {
   return view_.voxels + static_cast<std::ptrdiff_t>(z) * view_.slice + static_cast<std::ptrdiff_t>(y) * view_.row;
-}
-
-void VoxelGrid::find_seen_of_scan() {
-  const auto& n = volume_.size;
-  scan_seen_.resize(count_of(bricks_));
-  tbb::parallel_for(0, bricks_[2], [&](int bk) {
-    for (int bj = 0; bj < bricks_[1]; ++bj) {
-      for (int bi = 0; bi < bricks_[0]; ++bi) {
-        std::int16_t low = std::numeric_limits<std::int16_t>::max();
-        std::int16_t high = std::numeric_limits<std::int16_t>::min();
-        for (int k = bk * kBrick; k <= std::min(bk * kBrick + kBrick, n[2] - 1); ++k) {
-          for (int j = bj * kBrick; j <= std::min(bj * kBrick + kBrick, n[1] - 1); ++j) {
-            for (int i = bi * kBrick; i <= std::min(bi * kBrick + kBrick, n[0] - 1); ++i) {
-              low = std::min(low, volume_.at(i, j, k));
-              high = std::max(high, volume_.at(i, j, k));
-            }
-          }
-        }
-        scan_seen_[index_of(bricks_, bi, bj, bk)] = !prune_ || transfer_.any_seen(low, high) ? 1 : 0;
-      }
-    }
-  });
-  const Counts sums{bricks_[0] + 1, bricks_[1] + 1, bricks_[2] + 1};
-  scan_seen_before_.assign(count_of(sums), 0);
-  for (int k = 1; k < sums[2]; ++k) {
-    for (int j = 1; j < sums[1]; ++j) {
-      int line = 0;
-      for (int i = 1; i < sums[0]; ++i) {
-        line += scan_seen_[index_of(bricks_, i - 1, j - 1, k - 1)];
-        scan_seen_before_[index_of(sums, i, j, k)] = line + scan_seen_before_[index_of(sums, i, j - 1, k)] +
-                                                     scan_seen_before_[index_of(sums, i, j, k - 1)] -
-                                                     scan_seen_before_[index_of(sums, i, j - 1, k - 1)];
-      }
-    }
-  }
 }
 
 void VoxelGrid::undeform() {
@@ -106,7 +67,8 @@ void VoxelGrid::undeform() {
     copy_border();
     holds_scan_ = true;
   }
-  seen_ = scan_seen_;
+  seen_ = scan_seen_.flags();
+  if (!prune_) std::fill(seen_.begin(), seen_.end(), std::uint8_t{1});
   measure_distances();
 }
 
@@ -164,7 +126,6 @@ void VoxelGrid::mark_seen_after(const DisplacementField& field, const Eigen::Aff
   // The field's bounds over blocks of bricks tell from where the values of each brick may come.
   constexpr int kBlock = 4;
   constexpr float kMargin = 1e-3F;
-  const Counts sums{bricks_[0] + 1, bricks_[1] + 1, bricks_[2] + 1};
   const Counts blocks{(bricks_[0] + kBlock - 1) / kBlock, (bricks_[1] + kBlock - 1) / kBlock,
                       (bricks_[2] + kBlock - 1) / kBlock};
   const Eigen::Array3i last_voxel(volume_.size[0] - 1, volume_.size[1] - 1, volume_.size[2] - 1);
@@ -203,18 +164,8 @@ void VoxelGrid::mark_seen_after(const DisplacementField& field, const Eigen::Aff
           const Eigen::Array3f from = (brick * kBrick).cast<float>() + least - kMargin;
           const Eigen::Array3f to = (brick * kBrick + kBrick).min(last_voxel).cast<float>() + most + kMargin;
           const bool past = (from < -2 * kMargin).any() || (to > last_voxel.cast<float>() + 2 * kMargin).any();
-          const auto brick_of = [&](const Eigen::Array3f& voxel) {
-            return Eigen::Array3i((voxel / static_cast<float>(kBrick)).floor().cast<int>());
-          };
-          const Eigen::Array3i most_brick(bricks_[0] - 1, bricks_[1] - 1, bricks_[2] - 1);
-          const Eigen::Array3i a = brick_of(from.max(0.0F)).min(most_brick);
-          const Eigen::Array3i b = brick_of(to.max(0.0F)).min(most_brick) + 1;
-          const auto sum = [&](int i, int j, int k) { return scan_seen_before_[index_of(sums, i, j, k)]; };
-          const int count = sum(b[0], b[1], b[2]) - sum(a[0], b[1], b[2]) - sum(b[0], a[1], b[2]) -
-                            sum(b[0], b[1], a[2]) + sum(a[0], a[1], b[2]) + sum(a[0], b[1], a[2]) +
-                            sum(b[0], a[1], a[2]) - sum(a[0], a[1], a[2]);
           // Where values come from past the volume's faces there is air, and what lies between it and tissue.
-          seen_[index_of(bricks_, bi, bj, bk)] = count > 0 || past ? 1 : 0;
+          seen_[index_of(bricks_, bi, bj, bk)] = !prune_ || past || scan_seen_.any(from, to) ? 1 : 0;
         }
       }
     }
@@ -397,8 +348,8 @@ void VoxelGrid::light(const Eigen::Vector3d& eye_in_patient_mm, const RenderSett
 }
 
 std::size_t VoxelGrid::bytes() const {
-  std::size_t bytes = voxels_.capacity() * sizeof(std::uint32_t) + scan_seen_before_.capacity() * sizeof(int);
-  for (const auto* flags : {&seen_, &distance_, &scan_seen_, &resampled_}) bytes += flags->capacity();
+  std::size_t bytes = voxels_.capacity() * sizeof(std::uint32_t) + scan_seen_.bytes();
+  for (const auto* flags : {&seen_, &distance_, &resampled_}) bytes += flags->capacity();
   for (const std::vector<float>& axis : moves_) bytes += axis.capacity() * sizeof(float);
   return bytes;
 }

@@ -8,6 +8,7 @@
 #include "host/deform/displacement_field.hpp"
 #include "host/render/cpu/kernels.hpp"
 #include "host/render/scene.hpp"
+#include "host/render/seen_bricks.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 
@@ -38,7 +39,6 @@ class VoxelGrid {
   void for_runs(const std::uint8_t* tiles, const Run& run) const;
   [[nodiscard]] std::uint32_t* voxel_row(int y, int z);
   void copy_border();
-  void find_seen_of_scan();
   void mark_seen_after(const DisplacementField& field, const Eigen::Affine3d& lattice_from_voxel);
   void refine_seen();
   void measure_distances();
@@ -47,10 +47,9 @@ class VoxelGrid {
   const TransferFunction& transfer_;
   const Kernels& kernels_;
   std::vector<std::uint32_t> voxels_;
-  std::vector<std::uint8_t> seen_;       ///< of each brick of cells, as the grid is now
-  std::vector<std::uint8_t> distance_;   ///< GridView::distance
-  std::vector<std::uint8_t> scan_seen_;  ///< of each brick of cells, as the volume was scanned
-  std::vector<int> scan_seen_before_;    ///< how many of them lie before each brick along all three axes
+  std::vector<std::uint8_t> seen_;      ///< of each brick of cells, as the grid is now
+  std::vector<std::uint8_t> distance_;  ///< GridView::distance
+  SeenBricks scan_seen_;
   std::vector<std::uint8_t> resampled_;  ///< of each row's tiles of voxels: hold a deformation's values
   std::vector<float> moves_[3];
   bool prune_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/render/gl/ray_caster_shaders.hpp"
+#include "host/render/gl/uniforms.hpp"
 
 namespace birdseye::host {
 
@@ -14,44 +15,6 @@ namespace {
 constexpr int kBrick = 4;
 constexpr int kLeaps = 16;  // bricks that one leap may take
 constexpr int kEntries = TransferFunction::kHighestHu - TransferFunction::kLowestHu + 1;
-
-GLuint groups(int count, int size) {
-  return static_cast<GLuint>((count + size - 1) / size);
-}
-
-void dispatch(const GlProgram& program, const int* size, int x, int y, int z) {
-  glUseProgram(program.id());
-  glDispatchCompute(groups(size[0], x), groups(size[1], y), groups(size[2], z));
-  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
-}
-
-GLint place(const GlProgram& program, const char* name) {
-  return glGetUniformLocation(program.id(), name);
-}
-
-void set(const GlProgram& program, const char* name, const Eigen::Affine3d& m) {
-  const Eigen::Matrix4f columns = m.matrix().cast<float>();
-  glProgramUniformMatrix4fv(program.id(), place(program, name), 1, GL_FALSE, columns.data());
-}
-
-void set(const GlProgram& program, const char* name, const Eigen::Matrix3d& m) {
-  const Eigen::Matrix3f columns = m.cast<float>();
-  glProgramUniformMatrix3fv(program.id(), place(program, name), 1, GL_FALSE, columns.data());
-}
-
-void set(const GlProgram& program, const char* name, const Eigen::Vector3d& v) {
-  const Eigen::Vector3f f = v.cast<float>();
-  glProgramUniform3fv(program.id(), place(program, name), 1, f.data());
-}
-
-void set(const GlProgram& program, const char* name, const Eigen::Vector4d& v) {
-  const Eigen::Vector4f f = v.cast<float>();
-  glProgramUniform4fv(program.id(), place(program, name), 1, f.data());
-}
-
-void set(const GlProgram& program, const char* name, double value) {
-  glProgramUniform1f(program.id(), place(program, name), static_cast<float>(value));
-}
 
 }  // namespace
 
