@@ -12,8 +12,10 @@
 
 #include "host/app/bench_phantom.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/picture.hpp"
 #include "host/app/write_files.hpp"
-#include "host/render/cpu/ray_caster.hpp"
+#include "host/render/cpu/kernels.hpp"
+#include "host/render/engine.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 
 namespace birdseye::host {
@@ -21,9 +23,12 @@ namespace birdseye::host {
 namespace {
 
 constexpr double kStep_mm = 1;
+constexpr int kWidth_px = 768, kHeight_px = 576;
+constexpr int kStride = 12;  // of the pixels that are compared with the reference
 
 struct Options {
-  std::filesystem::path json;
+  std::filesystem::path json, pictures, scene;
+  std::vector<std::string> engines{"cpu"};
   int frames = 15;
   bool large = false;
   std::vector<int> levels{0, 1, 2, 3, 4, 5};
@@ -76,57 +81,145 @@ double mean_error(const ImageRgba& picture, const std::vector<double>& reference
   return sum / static_cast<double>(n);
 }
 
+struct Level {
+  int number = 0;
+  std::optional<DisplacementField> field;
+  std::size_t free_vertices = 0;
+  std::vector<double> reference;
+};
+
+std::vector<std::uint8_t> over_white(const ImageRgba& image) {
+  std::vector<std::uint8_t> rgb;
+  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      rgb.push_back(static_cast<std::uint8_t>(std::min(255, image.rgba[i + c] + 255 - image.rgba[i + 3])));
+    }
+  }
+  return rgb;
+}
+
 struct Case {
   std::string phantom;
   std::array<int, 3> size;
   double step_mm;
 };
 
-void bench_case(const Case& c, const Options& options, nlohmann::json& rows) {
-  const Volume volume = bench_phantom(c.phantom, c.size);
-  const LensRays rays(bench_camera(768, 576));
+/// One engine at one level, with pruning or without.
+Result<nlohmann::json> bench_engine(const Case& c, const Options& options, const Volume& volume, Engine& engine,
+                                    const Level& level, bool pruned) {
+  const CameraModel camera = bench_camera(kWidth_px, kHeight_px);
   RenderSettings settings;
   settings.step_mm = c.step_mm;
-  for (const int level : options.levels) {
-    std::optional<DisplacementField> field;
-    std::size_t free_vertices = 0;
-    if (level > 0) {
-      auto [made, count] = bench_deformation(volume, level);
-      field = std::move(made);
-      free_vertices = count;
-    }
-    constexpr int kStride = 12;
-    const auto reference = render_reference(volume, bench_transfer(), rays.camera(), bench_pose(0), settings,
-                                            field ? &*field : nullptr, kStride);
-    for (const bool pruned : {true, false}) {
-      RayCaster caster(volume, bench_transfer(), cpu::supported_isas().back(), pruned);
-      const auto frame = [&](double azimuth_deg) {
-        if (field) caster.deform(*field);
-        return caster.render(rays, bench_pose(azimuth_deg), settings);
-      };
-      const double error = mean_error(frame(0), reference, kStride);
-      const Timing timing = time_frames(options.frames, frame);
-      rows.push_back(
-          {{"engine", "cpu"},
-           {"phantom", c.phantom},
-           {"volume", fmt::format("{}x{}x{}", c.size[0], c.size[1], c.size[2])},
-           {"viewport", "768x576"},
-           {"step_mm", c.step_mm},
-           {"level", level},
-           {"free_vertices", free_vertices},
-           {"pruned", pruned},
-           {"frame_ms_median", timing.frame_ms},
-           {"cpu_ms_median", timing.cpu_ms},
-           {"fps", 1e3 / timing.frame_ms},
-           {"mean_abs_error_255", error},
-           {"memory_ratio", static_cast<double>(caster.bytes()) / (2.0 * static_cast<double>(volume.hu.size()))}});
-      const auto& row = rows.back();
-      fmt::print("cpu  {:5}  {:11}  level {}  {:5} free  {:8}  {:7.2f} ms  {:7.2f} ms CPU  {:6.1f} fps  error {:.3f}\n",
-                 c.phantom, row["volume"].get<std::string>(), level, free_vertices, pruned ? "pruned" : "unpruned",
-                 timing.frame_ms, timing.cpu_ms, 1e3 / timing.frame_ms, error);
-      std::fflush(stdout);
+  const auto frame = [&](double azimuth_deg) {
+    if (level.field) engine.deform(*level.field);
+    return engine.render(camera, bench_pose(azimuth_deg), settings);
+  };
+  const double error = mean_error(frame(0), level.reference, kStride);
+  const Timing timing = time_frames(options.frames, frame);
+  if (const std::string fault = engine.fault(); !fault.empty()) return Error{Errc::io, engine.name() + ": " + fault};
+  nlohmann::json row = {{"engine", engine.name()},
+                        {"phantom", c.phantom},
+                        {"volume", fmt::format("{}x{}x{}", c.size[0], c.size[1], c.size[2])},
+                        {"viewport", fmt::format("{}x{}", kWidth_px, kHeight_px)},
+                        {"step_mm", c.step_mm},
+                        {"level", level.number},
+                        {"free_vertices", level.free_vertices},
+                        {"pruned", pruned},
+                        {"frame_ms_median", timing.frame_ms},
+                        {"cpu_ms_median", timing.cpu_ms},
+                        {"fps", 1e3 / timing.frame_ms},
+                        {"mean_abs_error_255", error}};
+  if (engine.bytes() > 0) {
+    row["memory_ratio"] = static_cast<double>(engine.bytes()) / (2.0 * static_cast<double>(volume.hu.size()));
+  }
+  fmt::print(
+      "{:12.12}  {:5}  {:11}  level {}  {:5} free  {:8}  {:8.2f} ms  {:8.2f} ms CPU  {:6.1f} fps  error {:.3f}\n",
+      engine.name(), c.phantom, row["volume"].get<std::string>(), level.number, level.free_vertices,
+      pruned ? "pruned" : "unpruned", timing.frame_ms, timing.cpu_ms, 1e3 / timing.frame_ms, error);
+  std::fflush(stdout);
+  return row;
+}
+
+Level make_level(const Case& c, const Volume& volume, int number) {
+  Level level;
+  level.number = number;
+  if (number > 0) {
+    auto [field, count] = bench_deformation(volume, number);
+    level.field = std::move(field);
+    level.free_vertices = count;
+  }
+  RenderSettings settings;
+  settings.step_mm = c.step_mm;
+  level.reference = render_reference(volume, bench_transfer(), bench_camera(kWidth_px, kHeight_px), bench_pose(0),
+                                     settings, level.field ? &*level.field : nullptr, kStride);
+  return level;
+}
+
+/// The phantom cut open, as the manual shows it.
+Result<void> draw_level(const Options& options, const Case& c, Engine& engine, const Level& level) {
+  RenderSettings settings;
+  settings.step_mm = 0.5 * c.step_mm;
+  settings.clip = ClipPlane{Eigen::Vector3d(-1, 0, 0), -150};
+  if (level.field) engine.deform(*level.field);
+  const ImageRgba image = engine.render(bench_camera(kWidth_px, kHeight_px), bench_pose(20), settings);
+  const std::string engine_name = engine.name().substr(0, engine.name().find(','));
+  return write_file(options.pictures / fmt::format("{}-{}-level{}.png", c.phantom, engine_name, level.number),
+                    png_of(over_white(image), image.width_px, image.height_px, 3));
+}
+
+/// The undeformed case for another program: volume.mha and scene.json.
+Result<void> write_scene(const std::filesystem::path& folder, const Case& c, const Volume& volume) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --export", folder.string())};
+  const Eigen::Vector3d& spacing = volume.spacing_mm;
+  const Eigen::Vector3d origin = volume.patient_from_voxel.translation();
+  std::string mha = fmt::format(
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nDimSize = {} {} {}\n"
+      "ElementSpacing = {} {} {}\nOffset = {} {} {}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n",
+      c.size[0], c.size[1], c.size[2], spacing.x(), spacing.y(), spacing.z(), origin.x(), origin.y(), origin.z());
+  mha.append(reinterpret_cast<const char*>(volume.hu.data()), volume.hu.size() * sizeof(std::int16_t));
+  nlohmann::json transfer = nlohmann::json::array();
+  const TransferFunction table = bench_transfer();
+  for (int hu = TransferFunction::kLowestHu; hu <= TransferFunction::kHighestHu; hu += 5) {
+    const TransferFunction::Entry& e = table.at(hu);
+    transfer.push_back({hu, e.r, e.g, e.b, e.extinction_per_mm});
+  }
+  const Eigen::Vector3d middle = 0.5 * spacing.cwiseProduct(Eigen::Vector3d(c.size[0], c.size[1], c.size[2]));
+  const nlohmann::json scene = {{"phantom", c.phantom},
+                                {"volume", fmt::format("{}x{}x{}", c.size[0], c.size[1], c.size[2])},
+                                {"width_px", kWidth_px},
+                                {"height_px", kHeight_px},
+                                {"step_mm", c.step_mm},
+                                {"view_angle_deg", 30},
+                                {"elevation_deg", 30},
+                                {"distance_mm", 340},
+                                {"middle_mm", {middle.x(), middle.y(), middle.z()}},
+                                {"transfer", transfer}};
+  return write_files({{folder / "volume.mha", mha}, {folder / "scene.json", text_of(scene)}});
+}
+
+Result<void> bench_case(const Case& c, const Options& options, nlohmann::json& rows) {
+  const Volume volume = bench_phantom(c.phantom, c.size);
+  if (!options.scene.empty() && c.phantom == "liver" && c.size[2] == 64) {
+    if (auto written = write_scene(options.scene, c, volume); !written) return written;
+  }
+  for (const int number : options.levels) {
+    const Level level = make_level(c, volume, number);
+    for (const std::string& name : options.engines) {
+      for (const bool pruned : {true, false}) {
+        auto engine = make_engine(name, volume, bench_transfer(), nullptr, pruned);
+        if (!engine) return engine.error();
+        auto row = bench_engine(c, options, volume, **engine, level, pruned);
+        if (!row) return row.error();
+        rows.push_back(*std::move(row));
+        if (!pruned || options.pictures.empty()) continue;
+        if (auto drawn = draw_level(options, c, **engine, level); !drawn) return drawn;
+      }
     }
   }
+  return {};
 }
 
 Result<void> bench_render(const Options& options) {
@@ -136,7 +229,9 @@ Result<void> bench_render(const Options& options) {
     for (const int depth : {64, 32}) cases.push_back({phantom, {256, 256, depth}, kStep_mm});
   }
   if (options.large) cases.push_back({"liver", {512, 512, 128}, 0.5});
-  for (const Case& c : cases) bench_case(c, options, rows);
+  for (const Case& c : cases) {
+    if (auto done = bench_case(c, options, rows); !done) return done;
+  }
   utsname machine{};
   ::uname(&machine);
   const nlohmann::json json = {{"rows", rows},
@@ -158,6 +253,10 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");
   render.add_option("--frames", options->frames, "frames a row (default 15)")->check(CLI::Range(3, 1000));
+  render.add_option("--engine", options->engines, "these engines: cpu, gl, slices (default cpu)")
+      ->check(CLI::IsMember(engine_names()));
+  render.add_option("--pictures", options->pictures, "folder for a picture of each level, cut open");
+  render.add_option("--export", options->scene, "folder for the 256x256x64 liver and its scene, for other programs");
   render.add_option("--level", options->levels, "only these levels, 0 (not deformed) to 5")->check(CLI::Range(0, 5));
   render.add_option("--phantom", options->phantoms, "only these: liver, torso")
       ->check(CLI::IsMember({"liver", "torso"}));

@@ -19,13 +19,13 @@ constexpr int kEntries = TransferFunction::kHighestHu - TransferFunction::kLowes
 }  // namespace
 
 Result<std::unique_ptr<GlRayCaster>> GlRayCaster::create(GlContext& /*context*/, const Volume& volume,
-                                                         const TransferFunction& transfer) {
+                                                         const TransferFunction& transfer, bool prune) {
   GLint largest = 0;
   glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &largest);
   if (*std::max_element(volume.size.begin(), volume.size.end()) > largest) {
     return Error{Errc::unsupported, "OpenGL: the volume is larger than this driver's textures; use --engine cpu"};
   }
-  std::unique_ptr<GlRayCaster> made(new GlRayCaster(volume, transfer));
+  std::unique_ptr<GlRayCaster> made(new GlRayCaster(volume, transfer, prune));
   const std::pair<GlProgram*, const char*> computed[] = {{&made->warp_, shaders::kWarp},
                                                          {&made->light_, shaders::kLight},
                                                          {&made->seen_, shaders::kSeen},
@@ -52,7 +52,7 @@ Result<std::unique_ptr<GlRayCaster>> GlRayCaster::create(GlContext& /*context*/,
     texture = make_texture(GL_TEXTURE_3D, GL_R8UI, bricks[0], bricks[1], bricks[2]);
   std::vector<std::int32_t> seen_up_to{0};
   for (int hu = TransferFunction::kLowestHu; hu <= TransferFunction::kHighestHu; ++hu) {
-    seen_up_to.push_back(seen_up_to.back() + (transfer.at(hu).extinction_per_mm > 0 ? 1 : 0));
+    seen_up_to.push_back(seen_up_to.back() + (!prune || transfer.at(hu).extinction_per_mm > 0 ? 1 : 0));
   }
   made->seen_up_to_ = make_buffer(static_cast<GLsizeiptr>(seen_up_to.size() * sizeof(std::int32_t)), seen_up_to.data());
   made->transfer_table_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, 64, kEntries / 64, 1);

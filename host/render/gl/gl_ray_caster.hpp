@@ -18,19 +18,21 @@ class GlRayCaster {
  public:
   /// Keeps references to context, which must be current whenever this is used, and to volume.
   static Result<std::unique_ptr<GlRayCaster>> create(GlContext& context, const Volume& volume,
-                                                     const TransferFunction& transfer);
+                                                     const TransferFunction& transfer, bool prune = true);
   void deform(const DisplacementField& field);
   void undeform();
   [[nodiscard]] ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                                  const RenderSettings& settings);
 
  private:
-  GlRayCaster(const Volume& volume, const TransferFunction& transfer) : volume_(volume), transfer_(transfer) {}
+  GlRayCaster(const Volume& volume, const TransferFunction& transfer, bool prune)
+      : volume_(volume), transfer_(transfer), prune_(prune) {}
   void find_bricks();
   void prepare(const CameraModel& camera);
 
   const Volume& volume_;
   TransferFunction transfer_;
+  bool prune_;
   GlProgram warp_, light_, seen_, grow_, cast_;
   GlTexture scan_hu_, warped_hu_, lit_, bricks_[2], directions_, target_, transfer_table_;
   GlBuffer seen_up_to_;

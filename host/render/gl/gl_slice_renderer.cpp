@@ -27,12 +27,12 @@ std::size_t point(int i, int j, int k) {
 }  // namespace
 
 Result<std::unique_ptr<GlSliceRenderer>> GlSliceRenderer::create(GlContext& /*context*/, const Volume& volume,
-                                                                 const TransferFunction& transfer) {
+                                                                 const TransferFunction& transfer, bool prune) {
   const auto& n = volume.size;
   if (*std::min_element(n.begin(), n.end()) < 2) {
     return Error{Errc::unsupported, "OpenGL: slices need a volume of two voxels or more along every axis"};
   }
-  std::unique_ptr<GlSliceRenderer> made(new GlSliceRenderer(volume, transfer));
+  std::unique_ptr<GlSliceRenderer> made(new GlSliceRenderer(volume, transfer, prune));
   auto draw = make_program({{GL_VERTEX_SHADER, shaders::kSliceVertex}, {GL_FRAGMENT_SHADER, shaders::kSliceFragment}});
   if (!draw) return draw.error();
   made->draw_ = *std::move(draw);
@@ -176,7 +176,7 @@ const GlSliceRenderer::Slices& GlSliceRenderer::slices_along(int axis) {
           low = low.min(corner.from.array());
           high = high.max(corner.from.array());
         }
-        if (!seen_.any(low, high)) continue;
+        if (prune_ && !seen_.any(low, high)) continue;
         const auto first = static_cast<GLuint>(vertices.size());
         vertices.insert(vertices.end(), corners.begin(), corners.end());
         for (GLuint side = 0; side < 4; ++side) {

@@ -26,7 +26,7 @@ class GlSliceRenderer {
  public:
   /// Keeps references to context, which must be current whenever this is used, and to volume.
   static Result<std::unique_ptr<GlSliceRenderer>> create(GlContext& context, const Volume& volume,
-                                                         const TransferFunction& transfer);
+                                                         const TransferFunction& transfer, bool prune = true);
   void deform(const DisplacementField& field);
   void undeform();
   [[nodiscard]] ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
@@ -42,14 +42,15 @@ class GlSliceRenderer {
     GlVertexArray array;
     std::size_t drawn = 0;
   };
-  GlSliceRenderer(const Volume& volume, const TransferFunction& transfer)
-      : volume_(volume), transfer_(transfer), seen_(volume, transfer_) {}
+  GlSliceRenderer(const Volume& volume, const TransferFunction& transfer, bool prune)
+      : volume_(volume), transfer_(transfer), seen_(volume, transfer_), prune_(prune) {}
   void measure_moves(const DisplacementField* field);
   [[nodiscard]] const Slices& slices_along(int axis);
 
   const Volume& volume_;
   TransferFunction transfer_;
   SeenBricks seen_;
+  bool prune_;
   GlProgram draw_;
   GlTexture hu_, gradient_, target_, transfer_table_;
   GlFramebuffer framebuffer_;

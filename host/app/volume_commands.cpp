@@ -9,6 +9,7 @@
 #include "host/app/commands.hpp"
 #include "host/app/write_files.hpp"
 #include "host/volume/import.hpp"
+#include "host/volume/segmentation.hpp"
 
 namespace birdseye::host {
 
@@ -42,6 +43,31 @@ Result<void> volume_info(const std::filesystem::path& path, const std::filesyste
   return write_file(json_path, text_of(json));
 }
 
+struct SegmentOptions {
+  std::filesystem::path path, out;
+  std::vector<int> range;
+  std::vector<double> seed;
+  bool largest = false;
+};
+
+Result<void> volume_segment(const SegmentOptions& options) {
+  const auto ct = import_volume(options.path);
+  if (!ct) return ct.error();
+  SegmentationSettings settings;
+  settings.low_hu = options.range[0];
+  settings.high_hu = options.range[1];
+  settings.largest = options.largest;
+  if (!options.seed.empty())
+    settings.seed_in_patient_mm = Eigen::Vector3d(options.seed[0], options.seed[1], options.seed[2]);
+  const auto labels = segment(*ct, settings);
+  if (!labels) return Error{labels.error().code, fmt::format("{}: {}", options.path.string(), labels.error().what)};
+  if (auto written = write_labels(options.out, *labels); !written) return written;
+  const auto voxels = std::count(labels->hu.begin(), labels->hu.end(), std::int16_t{1});
+  fmt::print("{}: {} voxels, {:.1f} ml\n", options.out.string(), voxels,
+             static_cast<double>(voxels) * ct->spacing_mm.prod() / 1000);
+  return {};
+}
+
 }  // namespace
 
 void add_volume(CLI::App& app, CommandStatus& status) {
@@ -55,6 +81,17 @@ void add_volume(CLI::App& app, CommandStatus& status) {
   info.add_option("path", options->path, "DICOM folder or file, NIfTI, NRRD, MHA or MHD")->required();
   info.add_option("--json", options->json, "write the figures to this file");
   info.callback([options, &status] { status.take(volume_info(options->path, options->json)); });
+
+  const auto chosen = std::make_shared<SegmentOptions>();
+  CLI::App& segment = *volume.add_subcommand("segment", "an organ by its HU, as a label volume");
+  segment.add_option("path", chosen->path, "the CT")->required();
+  segment.add_option("--hu", chosen->range, "LOW,HIGH: the organ's values")->required()->expected(2)->delimiter(',');
+  segment.add_option("--seed", chosen->seed, "X,Y,Z: only what is connected to this point, patient LPS mm")
+      ->expected(3)
+      ->delimiter(',');
+  segment.add_flag("--largest", chosen->largest, "only the largest connected part");
+  segment.add_option("--out", chosen->out, "labels to write: .nii.gz, .nrrd or .mha")->required();
+  segment.callback([chosen, &status] { status.take(volume_segment(*chosen)); });
 }
 
 }  // namespace birdseye::host

@@ -1,0 +1,115 @@
+#include "host/render/engine.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "host/render/cpu/ray_caster.hpp"
+#include "host/render/gl/gl_ray_caster.hpp"
+#include "host/render/gl/gl_slice_renderer.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+class CpuEngine final : public Engine {
+ public:
+  CpuEngine(const Volume& volume, const TransferFunction& transfer, bool prune)
+      : caster_(volume, transfer, cpu::supported_isas().back(), prune) {}
+  void deform(const DisplacementField& field) override { caster_.deform(field); }
+  void undeform() override { caster_.undeform(); }
+  ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
+                   const RenderSettings& settings) override {
+    if (!rays_ || !(rays_->camera() == camera)) rays_.emplace(camera);
+    return caster_.render(*rays_, camera_from_patient, settings);
+  }
+  [[nodiscard]] std::string name() const override { return "cpu, " + cpu::name_of(cpu::supported_isas().back()); }
+  [[nodiscard]] std::size_t bytes() const override { return caster_.bytes(); }
+
+ private:
+  RayCaster caster_;
+  std::optional<LensRays> rays_;
+};
+
+template <typename Renderer>
+class GlEngine final : public Engine {
+ public:
+  GlEngine(std::unique_ptr<GlContext> context, std::unique_ptr<Renderer> renderer, const char* what)
+      : context_(std::move(context)), renderer_(std::move(renderer)), what_(what) {}
+  void deform(const DisplacementField& field) override { renderer_->deform(field); }
+  void undeform() override { renderer_->undeform(); }
+  ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
+                   const RenderSettings& settings) override {
+    return renderer_->render(camera, camera_from_patient, settings);
+  }
+  [[nodiscard]] std::string name() const override { return fmt::format("{}, {}", what_, context_->renderer()); }
+  [[nodiscard]] std::string fault() const override { return context_->fault(); }
+
+ private:
+  std::unique_ptr<GlContext> context_;  // outlives what was made with it
+  std::unique_ptr<Renderer> renderer_;
+  const char* what_;
+};
+
+template <typename Renderer>
+Result<std::unique_ptr<Engine>> make_gl(std::unique_ptr<GlContext> context, const Volume& volume,
+                                        const TransferFunction& transfer, const char* what, bool prune) {
+  auto renderer = Renderer::create(*context, volume, transfer, prune);
+  if (!renderer) return renderer.error();
+  return std::unique_ptr<Engine>(std::make_unique<GlEngine<Renderer>>(std::move(context), *std::move(renderer), what));
+}
+
+bool is_software(const std::string& renderer) {
+  return renderer.find("llvmpipe") != std::string::npos || renderer.find("softpipe") != std::string::npos ||
+         renderer.find("SwiftShader") != std::string::npos;
+}
+
+/// Engines keep two to three times the volume besides it; what does not fit would end us, or be swapped for minutes.
+Result<void> check_memory(const Volume& volume) {
+  const auto needed = 4.0 * static_cast<double>(volume.hu.size()) * sizeof(std::int16_t);
+  const auto physical = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  if (needed <= 0.8 * physical) return {};
+  return Error{Errc::unsupported,
+               fmt::format("a volume of {}x{}x{} needs {:.1f} GB to draw, of {:.1f} GB there are; "
+                           "resample or crop it",
+                           volume.size[0], volume.size[1], volume.size[2], needed / 1e9, physical / 1e9)};
+}
+
+}  // namespace
+
+std::vector<std::string> engine_names() {
+  return {"auto", "cpu", "gl", "slices"};
+}
+
+Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
+                                            const TransferFunction& transfer, std::string* why, bool prune) {
+  if (auto enough = check_memory(volume); !enough) return enough.error();
+  const auto on_cpu = [&] { return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune)); };
+  const auto say = [why](const std::string& text) {
+    if (why != nullptr) *why = text;
+  };
+  if (name == "cpu") return on_cpu();
+  if (name == "auto" || name == "gl" || name == "slices") {
+    auto context = GlContext::offscreen();
+    if (name == "auto") {
+      if (!context) {
+        say("engine cpu: " + context.error().what);
+        return on_cpu();
+      }
+      if (is_software((*context)->renderer())) {
+        say("engine cpu: OpenGL is here in software only (" + (*context)->renderer() + ")");
+        return on_cpu();
+      }
+      say("engine gl: " + (*context)->renderer());
+    }
+    if (!context) return context.error();
+    if (name == "slices") return make_gl<GlSliceRenderer>(*std::move(context), volume, transfer, "slices", prune);
+    return make_gl<GlRayCaster>(*std::move(context), volume, transfer, "gl", prune);
+  }
+  return Error{Errc::bad_value, fmt::format("engine \"{}\" is none of {}", name, fmt::join(engine_names(), ", "))};
+}
+
+}  // namespace birdseye::host

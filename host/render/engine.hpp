@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/render/scene.hpp"
+#include "host/render/transfer_function.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// Anything that draws a volume: docs/image-formation.md says what.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  /// Until the next call, or undeform(), pictures show the volume deformed.
+  virtual void deform(const DisplacementField& field) = 0;
+  virtual void undeform() = 0;
+  virtual ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
+                           const RenderSettings& settings) = 0;
+  /// What runs, in words: "cpu, avx512".
+  [[nodiscard]] virtual std::string name() const = 0;
+  /// What went wrong below that no call could say; empty for nothing.
+  [[nodiscard]] virtual std::string fault() const { return {}; }
+  /// Main memory beyond the volume's own; 0 for what lies on the graphics card.
+  [[nodiscard]] virtual std::size_t bytes() const { return 0; }
+};
+
+/// cpu, gl (the same rays on the graphics card), slices (the paper's method, on the card), or auto: gl where there is a
+/// graphics card, else cpu.
+std::vector<std::string> engine_names();
+/// Keeps a reference to volume, which must outlive it. With auto, `why` says what was chosen and why.
+/// prune: false draws what is not seen too, for measurements; the picture is the same.
+Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
+                                            const TransferFunction& transfer, std::string* why = nullptr,
+                                            bool prune = true);
+
+}  // namespace birdseye::host
