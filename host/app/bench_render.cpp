@@ -169,10 +169,6 @@ Result<void> draw_level(const Options& options, const Case& c, Engine& engine, c
 
 /// The undeformed case for another program: volume.mha and scene.json.
 Result<void> write_scene(const std::filesystem::path& folder, const Case& c, const Volume& volume) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --export", folder.string())};
   const Eigen::Vector3d& spacing = volume.spacing_mm;
   const Eigen::Vector3d origin = volume.patient_from_voxel.translation();
   std::string mha = fmt::format(
@@ -223,6 +219,12 @@ Result<void> bench_case(const Case& c, const Options& options, nlohmann::json& r
 }
 
 Result<void> bench_render(const Options& options) {
+  for (const std::filesystem::path& folder : {options.scene, options.pictures}) {
+    std::error_code error;
+    if (!folder.empty()) std::filesystem::create_directories(folder, error);
+    if (error)
+      return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", folder.string())};
+  }
   nlohmann::json rows = nlohmann::json::array();
   std::vector<Case> cases;
   for (const std::string& phantom : options.phantoms) {

@@ -10,14 +10,19 @@ namespace birdseye::host::cpu {
 // inline that they shared with the rest of the program might be kept in a form that not every machine can run.
 
 inline constexpr int kBrick = 4;  ///< cells of a brick along an axis
+/// A brick's distance to the nearest that is seen; of one that is seen itself, this and how many bricks all around it
+/// are seen too.
+inline constexpr int kSeenBrick = 128;
 
-/// Voxels of 32 bits: Hounsfield units (16, signed), shade (8), highlight (8). A border of one voxel, a copy of the
+inline constexpr int kLowestHu = -1024, kHighestHu = 3071;  ///< what HU are cut to: those of a transfer function
+
+/// Voxels of 32 bits: HU - kLowestHu (16), shade (8), highlight (8). A border of one voxel, a copy of the
 /// nearest, surrounds them, so that neighbours and cells need no clamping.
 struct GridView {
   std::uint32_t* voxels = nullptr;  ///< voxel (0, 0, 0)
   int size[3] = {};
   std::int64_t row = 0, slice = 0;         ///< voxels from one to the next along y and z
-  const std::uint8_t* distance = nullptr;  ///< of each brick to the nearest that is seen, in bricks; 0: it is seen
+  const std::uint8_t* distance = nullptr;  ///< of each brick, see kSeenBrick
   int bricks[3] = {};
 };
 

@@ -52,6 +52,7 @@ struct Avx512 {
   static M lt(F a, F b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
   static M le(F a, F b) { return _mm512_cmp_ps_mask(a, b, _CMP_LE_OQ); }
   static M both(M a, M b) { return static_cast<M>(a & b); }
+  static float least(F a) { return _mm512_reduce_min_ps(a); }
   static bool any(M m) { return m != 0; }
   static F select(M m, F a, F b) { return _mm512_mask_mov_ps(b, m, a); }
 
@@ -71,9 +72,10 @@ struct Avx512 {
     high = _mm512_permutex2var_epi32(a, odds(), b);
   }
 
-  /// HU, shade and highlight (both in [0, 1]) in the cell of voxel `index`. Two voxels side by side come with one load:
-  /// their HU are blended with weights of 14 bits, their light with 7 along x and 15 along y and z.
-  static void sample(const GridView& grid, I index, F x, F y, F z, M m, F& value, F& shade, F& highlight) {
+  /// In the cell of voxel `index`, at x, y, z of 32768 in it: HU as an entry of the transfer function, shade (of 1023)
+  /// and highlight (of 1). Two voxels side by side come with one load. HU are blended with weights of 14 bits along x
+  /// and z and of 15 along y, and kept to an eighth; light with 7 bits along x and 15 along y and z.
+  static void sample(const GridView& grid, I index, I x, I y, I z, M m, I& entry, F& shade, F& highlight) {
     const I zero = _mm512_setzero_si512();
     const __m256i first = _mm512_castsi512_si256(index);
     const __m256i second = _mm512_extracti64x4_epi64(index, 1);
@@ -81,34 +83,39 @@ struct Avx512 {
     const auto m2 = static_cast<__mmask8>(m >> 8);
     // HU HU' | shade shade' highlight highlight', of the two voxels.
     const I order = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 4, 5, 2, 6, 3, 7, 8, 9, 12, 13, 10, 14, 11, 15));
-    const I wx = round(x * f(16384));
-    const I value_weights = unite(_mm512_slli_epi32(wx, 16), _mm512_sub_epi32(i(16384), wx));
-    const I lx = round(x * f(127));
-    const I light_half = unite(_mm512_slli_epi32(lx, 8), _mm512_sub_epi32(i(127), lx));
-    const I light_weights = unite(light_half, _mm512_slli_epi32(light_half, 16));
-    F values[4];
+    const I both = _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13));
+    const auto pair_weights = [](I part) {
+      const I w = _mm512_srli_epi32(part, 1);
+      return _mm512_add_epi32(i(16384), _mm512_sub_epi32(_mm512_slli_epi32(w, 16), w));
+    };
+    const I value_weights = pair_weights(x);
+    // 127 - w and w, twice: in 16 bits, 127 + 255 w.
+    const I light_weights = _mm512_add_epi16(
+        _mm512_set1_epi16(127),
+        _mm512_mullo_epi16(_mm512_shuffle_epi8(_mm512_srli_epi32(x, 8), both), _mm512_set1_epi16(255)));
+    I values[4];
     I lights[4];
     for (int n = 0; n < 4; ++n) {
       const std::uint32_t* const base = grid.voxels + (n & 1) * grid.row + (n >> 1) * grid.slice;
       const I a = _mm512_shuffle_epi8(_mm512_mask_i32gather_epi64(zero, m1, first, base, 4), order);
       const I b = _mm512_shuffle_epi8(_mm512_mask_i32gather_epi64(zero, m2, second, base, 4), order);
-      values[n] = to_float(_mm512_madd_epi16(_mm512_permutex2var_epi32(a, evens(), b), value_weights));
+      values[n] = _mm512_madd_epi16(_mm512_permutex2var_epi32(a, evens(), b), value_weights);
       lights[n] = _mm512_maddubs_epi16(_mm512_permutex2var_epi32(a, odds(), b), light_weights);
     }
-    const F low = values[0] + y * (values[1] - values[0]);
-    const F high = values[2] + y * (values[3] - values[2]);
-    value = (low + z * (high - low)) * f(1.0F / 16384);
-    const auto fraction = [](F t) {
-      const I q = min(round(t * f(32768)), i(32767));
-      return unite(q, _mm512_slli_epi32(q, 16));
-    };
+    const I wy = _mm512_shuffle_epi8(y, both);
+    const I wz = _mm512_shuffle_epi8(z, both);
     const auto blend = [](I a, I b, I t) {
       return _mm512_add_epi16(a, _mm512_mulhrs_epi16(_mm512_sub_epi16(b, a), t));
     };
-    const I wy = fraction(y);
-    const I lit = blend(blend(lights[0], lights[1], wy), blend(lights[2], lights[3], wy), fraction(z));
+    // Both rows of a slice in one: eighths of HU in 16 bits each.
+    const auto halves = [](I low, I high) {
+      return _mm512_mask_blend_epi16(0xAAAAAAAA, _mm512_srli_epi32(low, 11), _mm512_slli_epi32(high, 5));
+    };
+    const I slices = blend(halves(values[0], values[2]), halves(values[1], values[3]), wy);
+    entry = _mm512_srli_epi32(_mm512_add_epi32(_mm512_madd_epi16(slices, pair_weights(z)), i(1 << 16)), 17);
+    const I lit = blend(blend(lights[0], lights[1], wy), blend(lights[2], lights[3], wy), wz);
     constexpr float kUnit = 1.0F / (255 * 127);
-    shade = to_float(intersect(lit, i(0xFFFF))) * f(kUnit);
+    shade = to_float(intersect(lit, i(0xFFFF))) * f(kUnit / 1023);
     highlight = to_float(_mm512_srli_epi32(lit, 16)) * f(kUnit);
   }
 

@@ -55,18 +55,17 @@ void cast_packet(const CastJob& job, int block, int part) {
   const GridView& grid = job.grid;
   const float* const at = job.directions + std::int64_t{48} * block + part;
   const Vector<P> in_camera{P::load(at), P::load(at + 16), P::load(at + 32)};
-  const Vector<P> d = times<P>(job.voxels_from_camera, in_camera);
+  const Vector<P> in_voxels = times<P>(job.voxels_from_camera, in_camera);  // per mm
   const Vector<P> o{P::f(job.origin[0]), P::f(job.origin[1]), P::f(job.origin[2])};
 
   F near = P::f(job.near_mm);
   F far = P::f(1e30F);
   const F* const axis_o[3] = {&o.x, &o.y, &o.z};
-  const F* const axis_d[3] = {&d.x, &d.y, &d.z};
-  F inverse[3];
+  const F* const axis_d[3] = {&in_voxels.x, &in_voxels.y, &in_voxels.z};
   for (int axis = 0; axis < 3; ++axis) {
-    inverse[axis] = reciprocal<P>(*axis_d[axis]);
-    const F a = (P::f(0) - *axis_o[axis]) * inverse[axis];
-    const F b = (P::f(static_cast<float>(grid.size[axis] - 1)) - *axis_o[axis]) * inverse[axis];
+    const F inverse_d = reciprocal<P>(*axis_d[axis]);
+    const F a = (P::f(0) - *axis_o[axis]) * inverse_d;
+    const F b = (P::f(static_cast<float>(grid.size[axis] - 1)) - *axis_o[axis]) * inverse_d;
     near = P::max(near, P::min(a, b));
     far = P::min(far, P::max(a, b));
   }
@@ -75,70 +74,93 @@ void cast_packet(const CastJob& job, int block, int part) {
     keep_positive<P>(P::f(job.clip_at_origin_mm), dot(normal, in_camera), near, far);
   }
   // Whole numbers of steps, so that every ray samples the same distances.
-  const F h = P::f(job.step_mm);
   const F per_h = P::f(1.0F / job.step_mm);
   F i = P::max(P::f(0), P::ceil(near * per_h - P::f(0.5F)));
   const F end = P::floor(far * per_h - P::f(0.5F));
   M active = P::both(P::lt(P::f(0), in_camera.z), P::le(i, end));
 
+  // From here on places are in 1/32768 voxel: a sample's cell and its place in that are bits of one whole number.
+  constexpr float kUnit = 32768;
+  const F step = P::f(job.step_mm * kUnit);
+  const Vector<P> d{in_voxels.x * step, in_voxels.y * step, in_voxels.z * step};
+  const F half = P::f(0.5F);
+  const Vector<P> first{o.x * P::f(kUnit) + half * d.x, o.y * P::f(kUnit) + half * d.y, o.z * P::f(kUnit) + half * d.z};
+  const F inverse[3] = {reciprocal<P>(d.x), reciprocal<P>(d.y), reciprocal<P>(d.z)};
+
+  const F longest = P::max(P::abs(d.x), P::max(P::abs(d.y), P::abs(d.z)));
+  const float runs_per_brick =
+      static_cast<float>(kBrick) * kUnit / (0.0F - P::least(P::f(0) - longest)) / static_cast<float>(kRun);
+
   F red = P::f(0), green = P::f(0), blue = P::f(0), through = P::f(1);
   const I row = P::i(static_cast<int>(grid.row)), slice = P::i(static_cast<int>(grid.slice));
   const I brick_row = P::i(grid.bricks[0]), brick_slice = P::i(grid.bricks[0] * grid.bricks[1]);
   const auto place = [&](F index) {
-    const F s = (index + P::f(0.5F)) * h;
-    return Vector<P>{o.x + s * d.x, o.y + s * d.y, o.z + s * d.z};
+    return Vector<P>{first.x + index * d.x, first.y + index * d.y, first.z + index * d.z};
   };
   while (P::any(active)) {
+    float depth = 0;  // bricks that are seen all around every ray
     // Leap from empty brick to the end of all that is empty around it, until every ray is where something is seen.
     for (;;) {
       const Vector<P> x = place(i);
-      const I bx = P::min(P::template shift_right<2>(P::truncate(x.x)), P::i(grid.bricks[0] - 1));
-      const I by = P::min(P::template shift_right<2>(P::truncate(x.y)), P::i(grid.bricks[1] - 1));
-      const I bz = P::min(P::template shift_right<2>(P::truncate(x.z)), P::i(grid.bricks[2] - 1));
+      constexpr int kBrickBits = 15 + 2;
+      const I bx = P::min(P::template shift_right<kBrickBits>(P::truncate(x.x)), P::i(grid.bricks[0] - 1));
+      const I by = P::min(P::template shift_right<kBrickBits>(P::truncate(x.y)), P::i(grid.bricks[1] - 1));
+      const I bz = P::min(P::template shift_right<kBrickBits>(P::truncate(x.z)), P::i(grid.bricks[2] - 1));
       const I brick = P::add(bx, P::add(P::multiply(by, brick_row), P::multiply(bz, brick_slice)));
-      const F empty = P::to_float(P::gather_byte(grid.distance, brick, active));
-      const M leaps = P::both(active, P::lt(P::f(0), empty));
-      if (!P::any(leaps)) break;
+      const F distance = P::to_float(P::gather_byte(grid.distance, brick, active));
+      const M leaps = P::both(active, P::lt(distance, P::f(kSeenBrick)));
+      if (!P::any(leaps)) {
+        depth = P::least(P::select(active, distance, P::f(255))) - kSeenBrick;
+        break;
+      }
+      const F empty = distance;
       const auto exit = [&](I b, F xa, F da, F inverse_d) {
         const F low = P::to_float(b);
-        const F face = P::select(P::lt(P::f(0), da), low + empty, low - empty + P::f(1)) * P::f(kBrick);
+        const F face = P::select(P::lt(P::f(0), da), low + empty, low - empty + P::f(1)) *
+                       P::f(static_cast<float>(kBrick) * kUnit);
         return (face - xa) * inverse_d;
       };
-      const F mm = P::min(exit(bx, x.x, d.x, inverse[0]),
-                          P::min(exit(by, x.y, d.y, inverse[1]), exit(bz, x.z, d.z, inverse[2])));
+      const F steps = P::min(exit(bx, x.x, d.x, inverse[0]),
+                             P::min(exit(by, x.y, d.y, inverse[1]), exit(bz, x.z, d.z, inverse[2])));
       // To the first sample past the face; one that lies on it belongs to the brick beyond.
-      const F steps = P::floor(P::max(P::f(0), mm) * per_h * P::f(1 - 1e-5F)) + P::f(1);
-      i = P::select(leaps, i + steps, i);
+      const F whole = P::floor(P::max(P::f(0), steps) * P::f(1 - 1e-5F)) + P::f(1);
+      i = P::select(leaps, i + whole, i);
       active = P::both(active, P::le(i, end));
       if (!P::any(active)) break;
     }
     if (!P::any(active)) break;
-    for (int run = 0; run < kRun; ++run) {
-      const M now = P::both(active, P::le(i, end));
-      const Vector<P> x = place(i);
-      i = i + P::f(1);
-      const I jx = P::truncate(x.x), jy = P::truncate(x.y), jz = P::truncate(x.z);
-      const I index = P::add(jx, P::add(P::multiply(jy, row), P::multiply(jz, slice)));
-      F value, shade, highlight;
-      P::sample(grid, index, x.x - P::to_float(jx), x.y - P::to_float(jy), x.z - P::to_float(jz), now, value, shade,
-                highlight);
-      const I hu = P::add(P::round(value), P::i(1024));
-      I opacity_bits, colour;
-      P::gather_pair(job.transfer, P::min(P::max(hu, P::i(0)), P::i(4095)), now, opacity_bits, colour);
-      const F opacity = P::as_float(opacity_bits);  // 0 where the ray is not here
-      constexpr float kColour = 1.0F / 1023;
-      shade = shade * P::f(kColour);
-      const I bits = P::i(1023);
-      const F r = P::to_float(P::intersect(colour, bits));
-      const F g = P::to_float(P::intersect(P::template shift_right<10>(colour), bits));
-      const F b = P::to_float(P::template shift_right<20>(colour));
-      const F weight = through * opacity;
-      red = red + weight * P::min(r * shade + highlight, P::f(1));
-      green = green + weight * P::min(g * shade + highlight, P::f(1));
-      blue = blue + weight * P::min(b * shade + highlight, P::f(1));
-      through = through - weight;
+    // As far as nothing but what is seen lies around, no ray need look at the bricks again.
+    const int runs = 1 + static_cast<int>(depth * runs_per_brick);
+    for (int run = 0; run < runs && P::any(active); ++run) {
+      for (int sample = 0; sample < kRun; ++sample) {
+        const M now = P::both(active, P::le(i, end));
+        const Vector<P> at_sample = place(i);
+        i = i + P::f(1);
+        const I x = P::truncate(at_sample.x), y = P::truncate(at_sample.y), z = P::truncate(at_sample.z);
+        const I index =
+            P::add(P::template shift_right<15>(x), P::add(P::multiply(P::template shift_right<15>(y), row),
+                                                          P::multiply(P::template shift_right<15>(z), slice)));
+        const I within = P::i(32767);
+        I entry;
+        F shade, highlight;
+        P::sample(grid, index, P::intersect(x, within), P::intersect(y, within), P::intersect(z, within), now, entry,
+                  shade, highlight);
+        I opacity_bits, colour;
+        P::gather_pair(job.transfer, entry, now, opacity_bits, colour);
+        const F opacity = P::as_float(opacity_bits);  // 0 where the ray is not here
+        // Shades are of 1023: so are the colours that they are multiplied with.
+        const I bits = P::i(1023);
+        const F r = P::to_float(P::intersect(colour, bits));
+        const F g = P::to_float(P::intersect(P::template shift_right<10>(colour), bits));
+        const F b = P::to_float(P::template shift_right<20>(colour));
+        const F weight = through * opacity;
+        red = red + weight * P::min(r * shade + highlight, P::f(1));
+        green = green + weight * P::min(g * shade + highlight, P::f(1));
+        blue = blue + weight * P::min(b * shade + highlight, P::f(1));
+        through = through - weight;
+      }
+      active = P::both(active, P::both(P::le(i, end), P::le(P::f(kOpaque), through)));
     }
-    active = P::both(active, P::both(P::le(i, end), P::le(P::f(kOpaque), through)));
   }
   const M opaque = P::lt(through, P::f(kOpaque));
   const F full = P::select(opaque, P::f(1) / (P::f(1) - through), P::f(1)) * P::f(255);
@@ -174,9 +196,7 @@ void light(const LightJob& job, int x_begin, int x_end, int y, int z) {
   using I = typename P::I;
   const GridView& grid = job.grid;
   std::uint32_t* const row = grid.voxels + z * grid.slice + y * grid.row;
-  const auto hu = [](const std::uint32_t* at) {
-    return P::to_float(P::template shift_right<16>(P::template shift_left<16>(P::load_bits(at))));
-  };
+  const auto hu = [](const std::uint32_t* at) { return P::to_float(P::intersect(P::load_bits(at), P::i(0xFFFF))); };
   const float(*const m)[3] = job.patient_from_voxel;
   for (int x = x_begin; x < x_end; x += P::kLanes) {
     std::uint32_t* const at = row + x;
@@ -250,9 +270,8 @@ inline void store_resampled(const WarpJob& job, typename P::F* to, int x, int x_
   };
   const F value = lerp(lerp(pair(0), pair(source_row), to[1]),
                        lerp(pair(source_slice), pair(source_slice + source_row), to[1]), to[2]);
-  constexpr int kAir = -1024;
-  const I hu = P::intersect(P::round(P::select(there, value, P::f(kAir))), P::i(0xFFFF));
-  P::store_first(row + x, hu, x_end - x);
+  const I entry = P::add(P::round(P::select(there, value, P::f(kLowestHu))), P::i(-kLowestHu));
+  P::store_first(row + x, P::min(P::max(entry, P::i(0)), P::i(kHighestHu - kLowestHu)), x_end - x);
 }
 
 /// Where the field's axes are the volume's, all of a row of voxels lies between the same four rows of the field: they
@@ -352,7 +371,7 @@ void bounds(const GridView& grid, int x_begin, int x_end, int y_begin, int y_end
     for (int y = y_begin; y < y_end; ++y) {
       const std::uint32_t* const row = grid.voxels + z * grid.slice + y * grid.row + x_begin;
       for (int i = 0; i < count; ++i) {
-        const int hu = static_cast<std::int16_t>(row[i]);
+        const int hu = static_cast<int>(row[i] & 0xFFFF) + kLowestHu;
         low[i] = hu < low[i] ? hu : low[i];
         high[i] = hu > high[i] ? hu : high[i];
       }

@@ -85,6 +85,11 @@ struct Portable {
   static M lt(F a, F b) { return {a < b}; }
   static M le(F a, F b) { return {a <= b}; }
   static M both(M a, M b) { return {a.lanes & b.lanes}; }
+  static float least(F a) {
+    float all = a[0];
+    for (int n = 1; n < kLanes; ++n) all = a[n] < all ? a[n] : all;
+    return all;
+  }
   static bool any(M m) {
     int all = 0;
     for (int n = 0; n < kLanes; ++n) all |= m.lanes[n];
@@ -113,9 +118,11 @@ struct Portable {
     }
   }
 
-  static void sample(const GridView& grid, I index, F x, F y, F z, M m, F& value, F& shade, F& highlight) {
+  static void sample(const GridView& grid, I index, I x, I y, I z, M m, I& entry, F& shade, F& highlight) {
     const I zero = {};
-    value = shade = highlight = F{};
+    const auto part = [](I t) { return to_float(t) * (1.0F / 32768); };
+    F value{};
+    shade = highlight = F{};
     for (int n = 0; n < 4; ++n) {
       const std::uint32_t* const base = grid.voxels + (n & 1) * grid.row + (n >> 1) * grid.slice;
       I a = zero, b = zero;
@@ -124,13 +131,14 @@ struct Portable {
         a[lane] = static_cast<int>(base[index[lane]]);
         b[lane] = static_cast<int>(base[index[lane] + 1]);
       }
-      const F weight = ((n & 1) != 0 ? y : 1 - y) * ((n >> 1) != 0 ? z : 1 - z);
-      const auto blend = [&](I from, I to) { return weight * (to_float(from) + x * to_float(to - from)); };
-      value += blend((a << 16) >> 16, (b << 16) >> 16);
+      const F weight = ((n & 1) != 0 ? part(y) : 1 - part(y)) * ((n >> 1) != 0 ? part(z) : 1 - part(z));
+      const auto blend = [&](I from, I to) { return weight * (to_float(from) + part(x) * to_float(to - from)); };
+      value += blend(a & 0xFFFF, b & 0xFFFF);
       shade += blend((a >> 16) & 255, (b >> 16) & 255);
       highlight += blend((a >> 24) & 255, (b >> 24) & 255);
     }
-    shade *= 1.0F / 255;
+    entry = round(value);
+    shade *= 1.0F / 255 / 1023;
     highlight *= 1.0F / 255;
   }
 };

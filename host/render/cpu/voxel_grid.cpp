@@ -13,8 +13,6 @@ namespace birdseye::host::cpu {
 
 namespace {
 
-constexpr int kAir = -1024;
-
 std::size_t index_of(const std::array<int, 3>& size, int i, int j, int k) {
   return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
              static_cast<std::size_t>(size[0]) +
@@ -36,6 +34,7 @@ void copy(const Eigen::Vector3f& v, float* to) {
 VoxelGrid::VoxelGrid(const Volume& volume, const TransferFunction& transfer, const Kernels& kernels, bool prune)
     : volume_(volume), transfer_(transfer), kernels_(kernels), scan_seen_(volume, transfer), prune_(prune) {
   static_assert(SeenBricks::kBrick == kBrick);
+  static_assert(kLowestHu == TransferFunction::kLowestHu && kHighestHu == TransferFunction::kHighestHu);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     view_.size[axis] = volume.size[axis];
     bricks_[axis] = scan_seen_.size()[axis];
@@ -61,7 +60,8 @@ void VoxelGrid::undeform() {
       for (int y = 0; y < n[1]; ++y) {
         const std::int16_t* const from = &volume_.hu[volume_.index(0, y, z)];
         std::uint32_t* const to = voxel_row(y, z);
-        for (int x = 0; x < n[0]; ++x) to[x] = static_cast<std::uint16_t>(from[x]);
+        for (int x = 0; x < n[0]; ++x)
+          to[x] = static_cast<std::uint32_t>(std::clamp<int>(from[x], kLowestHu, kHighestHu) - kLowestHu);
       }
     });
     copy_border();
@@ -218,7 +218,7 @@ void VoxelGrid::deform(const DisplacementField& field) {
         held[i] = wanted[i];
       }
       for_runs(stale.data(), [&](int x_begin, int x_end) {
-        std::fill(voxel_row(y, z) + x_begin, voxel_row(y, z) + x_end, static_cast<std::uint32_t>(kAir) & 0xFFFFU);
+        std::fill(voxel_row(y, z) + x_begin, voxel_row(y, z) + x_end, std::uint32_t{0});
       });
       for_runs(wanted.data(), [&](int x_begin, int x_end) { kernels_.warp(job, x_begin, x_end, y, z); });
     }
@@ -260,57 +260,67 @@ void VoxelGrid::refine_seen() {
   });
 }
 
-void VoxelGrid::measure_distances() {
-  // What is seen, one bit a brick, grown by a brick along all three axes at a time: a cube. The step at which it
-  // reaches a brick is that brick's distance.
-  constexpr std::uint8_t kFurthest = 24;  // leaps of 96 voxels are far enough
+/// Grows what is set, one bit a brick, by a brick along all three axes at a time, and tells of each brick at which step
+/// it is reached: how far it is, as a cube measures. Bricks that are set stay at 0.
+void VoxelGrid::grow(std::vector<std::uint64_t> bits, std::uint8_t furthest, const Reached& reached) const {
   const auto nx = static_cast<std::size_t>(bricks_[0]), ny = static_cast<std::size_t>(bricks_[1]),
              nz = static_cast<std::size_t>(bricks_[2]);
   const std::size_t words = (nx + 63) / 64;
-  const std::size_t slice = words * ny;
-  distance_.assign(seen_.size() + 4, kFurthest + 1);  // a byte is loaded with the three after it
-  std::vector<std::uint64_t> grown(slice * nz, 0), next(grown.size());
-  for (std::size_t row = 0; row < ny * nz; ++row) {
-    for (std::size_t i = 0; i < nx; ++i) {
-      if (seen_[row * nx + i] == 0) continue;
-      grown[row * words + i / 64] |= std::uint64_t{1} << i % 64;
-      distance_[row * nx + i] = 0;
-    }
-  }
+  std::vector<std::uint64_t> next(bits.size()), before;
   // A word or'ed with those that lie `stride` before and after it in a line of `line` words.
   const auto spread = [&](std::size_t stride, std::size_t line) {
-    for (std::size_t at = 0; at < grown.size(); ++at) {
+    for (std::size_t at = 0; at < bits.size(); ++at) {
       const std::size_t place = at / stride % line;
-      std::uint64_t word = grown[at];
-      if (place > 0) word |= grown[at - stride];
-      if (place + 1 < line) word |= grown[at + stride];
+      std::uint64_t word = bits[at];
+      if (place > 0) word |= bits[at - stride];
+      if (place + 1 < line) word |= bits[at + stride];
       next[at] = word;
     }
-    grown.swap(next);
+    bits.swap(next);
   };
-  for (std::uint8_t step = 1; step <= kFurthest; ++step) {
-    const std::vector<std::uint64_t> before = grown;
-    for (std::size_t at = 0; at < grown.size(); ++at) {
-      const std::uint64_t word = grown[at];
+  for (std::uint8_t step = 1; step <= furthest; ++step) {
+    before = bits;
+    for (std::size_t at = 0; at < bits.size(); ++at) {
+      const std::uint64_t word = bits[at];
       std::uint64_t more = word | word << 1U | word >> 1U;
-      if (at % words > 0) more |= grown[at - 1] >> 63U;
-      if (at % words + 1 < words) more |= grown[at + 1] << 63U;
+      if (at % words > 0) more |= bits[at - 1] >> 63U;
+      if (at % words + 1 < words) more |= bits[at + 1] << 63U;
       next[at] = more;
     }
-    grown.swap(next);
+    bits.swap(next);
     spread(words, ny);
-    spread(slice, nz);
+    spread(words * ny, nz);
     bool changed = false;
-    for (std::size_t at = 0; at < grown.size(); ++at) {
-      for (std::uint64_t fresh = grown[at] & ~before[at]; fresh != 0; fresh &= fresh - 1) {
+    for (std::size_t at = 0; at < bits.size(); ++at) {
+      for (std::uint64_t fresh = bits[at] & ~before[at]; fresh != 0; fresh &= fresh - 1) {
         const std::size_t i = at % words * 64 + static_cast<std::size_t>(std::countr_zero(fresh));
         if (i >= nx) break;
-        distance_[at / words * nx + i] = step;
+        reached(at / words * nx + i, step);
         changed = true;
       }
     }
     if (!changed) break;
   }
+}
+
+void VoxelGrid::measure_distances() {
+  constexpr std::uint8_t kFurthest = 24;  // leaps of 96 voxels are far enough
+  constexpr std::uint8_t kDeepest = 12;
+  const auto nx = static_cast<std::size_t>(bricks_[0]);
+  const std::size_t words = (nx + 63) / 64;
+  std::vector<std::uint64_t> seen(seen_.size() / nx * words, 0), empty(seen.size(), 0);
+  // A byte is loaded with the three after it.
+  distance_.assign(seen_.size() + 4, kFurthest + 1);
+  for (std::size_t n = 0; n < seen_.size(); ++n) {
+    auto& bits = seen_[n] != 0 ? seen : empty;
+    bits[n / nx * words + n % nx / 64] |= std::uint64_t{1} << n % nx % 64;
+    if (seen_[n] != 0) distance_[n] = kSeenBrick + kDeepest;
+  }
+  // Past the volume's faces nothing needs to be looked at: rays end there.
+  grow(std::move(seen), kFurthest, [this](std::size_t brick, std::uint8_t step) { distance_[brick] = step; });
+  grow(std::move(empty), kDeepest, [this](std::size_t brick, std::uint8_t step) {
+    distance_[brick] = static_cast<std::uint8_t>(kSeenBrick + step - 1);
+  });
   view_.distance = distance_.data();
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "host/deform/displacement_field.hpp"
@@ -41,6 +42,8 @@ class VoxelGrid {
   void copy_border();
   void mark_seen_after(const DisplacementField& field, const Eigen::Affine3d& lattice_from_voxel);
   void refine_seen();
+  using Reached = std::function<void(std::size_t brick, std::uint8_t step)>;
+  void grow(std::vector<std::uint64_t> bits, std::uint8_t furthest, const Reached& reached) const;
   void measure_distances();
 
   const Volume& volume_;

@@ -88,7 +88,9 @@ std::vector<Light> light_of(const Volume& v, const Vector3d& eye, const RenderSe
 std::vector<double> render_reference(const Volume& scan, const TransferFunction& transfer, const CameraModel& camera,
                                      const Transform<Camera, Patient>& camera_from_patient,
                                      const RenderSettings& settings, const DisplacementField* deformation, int stride) {
-  const Volume volume = deformation != nullptr ? resampled(scan, *deformation) : scan;
+  Volume volume = deformation != nullptr ? resampled(scan, *deformation) : scan;
+  for (std::int16_t& hu : volume.hu)
+    hu = std::clamp<std::int16_t>(hu, TransferFunction::kLowestHu, TransferFunction::kHighestHu);
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
   const Eigen::Affine3d voxel_from_patient = volume.patient_from_voxel.inverse();
   const Vector3d last(volume.size[0] - 1, volume.size[1] - 1, volume.size[2] - 1);
