@@ -115,9 +115,9 @@ std::pair<DisplacementField, std::size_t> bench_deformation(const Volume& volume
   BezierPatch patch = *BezierPatch::create({4, 4, 4});
   std::vector<Vector3d> moves;
   for (std::size_t i = 0; i < patch.free_points(); ++i) {
-    // The middle goes one way and its surroundings another: a bend, not a shift.
-    const double side = i % 3 == 1 ? 1 : -0.5;
-    moves.emplace_back(0.10 * side, -0.05 * side, 0.12 * side * (i / 9 == 1 ? 1 : -1));
+    // All the same way, and on one side further: the middle is pushed and turned against the faces, which hold still.
+    const double side = i % 3 == 0 ? 1.6 : i % 3 == 1 ? 1 : 0.2;
+    moves.emplace_back(0.05 * side, 0.08 * side, -0.20 * side);
   }
   patch.set_displacements(moves);
   patch.drive(tree);

@@ -3,6 +3,7 @@
 #include <tbb/info.h>
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
@@ -145,6 +146,7 @@ Level make_level(const Case& c, const Volume& volume, int number) {
   level.number = number;
   if (number > 0) {
     auto [field, count] = bench_deformation(volume, number);
+    assert(least_determinant(field) > 0);
     level.field = std::move(field);
     level.free_vertices = count;
   }

@@ -210,7 +210,7 @@ Result<void> render(const Options& options) {
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
   const std::string png = png_of(image.rgba, image.width_px, image.height_px, 4);
   if (!options.movie.empty()) {
-    const auto filmed = make_movie(options, *volume, *view, settings, deformation ? &*deformation : nullptr, **engine);
+    auto filmed = make_movie(options, *volume, *view, settings, deformation ? &*deformation : nullptr, **engine);
     if (!filmed) return filmed;
   }
   if (auto written = write_files({{options.out, png}, {options.json, text_of(json)}}); !written) return written;

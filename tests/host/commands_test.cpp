@@ -170,6 +170,38 @@ TEST(Commands, RenderDrawsThroughALens) {
   EXPECT_GT(fs::file_size(scratch / "front.png"), 200U);
 }
 
+TEST(Commands, BenchRenderWritesItsTable) {
+  const Scratch scratch;
+  const auto result = run("birdseye", "bench render --phantom liver --level 0 --level 2 --frames 3 --json " +
+                                          (scratch / "b.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "b.json"));
+  ASSERT_EQ(json["rows"].size(), 8U);  // two depths, two levels, with and without pruning
+  for (const auto& row : json["rows"]) {
+    EXPECT_EQ(row["viewport"], "768x576");
+    EXPECT_GT(row["frame_ms_median"].get<double>(), 0);
+    EXPECT_GT(row["cpu_ms_median"].get<double>(), 0);
+    EXPECT_LT(row["mean_abs_error_255"].get<double>(), 0.5) << row;
+    EXPECT_LT(row["memory_ratio"].get<double>(), 3) << row;
+  }
+  EXPECT_EQ(json["rows"][2]["free_vertices"], 27);
+}
+
+TEST(Commands, RenderFilmsAndRestrictsToLabels) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  const std::string labels = (scratch / "l.nii.gz").string();
+  ASSERT_EQ(run("birdseye", "volume segment " + ct + " --hu 100,300 --out " + labels).code, 0);
+  const auto kept =
+      run("birdseye", "render --volume " + ct + " --labels " + labels + " --keep 1 --clip 0 --size 64x48 --out " +
+                          (scratch / "k.png").string() + " --movie " + (scratch / "k.mp4").string());
+  EXPECT_EQ(kept.code, 0) << kept.output;
+  EXPECT_GT(fs::file_size(scratch / "k.mp4"), 1000U);
+  expect_refused("birdseye",
+                 "render --volume " + ct + " --labels " + labels + " --keep 9 --out " + (scratch / "n.png").string(),
+                 {"l.nii.gz", "none of 9"}, scratch / "n.png");
+}
+
 TEST(Commands, RenderShowsTheRealAbdomen) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";

@@ -12,6 +12,7 @@
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
+#include "host/volume/segmentation.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
 #include "tests/support/data.hpp"
@@ -376,6 +377,54 @@ TEST(Markers, AreFoundToASmallPartOfAVoxel) {
     for (const Eigen::Vector3d& f : found) nearest = std::min(nearest, (f - centre).norm());
     EXPECT_LT(nearest, 0.1);
   }
+}
+
+TEST(Segmentation, ByRangeSeedAndSize) {
+  const Scratch scratch;
+  Volume ct;
+  ct.size = {12, 10, 8};
+  ct.spacing_mm = {2, 2, 3};
+  ct.patient_from_voxel.linear() = ct.spacing_mm.asDiagonal();
+  ct.patient_from_voxel.translation() = Eigen::Vector3d(-10, 5, 40);
+  ct.hu.assign(12 * 10 * 8, -100);
+  const auto fill = [&ct](int i0, int i1, std::int16_t hu) {
+    for (int k = 2; k < 5; ++k) {
+      for (int j = 2; j < 5; ++j) {
+        for (int i = i0; i < i1; ++i) ct.hu[ct.index(i, j, k)] = hu;
+      }
+    }
+  };
+  fill(1, 4, 60);   // 27 voxels
+  fill(6, 11, 80);  // 45 voxels
+  const auto count = [](const Result<Volume>& labels) {
+    EXPECT_TRUE(labels) << labels.error().what;
+    return std::count(labels->hu.begin(), labels->hu.end(), std::int16_t{1});
+  };
+  SegmentationSettings settings;
+  settings.low_hu = 50;
+  settings.high_hu = 90;
+  EXPECT_EQ(count(segment(ct, settings)), 72);
+  settings.largest = true;
+  EXPECT_EQ(count(segment(ct, settings)), 45);
+  settings.largest = false;
+  settings.seed_in_patient_mm = ct.patient_from_voxel * Eigen::Vector3d(2, 3, 3);
+  const auto seeded = segment(ct, settings);
+  EXPECT_EQ(count(seeded), 27);
+  ASSERT_TRUE(write_labels(scratch / "organ.nii.gz", *seeded));
+  const auto back = import_labels(scratch / "organ.nii.gz", ct);
+  ASSERT_TRUE(back) << back.error().what;
+  EXPECT_EQ(back->hu, seeded->hu);
+
+  settings.seed_in_patient_mm = Eigen::Vector3d(1000, 0, 0);
+  EXPECT_NE(segment(ct, settings).error().what.find("outside of the volume"), std::string::npos);
+  settings.seed_in_patient_mm = ct.patient_from_voxel * Eigen::Vector3d(0, 0, 0);
+  EXPECT_NE(segment(ct, settings).error().what.find("-100 HU"), std::string::npos);
+  settings.seed_in_patient_mm.reset();
+  settings.low_hu = 500;
+  settings.high_hu = 600;
+  EXPECT_EQ(segment(ct, settings).error().code, Errc::not_found);
+  settings.high_hu = 400;
+  EXPECT_EQ(segment(ct, settings).error().code, Errc::bad_value);
 }
 
 TEST(Labels, KeepTheirVoxelsAndASoftEdge) {

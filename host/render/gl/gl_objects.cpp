@@ -37,9 +37,9 @@ GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei heig
   } else {
     glTextureStorage2D(id, 1, format, width, height);
   }
-  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+  for (const GLenum filter : {GLenum{GL_TEXTURE_MIN_FILTER}, GLenum{GL_TEXTURE_MAG_FILTER}})
     glTextureParameteri(id, filter, GL_NEAREST);
-  for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R}) {
+  for (const GLenum wrap : {GLenum{GL_TEXTURE_WRAP_S}, GLenum{GL_TEXTURE_WRAP_T}, GLenum{GL_TEXTURE_WRAP_R}}) {
     glTextureParameteri(id, wrap, GL_CLAMP_TO_EDGE);
   }
   return GlTexture(id);

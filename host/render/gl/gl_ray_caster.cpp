@@ -25,7 +25,7 @@ Result<std::unique_ptr<GlRayCaster>> GlRayCaster::create(GlContext& /*context*/,
   if (*std::max_element(volume.size.begin(), volume.size.end()) > largest) {
     return Error{Errc::unsupported, "OpenGL: the volume is larger than this driver's textures; use --engine cpu"};
   }
-  std::unique_ptr<GlRayCaster> made(new GlRayCaster(volume, transfer, prune));
+  std::unique_ptr<GlRayCaster> made(new GlRayCaster(volume, transfer));
   const std::pair<GlProgram*, const char*> computed[] = {{&made->warp_, shaders::kWarp},
                                                          {&made->light_, shaders::kLight},
                                                          {&made->seen_, shaders::kSeen},
@@ -44,7 +44,7 @@ Result<std::unique_ptr<GlRayCaster>> GlRayCaster::create(GlContext& /*context*/,
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glTextureSubImage3D(made->scan_hu_.id(), 0, 0, 0, 0, n[0], n[1], n[2], GL_RED_INTEGER, GL_SHORT, volume.hu.data());
   made->lit_ = make_texture(GL_TEXTURE_3D, GL_RG8, n[0], n[1], n[2]);
-  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+  for (const GLenum filter : {GLenum{GL_TEXTURE_MIN_FILTER}, GLenum{GL_TEXTURE_MAG_FILTER}})
     glTextureParameteri(made->lit_.id(), filter, GL_LINEAR);
   int bricks[3];
   for (std::size_t axis = 0; axis < 3; ++axis) bricks[axis] = std::max(1, (n[axis] - 1 + kBrick - 1) / kBrick);
@@ -130,7 +130,7 @@ ImageRgba GlRayCaster::render(const CameraModel& camera, const Transform<Camera,
                               const RenderSettings& settings) {
   if (!(camera == prepared_)) prepare(camera);
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
-  const Eigen::Vector3d eye = patient_from_camera.translation();
+  const Eigen::Vector3d& eye = patient_from_camera.translation();
   const Eigen::Affine3d voxel_from_patient = volume_.patient_from_voxel.inverse();
   const GLuint hu = deformed_ ? warped_hu_.id() : scan_hu_.id();
 

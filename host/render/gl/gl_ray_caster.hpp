@@ -25,14 +25,12 @@ class GlRayCaster {
                                  const RenderSettings& settings);
 
  private:
-  GlRayCaster(const Volume& volume, const TransferFunction& transfer, bool prune)
-      : volume_(volume), transfer_(transfer), prune_(prune) {}
+  GlRayCaster(const Volume& volume, const TransferFunction& transfer) : volume_(volume), transfer_(transfer) {}
   void find_bricks();
   void prepare(const CameraModel& camera);
 
   const Volume& volume_;
   TransferFunction transfer_;
-  bool prune_;
   GlProgram warp_, light_, seen_, grow_, cast_;
   GlTexture scan_hu_, warped_hu_, lit_, bricks_[2], directions_, target_, transfer_table_;
   GlBuffer seen_up_to_;

@@ -21,7 +21,7 @@ struct Vertex {
 };
 
 std::size_t point(int i, int j, int k) {
-  return static_cast<std::size_t>((k * kPoints + j) * kPoints + i);
+  return (static_cast<std::size_t>(k) * kPoints + static_cast<std::size_t>(j)) * kPoints + static_cast<std::size_t>(i);
 }
 
 }  // namespace
@@ -48,7 +48,7 @@ Result<std::unique_ptr<GlSliceRenderer>> GlSliceRenderer::create(GlContext& /*co
   glBindImageTexture(0, made->gradient_.id(), 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_RGBA16F);
   dispatch(*gradient, n.data(), 8, 4, 4);
   for (const GLuint texture : {made->hu_.id(), made->gradient_.id()}) {
-    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    for (const GLenum filter : {GLenum{GL_TEXTURE_MIN_FILTER}, GLenum{GL_TEXTURE_MAG_FILTER}})
       glTextureParameteri(texture, filter, GL_LINEAR);
   }
   std::vector<Eigen::Vector4f> table;
@@ -272,8 +272,9 @@ ImageRgba GlSliceRenderer::render(const CameraModel& camera, const Transform<Cam
   });
   for (const std::size_t slice : order) {
     if (slices.count[slice] == 0) continue;
-    glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(slices.count[slice]), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(slices.first[slice] * sizeof(GLuint)));
+    glDrawElements(
+        GL_TRIANGLES, static_cast<GLsizei>(slices.count[slice]), GL_UNSIGNED_INT,
+        reinterpret_cast<const void*>(slices.first[slice] * sizeof(GLuint)));  // NOLINT: OpenGL's way to say an offset
   }
   glDisable(GL_BLEND);
   ImageRgba image{camera.width_px, camera.height_px, {}};
