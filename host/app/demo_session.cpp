@@ -89,8 +89,9 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
-  rays_ = std::make_unique<LensRays>(setup->camera);
-  caster_ = std::make_unique<RayCaster>(plan_.shown, *transfer);
+  auto engine = make_engine("cpu", plan_.shown, *transfer);
+  if (!engine) return engine.error();
+  engine_ = *std::move(engine);
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
                              figures.board_views, hand_eye->tracked_rms_px, fit->fit.fre_rms_mm));
   return {};
@@ -104,7 +105,7 @@ Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
         setup->camera_from_sensor * decision.tracker_from_sensor->inverse() * setup->tracker_from_patient;
     RenderSettings settings;
     settings.step_mm = 1.2;
-    out = composite(*frame.rgb, caster_->render(*rays_, camera_from_patient, settings), decision.strength);
+    out = composite(*frame.rgb, engine_->render(setup->camera, camera_from_patient, settings), decision.strength);
     if (overlaid.size() % kKeepEvery == 0) {
       kept.push_back(
           {frame.info.sequence, {frame.width_px, frame.height_px, *frame.rgb}, {frame.width_px, frame.height_px, out}});

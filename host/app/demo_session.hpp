@@ -16,7 +16,7 @@
 #include "host/app/simulated_cart.hpp"
 #include "host/overlay/gate.hpp"
 #include "host/registration/touch_detector.hpp"
-#include "host/render/cpu/ray_caster.hpp"
+#include "host/render/engine.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
@@ -79,8 +79,7 @@ class DemoSession {
   TouchDetector touch_detector_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
   OverlayGate gate_;
-  std::unique_ptr<LensRays> rays_;
-  std::unique_ptr<RayCaster> caster_;
+  std::unique_ptr<Engine> engine_;
   std::optional<std::uint64_t> first_sequence_;
   DeviceTime first_measurement_;
   int measurements_ = 0;

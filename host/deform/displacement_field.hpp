@@ -8,6 +8,7 @@
 
 #include "calibration/base/result.hpp"
 #include "host/deform/patch_octree.hpp"
+#include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
@@ -20,10 +21,7 @@ struct DisplacementField {
   Eigen::Affine3d patient_from_lattice = Eigen::Affine3d::Identity();
 
   [[nodiscard]] const Eigen::Vector3f& at(int i, int j, int k) const {
-    return displacement_mm[(static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) +
-                            static_cast<std::size_t>(j)) *
-                               static_cast<std::size_t>(size[0]) +
-                           static_cast<std::size_t>(i)];
+    return displacement_mm[grid_index(size, i, j, k)];
   }
   [[nodiscard]] Eigen::Vector3d displacement(const Eigen::Vector3d& point_in_patient_mm) const;
   /// du/dp within the lattice cell of the point; zero outside the box.

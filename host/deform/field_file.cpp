@@ -1,10 +1,4 @@
 #include <fmt/format.h>
-#include <itkImage.h>
-#include <itkImageFileWriter.h>
-#include <itkMetaImageIO.h>
-#include <itkNiftiImageIO.h>
-#include <itkNrrdImageIO.h>
-#include <itkVector.h>
 
 #include <Eigen/LU>
 #include <cmath>
@@ -14,54 +8,16 @@
 
 namespace birdseye::host {
 
-namespace {
-
-using FieldImage = itk::Image<itk::Vector<float, 3>, 3>;
-
-itk::ImageIOBase::Pointer writer_for(const std::filesystem::path& path) {
-  for (const itk::ImageIOBase::Pointer& io :
-       {itk::ImageIOBase::Pointer(itk::MetaImageIO::New()), itk::ImageIOBase::Pointer(itk::NrrdImageIO::New()),
-        itk::ImageIOBase::Pointer(itk::NiftiImageIO::New())}) {
-    if (io->CanWriteFile(path.c_str())) return io;
-  }
-  return nullptr;
-}
-
-}  // namespace
-
 Result<void> write_field(const std::filesystem::path& path, const DisplacementField& field) {
-  const itk::ImageIOBase::Pointer io = writer_for(path);
-  if (io == nullptr) return Error{Errc::bad_value, fmt::format("{}: name it .mha, .nrrd or .nii.gz", path.string())};
-  const auto image = FieldImage::New();
-  FieldImage::SizeType size;
-  FieldImage::PointType origin;
-  FieldImage::SpacingType spacing;
-  FieldImage::DirectionType direction;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d column = field.patient_from_lattice.linear().col(axis);
-    size[axis] = static_cast<itk::SizeValueType>(field.size[axis]);
-    origin[axis] = field.patient_from_lattice.translation()[axis];
-    spacing[axis] = column.norm();
-    for (unsigned row = 0; row < 3; ++row) direction(row, axis) = column[row] / column.norm();
-  }
-  image->SetRegions(size);
-  image->SetOrigin(origin);
-  image->SetSpacing(spacing);
-  try {
-    image->SetDirection(direction);
-    image->Allocate();
-    for (std::size_t i = 0; i < field.displacement_mm.size(); ++i) {
-      for (unsigned axis = 0; axis < 3; ++axis) image->GetBufferPointer()[i][axis] = field.displacement_mm[i][axis];
-    }
-    const auto writer = itk::ImageFileWriter<FieldImage>::New();
-    writer->SetInput(image);
-    writer->SetImageIO(io);
-    writer->SetFileName(path.string());
-    writer->Update();
-  } catch (const std::exception&) {
-    return Error{Errc::unreadable, fmt::format("{}: cannot be written; does its folder exist?", path.string())};
-  }
-  return {};
+  ImageFile image;
+  image.size = field.size;
+  image.components = 3;
+  image.origin_mm = field.patient_from_lattice.translation();
+  image.spacing_mm = field.patient_from_lattice.linear().colwise().norm();
+  image.axes = field.patient_from_lattice.linear().colwise().normalized();
+  image.values.reserve(3 * field.displacement_mm.size());
+  for (const Eigen::Vector3f& u : field.displacement_mm) image.values.insert(image.values.end(), u.begin(), u.end());
+  return write_image(path, image, StoredAs::float32);
 }
 
 Result<DisplacementField> read_field(const std::filesystem::path& path) {

@@ -7,24 +7,10 @@
 
 namespace birdseye::host {
 
-namespace {
-
-std::size_t index_of(const std::array<int, 3>& size, int i, int j, int k) {
-  return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
-             static_cast<std::size_t>(size[0]) +
-         static_cast<std::size_t>(i);
-}
-
-std::size_t count_of(const std::array<int, 3>& size) {
-  return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]);
-}
-
-}  // namespace
-
 SeenBricks::SeenBricks(const Volume& volume, const TransferFunction& transfer) {
   const auto& n = volume.size;
   for (std::size_t axis = 0; axis < 3; ++axis) size_[axis] = std::max(1, (n[axis] - 1 + kBrick - 1) / kBrick);
-  flags_.resize(count_of(size_));
+  flags_.resize(grid_count(size_));
   tbb::parallel_for(0, size_[2], [&](int bk) {
     for (int bj = 0; bj < size_[1]; ++bj) {
       for (int bi = 0; bi < size_[0]; ++bi) {
@@ -38,25 +24,25 @@ SeenBricks::SeenBricks(const Volume& volume, const TransferFunction& transfer) {
             }
           }
         }
-        flags_[index_of(size_, bi, bj, bk)] = transfer.any_seen(low, high) ? 1 : 0;
+        flags_[grid_index(size_, bi, bj, bk)] = transfer.any_seen(low, high) ? 1 : 0;
       }
     }
   });
   const std::array<int, 3> sums{size_[0] + 1, size_[1] + 1, size_[2] + 1};
-  before_.assign(count_of(sums), 0);
+  before_.assign(grid_count(sums), 0);
   for (int k = 1; k < sums[2]; ++k) {
     for (int j = 1; j < sums[1]; ++j) {
       int line = 0;
       for (int i = 1; i < sums[0]; ++i) {
-        line += flags_[index_of(size_, i - 1, j - 1, k - 1)];
-        before_[index_of(sums, i, j, k)] = line + before(i, j - 1, k) + before(i, j, k - 1) - before(i, j - 1, k - 1);
+        line += flags_[grid_index(size_, i - 1, j - 1, k - 1)];
+        before_[grid_index(sums, i, j, k)] = line + before(i, j - 1, k) + before(i, j, k - 1) - before(i, j - 1, k - 1);
       }
     }
   }
 }
 
 int SeenBricks::before(int i, int j, int k) const {
-  return before_[index_of({size_[0] + 1, size_[1] + 1, size_[2] + 1}, i, j, k)];
+  return before_[grid_index({size_[0] + 1, size_[1] + 1, size_[2] + 1}, i, j, k)];
 }
 
 bool SeenBricks::any(const Eigen::Array3f& low, const Eigen::Array3f& high) const {

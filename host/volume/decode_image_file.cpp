@@ -121,12 +121,12 @@ class NiftiFile {
   fs::path voxels_;
 };
 
-itk::ImageIOBase::Pointer reader_for(const fs::path& path) {
-  const std::string name = path.string();
+/// What reads the file, or would write it; null for nothing.
+itk::ImageIOBase::Pointer image_io(const fs::path& path, bool writing) {
   for (const itk::ImageIOBase::Pointer& io :
        {itk::ImageIOBase::Pointer(itk::NiftiImageIO::New()), itk::ImageIOBase::Pointer(itk::NrrdImageIO::New()),
         itk::ImageIOBase::Pointer(itk::MetaImageIO::New())}) {
-    if (io->CanReadFile(name.c_str())) return io;
+    if (writing ? io->CanWriteFile(path.c_str()) : io->CanReadFile(path.c_str())) return io;
   }
   return nullptr;
 }
@@ -141,50 +141,33 @@ void convert(const std::vector<char>& bytes, std::vector<float>& values) {
 }
 
 /// False for types that hold no numbers.
-bool convert(itk::ImageIOBase::IOComponentType type, const std::vector<char>& bytes, std::vector<float>& values) {
+bool convert(itk::IOComponentEnum type, const std::vector<char>& bytes, std::vector<float>& values) {
   using Type = itk::IOComponentEnum;
-  switch (type) {
-    case Type::UCHAR:
-      convert<unsigned char>(bytes, values);
-      return true;
-    case Type::CHAR:
-      convert<signed char>(bytes, values);
-      return true;
-    case Type::USHORT:
-      convert<unsigned short>(bytes, values);
-      return true;
-    case Type::SHORT:
-      convert<short>(bytes, values);
-      return true;
-    case Type::UINT:
-      convert<unsigned>(bytes, values);
-      return true;
-    case Type::INT:
-      convert<int>(bytes, values);
-      return true;
-    case Type::ULONG:
-      convert<unsigned long>(bytes, values);
-      return true;
-    case Type::LONG:
-      convert<long>(bytes, values);
-      return true;
-    case Type::FLOAT:
-      convert<float>(bytes, values);
-      return true;
-    case Type::DOUBLE:
-      convert<double>(bytes, values);
-      return true;
-    default:
-      return false;
+  constexpr std::pair<Type, void (*)(const std::vector<char>&, std::vector<float>&)> kTypes[] = {
+      {Type::UCHAR, convert<unsigned char>},   {Type::CHAR, convert<signed char>},
+      {Type::USHORT, convert<unsigned short>}, {Type::SHORT, convert<short>},
+      {Type::UINT, convert<unsigned>},         {Type::INT, convert<int>},
+      {Type::ULONG, convert<unsigned long>},   {Type::LONG, convert<long>},
+      {Type::FLOAT, convert<float>},           {Type::DOUBLE, convert<double>}};
+  for (const auto& [known, converter] : kTypes) {
+    if (known != type) continue;
+    converter(bytes, values);
+    return true;
   }
+  return false;
+}
+
+/// All of the image is to be read, or written.
+void take_whole(itk::ImageIOBase& io) {
+  itk::ImageIORegion whole(io.GetNumberOfDimensions());
+  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) whole.SetSize(axis, io.GetDimensions(axis));
+  io.SetIORegion(whole);
 }
 
 /// The voxels as the file has them. The readers leave what a damaged or missing file does not give as it was, and some
 /// say nothing: what differs after two readings over two fillings was never read.
 std::optional<std::vector<char>> read_voxels(itk::ImageIOBase& io) {
-  itk::ImageIORegion whole(io.GetNumberOfDimensions());
-  for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) whole.SetSize(axis, io.GetDimensions(axis));
-  io.SetIORegion(whole);
+  take_whole(io);
   std::vector<char> first(static_cast<std::size_t>(io.GetImageSizeInBytes()), '\x55');
   io.Read(first.data());
   std::vector<char> second(first.size(), '\xAA');
@@ -196,7 +179,7 @@ std::optional<std::vector<char>> read_voxels(itk::ImageIOBase& io) {
 }  // namespace
 
 Result<ImageFile> decode_image_file(const fs::path& path, int components) {
-  const itk::ImageIOBase::Pointer io = reader_for(path);
+  const itk::ImageIOBase::Pointer io = image_io(path, false);
   if (io == nullptr) {
     return refused(Errc::bad_format, path, "is no image that can be read; give DICOM, NIfTI, NRRD, MHA or MHD");
   }
@@ -248,6 +231,37 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
     return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   } catch (const std::exception&) {
     return refused(Errc::unreadable, path, cut);
+  }
+}
+
+Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs stored) {
+  const itk::ImageIOBase::Pointer io = image_io(path, true);
+  if (io == nullptr) return refused(Errc::bad_value, path, "name it .nii.gz, .nrrd or .mha");
+  try {
+    io->SetFileName(path.string());
+    io->SetNumberOfDimensions(3);
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      io->SetDimensions(axis, static_cast<itk::SizeValueType>(image.size[axis]));
+      io->SetSpacing(axis, image.spacing_mm[axis]);
+      io->SetOrigin(axis, image.origin_mm[axis]);
+      const Eigen::Vector3d direction = image.axes.col(axis);
+      io->SetDirection(axis, std::vector<double>(direction.begin(), direction.end()));
+    }
+    io->SetNumberOfComponents(static_cast<unsigned>(image.components));
+    io->SetPixelType(image.components == 1 ? itk::IOPixelEnum::SCALAR : itk::IOPixelEnum::VECTOR);
+    io->UseCompressionOn();
+    take_whole(*io);
+    if (stored == StoredAs::float32) {
+      io->SetComponentType(itk::IOComponentEnum::FLOAT);
+      io->Write(image.values.data());
+    } else {
+      io->SetComponentType(itk::IOComponentEnum::UCHAR);
+      const std::vector<std::uint8_t> bytes(image.values.begin(), image.values.end());
+      io->Write(bytes.data());
+    }
+    return {};
+  } catch (const std::exception&) {
+    return refused(Errc::unreadable, path, "cannot be written; check the folder and its permissions");
   }
 }
 

@@ -5,15 +5,13 @@
 #include <itkConnectedComponentImageFilter.h>
 #include <itkConnectedThresholdImageFilter.h>
 #include <itkImage.h>
-#include <itkImageFileWriter.h>
-#include <itkMetaImageIO.h>
-#include <itkNiftiImageIO.h>
-#include <itkNrrdImageIO.h>
 #include <itkRelabelComponentImageFilter.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "host/volume/image_file.hpp"
 
 namespace birdseye::host {
 
@@ -22,27 +20,14 @@ namespace {
 using Scan = itk::Image<std::int16_t, 3>;
 using Labels = itk::Image<std::uint8_t, 3>;
 
-template <typename Image>
-typename Image::Pointer image_of(const Volume& volume) {
-  const auto image = Image::New();
-  typename Image::SizeType size;
-  typename Image::PointType origin;
-  typename Image::SpacingType spacing;
-  typename Image::DirectionType direction;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    size[axis] = static_cast<itk::SizeValueType>(volume.size[axis]);
-    origin[axis] = volume.patient_from_voxel.translation()[axis];
-    spacing[axis] = volume.spacing_mm[axis];
-    for (unsigned row = 0; row < 3; ++row)
-      direction(row, axis) = volume.patient_from_voxel.linear()(row, axis) / volume.spacing_mm[axis];
-  }
+/// Without its place in the patient, which no filter here looks at.
+Scan::Pointer image_of(const Volume& volume) {
+  const auto image = Scan::New();
+  Scan::SizeType size;
+  for (unsigned axis = 0; axis < 3; ++axis) size[axis] = static_cast<itk::SizeValueType>(volume.size[axis]);
   image->SetRegions(size);
-  image->SetOrigin(origin);
-  image->SetSpacing(spacing);
-  image->SetDirection(direction);
   image->Allocate();
-  std::transform(volume.hu.begin(), volume.hu.end(), image->GetBufferPointer(),
-                 [](std::int16_t value) { return static_cast<typename Image::PixelType>(value); });
+  std::copy(volume.hu.begin(), volume.hu.end(), image->GetBufferPointer());
   return image;
 }
 
@@ -51,7 +36,7 @@ Labels::Pointer in_range(const Volume& ct, const SegmentationSettings& settings,
                          const std::optional<Scan::IndexType>& seed) {
   const auto low = static_cast<std::int16_t>(std::clamp(settings.low_hu, -32768, 32767));
   const auto high = static_cast<std::int16_t>(std::clamp(settings.high_hu, -32768, 32767));
-  const auto scan = image_of<Scan>(ct);
+  const auto scan = image_of(ct);
   if (seed) {
     const auto grow = itk::ConnectedThresholdImageFilter<Scan, Labels>::New();
     grow->SetInput(scan);
@@ -122,24 +107,13 @@ Result<Volume> segment(const Volume& ct, const SegmentationSettings& settings) {
 }
 
 Result<void> write_labels(const std::filesystem::path& path, const Volume& labels) {
-  for (const itk::ImageIOBase::Pointer& io :
-       {itk::ImageIOBase::Pointer(itk::NiftiImageIO::New()), itk::ImageIOBase::Pointer(itk::NrrdImageIO::New()),
-        itk::ImageIOBase::Pointer(itk::MetaImageIO::New())}) {
-    if (!io->CanWriteFile(path.c_str())) continue;
-    try {
-      const auto writer = itk::ImageFileWriter<Labels>::New();
-      writer->SetInput(image_of<Labels>(labels));
-      writer->SetImageIO(io);
-      writer->SetFileName(path.string());
-      writer->UseCompressionOn();
-      writer->Update();
-      return {};
-    } catch (const std::exception&) {
-      return Error{Errc::unreadable,
-                   fmt::format("{}: cannot be written; check the folder and its permissions", path.string())};
-    }
-  }
-  return Error{Errc::bad_value, fmt::format("{}: name it .nii.gz, .nrrd or .mha", path.string())};
+  ImageFile image;
+  image.size = labels.size;
+  image.spacing_mm = labels.spacing_mm;
+  image.origin_mm = labels.patient_from_voxel.translation();
+  image.axes = labels.patient_from_voxel.linear().colwise().normalized();
+  image.values.assign(labels.hu.begin(), labels.hu.end());
+  return write_image(path, image, StoredAs::uint8);
 }
 
 }  // namespace birdseye::host

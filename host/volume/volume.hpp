@@ -9,6 +9,16 @@
 
 namespace birdseye::host {
 
+/// Where (i, j, k) lies in what a grid of this size holds, x fastest.
+inline std::size_t grid_index(const std::array<int, 3>& size, int i, int j, int k) {
+  return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+             static_cast<std::size_t>(size[0]) +
+         static_cast<std::size_t>(i);
+}
+inline std::size_t grid_count(const std::array<int, 3>& size) {
+  return grid_index(size, 0, 0, size[2]);
+}
+
 /// A CT: Hounsfield units on a regular grid. x fastest; voxel centres at integers; patient frame is DICOM LPS, mm.
 struct Volume {
   std::array<int, 3> size{};
@@ -16,11 +26,7 @@ struct Volume {
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
 
-  [[nodiscard]] std::size_t index(int i, int j, int k) const {
-    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
-               static_cast<std::size_t>(size[0]) +
-           static_cast<std::size_t>(i);
-  }
+  [[nodiscard]] std::size_t index(int i, int j, int k) const { return grid_index(size, i, j, k); }
   [[nodiscard]] std::int16_t at(int i, int j, int k) const { return hu[index(i, j, k)]; }
 };
 

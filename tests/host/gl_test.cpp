@@ -15,18 +15,24 @@ using testing::pose;
 using testing::scene;
 using testing::soft;
 
-TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
+/// A driver is among the packages, so that none is a failure and no reason to skip.
+std::unique_ptr<GlContext> offscreen() {
   auto context = GlContext::offscreen();
-  if (!context) GTEST_SKIP() << context.error().what;
+  EXPECT_TRUE(context) << context.error().what;
+  return context ? *std::move(context) : nullptr;
+}
+
+TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
+  const auto context = offscreen();
+  ASSERT_NE(context, nullptr);
   const Volume volume = scene();
-  auto caster = GlRayCaster::create(**context, volume, soft());
+  auto caster = GlRayCaster::create(*context, volume, soft());
   ASSERT_TRUE(caster) << caster.error().what;
   RenderSettings settings;
   settings.step_mm = 0.8;
   const auto check = [&](const DisplacementField* field) {
     const auto d = difference((*caster)->render(lens(), pose(volume), settings),
                               render_reference(volume, soft(), lens(), pose(volume), settings, field));
-    std::printf("rays: mean %.3f worst %.2f\n", d.mean, d.worst);
     EXPECT_LT(d.mean, 0.5);
     EXPECT_LT(d.worst, 6);
   };
@@ -42,22 +48,20 @@ TEST(GlRayCaster, AgreesWithTheReferenceScannedAndDeformed) {
   settings.clip = ClipPlane{Eigen::Vector3d(1, 0.3, -0.2).normalized(), 0};
   settings.clip->offset_mm = settings.clip->normal.dot(volume.patient_from_voxel * Eigen::Vector3d(18, 17, 15));
   check(nullptr);
-  EXPECT_EQ((*context)->fault(), "");
+  EXPECT_EQ(context->fault(), "");
 }
 
 TEST(GlSliceRenderer, IsLikeTheReferenceScannedAndDeformed) {
-  auto context = GlContext::offscreen();
-  if (!context) GTEST_SKIP() << context.error().what;
+  const auto context = offscreen();
+  ASSERT_NE(context, nullptr);
   const Volume volume = scene();
-  auto slices = GlSliceRenderer::create(**context, volume, soft());
+  auto slices = GlSliceRenderer::create(*context, volume, soft());
   ASSERT_TRUE(slices) << slices.error().what;
   RenderSettings settings;
   settings.step_mm = 0.5;
   const auto check = [&](const DisplacementField* field) {
     const auto d = difference((*slices)->render(lens(), pose(volume), settings),
                               render_reference(volume, soft(), lens(), pose(volume), settings, field));
-    std::printf("slices: mean %.2f worst %.1f, %zu of %zu patches\n", d.mean, d.worst, (*slices)->patches_drawn(),
-                (*slices)->patches());
     EXPECT_LT(d.mean, 3);
   };
   check(nullptr);
@@ -65,19 +69,19 @@ TEST(GlSliceRenderer, IsLikeTheReferenceScannedAndDeformed) {
   (*slices)->deform(field);
   check(&field);
   EXPECT_LT((*slices)->patches_drawn(), (*slices)->patches() / 2);
-  EXPECT_EQ((*context)->fault(), "");
+  EXPECT_EQ(context->fault(), "");
 }
 
 TEST(GlRayCaster, DrawsNothingOfAnEmptyVolume) {
-  auto context = GlContext::offscreen();
-  if (!context) GTEST_SKIP() << context.error().what;
+  const auto context = offscreen();
+  ASSERT_NE(context, nullptr);
   Volume volume = scene();
   std::fill(volume.hu.begin(), volume.hu.end(), std::int16_t{-1000});
-  auto caster = GlRayCaster::create(**context, volume, soft());
+  auto caster = GlRayCaster::create(*context, volume, soft());
   ASSERT_TRUE(caster) << caster.error().what;
   const ImageRgba picture = (*caster)->render(lens(), pose(volume), {});
   EXPECT_EQ(std::count(picture.rgba.begin(), picture.rgba.end(), 0), static_cast<std::ptrdiff_t>(picture.rgba.size()));
-  EXPECT_EQ((*context)->fault(), "");
+  EXPECT_EQ(context->fault(), "");
 }
 
 }  // namespace

@@ -131,16 +131,13 @@ struct Avx2 {
             _mm256_mask_i32gather_epi64(zero, at, _mm256_extracti128_si256(index, 1),
                                         _mm256_cvtepi32_epi64(_mm256_extracti128_si256(m.lanes, 1)), Scale)};
   }
-  static I halves(const Pairs& p, __m256 shuffled) {
-    static_cast<void>(p);
-    return _mm256_permute4x64_epi64(_mm256_castps_si256(shuffled), 0xD8);
+  template <int Which>
+  static I every_other(const Pairs& p) {
+    const __m256 picked = _mm256_shuffle_ps(_mm256_castsi256_ps(p.first), _mm256_castsi256_ps(p.second), Which);
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(picked), 0xD8);
   }
-  static I evens(const Pairs& p) {
-    return halves(p, _mm256_shuffle_ps(_mm256_castsi256_ps(p.first), _mm256_castsi256_ps(p.second), 0x88));
-  }
-  static I odds(const Pairs& p) {
-    return halves(p, _mm256_shuffle_ps(_mm256_castsi256_ps(p.first), _mm256_castsi256_ps(p.second), 0xDD));
-  }
+  static I evens(const Pairs& p) { return every_other<0x88>(p); }
+  static I odds(const Pairs& p) { return every_other<0xDD>(p); }
 };
 
 constexpr Kernels kKernels = make_kernels<Avx2>();

@@ -13,12 +13,6 @@ namespace birdseye::host::cpu {
 
 namespace {
 
-std::size_t index_of(const std::array<int, 3>& size, int i, int j, int k) {
-  return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
-             static_cast<std::size_t>(size[0]) +
-         static_cast<std::size_t>(i);
-}
-
 void copy(const Eigen::Matrix3f& m, float (*rows)[3]) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) rows[row][column] = m(row, column);
@@ -96,7 +90,7 @@ void VoxelGrid::tiles_of_row(int y, int z, int margin, std::uint8_t* tiles) cons
   const auto last = [margin](int voxel, int bricks) { return std::min(bricks - 1, (voxel + margin) / kBrick); };
   for (int bk = first(z); bk <= last(z, bricks_[2]); ++bk) {
     for (int bj = first(y); bj <= last(y, bricks_[1]); ++bj) {
-      const std::uint8_t* const bricks = &seen_[index_of(bricks_, 0, bj, bk)];
+      const std::uint8_t* const bricks = &seen_[grid_index(bricks_, 0, bj, bk)];
       for (int bi = 0; bi < bricks_[0]; ++bi) {
         if (bricks[bi] == 0) continue;
         if (margin > 0 && bi > 0) tiles[bi - 1] = 1;
@@ -149,7 +143,7 @@ void VoxelGrid::mark_seen_after(const DisplacementField& field, const Eigen::Aff
     for (int k = first[2]; k <= last[2]; ++k) {
       for (int j = first[1]; j <= last[1]; ++j) {
         for (int i = first[0]; i <= last[0]; ++i) {
-          const std::size_t point = index_of(field.size, i, j, k);
+          const std::size_t point = grid_index(field.size, i, j, k);
           const Eigen::Array3f move(moves_[0][point], moves_[1][point], moves_[2][point]);
           least = least.min(move);
           most = most.max(move);
@@ -165,7 +159,7 @@ void VoxelGrid::mark_seen_after(const DisplacementField& field, const Eigen::Aff
           const Eigen::Array3f to = (brick * kBrick + kBrick).min(last_voxel).cast<float>() + most + kMargin;
           const bool past = (from < -2 * kMargin).any() || (to > last_voxel.cast<float>() + 2 * kMargin).any();
           // Where values come from past the volume's faces there is air, and what lies between it and tissue.
-          seen_[index_of(bricks_, bi, bj, bk)] = !prune_ || past || scan_seen_.any(from, to) ? 1 : 0;
+          seen_[grid_index(bricks_, bi, bj, bk)] = !prune_ || past || scan_seen_.any(from, to) ? 1 : 0;
         }
       }
     }
@@ -234,7 +228,7 @@ void VoxelGrid::refine_seen() {
   tbb::parallel_for(0, bricks_[2], [&](int bk) {
     std::vector<int> low(static_cast<std::size_t>(n[0])), high(static_cast<std::size_t>(n[0]));
     for (int bj = 0; bj < bricks_[1]; ++bj) {
-      std::uint8_t* const seen = &seen_[index_of(bricks_, 0, bj, bk)];
+      std::uint8_t* const seen = &seen_[grid_index(bricks_, 0, bj, bk)];
       for (int begin = 0; begin < bricks_[0];) {
         if (seen[begin] == 0) {
           ++begin;

@@ -45,6 +45,14 @@ GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei heig
   return GlTexture(id);
 }
 
+ImageRgba read_picture(int width_px, int height_px) {
+  ImageRgba image{width_px, height_px, {}};
+  image.rgba.resize(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px) * 4);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width_px, height_px, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
+  return image;
+}
+
 GlBuffer make_buffer(GLsizeiptr bytes, const void* data) {
   GLuint id = 0;
   glCreateBuffers(1, &id);

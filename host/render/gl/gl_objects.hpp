@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calibration/base/result.hpp"
+#include "host/render/scene.hpp"
 
 namespace birdseye::host {
 
@@ -55,6 +56,8 @@ using GlProgram = GlObject<DeleteProgram>;
 Result<GlProgram> make_program(std::initializer_list<std::pair<GLenum, std::string>> shaders);
 /// Nearest, clamped, of one level.
 GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei height, GLsizei depth);
+/// What the bound framebuffer holds, as 8 bits; row 0 of the picture is the first that the card keeps.
+ImageRgba read_picture(int width_px, int height_px);
 GlBuffer make_buffer(GLsizeiptr bytes, const void* data);
 
 }  // namespace birdseye::host

@@ -172,12 +172,7 @@ ImageRgba GlRayCaster::render(const CameraModel& camera, const Transform<Camera,
   glUseProgram(cast_.id());
   glDrawArrays(GL_TRIANGLES, 0, 3);
 
-  ImageRgba image{camera.width_px, camera.height_px, {}};
-  image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  // Row 0 of the picture is the first that the card keeps, for its fragments looked their rays up by their place.
-  glReadPixels(0, 0, camera.width_px, camera.height_px, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
-  return image;
+  return read_picture(camera.width_px, camera.height_px);
 }
 
 }  // namespace birdseye::host

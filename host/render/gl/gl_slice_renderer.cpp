@@ -277,11 +277,7 @@ ImageRgba GlSliceRenderer::render(const CameraModel& camera, const Transform<Cam
         reinterpret_cast<const void*>(slices.first[slice] * sizeof(GLuint)));  // NOLINT: OpenGL's way to say an offset
   }
   glDisable(GL_BLEND);
-  ImageRgba image{camera.width_px, camera.height_px, {}};
-  image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, camera.width_px, camera.height_px, GL_RGBA, GL_UNSIGNED_BYTE, image.rgba.data());
-  return image;
+  return read_picture(camera.width_px, camera.height_px);
 }
 
 }  // namespace birdseye::host
