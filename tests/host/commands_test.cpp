@@ -185,6 +185,7 @@ TEST(Commands, BenchRenderWritesItsTable) {
     EXPECT_LT(row["memory_ratio"].get<double>(), 3) << row;
   }
   EXPECT_EQ(json["rows"][2]["free_vertices"], 27);
+  EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
 }
 
 TEST(Commands, RenderFilmsAndRestrictsToLabels) {
