@@ -20,6 +20,18 @@ cv::Point point_of(const Eigen::Vector2d& p) {
 
 }  // namespace
 
+Result<Picture> read_picture(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return Error{Errc::not_found, path.string() + ": no such file"};
+  const cv::Mat read = cv::imread(path.string(), cv::IMREAD_COLOR);
+  if (read.empty()) return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};
+  Picture picture{read.cols, read.rows, {}};
+  picture.rgb.resize(3 * read.total());
+  cv::Mat rgb = view_of(picture);
+  cv::cvtColor(read, rgb, cv::COLOR_BGR2RGB);
+  return picture;
+}
+
 std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels) {
   const cv::Mat image(height_px, width_px, channels == 4 ? CV_8UC4 : CV_8UC3, const_cast<std::uint8_t*>(pixels.data()));
   cv::Mat swapped;

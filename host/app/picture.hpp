@@ -16,6 +16,9 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
+/// A PNG, JPEG or any other picture that OpenCV reads.
+Result<Picture> read_picture(const std::filesystem::path& path);
+
 /// channels: 3 (RGB) or 4 (RGBA, not premultiplied), 8 bits, rows from the top. The bytes of a PNG file.
 std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels);
 

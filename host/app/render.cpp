@@ -7,15 +7,15 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "host/app/commands.hpp"
-#include "host/app/film.hpp"
 #include "host/app/picture.hpp"
-#include "host/app/progress.hpp"
+#include "host/app/render_scene.hpp"
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
+#include "host/overlay/compositor.hpp"
 #include "host/render/engine.hpp"
+#include "host/ui/window.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
@@ -24,82 +24,14 @@ namespace birdseye::host {
 namespace {
 
 struct Options {
-  std::filesystem::path volume, labels, camera, pose, deformation, out, movie, json;
+  std::filesystem::path volume, labels, camera, pose, deformation, over, out, movie, json;
   std::vector<int> keep;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu";
   double clip = 0.5;
   double step_mm = 0.7;
+  bool window = false;
+  int frames = 0;
 };
-
-struct View {
-  CameraModel camera;
-  Transform<Camera, Patient> camera_from_patient;
-  std::optional<ClipPlane> clip;
-};
-
-/// The corners of the volume's box in the patient frame.
-std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9);
-  Eigen::Vector3d high = -low;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d voxel((corner & 1) * (volume.size[0] - 1), (corner >> 1 & 1) * (volume.size[1] - 1),
-                                (corner >> 2) * (volume.size[2] - 1));
-    const Eigen::Vector3d p = volume.patient_from_voxel * voxel;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return {low, high};
-}
-
-/// From in front of the patient, head up; of a scan thinner than half its height or width, from the feet as
-/// radiologists look at a slice. The volume fills the picture; what lies before share `clip` of its depth is cut away.
-Result<View> default_view(const Volume& volume, const Options& options) {
-  View view;
-  CameraModel& c = view.camera;
-  int read = 0;
-  if (std::sscanf(options.size.c_str(), "%dx%d%n", &c.width_px, &c.height_px, &read) != 2 ||
-      static_cast<std::size_t>(read) != options.size.size() || c.width_px < 16 || c.height_px < 16 ||
-      c.width_px > 8192 || c.height_px > 8192) {
-    return Error{Errc::bad_value, fmt::format("--size {}: give WIDTHxHEIGHT of 16 to 8192 pixels", options.size)};
-  }
-  const auto [low, high] = bounds(volume);
-  const Eigen::Vector3d extent = high - low;
-  const bool thin = 2 * extent.z() < std::min(extent.x(), extent.y());
-  const Eigen::Vector3d right = Eigen::Vector3d::UnitX();
-  const Eigen::Vector3d down =
-      thin ? Eigen::Vector3d(Eigen::Vector3d::UnitY()) : Eigen::Vector3d(-Eigen::Vector3d::UnitZ());
-  const Eigen::Vector3d forward = right.cross(down);
-  const double wide = extent.x();
-  const double tall = extent.dot(down.cwiseAbs());
-  const double deep = extent.dot(forward);
-  const double distance = 2.5 * std::max(wide, tall);
-  const Eigen::Vector3d middle = 0.5 * (low + high);
-  const Eigen::Vector3d eye = middle - (0.5 * deep + distance) * forward;
-  c.fx_px = c.fy_px = 0.96 * (distance + options.clip * deep) * std::min(c.width_px / wide, c.height_px / tall);
-  c.cx_px = 0.5 * (c.width_px - 1);
-  c.cy_px = 0.5 * (c.height_px - 1);
-  Eigen::Matrix3d patient_from_camera;
-  patient_from_camera << right, down, forward;
-  view.camera_from_patient = Transform<Patient, Camera>(patient_from_camera, eye).inverse();
-  if (options.clip > 0) view.clip = ClipPlane{forward, low.dot(forward) + options.clip * deep};
-  return view;
-}
-
-Result<View> view_of(const Volume& volume, const Options& options) {
-  if (options.camera.empty() && options.pose.empty()) return default_view(volume, options);
-  if (options.camera.empty() || options.pose.empty()) {
-    return Error{Errc::bad_value,
-                 "--camera and --pose go together; give both, or neither for a view of the whole volume"};
-  }
-  View view;
-  auto camera = read_camera(options.camera);
-  if (!camera) return camera.error();
-  auto pose = read_pose(options.pose);
-  if (!pose) return pose.error();
-  view.camera = *camera;
-  view.camera_from_patient = Transform<Camera, Patient>::from_matrix(*pose);
-  return view;
-}
 
 /// The CT, or of it what has one of the labels to keep.
 Result<Volume> shown_of(const Options& options) {
@@ -112,111 +44,127 @@ Result<Volume> shown_of(const Options& options) {
   return kept;
 }
 
-std::vector<std::uint8_t> over_black(const ImageRgba& image) {
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(image.rgba.size() / 4 * 3);
-  for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
-    rgb.insert(rgb.end(), image.rgba.begin() + static_cast<std::ptrdiff_t>(i),
-               image.rgba.begin() + static_cast<std::ptrdiff_t>(i + 3));
+/// Where it is seen from, and through what.
+Result<void> look(RenderScene& scene, const Options& options) {
+  if (options.camera.empty() && options.pose.empty()) return look_from_the_front(scene, options.size, options.clip);
+  if (options.camera.empty() || options.pose.empty()) {
+    return Error{Errc::bad_value,
+                 "--camera and --pose go together; give both, or neither for a view of the whole volume"};
   }
-  return rgb;
+  auto camera = read_camera(options.camera);
+  if (!camera) return camera.error();
+  auto pose = read_pose(options.pose);
+  if (!pose) return pose.error();
+  scene.camera = *camera;
+  scene.camera_from_patient = Transform<Camera, Patient>::from_matrix(*pose);
+  return {};
 }
 
-/// With a deformation: it grows from nothing and goes back. Without: the camera swings about the middle of the volume.
-Result<void> make_movie(const Options& options, const Volume& volume, const View& view, const RenderSettings& settings,
-                        const DisplacementField* deformation, Engine& engine) {
-  constexpr int kFrames = 100;
-  constexpr double kRate_hz = 25, kSwing_rad = 0.6;
-  auto film = Film::open(options.movie, view.camera.width_px, view.camera.height_px, kRate_hz);
-  if (!film) return film.error();
-  const auto [low, high] = bounds(volume);
-  const Eigen::Vector3d middle = 0.5 * (low + high);
-  Progress progress;
-  for (int frame = 0; frame < kFrames; ++frame) {
-    if (frame % 10 == 0) progress(fmt::format("frame {} of {}", frame, kFrames));
-    const double phase = 2 * std::numbers::pi * frame / kFrames;
-    Transform<Camera, Patient> camera_from_patient = view.camera_from_patient;
-    if (deformation != nullptr) {
-      DisplacementField part = *deformation;
-      const auto share = static_cast<float>(0.5 - 0.5 * std::cos(phase));
-      for (Eigen::Vector3f& u : part.displacement_mm) u *= share;
-      engine.deform(part);
-    } else {
-      const Eigen::Vector3d down = view.camera_from_patient.rotation().transpose().col(1);
-      const Eigen::Matrix3d turn = rotation_exp(kSwing_rad * std::sin(phase) * down);
-      camera_from_patient =
-          view.camera_from_patient * Transform<Patient, Patient>(turn, Eigen::Vector3d(middle - turn * middle));
-    }
-    if (auto added = film->add(over_black(engine.render(view.camera, camera_from_patient, settings))); !added)
-      return added;
+Result<Picture> behind_of(const CameraModel& camera, const std::filesystem::path& over) {
+  if (over.empty()) {
+    const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+    return Picture{camera.width_px, camera.height_px, std::vector<std::uint8_t>(3 * pixels)};
   }
-  progress.keep(options.movie.string());
-  return film->finish();
+  auto picture = read_picture(over);
+  if (picture && (picture->width_px != camera.width_px || picture->height_px != camera.height_px)) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: is {}x{} where the view is {}x{}; give the --camera that took it, or its --size",
+                             over.string(), picture->width_px, picture->height_px, camera.width_px, camera.height_px)};
+  }
+  return picture;
 }
 
-Result<void> render(const Options& options) {
-  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the PNG to write"};
-  if (!std::isfinite(options.step_mm) || !std::isfinite(options.clip)) {
-    return Error{Errc::bad_value, "--step-mm and --clip need finite numbers"};
-  }
-  const auto transfer = load_transfer_function(options.transfer);
-  if (!transfer) return transfer.error();
-  const auto volume = shown_of(options);
+Result<RenderScene> scene_of(const Options& options) {
+  RenderScene scene;
+  auto volume = shown_of(options);
   if (!volume) return volume.error();
-  const auto view = view_of(*volume, options);
-  if (!view) return view.error();
-  std::string why;
-  const auto engine = make_engine(options.engine, *volume, *transfer, &why);
-  if (!engine) return engine.error();
-  if (!why.empty()) fmt::print(stderr, "{}\n", why);
-  std::optional<DisplacementField> deformation;
-  if (!options.deformation.empty()) {
-    if (*std::min_element(volume->size.begin(), volume->size.end()) < 2) {
-      return Error{Errc::unsupported,
-                   fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.string())};
-    }
-    auto field = read_field(options.deformation);
-    if (!field) return field.error();
-    deformation = *std::move(field);
-    (*engine)->deform(*deformation);
+  scene.volume = *std::move(volume);
+  if (auto looked = look(scene, options); !looked) return looked.error();
+  auto behind = behind_of(scene.camera, options.over);
+  if (!behind) return behind.error();
+  scene.behind = *std::move(behind);
+  scene.settings.step_mm = options.step_mm;
+  if (options.deformation.empty()) return scene;
+  if (*std::min_element(scene.volume.size.begin(), scene.volume.size.end()) < 2) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.string())};
   }
-  RenderSettings settings;
-  settings.step_mm = options.step_mm;
-  settings.clip = view->clip;
-  const auto began = std::chrono::steady_clock::now();
-  ImageRgba image = (*engine)->render(view->camera, view->camera_from_patient, settings);
-  const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
-  if (const std::string fault = (*engine)->fault(); !fault.empty()) {
-    return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
-  }
-  std::size_t covered = 0;
+  auto field = read_field(options.deformation);
+  if (!field) return field.error();
+  scene.deformation = *std::move(field);
+  return scene;
+}
+
+/// The colours of a PNG are not premultiplied.
+std::string transparent_png_of(ImageRgba image) {
   for (std::size_t i = 0; i < image.rgba.size(); i += 4) {
     const int alpha = image.rgba[i + 3];
-    if (alpha > 0) ++covered;
-    // A PNG's colours are not premultiplied.
     for (std::size_t c = 0; c < 3 && alpha > 0; ++c) {
       image.rgba[i + c] = static_cast<std::uint8_t>(std::min(255, (image.rgba[i + c] * 255 + alpha / 2) / alpha));
     }
   }
+  return png_of(image.rgba, image.width_px, image.height_px, 4);
+}
+
+Result<void> write_still(const Options& options, const RenderScene& scene, Engine& engine) {
+  const auto began = std::chrono::steady_clock::now();
+  const ImageRgba image = engine.render(scene.camera, scene.camera_from_patient, scene.settings);
+  const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
+  if (const std::string fault = engine.fault(); !fault.empty()) {
+    return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", engine.name(), fault)};
+  }
+  std::size_t covered = 0;
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) covered += image.rgba[i] > 0 ? 1 : 0;
   const double coverage = static_cast<double>(covered) / (static_cast<double>(image.rgba.size()) / 4);
   const bool seen = covered > 0;
   const nlohmann::json json = {
-      {"engine", (*engine)->name()},
+      {"engine", engine.name()},
       {"width_px", image.width_px},
       {"height_px", image.height_px},
       {"render_ms", ms},
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
-  const std::string png = png_of(image.rgba, image.width_px, image.height_px, 4);
+  const std::string png = options.over.empty()
+                              ? transparent_png_of(image)
+                              : png_of(composite(scene.behind.rgb, image, 1), image.width_px, image.height_px, 3);
   if (!options.movie.empty()) {
-    auto filmed = make_movie(options, *volume, *view, settings, deformation ? &*deformation : nullptr, **engine);
-    if (!filmed) return filmed;
+    if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }
   if (auto written = write_files({{options.out, png}, {options.json, text_of(json)}}); !written) return written;
   fmt::print("{}: {}x{}, {:.0f} % covered, {:.0f} ms ({})\n", options.out.string(), image.width_px, image.height_px,
-             100 * coverage, ms, (*engine)->name());
+             100 * coverage, ms, engine.name());
   return {};
+}
+
+Result<void> render(const Options& options) {
+  if (options.out.empty() && !options.window) {
+    return Error{Errc::bad_value, "--out: is empty; name the PNG to write, or give --window"};
+  }
+  if (!std::isfinite(options.step_mm) || !std::isfinite(options.clip)) {
+    return Error{Errc::bad_value, "--step-mm and --clip need finite numbers"};
+  }
+  const auto transfer = load_transfer_function(options.transfer);
+  if (!transfer) return transfer.error();
+  const auto scene = scene_of(options);
+  if (!scene) return scene.error();
+  std::unique_ptr<Window> window;  // outlives the engine that draws with it
+  if (options.window) {
+    auto opened = Window::open("Birdseye: " + options.volume.filename().string(), scene->camera.width_px,
+                               scene->camera.height_px);
+    if (!opened) return opened.error();
+    window = *std::move(opened);
+  }
+  std::string why;
+  const auto engine = make_engine(options.engine, scene->volume, *transfer, &why, true, window.get());
+  if (!engine) return engine.error();
+  if (!why.empty()) fmt::print(stderr, "{}\n", why);
+  if (scene->deformation) (*engine)->deform(*scene->deformation);
+  if (!options.window) return write_still(options, *scene, **engine);
+  const auto last = show_scene(*window, *scene, **engine, options.frames);
+  if (!last) return last.error();
+  if (options.out.empty()) return {};
+  return write_file(options.out, png_of(last->rgb, last->width_px, last->height_px, 3));
 }
 
 }  // namespace
@@ -228,7 +176,8 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--camera", options->camera, "lens, OpenCV YAML; without it a view that shows the whole volume");
   command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
-  command.add_option("--out", options->out, "PNG to write, RGBA")->required();
+  command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
+  command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over");
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");
   command.add_option("--clip", options->clip, "share of the depth cut away in the view without a camera (default 0.5)")
@@ -236,12 +185,19 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--step-mm", options->step_mm, "between samples along a ray")->check(CLI::Range(0.05, 20.0));
   command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));
-  command.add_option("--movie", options->movie, "MP4 of the deformation growing, or of the camera swinging");
+  CLI::Option* const movie =
+      command.add_option("--movie", options->movie, "MP4 of the deformation growing, or of the camera swinging");
+  CLI::Option* const window =
+      command.add_flag("--window", options->window, "show it; --out gets what the window showed last");
+  command.add_option("--frames", options->frames, "close the window after so many pictures")
+      ->check(CLI::Range(1, 1'000'000))
+      ->needs(window);
   CLI::Option* const labels = command.add_option("--labels", options->labels, "label volume on the CT's grid");
   CLI::Option* const keep = command.add_option("--keep", options->keep, "the labels to show")->delimiter(',');
   labels->needs(keep);
   keep->needs(labels);
-  command.add_option("--json", options->json, "write the figures to this file");
+  CLI::Option* const json = command.add_option("--json", options->json, "write the figures to this file");
+  window->excludes(movie)->excludes(json);
   command.callback([options, &status] { status.take(render(*options)); });
 }
 

@@ -37,29 +37,32 @@ class CpuEngine final : public Engine {
 template <typename Renderer>
 class GlEngine final : public Engine {
  public:
-  GlEngine(std::unique_ptr<GlContext> context, std::unique_ptr<Renderer> renderer, const char* what)
-      : context_(std::move(context)), renderer_(std::move(renderer)), what_(what) {}
+  GlEngine(std::unique_ptr<GlContext> own, const GlContext& context, std::unique_ptr<Renderer> renderer,
+           const char* what)
+      : own_(std::move(own)), context_(context), renderer_(std::move(renderer)), what_(what) {}
   void deform(const DisplacementField& field) override { renderer_->deform(field); }
   void undeform() override { renderer_->undeform(); }
   ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                    const RenderSettings& settings) override {
     return renderer_->render(camera, camera_from_patient, settings);
   }
-  [[nodiscard]] std::string name() const override { return fmt::format("{}, {}", what_, context_->renderer()); }
-  [[nodiscard]] std::string fault() const override { return context_->fault(); }
+  [[nodiscard]] std::string name() const override { return fmt::format("{}, {}", what_, context_.renderer()); }
+  [[nodiscard]] std::string fault() const override { return context_.fault(); }
 
  private:
-  std::unique_ptr<GlContext> context_;  // outlives what was made with it
+  std::unique_ptr<GlContext> own_;  // outlives what was made with it; none in a window
+  const GlContext& context_;
   std::unique_ptr<Renderer> renderer_;
   const char* what_;
 };
 
 template <typename Renderer>
-Result<std::unique_ptr<Engine>> make_gl(std::unique_ptr<GlContext> context, const Volume& volume,
+Result<std::unique_ptr<Engine>> make_gl(std::unique_ptr<GlContext> own, GlContext& context, const Volume& volume,
                                         const TransferFunction& transfer, const char* what, bool prune) {
-  auto renderer = Renderer::create(*context, volume, transfer, prune);
+  auto renderer = Renderer::create(context, volume, transfer, prune);
   if (!renderer) return renderer.error();
-  return std::unique_ptr<Engine>(std::make_unique<GlEngine<Renderer>>(std::move(context), *std::move(renderer), what));
+  return std::unique_ptr<Engine>(
+      std::make_unique<GlEngine<Renderer>>(std::move(own), context, *std::move(renderer), what));
 }
 
 bool is_software(const std::string& renderer) {
@@ -85,7 +88,8 @@ std::vector<std::string> engine_names() {
 }
 
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
-                                            const TransferFunction& transfer, std::string* why, bool prune) {
+                                            const TransferFunction& transfer, std::string* why, bool prune,
+                                            GlContext* context) {
   if (auto enough = check_memory(volume); !enough) return enough.error();
   const auto on_cpu = [&] { return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune)); };
   const auto say = [why](const std::string& text) {
@@ -93,21 +97,28 @@ Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volum
   };
   if (name == "cpu") return on_cpu();
   if (name == "auto" || name == "gl" || name == "slices") {
-    auto context = GlContext::offscreen();
-    if (name == "auto") {
-      if (!context) {
-        say("engine cpu: " + context.error().what);
+    std::unique_ptr<GlContext> own;
+    if (context == nullptr) {
+      auto made = GlContext::offscreen();
+      if (!made && name == "auto") {
+        say("engine cpu: " + made.error().what);
         return on_cpu();
       }
-      if (is_software((*context)->renderer())) {
-        say("engine cpu: OpenGL is here in software only (" + (*context)->renderer() + ")");
-        return on_cpu();
-      }
-      say("engine gl: " + (*context)->renderer());
+      if (!made) return made.error();
+      own = *std::move(made);
+      context = own.get();
     }
-    if (!context) return context.error();
-    if (name == "slices") return make_gl<GlSliceRenderer>(*std::move(context), volume, transfer, "slices", prune);
-    return make_gl<GlRayCaster>(*std::move(context), volume, transfer, "gl", prune);
+    if (name == "auto") {
+      if (is_software(context->renderer())) {
+        say("engine cpu: OpenGL is here in software only (" + context->renderer() + ")");
+        return on_cpu();
+      }
+      say("engine gl: " + context->renderer());
+    }
+    if (name == "slices") {
+      return make_gl<GlSliceRenderer>(std::move(own), *context, volume, transfer, "slices", prune);
+    }
+    return make_gl<GlRayCaster>(std::move(own), *context, volume, transfer, "gl", prune);
   }
   return Error{Errc::bad_value, fmt::format("engine \"{}\" is none of {}", name, fmt::join(engine_names(), ", "))};
 }

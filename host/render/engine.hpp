@@ -8,6 +8,7 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/render/gl/gl_context.hpp"
 #include "host/render/scene.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
@@ -35,9 +36,10 @@ class Engine {
 /// graphics card, else cpu.
 std::vector<std::string> engine_names();
 /// Keeps a reference to volume, which must outlive it. With auto, `why` says what was chosen and why.
-/// prune: false draws what is not seen too, for measurements; the picture is the same.
+/// prune: false draws what is not seen too, for measurements; the picture is the same. context: a window's to draw
+/// with, which must outlive the engine; without one, the engines that need the card make their own, off-screen.
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
                                             const TransferFunction& transfer, std::string* why = nullptr,
-                                            bool prune = true);
+                                            bool prune = true, GlContext* context = nullptr);
 
 }  // namespace birdseye::host

@@ -20,19 +20,29 @@ void note(GLenum /*source*/, GLenum type, GLuint /*id*/, GLenum severity, GLsize
   if (first->empty()) *first = message;
 }
 
-}  // namespace
+class Surfaceless final : public GlContext {
+ public:
+  Surfaceless() = default;
+  ~Surfaceless() override;
+  Surfaceless(const Surfaceless&) = delete;
+  Surfaceless& operator=(const Surfaceless&) = delete;
+  Result<void> open();
 
-Result<std::unique_ptr<GlContext>> GlContext::offscreen() {
+ private:
+  EGLDisplay display_ = nullptr;
+  EGLContext context_ = nullptr;
+};
+
+Result<void> Surfaceless::open() {
   if (!epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless") ||
       !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base")) {
     return missing("no EGL with a surfaceless platform");
   }
-  std::unique_ptr<GlContext> made(new GlContext);
   EGLDisplay display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, nullptr, nullptr);
   if (display == EGL_NO_DISPLAY || eglInitialize(display, nullptr, nullptr) == EGL_FALSE) {
     return missing("EGL finds no driver");
   }
-  made->display_ = display;
+  display_ = display;
   if (eglBindAPI(EGL_OPENGL_API) == EGL_FALSE) return missing("EGL has OpenGL ES only");
   constexpr std::array<EGLint, 5> kConfig{EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, 0, EGL_NONE};
   EGLConfig config = nullptr;
@@ -47,23 +57,35 @@ Result<std::unique_ptr<GlContext>> GlContext::offscreen() {
                                            EGL_CONTEXT_OPENGL_DEBUG,
                                            EGL_TRUE,
                                            EGL_NONE};
-  made->context_ = count > 0 ? eglCreateContext(display, config, EGL_NO_CONTEXT, kContext.data()) : EGL_NO_CONTEXT;
-  if (made->context_ == EGL_NO_CONTEXT) return missing("the driver has no OpenGL 4.5 core");
-  if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, made->context_) == EGL_FALSE) {
+  context_ = count > 0 ? eglCreateContext(display, config, EGL_NO_CONTEXT, kContext.data()) : EGL_NO_CONTEXT;
+  if (context_ == EGL_NO_CONTEXT) return missing("the driver has no OpenGL 4.5 core");
+  if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE) {
     return missing("the driver needs a window");
   }
-  made->renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  glEnable(GL_DEBUG_OUTPUT);
-  glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
-  glDebugMessageCallback(note, &made->fault_);
-  return made;
+  begin();
+  return {};
 }
 
-GlContext::~GlContext() {
+Surfaceless::~Surfaceless() {
   if (display_ == nullptr) return;
   eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   if (context_ != nullptr) eglDestroyContext(display_, context_);
   eglTerminate(display_);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<GlContext>> GlContext::offscreen() {
+  auto made = std::make_unique<Surfaceless>();
+  if (auto opened = made->open(); !opened) return opened.error();
+  return std::unique_ptr<GlContext>(std::move(made));
+}
+
+void GlContext::begin() {
+  renderer_ = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  glEnable(GL_DEBUG_OUTPUT);
+  glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
+  glDebugMessageCallback(note, &fault_);
 }
 
 }  // namespace birdseye::host

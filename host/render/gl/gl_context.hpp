@@ -7,13 +7,14 @@
 
 namespace birdseye::host {
 
-/// An OpenGL 4.5 core context without a window, current on the thread that made it until it ends. Any GPU's driver that
-/// has EGL's surfaceless platform, or Mesa's software renderer.
+/// An OpenGL 4.5 core context, current on the thread that made it until it ends: one without a window, or a window's
+/// (host/ui/window.hpp). What draws with it does not know which.
 class GlContext {
  public:
+  /// Without a window, through EGL's surfaceless platform: any GPU's driver that has it, or Mesa's software renderer.
   /// Errc::unsupported names what is missing.
   static Result<std::unique_ptr<GlContext>> offscreen();
-  ~GlContext();
+  virtual ~GlContext() = default;
   GlContext(const GlContext&) = delete;
   GlContext& operator=(const GlContext&) = delete;
 
@@ -21,10 +22,12 @@ class GlContext {
   /// The first error that the driver reported since the context was made; empty for none. Tests want none.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
- private:
+ protected:
   GlContext() = default;
-  void* display_ = nullptr;
-  void* context_ = nullptr;
+  /// Once it is current: asks its name, and listens to its errors.
+  void begin();
+
+ private:
   std::string renderer_, fault_;
 };
 

@@ -1,0 +1,175 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "host/deform/displacement_field.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/data.hpp"
+#include "tests/support/display.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/small_ct.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using host::DisplacementField;
+using testing::Display;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+using testing::small_ct;
+
+constexpr const char* kIdentity = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+constexpr const char* kCamera =
+    "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: "
+    "d\n"
+    "   data: [ 60., 0., 32., 0., 60., 24., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   "
+    "cols: 5\n"
+    "   dt: d\n   data: [ -0.1, 0., 0., 0., 0. ]\n";
+
+/// A push over small_ct's ball to the patient's right, or with a large one tissue through itself.
+std::string push(const Scratch& scratch, float right_mm) {
+  DisplacementField field;
+  field.size = {5, 5, 5};
+  field.patient_from_lattice.linear() = 10 * Eigen::Matrix3d::Identity();
+  field.patient_from_lattice.translation() = Eigen::Vector3d(-20, -20, -20);
+  field.displacement_mm.assign(125, Eigen::Vector3f::Zero());
+  field.displacement_mm[62].x() = right_mm;
+  const fs::path path = scratch / ("push" + std::to_string(right_mm) + ".mha");
+  EXPECT_TRUE(host::write_field(path, field));
+  return path.string();
+}
+
+/// A frame of video, red from left to right.
+std::string video_frame(const Scratch& scratch, int width_px, int height_px) {
+  std::string text = "P6\n" + std::to_string(width_px) + " " + std::to_string(height_px) + "\n255\n";
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x) text += {static_cast<char>(255 * x / width_px), '\x20', '\x40'};
+  }
+  return scratch.file("video.ppm", text);
+}
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(RenderCommand, AWindowShowsWhatAPictureHolds) {
+  const Scratch scratch;
+  const Display display;
+  const std::string common = "render --volume " + small_ct(scratch) +
+                             " --clip 0 --size 120x90 --transfer skin --over " + video_frame(scratch, 120, 90) +
+                             " --deformation " + push(scratch, 6);
+  for (const std::string engine : {"cpu", "gl", "slices"}) {
+    const fs::path picture = scratch / (engine + ".png"), window = scratch / (engine + "_window.png");
+    const auto drawn = run("birdseye", common + " --engine " + engine + " --out " + picture.string());
+    ASSERT_EQ(drawn.code, 0) << drawn.output;
+    const auto shown = run("birdseye", common + " --engine " + engine + " --window --frames 3 --out " + window.string(),
+                           display.env());
+    ASSERT_EQ(shown.code, 0) << shown.output;
+    EXPECT_EQ(shown.output, "");
+    EXPECT_GT(bytes_of(picture).size(), 1000U);
+    EXPECT_EQ(bytes_of(window), bytes_of(picture)) << engine;
+  }
+}
+
+TEST(RenderCommand, AWindowSaysWhatItLacks) {
+  const Scratch scratch;
+  const Display display;
+  const std::string common = "render --volume " + small_ct(scratch) + " --size 64x48";
+  const fs::path out = scratch / "o.png";
+  const std::string window = common + " --window --frames 1 --out " + out.string();
+  expect_refused("birdseye", window, {"display", "--out instead of --window"}, out,
+                 "env -u DISPLAY -u WAYLAND_DISPLAY");
+  expect_refused("birdseye", window, {"display", "--out instead of --window"}, out, "env DISPLAY=:4242");
+  expect_refused("birdseye", window, {"OpenGL 4.5", "libgl1-mesa-dri", "--out instead of --window"}, out,
+                 display.env() + " MESA_GL_VERSION_OVERRIDE=3.3");
+  expect_refused("birdseye", common, {"--out", "--window"});
+  expect_refused("birdseye", common + " --frames 2 --out " + out.string(), {"--window"}, out);
+  expect_refused("birdseye", common + " --over " + video_frame(scratch, 64, 40) + " --out " + out.string(),
+                 {"video.ppm", "64x40", "64x48"}, out);
+  expect_refused("birdseye", common + " --over " + scratch.file("no.png", "no") + " --out " + out.string(),
+                 {"no.png", "no picture"}, out);
+}
+
+TEST(RenderCommand, DrawsThroughALens) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  const std::string pose = scratch.file("pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 80\n0 0 0 1\n");
+  const auto with_lens =
+      run("birdseye", "render --volume " + ct + " --camera " + scratch.file("c.yaml", kCamera) + " --pose " + pose +
+                          " --transfer skin --out " + (scratch / "lens.png").string() + " --json " +
+                          (scratch / "r.json").string());
+  ASSERT_EQ(with_lens.code, 0) << with_lens.output;
+  // A ball of 12 mm seen from 80 mm with 60 px focal length: a disc of about 9 px radius in 64 x 48.
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "r.json"));
+  EXPECT_NEAR(json["coverage"].get<double>(), 3.1416 * 9.2 * 9.2 / (64 * 48), 0.025);
+  const auto front =
+      run("birdseye", "render --volume " + ct + " --size 80x60 --out " + (scratch / "front.png").string());
+  EXPECT_EQ(front.code, 0) << front.output;
+  EXPECT_GT(fs::file_size(scratch / "front.png"), 200U);
+}
+
+TEST(RenderCommand, FilmsAndRestrictsToLabels) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  const std::string labels = (scratch / "l.nii.gz").string();
+  ASSERT_EQ(run("birdseye", "volume segment " + ct + " --hu 100,300 --out " + labels).code, 0);
+  const auto kept =
+      run("birdseye", "render --volume " + ct + " --labels " + labels + " --keep 1 --clip 0 --size 64x48 --out " +
+                          (scratch / "k.png").string() + " --movie " + (scratch / "k.mp4").string());
+  EXPECT_EQ(kept.code, 0) << kept.output;
+  EXPECT_GT(fs::file_size(scratch / "k.mp4"), 1000U);
+  expect_refused("birdseye",
+                 "render --volume " + ct + " --labels " + labels + " --keep 9 --out " + (scratch / "n.png").string(),
+                 {"l.nii.gz", "none of 9"}, scratch / "n.png");
+}
+
+TEST(RenderCommand, ShowsTheRealAbdomen) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const Scratch scratch;
+  // The body fills most of the frontal view, and of the slab seen from the feet about a third.
+  for (const auto& [name, least, most] :
+       {std::tuple{"example_ct.nii.gz", 0.5, 0.95}, std::tuple{"example_ct_dicom", 0.2, 0.5}}) {
+    const auto result =
+        run("birdseye", "render --volume " + (*data / "ct_abdomen" / name).string() + " --size 300x300 --out " +
+                            (scratch / "a.png").string() + " --json " + (scratch / "a.json").string());
+    ASSERT_EQ(result.code, 0) << result.output;
+    const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "a.json"));
+    EXPECT_GT(json["coverage"].get<double>(), least) << name;
+    EXPECT_LT(json["coverage"].get<double>(), most) << name;
+  }
+}
+
+TEST(RenderCommand, RefusesBadInputInOneLine) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  const fs::path out = scratch / "out.png";
+  const auto refuse = [&](const std::string& arguments, const std::vector<std::string>& words) {
+    expect_refused("birdseye", "render --volume " + ct + " --out " + out.string() + " " + arguments, words, out);
+  };
+  const std::string camera = scratch.file("camera.yaml", kCamera);
+  const std::string pose = scratch.file("pose.txt", kIdentity);
+  const std::string no_size = std::string(kCamera).erase(14, std::string("image_width: 64\n").size());
+  refuse("--camera " + scratch.file("size.yaml", no_size) + " --pose " + pose, {"size.yaml", "image_width"});
+  refuse("--camera " + camera + " --pose " + scratch.file("row.txt", "1 0 0 0\n0 1 0 0\n0 0 0 1\n"),
+         {"row.txt", "3 rows"});
+  refuse("--camera " + camera + " --pose " + scratch.file("shear.txt", "1 1 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"),
+         {"shear.txt", "no rigid"});
+  refuse("--camera " + camera, {"--pose"});
+  std::string skew = kCamera;
+  skew.replace(skew.find("60., 0."), 7, "60., 1.");
+  refuse("--camera " + scratch.file("skew.yaml", skew) + " --pose " + pose, {"skew.yaml", "skew"});
+  refuse("--transfer " + scratch.file("t.json", R"({"points": [{"hu": 1, "rgb": [1, 1, 1], "extinction": 2}]})"),
+         {"t.json", "extinction: unknown key"});
+  refuse("--transfer livre", {"livre", "liver"});
+  refuse("--size big", {"--size"});
+}
+
+}  // namespace
+}  // namespace birdseye
