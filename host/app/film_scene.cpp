@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "calibration/geometry/camera_path.hpp"
 #include "host/app/film.hpp"
 #include "host/app/progress.hpp"
 #include "host/app/render_scene.hpp"
@@ -10,17 +12,20 @@
 namespace birdseye::host {
 
 Result<void> film_scene(const std::filesystem::path& path, const RenderScene& scene, Engine& engine) {
-  constexpr int kFrames = 100;
   constexpr double kRate_hz = 25, kSwing_rad = 0.6;
+  const int frames = std::max(2, static_cast<int>(std::lround(scene.film_s * kRate_hz)));
   auto film = Film::open(path, scene.camera.width_px, scene.camera.height_px, kRate_hz);
   if (!film) return film.error();
   const Eigen::Vector3d middle = middle_of(scene.volume);
   Progress progress;
-  for (int frame = 0; frame < kFrames; ++frame) {
-    if (frame % 10 == 0) progress(fmt::format("frame {} of {}", frame, kFrames));
-    const double phase = 2 * std::numbers::pi * frame / kFrames;
+  for (int frame = 0; frame < frames; ++frame) {
+    if (frame % 10 == 0) progress(fmt::format("frame {} of {}", frame, frames));
+    const double phase = 2 * std::numbers::pi * frame / frames;
     Transform<Camera, Patient> camera_from_patient = scene.camera_from_patient;
-    if (scene.deformation) {
+    if (!scene.path.empty()) {
+      const double share = static_cast<double>(frame) / (frames - 1);
+      camera_from_patient = camera_along(scene.path, share * static_cast<double>(scene.path.size() - 1));
+    } else if (scene.deformation) {
       DisplacementField part = *scene.deformation;
       const auto share = static_cast<float>(0.5 - 0.5 * std::cos(phase));
       for (Eigen::Vector3f& u : part.displacement_mm) u *= share;

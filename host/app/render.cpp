@@ -24,11 +24,11 @@ namespace birdseye::host {
 namespace {
 
 struct Options {
-  std::filesystem::path volume, labels, camera, pose, deformation, over, out, movie, json;
+  std::filesystem::path volume, labels, camera, pose, path, deformation, over, out, movie, json;
   std::vector<int> keep;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu";
   double clip = 0.5;
-  double step_mm = 0.7;
+  double step_mm = 0.7, seconds = 4;
   bool window = false;
   int frames = 0;
 };
@@ -46,16 +46,24 @@ Result<Volume> shown_of(const Options& options) {
 
 /// Where it is seen from, and through what.
 Result<void> look(RenderScene& scene, const Options& options) {
-  if (options.camera.empty() && options.pose.empty()) return look_from_the_front(scene, options.size, options.clip);
-  if (options.camera.empty() || options.pose.empty()) {
+  const bool posed = !options.pose.empty() || !options.path.empty();
+  if (options.camera.empty() && !posed) return look_from_the_front(scene, options.size, options.clip);
+  if (options.camera.empty() || !posed) {
     return Error{Errc::bad_value,
-                 "--camera and --pose go together; give both, or neither for a view of the whole volume"};
+                 "--camera and --pose (or --path) go together; give both, or neither for a view of the whole volume"};
   }
   auto camera = read_camera(options.camera);
   if (!camera) return camera.error();
+  scene.camera = *camera;
+  if (!options.path.empty()) {
+    auto path = read_path(options.path);
+    if (!path) return path.error();
+    scene.path = *std::move(path);
+    scene.camera_from_patient = scene.path.front();
+    return {};
+  }
   auto pose = read_pose(options.pose);
   if (!pose) return pose.error();
-  scene.camera = *camera;
   scene.camera_from_patient = Transform<Camera, Patient>::from_matrix(*pose);
   return {};
 }
@@ -84,6 +92,7 @@ Result<RenderScene> scene_of(const Options& options) {
   if (!behind) return behind.error();
   scene.behind = *std::move(behind);
   scene.settings.step_mm = options.step_mm;
+  scene.film_s = options.seconds;
   if (options.deformation.empty()) return scene;
   if (*std::min_element(scene.volume.size.begin(), scene.volume.size.end()) < 2) {
     return Error{Errc::unsupported,
@@ -174,7 +183,7 @@ void add_render(CLI::App& app, CommandStatus& status) {
   CLI::App& command = *app.add_subcommand("render", "render a CT to a PNG");
   command.add_option("--volume", options->volume, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
   command.add_option("--camera", options->camera, "lens, OpenCV YAML; without it a view that shows the whole volume");
-  command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
+  CLI::Option* const pose = command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
   command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
   command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over");
@@ -185,8 +194,16 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--step-mm", options->step_mm, "between samples along a ray")->check(CLI::Range(0.05, 20.0));
   command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));
-  CLI::Option* const movie =
-      command.add_option("--movie", options->movie, "MP4 of the deformation growing, or of the camera swinging");
+  CLI::Option* const movie = command.add_option("--movie", options->movie,
+                                                "MP4 of the camera along --path, the deformation growing, or a swing");
+  command
+      .add_option("--path", options->path,
+                  "folder of camera_from_patient matrices, or a file of 16 numbers a line: the film's key poses")
+      ->needs(movie)
+      ->excludes(pose);
+  command.add_option("--seconds", options->seconds, "that the film lasts (default 4)")
+      ->check(CLI::Range(0.1, 600.0))
+      ->needs(movie);
   CLI::Option* const window =
       command.add_flag("--window", options->window, "show it; --out gets what the window showed last");
   command.add_option("--frames", options->frames, "close the window after so many pictures")

@@ -27,6 +27,8 @@ struct RenderScene {
   CameraModel camera;
   Transform<Camera, Patient> camera_from_patient;
   RenderSettings settings;
+  std::vector<Transform<Camera, Patient>> path;  ///< that a film goes along; may be none
+  double film_s = 4;
   Picture behind;  ///< of the camera's size: a frame of video, or black
 };
 
@@ -42,7 +44,8 @@ Eigen::Vector3d middle_of(const Volume& volume);
 Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
              const RenderSettings& settings);
 
-/// With a deformation: it grows from nothing and goes back. Without: the camera swings about the middle of the volume.
+/// With a path the camera goes along it, from the first pose in the first frame to the last in the last. Without, and
+/// with a deformation: it grows from nothing and goes back. Without both the camera swings about the volume's middle.
 Result<void> film_scene(const std::filesystem::path& path, const RenderScene& scene, Engine& engine);
 
 /// Shows the scene in a window until the user closes it, or after so many pictures where that is not 0. The mouse turns

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <sstream>
@@ -18,8 +19,8 @@ struct Row {
   std::vector<double> numbers;
 };
 
-/// The lines of numbers in a file.
-Result<std::vector<Row>> read_rows(const fs::path& path) {
+/// The lines of numbers in a file; with headed, its first line may be one of names.
+Result<std::vector<Row>> read_rows(const fs::path& path, bool headed = false) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
@@ -40,6 +41,10 @@ Result<std::vector<Row>> read_rows(const fs::path& path) {
       } catch (const std::exception&) {
         used = 0;
       }
+      if (used != word.size() && headed && line == 1) {
+        row.numbers.clear();
+        break;
+      }
       if (used != word.size()) {
         return Error{Errc::bad_format, fmt::format("{}: line {}: \"{}\" is not a number", path.string(), line, word)};
       }
@@ -47,6 +52,17 @@ Result<std::vector<Row>> read_rows(const fs::path& path) {
     if (!row.numbers.empty()) rows.push_back(std::move(row));
   }
   return rows;
+}
+
+/// m, or that what stands at `where` is no pose.
+Result<Eigen::Matrix4d> rigid(const Eigen::Matrix4d& m, const std::string& where) {
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() > 0 &&
+      (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() <= 1e-9) {
+    return m;
+  }
+  return Error{Errc::bad_value,
+               where + ": is no rigid transform; give rotation and translation in mm, last row 0 0 0 1"};
 }
 
 }  // namespace
@@ -82,14 +98,41 @@ Result<Eigen::Matrix4d> read_pose(const fs::path& path) {
     }
     for (int j = 0; j < 4; ++j) m(i, j) = row.numbers[static_cast<std::size_t>(j)];
   }
-  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-  if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-3) || r.determinant() < 0 ||
-      (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9) {
-    return Error{
-        Errc::bad_value,
-        fmt::format("{}: is no rigid transform; give rotation and translation in mm, last row 0 0 0 1", path.string())};
+  return rigid(m, path.string());
+}
+
+Result<std::vector<Transform<Camera, Patient>>> read_path(const fs::path& path) {
+  std::vector<Transform<Camera, Patient>> keys;
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(path, ignored)) {
+      if (entry.path().filename().string()[0] != '.') files.push_back(entry.path());
+    }
+    std::sort(files.begin(), files.end());
+    for (const fs::path& file : files) {
+      const auto pose = read_pose(file);
+      if (!pose) return pose.error();
+      keys.push_back(Transform<Camera, Patient>::from_matrix(*pose));
+    }
+  } else {
+    const auto rows = read_rows(path, true);
+    if (!rows) return rows.error();
+    for (const Row& row : *rows) {
+      const std::string where = fmt::format("{}: line {}", path.string(), row.line);
+      if (row.numbers.size() != 16 && row.numbers.size() != 18) {
+        return Error{Errc::bad_format,
+                     fmt::format("{}: {} numbers where a pose has 16, row by row", where, row.numbers.size())};
+      }
+      using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
+      const auto pose = rigid(Eigen::Map<const RowMajor>(&row.numbers[row.numbers.size() - 16]), where);
+      if (!pose) return pose.error();
+      keys.push_back(Transform<Camera, Patient>::from_matrix(*pose));
+    }
   }
-  return m;
+  if (keys.size() >= 2) return keys;
+  return Error{Errc::bad_format,
+               fmt::format("{}: holds {} poses where a camera's way needs two or more", path.string(), keys.size())};
 }
 
 std::string pose_text(const Eigen::Matrix4d& m) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -127,6 +129,86 @@ TEST(RenderCommand, FilmsAndRestrictsToLabels) {
   expect_refused("birdseye",
                  "render --volume " + ct + " --labels " + labels + " --keep 9 --out " + (scratch / "n.png").string(),
                  {"l.nii.gz", "none of 9"}, scratch / "n.png");
+}
+
+/// All frames of a film, or a picture, as raw RGB.
+std::string rgb_of(const fs::path& path) {
+  const std::string raw = path.string() + ".rgb";
+  const std::string line = "ffmpeg -v error -y -i " + path.string() + " -f rawvideo -pix_fmt rgb24 " + raw;
+  EXPECT_EQ(std::system(line.c_str()), 0) << line;
+  return bytes_of(raw);
+}
+
+double mean_difference(const std::string& a, const std::string& b) {
+  EXPECT_EQ(a.size(), b.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    sum += std::abs(static_cast<std::uint8_t>(a[i]) - static_cast<std::uint8_t>(b[i]));
+  }
+  return sum / static_cast<double>(a.size());
+}
+
+TEST(RenderCommand, FilmsACameraOnItsWayFromTheFirstPoseToTheLast) {
+  const Scratch scratch;
+  const std::string common = "render --volume " + small_ct(scratch) + " --camera " + scratch.file("c.yaml", kCamera) +
+                             " --transfer skin --over " + video_frame(scratch, 64, 48) + " --out ";
+  const std::string first = "1 0 0 -8\n0 1 0 0\n0 0 1 80\n0 0 0 1\n", middle = "1 0 0 0\n0 1 0 4\n0 0 1 70\n0 0 0 1\n",
+                    last = "0 1 0 10\n-1 0 0 0\n0 0 1 50\n0 0 0 1\n";
+  fs::create_directory(scratch / "poses");
+  const std::string pose_a = scratch.file("poses/a.txt", first), pose_b = scratch.file("poses/b.txt", middle),
+                    pose_c = scratch.file("poses/c.txt", last);
+  // The same poses one a line, as the simulator writes them.
+  std::string table = "sequence,world_s,camera_from_patient_00\n";
+  for (std::string pose : {first, middle, last}) {
+    std::replace(pose.begin(), pose.end(), '\n', ' ');
+    table += "7 0.25 " + pose + "\n";
+  }
+  const std::string still_a = (scratch / "a.png").string(), still_c = (scratch / "c.png").string();
+  ASSERT_EQ(run("birdseye", common + still_a + " --pose " + pose_a).code, 0);
+  ASSERT_EQ(run("birdseye", common + still_c + " --pose " + pose_c).code, 0);
+  const std::string a = rgb_of(still_a), c = rgb_of(still_c);
+  for (const std::string& path : {(scratch / "poses").string(), scratch.file("frames.csv", table)}) {
+    const fs::path film = path + ".mp4";
+    const auto filmed = run("birdseye", common + (scratch / "s.png").string() + " --path " + path + " --movie " +
+                                            film.string() + " --seconds 1");
+    ASSERT_EQ(filmed.code, 0) << filmed.output;
+    EXPECT_EQ(rgb_of(scratch / "s.png"), a);
+    const std::string frames = rgb_of(film);
+    ASSERT_EQ(frames.size(), 25 * a.size());
+    // Compression blurs a frame by a few parts of 255; that it is the still, its neighbours being less so, tells.
+    const auto nearest = [&](const std::string& still) {
+      std::vector<double> differences;
+      for (std::size_t at = 0; at < frames.size(); at += still.size()) {
+        differences.push_back(mean_difference(frames.substr(at, still.size()), still));
+      }
+      const auto least = std::min_element(differences.begin(), differences.end());
+      EXPECT_LT(*least, 5);
+      return least - differences.begin();
+    };
+    EXPECT_EQ(nearest(a), 0);
+    EXPECT_EQ(nearest(c), 24);
+  }
+  EXPECT_GT(mean_difference(a, c), 20);
+}
+
+TEST(RenderCommand, RefusesAPathThatIsNone) {
+  const Scratch scratch;
+  const std::string common = "render --volume " + small_ct(scratch) + " --camera " + scratch.file("c.yaml", kCamera) +
+                             " --out " + (scratch / "o.png").string() + " --movie " + (scratch / "o.mp4").string();
+  const std::string one = "1 0 0 0 0 1 0 0 0 0 1 80 0 0 0 1\n";
+  const auto refuse = [&](const std::string& path, const std::vector<std::string>& words) {
+    expect_refused("birdseye", common + " --path " + path, words, scratch / "o.mp4");
+  };
+  refuse((scratch / "none.csv").string(), {"none.csv", "no such file"});
+  refuse(scratch.file("one.csv", one), {"one.csv", "1 poses", "two"});
+  refuse(scratch.file("short.csv", one + "1 0 0 0\n"), {"short.csv", "line 2", "4 numbers"});
+  refuse(scratch.file("skew.csv", one + "1 1 0 0 0 1 0 0 0 0 1 80 0 0 0 1\n"), {"skew.csv", "line 2", "no rigid"});
+  refuse(scratch.file("word.csv", "a,b\n" + one + "c,d\n"), {"word.csv", "line 3", "\"c\""});
+  fs::create_directory(scratch / "empty");
+  refuse((scratch / "empty").string(), {"empty", "0 poses"});
+  const std::string two = scratch.file("two.csv", one + one);
+  refuse(two + " --pose " + scratch.file("p.txt", kIdentity), {"--path", "--pose"});
+  expect_refused("birdseye", "render --volume " + small_ct(scratch) + " --path " + two + " --out o.png", {"--movie"});
 }
 
 TEST(RenderCommand, ShowsTheRealAbdomen) {
