@@ -61,6 +61,11 @@ Result<std::unique_ptr<Engine>> make_gl(std::unique_ptr<GlContext> own, GlContex
                                         const TransferFunction& transfer, const char* what, bool prune) {
   auto renderer = Renderer::create(context, volume, transfer, prune);
   if (!renderer) return renderer.error();
+  if (!context.fault().empty()) {
+    return Error{Errc::unsupported,
+                 fmt::format("OpenGL: {} cannot hold a volume of {}x{}x{} ({}); use --engine cpu", context.renderer(),
+                             volume.size[0], volume.size[1], volume.size[2], context.fault())};
+  }
   return std::unique_ptr<Engine>(
       std::make_unique<GlEngine<Renderer>>(std::move(own), context, *std::move(renderer), what));
 }
@@ -70,9 +75,26 @@ bool is_software(const std::string& renderer) {
          renderer.find("SwiftShader") != std::string::npos;
 }
 
+/// gl or slices; or auto, gl where it is not done in software.
+Result<std::unique_ptr<Engine>> on_card(const std::string& name, const Volume& volume, const TransferFunction& transfer,
+                                        bool prune, GlContext* context) {
+  std::unique_ptr<GlContext> own;
+  if (context == nullptr) {
+    auto made = GlContext::offscreen();
+    if (!made) return made.error();
+    own = *std::move(made);
+    context = own.get();
+  }
+  if (name == "auto" && is_software(context->renderer())) {
+    return Error{Errc::unsupported, "OpenGL is here in software only (" + context->renderer() + ")"};
+  }
+  if (name == "slices") return make_gl<GlSliceRenderer>(std::move(own), *context, volume, transfer, "slices", prune);
+  return make_gl<GlRayCaster>(std::move(own), *context, volume, transfer, "gl", prune);
+}
+
 /// Engines keep two to three times the volume besides it; what does not fit would end us, or be swapped for minutes.
 Result<void> check_memory(const Volume& volume) {
-  const auto needed = 4.0 * static_cast<double>(volume.hu.size()) * sizeof(std::int16_t);
+  const double needed = 4.0 * sizeof(std::int16_t) * volume.size[0] * volume.size[1] * volume.size[2];
   const auto physical = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
   if (needed <= 0.8 * physical) return {};
   return Error{Errc::unsupported,
@@ -92,33 +114,12 @@ Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volum
                                             GlContext* context) {
   if (auto enough = check_memory(volume); !enough) return enough.error();
   const auto on_cpu = [&] { return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune)); };
-  const auto say = [why](const std::string& text) {
-    if (why != nullptr) *why = text;
-  };
   if (name == "cpu") return on_cpu();
-  if (name == "auto" || name == "gl" || name == "slices") {
-    std::unique_ptr<GlContext> own;
-    if (context == nullptr) {
-      auto made = GlContext::offscreen();
-      if (!made && name == "auto") {
-        say("engine cpu: " + made.error().what);
-        return on_cpu();
-      }
-      if (!made) return made.error();
-      own = *std::move(made);
-      context = own.get();
-    }
-    if (name == "auto") {
-      if (is_software(context->renderer())) {
-        say("engine cpu: OpenGL is here in software only (" + context->renderer() + ")");
-        return on_cpu();
-      }
-      say("engine gl: " + context->renderer());
-    }
-    if (name == "slices") {
-      return make_gl<GlSliceRenderer>(std::move(own), *context, volume, transfer, "slices", prune);
-    }
-    return make_gl<GlRayCaster>(std::move(own), *context, volume, transfer, "gl", prune);
+  if (name == "gl" || name == "slices") return on_card(name, volume, transfer, prune, context);
+  if (name == "auto") {
+    auto engine = on_card(name, volume, transfer, prune, context);
+    if (why != nullptr) *why = engine ? "engine " + (*engine)->name() : "engine cpu: " + engine.error().what;
+    return engine ? std::move(engine) : on_cpu();
   }
   return Error{Errc::bad_value, fmt::format("engine \"{}\" is none of {}", name, fmt::join(engine_names(), ", "))};
 }

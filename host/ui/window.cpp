@@ -25,6 +25,7 @@ Window& window_of(GLFWwindow* window) {
 }  // namespace
 
 Result<std::unique_ptr<Window>> Window::open(const std::string& title, int width_px, int height_px) {
+  hush_drivers();
   if (glfwInit() == GLFW_FALSE) {
     return missing("there is no display", "set DISPLAY, or write a picture with --out instead of --window");
   }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "host/render/cpu/ray_caster.hpp"
+#include "host/render/engine.hpp"
 #include "host/render/gl/gl_ray_caster.hpp"
 #include "host/render/gl/gl_slice_renderer.hpp"
 #include "tests/support/render_scene.hpp"
@@ -82,6 +83,37 @@ TEST(GlRayCaster, DrawsNothingOfAnEmptyVolume) {
   const ImageRgba picture = (*caster)->render(lens(), pose(volume), {});
   EXPECT_EQ(std::count(picture.rgba.begin(), picture.rgba.end(), 0), static_cast<std::ptrdiff_t>(picture.rgba.size()));
   EXPECT_EQ(context->fault(), "");
+}
+
+TEST(Engine, EveryOneRefusesAVolumeBeyondMemory) {
+  Volume volume;
+  volume.size = {40'000, 40'000, 40'000};  // its voxels are not asked for
+  for (const std::string& name : engine_names()) {
+    const auto engine = make_engine(name, volume, soft());
+    ASSERT_FALSE(engine) << name;
+    EXPECT_EQ(engine.error().code, Errc::unsupported);
+    EXPECT_NE(engine.error().what.find("40000x40000x40000 needs 512000.0 GB"), std::string::npos)
+        << engine.error().what;
+    EXPECT_NE(engine.error().what.find("resample or crop"), std::string::npos) << engine.error().what;
+  }
+}
+
+TEST(Engine, OfTheCardRefusesAVolumeBeyondItsTexturesAndAutoTakesTheOther) {
+  Volume volume;
+  volume.size = {40'000, 2, 2};
+  volume.hu.assign(160'000, 0);
+  for (const char* name : {"gl", "slices"}) {
+    const auto engine = make_engine(name, volume, soft());
+    ASSERT_FALSE(engine) << name;
+    EXPECT_NE(engine.error().what.find("40000x2x2 is larger than this driver's textures"), std::string::npos)
+        << engine.error().what;
+    EXPECT_NE(engine.error().what.find("--engine cpu"), std::string::npos);
+  }
+  std::string why;
+  const auto engine = make_engine("auto", volume, soft(), &why);
+  ASSERT_TRUE(engine) << engine.error().what;
+  EXPECT_EQ((*engine)->name().substr(0, 4), "cpu,");
+  EXPECT_EQ(why.find("engine cpu: OpenGL"), 0U) << why;
 }
 
 }  // namespace

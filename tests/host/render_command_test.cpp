@@ -98,6 +98,86 @@ TEST(RenderCommand, AWindowSaysWhatItLacks) {
                  {"no.png", "no picture"}, out);
 }
 
+/// Ways in which OpenGL can lack: no library, no vendor in it, no driver for the vendor, too old a driver.
+std::vector<std::pair<std::string, std::string>> absences(const Scratch& scratch) {
+  fs::create_directory(scratch / "lib");
+  const std::string broken = scratch.file("lib/libEGL.so.1", "no library");
+  return {{"env LD_LIBRARY_PATH=" + fs::path(broken).parent_path().string(), "no libEGL.so.1"},
+          {"env __EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent", "no EGL with a surfaceless platform"},
+          {"env LIBGL_DRIVERS_PATH=/nonexistent", "EGL finds no driver"},
+          {"env MESA_GL_VERSION_OVERRIDE=3.3", "the driver has no OpenGL 4.5 core"}};
+}
+
+TEST(RenderCommand, WithoutADriverAutoTakesTheCpuAndSaysSo) {
+  const Scratch scratch;
+  const std::string common = "render --volume " + small_ct(scratch) + " --size 64x48 --out ";
+  ASSERT_EQ(run("birdseye", common + (scratch / "cpu.png").string() + " --engine cpu").code, 0);
+  for (const auto& [absence, missing] : absences(scratch)) {
+    const auto result = run("birdseye", common + (scratch / "auto.png").string() + " --engine auto", absence);
+    ASSERT_EQ(result.code, 0) << result.output;
+    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 2) << result.output;  // and what it drew
+    EXPECT_NE(result.output.find("engine cpu: OpenGL: " + missing), std::string::npos) << result.output;
+    EXPECT_EQ(bytes_of(scratch / "auto.png"), bytes_of(scratch / "cpu.png"));
+  }
+}
+
+TEST(RenderCommand, WithoutADriverTheCardsEnginesSayWhatIsMissing) {
+  const Scratch scratch;
+  const fs::path out = scratch / "o.png";
+  const std::string common = "render --volume " + small_ct(scratch) + " --size 64x48 --out " + out.string();
+  for (const auto& [absence, missing] : absences(scratch)) {
+    for (const std::string engine : {" --engine gl", " --engine slices"}) {
+      expect_refused("birdseye", common + engine, {missing, "install libegl1 and libgl1-mesa-dri", "--engine cpu"}, out,
+                     absence);
+    }
+  }
+}
+
+TEST(RenderCommand, RefusesAVolumeThatDoesNotFitIntoMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers need more address space than the limit leaves";
+#endif
+  const Scratch scratch;
+  const fs::path out = scratch / "o.png";
+  const std::string header =
+      scratch.file("large.nhdr",
+                   "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 3000 3000 1000\n"
+                   "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nkinds: domain domain domain\n"
+                   "endian: little\nencoding: raw\ndata file: large.raw\n");
+  std::ofstream(scratch / "large.raw");
+  fs::resize_file(scratch / "large.raw", 18'000'000'000);  // holes: it takes no room
+  for (const std::string engine : {"cpu", "gl", "slices", "auto"}) {
+    expect_refused("birdseye", "render --volume " + header + " --engine " + engine + " --out " + out.string(),
+                   {"large.nhdr", "more memory than there is", "resample it"}, out, "ulimit -v 8000000;");
+  }
+}
+
+TEST(RenderCommand, RefusesFieldsThatAreNoneInOneLine) {
+  const Scratch scratch;
+  const fs::path out = scratch / "o.png";
+  const std::string ct = small_ct(scratch);
+  const auto refuse = [&](const std::string& field, const std::vector<std::string>& words) {
+    for (const std::string engine : {"cpu", "gl", "slices"}) {
+      expect_refused(
+          "birdseye",
+          "render --volume " + ct + " --deformation " + field + " --engine " + engine + " --out " + out.string(), words,
+          out);
+    }
+  };
+  const std::string labels = (scratch / "labels.nii.gz").string();
+  ASSERT_EQ(run("birdseye", "volume segment " + ct + " --hu 100,300 --out " + labels).code, 0);
+  refuse(push(scratch, 25), {"push25", "folds", "smooth it or lessen it"});
+  refuse(push(scratch, NAN), {"pushnan", "not finite"});
+  refuse(labels, {"labels.nii.gz", "displacement field"});
+  refuse((scratch / "none.mha").string(), {"none.mha", "no such file"});
+  // Flat: no grid that can be trilinear in.
+  DisplacementField flat;
+  flat.size = {5, 5, 1};
+  flat.displacement_mm.assign(25, Eigen::Vector3f::Zero());
+  ASSERT_TRUE(host::write_field(scratch / "flat.mha", flat));
+  refuse((scratch / "flat.mha").string(), {"flat.mha", "give the whole stack"});
+}
+
 TEST(RenderCommand, DrawsThroughALens) {
   const Scratch scratch;
   const std::string ct = small_ct(scratch);
@@ -249,6 +329,17 @@ TEST(RenderCommand, RefusesBadInputInOneLine) {
   refuse("--camera " + scratch.file("skew.yaml", skew) + " --pose " + pose, {"skew.yaml", "skew"});
   refuse("--transfer " + scratch.file("t.json", R"({"points": [{"hu": 1, "rgb": [1, 1, 1], "extinction": 2}]})"),
          {"t.json", "extinction: unknown key"});
+  const auto transfer = [&](const std::string& name, const std::string& points) {
+    return "--transfer " + scratch.file(name, R"({"points": [)" + points + "]}");
+  };
+  const std::string at_100 = R"({"hu": 100, "rgb": [1, 1, 1], "extinction_per_mm": 1})";
+  const std::string at_50 = R"({"hu": 50, "rgb": [1, 1, 1], "extinction_per_mm": 1})";
+  refuse(transfer("falls.json", at_100 + "," + at_50), {"falls.json", "ascend in hu"});
+  refuse(transfer("twice.json", at_100 + "," + at_100), {"twice.json", "ascend in hu"});
+  refuse(transfer("none.json", ""), {"none.json", "no points"});
+  refuse(transfer("dark.json", R"({"hu": 1, "rgb": [1, 1, 1], "extinction_per_mm": -1})"), {"dark.json", "negative"});
+  refuse(transfer("loud.json", R"({"hu": 1, "rgb": [1, 2, 1], "extinction_per_mm": 1})"), {"loud.json", "[0, 1]"});
+  refuse("--transfer " + scratch.file("text.json", "skin"), {"text.json", "JSON"});
   refuse("--transfer livre", {"livre", "liver"});
   refuse("--size big", {"--size"});
 }

@@ -1,9 +1,11 @@
 #include "host/render/gl/gl_context.hpp"
 
+#include <dlfcn.h>
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 
 #include <array>
+#include <cstdlib>
 
 namespace birdseye::host {
 
@@ -34,6 +36,9 @@ class Surfaceless final : public GlContext {
 };
 
 Result<void> Surfaceless::open() {
+  // epoxy ends the program where there is no EGL to load.
+  if (::dlopen("libEGL.so.1", RTLD_LAZY) == nullptr) return missing("no libEGL.so.1");
+  hush_drivers();
   if (!epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless") ||
       !epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base")) {
     return missing("no EGL with a surfaceless platform");
@@ -79,6 +84,10 @@ Result<std::unique_ptr<GlContext>> GlContext::offscreen() {
   auto made = std::make_unique<Surfaceless>();
   if (auto opened = made->open(); !opened) return opened.error();
   return std::unique_ptr<GlContext>(std::move(made));
+}
+
+void GlContext::hush_drivers() {
+  ::setenv("EGL_LOG_LEVEL", "fatal", 0);
 }
 
 void GlContext::begin() {

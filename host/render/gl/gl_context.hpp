@@ -24,6 +24,8 @@ class GlContext {
 
  protected:
   GlContext() = default;
+  /// Before it is made: what is missing is our one line to say, not the drivers'.
+  static void hush_drivers();
   /// Once it is current: asks its name, and listens to its errors.
   void begin();
 

@@ -1,6 +1,8 @@
 #include "host/render/gl/gl_objects.hpp"
 
-#include <array>
+#include <fmt/format.h>
+
+#include <algorithm>
 
 namespace birdseye::host {
 
@@ -43,6 +45,16 @@ GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei heig
     glTextureParameteri(id, wrap, GL_CLAMP_TO_EDGE);
   }
   return GlTexture(id);
+}
+
+Result<void> check_texture_size(const std::array<int, 3>& size) {
+  GLint largest = 0;
+  glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &largest);
+  if (*std::max_element(size.begin(), size.end()) <= largest) return {};
+  return Error{Errc::unsupported,
+               fmt::format("OpenGL: a volume of {}x{}x{} is larger than this driver's textures, {} an axis; "
+                           "use --engine cpu",
+                           size[0], size[1], size[2], largest)};
 }
 
 ImageRgba read_picture(int width_px, int height_px) {

@@ -2,6 +2,7 @@
 
 #include <epoxy/gl.h>
 
+#include <array>
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -56,6 +57,8 @@ using GlProgram = GlObject<DeleteProgram>;
 Result<GlProgram> make_program(std::initializer_list<std::pair<GLenum, std::string>> shaders);
 /// Nearest, clamped, of one level.
 GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei height, GLsizei depth);
+/// Whether the driver has textures of a volume's size; Errc::unsupported.
+Result<void> check_texture_size(const std::array<int, 3>& size);
 /// What the bound framebuffer holds, as 8 bits; row 0 of the picture is the first that the card keeps.
 ImageRgba read_picture(int width_px, int height_px);
 GlBuffer make_buffer(GLsizeiptr bytes, const void* data);

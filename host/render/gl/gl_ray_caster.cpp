@@ -20,11 +20,7 @@ constexpr int kEntries = TransferFunction::kHighestHu - TransferFunction::kLowes
 
 Result<std::unique_ptr<GlRayCaster>> GlRayCaster::create(GlContext& /*context*/, const Volume& volume,
                                                          const TransferFunction& transfer, bool prune) {
-  GLint largest = 0;
-  glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &largest);
-  if (*std::max_element(volume.size.begin(), volume.size.end()) > largest) {
-    return Error{Errc::unsupported, "OpenGL: the volume is larger than this driver's textures; use --engine cpu"};
-  }
+  if (auto fits = check_texture_size(volume.size); !fits) return fits.error();
   std::unique_ptr<GlRayCaster> made(new GlRayCaster(volume, transfer));
   const std::pair<GlProgram*, const char*> computed[] = {{&made->warp_, shaders::kWarp},
                                                          {&made->light_, shaders::kLight},

@@ -32,6 +32,7 @@ Result<std::unique_ptr<GlSliceRenderer>> GlSliceRenderer::create(GlContext& /*co
   if (*std::min_element(n.begin(), n.end()) < 2) {
     return Error{Errc::unsupported, "OpenGL: slices need a volume of two voxels or more along every axis"};
   }
+  if (auto fits = check_texture_size(n); !fits) return fits.error();
   std::unique_ptr<GlSliceRenderer> made(new GlSliceRenderer(volume, transfer, prune));
   auto draw = make_program({{GL_VERTEX_SHADER, shaders::kSliceVertex}, {GL_FRAGMENT_SHADER, shaders::kSliceFragment}});
   if (!draw) return draw.error();
