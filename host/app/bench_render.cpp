@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
+#include <tbb/global_control.h>
 #include <tbb/info.h>
 
 #include <algorithm>
@@ -31,6 +32,7 @@ struct Options {
   std::filesystem::path json, pictures, scene;
   std::vector<std::string> engines{"cpu"};
   int frames = 15;
+  int threads = 0;  ///< 0: all cores
   bool large = false;
   std::vector<int> levels{0, 1, 2, 3, 4, 5};
   std::vector<std::string> phantoms{"liver", "torso"};
@@ -111,10 +113,12 @@ Result<nlohmann::json> bench_engine(const Case& c, const Options& options, const
   const CameraModel camera = bench_camera(kWidth_px, kHeight_px);
   RenderSettings settings;
   settings.step_mm = c.step_mm;
-  const auto frame = [&](double azimuth_deg) {
-    if (level.field) engine.deform(*level.field);
-    return engine.render(camera, bench_pose(azimuth_deg), settings);
+  const auto frame = [&](double azimuth_deg) { return engine.render(camera, bench_pose(azimuth_deg), settings); };
+  const auto deforming_frame = [&](double azimuth_deg) {
+    engine.deform(*level.field);
+    return frame(azimuth_deg);
   };
+  if (level.field) engine.deform(*level.field);
   const double error = mean_error(frame(0), level.reference, kStride);
   const Timing timing = time_frames(options.frames, frame);
   if (const std::string fault = engine.fault(); !fault.empty()) return Error{Errc::io, engine.name() + ": " + fault};
@@ -130,13 +134,19 @@ Result<nlohmann::json> bench_engine(const Case& c, const Options& options, const
                         {"cpu_ms_median", timing.cpu_ms},
                         {"fps", 1e3 / timing.frame_ms},
                         {"mean_abs_error_255", error}};
+  std::string deforming;
+  if (level.field) {
+    const double ms = time_frames(options.frames, deforming_frame).frame_ms;
+    row["deforming_frame_ms_median"] = ms;
+    deforming = fmt::format("  {:7.2f} ms deforming", ms);
+  }
   if (engine.bytes() > 0) {
     row["memory_ratio"] = static_cast<double>(engine.bytes()) / (2.0 * static_cast<double>(volume.hu.size()));
   }
   fmt::print(
-      "{:12.12}  {:5}  {:11}  level {}  {:5} free  {:8}  {:8.2f} ms  {:8.2f} ms CPU  {:6.1f} fps  error {:.3f}\n",
+      "{:12.12}  {:5}  {:11}  level {}  {:5} free  {:8}  {:8.2f} ms  {:8.2f} ms CPU  {:6.1f} fps  error {:.3f}{}\n",
       engine.name(), c.phantom, row["volume"].get<std::string>(), level.number, level.free_vertices,
-      pruned ? "pruned" : "unpruned", timing.frame_ms, timing.cpu_ms, 1e3 / timing.frame_ms, error);
+      pruned ? "pruned" : "unpruned", timing.frame_ms, timing.cpu_ms, 1e3 / timing.frame_ms, error, deforming);
   std::fflush(stdout);
   return row;
 }
@@ -227,6 +237,9 @@ Result<ExitCode> bench_render(const Options& options) {
     if (error)
       return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", folder.string())};
   }
+  const auto threads =
+      static_cast<std::size_t>(options.threads > 0 ? options.threads : tbb::info::default_concurrency());
+  const tbb::global_control at_most(tbb::global_control::max_allowed_parallelism, threads);
   nlohmann::json rows = nlohmann::json::array();
   std::vector<Case> cases;
   for (const std::string& phantom : options.phantoms) {
@@ -259,6 +272,7 @@ Result<ExitCode> bench_render(const Options& options) {
   const nlohmann::json json = {{"rows", rows},
                                {"machine",
                                 {{"cores", tbb::info::default_concurrency()},
+                                 {"threads", threads},
                                  {"isa", cpu::name_of(cpu::supported_isas().back())},
                                  {"kernel", machine.release}}},
                                {"verdict", verdict},
@@ -276,6 +290,7 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");
   render.add_option("--frames", options->frames, "frames a row (default 15)")->check(CLI::Range(3, 1000));
+  render.add_option("--threads", options->threads, "of the cpu engine (default all cores)")->check(CLI::Range(1, 1024));
   render.add_option("--engine", options->engines, "these engines: cpu, gl, slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));
   render.add_option("--pictures", options->pictures, "folder for a picture of each level, cut open");

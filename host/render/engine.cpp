@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 
 #include "host/render/cpu/ray_caster.hpp"
@@ -103,6 +104,19 @@ Result<void> check_memory(const Volume& volume) {
                            volume.size[0], volume.size[1], volume.size[2], needed / 1e9, physical / 1e9)};
 }
 
+/// What the inner loops can count.
+Result<void> check_size(const Volume& volume) {
+  const auto row = static_cast<std::int64_t>(volume.size[0]) + 2;
+  const std::int64_t slice = row * (volume.size[1] + 2) + cpu::kSliceUnit;
+  const bool fits = row <= cpu::kLongestRow && volume.size[1] < cpu::kLongestRow && volume.size[2] < cpu::kLongestRow &&
+                    slice / cpu::kSliceUnit <= cpu::kLongestRow &&
+                    slice * (volume.size[2] + 2) <= std::numeric_limits<std::int32_t>::max();
+  if (fits) return {};
+  return Error{Errc::unsupported, fmt::format("a volume of {}x{}x{} is larger than the cpu engine draws; resample or "
+                                              "crop it",
+                                              volume.size[0], volume.size[1], volume.size[2])};
+}
+
 }  // namespace
 
 std::vector<std::string> engine_names() {
@@ -113,7 +127,10 @@ Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volum
                                             const TransferFunction& transfer, std::string* why, bool prune,
                                             GlContext* context) {
   if (auto enough = check_memory(volume); !enough) return enough.error();
-  const auto on_cpu = [&] { return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune)); };
+  const auto on_cpu = [&]() -> Result<std::unique_ptr<Engine>> {
+    if (auto fits = check_size(volume); !fits) return fits.error();
+    return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune));
+  };
   if (name == "cpu") return on_cpu();
   if (name == "gl" || name == "slices") return on_card(name, volume, transfer, prune, context);
   if (name == "auto") {

@@ -100,12 +100,12 @@ TEST(Engine, EveryOneRefusesAVolumeBeyondMemory) {
 
 TEST(Engine, OfTheCardRefusesAVolumeBeyondItsTexturesAndAutoTakesTheOther) {
   Volume volume;
-  volume.size = {40'000, 2, 2};
-  volume.hu.assign(160'000, 0);
+  volume.size = {30'000, 2, 2};
+  volume.hu.assign(120'000, 0);
   for (const char* name : {"gl", "slices"}) {
     const auto engine = make_engine(name, volume, soft());
     ASSERT_FALSE(engine) << name;
-    EXPECT_NE(engine.error().what.find("40000x2x2 is larger than this driver's textures"), std::string::npos)
+    EXPECT_NE(engine.error().what.find("30000x2x2 is larger than this driver's textures"), std::string::npos)
         << engine.error().what;
     EXPECT_NE(engine.error().what.find("--engine cpu"), std::string::npos);
   }
@@ -114,6 +114,15 @@ TEST(Engine, OfTheCardRefusesAVolumeBeyondItsTexturesAndAutoTakesTheOther) {
   ASSERT_TRUE(engine) << engine.error().what;
   EXPECT_EQ((*engine)->name().substr(0, 4), "cpu,");
   EXPECT_EQ(why.find("engine cpu: OpenGL"), 0U) << why;
+}
+
+TEST(Engine, OfTheProcessorRefusesAVolumeThatItsLoopsCannotCount) {
+  Volume volume;
+  volume.size = {40'000, 2, 2};
+  volume.hu.assign(160'000, 0);
+  const auto engine = make_engine("cpu", volume, soft());
+  ASSERT_FALSE(engine);
+  EXPECT_NE(engine.error().what.find("40000x2x2 is larger than the cpu engine draws"), std::string::npos);
 }
 
 }  // namespace

@@ -16,12 +16,19 @@ inline constexpr int kSeenBrick = 128;
 
 inline constexpr int kLowestHu = -1024, kHighestHu = 3071;  ///< what HU are cut to: those of a transfer function
 
-/// Voxels of 32 bits: HU - kLowestHu (16), shade (8), highlight (8). A border of one voxel, a copy of the
+/// Voxels from one slice to the next are a multiple of this.
+inline constexpr int kSliceUnitBits = 8, kSliceUnit = 1 << kSliceUnitBits;
+/// Rows of a slice, and slices by kSliceUnit, are at most so long: they are multiplied in 16 bits.
+inline constexpr int kLongestRow = 32767;
+inline constexpr int kHuBits = 4;                        ///< HU are kept times 16, in 16 bits
+inline constexpr float kLightUnit = 1.0F / (255 * 127);  ///< of a sample's shade and highlight
+
+/// Voxels of 32 bits: 16 (HU - kLowestHu) (16), shade (8), highlight (8). A border of one voxel, a copy of the
 /// nearest, surrounds them, so that neighbours and cells need no clamping.
 struct GridView {
   std::uint32_t* voxels = nullptr;  ///< voxel (0, 0, 0)
   int size[3] = {};
-  std::int64_t row = 0, slice = 0;         ///< voxels from one to the next along y and z
+  std::int64_t row = 0, slice = 0;         ///< voxels from one to the next along y and z; see kSliceUnit
   const std::uint8_t* distance = nullptr;  ///< of each brick, see kSeenBrick
   int bricks[3] = {};
 };
@@ -31,6 +38,7 @@ struct CastJob {
   GridView grid;
   /// Blocks of 4x4 pixels: 16 x, 16 y, 16 z; unit, camera frame; zero where the lens does not see.
   const float* directions = nullptr;
+  const float* ranges = nullptr;  ///< of each block: from where to where anything is seen, mm; none where to < from
   int width_px = 0, height_px = 0, blocks_per_row = 0;
   float origin[3] = {};                 ///< of the rays, voxels
   float voxels_from_camera[3][3] = {};  ///< row by row

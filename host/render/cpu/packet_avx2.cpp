@@ -1,6 +1,7 @@
 #include <immintrin.h>
 
 #include "host/render/cpu/packet_kernels.hpp"
+#include "host/render/cpu/packet_sample.hpp"
 
 namespace birdseye::host::cpu {
 
@@ -40,6 +41,7 @@ struct Avx2 {
   static F as_float(I a) { return _mm256_castsi256_ps(a); }
 
   static I add(I a, I b) { return _mm256_add_epi32(a, b); }
+  static I subtract(I a, I b) { return _mm256_sub_epi32(a, b); }
   static I multiply(I a, I b) { return _mm256_mullo_epi32(a, b); }
   static I intersect(I a, I b) { return _mm256_and_si256(a, b); }
   static I unite(I a, I b) { return _mm256_or_si256(a, b); }
@@ -72,72 +74,50 @@ struct Avx2 {
   static I gather_halves(const std::int16_t* base, I index, M m) {
     return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), reinterpret_cast<const int*>(base), index, m.lanes, 2);
   }
-  static void gather_pair(const std::uint64_t* base, I index, M m, I& low, I& high) {
-    const Pairs p = gather_64<8>(base, index, m);
-    low = evens(p);
-    high = odds(p);
+  using Blended = BlendedBytes<Avx2>;
+  static Blended blend(const GridView& grid, I x, I y, I z, M m) { return blend_bytes<Avx2>(grid, x, y, z, m); }
+  static Sample<Avx2> classify(const std::uint64_t* transfer, const Blended& blended) {
+    return classify_bytes<Avx2>(transfer, blended);
   }
 
-  static void sample(const GridView& grid, I index, I x, I y, I z, M m, I& entry, F& shade, F& highlight) {
-    // HU HU' | shade shade' highlight highlight', of the two voxels.
-    const I order = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 4, 5, 2, 6, 3, 7, 8, 9, 12, 13, 10, 14, 11, 15));
-    const I both = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 0, 1, 4, 5, 4, 5, 8, 9, 8, 9, 12, 13, 12, 13));
-    const auto pair_weights = [](I part) {
-      const I w = _mm256_srli_epi32(part, 1);
-      return _mm256_add_epi32(i(16384), _mm256_sub_epi32(_mm256_slli_epi32(w, 16), w));
-    };
-    const I value_weights = pair_weights(x);
-    // 127 - w and w, twice: in 16 bits, 127 + 255 w.
-    const I light_weights = _mm256_add_epi16(
-        _mm256_set1_epi16(127),
-        _mm256_mullo_epi16(_mm256_shuffle_epi8(_mm256_srli_epi32(x, 8), both), _mm256_set1_epi16(255)));
-    I values[4];
-    I lights[4];
-    for (int n = 0; n < 4; ++n) {
-      const std::uint32_t* const base = grid.voxels + (n & 1) * grid.row + (n >> 1) * grid.slice;
-      Pairs p = gather_64<4>(base, index, m);
-      p.first = _mm256_shuffle_epi8(p.first, order);
-      p.second = _mm256_shuffle_epi8(p.second, order);
-      values[n] = _mm256_madd_epi16(evens(p), value_weights);
-      lights[n] = _mm256_maddubs_epi16(odds(p), light_weights);
-    }
-    const I wy = _mm256_shuffle_epi8(y, both);
-    const I wz = _mm256_shuffle_epi8(z, both);
-    const auto blend = [](I a, I b, I t) {
-      return _mm256_add_epi16(a, _mm256_mulhrs_epi16(_mm256_sub_epi16(b, a), t));
-    };
-    // Both rows of a slice in one: eighths of HU in 16 bits each.
-    const auto halves = [](I low, I high) {
-      return _mm256_blend_epi16(_mm256_srli_epi32(low, 11), _mm256_slli_epi32(high, 5), 0xAA);
-    };
-    const I slices = blend(halves(values[0], values[2]), halves(values[1], values[3]), wy);
-    entry = _mm256_srli_epi32(_mm256_add_epi32(_mm256_madd_epi16(slices, pair_weights(z)), i(1 << 16)), 17);
-    const I lit = blend(blend(lights[0], lights[1], wy), blend(lights[2], lights[3], wy), wz);
-    constexpr float kUnit = 1.0F / (255 * 127);
-    shade = to_float(intersect(lit, i(0xFFFF))) * f(kUnit / 1023);
-    highlight = to_float(_mm256_srli_epi32(lit, 16)) * f(kUnit);
+  // For blend_bytes: lanes 0, 1, 4, 5 are the first half, 2, 3, 6, 7 the second, as shuffle_ps has them.
+  struct Halves {
+    __m128i first, second;
+  };
+  static Halves halves(I index) {
+    const I split = _mm256_permutevar8x32_epi32(index, _mm256_setr_epi32(0, 1, 4, 5, 2, 3, 6, 7));
+    return {_mm256_castsi256_si128(split), _mm256_extracti128_si256(split, 1)};
+  }
+  static I gather_64(const std::uint32_t* base, __m128i index) {
+    return _mm256_i32gather_epi64(reinterpret_cast<const long long*>(base), index, 4);
+  }
+  static I gather_table(const std::uint64_t* base, I index) {
+    return _mm256_i64gather_epi64(reinterpret_cast<const long long*>(base), index, 8);
+  }
+  static I evens(I first, I second) { return shuffled<0x88>(first, second); }
+  static I odds(I first, I second) { return shuffled<0xDD>(first, second); }
+  static I keep(M m, I a) { return _mm256_and_si256(m.lanes, a); }
+  static I bytes(__m128i pattern) { return _mm256_broadcastsi128_si256(pattern); }
+  static I i_16(short value) { return _mm256_set1_epi16(value); }
+  static I i_64(long long value) { return _mm256_set1_epi64x(value); }
+  static I shuffle(I a, I pattern) { return _mm256_shuffle_epi8(a, pattern); }
+  static I half_16(I a) { return _mm256_srli_epi16(a, 1); }
+  static I add_16(I a, I b) { return _mm256_add_epi16(a, b); }
+  static I subtract_16(I a, I b) { return _mm256_sub_epi16(a, b); }
+  static I multiply_16(I a, I b) { return _mm256_mullo_epi16(a, b); }
+  static I scale_16(I a, I b) { return _mm256_mulhrs_epi16(a, b); }
+  static I multiply_add(I a, I b) { return _mm256_madd_epi16(a, b); }
+  static I multiply_add_bytes(I a, I b) { return _mm256_maddubs_epi16(a, b); }
+  template <int Bits>
+  static I shift_right_64(I a) {
+    return _mm256_srli_epi64(a, Bits);
   }
 
  private:
-  struct Pairs {
-    I first, second;  ///< of lanes 0 to 3 and 4 to 7
-  };
-  template <int Scale, typename T>
-  static Pairs gather_64(const T* base, I index, M m) {
-    const auto* const at = reinterpret_cast<const long long*>(base);
-    const I zero = _mm256_setzero_si256();
-    return {_mm256_mask_i32gather_epi64(zero, at, _mm256_castsi256_si128(index),
-                                        _mm256_cvtepi32_epi64(_mm256_castsi256_si128(m.lanes)), Scale),
-            _mm256_mask_i32gather_epi64(zero, at, _mm256_extracti128_si256(index, 1),
-                                        _mm256_cvtepi32_epi64(_mm256_extracti128_si256(m.lanes, 1)), Scale)};
-  }
   template <int Which>
-  static I every_other(const Pairs& p) {
-    const __m256 picked = _mm256_shuffle_ps(_mm256_castsi256_ps(p.first), _mm256_castsi256_ps(p.second), Which);
-    return _mm256_permute4x64_epi64(_mm256_castps_si256(picked), 0xD8);
+  static I shuffled(I first, I second) {
+    return _mm256_castps_si256(_mm256_shuffle_ps(_mm256_castsi256_ps(first), _mm256_castsi256_ps(second), Which));
   }
-  static I evens(const Pairs& p) { return every_other<0x88>(p); }
-  static I odds(const Pairs& p) { return every_other<0xDD>(p); }
 };
 
 constexpr Kernels kKernels = make_kernels<Avx2>();

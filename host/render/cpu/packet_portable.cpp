@@ -63,13 +63,9 @@ struct Portable {
   }
   static I round(F a) { return truncate(floor(a + 0.5F)); }
   static F to_float(I a) { return __builtin_convertvector(a, F); }
-  static F as_float(I a) {
-    F out;
-    __builtin_memcpy(&out, &a, sizeof out);
-    return out;
-  }
 
   static I add(I a, I b) { return a + b; }
+  static I subtract(I a, I b) { return a - b; }
   static I multiply(I a, I b) { return a * b; }
   static I intersect(I a, I b) { return a & b; }
   static I unite(I a, I b) { return a | b; }
@@ -110,36 +106,40 @@ struct Portable {
       return two;
     });
   }
-  static void gather_pair(const std::uint64_t* base, I index, M m, I& low, I& high) {
-    for (int n = 0; n < kLanes; ++n) {
-      const std::uint64_t both = m.lanes[n] != 0 ? base[index[n]] : 0;
-      low[n] = static_cast<int>(both & 0xFFFFFFFF);
-      high[n] = static_cast<int>(both >> 32U);
-    }
-  }
-
-  static void sample(const GridView& grid, I index, I x, I y, I z, M m, I& entry, F& shade, F& highlight) {
-    const I zero = {};
-    const auto part = [](I t) { return to_float(t) * (1.0F / 32768); };
-    F value{};
-    shade = highlight = F{};
+  struct Blended {
+    I entry;
+    F shade, highlight;
+  };
+  static Blended blend(const GridView& grid, I x, I y, I z, M m) {
+    const auto part = [](I t) { return to_float(t & 0xFFFF) * (1.0F / 65536); };
+    F value{}, shade{}, highlight{};
     for (int n = 0; n < 4; ++n) {
-      const std::uint32_t* const base = grid.voxels + (n & 1) * grid.row + (n >> 1) * grid.slice;
-      I a = zero, b = zero;
+      I a{}, b{};
       for (int lane = 0; lane < kLanes; ++lane) {
         if (m.lanes[lane] == 0) continue;
-        a[lane] = static_cast<int>(base[index[lane]]);
-        b[lane] = static_cast<int>(base[index[lane] + 1]);
+        const std::uint32_t* const voxel = grid.voxels + (x[lane] >> 16) + ((y[lane] >> 16) + (n & 1)) * grid.row +
+                                           ((z[lane] >> 16) + (n >> 1)) * grid.slice;
+        a[lane] = static_cast<int>(voxel[0]);
+        b[lane] = static_cast<int>(voxel[1]);
       }
       const F weight = ((n & 1) != 0 ? part(y) : 1 - part(y)) * ((n >> 1) != 0 ? part(z) : 1 - part(z));
-      const auto blend = [&](I from, I to) { return weight * (to_float(from) + part(x) * to_float(to - from)); };
-      value += blend(a & 0xFFFF, b & 0xFFFF);
-      shade += blend((a >> 16) & 255, (b >> 16) & 255);
-      highlight += blend((a >> 24) & 255, (b >> 24) & 255);
+      const auto along_x = [&](I from, I to) { return weight * (to_float(from) + part(x) * to_float(to - from)); };
+      value += along_x((a & 0xFFFF) >> kHuBits, (b & 0xFFFF) >> kHuBits);
+      shade += along_x((a >> 16) & 255, (b >> 16) & 255);
+      highlight += along_x((a >> 24) & 255, (b >> 24) & 255);
     }
-    entry = round(value);
-    shade *= 1.0F / 255 / 1023;
-    highlight *= 1.0F / 255;
+    return {round(value), shade * (1.0F / 255 / kLightUnit), highlight * (1.0F / 255 / kLightUnit)};
+  }
+  static Sample<Portable> classify(const std::uint64_t* transfer, const Blended& blended) {
+    Sample<Portable> out;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const std::uint64_t both = transfer[blended.entry[lane]];
+      out.opacity[lane] = __builtin_bit_cast(float, static_cast<std::uint32_t>(both));
+      out.colour[lane] = static_cast<int>(both >> 32U);
+    }
+    out.shade = blended.shade;
+    out.highlight = blended.highlight;
+    return out;
   }
 };
 

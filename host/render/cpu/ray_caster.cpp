@@ -48,6 +48,7 @@ LensRays::LensRays(const CameraModel& camera) : camera_(camera) {
       for (int axis = 0; axis < 3; ++axis) at[16 * axis + pixel] = unit[axis];
     }
   });
+  ranges_.emplace(directions_.data(), blocks_per_row(), blocks());
 }
 
 RayCaster::RayCaster(const Volume& volume, const TransferFunction& transfer, cpu::Isa isa, bool prune)
@@ -67,6 +68,9 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   cpu::CastJob job;
   job.grid = grid_.view();
   job.directions = rays.directions();
+  const std::vector<float> ranges =
+      rays.ranges().of(job.grid, Eigen::Affine3d(camera_from_patient.matrix()) * volume_.patient_from_voxel);
+  job.ranges = ranges.data();
   job.width_px = camera.width_px;
   job.height_px = camera.height_px;
   job.blocks_per_row = rays.blocks_per_row();

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/render/cpu/seen_ranges.hpp"
 #include "host/render/cpu/voxel_grid.hpp"
 #include "host/render/scene.hpp"
 #include "host/render/transfer_function.hpp"
@@ -22,10 +24,12 @@ class LensRays {
   [[nodiscard]] int blocks_per_row() const { return (camera_.width_px + 3) / 4; }
   [[nodiscard]] int blocks() const { return blocks_per_row() * ((camera_.height_px + 3) / 4); }
   [[nodiscard]] const float* directions() const { return directions_.data(); }
+  [[nodiscard]] const cpu::SeenRanges& ranges() const { return *ranges_; }
 
  private:
   CameraModel camera_;
   std::vector<float> directions_;
+  std::optional<cpu::SeenRanges> ranges_;
 };
 
 /// Renders a volume by casting rays, in packets, on all cores. Whatever the transfer function does not show is leapt

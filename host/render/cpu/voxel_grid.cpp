@@ -36,7 +36,7 @@ VoxelGrid::VoxelGrid(const Volume& volume, const TransferFunction& transfer, con
     view_.bricks[axis] = bricks_[axis];
   }
   view_.row = volume.size[0] + 2;
-  view_.slice = view_.row * (volume.size[1] + 2);
+  view_.slice = (view_.row * (volume.size[1] + 2) + kSliceUnit - 1) / kSliceUnit * kSliceUnit;
   constexpr std::size_t kPastTheEnd = 64;  // packets read past the last voxel, and use nothing of it
   voxels_.resize(static_cast<std::size_t>(view_.slice) * static_cast<std::size_t>(volume.size[2] + 2) + kPastTheEnd);
   view_.voxels = voxels_.data() + view_.slice + view_.row + 1;
@@ -55,7 +55,7 @@ void VoxelGrid::undeform() {
         const std::int16_t* const from = &volume_.hu[volume_.index(0, y, z)];
         std::uint32_t* const to = voxel_row(y, z);
         for (int x = 0; x < n[0]; ++x)
-          to[x] = static_cast<std::uint32_t>(std::clamp<int>(from[x], kLowestHu, kHighestHu) - kLowestHu);
+          to[x] = static_cast<std::uint32_t>(std::clamp<int>(from[x], kLowestHu, kHighestHu) - kLowestHu) << kHuBits;
       }
     });
     copy_border();
@@ -83,21 +83,24 @@ void VoxelGrid::copy_border() {
 
 /// Of a row of voxels, the tiles that seen bricks need when a brick needs its voxels and `margin` more on either side.
 void VoxelGrid::tiles_of_row(int y, int z, int margin, std::uint8_t* tiles) const {
-  const int nx = tiles_[0];
-  std::fill(tiles, tiles + nx, std::uint8_t{0});
+  const int nx = bricks_[0];
   // Brick b has voxels 4b to 4b + 4.
   const auto first = [margin](int voxel) { return std::max(0, (voxel - margin - 1) / kBrick); };
   const auto last = [margin](int voxel, int bricks) { return std::min(bricks - 1, (voxel + margin) / kBrick); };
+  std::fill(tiles, tiles + tiles_[0], std::uint8_t{0});
   for (int bk = first(z); bk <= last(z, bricks_[2]); ++bk) {
     for (int bj = first(y); bj <= last(y, bricks_[1]); ++bj) {
       const std::uint8_t* const bricks = &seen_[grid_index(bricks_, 0, bj, bk)];
-      for (int bi = 0; bi < bricks_[0]; ++bi) {
-        if (bricks[bi] == 0) continue;
-        if (margin > 0 && bi > 0) tiles[bi - 1] = 1;
-        tiles[bi] = 1;
-        if (bi + 1 < nx) tiles[bi + 1] = 1;
-      }
+      for (int bi = 0; bi < nx; ++bi) tiles[bi] |= bricks[bi];
     }
+  }
+  // A brick reaches into the tile after it, and with a margin into the one before it.
+  std::uint8_t before = 0;
+  for (int tile = 0; tile < tiles_[0]; ++tile) {
+    const std::uint8_t here = tiles[tile];
+    const std::uint8_t after = margin > 0 && tile + 1 < nx ? tiles[tile + 1] : std::uint8_t{0};
+    tiles[tile] = here | before | after;
+    before = here;
   }
 }
 
@@ -329,7 +332,9 @@ void VoxelGrid::light(const Eigen::Vector3d& eye_in_patient_mm, const RenderSett
   const Eigen::Affine3d& patient_from_voxel = volume_.patient_from_voxel;
   copy(Eigen::Matrix3f(patient_from_voxel.linear().cast<float>()), job.patient_from_voxel);
   copy(Eigen::Vector3f((patient_from_voxel.translation() - eye_in_patient_mm).cast<float>()), job.first_from_eye_mm);
-  copy(Eigen::Matrix3f((0.5 * patient_from_voxel.linear().inverse().transpose()).cast<float>()), job.patient_gradient);
+  constexpr double kPerStored = 0.5 / (1 << kHuBits);
+  copy(Eigen::Matrix3f((kPerStored * patient_from_voxel.linear().inverse().transpose()).cast<float>()),
+       job.patient_gradient);
   job.per_surface_gradient = static_cast<float>(1 / settings.surface_gradient_hu_per_mm);
   job.ambient = static_cast<float>(settings.ambient);
   job.diffuse = static_cast<float>(settings.diffuse);

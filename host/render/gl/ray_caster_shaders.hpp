@@ -183,10 +183,13 @@ void main() {
     vec4 c = texelFetch(transfer, ivec2(hu & 63, hu >> 6), 0);
     if (c.a == 0) continue;
     vec2 lit = texture(light, (x + 0.5) / vec3(size)).rg;
-    sum += through * c.a * min(c.rgb * lit.r + lit.g, vec3(1));
+    sum += through * c.a * (c.rgb * lit.r + lit.g);
     through *= 1 - c.a;
   }
-  colour = through < 1.0 / 64 ? vec4(sum / (1 - through), 1) : vec4(sum, 1 - through);
+  float covered = 1 - through;
+  bool opaque = through < 1.0 / 64;
+  colour = vec4(opaque ? sum / covered : sum, opaque ? 1 : covered);
+  colour.rgb = min(colour.rgb, colour.a);
 }
 )";
 

@@ -129,7 +129,7 @@ std::vector<double> render_reference(const Volume& scan, const TransferFunction&
         const double highlight =
             trilinear(volume, x, [&](int i, int j, int k) { return lights[volume.index(i, j, k)].highlight; });
         const Vector3d rgb(static_cast<double>(entry.r), static_cast<double>(entry.g), static_cast<double>(entry.b));
-        c += t * a * (rgb * shade + Vector3d::Constant(highlight)).cwiseMin(1.0);
+        c += t * a * (rgb * shade + Vector3d::Constant(highlight));
         t *= 1 - a;
       }
       if (t < 1.0 / 64) {
@@ -137,7 +137,7 @@ std::vector<double> render_reference(const Volume& scan, const TransferFunction&
         t = 0;
       }
       double* const pixel = &out[static_cast<std::size_t>(row * columns + column) * 4];
-      for (int channel = 0; channel < 3; ++channel) pixel[channel] = c[channel];
+      for (int channel = 0; channel < 3; ++channel) pixel[channel] = std::min(c[channel], 1 - t);
       pixel[3] = 1 - t;
     }
   });
