@@ -1,6 +1,5 @@
 #include "hw-sim/camera/laparoscope.hpp"
 
-#include <embree3/rtcore.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -8,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hw-sim/camera/embree_scene.hpp"
 #include "hw-sim/camera/solid_noise.hpp"
 #include "hw-sim/phantom/grid.hpp"
 
@@ -22,6 +22,7 @@ constexpr int kPacket = 8;
 /// What a ray meets: where, in the scene's frame, and the surface's normal there (unit, towards the camera).
 struct Hit {
   Vector3f point, normal;
+  Vector3f rest;  ///< the point before the organ was deformed, where its texture is
   float distance = 0;
   unsigned geometry = RTC_INVALID_GEOMETRY_ID;
 };
@@ -32,55 +33,21 @@ struct Surface {
   float gloss = 0;
 };
 
-enum CavityGeometry : unsigned { kLiverGeometry = 0, kWallGeometry = 1 };
+enum CavityGeometry : unsigned { kOrganGeometry = 0, kWallGeometry = 1 };
 
-class EmbreeScene {
- public:
-  explicit EmbreeScene(RTCDevice device) : device_(device), scene_(rtcNewScene(device)) {}
-  ~EmbreeScene() { rtcReleaseScene(scene_); }
-  EmbreeScene(const EmbreeScene&) = delete;
-  EmbreeScene& operator=(const EmbreeScene&) = delete;
-
-  void add(const Mesh& mesh, unsigned id) {
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                          3 * sizeof(float), mesh.vertices.size()));
-    for (const Vector3f& p : mesh.vertices) v = std::copy_n(p.data(), 3, v);
-    auto* t = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                             3 * sizeof(unsigned), mesh.triangles.size()));
-    for (const auto& triangle : mesh.triangles) t = std::copy(triangle.begin(), triangle.end(), t);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene_, geometry, id);
-    rtcReleaseGeometry(geometry);
-    smooth_.resize(std::max<std::size_t>(smooth_.size(), id + 1));
-    smooth_[id] = {mesh.triangles, mesh.normals};
-  }
-  /// The normal at a hit: between those of the vertices where the mesh has them, else that of the triangle.
-  [[nodiscard]] Vector3f normal(const RTCRayHit8& packet, int lane) const {
-    const Smooth& mesh = smooth_[packet.hit.geomID[lane]];
-    if (mesh.normals.empty()) return {packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]};
-    const auto& t = mesh.triangles[packet.hit.primID[lane]];
-    const float u = packet.hit.u[lane];
-    const float v = packet.hit.v[lane];
-    return (1 - u - v) * mesh.normals[t[0]] + u * mesh.normals[t[1]] + v * mesh.normals[t[2]];
-  }
-  void commit() { rtcCommitScene(scene_); }
-  [[nodiscard]] RTCScene get() const { return scene_; }
-
- private:
-  struct Smooth {
-    std::vector<std::array<std::uint32_t, 3>> triangles;
-    std::vector<Vector3f> normals;
-  };
-  RTCDevice device_;
-  RTCScene scene_;
-  std::vector<Smooth> smooth_;  ///< by geometry id
-};
+constexpr float kReferenceMm = 100;  // where a lamp of strength one gives light of strength one
 
 class EmbreeLaparoscope final : public Laparoscope {
  public:
-  EmbreeLaparoscope(const CameraModel& camera, std::uint64_t seed, RTCDevice device)
-      : camera_(camera), seed_(seed), device_(device), texture_(seed + 31) {
+  EmbreeLaparoscope(const LaparoscopeSettings& settings, RTCDevice device)
+      : camera_(settings.lens),
+        lamp_(settings.lamp_in_camera_mm.cast<float>()),
+        exposure_(static_cast<float>(1.55 * std::pow(settings.well_lit_mm / kReferenceMm, 2))),
+        noise_level_(static_cast<float>(settings.noise)),
+        seed_(settings.seed),
+        device_(device),
+        texture_(settings.seed + 31) {
+    const CameraModel& camera = camera_;
     const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
     rays_.resize(pixels);
     light_.resize(pixels, Vector3f::Zero());
@@ -97,7 +64,7 @@ class EmbreeLaparoscope final : public Laparoscope {
         rays_[at] = ray ? Vector3f(ray->normalized().cast<float>()) : Vector3f(0, 0, 1);
       }
     }
-    for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = static_cast<float>(hashed_normal(seed + 32, i));
+    for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = static_cast<float>(hashed_normal(seed_ + 32, i));
     for (std::size_t i = 0; i < gamma_.size(); ++i) {
       const double share = static_cast<double>(i) / static_cast<double>(gamma_.size() - 1);
       gamma_[i] = static_cast<std::uint8_t>(std::lround(255.0 * std::pow(share, 1 / 2.2)));
@@ -109,15 +76,17 @@ class EmbreeLaparoscope final : public Laparoscope {
     rtcReleaseDevice(device_);
   }
 
-  void set_cavity(const Mesh& liver, const Eigen::Vector3d& centre) override {
+  void set_cavity(const Cavity& cavity) override {
     traced_scene_ = nullptr;
+    coat_ = cavity.coat;
     cavity_ = std::make_unique<EmbreeScene>(device_);
-    cavity_->add(liver, kLiverGeometry);
-    const Vector3f c = centre.cast<float>();
-    const Field wall = [&](const Eigen::Vector3d& p) { return (p - c.cast<double>()).norm() - 300.0; };
-    cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(centre - Eigen::Vector3d::Constant(330),
-                                                                  centre + Eigen::Vector3d::Constant(330), 20))),
-                 kWallGeometry);
+    cavity_->add(cavity.organ, kOrganGeometry, cavity.rest_mm);
+    if (cavity.wall_centre_mm) {
+      const Eigen::Vector3d& c = *cavity.wall_centre_mm;
+      const Field wall = [&](const Eigen::Vector3d& p) { return (p - c).norm() - 300.0; };
+      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(330);
+      cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(c - reach, c + reach, 20))), kWallGeometry);
+    }
     cavity_->commit();
   }
 
@@ -137,7 +106,7 @@ class EmbreeLaparoscope final : public Laparoscope {
                                              std::uint64_t sequence) override {
     const Transform<Patient, Camera> pose = camera_from_patient.inverse();
     if (is_new(*cavity_, pose.matrix())) {
-      trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), 1.55F,
+      trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), exposure_,
             [this](const Hit& hit) { return cavity_surface(hit); });
     }
     return expose(sequence);
@@ -153,18 +122,58 @@ class EmbreeLaparoscope final : public Laparoscope {
     return expose(sequence);
   }
 
+  [[nodiscard]] std::vector<std::uint8_t> lens_circle() const override {
+    std::vector<std::uint8_t> circle(field_.size(), 0);
+    for (std::size_t i = 0; i < circle.size(); ++i) {
+      // The light falls to 0.55 at the edge, within which the stop is wide open.
+      if (field_[i] >= 0.55F) circle[i] = 255;
+    }
+    return circle;
+  }
+
+  [[nodiscard]] bool sees(const Transform<Camera, Patient>& camera_from_patient, const Eigen::Vector3d& point,
+                          const Eigen::Vector3d& normal) const override {
+    const auto at = project(camera_, camera_from_patient * point);
+    if (!at) return false;
+    const int x = static_cast<int>(std::lround(std::clamp(at->x(), -1.0, 1e4)));
+    const int y = static_cast<int>(std::lround(std::clamp(at->y(), -1.0, 1e4)));
+    if (x < 0 || y < 0 || x >= camera_.width_px || y >= camera_.height_px || field_[pixel(x, y)] < 0.55F) return false;
+    const Eigen::Vector3d eye = camera_from_patient.inverse().translation();
+    const Eigen::Vector3d way = point - eye;
+    constexpr double kLeastFacing = 0.25;  // grazing surfaces are a pixel wide
+    if (-way.normalized().dot(normal) < kLeastFacing) return false;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay ray{};
+    ray.org_x = static_cast<float>(eye.x());
+    ray.org_y = static_cast<float>(eye.y());
+    ray.org_z = static_cast<float>(eye.z());
+    ray.dir_x = static_cast<float>(way.x());
+    ray.dir_y = static_cast<float>(way.y());
+    ray.dir_z = static_cast<float>(way.z());
+    ray.tfar = static_cast<float>(1 - 1.0 / way.norm());  // up to a millimetre before the point itself
+    ray.mask = ~0U;
+    rtcOccluded1(cavity_->get(), &context, &ray);
+    return ray.tfar >= 0;  // it is set to minus infinity where something is in the way
+  }
+
  private:
   [[nodiscard]] std::size_t pixel(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width_px) + static_cast<std::size_t>(x);
   }
 
   [[nodiscard]] Surface cavity_surface(const Hit& hit) const {
-    const Vector3f& p = hit.point;
+    const Vector3f& p = hit.rest;
     const float coarse = texture_.at(p / 19.0F);
     const float middle = texture_.at(p / 6.3F);
     const float fine = texture_.at(p / 1.9F);
     Surface out;
-    if (hit.geometry == kLiverGeometry) {
+    if (coat_ == Coat::skin) {
+      const bool organ = hit.geometry == kOrganGeometry;
+      const float shade = organ ? 0.80F + 0.14F * coarse + 0.14F * middle + 0.12F * fine : 0.6F + 0.5F * middle;
+      out.albedo = (organ ? Vector3f(0.58F, 0.37F, 0.27F) : Vector3f(0.05F, 0.16F, 0.20F)) * shade;
+      out.gloss = organ ? 0.16F : 0.0F;
+    } else if (hit.geometry == kOrganGeometry) {
       const float shade = 0.62F + 0.40F * coarse + 0.26F * middle + 0.16F * fine;
       out.albedo = Vector3f(0.40F, 0.105F, 0.075F) * shade;
       // Fine capsular vessels: the thin set where a smooth scalar passes through its middle.
@@ -222,6 +231,7 @@ class EmbreeLaparoscope final : public Laparoscope {
   template <typename SurfaceOf>
   void trace(const EmbreeScene& scene, const Eigen::Matrix3f& rotation, const Vector3f& eye, float exposure,
              const SurfaceOf& surface_of_hit) {
+    const Vector3f lamp = eye + rotation * lamp_;
     tbb::parallel_for(0, camera_.height_px, [&](int y) {
       RTCIntersectContext context;
       rtcInitIntersectContext(&context);
@@ -256,7 +266,7 @@ class EmbreeLaparoscope final : public Laparoscope {
           const std::size_t at = pixel(x0 + lane, y);
           Vector3f light = Vector3f::Zero();
           if (valid[lane] != 0 && packet.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID) {
-            light = shade(scene, packet, lane, eye, directions[static_cast<std::size_t>(lane)], surface_of_hit) *
+            light = shade(scene, packet, lane, eye, lamp, directions[static_cast<std::size_t>(lane)], surface_of_hit) *
                     (exposure * field_[at]);
           }
           light_[at] = light;
@@ -281,10 +291,11 @@ class EmbreeLaparoscope final : public Laparoscope {
 
   template <typename SurfaceOf>
   [[nodiscard]] Vector3f shade(const EmbreeScene& scene, const RTCRayHit8& packet, int lane, const Vector3f& eye,
-                               const Vector3f& direction, const SurfaceOf& surface_of_hit) const {
+                               const Vector3f& lamp, const Vector3f& direction, const SurfaceOf& surface_of_hit) const {
     Hit hit;
     hit.distance = packet.ray.tfar[lane];
     hit.point = eye + hit.distance * direction;
+    hit.rest = scene.rest(packet, lane, hit.point);
     hit.geometry = packet.hit.geomID[lane];
     hit.normal = scene.normal(packet, lane);
     hit.normal.normalize();
@@ -293,19 +304,22 @@ class EmbreeLaparoscope final : public Laparoscope {
     Vector3f normal = hit.normal;
     if (surface.gloss > 0) {
       // A wet surface is not smooth: ripples break the highlight up.
-      const Vector3f q = hit.point / 3.1F;
+      const Vector3f q = hit.rest / 3.1F;
       const float ripple = texture_.at(q) - 0.5F;
       const float other = texture_.at(q + Vector3f(17, 5, 3)) - 0.5F;
       normal += 0.22F * Vector3f(ripple, other, ripple * other * 2);
       normal.normalize();
     }
-    constexpr float kReferenceMm = 100;
-    const float fall = (kReferenceMm / hit.distance) * (kReferenceMm / hit.distance);
-    const float facing = std::max(0.0F, -normal.dot(direction));
-    const float facing2 = facing * facing;
-    const float facing8 = facing2 * facing2 * facing2 * facing2;
-    const float facing32 = facing8 * facing8 * facing8 * facing8;
-    const float highlight = surface.gloss * facing32 * facing32 * facing32;  // a Phong exponent of 96
+    const Vector3f to_lamp = lamp - hit.point;
+    const float lamp_distance = to_lamp.norm();
+    const Vector3f towards_lamp = to_lamp / lamp_distance;
+    const float fall = (kReferenceMm / lamp_distance) * (kReferenceMm / lamp_distance);
+    const float facing = std::max(0.0F, normal.dot(towards_lamp));
+    const float half = facing > 0 ? std::max(0.0F, normal.dot((towards_lamp - direction).normalized())) : 0.0F;
+    const float half2 = half * half;
+    const float half8 = half2 * half2 * half2 * half2;
+    const float half32 = half8 * half8 * half8 * half8;
+    const float highlight = surface.gloss * half32 * half32 * half32;  // Blinn and Phong's, with an exponent of 96
     return (surface.albedo * facing + Vector3f::Constant(highlight)) * fall;
   }
 
@@ -313,7 +327,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const float value = light[static_cast<Eigen::Index>(channel)];
       // Shot noise grows with the root of the light; the read noise is what is left in the dark.
-      const float sigma = 0.0015F + 0.012F * std::sqrt(std::max(0.0F, value));
+      const float sigma = noise_level_ * (0.0015F + 0.012F * std::sqrt(std::max(0.0F, value)));
       const float noisy = value + sigma * noise_[(noise_at + channel) % noise_.size()];
       const float scaled = std::clamp(noisy, 0.0F, 1.0F) * static_cast<float>(gamma_.size() - 1);
       out[channel] = gamma_[static_cast<std::size_t>(scaled)];
@@ -321,10 +335,13 @@ class EmbreeLaparoscope final : public Laparoscope {
   }
 
   CameraModel camera_;
+  Vector3f lamp_;  ///< in the camera frame
+  float exposure_, noise_level_;
   std::uint64_t seed_;
   RTCDevice device_;
   SolidNoise texture_;
   Chessboard board_;
+  Coat coat_ = Coat::liver;
   std::vector<Vector3f> rays_;  ///< unit directions in the camera frame, one per pixel
   std::vector<float> field_;    ///< how much of the light reaches each pixel, 0 outside the round field
   std::array<float, 1U << 16U> noise_{};
@@ -337,11 +354,11 @@ class EmbreeLaparoscope final : public Laparoscope {
 
 }  // namespace
 
-Result<std::unique_ptr<Laparoscope>> Laparoscope::create(const CameraModel& camera, std::uint64_t seed) {
-  if (const auto checked = check(camera); !checked) return checked.error();
+Result<std::unique_ptr<Laparoscope>> Laparoscope::create(const LaparoscopeSettings& settings) {
+  if (const auto checked = check(settings.lens); !checked) return checked.error();
   RTCDevice device = rtcNewDevice(nullptr);
   if (device == nullptr) return Error{Errc::io, "the ray tracer (Embree) does not start on this machine"};
-  return std::unique_ptr<Laparoscope>(std::make_unique<EmbreeLaparoscope>(camera, seed, device));
+  return std::unique_ptr<Laparoscope>(std::make_unique<EmbreeLaparoscope>(settings, device));
 }
 
 CameraModel laparoscope_lens(int width_px, int height_px) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -18,17 +19,38 @@ struct Chessboard {
   double square_mm = 6;
 };
 
+/// What an organ's surface looks like, and what is behind it.
+enum class Coat {
+  liver,  ///< dark red and wet, with capsular vessels, in a cavity of peritoneum
+  skin,   ///< a plastic head's, among surgical drapes
+};
+
+struct Cavity {
+  Mesh organ = {};                            ///< as the scope sees it, in the patient frame
+  std::vector<Eigen::Vector3f> rest_mm = {};  ///< of each vertex before the organ was deformed, or empty where it was
+                                              ///< not: the texture stays on the tissue
+  Coat coat = Coat::liver;
+  std::optional<Eigen::Vector3d> wall_centre_mm = {};  ///< of a round wall behind the organ; without it, black is
+};
+
+struct LaparoscopeSettings {
+  CameraModel lens = {};
+  std::uint64_t seed = 1;  ///< of texture and noise
+  Eigen::Vector3d lamp_in_camera_mm = {0, 0, 0};
+  double well_lit_mm = 100;  ///< the distance at which the exposure is right
+  double noise = 1;          ///< of the sensor, as a multiple of the usual; 0 is none
+};
+
 /// The lens, light and sensor of a laparoscope before a scene, by ray tracing (Embree). Its image formation is its own
 /// and shares nothing with the host's renderer: solid texture, wet highlights, a light at the lens that falls with the
 /// square of the distance, the round field of the rod optics, lens distortion, shot and read noise.
 class Laparoscope {
  public:
   /// Fails where the camera model does not pass check() or the ray tracer cannot start.
-  static Result<std::unique_ptr<Laparoscope>> create(const CameraModel& camera, std::uint64_t seed);
+  static Result<std::unique_ptr<Laparoscope>> create(const LaparoscopeSettings& settings);
   virtual ~Laparoscope() = default;
 
-  /// The cavity: the liver's surface in the patient frame, before a wall of peritoneum around centre.
-  virtual void set_cavity(const Mesh& liver_in_patient, const Eigen::Vector3d& centre_in_patient_mm) = 0;
+  virtual void set_cavity(const Cavity& cavity) = 0;
   virtual void set_bench(const Chessboard& board) = 0;
 
   /// RGB, width * height * 3 bytes. The same pose and sequence give the same bytes. Not for two threads at once.
@@ -36,6 +58,13 @@ class Laparoscope {
                                                      std::uint64_t sequence) = 0;
   virtual std::vector<std::uint8_t> look_at_bench(const Transform<Camera, Marker>& camera_from_marker,
                                                   std::uint64_t sequence) = 0;
+
+  /// 255 at pixels that the round field of the lens shows whole, else 0.
+  [[nodiscard]] virtual std::vector<std::uint8_t> lens_circle() const = 0;
+  /// Whether a point of the organ's surface, with this normal there, faces the lens, lies in its field, and has nothing
+  /// of the cavity before it.
+  [[nodiscard]] virtual bool sees(const Transform<Camera, Patient>& camera_from_patient,
+                                  const Eigen::Vector3d& point_in_patient_mm, const Eigen::Vector3d& normal) const = 0;
 };
 
 /// The lens of the simulated laparoscope for a picture of this size: a wide rod lens with the barrel distortion such

@@ -78,9 +78,9 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
   const auto world = World::create(*truth, *liver, lens, settings.seed);
   if (!world) return world.error();
-  const auto laparoscope = Laparoscope::create(lens, settings.seed);
+  const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
   if (!laparoscope) return laparoscope.error();
-  (*laparoscope)->set_cavity(*liver, truth->liver_centre_mm);
+  (*laparoscope)->set_cavity({.organ = *liver, .wall_centre_mm = truth->liver_centre_mm});
   (*laparoscope)->set_bench(world->board());
 
   std::error_code error;

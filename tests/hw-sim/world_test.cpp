@@ -101,9 +101,9 @@ TEST(Laparoscope, TheSameFrameIsTheSameBytesAndAnotherIsNot) {
   const CameraModel lens = laparoscope_lens(384, 288);
   const auto world = World::create(scene().truth, scene().liver, lens, 1);
   ASSERT_TRUE(world) << world.error().what;
-  const auto scope = Laparoscope::create(lens, 1);
+  const auto scope = Laparoscope::create({.lens = lens});
   ASSERT_TRUE(scope);
-  (*scope)->set_cavity(scene().liver, scene().truth.liver_centre_mm);
+  (*scope)->set_cavity({.organ = scene().liver, .wall_centre_mm = scene().truth.liver_centre_mm});
   const auto pose = world->tracker_from_camera(world->ends_s() - 3).inverse() * world->tracker_from_patient();
   const auto first = (*scope)->look_into_cavity(pose, 7);
   EXPECT_EQ(first, (*scope)->look_into_cavity(pose, 7));
@@ -117,8 +117,8 @@ TEST(Laparoscope, Pictures) {
   const CameraModel lens = laparoscope_lens(768, 576);
   const auto world = World::create(scene().truth, scene().liver, lens, 1);
   ASSERT_TRUE(world) << world.error().what;
-  const auto scope = Laparoscope::create(lens, 1);
-  (*scope)->set_cavity(scene().liver, scene().truth.liver_centre_mm);
+  const auto scope = Laparoscope::create({.lens = lens});
+  (*scope)->set_cavity({.organ = scene().liver, .wall_centre_mm = scene().truth.liver_centre_mm});
   (*scope)->set_bench(world->board());
   int number = 0;
   for (const double t : {0.1, 2.7, 5.0, world->ends_s() - 6.8, world->ends_s() - 5, world->ends_s() - 2}) {
