@@ -19,6 +19,10 @@ struct Body {
 
 /// A procedural torso: wall of fat and muscle, ribs, spine, kidneys, spleen, great vessels and a liver of two lobes.
 Body procedural_body(std::uint64_t seed);
+/// What a scan on this grid has of it.
+Body procedural_body(std::uint64_t seed, const Grid& grid);
+/// Signed distance to the surface of its liver.
+double procedural_liver_mm(const Eigen::Vector3d& point_in_patient_mm);
 
 /// A CT of the user's own (a folder of one DICOM series, NIfTI, NRRD or MHA), resampled to axes along the patient and
 /// at most 2 mm. The liver is taken from labels where given (label value), else found as the largest thick region of

@@ -4,39 +4,14 @@
 #include <itkGDCMImageIO.h>
 #include <itkImage.h>
 #include <itkImageFileWriter.h>
-#include <itkImportImageFilter.h>
 #include <itkMetaDataObject.h>
-#include <itkNiftiImageIO.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "hw-sim/phantom/itk_image.hpp"
+
 namespace birdseye::hw_sim {
-
-namespace {
-
-template <typename Pixel>
-typename itk::Image<Pixel, 3>::Pointer image_of(const Grid& grid, std::span<const Pixel> values) {
-  using Image = itk::Image<Pixel, 3>;
-  const auto image = Image::New();
-  typename Image::SizeType size;
-  typename Image::PointType origin;
-  typename Image::SpacingType spacing;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    size[axis] = static_cast<itk::SizeValueType>(grid.size[axis]);
-    origin[axis] = grid.origin_mm[axis];
-    spacing[axis] = grid.spacing_mm[axis];
-  }
-  image->SetRegions(size);
-  image->SetOrigin(origin);
-  image->SetSpacing(spacing);
-  image->Allocate();
-  std::copy(values.begin(), values.end(), image->GetBufferPointer());
-  return image;
-}
-
-}  // namespace
 
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg) {
@@ -94,21 +69,6 @@ Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid&
     }
   } catch (const std::exception&) {
     return Error{Errc::unreadable, fmt::format("{}: cannot be written; is the disk full?", folder.string())};
-  }
-  return {};
-}
-
-Result<void> write_labels(const std::filesystem::path& path, const Grid& grid, std::span<const std::uint8_t> labels) {
-  using Labels = itk::Image<std::uint8_t, 3>;
-  try {
-    const auto writer = itk::ImageFileWriter<Labels>::New();
-    writer->SetInput(image_of<std::uint8_t>(grid, labels));
-    writer->SetImageIO(itk::NiftiImageIO::New());
-    writer->SetFileName(path.string());
-    writer->UseCompressionOn();
-    writer->Update();
-  } catch (const std::exception&) {
-    return Error{Errc::unreadable, fmt::format("{}: cannot be written; is the disk full?", path.string())};
   }
   return {};
 }

@@ -14,7 +14,5 @@ namespace birdseye::hw_sim {
 /// series come about that must not be stacked straight.
 Result<void> write_dicom_series(const std::filesystem::path& folder, const Grid& grid, std::span<const std::int16_t> hu,
                                 std::uint64_t seed, double gantry_tilt_deg = 0);
-/// Labels on the same grid as a compressed NIfTI file.
-Result<void> write_labels(const std::filesystem::path& path, const Grid& grid, std::span<const std::uint8_t> labels);
 
 }  // namespace birdseye::hw_sim

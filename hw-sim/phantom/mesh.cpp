@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <bit>
 #include <fstream>
 #include <limits>
@@ -38,7 +39,9 @@ bool crossing_mean(const std::array<float, 8>& corner, Eigen::Vector3f& mean) {
   return true;
 }
 
-void add_normals(Mesh& mesh) {
+}  // namespace
+
+void compute_normals(Mesh& mesh) {
   mesh.normals.assign(mesh.vertices.size(), Eigen::Vector3f::Zero());
   for (const auto& t : mesh.triangles) {
     const Eigen::Vector3f area =
@@ -47,8 +50,6 @@ void add_normals(Mesh& mesh) {
   }
   for (Eigen::Vector3f& n : mesh.normals) n.normalize();
 }
-
-}  // namespace
 
 Mesh surface_of(const ScalarGrid& field) {
   const Grid& grid = field.grid;
@@ -96,8 +97,26 @@ Mesh surface_of(const ScalarGrid& field) {
       }
     }
   }
-  add_normals(mesh);
+  compute_normals(mesh);
   return mesh;
+}
+
+Mesh closed_surface(const Field& field, const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm,
+                    double spacing_mm) {
+  ScalarGrid sampled = ScalarGrid::sample(field, Grid::around(low_mm, high_mm, spacing_mm));
+  const Grid& grid = sampled.grid;
+  // A border that is outside closes the surface.
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        const bool border =
+            i < 2 || j < 2 || k < 2 || i > grid.size[0] - 3 || j > grid.size[1] - 3 || k > grid.size[2] - 3;
+        float& value = sampled.values[grid.index(i, j, k)];
+        if (border) value = std::max(value, static_cast<float>(spacing_mm));
+      }
+    }
+  }
+  return surface_of(sampled);
 }
 
 Result<void> write_ply(const std::filesystem::path& path, const Mesh& mesh) {

@@ -21,6 +21,11 @@ struct Mesh {
 /// crosses, at the mean of its edge crossings (S. Gibson, "Constrained elastic surface nets", 1998, without the
 /// relaxation, which a smooth field does not need).
 Mesh surface_of(const ScalarGrid& field);
+/// The surface of a field within a box, closed where the box cuts it off.
+Mesh closed_surface(const Field& field, const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm,
+                    double spacing_mm);
+/// The normals that follow from where the vertices are now.
+void compute_normals(Mesh& mesh);
 
 /// Binary little-endian PLY, the form that every mesh program reads.
 Result<void> write_ply(const std::filesystem::path& path, const Mesh& mesh);

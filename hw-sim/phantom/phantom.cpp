@@ -10,6 +10,7 @@
 
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
+#include "hw-sim/phantom/image_files.hpp"
 #include "hw-sim/phantom/implants.hpp"
 #include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/phantom/mesh.hpp"
@@ -24,23 +25,6 @@ using Eigen::Vector3d;
 Result<Vector3d> vector_of(const nlohmann::json& json) {
   if (!json.is_array() || json.size() != 3) return Error{Errc::bad_format, "needs three numbers"};
   return Vector3d(json[0].get<double>(), json[1].get<double>(), json[2].get<double>());
-}
-
-/// The surface of a field within the box that holds it, with a border that is outside, so that the surface closes.
-Mesh closed_surface(const Field& field, const Vector3d& low, const Vector3d& high, double spacing_mm) {
-  ScalarGrid sampled = ScalarGrid::sample(field, Grid::around(low, high, spacing_mm));
-  const Grid& grid = sampled.grid;
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      for (int i = 0; i < grid.size[0]; ++i) {
-        const bool border =
-            i < 2 || j < 2 || k < 2 || i > grid.size[0] - 3 || j > grid.size[1] - 3 || k > grid.size[2] - 3;
-        float& value = sampled.values[grid.index(i, j, k)];
-        if (border) value = std::max(value, static_cast<float>(spacing_mm));
-      }
-    }
-  }
-  return surface_of(sampled);
 }
 
 Result<void> write_surfaces(const std::filesystem::path& folder, const Body& body, const Implants& implants) {

@@ -94,13 +94,20 @@ double tissue_hu(const Vector3d& p) {
 
 }  // namespace
 
+double procedural_liver_mm(const Vector3d& p) {
+  return liver_mm(p);
+}
+
 Body procedural_body(std::uint64_t seed) {
+  return procedural_body(seed,
+                         {.size = {243, 173, 144}, .origin_mm = {-181.5, -129, -140}, .spacing_mm = {1.5, 1.5, 2.0}});
+}
+
+Body procedural_body(std::uint64_t seed, const Grid& grid) {
   Body body;
   body.skin_mm = skin_mm;
   body.liver_mm = liver_mm;
-  body.grid.spacing_mm = {1.5, 1.5, 2.0};
-  body.grid.origin_mm = {-181.5, -129, -140};
-  body.grid.size = {243, 173, 144};
+  body.grid = grid;
   body.hu.resize(body.grid.voxels());
   tbb::parallel_for(0, body.grid.size[2], [&](int k) {
     for (int j = 0; j < body.grid.size[1]; ++j) {

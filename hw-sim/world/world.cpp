@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "calibration/base/units.hpp"
+#include "hw-sim/camera/look_at.hpp"
 #include "hw-sim/phantom/grid.hpp"
 #include "hw-sim/phantom/implants.hpp"
 
@@ -32,16 +33,6 @@ double ease(double u) {
 
 Vector3d rotation_vector(const Vector3d& axis_deg) {
   return axis_deg * kRadPerDeg;
-}
-
-/// A camera at eye that looks at target, with the image's down nearest to `down`; rotated by roll about its axis.
-template <typename Frame>
-Transform<Frame, Camera> look_at(const Vector3d& eye, const Vector3d& target, const Vector3d& down, double roll_rad) {
-  const Vector3d z = (target - eye).normalized();
-  const Vector3d x = down.cross(z).normalized();
-  Eigen::Matrix3d rotation;
-  rotation << x, z.cross(x), z;
-  return Transform<Frame, Camera>(Eigen::Matrix3d(rotation * rotation_exp(Vector3d(0, 0, roll_rad))), eye);
 }
 
 /// Between two poses: along a line, and about one axis.

@@ -15,6 +15,7 @@
 #include "host/volume/segmentation.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/phantom/image_files.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/scratch.hpp"
 

@@ -61,10 +61,11 @@ TEST(World, ThePointerTouchesEachFiducialAndTheScopeStandsStillAtItsStations) {
   double nearest[6];
   std::fill(std::begin(nearest), std::end(nearest), 1e9);
   int still = 0;
-  for (double t = 0; t < world->ends_s(); t += 0.01) {
+  for (int i = 0; 0.01 * i < world->ends_s(); ++i) {
+    const double t = 0.01 * i;
     const Eigen::Vector3d tip = world->tracker_from_pointer(t) * world->tip_in_pointer_mm();
-    for (std::size_t i = 0; i < 6; ++i) {
-      nearest[i] = std::min(nearest[i], (tip - world->tracker_from_patient() * scene().truth.fiducials_mm[i]).norm());
+    for (std::size_t f = 0; f < 6; ++f) {
+      nearest[f] = std::min(nearest[f], (tip - world->tracker_from_patient() * scene().truth.fiducials_mm[f]).norm());
     }
     const Eigen::Vector3d a = world->tracker_from_sensor(t).translation();
     const Eigen::Vector3d b = world->tracker_from_sensor(t + 0.01).translation();
@@ -82,7 +83,7 @@ TEST(World, TheScopeTurnsAboutOnePointOfTheWallWhileItLooks) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   std::vector<Transform<Tracker, Camera>> poses;
-  for (double t = world->ends_s() - 6.9; t < world->ends_s(); t += 0.1) poses.push_back(world->tracker_from_camera(t));
+  for (int i = 0; i < 69; ++i) poses.push_back(world->tracker_from_camera(world->ends_s() - 6.9 + 0.1 * i));
   for (const auto& pose : poses) {
     const Eigen::Vector3d axis = pose.rotation().col(2);
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
