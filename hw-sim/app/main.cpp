@@ -7,12 +7,23 @@
 #include <string>
 
 #include "calibration/base/program.hpp"
+#include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
 
 namespace {
 
 std::atomic<bool> g_stop = false;
+
+birdseye::Result<void> parse_size(const std::string& text, int& width_px, int& height_px) {
+  int read = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%n", &width_px, &height_px, &read) == 2 &&
+      static_cast<std::size_t>(read) == text.size() && width_px >= 64 && height_px >= 64 && width_px <= 4096 &&
+      height_px <= 4096) {
+    return {};
+  }
+  return birdseye::Error{birdseye::Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"};
+}
 
 }  // namespace
 
@@ -51,14 +62,48 @@ int main(int argc, char** argv) {
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {
-    if (std::sscanf(size.c_str(), "%dx%d", &cart.width_px, &cart.height_px) != 2 || cart.width_px < 64 ||
-        cart.height_px < 64 || cart.width_px > 4096 || cart.height_px > 4096) {
-      take(Error{Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"});
+    if (const auto parsed = parse_size(size, cart.width_px, cart.height_px); !parsed) {
+      take(parsed);
       return;
     }
     std::signal(SIGTERM, [](int) { g_stop = true; });
     std::signal(SIGINT, [](int) { g_stop = true; });
     take(hw_sim::run_cart(cart, g_stop));
+  });
+
+  hw_sim::CaseSettings registration;
+  std::string dof = "3";
+  bool still = false;
+  CLI::App& make_case =
+      *app.add_subcommand("case", "write a registration case: CT at rest, views of it deformed, truth");
+  make_case.add_option("--out", registration.folder, "folder to write")->required();
+  make_case.add_option("--seed", registration.seed, "everything random follows from it");
+  CLI::Option* const organ = make_case.add_option("--phantom", registration.phantom, "liver or head (default liver)");
+  make_case.add_option("--ct", registration.ct, "a CT with a liver in place of the phantom")->excludes(organ);
+  make_case.add_option("--labels", registration.labels, "organ labels of that CT")->needs("--ct");
+  make_case.add_option("--liver-label", registration.liver_label, "the liver's value in the labels")->needs("--labels");
+  make_case.add_option("--views", registration.views, "how many (default 5)");
+  make_case.add_option("--size", size, "WIDTHxHEIGHT of the views (default 768x576)");
+  make_case.add_option("--dof", dof,
+                       "of the deformation: 3 (default), 24, 81.., or inner control points an axis as 3x3x3");
+  make_case.add_option("--amplitude-mm", registration.amplitude_mm,
+                       "the largest move of the organ's surface (default 10)");
+  make_case.add_flag("--no-deformation", still, "the same views of the organ at rest");
+  make_case.add_option("--distance-mm", registration.distance_mm,
+                       "about, from organ to lens (default as suits the organ)");
+  make_case.add_option("--noise", registration.noise, "of the sensor, as a multiple of the usual (default 1)");
+  make_case.add_option("--light-offset-mm", registration.lamp_offset_mm, "of the lamp, to the right of the lens");
+  make_case.add_flag("--plain-background", registration.plain_background, "black in place of the cavity's wall");
+  make_case.callback([&] {
+    const auto inner = hw_sim::parse_dof(dof);
+    const auto parsed = parse_size(size, registration.width_px, registration.height_px);
+    if (!inner || !parsed) {
+      take(inner ? parsed : Result<void>(inner.error()));
+      return;
+    }
+    registration.inner = *inner;
+    if (still) registration.amplitude_mm = 0;
+    take(hw_sim::write_case(registration));
   });
 
   return run_program(app, argc, argv, [&code] { return code; });

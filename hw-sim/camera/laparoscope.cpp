@@ -83,9 +83,10 @@ class EmbreeLaparoscope final : public Laparoscope {
     cavity_->add(cavity.organ, kOrganGeometry, cavity.rest_mm);
     if (cavity.wall_centre_mm) {
       const Eigen::Vector3d& c = *cavity.wall_centre_mm;
-      const Field wall = [&](const Eigen::Vector3d& p) { return (p - c).norm() - 300.0; };
-      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(330);
-      cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(c - reach, c + reach, 20))), kWallGeometry);
+      const Field wall = [&](const Eigen::Vector3d& p) { return (p - c).norm() - cavity.wall_radius_mm; };
+      const Eigen::Vector3d reach = Eigen::Vector3d::Constant(1.1 * cavity.wall_radius_mm);
+      cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(c - reach, c + reach, cavity.wall_radius_mm / 15))),
+                   kWallGeometry);
     }
     cavity_->commit();
   }

@@ -30,7 +30,8 @@ struct Cavity {
   std::vector<Eigen::Vector3f> rest_mm = {};  ///< of each vertex before the organ was deformed, or empty where it was
                                               ///< not: the texture stays on the tissue
   Coat coat = Coat::liver;
-  std::optional<Eigen::Vector3d> wall_centre_mm = {};  ///< of a round wall behind the organ; without it, black is
+  std::optional<Eigen::Vector3d> wall_centre_mm = {};  ///< of a round wall about all; without it, black is behind
+  double wall_radius_mm = 300;                         ///< beyond every place to look from
 };
 
 struct LaparoscopeSettings {

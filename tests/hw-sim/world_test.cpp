@@ -83,6 +83,7 @@ TEST(World, TheScopeTurnsAboutOnePointOfTheWallWhileItLooks) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   std::vector<Transform<Tracker, Camera>> poses;
+  poses.reserve(69);
   for (int i = 0; i < 69; ++i) poses.push_back(world->tracker_from_camera(world->ends_s() - 6.9 + 0.1 * i));
   for (const auto& pose : poses) {
     const Eigen::Vector3d axis = pose.rotation().col(2);

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibration/geometry/transform.hpp"
+#include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/case/subject.hpp"
+#include "hw-sim/case/tissue_map.hpp"
+
+namespace birdseye::hw_sim {
+
+/// A point of the tissue, patient LPS mm.
+struct Landmark {
+  std::string name;
+  Eigen::Vector3d rest_mm, deformed_mm;
+};
+
+/// Points whose true place is known: surface_01.. on the deformed organ where a view sees it, vessel_01.. where vessels
+/// fork or halfway between forks, and tumour, its centre. All spread out as far as they go. Refused where the views see
+/// too little of the organ. scope: with the deformed organ in its cavity.
+Result<std::vector<Landmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
+                                               const Laparoscope& scope,
+                                               std::span<const Transform<Camera, Patient>> views, std::uint64_t seed);
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::hw_sim {
+
+struct CaseSettings {
+  std::filesystem::path folder;
+  std::uint64_t seed = 1;
+  std::string phantom = "liver";  ///< or head
+  std::filesystem::path ct;       ///< a CT of a liver in place of the phantom
+  std::filesystem::path labels;   ///< its organ labels, or empty to find the liver
+  int liver_label = 5;
+  int views = 5;
+  int width_px = 768, height_px = 576;
+  std::array<int, 3> inner = {1, 1, 1};  ///< control points of the true deformation that move, an axis
+  double amplitude_mm = 10;              ///< how far the point of the organ's surface moves that moves most
+  double distance_mm = 0;                ///< about, from the organ's surface to the lens; 0 as suits the organ
+  double noise = 1;                      ///< of the sensor, as a multiple of the usual
+  double lamp_offset_mm = 0;             ///< of the lamp to the right of the lens
+  bool plain_background = false;
+};
+
+/// "3", "24", "81".. degrees of freedom, or "3x2x1" inner control points an axis.
+Result<std::array<int, 3>> parse_dof(const std::string& text);
+
+/// Writes folder/case.toml and all that it names: a CT of an organ at rest, its segmentation, and what a laparoscope
+/// sees of it once it is deformed, with the truth beside it (docs/manual/simulator.md). The same settings give the same
+/// bytes.
+Result<void> write_case(const CaseSettings& settings);
+
+}  // namespace birdseye::hw_sim

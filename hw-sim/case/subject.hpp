@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/phantom/implants.hpp"
+#include "hw-sim/phantom/mesh.hpp"
+
+namespace birdseye::hw_sim {
+
+/// The organ of a registration case, at rest, in a CT cut to a margin about it.
+struct Subject {
+  Grid grid;
+  std::vector<std::int16_t> hu;
+  std::vector<std::uint8_t> labels;
+  std::vector<int> organ_labels;  ///< which of the labels are the organ and what lies in it
+  std::string transfer;           ///< the preset of `birdseye render` that shows it
+  Coat coat = Coat::liver;
+  Mesh surface;  ///< patient LPS, mm
+  VesselTree vessels;
+  Eigen::Vector3d tumour_centre_mm;
+  Eigen::Vector3d towards_scope;  ///< from the organ, unit
+  double view_distance_mm = 0;    ///< from its surface to a lens that has it well in the picture
+};
+
+/// Of the procedural body.
+Result<Subject> liver_subject(std::uint64_t seed);
+/// Of a CT of the user's own, as body_from_ct reads it.
+Result<Subject> liver_subject(const std::filesystem::path& ct, const std::filesystem::path& labels, int liver_label,
+                              std::uint64_t seed);
+Subject head_subject(std::uint64_t seed);
+
+}  // namespace birdseye::hw_sim
