@@ -69,17 +69,23 @@ TEST(PointFit, PelvisPhantomAsPublished) {
   struct Case {
     const char *ct, *published;
     double fre_mm;
-    std::vector<double> residuals_mm;
+    std::vector<double> residuals_mm, leave_one_out_mm;
   };
   const Case cases[] = {
-      {"pelvis_cropped_ct_fiducial_markers.txt", "Tracker_to_pelvis_cropped.txt", 0.4284, {0.418, 0.408, 0.465, 0.420}},
-      {"pelvis_nii_ct_fiducial_markers.txt", "Tracker_to_pelvis.txt", 0.6511, {0.579, 0.715, 0.746, 0.540}}};
+      {"pelvis_cropped_ct_fiducial_markers.txt",
+       "Tracker_to_pelvis_cropped.txt",
+       0.4284,
+       {0.418, 0.408, 0.465, 0.420},
+       {0.93, 1.00, 0.96, 1.11}},
+      {"pelvis_nii_ct_fiducial_markers.txt", "Tracker_to_pelvis.txt", 0.6511, {0.579, 0.715, 0.746, 0.540}, {}}};
   for (const Case& c : cases) {
     const auto fit =
         fit_points<Patient, Tracker>(read_points(folder / c.ct), read_points(folder / "Tracker_Fiducial_Markers.txt"));
     ASSERT_TRUE(fit) << fit.error().what;
     EXPECT_NEAR(fit->fre_rms_mm, c.fre_mm, 5e-5);
     for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(fit->residuals_mm[i], c.residuals_mm[i], 5e-4);
+    for (std::size_t i = 0; i < c.leave_one_out_mm.size(); ++i)
+      EXPECT_NEAR(fit->leave_one_out_mm[i], c.leave_one_out_mm[i], 5e-3);
     std::ifstream in(folder / c.published);
     for (int row = 0; row < 4; ++row) {
       for (int column = 0; column < 4; ++column) {
