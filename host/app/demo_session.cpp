@@ -35,7 +35,8 @@ Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials) {
   const auto centre = label_centroid_mm(*labels, kTumour);
   if (!centre) return centre.error();
   plan.tumour_centre_in_patient_mm = *centre;
-  plan.markers_in_patient_mm = find_markers(*ct);
+  for (const MarkerFit& marker : find_markers(*ct).markers)
+    plan.markers_in_patient_mm.push_back(marker.centre_in_patient_mm);
   if (static_cast<int>(plan.markers_in_patient_mm.size()) < fiducials) {
     return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", (patient / "ct").string(),
                                               plan.markers_in_patient_mm.size(), fiducials)};

@@ -1,19 +1,34 @@
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "host/volume/volume.hpp"
+#include "host/volume/marker_fit.hpp"
 
 namespace birdseye::host {
 
-struct MarkerShape {
-  double diameter_mm = 8;
-  std::int16_t threshold_hu = 1200;  ///< half the height of the ball over what is round it, roughly
+struct MarkerSearch {
+  MarkerShape shape;
+  /// Markers are looked for among what is brighter than this. Unset: 300, 700 and 1500 HU in turn, which finds markers
+  /// of plastic and of metal, and parts those that only touch.
+  std::optional<std::int16_t> threshold_hu;
 };
 
-/// The centres of bright balls of this size in a CT, patient LPS mm, brightest first. A component over the threshold
-/// counts where its volume and its extent along every axis fit the ball; its centre is weighted by HU over what is
-/// round it, to a small part of a voxel.
-std::vector<Eigen::Vector3d> find_markers(const Volume& ct, const MarkerShape& shape = {});
+/// Looks like a marker, and its centre cannot be had.
+struct DoubtfulMarker {
+  Eigen::Vector3d centre_in_patient_mm;
+  std::string reason;
+};
+
+struct FoundMarkers {
+  std::vector<MarkerFit> markers;        ///< brightest first
+  std::vector<DoubtfulMarker> doubtful;  ///< cut by the border of the CT, or touching another
+  int passed_over = 0;                   ///< bright things of about the size, of another shape
+};
+
+/// Finds markers of one shape in a CT. What is connected and brighter than the threshold, and of about the size, is
+/// fitted (fit_marker), and taken for a marker where the shape explains the voxels.
+FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search = {});
 
 }  // namespace birdseye::host

@@ -11,7 +11,6 @@
 
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
-#include "host/volume/marker_finder.hpp"
 #include "host/volume/segmentation.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/grid.hpp"
@@ -342,42 +341,6 @@ TEST(Import, OdditiesDecodeOrAreRefused) {
   const auto doubled = import_volume(slices);
   ASSERT_FALSE(doubled);
   EXPECT_EQ(doubled.error().code, Errc::unsupported);
-}
-
-TEST(Markers, AreFoundToASmallPartOfAVoxel) {
-  Volume ct;
-  ct.size = {80, 70, 60};
-  ct.spacing_mm = {1.5, 1.5, 2};
-  ct.patient_from_voxel.linear() = ct.spacing_mm.asDiagonal();
-  ct.patient_from_voxel.translation() = Eigen::Vector3d(-60, -50, -55);
-  ct.hu.assign(80 * 70 * 60, 40);
-  const std::vector<Eigen::Vector3d> truth{{-20.3, -11.7, 3.1}, {15.25, 22.8, -17.6}, {31.1, -2.4, 24.9}};
-  const auto burn = [&](const Eigen::Vector3d& centre, const Eigen::Vector3d& radii, double hu) {
-    for (int k = 0; k < 60; ++k) {
-      for (int j = 0; j < 70; ++j) {
-        for (int i = 0; i < 80; ++i) {
-          int filled = 0;
-          for (int part = 0; part < 125; ++part) {
-            const Eigen::Vector3d offset((part % 5 + 0.5) / 5 - 0.5, (part / 5 % 5 + 0.5) / 5 - 0.5,
-                                         (part / 25 + 0.5) / 5 - 0.5);
-            const Eigen::Vector3d p = ct.patient_from_voxel * Eigen::Vector3d(Eigen::Vector3d(i, j, k) + offset);
-            if ((p - centre).cwiseQuotient(radii).norm() < 1) ++filled;
-          }
-          if (filled > 0) ct.hu[ct.index(i, j, k)] = static_cast<std::int16_t>(40 + filled / 125.0 * (hu - 40));
-        }
-      }
-    }
-  };
-  for (const Eigen::Vector3d& centre : truth) burn(centre, Eigen::Vector3d::Constant(4), 2500);
-  burn({0, 0, 0}, {20, 4, 4}, 2500);     // a rod: not a ball
-  burn({-40, 30, 20}, {2, 2, 2}, 2500);  // a clip: too small
-  const auto found = find_markers(ct);
-  ASSERT_EQ(found.size(), truth.size());
-  for (const Eigen::Vector3d& centre : truth) {
-    double nearest = 1e9;
-    for (const Eigen::Vector3d& f : found) nearest = std::min(nearest, (f - centre).norm());
-    EXPECT_LT(nearest, 0.1);
-  }
 }
 
 TEST(Segmentation, ByRangeSeedAndSize) {

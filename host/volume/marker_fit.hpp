@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+
+#include "host/volume/marker_shape.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// A marker's shape laid over the voxels.
+struct MarkerFit {
+  Eigen::Vector3d centre_in_patient_mm;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of a ring or cylinder, unit length, patient frame
+  double scale = 1;                                 ///< what was found over what was asked for
+  double hu = 0;                                    ///< of the marker's material
+  double contrast_hu = 0;                           ///< over what is round it
+  double explained = 0;  ///< share of what differs from the surroundings that the shape explains, at most 1
+};
+
+/// Fits centre, axis, size, blur and density of one marker, from a centre that is right to a third of the marker. Each
+/// voxel is taken for a mixture: the share of it that the shape fills has the marker's density, the rest that of the
+/// surroundings next to it. Air on one side and skin on the other thus do not pull the centre.
+/// directions: first guesses of the axis, columns. Empty where too few voxels surround the place, or the fit runs away.
+std::optional<MarkerFit> fit_marker(const Volume& ct, const MarkerShape& shape,
+                                    const Eigen::Vector3d& centre_in_patient_mm, const Eigen::Matrix3d& directions);
+
+}  // namespace birdseye::host
