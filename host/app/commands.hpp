@@ -24,5 +24,6 @@ void add_demo(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
 void add_render(CLI::App& app, CommandStatus& status);
 void add_volume(CLI::App& app, CommandStatus& status);
+void add_volume_markers(CLI::App& volume, CommandStatus& status);  ///< under `volume`
 
 }  // namespace birdseye::host

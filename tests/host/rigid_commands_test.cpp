@@ -1,0 +1,198 @@
+// `volume markers` and `register fiducials`, from the outside.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "hw-sim/phantom/phantom.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/data.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::run;
+using testing::Scratch;
+
+using Points = std::vector<Eigen::Vector3d>;
+
+std::string text_of(const Points& points) {
+  std::ostringstream text;
+  text.precision(12);
+  for (const Eigen::Vector3d& p : points) text << p.x() << ' ' << p.y() << ' ' << p.z() << '\n';
+  return text.str();
+}
+
+/// A rigid move, and what little a hand adds.
+Points touched(const Points& points) {
+  const Eigen::Affine3d move =
+      Eigen::Translation3d(300, 20, -40) * Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, -2, 0.5).normalized());
+  Points out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto k = static_cast<double>(i);
+    out.emplace_back(move * points[i] + 0.4 * Eigen::Vector3d(std::sin(5 * k), std::cos(3 * k), std::sin(7 * k + 1)));
+  }
+  return out;
+}
+
+nlohmann::json read(const fs::path& path) {
+  return nlohmann::json::parse(std::ifstream(path));
+}
+
+const Points kMarkers{{-152, -50, 40}, {-78, -101, 106}, {-15, -113, 132},
+                      {70, -105, 86},  {-99, -95, -38},  {34, -114, -56}};
+
+TEST(RigidCommands, FromTheCtToTheTarget) {
+  const Scratch scratch;
+  hw_sim::PhantomSettings settings;
+  settings.folder = scratch / "patient";
+  ASSERT_TRUE(hw_sim::write_phantom(settings));
+  const auto truth = hw_sim::read_phantom_truth(settings.folder);
+  ASSERT_TRUE(truth);
+  const std::string ct = (scratch / "patient/ct").string();
+  const std::string points = (scratch / "m.txt").string();
+  const auto found =
+      run("birdseye", "volume markers " + ct + " --shape ball --diameter 8 --out " + points + " --picture " +
+                          (scratch / "m.png").string() + " --json " + (scratch / "m.json").string());
+  ASSERT_EQ(found.code, 0) << found.output;
+  const nlohmann::json markers = read(scratch / "m.json");
+  EXPECT_EQ(markers["verdict"], "pass");
+  ASSERT_EQ(markers["markers"].size(), truth->fiducials_mm.size());
+  for (const Eigen::Vector3d& fiducial : truth->fiducials_mm) {
+    double nearest = 1e9;
+    for (const auto& m : markers["markers"]) {
+      const auto c = m["centre_mm"].get<std::vector<double>>();
+      nearest = std::min(nearest, (Eigen::Vector3d(c[0], c[1], c[2]) - fiducial).norm());
+    }
+    EXPECT_LT(nearest, 0.15);
+  }
+  EXPECT_GT(fs::file_size(scratch / "m.png"), 10'000U);
+
+  // Five of six touched, in another order.
+  Points five(truth->fiducials_mm.rbegin(), truth->fiducials_mm.rbegin() + 5);
+  const std::string common = "register fiducials --ct " + points + " --tracker " +
+                             scratch.file("t.txt", text_of(touched(five))) + " --match --targets " +
+                             scratch.file("g.txt", text_of({truth->tumour_centre_mm})) + " --volume " + ct + " --map " +
+                             (scratch / "map.png").string() + " --out " + (scratch / "p.txt").string() + " --json " +
+                             (scratch / "r.json").string();
+  const auto registered = run("birdseye", common);
+  ASSERT_EQ(registered.code, 0) << registered.output;
+  const nlohmann::json r = read(scratch / "r.json");
+  EXPECT_EQ(r["verdict"], "pass") << r["reasons"];
+  EXPECT_EQ(r["ct_of_touch"].size(), 5U);
+  EXPECT_LT(r["fre_rms_mm"].get<double>(), 0.6);
+  EXPECT_GT(r["fle_upper95_mm"].get<double>(), r["fle_rms_mm"].get<double>());
+  ASSERT_EQ(r["tre_mm"].size(), 1U);
+  EXPECT_LT(r["tre_mm"][0].get<double>(), 0.6);
+  EXPECT_LE(r["tre_mm_min"].get<double>(), r["tre_mm"][0].get<double>());
+  EXPECT_LE(r["tre_mm_median"].get<double>(), r["tre_mm_p95"].get<double>());
+  EXPECT_LE(r["tre_mm_p95"].get<double>(), r["tre_mm_max"].get<double>());
+  EXPECT_TRUE(r["outliers"].empty());
+  EXPECT_GT(fs::file_size(scratch / "map.png"), 10'000U);
+}
+
+TEST(RigidCommands, ABlunderIsNamedAndASharperErrorPredictedWhereItIsKnown) {
+  const Scratch scratch;
+  Points wrong = touched(kMarkers);
+  wrong[4] += Eigen::Vector3d(6, 6, -5);
+  const std::string common = "register fiducials --ct " + scratch.file("c.txt", text_of(kMarkers)) + " --tracker " +
+                             scratch.file("t.txt", text_of(wrong)) + " --targets " +
+                             scratch.file("g.txt", "-50 -20 10\n") + " --out " + (scratch / "p.txt").string() +
+                             " --json " + (scratch / "r.json").string();
+  ASSERT_EQ(run("birdseye", common).code, 0);
+  nlohmann::json r = read(scratch / "r.json");
+  EXPECT_EQ(r["verdict"], "marginal");
+  ASSERT_EQ(r["outliers"].size(), 1U) << r["reasons"];
+  EXPECT_EQ(r["outliers"][0]["name"], "fiducial 5");
+  EXPECT_NE(r["outliers"][0]["reason"].get<std::string>().find("from where the others put it"), std::string::npos);
+  ASSERT_EQ(run("birdseye", common + " --fle 0.7").code, 0);
+  EXPECT_EQ(read(scratch / "r.json")["fle_rms_mm"], 0.7);
+  // A target far from markers that are badly touched.
+  const auto far = run("birdseye", common + " --fle 14");
+  EXPECT_EQ(far.code, 3);
+  EXPECT_NE(far.output.find("predicted error at target 1"), std::string::npos);
+}
+
+TEST(RigidCommands, PelvisPhantomsSurfaceIsRefusedUnlessItsErrorIsKnownToBeLarger) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const Scratch scratch;
+  const fs::path folder = *data / "fiducial_registration_pelvis_phantom";
+  const std::string fiducials = "register fiducials --ct " +
+                                (folder / "pelvis_cropped_ct_fiducial_markers.txt").string() + " --tracker " +
+                                (folder / "Tracker_Fiducial_Markers.txt").string() + " --out " +
+                                (scratch / "p.txt").string() + " --json " + (scratch / "r.json").string();
+  const std::string common = fiducials + " --surface " + (folder / "pelvis_cropped_decimated.vtk").string() +
+                             " --surface-points " + (folder / "Tracker_Surface_Scan.txt").string();
+  ASSERT_EQ(run("birdseye", common).code, 0);
+  const nlohmann::json refused = read(scratch / "r.json");
+  EXPECT_EQ(refused["verdict"], "marginal");
+  EXPECT_EQ(refused["surface"]["accepted"], false);
+  EXPECT_NEAR(refused["surface"]["moved_mm"].get<double>(), 8.57, 0.02);
+  std::ifstream published(folder / "Tracker_to_pelvis_cropped.txt");
+  for (std::size_t i = 0; i < 16; ++i) {
+    double expected = 0;
+    published >> expected;
+    EXPECT_NEAR(refused["patient_from_tracker"][i / 4][i % 4].get<double>(), expected, 1e-6);
+  }
+  ASSERT_EQ(run("birdseye", common + " --fle 8").code, 0);
+  const nlohmann::json accepted = read(scratch / "r.json");
+  EXPECT_EQ(accepted["surface"]["accepted"], true);
+  EXPECT_EQ(accepted["patient_from_tracker"], accepted["surface"]["patient_from_tracker"]);
+  EXPECT_LT(accepted["surface"]["rms_after_mm"].get<double>(), 0.4);
+  // Its four markers make nearly a symmetric cross: which is which cannot be had from their distances.
+  const auto matched = run("birdseye", fiducials + " --match");
+  EXPECT_EQ(matched.code, 2);
+  EXPECT_NE(matched.output.find("cannot be told apart"), std::string::npos) << matched.output;
+}
+
+TEST(RigidCommands, ARealAbdomenWithoutMarkersHasNone) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const Scratch scratch;
+  for (const char* shape : {"ball --diameter 8", "ring --diameter 15 --hole 5"}) {
+    const auto result =
+        run("birdseye", "volume markers " + (*data / "ct_abdomen/example_ct.nii.gz").string() + " --shape " + shape +
+                            " --out " + (scratch / "m.txt").string() + " --json " + (scratch / "m.json").string());
+    EXPECT_EQ(result.code, 3) << result.output;
+    EXPECT_EQ(read(scratch / "m.json")["markers"].size(), 0U) << shape << result.output;
+  }
+}
+
+TEST(RigidCommands, RefuseBadInputInOneLine) {
+  const Scratch scratch;
+  const std::string points = scratch.file("p.txt", text_of(kMarkers));
+  const std::string out = (scratch / "o.txt").string();
+  const std::string fiducials = "register fiducials --ct " + points + " --tracker " + points + " --out " + out + " ";
+  const std::string markers = "volume markers " + (scratch / "none").string() + " --out " + out + " ";
+  for (const auto& [arguments, words] :
+       {std::pair{fiducials + "--surface " + points, "--surface-points"},
+        {fiducials + "--surface " + points + " --surface-points " + points, "no triangles"},
+        {fiducials + "--surface " + (scratch / "no.ply").string() + " --surface-points " + points, "no such file"},
+        {fiducials + "--targets " + (scratch / "no.txt").string(), "no such file"},
+        {fiducials + "--volume " + (scratch / "no.mha").string(), "no such file"},
+        {fiducials + "--fle -1", "--fle"},
+        {fiducials + "--fle nan", "--fle"},
+        {"register fiducials --ct " + points + " --tracker " + scratch.file("l.txt", "0 0 0\n1 1 1\n2 2 2\n") +
+             " --match --out " + out,
+         "on a line"},
+        {markers + "--shape ball --diameter 8", "no such file"},
+        {markers + "--shape cube --diameter 8", "--shape"},
+        {markers + "--shape ball --diameter 0", "outer diameter"},
+        {markers + "--shape ring --diameter 8", "hole"},
+        {markers + "--shape cylinder --diameter 8 --hole 3", "height"},
+        {markers + "--shape ball --diameter 8 --threshold 99999", "--threshold"}}) {
+    const auto result = run("birdseye", arguments);
+    EXPECT_EQ(result.code, 2) << arguments << result.output;
+    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+    EXPECT_NE(result.output.find(words), std::string::npos) << words << "\n" << result.output;
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
+}  // namespace
+}  // namespace birdseye
