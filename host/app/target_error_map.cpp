@@ -37,16 +37,14 @@ double step_of(double least_mm, double most_mm) {
 void draw_lines(Picture& picture, const std::vector<double>& tre_mm) {
   const auto [least, most] = std::minmax_element(tre_mm.begin(), tre_mm.end());
   const double step = step_of(*least, *most);
-  const auto at = [&](int x, int y) {
-    return tre_mm[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width_px) +
-                  static_cast<std::size_t>(x)];
+  const auto index = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width_px) + static_cast<std::size_t>(x);
   };
-  const auto band = [&](int x, int y) { return static_cast<int>(at(x, y) / step); };
+  const auto band = [&](int x, int y) { return static_cast<int>(tre_mm[index(x, y)] / step); };
   for (int y = 0; y + 1 < picture.height_px; ++y) {
     for (int x = 0; x + 1 < picture.width_px; ++x) {
       if (band(x, y) == band(x + 1, y) && band(x, y) == band(x, y + 1)) continue;
-      const auto pixel = static_cast<std::ptrdiff_t>(3 * (y * picture.width_px + x));
-      std::copy(kLine.begin(), kLine.end(), picture.rgb.begin() + pixel);
+      std::copy(kLine.begin(), kLine.end(), &picture.rgb[3 * index(x, y)]);
     }
   }
   // Along both diagonals, where the names of the lines are out of one another's way.
@@ -83,7 +81,7 @@ Picture draw_target_error(const calibration::TargetError& error, const TargetErr
       for (int x = 0; x < kSide_px; ++x) {
         tre_mm.push_back(error.rms_mm(plane.at(x + 0.5, y + 0.5)));
         const Eigen::Array3d tint = tint_of(tre_mm.back());
-        std::uint8_t* rgb = slice.rgb.data() + static_cast<std::ptrdiff_t>(3 * (y * kSide_px + x));
+        std::uint8_t* rgb = &slice.rgb[3 * (tre_mm.size() - 1)];
         for (int c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(0.7 * rgb[c] + 0.3 * tint[c]);
       }
     }

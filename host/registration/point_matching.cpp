@@ -50,6 +50,7 @@ class Search {
   [[nodiscard]] const std::vector<std::size_t>& best_order() const { return best_order_; }
   [[nodiscard]] std::vector<Eigen::Vector3d> ct_in_order(const std::vector<std::size_t>& order) const {
     std::vector<Eigen::Vector3d> ct;
+    ct.reserve(order.size());
     for (const std::size_t i : order) ct.push_back(ct_mm_[i]);
     return ct;
   }
