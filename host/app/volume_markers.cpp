@@ -69,7 +69,8 @@ std::pair<std::string, std::vector<std::string>> judge(const FoundMarkers& found
   std::vector<std::string> reasons{fmt::format("{} marker{} found", n, n == 1 ? "" : "s")};
   for (const DoubtfulMarker& d : found.doubtful) {
     const Vector3d& c = d.centre_in_patient_mm;
-    reasons.push_back(fmt::format("the marker at ({:.1f}, {:.1f}, {:.1f}) mm {}", c.x(), c.y(), c.z(), d.reason));
+    reasons.push_back(
+        fmt::format("what looks like a marker at ({:.1f}, {:.1f}, {:.1f}) mm {}", c.x(), c.y(), c.z(), d.reason));
   }
   if (n < 3) {
     reasons.push_back(
