@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// The bright field of a rod lens in its dark surround: an ellipse along the picture's axes, for pixels need not be
+/// square.
+struct LensField {
+  double centre_x_px = 0, centre_y_px = 0, radius_x_px = 0, radius_y_px = 0;
+};
+
+/// rgb: 8 bits, rows from the top. Nothing where there is no dark surround with the edge of a round field, whole or cut
+/// by the picture's border, at least 0.8 of the picture's shorter side across. What is dark inside it does not matter,
+/// nor does a little light outside. A round organ that large before black looks the same.
+std::optional<LensField> find_lens_field(std::span<const std::uint8_t> rgb, int width_px, int height_px);
+
+/// Where a video picture can be compared with a synthetic one, not zero: inside the lens field, if there is one; not in
+/// or close by saturated highlights; and where instruments, if given, is zero. Errc::bad_value for spans of another
+/// size, Errc::degenerate where nothing is left.
+Result<std::vector<std::uint8_t>> overlap_mask(std::span<const std::uint8_t> rgb, int width_px, int height_px,
+                                               std::span<const std::uint8_t> instruments = {});
+
+}  // namespace birdseye::host
