@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/utsname.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 
@@ -12,11 +11,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "host/app/bench_machine.hpp"
 #include "host/app/bench_phantom.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/write_files.hpp"
-#include "host/render/cpu/kernels.hpp"
 #include "host/render/engine.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 
@@ -41,11 +40,6 @@ struct Options {
 struct Timing {
   double frame_ms = 0, cpu_ms = 0;  ///< medians
 };
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
 
 double cpu_seconds() {
   timespec time{};
@@ -249,8 +243,6 @@ Result<ExitCode> bench_render(const Options& options) {
   for (const Case& c : cases) {
     if (auto done = bench_case(c, options, rows); !done) return done.error();
   }
-  utsname machine{};
-  ::uname(&machine);
   // Pictures and memory are judged here; times are for whoever knows the machine.
   constexpr double kMostError = 0.5, kMostMemory = 3;
   std::vector<std::string> reasons;
@@ -269,14 +261,10 @@ Result<ExitCode> bench_render(const Options& options) {
     reasons.push_back(
         fmt::format("all rays within {}/255 of the reference, in at most {} volumes more", kMostError, kMostMemory));
   }
-  const nlohmann::json json = {{"rows", rows},
-                               {"machine",
-                                {{"cores", tbb::info::default_concurrency()},
-                                 {"threads", threads},
-                                 {"isa", cpu::name_of(cpu::supported_isas().back())},
-                                 {"kernel", machine.release}}},
-                               {"verdict", verdict},
-                               {"reasons", reasons}};
+  nlohmann::json machine = bench_machine();
+  machine["threads"] = threads;
+  const nlohmann::json json = {
+      {"rows", rows}, {"machine", machine}, {"verdict", verdict}, {"reasons", reasons}};
   if (auto written = write_files({{options.json, text_of(json)}}); !written) return written.error();
   return sound ? ExitCode::success : ExitCode::verdict_fail;
 }
@@ -287,6 +275,7 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<Options>();
   CLI::App& bench = *app.add_subcommand("bench", "measure speed on this machine");
   bench.require_subcommand(1);
+  add_bench_similarity(bench, status);
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");
   render.add_option("--frames", options->frames, "frames a row (default 15)")->check(CLI::Range(3, 1000));

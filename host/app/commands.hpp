@@ -20,6 +20,7 @@ struct CommandStatus {
 
 // One file per command: each adds its subcommand, whose callback sets status.
 void add_bench(CLI::App& app, CommandStatus& status);
+void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
 void add_render(CLI::App& app, CommandStatus& status);

@@ -132,6 +132,22 @@ TEST(Commands, BenchRenderWritesItsTable) {
   EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
 }
 
+TEST(Commands, BenchSimilarityAgreesWithOpenCv) {
+  const Scratch scratch;
+  const auto result = run("birdseye", "bench similarity --rounds 1 --json " + (scratch / "s.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "s.json"));
+  ASSERT_EQ(json["rows"].size(), 7U);
+  for (const auto& row : json["rows"]) {
+    EXPECT_EQ(row["viewport"], "768x576");
+    EXPECT_GT(row["value_ms_median"].get<double>(), 0);
+  }
+  EXPECT_EQ(json["rows"][1]["measure"], "mi");
+  EXPECT_EQ(json["rows"][1]["bins"], 64);
+  EXPECT_GT(json["rows"][1]["opencv_ratio"].get<double>(), 0);
+  EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
+}
+
 TEST(Commands, WrongUsageIsCode2) {
   for (const auto& [program, arguments] :
        {std::pair{"birdseye", ""}, {"birdseye", "volume info"}, {"birdseyed", ""}, {"birdseye-sim", "cart"}}) {
