@@ -263,8 +263,7 @@ Result<ExitCode> bench_render(const Options& options) {
   }
   nlohmann::json machine = bench_machine();
   machine["threads"] = threads;
-  const nlohmann::json json = {
-      {"rows", rows}, {"machine", machine}, {"verdict", verdict}, {"reasons", reasons}};
+  const nlohmann::json json = {{"rows", rows}, {"machine", machine}, {"verdict", verdict}, {"reasons", reasons}};
   if (auto written = write_files({{options.json, text_of(json)}}); !written) return written.error();
   return sound ? ExitCode::success : ExitCode::verdict_fail;
 }

@@ -23,6 +23,7 @@ void add_bench(CLI::App& app, CommandStatus& status);
 void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
+void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `register`
 void add_render(CLI::App& app, CommandStatus& status);
 void add_volume(CLI::App& app, CommandStatus& status);
 void add_volume_markers(CLI::App& volume, CommandStatus& status);  ///< under `volume`

@@ -256,6 +256,7 @@ void add_register(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<Options>();
   CLI::App& reg = *app.add_subcommand("register", "bring a CT and the patient together");
   reg.require_subcommand(1);
+  add_register_views(reg, status);
   CLI::App& fiducials = *reg.add_subcommand("fiducials", "rigidly, by corresponding points");
   fiducials.add_option("--ct", options->ct, "markers in the CT: x y z a line, mm, patient frame")->required();
   fiducials.add_option("--tracker", options->tracker, "the same markers as touched, in the same order, tracker frame")

@@ -1,0 +1,213 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/app/commands.hpp"
+#include "host/app/picture.hpp"
+#include "host/app/progress.hpp"
+#include "host/app/registration_case.hpp"
+#include "host/app/registration_report.hpp"
+#include "host/app/write_files.hpp"
+#include "host/overlay/compositor.hpp"
+#include "host/registration/view_registration.hpp"
+#include "host/render/engine.hpp"
+#include "host/volume/labels.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path file, out, json;
+};
+
+/// Where a point of the organ at rest is now: x with x + u(x) = rest, by fixed-point steps.
+Eigen::Vector3d deformed(const DisplacementField& field, const Eigen::Vector3d& rest_mm) {
+  Eigen::Vector3d x = rest_mm;
+  constexpr int kSteps = 200;
+  constexpr double kClose_mm = 1e-4;
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::Vector3d change = 0.7 * (rest_mm - field.displacement(x) - x);
+    x += change;
+    if (change.norm() < kClose_mm) break;
+  }
+  return x;
+}
+
+struct TargetError {
+  double mean_mm = 0, max_mm = 0;
+};
+
+/// Of the landmarks whose names begin so; all for "".
+std::optional<TargetError> target_error(const std::vector<Landmark>& landmarks, const std::string& prefix,
+                                        const DisplacementField* field) {
+  TargetError error;
+  int count = 0;
+  for (const Landmark& landmark : landmarks) {
+    if (landmark.name.rfind(prefix, 0) != 0) continue;
+    const Eigen::Vector3d now = field != nullptr ? deformed(*field, landmark.rest_mm) : landmark.rest_mm;
+    const double mm = (now - landmark.deformed_mm).norm();
+    error.mean_mm += mm;
+    error.max_mm = std::max(error.max_mm, mm);
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  error.mean_mm /= count;
+  return error;
+}
+
+std::pair<std::string, std::string> verdict_of(const ViewRegistration& found) {
+  constexpr double kSure_mm = 3, kGain = 0.01;
+  if (found.min_jacobian <= 0) return {"fail", "every deformation that was found folds: check the poses"};
+  if (found.worse_than_start)
+    return {"fail", "no deformation explains the views better than the start, which is what is written"};
+  const double gain = found.similarity_after - found.similarity_before;
+  if (!found.uncertainty_mm) return {"marginal", "a single view says little about depth: add others"};
+  if (*found.uncertainty_mm > kSure_mm) {
+    return {"marginal", fmt::format("the surface moves by {:.1f} mm when a view is left out, over {} mm: add views",
+                                    *found.uncertainty_mm, kSure_mm)};
+  }
+  if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f} nats", gain)};
+  return {"pass", fmt::format("similarity rose by {:.3f} nats; without any one view the surface moves by {:.1f} mm",
+                              gain, *found.uncertainty_mm)};
+}
+
+nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
+  nlohmann::json json = {{"similarity_before", found.similarity_before},
+                         {"similarity_after", found.similarity_after},
+                         {"evaluations", found.evaluations},
+                         {"gradient_evaluations", found.gradient_evaluations},
+                         {"time_s", time_s},
+                         {"dof", found.parameters.size()},
+                         {"control_points", found.control_points},
+                         {"why_so_many_points", found.why_so_many_points},
+                         {"views", c.views.size()},
+                         {"min_jacobian", found.min_jacobian},
+                         {"uncertainty_mm", nullptr}};
+  if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
+  json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
+                   {"falloff", found.light.falloff},
+                   {"ambient", found.light.ambient},
+                   {"vignette", found.light.vignette}};
+  for (std::size_t n = 0; n < c.views.size(); ++n) {
+    json["per_view"].push_back({{"view", c.views[n].name},
+                                {"similarity_before", found.per_view_before[n]},
+                                {"similarity_after", found.per_view_after[n]}});
+  }
+  const DisplacementField* const initial = c.initial ? &*c.initial : nullptr;
+  for (const auto& [key, prefix] :
+       {std::pair{"", ""}, {"surface_", "surface"}, {"vessel_", "vessel"}, {"tumour_", "tumour"}}) {
+    const auto before = target_error(c.landmarks, prefix, initial);
+    const auto after = target_error(c.landmarks, prefix, &found.field);
+    if (!before || !after) continue;
+    json[fmt::format("{}tre_before_mm_mean", key)] = before->mean_mm;
+    json[fmt::format("{}tre_before_mm_max", key)] = before->max_mm;
+    json[fmt::format("{}tre_after_mm_mean", key)] = after->mean_mm;
+    json[fmt::format("{}tre_after_mm_max", key)] = after->max_mm;
+  }
+  nlohmann::json& points = json["control_displacement_mm"];
+  for (std::size_t i = 0; i < found.parameters.size(); i += 3)
+    points.push_back({found.parameters[i], found.parameters[i + 1], found.parameters[i + 2]});
+  return json;
+}
+
+/// Overlays of every view before and after, and where its grey and the synthetic picture's differ.
+Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const TransferFunction& transfer,
+                                          const ViewRegistration& found) {
+  std::optional<Volume> kept;
+  if (c.labels) {
+    auto cut = keep_labels(c.ct, *c.labels, c.label_values);
+    if (!cut) return cut.error();
+    kept = *std::move(cut);
+  }
+  auto engine = make_engine("cpu", kept ? *kept : c.ct, transfer);
+  if (!engine) return engine.error();
+  std::vector<FileText> files;
+  for (const bool after : {false, true}) {
+    if (after) (*engine)->deform(found.field);
+    if (!after && c.initial) (*engine)->deform(*c.initial);
+    for (std::size_t n = 0; n < c.views.size(); ++n) {
+      const VideoView& view = c.views[n];
+      const ImageRgba overlay = (*engine)->render(view.camera, view.camera_from_patient, {});
+      constexpr double kStrength = 0.7;
+      const auto mixed = composite(c.pictures[n].rgb, overlay, kStrength);
+      const char* const when = after ? "after" : "before";
+      files.push_back(
+          {fmt::format("view{}_{}.png", n, when), png_of(mixed, view.camera.width_px, view.camera.height_px, 3)});
+      files.push_back({fmt::format("view{}_difference_{}.png", n, when),
+                       png_of(difference_picture(view, overlay), view.camera.width_px, view.camera.height_px, 3)});
+    }
+  }
+  return files;
+}
+
+Result<ExitCode> run(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  auto read = read_case(options.file);
+  if (!read) return read.error();
+  const RegistrationCase& c = *read;
+  const auto transfer = load_transfer_function(c.transfer);
+  if (!transfer) return transfer.error();
+
+  Progress progress;
+  ViewRegistrationSettings settings;
+  settings.control_points = c.control_points;
+  settings.level = c.level;
+  settings.initial = c.initial;
+  settings.optimiser = c.optimiser == "simplex"  ? ViewOptimiser::simplex
+                       : c.optimiser == "powell" ? ViewOptimiser::powell
+                                                 : ViewOptimiser::gradient;
+  settings.progress = [&progress](const std::string& line) { progress(line); };
+  const auto found =
+      register_views(c.views, c.ct, c.labels ? &*c.labels : nullptr, c.label_values, *transfer, settings);
+  if (!found) return Error{found.error().code, fmt::format("{}: {}", options.file.string(), found.error().what)};
+  const double time_s = progress.seconds();
+
+  nlohmann::json json = json_of(c, *found, time_s);
+  const auto [verdict, reason] = verdict_of(*found);
+  json["verdict"] = verdict;
+  json["reasons"] = {reason};
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", options.out.string())};
+  if (auto written = write_field(options.out / "field.mha", found->field); !written) return written.error();
+  auto files = pictures_of(c, *transfer, *found);
+  if (!files) return files.error();
+  files->push_back({"trace.svg", trace_svg(found->trace)});
+  files->push_back({"report.html", registration_report(c, *found, json)});
+  files->push_back({"result.json", text_of(json)});
+  for (FileText& file : *files) file.path = options.out / file.path;
+  files->push_back({options.json, text_of(json)});
+  if (auto written = write_files(*files); !written) return written.error();
+  progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), verdict, reason));
+  if (json.contains("tre_after_mm_mean")) {
+    fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",
+               json["tre_before_mm_mean"].get<double>(), json["tre_after_mm_mean"].get<double>(), c.landmarks.size());
+  }
+  return verdict == "fail" ? ExitCode::verdict_fail : ExitCode::success;
+}
+
+}  // namespace
+
+void add_register_views(CLI::App& reg, CommandStatus& status) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& views = *reg.add_subcommand("views", "by deformation, to several views of a laparoscope");
+  views.add_option("--case", options->file, "the case: volume, model and views, a TOML file")->required();
+  views.add_option("--out", options->out, "folder for the field, pictures and report")->required();
+  views.add_option("--json", options->json, "write the figures to this file");
+  views.callback([options, &status] {
+    const auto done = run(*options);
+    done ? void(status.code = *done) : status.refuse(done.error());
+  });
+}
+
+}  // namespace birdseye::host

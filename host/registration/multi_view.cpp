@@ -1,0 +1,66 @@
+#include "host/registration/multi_view.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <numeric>
+
+namespace birdseye::host {
+
+Result<MultiView> MultiView::make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
+                                  int reduction, const Prior& prior) {
+  MultiView made(tissue, control, prior);
+  made.views_.reserve(views.size());
+  for (const VideoView& view : views) {
+    const SyntheticView& synthetic = made.views_.emplace_back(view, tissue, reduction);
+    const std::vector<std::uint8_t> all(synthetic.video().size(), 1);
+    auto measure =
+        ParzenMutualInformation::make({static_cast<int>(all.size()), all.empty() ? 0 : 1, synthetic.video(), all});
+    if (!measure) return Error{measure.error().code, view.name + ": " + measure.error().what};
+    made.measures_.push_back(*std::move(measure));
+  }
+  made.per_view_.resize(views.size());
+  return made;
+}
+
+void MultiView::deform(const std::vector<double>& parameters) {
+  controlled_.displacements(parameters, moves_);
+  warp(tissue_, moves_, warped_);
+}
+
+double MultiView::similarity(const std::vector<double>& parameters, const Headlight& light) {
+  deform(parameters);
+  tbb::parallel_for(std::size_t{0}, views_.size(),
+                    [&](std::size_t n) { per_view_[n] = measures_[n].value(views_[n].render(warped_, light)); });
+  return std::accumulate(per_view_.begin(), per_view_.end(), 0.0) / static_cast<double>(views_.size());
+}
+
+double MultiView::value(const std::vector<double>& parameters, const Headlight& light) {
+  std::vector<double> unused(parameters.size(), 0.0);
+  return similarity(parameters, light) - prior_.strain * control_.strain(parameters, tissue_.box_mm(), 0, unused);
+}
+
+double MultiView::value_and_gradient(const std::vector<double>& parameters, const Headlight& light,
+                                     std::vector<double>& gradient) {
+  deform(parameters);
+  std::vector<std::vector<float>> by_warped(views_.size());
+  tbb::parallel_for(std::size_t{0}, views_.size(), [&](std::size_t n) {
+    const std::vector<double>& grey = views_[n].render(warped_, light);
+    std::vector<double> by_grey(grey.size());
+    per_view_[n] = measures_[n].value_and_gradient(grey, by_grey);
+    for (double& by : by_grey) by /= static_cast<double>(views_.size());
+    by_warped[n].assign(warped_.size(), 0.0F);
+    views_[n].pull_back(warped_, by_grey, by_warped[n]);
+  });
+  for (std::size_t n = 1; n < views_.size(); ++n) {
+    for (std::size_t v = 0; v < warped_.size(); ++v) by_warped[0][v] += by_warped[n][v];
+  }
+  std::vector<float> by_move;
+  pull_back_warp(tissue_, moves_, by_warped[0], by_move);
+  gradient.assign(parameters.size(), 0.0);
+  controlled_.pull_back(by_move, gradient);
+  const double similarity =
+      std::accumulate(per_view_.begin(), per_view_.end(), 0.0) / static_cast<double>(views_.size());
+  return similarity - prior_.strain * control_.strain(parameters, tissue_.box_mm(), -prior_.strain, gradient);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <vector>
+
+#include "host/registration/control_grid.hpp"
+#include "host/registration/parzen_mutual_information.hpp"
+#include "host/registration/synthetic_view.hpp"
+
+namespace birdseye::host {
+
+/// What keeps a deformation plausible where the pictures say nothing.
+struct Prior {
+  double strain = 1;  ///< weight of ControlGrid::strain
+};
+
+/// How well a deformation explains all views (the paper's Equation 6, as a mean), and its analytic gradient with
+/// respect to every control point: through the mutual information, compositing, light, sampling and the Bezier map.
+class MultiView {
+ public:
+  /// Keeps references to tissue and control. Refuses, naming the view, one of which nothing counts or that is of a
+  /// single grey where it does.
+  static Result<MultiView> make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
+                                int reduction, const Prior& prior);
+
+  /// Mean mutual information of the views, in nats, without the prior.
+  double similarity(const std::vector<double>& parameters, const Headlight& light);
+  /// Similarity less what the prior takes off, which is what to make large.
+  double value(const std::vector<double>& parameters, const Headlight& light);
+  /// With its gradient.
+  double value_and_gradient(const std::vector<double>& parameters, const Headlight& light,
+                            std::vector<double>& gradient);
+  /// Of each view, after either.
+  [[nodiscard]] const std::vector<double>& per_view() const { return per_view_; }
+  /// Of view n, after either: how many pixels show tissue.
+  [[nodiscard]] std::size_t tissue_pixels(std::size_t n) const { return views_[n].tissue_pixels(); }
+
+ private:
+  MultiView(const Tissue& tissue, const ControlGrid& control, const Prior& prior)
+      : tissue_(tissue), control_(control), controlled_(control, tissue.points), prior_(prior) {}
+  void deform(const std::vector<double>& parameters);
+
+  const Tissue& tissue_;
+  const ControlGrid& control_;
+  ControlledGrid controlled_;
+  Prior prior_;
+  std::vector<SyntheticView> views_;
+  std::vector<ParzenMutualInformation> measures_;
+  std::vector<double> per_view_;
+  std::vector<float> moves_, warped_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,354 @@
+#include "host/registration/view_registration.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <nlopt.hpp>
+
+namespace birdseye::host {
+
+namespace {
+
+using Parameters = std::vector<double>;
+
+/// Coarse to fine: pictures about so wide, on a grid of this spacing.
+struct Stage {
+  int width_px;
+  double spacing_mm;
+  int most_steps;
+};
+constexpr Stage kCoarse{96, 4, 30}, kFine{128, 3, 15};
+constexpr int kFirstSteps = 12;
+/// What more control points must bring on pixels that were not used, nats.
+constexpr double kWorthwhile = 0.004;
+constexpr int kMostControlPoints = 7;
+
+/// The views at one resolution, and how often they were asked.
+class Problem {
+ public:
+  static Result<Problem> make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
+                              const Stage& stage, const Prior& prior, ViewRegistration& record) {
+    const int reduction = std::max(1, views.front().camera.width_px / stage.width_px);
+    auto made = MultiView::make(views, tissue, control, reduction, prior);
+    if (!made) return made.error();
+    return Problem(control, reduction, *std::move(made), record);
+  }
+
+  double similarity(const Parameters& parameters, const Headlight& light) {
+    ++record_.evaluations;
+    return views_.similarity(parameters, light);
+  }
+
+  /// Climbs from start; steps are taken in even coordinates.
+  Parameters climb(const Parameters& start, const Headlight& light, nlopt::algorithm algorithm, int most_steps) {
+    Parameters even = control_.to_even(start);
+    nlopt::opt optimiser(algorithm, static_cast<unsigned>(even.size()));
+    const auto objective = [&](const Parameters& x, Parameters& gradient) {
+      const Parameters parameters = control_.from_even(x);
+      Parameters by_parameters;
+      double value = 0;
+      if (gradient.empty()) {
+        ++record_.evaluations;
+        by_parameters.assign(parameters.size(), 0.0);
+        value = views_.value(parameters, light);
+      } else {
+        ++record_.gradient_evaluations;
+        value = views_.value_and_gradient(parameters, light, by_parameters);
+        gradient = control_.gradient_to_even(by_parameters);
+      }
+      record_.trace.push_back({reduction_, parameters.size(), value});
+      return value;
+    };
+    using Objective = decltype(objective);
+    optimiser.set_max_objective([](const Parameters& x, Parameters& gradient,
+                                   void* data) { return (*static_cast<Objective*>(data))(x, gradient); },
+                                const_cast<void*>(static_cast<const void*>(&objective)));
+    optimiser.set_maxeval(most_steps);
+    optimiser.set_ftol_rel(1e-5);
+    constexpr double kFirstStep_mm = 1;
+    if (algorithm != nlopt::LD_LBFGS) optimiser.set_initial_step(kFirstStep_mm);
+    double value = 0;
+    try {
+      optimiser.optimize(even, value);
+    } catch (const std::exception&) {
+      // It stops so where rounding keeps it from climbing further; what it reached stands.
+    }
+    return control_.from_even(even);
+  }
+
+  MultiView& views() { return views_; }
+
+ private:
+  Problem(const ControlGrid& control, int reduction, MultiView views, ViewRegistration& record)
+      : control_(control), reduction_(reduction), views_(std::move(views)), record_(record) {}
+
+  const ControlGrid& control_;
+  int reduction_;
+  MultiView views_;
+  ViewRegistration& record_;
+};
+
+nlopt::algorithm algorithm_of(ViewOptimiser optimiser) {
+  if (optimiser == ViewOptimiser::simplex) return nlopt::LN_NELDERMEAD;
+  if (optimiser == ViewOptimiser::powell) return nlopt::LN_PRAXIS;
+  return nlopt::LD_LBFGS;
+}
+
+/// The lamp under which a deformation explains the views best.
+Headlight find_light(Problem& problem, const Parameters& parameters, const Headlight& start) {
+  const auto light_of = [](const Parameters& x) {
+    Headlight light;
+    light.offset_in_camera_mm = {10 * x[0], 10 * x[1], 0};
+    light.falloff = 2 * x[2];
+    light.ambient = 0.1 * x[3];
+    light.vignette = x[4];
+    return light;
+  };
+  Parameters x{start.offset_in_camera_mm.x() / 10, start.offset_in_camera_mm.y() / 10, start.falloff / 2,
+               std::clamp(start.ambient / 0.1, 0.1, 5.0), start.vignette};
+  const auto objective = [&](const Parameters& at, Parameters&) {
+    return problem.similarity(parameters, light_of(at));
+  };
+  using Objective = decltype(objective);
+  nlopt::opt optimiser(nlopt::LN_SBPLX, 5);
+  optimiser.set_max_objective([](const Parameters& at, Parameters& gradient,
+                                 void* data) { return (*static_cast<Objective*>(data))(at, gradient); },
+                              const_cast<void*>(static_cast<const void*>(&objective)));
+  optimiser.set_lower_bounds({-6, -6, 0.5, 0.1, 0});
+  optimiser.set_upper_bounds({6, 6, 1.5, 5, 0.8});
+  optimiser.set_initial_step({0.5, 0.5, 0.2, 0.5, 0.15});
+  optimiser.set_maxeval(60);
+  double value = 0;
+  try {
+    optimiser.optimize(x, value);
+  } catch (const std::exception&) {
+    // As above.
+  }
+  return light_of(x);
+}
+
+/// Tiles of every view, a quarter of them: left out of the fit to judge it, or all that is left in.
+std::vector<VideoView> tiles_of(const std::vector<VideoView>& views, bool held_out) {
+  std::vector<VideoView> out = views;
+  for (VideoView& view : out) {
+    const int tile = std::max(1, view.camera.width_px / 12);
+    for (int y = 0; y < view.camera.height_px; ++y) {
+      for (int x = 0; x < view.camera.width_px; ++x) {
+        const bool mine = (x / tile % 2 == 0) && (y / tile % 2 == 0);
+        if (mine != held_out)
+          view.mask[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.camera.width_px) +
+                    static_cast<std::size_t>(x)] = 0;
+      }
+    }
+  }
+  return out;
+}
+
+/// The control points that come closest to a field, by least squares over a grid of the box.
+Parameters fit_to(const DisplacementField& field, const ControlGrid& control, const Tissue& tissue) {
+  constexpr int kSide = 9;
+  const ControlledGrid grid(control, {kSide, kSide, kSide});
+  const std::size_t count = control.parameters() / 3;
+  Eigen::MatrixXd basis(kSide * kSide * kSide, static_cast<Eigen::Index>(count));
+  std::vector<float> response;
+  for (std::size_t c = 0; c < count; ++c) {
+    Parameters one(control.parameters(), 0.0);
+    one[3 * c] = 1;
+    grid.displacements(one, response);
+    for (Eigen::Index p = 0; p < basis.rows(); ++p)
+      basis(p, static_cast<Eigen::Index>(c)) = static_cast<double>(response[3 * static_cast<std::size_t>(p)]);
+  }
+  Eigen::MatrixXd wanted(basis.rows(), 3);
+  for (int p = 0; p < basis.rows(); ++p) {
+    const Eigen::Vector3d share = Eigen::Vector3d(p % kSide, p / kSide % kSide, p / kSide / kSide) / (kSide - 1);
+    const Eigen::Vector3d at = tissue.patient_from_grid * Eigen::Vector3d(share.cwiseProduct(tissue.box_mm()));
+    wanted.row(p) = (tissue.patient_from_grid.linear().transpose() * field.displacement(at)).transpose();
+  }
+  const Eigen::MatrixXd found = (basis.transpose() * basis).ldlt().solve(basis.transpose() * wanted);
+  Parameters out;
+  for (Eigen::Index c = 0; c < found.rows(); ++c) out.insert(out.end(), {found(c, 0), found(c, 1), found(c, 2)});
+  return out;
+}
+
+DisplacementField field_from(const ControlGrid& control, const Parameters& parameters, const Tissue& tissue,
+                             int level) {
+  PatchOctree tree = *PatchOctree::uniform(level);
+  control.patch(parameters, tissue.box_mm()).drive(tree);
+  Eigen::Affine3d patient_from_cube = tissue.patient_from_grid;
+  patient_from_cube.scale(tissue.box_mm());
+  return field_of(tree, patient_from_cube);
+}
+
+Result<void> check_views(const std::vector<VideoView>& views, Problem& problem, const Parameters& start) {
+  problem.similarity(start, {});
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    if (problem.views().tissue_pixels(n) == 0) {
+      return Error{Errc::not_found,
+                   fmt::format("{}: sees nothing of the organ; check its pose and the labels", views[n].name)};
+    }
+  }
+  return {};
+}
+
+/// How much the surface's displacement depends on each view.
+Result<double> jackknife_mm(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
+                            const Parameters& found, const Headlight& light, const Prior& prior,
+                            ViewRegistration& record) {
+  std::vector<std::size_t> surface;
+  for (std::size_t v = 0; v < tissue.occupancy.size(); ++v) {
+    constexpr float kInside = 0.7F;
+    if (tissue.occupancy[v] > kSurface && tissue.occupancy[v] < kInside) surface.push_back(v);
+  }
+  const ControlledGrid grid(control, tissue.points);
+  std::vector<std::vector<float>> moves(views.size());
+  for (std::size_t out = 0; out < views.size(); ++out) {
+    std::vector<VideoView> others = views;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
+    auto problem = Problem::make(others, tissue, control, kCoarse, prior, record);
+    if (!problem) return problem.error();
+    constexpr int kSteps = 8;
+    grid.displacements(problem->climb(found, light, nlopt::LD_LBFGS, kSteps), moves[out]);
+  }
+  double sum = 0;
+  for (const std::size_t v : surface) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double mean = 0;
+      for (const auto& move : moves)
+        mean += static_cast<double>(move[3 * v + axis]) / static_cast<double>(moves.size());
+      for (const auto& move : moves) sum += std::pow(static_cast<double>(move[3 * v + axis]) - mean, 2);
+    }
+  }
+  const auto n = static_cast<double>(views.size());
+  return std::sqrt((n - 1) / n * sum / static_cast<double>(std::max<std::size_t>(1, surface.size())));
+}
+
+std::string times(const std::array<int, 3>& n) {
+  return fmt::format("{}x{}x{}", n[0], n[1], n[2]);
+}
+
+/// As many control points as bring something on pixels that were not fitted.
+Result<std::array<int, 3>> choose_control_points(const std::vector<VideoView>& views, const Tissue& tissue,
+                                                 const Headlight& light, const ViewRegistrationSettings& settings,
+                                                 ViewRegistration& record) {
+  const std::vector<VideoView> fitted = tiles_of(views, false), held_out = tiles_of(views, true);
+  std::array<int, 3> best{1, 1, 1};
+  double best_value = -1;
+  Parameters found(3, 0.0);
+  std::array<int, 3> before = best;
+  for (int n = 1; n <= kMostControlPoints; n += 2) {
+    const std::array<int, 3> now{n, n, n};
+    const ControlGrid control(now);
+    found = ControlGrid(before).refine(found, control);
+    auto fit = Problem::make(fitted, tissue, control, kCoarse, settings.prior, record);
+    if (!fit) return fit.error();
+    found = fit->climb(found, light, nlopt::LD_LBFGS, kCoarse.most_steps);
+    auto judge = Problem::make(held_out, tissue, control, kCoarse, settings.prior, record);
+    if (!judge) return judge.error();
+    const double value = judge->similarity(found, light);
+    settings.progress(fmt::format("{} control points: {:.4f} nats on held-out pixels", times(now), value));
+    if (value < best_value + kWorthwhile) {
+      record.why_so_many_points = fmt::format("{} control points: {} bring {:+.4f} nats on held-out pixels, under {}",
+                                              times(best), times(now), value - best_value, kWorthwhile);
+      return best;
+    }
+    best = before = now;
+    best_value = value;
+  }
+  record.why_so_many_points = fmt::format("{} control points, the most that are tried", times(best));
+  return best;
+}
+
+}  // namespace
+
+Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
+                                        std::span<const int> label_values, const TransferFunction& transfer,
+                                        const ViewRegistrationSettings& settings) {
+  if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
+  const auto coarse = tissue_of(ct, labels, label_values, transfer, kCoarse.spacing_mm);
+  if (!coarse) return coarse.error();
+  if (settings.initial && least_determinant(*settings.initial) <= 0)
+    return Error{Errc::bad_value, "the initial field folds; start from another or from none"};
+
+  ViewRegistration out;
+  const ControlGrid one({1, 1, 1});
+  Parameters start_of_one(3, 0.0);
+  if (settings.initial) start_of_one = fit_to(*settings.initial, one, *coarse);
+  auto few = Problem::make(views, *coarse, one, kCoarse, settings.prior, out);
+  if (!few) return few.error();
+  if (auto sound = check_views(views, *few, start_of_one); !sound) return sound.error();
+  out.light = settings.light.value_or(Headlight{});
+  // What few control points can do, they do without straying.
+  const Parameters of_one = few->climb(start_of_one, out.light, nlopt::LD_LBFGS, kFirstSteps);
+
+  if (settings.control_points) {
+    out.control_points = *settings.control_points;
+    out.why_so_many_points = fmt::format("{} control points, as asked", times(out.control_points));
+  } else {
+    const auto chosen = choose_control_points(views, *coarse, out.light, settings, out);
+    if (!chosen) return chosen.error();
+    out.control_points = *chosen;
+  }
+  const ControlGrid control(out.control_points);
+  Parameters start(control.parameters(), 0.0);
+  if (settings.initial) start = fit_to(*settings.initial, control, *coarse);
+  Parameters rough = settings.initial ? start : one.refine(of_one, control);
+  auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
+  if (!wide) return wide.error();
+  if (!settings.light) {
+    // A rough fit first, so that the lamp does not stand in for a deformation.
+    out.light = find_light(*wide, wide->climb(rough, out.light, nlopt::LD_LBFGS, kFirstSteps), out.light);
+    settings.progress(
+        fmt::format("lamp: {:.1f}, {:.1f} mm beside the lens, fall-off {:.1f}, ambient {:.2f}, vignette {:.2f}",
+                    out.light.offset_in_camera_mm.x(), out.light.offset_in_camera_mm.y(), out.light.falloff,
+                    out.light.ambient, out.light.vignette));
+  }
+
+  const auto fine = tissue_of(ct, labels, label_values, transfer, kFine.spacing_mm);
+  if (!fine) return fine.error();
+  Prior prior = settings.prior;
+  auto judged = Problem::make(views, *fine, control, kFine, prior, out);
+  if (!judged) return judged.error();
+  Problem& judge = *judged;
+  out.similarity_before = judge.similarity(start, out.light);
+  out.per_view_before = judge.views().per_view();
+  constexpr int kTries = 3;
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    auto close = Problem::make(views, *fine, control, kFine, prior, out);
+    auto broad = Problem::make(views, *coarse, control, kCoarse, prior, out);
+    if (!close || !broad) return (close ? broad : close).error();
+    if (settings.optimiser == ViewOptimiser::gradient) {
+      rough = broad->climb(rough, out.light, nlopt::LD_LBFGS, kCoarse.most_steps);
+      out.parameters = close->climb(rough, out.light, nlopt::LD_LBFGS, kFine.most_steps);
+    } else {
+      out.parameters = close->climb(start, out.light, algorithm_of(settings.optimiser), settings.most_evaluations);
+    }
+    out.field = field_from(control, out.parameters, *fine, settings.level);
+    out.min_jacobian = least_determinant(out.field);
+    if (out.min_jacobian > 0) break;
+    constexpr double kStiffer = 10;
+    prior.strain *= kStiffer;
+    settings.progress("the result folds: again, stiffer");
+  }
+  out.similarity_after = judge.similarity(out.parameters, out.light);
+  out.per_view_after = judge.views().per_view();
+  out.worse_than_start = out.similarity_after < out.similarity_before || out.min_jacobian <= 0;
+  if (out.worse_than_start) {
+    out.parameters = start;
+    out.field = field_from(control, start, *fine, settings.level);
+    out.min_jacobian = least_determinant(out.field);
+    out.similarity_after = out.similarity_before;
+    out.per_view_after = out.per_view_before;
+  }
+  if (settings.estimate_uncertainty && views.size() > 1) {
+    ViewRegistration aside;  // its evaluations are not the registration's
+    const auto spread = jackknife_mm(views, *coarse, control, out.parameters, out.light, prior, aside);
+    if (!spread) return spread.error();
+    out.uncertainty_mm = *spread;
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

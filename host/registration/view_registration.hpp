@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/registration/control_grid.hpp"
+#include "host/registration/multi_view.hpp"
+#include "host/registration/tissue.hpp"
+
+namespace birdseye::host {
+
+enum class ViewOptimiser {
+  gradient,  ///< L-BFGS with the analytic gradient, coarse to fine
+  simplex,   ///< Nelder and Mead's downhill simplex, the value alone
+  powell,    ///< Powell's direction set, in Brent's form of principal axes, the value alone
+};
+
+struct ViewRegistrationSettings {
+  /// Inner control points along each axis; none: as many as the views support.
+  std::optional<std::array<int, 3>> control_points;
+  ViewOptimiser optimiser = ViewOptimiser::gradient;
+  /// Patches of the octree that carries the result: 2^level along each axis.
+  int level = 5;
+  /// Where to start; must not fold.
+  std::optional<DisplacementField> initial;
+  /// The lamp, where it is known; none: estimated from the views.
+  std::optional<Headlight> light;
+  /// Of the value alone, for simplex and powell.
+  int most_evaluations = 400;
+  bool estimate_uncertainty = true;
+  Prior prior;
+  /// Called with a line for a person now and then.
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+};
+
+/// One evaluation of the optimiser.
+struct TracePoint {
+  int reduction = 0;  ///< every so many pixels
+  std::size_t parameters = 0;
+  double similarity = 0;
+};
+
+struct ViewRegistration {
+  std::array<int, 3> control_points{};
+  std::vector<double> parameters;  ///< mm, see ControlGrid
+  DisplacementField field;         ///< rest = deformed + u(deformed)
+  Headlight light;
+  double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
+  std::vector<double> per_view_before, per_view_after;
+  int evaluations = 0, gradient_evaluations = 0;
+  std::vector<TracePoint> trace;
+  double min_jacobian = 1;
+  /// How far the organ's surface moves, root mean square, when one view is left out: the jackknife's standard
+  /// deviation. None for a single view, or where it was not asked for.
+  std::optional<double> uncertainty_mm;
+  std::string why_so_many_points;  ///< in words
+  bool worse_than_start = false;   ///< the start is what is returned then
+};
+
+/// Deforms the tissue until synthetic views look like the video. Refuses, naming the view: one that sees nothing of the
+/// organ, a picture of a single grey; and a start that folds.
+Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
+                                        std::span<const int> label_values, const TransferFunction& transfer,
+                                        const ViewRegistrationSettings& settings);
+
+}  // namespace birdseye::host

@@ -1,0 +1,121 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "tests/support/command.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream in(path);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Three small views of a liver that moved by 8 mm.
+fs::path make_case(const Scratch& scratch) {
+  const auto result = run("birdseye-sim", "case --out " + (scratch / "c").string() +
+                                              " --seed 5 --views 3 --size 384x288 --dof 3 --amplitude-mm 8");
+  EXPECT_EQ(result.code, 0) << result.output;
+  return scratch / "c";
+}
+
+/// That case with one thing changed in its file.
+fs::path changed(const Scratch& scratch, const std::string& from, const std::string& to) {
+  if (!fs::exists(scratch / "c")) make_case(scratch);
+  if (!fs::exists(scratch / "whole.toml")) fs::copy(scratch / "c/case.toml", scratch / "whole.toml");
+  const std::string text = std::regex_replace(text_of(scratch / "whole.toml"), std::regex(from), to,
+                                              std::regex_constants::format_first_only);
+  std::ofstream(scratch / "c/case.toml") << text;
+  return scratch / "c/case.toml";
+}
+
+std::string arguments(const fs::path& file, const Scratch& scratch) {
+  return "register views --case " + file.string() + " --out " + (scratch / "out").string();
+}
+
+TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
+  const Scratch scratch;
+  const fs::path folder = make_case(scratch);
+  const auto result =
+      run("birdseye", arguments(folder / "case.toml", scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  EXPECT_GT(json["tre_before_mm_mean"], 3);
+  EXPECT_LT(json["tre_after_mm_mean"], 1);
+  EXPECT_LT(json["tre_after_mm_max"], 2);
+  EXPECT_GT(json["similarity_after"], json["similarity_before"]);
+  EXPECT_EQ(json["dof"], 3);
+  EXPECT_EQ(json["views"], 3);
+  EXPECT_GT(json["min_jacobian"], 0.3);
+  EXPECT_LT(json["uncertainty_mm"], 3);
+  EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
+  for (const char* name :
+       {"field.mha", "report.html", "trace.svg", "view0_before.png", "view2_after.png", "view1_difference_after.png"})
+    EXPECT_GT(fs::file_size(scratch / "out" / name), 100U) << name;
+  // Another command reads the field back.
+  EXPECT_EQ(
+      run("birdseye", "render --volume " + (folder / "ct.nii.gz").string() + " --deformation " +
+                          (scratch / "out/field.mha").string() + " --size 64x48 --out " + (scratch / "p.png").string())
+          .code,
+      0);
+}
+
+TEST(RegisterViewsCommand, StartsFromAField) {
+  const Scratch scratch;
+  const auto file =
+      changed(scratch, "optimiser = \"gradient\"", "optimiser = \"gradient\"\ninitial = \"truth/field.mha\"");
+  const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_NE(result.code, 2) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  EXPECT_LT(json["tre_before_mm_mean"], 0.1);
+  EXPECT_LT(json["tre_after_mm_mean"], 1);
+}
+
+TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
+  const Scratch scratch;
+  for (const auto& [from, to, words] : std::vector<std::tuple<std::string, std::string, std::vector<std::string>>>{
+           {"ct.nii.gz", "none.nii.gz", {"none.nii.gz", "does not exist"}},
+           {"\"gradient\"", "\"guess\"", {"optimiser", "simplex"}},
+           {"control_points = \\[.*\\]", "control_points = [0, 1, 1]", {"control_points"}},
+           {"label_values = \\[.*\\]", "label_values = []", {"label_values"}},
+           {"image = \"view1.png\"", "image = \"camera.yaml\"", {"camera.yaml", "picture"}},
+           {"camera_from_patient = \"view1.txt\"", "camera_from_patient = \"camera.yaml\"", {"camera.yaml"}},
+           {"\\[model\\]", "[model", {"case.toml"}}}) {
+    expect_refused("birdseye", arguments(changed(scratch, from, to), scratch), words, scratch / "out");
+  }
+}
+
+TEST(RegisterViewsCommand, RefusesTwoViewsThatAreTheSame) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "image = \"view1.png\"[^]*?camera_from_patient = \"view1.txt\"",
+                            "image = \"view0.png\"\ncamera = \"camera.yaml\"\ncamera_from_patient = \"view0.txt\"");
+  expect_refused("birdseye", arguments(file, scratch), {"same view"}, scratch / "out");
+}
+
+TEST(RegisterViewsCommand, RefusesACameraOfAnotherSize) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "x^", "");
+  const std::string camera =
+      std::regex_replace(text_of(scratch / "c/camera.yaml"), std::regex("image_width: *384"), "image_width: 640");
+  std::ofstream(scratch / "c/camera.yaml") << camera;
+  expect_refused("birdseye", arguments(file, scratch), {"camera", "640x288", "384x288"}, scratch / "out");
+}
+
+TEST(RegisterViewsCommand, RefusesAViewThatSeesNothing) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "x^", "");
+  std::ofstream(scratch / "c/view2.txt") << "1 0 0 0\n0 1 0 0\n0 0 1 -4000\n0 0 0 1\n";
+  expect_refused("birdseye", arguments(file, scratch), {"view2.png", "nothing of the organ"}, scratch / "out");
+}
+
+}  // namespace
+}  // namespace birdseye
