@@ -100,6 +100,8 @@ Result<RenderScene> scene_of(const Options& options) {
   }
   auto field = read_field(options.deformation);
   if (!field) return field.error();
+  if (auto covers = check_covers(*field, scene.volume); !covers)
+    return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
   scene.deformation = *std::move(field);
   return scene;
 }
@@ -143,6 +145,8 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
   if (auto written = write_files({{options.out, png}, {options.json, text_of(json)}}); !written) return written;
   fmt::print("{}: {}x{}, {:.0f} % covered, {:.0f} ms ({})\n", options.out.string(), image.width_px, image.height_px,
              100 * coverage, ms, engine.name());
+  if (!seen)
+    fmt::print(stderr, "birdseye: nothing of the volume is seen: look at --transfer, --pose and the spacing\n");
   return {};
 }
 

@@ -1,5 +1,7 @@
 #include "host/deform/displacement_field.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -72,6 +74,36 @@ DisplacementField field_of(const PatchOctree& tree, const Eigen::Affine3d& patie
     }
   }
   return field;
+}
+
+Result<void> check_covers(const DisplacementField& field, const Volume& volume) {
+  const Eigen::Affine3d voxel_from_lattice = volume.patient_from_voxel.inverse() * field.patient_from_lattice;
+  const Eigen::Array3d last_voxel(volume.size[0] - 1, volume.size[1] - 1, volume.size[2] - 1);
+  constexpr double kMoves_mm = 0.5;
+  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::max()), high = -low;
+  double torn_mm = 0;
+  for (int k = 0; k < field.size[2]; ++k) {
+    for (int j = 0; j < field.size[1]; ++j) {
+      for (int i = 0; i < field.size[0]; ++i) {
+        const Eigen::Array3d voxel = (voxel_from_lattice * Eigen::Vector3d(i, j, k)).array();
+        low = low.min(voxel);
+        high = high.max(voxel);
+        const bool face =
+            i == 0 || j == 0 || k == 0 || i == field.size[0] - 1 || j == field.size[1] - 1 || k == field.size[2] - 1;
+        // A field may end a voxel short of the volume's faces.
+        const bool inside = (voxel > 1).all() && (voxel < last_voxel - 1).all();
+        if (face && inside) torn_mm = std::max(torn_mm, static_cast<double>(field.at(i, j, k).norm()));
+      }
+    }
+  }
+  if ((high < 0).any() || (low > last_voxel).any())
+    return Error{Errc::bad_value, "the field lies outside of the volume; is it in another frame?"};
+  if (torn_mm > kMoves_mm) {
+    return Error{Errc::bad_value, fmt::format("the field stops inside the volume where it still moves it by {:.1f} mm; "
+                                              "extend it to the volume's faces",
+                                              torn_mm)};
+  }
+  return {};
 }
 
 double least_determinant(const DisplacementField& field) {

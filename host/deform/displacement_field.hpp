@@ -36,6 +36,10 @@ DisplacementField field_of(const PatchOctree& tree, const Eigen::Affine3d& patie
 Result<void> write_field(const std::filesystem::path& path, const DisplacementField& field);
 Result<DisplacementField> read_field(const std::filesystem::path& path);
 
+/// Whether the field means anything for this volume: refuses (Errc::bad_value) one that lies outside of it, and one
+/// that stops inside of it while it still moves it, for there the picture would tear.
+Result<void> check_covers(const DisplacementField& field, const Volume& volume);
+
 /// The least Jacobian determinant of p + u(p) over the corners of the lattice's cells.
 double least_determinant(const DisplacementField& field);
 

@@ -206,5 +206,22 @@ TEST(DisplacementField, RefusesWhatIsNoSoundField) {
   EXPECT_FALSE(write_field(scratch / "field.txt", field_of(tree, oblique_box())));
 }
 
+TEST(DisplacementField, RefusesToTearOrToMissTheVolume) {
+  Volume volume;
+  volume.size = {20, 20, 20};
+  volume.hu.assign(8000, 0);
+  DisplacementField field;
+  field.size = {5, 5, 5};
+  field.patient_from_lattice.linear() = 5 * Eigen::Matrix3d::Identity();
+  field.displacement_mm.assign(125, Eigen::Vector3f(0, 3, 0));
+  EXPECT_TRUE(check_covers(field, volume));  // it ends beyond the volume, where it may move what it likes
+  field.patient_from_lattice.linear() *= 0.5;
+  EXPECT_FALSE(check_covers(field, volume));
+  for (Eigen::Vector3f& u : field.displacement_mm) u *= 0.1F;
+  EXPECT_TRUE(check_covers(field, volume));
+  field.patient_from_lattice.translation() = Eigen::Vector3d(500, 0, 0);
+  EXPECT_FALSE(check_covers(field, volume));
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -145,6 +145,42 @@ TEST(RayCaster, ADeformationOfNothingChangesNothing) {
   EXPECT_EQ(caster.render(rays, pose(volume), {}).rgba, scanned.rgba);
 }
 
+TEST(RayCaster, ADeformationOfNothingChangesNothingWhereAirIsSeenAndStepsAreLong) {
+  const Volume volume = scene();
+  const TransferFunction air({{-900, {0.5, 0.6, 0.9}, 0.05}, {-850, {0.5, 0.6, 0.9}, 0}});
+  const DisplacementField nothing = bent(volume, 2, 0, 1);
+  const LensRays rays(lens());
+  for (const double step_mm : {0.7, 3.0, 6.0}) {
+    RenderSettings settings;
+    settings.step_mm = step_mm;
+    RayCaster caster(volume, air);
+    const ImageRgba scanned = caster.render(rays, pose(volume), settings);
+    caster.deform(nothing);
+    EXPECT_EQ(caster.render(rays, pose(volume), settings).rgba, scanned.rgba) << step_mm;
+  }
+}
+
+TEST(RayCaster, DoesNotDriftAlongAMillionSteps) {
+  // The end of a long ray is where it is said to be: the last slices are dense, all before them nearly clear.
+  Volume volume;
+  volume.size = {8, 8, 1000};
+  volume.spacing_mm = {1, 1, 700};
+  volume.patient_from_voxel.linear() = volume.spacing_mm.asDiagonal();
+  volume.hu.assign(8 * 8 * 1000, 0);
+  std::fill(volume.hu.end() - std::ptrdiff_t{8 * 8 * 2}, volume.hu.end(), std::int16_t{1000});
+  const TransferFunction fog({{0, {1, 0, 0}, 1e-9}, {900, {0, 1, 0}, 0.01}});
+  CameraModel camera;
+  camera.width_px = camera.height_px = 4;
+  camera.fx_px = camera.fy_px = 1e7;
+  camera.cx_px = camera.cy_px = 1.5;
+  const Transform<Camera, Patient> from(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-3.5, -3.5, 100));
+  const std::vector<double> reference = render_reference(volume, fog, camera, from, {}, nullptr);
+  for (const cpu::Isa isa : cpu::supported_isas()) {
+    const ImageRgba picture = RayCaster(volume, fog, isa).render(LensRays(camera), from, {});
+    EXPECT_LT(testing::difference(picture, reference).worst, 3) << cpu::name_of(isa);
+  }
+}
+
 TEST(RayCaster, AnEmptyVolumeIsTransparent) {
   Volume volume = scene();
   std::fill(volume.hu.begin(), volume.hu.end(), std::int16_t{-1000});

@@ -8,6 +8,8 @@ namespace birdseye::host::cpu {
 
 /// Samples between two looks at the bricks and at the transmittance: their loads need not wait for one another.
 inline constexpr int kRun = 4;
+/// Voxels that a run may go on past what is seen.
+inline constexpr float kStray = 5;
 /// Below this, a pixel counts as opaque.
 inline constexpr float kOpaque = 1.0F / 64;
 
@@ -88,24 +90,38 @@ void cast_packet(const CastJob& job, int block, int part) {
   // From here on places are in 1/65536 voxel: a sample's cell and its place in that are bits of one whole number. They
   // are counted from where the ray enters the volume, whatever is leapt over.
   constexpr float kUnit = 65536;
-  const auto start = [&](F from, F rate) {
-    return P::round((from + (entry + P::f(0.5F)) * P::f(job.step_mm) * rate) * P::f(kUnit));
+  const auto start = [&](F from, F rate, F index) {
+    return P::round((from + (index + P::f(0.5F)) * P::f(job.step_mm) * rate) * P::f(kUnit));
   };
   const auto advance = [&](F rate) { return P::round(rate * P::f(job.step_mm * kUnit)); };
   const I entered = P::truncate(entry);
-  const I first_x = start(o.x, in_voxels.x), first_y = start(o.y, in_voxels.y), first_z = start(o.z, in_voxels.z);
+  const I first_x = start(o.x, in_voxels.x, entry), first_y = start(o.y, in_voxels.y, entry),
+          first_z = start(o.z, in_voxels.z, entry);
   const I dx = advance(in_voxels.x), dy = advance(in_voxels.y), dz = advance(in_voxels.z);
   const Vector<P> d{P::to_float(dx), P::to_float(dy), P::to_float(dz)};
   const F inverse[3] = {reciprocal<P>(d.x), reciprocal<P>(d.y), reciprocal<P>(d.z)};
 
-  const F longest = P::max(P::abs(d.x), P::max(P::abs(d.y), P::abs(d.z)));
-  const float runs_per_brick =
-      static_cast<float>(kBrick) * kUnit / (0.0F - P::least(P::f(0) - longest)) / static_cast<float>(kRun);
+  const F longest = P::max(P::f(1), P::max(P::abs(d.x), P::max(P::abs(d.y), P::abs(d.z))));
+  const float longest_step = 0.0F - P::least(P::f(0) - longest);
+  // Only a brick and a voxel around what is seen hold a deformation's values: no run may stray further.
+  const float run_length = static_cast<float>(kRun) * longest_step <= kStray * kUnit ? static_cast<float>(kRun) : 1.0F;
+  const float runs_per_brick = static_cast<float>(kBrick) * kUnit / longest_step / run_length;
 
   F red = P::f(0), green = P::f(0), blue = P::f(0), shine = P::f(0), through = P::f(1);
   const I brick_row = P::i(grid.bricks[0]), brick_slice = P::i(grid.bricks[0] * grid.bricks[1]);
+  constexpr int kAnew = 8192;
+  const bool long_rays = P::any(P::both(active, P::lt(P::f(kAnew), end - entry)));
   const auto go_to = [&](F index, I& x, I& y, I& z) {
     const I steps = P::subtract(P::truncate(index), entered);
+    if (long_rays) {
+      // Rounding a step adds up to half a voxel over kUnit steps: begin anew before it does.
+      const I rest = P::intersect(steps, P::i(kAnew - 1));
+      const F from = entry + P::to_float(P::subtract(steps, rest));
+      x = P::add(start(o.x, in_voxels.x, from), P::multiply(rest, dx));
+      y = P::add(start(o.y, in_voxels.y, from), P::multiply(rest, dy));
+      z = P::add(start(o.z, in_voxels.z, from), P::multiply(rest, dz));
+      return;
+    }
     x = P::add(first_x, P::multiply(steps, dx));
     y = P::add(first_y, P::multiply(steps, dy));
     z = P::add(first_z, P::multiply(steps, dz));
@@ -150,7 +166,7 @@ void cast_packet(const CastJob& job, int block, int part) {
     for (int run = 0; run < runs && P::any(active); ++run) {
       I x, y, z;
       go_to(i, x, y, z);
-      const F left = end - i;
+      const F left = P::min(end - i, P::f(run_length - 1));
       // All loads of a run go before their colours are looked up, for those wait for them.
       typename P::Blended blended[kRun];
       M there[kRun];
@@ -174,7 +190,7 @@ void cast_packet(const CastJob& job, int block, int part) {
         shine = shine + weight * s.highlight;
         through = through - weight;
       }
-      i = i + P::f(kRun);
+      i = i + P::f(run_length);
       active = P::both(active, P::both(P::le(i, end), P::le(P::f(kOpaque), through)));
     }
   }
