@@ -163,7 +163,8 @@ Parameters fit_to(const DisplacementField& field, const ControlGrid& control, co
   }
   Eigen::MatrixXd wanted(basis.rows(), 3);
   for (int p = 0; p < basis.rows(); ++p) {
-    const Eigen::Vector3d share = Eigen::Vector3d(p % kSide, p / kSide % kSide, p / kSide / kSide) / (kSide - 1);
+    const int i = p % kSide, j = p / kSide % kSide, k = p / kSide / kSide;
+    const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (kSide - 1);
     const Eigen::Vector3d at = tissue.patient_from_grid * Eigen::Vector3d(share.cwiseProduct(tissue.box_mm()));
     wanted.row(p) = (tissue.patient_from_grid.linear().transpose() * field.displacement(at)).transpose();
   }
