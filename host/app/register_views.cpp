@@ -12,10 +12,11 @@
 #include "host/app/picture.hpp"
 #include "host/app/progress.hpp"
 #include "host/app/registration_case.hpp"
+#include "host/app/registration_error.hpp"
 #include "host/app/registration_report.hpp"
+#include "host/app/run_registration.hpp"
 #include "host/app/write_files.hpp"
 #include "host/overlay/compositor.hpp"
-#include "host/registration/view_registration.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/labels.hpp"
 
@@ -29,55 +30,23 @@ struct Options {
   fs::path file, out, json;
 };
 
-/// Where a point of the organ at rest is now: x with x + u(x) = rest, by fixed-point steps.
-Eigen::Vector3d deformed(const DisplacementField& field, const Eigen::Vector3d& rest_mm) {
-  Eigen::Vector3d x = rest_mm;
-  constexpr int kSteps = 200;
-  constexpr double kClose_mm = 1e-4;
-  for (int step = 0; step < kSteps; ++step) {
-    const Eigen::Vector3d change = 0.7 * (rest_mm - field.displacement(x) - x);
-    x += change;
-    if (change.norm() < kClose_mm) break;
-  }
-  return x;
-}
-
-struct TargetError {
-  double mean_mm = 0, max_mm = 0;
-};
-
-/// Of the landmarks whose names begin so; all for "".
-std::optional<TargetError> target_error(const std::vector<Landmark>& landmarks, const std::string& prefix,
-                                        const DisplacementField* field) {
-  TargetError error;
-  int count = 0;
-  for (const Landmark& landmark : landmarks) {
-    if (landmark.name.rfind(prefix, 0) != 0) continue;
-    const Eigen::Vector3d now = field != nullptr ? deformed(*field, landmark.rest_mm) : landmark.rest_mm;
-    const double mm = (now - landmark.deformed_mm).norm();
-    error.mean_mm += mm;
-    error.max_mm = std::max(error.max_mm, mm);
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  error.mean_mm /= count;
-  return error;
-}
-
-std::pair<std::string, std::string> verdict_of(const ViewRegistration& found) {
+std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
   constexpr double kSure_mm = 3, kGain = 0.01;
+  const char* const unit = c.similarity == "mi" ? " nats" : "";
   if (found.min_jacobian <= 0) return {"fail", "every deformation that was found folds: check the poses"};
   if (found.worse_than_start)
     return {"fail", "no deformation explains the views better than the start, which is what is written"};
   const double gain = found.similarity_after - found.similarity_before;
-  if (!found.uncertainty_mm) return {"marginal", "a single view says little about depth: add others"};
-  if (*found.uncertainty_mm > kSure_mm) {
+  if (c.views.size() == 1) return {"marginal", "a single view says little about depth: add others"};
+  if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
     return {"marginal", fmt::format("the surface moves by {:.1f} mm when a view is left out, over {} mm: add views",
                                     *found.uncertainty_mm, kSure_mm)};
   }
-  if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f} nats", gain)};
-  return {"pass", fmt::format("similarity rose by {:.3f} nats; without any one view the surface moves by {:.1f} mm",
-                              gain, *found.uncertainty_mm)};
+  if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f}{}", gain, unit)};
+  std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);
+  if (found.uncertainty_mm)
+    reason += fmt::format("; without any one view the surface moves by {:.1f} mm", *found.uncertainty_mm);
+  return {"pass", reason};
 }
 
 nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
@@ -89,6 +58,8 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"dof", found.parameters.size()},
                          {"control_points", found.control_points},
                          {"why_so_many_points", found.why_so_many_points},
+                         {"optimiser", c.optimiser},
+                         {"similarity", c.similarity},
                          {"views", c.views.size()},
                          {"min_jacobian", found.min_jacobian},
                          {"uncertainty_mm", nullptr}};
@@ -103,6 +74,10 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                                 {"similarity_after", found.per_view_after[n]}});
   }
   const DisplacementField* const initial = c.initial ? &*c.initial : nullptr;
+  if (c.truth) {
+    json["epsilon_before"] = epsilon(*c.truth, initial);
+    json["epsilon_after"] = epsilon(*c.truth, &found.field);
+  }
   for (const auto& [key, prefix] :
        {std::pair{"", ""}, {"surface_", "surface"}, {"vessel_", "vessel"}, {"tumour_", "tumour"}}) {
     const auto before = target_error(c.landmarks, prefix, initial);
@@ -158,21 +133,12 @@ Result<ExitCode> run(const Options& options) {
   if (!transfer) return transfer.error();
 
   Progress progress;
-  ViewRegistrationSettings settings;
-  settings.control_points = c.control_points;
-  settings.level = c.level;
-  settings.initial = c.initial;
-  settings.optimiser = c.optimiser == "simplex"  ? ViewOptimiser::simplex
-                       : c.optimiser == "powell" ? ViewOptimiser::powell
-                                                 : ViewOptimiser::gradient;
-  settings.progress = [&progress](const std::string& line) { progress(line); };
-  const auto found =
-      register_views(c.views, c.ct, c.labels ? &*c.labels : nullptr, c.label_values, *transfer, settings);
+  const auto found = run_registration(c, *transfer, true, [&progress](const std::string& line) { progress(line); });
   if (!found) return Error{found.error().code, fmt::format("{}: {}", options.file.string(), found.error().what)};
   const double time_s = progress.seconds();
 
   nlohmann::json json = json_of(c, *found, time_s);
-  const auto [verdict, reason] = verdict_of(*found);
+  const auto [verdict, reason] = verdict_of(c, *found);
   json["verdict"] = verdict;
   json["reasons"] = {reason};
   std::error_code error;

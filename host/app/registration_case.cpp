@@ -1,6 +1,7 @@
 #include "host/app/registration_case.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
@@ -11,6 +12,7 @@
 
 #include "host/app/text_files.hpp"
 #include "host/registration/overlap_mask.hpp"
+#include "host/registration/similarity.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
@@ -82,6 +84,38 @@ Result<void> read_volume(const Table& table, RegistrationCase& out) {
   return {};
 }
 
+/// What only the optimisers that go by the value alone have a choice of.
+Result<void> read_direct_search(const Table& table, RegistrationCase& out) {
+  const bool direct = out.optimiser != "gradient";
+  for (const char* key : {"unknowns", "similarity", "most_evaluations"}) {
+    if (table.has(key) && !direct) return table.wrong(key, "needs optimiser = \"simplex\" or \"powell\"");
+  }
+  const auto unknowns = table.get<std::string>("unknowns", "control_points");
+  if (!unknowns) return unknowns.error();
+  if (*unknowns != "control_points" && *unknowns != "vertices")
+    return table.wrong("unknowns", "is control_points or vertices");
+  out.vertices = *unknowns == "vertices";
+  constexpr int kDeepest = 3;  // 1029 unknowns
+  if (out.vertices && out.level > kDeepest)
+    return table.wrong("level", fmt::format("is 1 to {} where unknowns = \"vertices\"", kDeepest));
+  if (direct && !out.vertices && !out.control_points) {
+    return table.wrong("control_points", fmt::format("give three whole numbers: \"auto\" needs optimiser = "
+                                                     "\"gradient\", not \"{}\"",
+                                                     out.optimiser));
+  }
+  const auto similarity = table.get<std::string>("similarity", out.similarity);
+  if (!similarity) return similarity.error();
+  out.similarity = *similarity;
+  const auto& names = similarity_names();
+  if (std::find(names.begin(), names.end(), out.similarity) == names.end())
+    return table.wrong("similarity", fmt::format("is none of {}", fmt::join(names, ", ")));
+  const auto most = table.get<int>("most_evaluations", out.most_evaluations);
+  if (!most) return most.error();
+  if (*most < 1) return table.wrong("most_evaluations", "is 1 or more");
+  out.most_evaluations = *most;
+  return {};
+}
+
 Result<void> read_model(const Table& table, RegistrationCase& out) {
   const auto& model = table.value();
   if (table.has("control_points") && model.at("control_points").is_string()) {
@@ -106,6 +140,7 @@ Result<void> read_model(const Table& table, RegistrationCase& out) {
   if (*optimiser != "gradient" && *optimiser != "simplex" && *optimiser != "powell")
     return table.wrong("optimiser", "is gradient, simplex or powell");
   out.optimiser = *optimiser;
+  if (auto done = read_direct_search(table, out); !done) return done.error();
   if (!table.has("initial")) return {};
   const auto initial = table.path("initial");
   if (!initial) return initial.error();
@@ -220,6 +255,13 @@ Result<RegistrationCase> read_case(const fs::path& path) {
     auto landmarks = read_landmarks(*landmarks_path);
     if (!landmarks) return landmarks.error();
     out.landmarks = *std::move(landmarks);
+  }
+  if (truth.has("control_points")) {
+    const auto points_path = truth.path("control_points");
+    if (!points_path) return points_path.error();
+    auto deformation = read_true_deformation(*points_path);
+    if (!deformation) return deformation.error();
+    out.truth = *std::move(deformation);
   }
   return out;
 }

@@ -7,6 +7,7 @@
 
 #include "calibration/base/result.hpp"
 #include "host/app/picture.hpp"
+#include "host/app/true_deformation.hpp"
 #include "host/deform/displacement_field.hpp"
 #include "host/registration/synthetic_view.hpp"
 #include "host/render/transfer_function.hpp"
@@ -29,11 +30,15 @@ struct RegistrationCase {
   /// Inner control points along each axis; empty for "auto".
   std::optional<std::array<int, 3>> control_points;
   int level = 5;
-  std::string optimiser = "gradient";
+  std::string optimiser = "gradient";  ///< or simplex, powell; only these use the three below
+  bool vertices = false;               ///< the unknowns are the free vertices of `level`
+  std::string similarity = "mi";
+  int most_evaluations = 400;
   std::optional<DisplacementField> initial;
   std::vector<VideoView> views;
   std::vector<Picture> pictures;  ///< of the views, in colour
   std::vector<Landmark> landmarks;
+  std::optional<TrueDeformation> truth;
 };
 
 /// Refuses, naming file and key: what is missing or of another size than it says, and two views that are the same.

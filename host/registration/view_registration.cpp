@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
+
+#include "host/registration/patch_field.hpp"
 
 namespace birdseye::host {
 
@@ -43,22 +43,15 @@ class Problem {
   }
 
   /// Climbs from start; steps are taken in even coordinates.
-  Parameters climb(const Parameters& start, const Headlight& light, nlopt::algorithm algorithm, int most_steps) {
+  Parameters climb(const Parameters& start, const Headlight& light, int most_steps) {
     Parameters even = control_.to_even(start);
-    nlopt::opt optimiser(algorithm, static_cast<unsigned>(even.size()));
+    nlopt::opt optimiser(nlopt::LD_LBFGS, static_cast<unsigned>(even.size()));
     const auto objective = [&](const Parameters& x, Parameters& gradient) {
       const Parameters parameters = control_.from_even(x);
       Parameters by_parameters;
-      double value = 0;
-      if (gradient.empty()) {
-        ++record_.evaluations;
-        by_parameters.assign(parameters.size(), 0.0);
-        value = views_.value(parameters, light);
-      } else {
-        ++record_.gradient_evaluations;
-        value = views_.value_and_gradient(parameters, light, by_parameters);
-        gradient = control_.gradient_to_even(by_parameters);
-      }
+      ++record_.gradient_evaluations;
+      const double value = views_.value_and_gradient(parameters, light, by_parameters);
+      if (!gradient.empty()) gradient = control_.gradient_to_even(by_parameters);
       record_.trace.push_back({reduction_, parameters.size(), value});
       return value;
     };
@@ -68,8 +61,6 @@ class Problem {
                                 const_cast<void*>(static_cast<const void*>(&objective)));
     optimiser.set_maxeval(most_steps);
     optimiser.set_ftol_rel(1e-5);
-    constexpr double kFirstStep_mm = 1;
-    if (algorithm != nlopt::LD_LBFGS) optimiser.set_initial_step(kFirstStep_mm);
     double value = 0;
     try {
       optimiser.optimize(even, value);
@@ -90,12 +81,6 @@ class Problem {
   MultiView views_;
   ViewRegistration& record_;
 };
-
-nlopt::algorithm algorithm_of(ViewOptimiser optimiser) {
-  if (optimiser == ViewOptimiser::simplex) return nlopt::LN_NELDERMEAD;
-  if (optimiser == ViewOptimiser::powell) return nlopt::LN_PRAXIS;
-  return nlopt::LD_LBFGS;
-}
 
 /// The lamp under which a deformation explains the views best.
 Headlight find_light(Problem& problem, const Parameters& parameters, const Headlight& start) {
@@ -147,42 +132,6 @@ std::vector<VideoView> tiles_of(const std::vector<VideoView>& views, bool held_o
   return out;
 }
 
-/// The control points that come closest to a field, by least squares over a grid of the box.
-Parameters fit_to(const DisplacementField& field, const ControlGrid& control, const Tissue& tissue) {
-  constexpr int kSide = 9;
-  const ControlledGrid grid(control, {kSide, kSide, kSide});
-  const std::size_t count = control.parameters() / 3;
-  Eigen::MatrixXd basis(kSide * kSide * kSide, static_cast<Eigen::Index>(count));
-  std::vector<float> response;
-  for (std::size_t c = 0; c < count; ++c) {
-    Parameters one(control.parameters(), 0.0);
-    one[3 * c] = 1;
-    grid.displacements(one, response);
-    for (Eigen::Index p = 0; p < basis.rows(); ++p)
-      basis(p, static_cast<Eigen::Index>(c)) = static_cast<double>(response[3 * static_cast<std::size_t>(p)]);
-  }
-  Eigen::MatrixXd wanted(basis.rows(), 3);
-  for (int p = 0; p < basis.rows(); ++p) {
-    const int i = p % kSide, j = p / kSide % kSide, k = p / kSide / kSide;
-    const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (kSide - 1);
-    const Eigen::Vector3d at = tissue.patient_from_grid * Eigen::Vector3d(share.cwiseProduct(tissue.box_mm()));
-    wanted.row(p) = (tissue.patient_from_grid.linear().transpose() * field.displacement(at)).transpose();
-  }
-  const Eigen::MatrixXd found = (basis.transpose() * basis).ldlt().solve(basis.transpose() * wanted);
-  Parameters out;
-  for (Eigen::Index c = 0; c < found.rows(); ++c) out.insert(out.end(), {found(c, 0), found(c, 1), found(c, 2)});
-  return out;
-}
-
-DisplacementField field_from(const ControlGrid& control, const Parameters& parameters, const Tissue& tissue,
-                             int level) {
-  PatchOctree tree = *PatchOctree::uniform(level);
-  control.patch(parameters, tissue.box_mm()).drive(tree);
-  Eigen::Affine3d patient_from_cube = tissue.patient_from_grid;
-  patient_from_cube.scale(tissue.box_mm());
-  return field_of(tree, patient_from_cube);
-}
-
 Result<void> check_views(const std::vector<VideoView>& views, Problem& problem, const Parameters& start) {
   problem.similarity(start, {});
   for (std::size_t n = 0; n < views.size(); ++n) {
@@ -211,7 +160,7 @@ Result<double> jackknife_mm(const std::vector<VideoView>& views, const Tissue& t
     auto problem = Problem::make(others, tissue, control, kCoarse, prior, record);
     if (!problem) return problem.error();
     constexpr int kSteps = 8;
-    grid.displacements(problem->climb(found, light, nlopt::LD_LBFGS, kSteps), moves[out]);
+    grid.displacements(problem->climb(found, light, kSteps), moves[out]);
   }
   double sum = 0;
   for (const std::size_t v : surface) {
@@ -245,7 +194,7 @@ Result<std::array<int, 3>> choose_control_points(const std::vector<VideoView>& v
     found = ControlGrid(before).refine(found, control);
     auto fit = Problem::make(fitted, tissue, control, kCoarse, settings.prior, record);
     if (!fit) return fit.error();
-    found = fit->climb(found, light, nlopt::LD_LBFGS, kCoarse.most_steps);
+    found = fit->climb(found, light, kCoarse.most_steps);
     auto judge = Problem::make(held_out, tissue, control, kCoarse, settings.prior, record);
     if (!judge) return judge.error();
     const double value = judge->similarity(found, light);
@@ -276,13 +225,13 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   ViewRegistration out;
   const ControlGrid one({1, 1, 1});
   Parameters start_of_one(3, 0.0);
-  if (settings.initial) start_of_one = fit_to(*settings.initial, one, *coarse);
+  if (settings.initial) start_of_one = closest_parameters(*settings.initial, one, *coarse);
   auto few = Problem::make(views, *coarse, one, kCoarse, settings.prior, out);
   if (!few) return few.error();
   if (auto sound = check_views(views, *few, start_of_one); !sound) return sound.error();
   out.light = settings.light.value_or(Headlight{});
   // What few control points can do, they do without straying.
-  const Parameters of_one = few->climb(start_of_one, out.light, nlopt::LD_LBFGS, kFirstSteps);
+  const Parameters of_one = few->climb(start_of_one, out.light, kFirstSteps);
 
   if (settings.control_points) {
     out.control_points = *settings.control_points;
@@ -294,13 +243,13 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   }
   const ControlGrid control(out.control_points);
   Parameters start(control.parameters(), 0.0);
-  if (settings.initial) start = fit_to(*settings.initial, control, *coarse);
+  if (settings.initial) start = closest_parameters(*settings.initial, control, *coarse);
   Parameters rough = settings.initial ? start : one.refine(of_one, control);
   auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
   if (!wide) return wide.error();
   if (!settings.light) {
     // A rough fit first, so that the lamp does not stand in for a deformation.
-    out.light = find_light(*wide, wide->climb(rough, out.light, nlopt::LD_LBFGS, kFirstSteps), out.light);
+    out.light = find_light(*wide, wide->climb(rough, out.light, kFirstSteps), out.light);
     settings.progress(
         fmt::format("lamp: {:.1f}, {:.1f} mm beside the lens, fall-off {:.1f}, ambient {:.2f}, vignette {:.2f}",
                     out.light.offset_in_camera_mm.x(), out.light.offset_in_camera_mm.y(), out.light.falloff,
@@ -320,13 +269,9 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
     auto close = Problem::make(views, *fine, control, kFine, prior, out);
     auto broad = Problem::make(views, *coarse, control, kCoarse, prior, out);
     if (!close || !broad) return (close ? broad : close).error();
-    if (settings.optimiser == ViewOptimiser::gradient) {
-      rough = broad->climb(rough, out.light, nlopt::LD_LBFGS, kCoarse.most_steps);
-      out.parameters = close->climb(rough, out.light, nlopt::LD_LBFGS, kFine.most_steps);
-    } else {
-      out.parameters = close->climb(start, out.light, algorithm_of(settings.optimiser), settings.most_evaluations);
-    }
-    out.field = field_from(control, out.parameters, *fine, settings.level);
+    rough = broad->climb(rough, out.light, kCoarse.most_steps);
+    out.parameters = close->climb(rough, out.light, kFine.most_steps);
+    out.field = driven_field(control, out.parameters, *fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     if (out.min_jacobian > 0) break;
     constexpr double kStiffer = 10;
@@ -338,7 +283,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   out.worse_than_start = out.similarity_after < out.similarity_before || out.min_jacobian <= 0;
   if (out.worse_than_start) {
     out.parameters = start;
-    out.field = field_from(control, start, *fine, settings.level);
+    out.field = driven_field(control, start, *fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     out.similarity_after = out.similarity_before;
     out.per_view_after = out.per_view_before;

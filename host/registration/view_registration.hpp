@@ -14,24 +14,15 @@
 
 namespace birdseye::host {
 
-enum class ViewOptimiser {
-  gradient,  ///< L-BFGS with the analytic gradient, coarse to fine
-  simplex,   ///< Nelder and Mead's downhill simplex, the value alone
-  powell,    ///< Powell's direction set, in Brent's form of principal axes, the value alone
-};
-
 struct ViewRegistrationSettings {
   /// Inner control points along each axis; none: as many as the views support.
   std::optional<std::array<int, 3>> control_points;
-  ViewOptimiser optimiser = ViewOptimiser::gradient;
   /// Patches of the octree that carries the result: 2^level along each axis.
   int level = 5;
   /// Where to start; must not fold.
   std::optional<DisplacementField> initial;
   /// The lamp, where it is known; none: estimated from the views.
   std::optional<Headlight> light;
-  /// Of the value alone, for simplex and powell.
-  int most_evaluations = 400;
   bool estimate_uncertainty = true;
   Prior prior;
   /// Called with a line for a person now and then.
@@ -62,7 +53,8 @@ struct ViewRegistration {
   bool worse_than_start = false;   ///< the start is what is returned then
 };
 
-/// Deforms the tissue until synthetic views look like the video. Refuses, naming the view: one that sees nothing of the
+/// Deforms the tissue until synthetic views look like the video: L-BFGS with the analytic gradient, coarse to fine.
+/// Refuses, naming the view: one that sees nothing of the
 /// organ, a picture of a single grey; and a start that folds.
 Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
                                         std::span<const int> label_values, const TransferFunction& transfer,

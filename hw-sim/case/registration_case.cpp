@@ -124,7 +124,7 @@ std::string case_toml(const CaseSettings& settings, const Case& made) {
         "mask = \"mask.png\"\n",
         i);
   }
-  return toml + "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\n";
+  return toml + "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\ncontrol_points = \"truth/control_points.json\"\n";
 }
 
 nlohmann::json truth_of(const CaseSettings& settings, const Case& made) {

@@ -58,6 +58,8 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
   EXPECT_GT(json["min_jacobian"], 0.3);
   EXPECT_LT(json["uncertainty_mm"], 3);
   EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
+  EXPECT_GT(json["epsilon_before"], 0.01);
+  EXPECT_LT(json["epsilon_after"], 0.05 * json["epsilon_before"].get<double>());
   for (const char* name :
        {"field.mha", "report.html", "trace.svg", "view0_before.png", "view2_after.png", "view1_difference_after.png"})
     EXPECT_GT(fs::file_size(scratch / "out" / name), 100U) << name;
@@ -67,6 +69,20 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
                           (scratch / "out/field.mha").string() + " --size 64x48 --out " + (scratch / "p.png").string())
           .code,
       0);
+}
+
+TEST(RegisterViewsCommand, FindsItByValuesAlone) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "optimiser = \"gradient\"",
+                            "optimiser = \"simplex\"\nmost_evaluations = 60\nsimilarity = \"nmi\"");
+  const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_NE(result.code, 2) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  EXPECT_EQ(json["optimiser"], "simplex");
+  EXPECT_EQ(json["similarity"], "nmi");
+  EXPECT_EQ(json["gradient_evaluations"], 0);
+  EXPECT_LE(json["evaluations"], 62);
+  EXPECT_LT(json["epsilon_after"], 0.3 * json["epsilon_before"].get<double>());
 }
 
 TEST(RegisterViewsCommand, StartsFromAField) {
@@ -85,6 +101,11 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
   for (const auto& [from, to, words] : std::vector<std::tuple<std::string, std::string, std::vector<std::string>>>{
            {"ct.nii.gz", "none.nii.gz", {"none.nii.gz", "does not exist"}},
            {"\"gradient\"", "\"guess\"", {"optimiser", "simplex"}},
+           {"\"gradient\"", "\"simplex\"\nsimilarity = \"taste\"", {"similarity", "ncc"}},
+           {"\"gradient\"", "\"gradient\"\nunknowns = \"vertices\"", {"unknowns", "simplex"}},
+           {"\"gradient\"", "\"powell\"\nunknowns = \"corners\"", {"unknowns", "vertices"}},
+           {"control_points = \\[.*\\]([^]*)\"gradient\"", "$1\"simplex\"", {"control_points", "auto"}},
+           {"truth/control_points.json", "truth/truth.json", {"truth.json", "control_points.json"}},
            {"control_points = \\[.*\\]", "control_points = [0, 1, 1]", {"control_points"}},
            {"label_values = \\[.*\\]", "label_values = []", {"label_values"}},
            {"image = \"view1.png\"", "image = \"camera.yaml\"", {"camera.yaml", "picture"}},

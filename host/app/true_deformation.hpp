@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+
+#include "calibration/base/result.hpp"
+#include "host/deform/bezier_patch.hpp"
+#include "host/deform/displacement_field.hpp"
+
+namespace birdseye::host {
+
+/// The deformation that a simulated case was made by, exact: docs/manual/simulator.md.
+struct TrueDeformation {
+  Eigen::Vector3d low_mm, box_mm;  ///< of its box, whose axes are the patient's
+  BezierPatch patch;               ///< over the box as unit cube
+};
+
+/// The simulator's truth/control_points.json. Errc::bad_format, naming the file, for what is none.
+Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path);
+
+/// The paper's Equation 7: the sum of squared distances, the box being the unit cube, between where the free vertices
+/// of a level 3 octree are displaced to in truth and by field (none: not at all).
+double epsilon(const TrueDeformation& truth, const DisplacementField* field);
+
+}  // namespace birdseye::host
