@@ -275,6 +275,7 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   CLI::App& bench = *app.add_subcommand("bench", "measure speed on this machine");
   bench.require_subcommand(1);
   add_bench_similarity(bench, status);
+  add_bench_register(bench, status);
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");
   render.add_option("--frames", options->frames, "frames a row (default 15)")->check(CLI::Range(3, 1000));
