@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "host/app/commands.hpp"
 #include "host/app/picture.hpp"
@@ -15,6 +16,7 @@
 #include "host/app/registration_error.hpp"
 #include "host/app/registration_report.hpp"
 #include "host/app/run_registration.hpp"
+#include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
 #include "host/overlay/compositor.hpp"
 #include "host/render/engine.hpp"
@@ -49,6 +51,19 @@ std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const 
   return {"pass", reason};
 }
 
+/// Shift of the organ's centre, and turn.
+nlohmann::json motion_json(const Transform<Patient, Patient>& motion, const Eigen::Vector3d& centre_mm) {
+  return {{"mm", (motion * centre_mm - centre_mm).norm()},
+          {"deg", rotation_log(motion.rotation()).norm() * 180 / std::numbers::pi}};
+}
+
+nlohmann::json pose_json(const ViewRegistration& found) {
+  nlohmann::json json = motion_json(found.patient_from_model, found.centre_mm);
+  const Eigen::Matrix4d m = found.patient_from_model.matrix();
+  for (int i = 0; i < 4; ++i) json["patient_from_model"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
+  return json;
+}
+
 nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
   nlohmann::json json = {{"similarity_before", found.similarity_before},
                          {"similarity_after", found.similarity_after},
@@ -73,6 +88,15 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                                 {"similarity_before", found.per_view_before[n]},
                                 {"similarity_after", found.per_view_after[n]}});
   }
+  if (c.refine_pose) json["pose_correction"] = pose_json(found);
+  // Without the true pose, the one that was found is believed.
+  Transform<Patient, Patient> error_before, error_after;
+  if (c.true_pose) {
+    error_before = c.true_pose->inverse();
+    error_after = c.true_pose->inverse() * found.patient_from_model;
+    json["pose_error_before"] = motion_json(error_before, found.centre_mm);
+    json["pose_error_after"] = motion_json(error_after, found.centre_mm);
+  }
   const DisplacementField* const initial = c.initial ? &*c.initial : nullptr;
   if (c.truth) {
     json["epsilon_before"] = epsilon(*c.truth, initial);
@@ -80,8 +104,8 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
   }
   for (const auto& [key, prefix] :
        {std::pair{"", ""}, {"surface_", "surface"}, {"vessel_", "vessel"}, {"tumour_", "tumour"}}) {
-    const auto before = target_error(c.landmarks, prefix, initial);
-    const auto after = target_error(c.landmarks, prefix, &found.field);
+    const auto before = target_error(c.landmarks, prefix, initial, error_before);
+    const auto after = target_error(c.landmarks, prefix, &found.field, error_after);
     if (!before || !after) continue;
     json[fmt::format("{}tre_before_mm_mean", key)] = before->mean_mm;
     json[fmt::format("{}tre_before_mm_max", key)] = before->max_mm;
@@ -111,7 +135,9 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
     if (!after && c.initial) (*engine)->deform(*c.initial);
     for (std::size_t n = 0; n < c.views.size(); ++n) {
       const VideoView& view = c.views[n];
-      const ImageRgba overlay = (*engine)->render(view.camera, view.camera_from_patient, {});
+      const Transform<Camera, Patient> camera_from_model =
+          after ? view.camera_from_patient * found.patient_from_model : view.camera_from_patient;
+      const ImageRgba overlay = (*engine)->render(view.camera, camera_from_model, {});
       constexpr double kStrength = 0.7;
       const auto mixed = composite(c.pictures[n].rgb, overlay, kStrength);
       const char* const when = after ? "after" : "before";
@@ -151,6 +177,12 @@ Result<ExitCode> run(const Options& options) {
   files->push_back({"trace.svg", trace_svg(found->trace)});
   files->push_back({"report.html", registration_report(c, *found, json)});
   files->push_back({"result.json", text_of(json)});
+  if (c.refine_pose) {
+    files->push_back({"pose.txt",
+                      "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given "
+                      "poses, mm\n" +
+                          pose_text(found->patient_from_model.matrix())});
+  }
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();

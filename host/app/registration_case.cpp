@@ -141,6 +141,10 @@ Result<void> read_model(const Table& table, RegistrationCase& out) {
     return table.wrong("optimiser", "is gradient, simplex or powell");
   out.optimiser = *optimiser;
   if (auto done = read_direct_search(table, out); !done) return done.error();
+  const auto refine_pose = table.get<bool>("refine_pose", out.refine_pose);
+  if (!refine_pose) return refine_pose.error();
+  if (*refine_pose && out.optimiser != "gradient") return table.wrong("refine_pose", "needs optimiser = \"gradient\"");
+  out.refine_pose = *refine_pose;
   if (!table.has("initial")) return {};
   const auto initial = table.path("initial");
   if (!initial) return initial.error();
@@ -262,6 +266,13 @@ Result<RegistrationCase> read_case(const fs::path& path) {
     auto deformation = read_true_deformation(*points_path);
     if (!deformation) return deformation.error();
     out.truth = *std::move(deformation);
+  }
+  if (truth.has("pose")) {
+    const auto pose_path = truth.path("pose");
+    if (!pose_path) return pose_path.error();
+    const auto pose = read_pose(*pose_path);
+    if (!pose) return pose.error();
+    out.true_pose = Transform<Patient, Patient>::from_matrix(*pose);
   }
   return out;
 }

@@ -34,11 +34,14 @@ struct RegistrationCase {
   bool vertices = false;               ///< the unknowns are the free vertices of `level`
   std::string similarity = "mi";
   int most_evaluations = 400;
+  bool refine_pose = false;  ///< only with gradient
   std::optional<DisplacementField> initial;
   std::vector<VideoView> views;
   std::vector<Picture> pictures;  ///< of the views, in colour
   std::vector<Landmark> landmarks;
   std::optional<TrueDeformation> truth;
+  /// What a refined pose should be: patient_from_model.
+  std::optional<Transform<Patient, Patient>> true_pose;
 };
 
 /// Refuses, naming file and key: what is missing or of another size than it says, and two views that are the same.

@@ -22,13 +22,14 @@ Eigen::Vector3d deformed(const DisplacementField& field, const Eigen::Vector3d& 
 }  // namespace
 
 std::optional<TargetError> target_error(const std::vector<Landmark>& landmarks, const std::string& prefix,
-                                        const DisplacementField* field) {
+                                        const DisplacementField* field,
+                                        const Transform<Patient, Patient>& model_from_found) {
   TargetError error;
   int count = 0;
   for (const Landmark& landmark : landmarks) {
     if (landmark.name.rfind(prefix, 0) != 0) continue;
     const Eigen::Vector3d now = field != nullptr ? deformed(*field, landmark.rest_mm) : landmark.rest_mm;
-    const double mm = (now - landmark.deformed_mm).norm();
+    const double mm = (model_from_found * now - landmark.deformed_mm).norm();
     error.mean_mm += mm;
     error.max_mm = std::max(error.max_mm, mm);
     ++count;

@@ -22,6 +22,16 @@ Result<MultiView> MultiView::make(const std::vector<VideoView>& views, const Tis
   return made;
 }
 
+void MultiView::set_pose(const PoseUnknowns& pose) {
+  if (pose == pose_) return;
+  pose_ = pose;
+  for (SyntheticView& view : views_) view.look_from(motion_.patient_from_model(pose));
+}
+
+double MultiView::penalty_of_pose() const {
+  return prior_.pose * std::inner_product(pose_.begin(), pose_.end(), pose_.begin(), 0.0);
+}
+
 void MultiView::deform(const std::vector<double>& parameters) {
   controlled_.displacements(parameters, moves_);
   warp(tissue_, moves_, warped_);
@@ -36,20 +46,22 @@ double MultiView::similarity(const std::vector<double>& parameters, const Headli
 
 double MultiView::value(const std::vector<double>& parameters, const Headlight& light) {
   std::vector<double> unused(parameters.size(), 0.0);
-  return similarity(parameters, light) - prior_.strain * control_.strain(parameters, tissue_.box_mm(), 0, unused);
+  return similarity(parameters, light) - prior_.strain * control_.strain(parameters, tissue_.box_mm(), 0, unused) -
+         penalty_of_pose();
 }
 
 double MultiView::value_and_gradient(const std::vector<double>& parameters, const Headlight& light,
-                                     std::vector<double>& gradient) {
+                                     std::vector<double>& gradient, PoseUnknowns* pose_gradient) {
   deform(parameters);
   std::vector<std::vector<float>> by_warped(views_.size());
+  std::vector<Wrench> on_cameras(views_.size());
   tbb::parallel_for(std::size_t{0}, views_.size(), [&](std::size_t n) {
     const std::vector<double>& grey = views_[n].render(warped_, light);
     std::vector<double> by_grey(grey.size());
     per_view_[n] = measures_[n].value_and_gradient(grey, by_grey);
     for (double& by : by_grey) by /= static_cast<double>(views_.size());
     by_warped[n].assign(warped_.size(), 0.0F);
-    views_[n].pull_back(warped_, by_grey, by_warped[n]);
+    views_[n].pull_back(warped_, by_grey, by_warped[n], pose_gradient != nullptr ? &on_cameras[n] : nullptr);
   });
   for (std::size_t n = 1; n < views_.size(); ++n) {
     for (std::size_t v = 0; v < warped_.size(); ++v) by_warped[0][v] += by_warped[n][v];
@@ -58,9 +70,15 @@ double MultiView::value_and_gradient(const std::vector<double>& parameters, cons
   pull_back_warp(tissue_, moves_, by_warped[0], by_move);
   gradient.assign(parameters.size(), 0.0);
   controlled_.pull_back(by_move, gradient);
+  if (pose_gradient != nullptr) {
+    for (std::size_t n = 1; n < views_.size(); ++n) on_cameras[0] += on_cameras[n];
+    *pose_gradient = motion_.gradient(pose_, on_cameras[0]);
+    for (std::size_t i = 0; i < pose_.size(); ++i) (*pose_gradient)[i] -= 2 * prior_.pose * pose_[i];
+  }
   const double similarity =
       std::accumulate(per_view_.begin(), per_view_.end(), 0.0) / static_cast<double>(views_.size());
-  return similarity - prior_.strain * control_.strain(parameters, tissue_.box_mm(), -prior_.strain, gradient);
+  return similarity - prior_.strain * control_.strain(parameters, tissue_.box_mm(), -prior_.strain, gradient) -
+         penalty_of_pose();
 }
 
 }  // namespace birdseye::host

@@ -10,7 +10,8 @@ namespace birdseye::host {
 
 /// What keeps a deformation plausible where the pictures say nothing.
 struct Prior {
-  double strain = 1;  ///< weight of ControlGrid::strain
+  double strain = 1;   ///< weight of ControlGrid::strain
+  double pose = 2e-5;  ///< of the sum of squares of PoseUnknowns: a pose 20 mm off costs 0.008 nats
 };
 
 /// How well a deformation explains all views (the paper's Equation 6, as a mean), and its analytic gradient with
@@ -28,7 +29,10 @@ class MultiView {
   double value(const std::vector<double>& parameters, const Headlight& light);
   /// With its gradient.
   double value_and_gradient(const std::vector<double>& parameters, const Headlight& light,
-                            std::vector<double>& gradient);
+                            std::vector<double>& gradient, PoseUnknowns* pose_gradient = nullptr);
+  /// Moves all cameras together; identity until then.
+  void set_pose(const PoseUnknowns& pose);
+  [[nodiscard]] const RigidMotion& motion() const { return motion_; }
   /// Of each view, after either.
   [[nodiscard]] const std::vector<double>& per_view() const { return per_view_; }
   /// Of view n, after either: how many pixels show tissue.
@@ -36,12 +40,15 @@ class MultiView {
 
  private:
   MultiView(const Tissue& tissue, const ControlGrid& control, const Prior& prior)
-      : tissue_(tissue), control_(control), controlled_(control, tissue.points), prior_(prior) {}
+      : tissue_(tissue), control_(control), controlled_(control, tissue.points), motion_(tissue), prior_(prior) {}
   void deform(const std::vector<double>& parameters);
+  [[nodiscard]] double penalty_of_pose() const;
 
   const Tissue& tissue_;
   const ControlGrid& control_;
   ControlledGrid controlled_;
+  RigidMotion motion_;
+  PoseUnknowns pose_{};
   Prior prior_;
   std::vector<SyntheticView> views_;
   std::vector<ParzenMutualInformation> measures_;

@@ -49,7 +49,7 @@ Stencil stencil_of(const Tissue& tissue, int x, int y, int z) {
 /// it.
 struct Shading {
   float value;
-  float by_gradient[3];
+  float by_gradient[3], by_to_lamp[3];  ///< the second at a fixed fall-off
 };
 Shading shade(const float g[3], const float l[3], float fall, float ambient) {
   const float below = 1 / std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + kWeakGradient * kWeakGradient);
@@ -60,32 +60,19 @@ Shading shade(const float g[3], const float l[3], float fall, float ambient) {
   s.value = fall * std::pow(linear, static_cast<float>(kGamma));
   const float outer = static_cast<float>(kGamma) * s.value / linear * (1 - ambient);
   const float sign = a < 0 ? -1.0F : 1.0F;
-  for (int axis = 0; axis < 3; ++axis)
+  for (int axis = 0; axis < 3; ++axis) {
     s.by_gradient[axis] = outer * below * (sign * l[axis] - facing * g[axis] * below);
+    s.by_to_lamp[axis] = outer * below * sign * g[axis];
+  }
   return s;
 }
 
 }  // namespace
 
-SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int reduction) : tissue_(tissue) {
-  const Transform<Patient, Camera> patient_from_camera = view.camera_from_patient.inverse();
-  const Eigen::Affine3d grid_from_patient = tissue.patient_from_grid.inverse();
-  eye_mm_ = grid_from_patient * patient_from_camera.translation();
-  grid_from_camera_ = grid_from_patient.linear() * patient_from_camera.rotation();
-  // As bright as can be a little nearer than the nearest tissue, which may still move.
-  double nearest_mm = 1e9;
-  for (int z = 0; z < tissue.points[2]; ++z) {
-    for (int y = 0; y < tissue.points[1]; ++y) {
-      for (int x = 0; x < tissue.points[0]; ++x) {
-        if (tissue.occupancy[grid_index(tissue.points, x, y, z)] <= kSurface) continue;
-        nearest_mm = std::min(nearest_mm, (Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm) - eye_mm_).norm());
-      }
-    }
-  }
-  typical_mm_ = std::max(1.0, 0.85 * nearest_mm);
+SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int reduction)
+    : tissue_(tissue), camera_from_patient_(view.camera_from_patient) {
   step_mm_ = static_cast<float>(0.5 * tissue.spacing_mm.minCoeff());
   const int columns = view.camera.width_px / reduction, rows = view.camera.height_px / reduction;
-  const Eigen::Vector3d per_mm = tissue.spacing_mm.cwiseInverse();
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       int sum = 0, count = 0;
@@ -102,28 +89,28 @@ SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int re
       const auto direction =
           unproject(view.camera, Eigen::Vector2d(column * reduction + middle, row * reduction + middle));
       if (!direction) continue;
-      const Eigen::Vector3d d = grid_from_camera_ * direction->normalized();
       Ray ray{};
-      double near = 1, far = 1e9;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double o = eye_mm_[axis] * per_mm[axis], v = d[axis] * per_mm[axis];
-        ray.origin[axis] = static_cast<float>(o);
-        ray.direction[axis] = static_cast<float>(std::abs(v) < 1e-9 ? 1e-9 : v);
-        const double a = -o / static_cast<double>(ray.direction[axis]);
-        const double b = (tissue.points[at(axis)] - 1 - o) / static_cast<double>(ray.direction[axis]);
-        near = std::max(near, std::min(a, b));
-        far = std::min(far, std::max(a, b));
-      }
       ray.radius2 = static_cast<float>(direction->head<2>().squaredNorm());
-      ray.near_mm = static_cast<float>(near);
-      ray.far_mm = static_cast<float>(far);
       rays_.push_back(ray);
+      directions_in_camera_.push_back(direction->normalized());
       video_.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
     }
   }
   float rim = 1e-6F;
   for (const Ray& ray : rays_) rim = std::max(rim, ray.radius2);
   for (Ray& ray : rays_) ray.radius2 /= rim;
+  look_from({});
+  // As bright as can be a little nearer than the nearest tissue, which may still move.
+  double nearest_mm = 1e9;
+  for (int z = 0; z < tissue.points[2]; ++z) {
+    for (int y = 0; y < tissue.points[1]; ++y) {
+      for (int x = 0; x < tissue.points[0]; ++x) {
+        if (tissue.occupancy[grid_index(tissue.points, x, y, z)] <= kSurface) continue;
+        nearest_mm = std::min(nearest_mm, (Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm) - eye_mm_).norm());
+      }
+    }
+  }
+  typical_mm_ = std::max(1.0, 0.85 * nearest_mm);
   grey_.resize(video_.size());
   points_.resize(grid_count(tissue.points));
   for (std::size_t axis = 0; axis < 3; ++axis) brick_count_[axis] = (tissue.points[axis] - 2) / kBrick + 1;
@@ -131,6 +118,30 @@ SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int re
   for (std::size_t n = 0; n < kBands; ++n) {
     bands_[n].first = rays_.size() * n / kBands;
     bands_[n].last = rays_.size() * (n + 1) / kBands;
+  }
+}
+
+void SyntheticView::look_from(const Transform<Patient, Patient>& patient_from_model) {
+  const Transform<Patient, Camera> model_from_camera = (camera_from_patient_ * patient_from_model).inverse();
+  const Eigen::Affine3d grid_from_patient = tissue_.patient_from_grid.inverse();
+  eye_mm_ = grid_from_patient * model_from_camera.translation();
+  grid_from_camera_ = grid_from_patient.linear() * model_from_camera.rotation();
+  const Eigen::Vector3d per_mm = tissue_.spacing_mm.cwiseInverse();
+  for (std::size_t r = 0; r < rays_.size(); ++r) {
+    Ray& ray = rays_[r];
+    const Eigen::Vector3d d = grid_from_camera_ * directions_in_camera_[r];
+    double near = 1, far = 1e9;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double o = eye_mm_[axis] * per_mm[axis], v = d[axis] * per_mm[axis];
+      ray.origin[axis] = static_cast<float>(o);
+      ray.direction[axis] = static_cast<float>(std::abs(v) < 1e-9 ? 1e-9 : v);
+      const double a = -o / static_cast<double>(ray.direction[axis]);
+      const double b = (tissue_.points[at(axis)] - 1 - o) / static_cast<double>(ray.direction[axis]);
+      near = std::max(near, std::min(a, b));
+      far = std::min(far, std::max(a, b));
+    }
+    ray.near_mm = static_cast<float>(near);
+    ray.far_mm = static_cast<float>(far);
   }
 }
 
@@ -267,10 +278,12 @@ const std::vector<double>& SyntheticView::render(const std::vector<float>& occup
   return grey_;
 }
 
-void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_grey) {
+void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_grey, bool rays_too) {
   const auto& n = tissue_.points;
   const std::size_t row = at(n[0]), slice = row * at(n[1]);
+  const Eigen::Vector3d per_mm = tissue_.spacing_mm.cwiseInverse();
   band.adjoint.assign(points_.size(), Point{0, 0});
+  band.on_rays = {};
   std::size_t begin = 0;
   for (std::size_t r = band.first; r < band.last; ++r) {
     const std::size_t end = band.ends[r - band.first];
@@ -297,13 +310,33 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
           }
         }
       }
+      if (!rays_too) continue;
+      // The sample's own motion: the slopes of the blend of its cell.
+      const Point* const cell = &points_[s.base];
+      float slope[3] = {0, 0, 0};
+      for (std::size_t k = 0; k < 2; ++k) {
+        for (std::size_t j = 0; j < 2; ++j) {
+          for (std::size_t m = 0; m < 2; ++m) {
+            const Point& corner = cell[k * slice + j * row + m];
+            const float value = by_occupancy * corner.occupancy + by_shade * corner.shade;
+            slope[0] += m == 1 ? wy[j] * wz[k] * value : -wy[j] * wz[k] * value;
+            slope[1] += j == 1 ? wx[m] * wz[k] * value : -wx[m] * wz[k] * value;
+            slope[2] += k == 1 ? wx[m] * wy[j] * value : -wx[m] * wy[j] * value;
+          }
+        }
+      }
+      const Eigen::Vector3d place(static_cast<double>(s.base % row) + static_cast<double>(s.t[0]),
+                                  static_cast<double>(s.base % slice / row) + static_cast<double>(s.t[1]),
+                                  static_cast<double>(s.base / slice) + static_cast<double>(s.t[2]));
+      band.on_rays.add(place.cwiseProduct(tissue_.spacing_mm),
+                       Eigen::Vector3f(slope[0], slope[1], slope[2]).cast<double>().cwiseProduct(per_mm));
     }
     begin = end;
   }
 }
 
 void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const std::vector<float>& by_shade,
-                                    std::vector<float>& by_occupancy) const {
+                                    std::vector<float>& by_occupancy, Wrench* on_lamp) const {
   const Eigen::Vector3d lamp = eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm;
   const auto& n = tissue_.points;
   const auto fall_power = static_cast<float>(-0.5 * kGamma * light_.falloff);
@@ -327,14 +360,21 @@ void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const s
           by_occupancy[s.high[axis]] += by;
           by_occupancy[s.low[axis]] -= by;
         }
+        if (on_lamp == nullptr) continue;
+        // The way to the point, to, is from the lamp: it turns, and the light falls off along it.
+        const Eigen::Vector3f by_l(shading.by_to_lamp);
+        Eigen::Vector3f by_to = (by_l - by_l.dot(l) * l) / std::sqrt(r2);
+        if (r2 > 1) by_to += 2 * fall_power * shading.value / r2 * to;
+        on_lamp->add(lamp, -static_cast<double>(by_shade[v]) * by_to.cast<double>());
       }
     }
   }
 }
 
 void SyntheticView::pull_back(const std::vector<float>& occupancy, const std::vector<double>& by_grey,
-                              std::vector<float>& by_occupancy) {
-  tbb::parallel_for(std::size_t{0}, bands_.size(), [&](std::size_t n) { pull_back_band(bands_[n], by_grey); });
+                              std::vector<float>& by_occupancy, Wrench* on_camera) {
+  tbb::parallel_for(std::size_t{0}, bands_.size(),
+                    [&](std::size_t n) { pull_back_band(bands_[n], by_grey, on_camera != nullptr); });
   std::vector<float> by_shade(points_.size(), 0.0F);
   for (const Band& band : bands_) {
     for (std::size_t v = 0; v < points_.size(); ++v) {
@@ -342,7 +382,10 @@ void SyntheticView::pull_back(const std::vector<float>& occupancy, const std::ve
       by_shade[v] += band.adjoint[v].shade;
     }
   }
-  pull_back_light(occupancy, by_shade, by_occupancy);
+  if (on_camera != nullptr) {
+    for (const Band& band : bands_) *on_camera += band.on_rays;
+  }
+  pull_back_light(occupancy, by_shade, by_occupancy, on_camera);
 }
 
 }  // namespace birdseye::host

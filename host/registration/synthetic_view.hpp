@@ -7,6 +7,7 @@
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "host/registration/rigid_motion.hpp"
 #include "host/registration/tissue.hpp"
 
 namespace birdseye::host {
@@ -45,11 +46,15 @@ class SyntheticView {
   /// After render(): how many pixels show tissue.
   [[nodiscard]] std::size_t tissue_pixels() const;
 
+  /// Casts from camera_from_patient * patient_from_model; the brightness stays what suits the pose that was given.
+  void look_from(const Transform<Patient, Patient>& patient_from_model);
+
   /// The grey of each pixel that counts, kBackground to 1.
   const std::vector<double>& render(const std::vector<float>& occupancy, const Headlight& light);
-  /// After render(): by_occupancy += d(value)/d(occupancy), from d(value)/d(grey).
+  /// After render(): by_occupancy += d(value)/d(occupancy), from d(value)/d(grey); and where it is asked for,
+  /// on_camera += what a motion of rays and lamp does, about the grid's origin and along its axes.
   void pull_back(const std::vector<float>& occupancy, const std::vector<double>& by_grey,
-                 std::vector<float>& by_occupancy);
+                 std::vector<float>& by_occupancy, Wrench* on_camera = nullptr);
 
  private:
   struct Ray {
@@ -71,21 +76,24 @@ class SyntheticView {
     std::vector<std::uint32_t> ends;  ///< of each ray, among samples
     std::vector<float> left;          ///< light that reaches the background
     std::vector<Point> adjoint;
+    Wrench on_rays;
   };
   void light_points(const std::vector<float>& occupancy, const Headlight& light);
   void find_empty_bricks(const std::vector<float>& occupancy);
   [[nodiscard]] bool beside_tissue(int x, int y, int z) const;
   void cast(Band& band);
-  void pull_back_band(Band& band, const std::vector<double>& by_grey);
+  void pull_back_band(Band& band, const std::vector<double>& by_grey, bool rays_too);
   void pull_back_light(const std::vector<float>& occupancy, const std::vector<float>& by_shade,
-                       std::vector<float>& by_occupancy) const;
+                       std::vector<float>& by_occupancy, Wrench* on_lamp) const;
 
   const Tissue& tissue_;
+  Transform<Camera, Patient> camera_from_patient_;
   Eigen::Vector3d eye_mm_ = Eigen::Vector3d::Zero();  ///< on the grid
   Eigen::Matrix3d grid_from_camera_ = Eigen::Matrix3d::Identity();
   double typical_mm_ = 100;
   Headlight light_;
   std::vector<std::uint8_t> video_;
+  std::vector<Eigen::Vector3d> directions_in_camera_;  ///< of the rays, unit length
   std::vector<Ray> rays_;
   std::vector<Point> points_;
   std::vector<std::uint8_t> bricks_;

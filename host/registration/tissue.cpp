@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kSmoothing_mm = 2.5;
+constexpr double kMostSmoothing_mm = 2.5;
 
 std::size_t at(int value) {
   return static_cast<std::size_t>(value);
@@ -174,8 +174,9 @@ Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const
   tissue.patient_from_grid.linear() = axes;
   tissue.patient_from_grid.translation() = ct.patient_from_voxel.translation();
   tissue.occupancy = occupancy_of(ct, labels, values, transfer, tissue);
+  const double smoothing_mm = std::min(kMostSmoothing_mm, spacing_mm);  // a small organ keeps its shape
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    smooth(tissue.occupancy, tissue.points, axis, kSmoothing_mm / tissue.spacing_mm[static_cast<Eigen::Index>(axis)]);
+    smooth(tissue.occupancy, tissue.points, axis, smoothing_mm / tissue.spacing_mm[static_cast<Eigen::Index>(axis)]);
   }
   tissue.level = level_cells(tissue);
   if (std::none_of(tissue.occupancy.begin(), tissue.occupancy.end(), [](float o) { return o > kSurface; }))

@@ -14,24 +14,41 @@ namespace {
 
 using Parameters = std::vector<double>;
 
-/// Coarse to fine: pictures about so wide, on a grid of this spacing.
+/// Coarse to fine: pictures about so wide, on a grid of this spacing. An organ that fills little of the pictures, or is
+/// small itself, still gets so many pixels and points.
 struct Stage {
-  int width_px;
+  int width_px, least_pixels;
   double spacing_mm;
+  int least_points;  ///< along the volume's longest side
   int most_steps;
 };
-constexpr Stage kCoarse{96, 4, 30}, kFine{128, 3, 15};
-constexpr int kFirstSteps = 12;
+constexpr Stage kCoarse{96, 2000, 4, 32, 30}, kFine{128, 3500, 3, 43, 15};
+constexpr int kFirstSteps = 12, kPoseSteps = 30;
 /// What more control points must bring on pixels that were not used, nats.
 constexpr double kWorthwhile = 0.004;
 constexpr int kMostControlPoints = 7;
 
-/// The views at one resolution, and how often they were asked.
+double spacing_mm(const Stage& stage, const Volume& ct) {
+  const Eigen::Vector3d extent_mm = ct.spacing_mm.cwiseProduct(Eigen::Vector3d(ct.size[0], ct.size[1], ct.size[2]));
+  return std::min(stage.spacing_mm, extent_mm.maxCoeff() / stage.least_points);
+}
+
+/// Every so many pixels along each axis.
+int reduction_of(const Stage& stage, const VideoView& view) {
+  const auto counts = view.mask.size() - static_cast<std::size_t>(std::count(view.mask.begin(), view.mask.end(), 0));
+  const double most = std::sqrt(static_cast<double>(counts) / stage.least_pixels);
+  return std::max(1, std::min(view.camera.width_px / stage.width_px, static_cast<int>(most)));
+}
+
+/// What a climb may change; the pose only where it is refined at all.
+enum class Free { all, pose };
+
+/// The views at one resolution, and how often they were asked. The pose, where it is refined, is the record's.
 class Problem {
  public:
   static Result<Problem> make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
                               const Stage& stage, const Prior& prior, ViewRegistration& record) {
-    const int reduction = std::max(1, views.front().camera.width_px / stage.width_px);
+    const int reduction = reduction_of(stage, views.front());
     auto made = MultiView::make(views, tissue, control, reduction, prior);
     if (!made) return made.error();
     return Problem(control, reduction, *std::move(made), record);
@@ -39,19 +56,31 @@ class Problem {
 
   double similarity(const Parameters& parameters, const Headlight& light) {
     ++record_.evaluations;
+    if (record_.pose) views_.set_pose(*record_.pose);
     return views_.similarity(parameters, light);
   }
 
   /// Climbs from start; steps are taken in even coordinates.
-  Parameters climb(const Parameters& start, const Headlight& light, int most_steps) {
+  Parameters climb(const Parameters& start, const Headlight& light, int most_steps, Free free = Free::all) {
     Parameters even = control_.to_even(start);
+    const auto inner = static_cast<std::ptrdiff_t>(even.size());
+    if (record_.pose) even.insert(even.end(), record_.pose->begin(), record_.pose->end());
     nlopt::opt optimiser(nlopt::LD_LBFGS, static_cast<unsigned>(even.size()));
     const auto objective = [&](const Parameters& x, Parameters& gradient) {
-      const Parameters parameters = control_.from_even(x);
+      const Parameters parameters = control_.from_even({x.begin(), x.begin() + inner});
+      PoseUnknowns pose{};
+      std::copy(x.begin() + inner, x.end(), pose.begin());
+      views_.set_pose(pose);
       Parameters by_parameters;
       ++record_.gradient_evaluations;
-      const double value = views_.value_and_gradient(parameters, light, by_parameters);
-      if (!gradient.empty()) gradient = control_.gradient_to_even(by_parameters);
+      PoseUnknowns by_pose{};
+      const double value =
+          views_.value_and_gradient(parameters, light, by_parameters, record_.pose ? &by_pose : nullptr);
+      if (!gradient.empty()) {
+        gradient = control_.gradient_to_even(by_parameters);
+        if (free == Free::pose) std::fill(gradient.begin(), gradient.end(), 0.0);
+        if (record_.pose) gradient.insert(gradient.end(), by_pose.begin(), by_pose.end());
+      }
       record_.trace.push_back({reduction_, parameters.size(), value});
       return value;
     };
@@ -67,7 +96,8 @@ class Problem {
     } catch (const std::exception&) {
       // It stops so where rounding keeps it from climbing further; what it reached stands.
     }
-    return control_.from_even(even);
+    if (record_.pose) std::copy(even.begin() + inner, even.end(), record_.pose->begin());
+    return control_.from_even({even.begin(), even.begin() + inner});
   }
 
   MultiView& views() { return views_; }
@@ -154,13 +184,16 @@ Result<double> jackknife_mm(const std::vector<VideoView>& views, const Tissue& t
   }
   const ControlledGrid grid(control, tissue.points);
   std::vector<std::vector<float>> moves(views.size());
+  const std::optional<PoseUnknowns> pose = record.pose;
   for (std::size_t out = 0; out < views.size(); ++out) {
     std::vector<VideoView> others = views;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
     auto problem = Problem::make(others, tissue, control, kCoarse, prior, record);
     if (!problem) return problem.error();
     constexpr int kSteps = 8;
+    record.pose = pose;
     grid.displacements(problem->climb(found, light, kSteps), moves[out]);
+    if (record.pose) problem->views().motion().add_to(tissue, *record.pose, moves[out]);
   }
   double sum = 0;
   for (const std::size_t v : surface) {
@@ -217,12 +250,13 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
                                         std::span<const int> label_values, const TransferFunction& transfer,
                                         const ViewRegistrationSettings& settings) {
   if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
-  const auto coarse = tissue_of(ct, labels, label_values, transfer, kCoarse.spacing_mm);
+  const auto coarse = tissue_of(ct, labels, label_values, transfer, spacing_mm(kCoarse, ct));
   if (!coarse) return coarse.error();
   if (settings.initial && least_determinant(*settings.initial) <= 0)
     return Error{Errc::bad_value, "the initial field folds; start from another or from none"};
 
   ViewRegistration out;
+  if (settings.refine_pose) out.pose.emplace();
   const ControlGrid one({1, 1, 1});
   Parameters start_of_one(3, 0.0);
   if (settings.initial) start_of_one = closest_parameters(*settings.initial, one, *coarse);
@@ -230,6 +264,8 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   if (!few) return few.error();
   if (auto sound = check_views(views, *few, start_of_one); !sound) return sound.error();
   out.light = settings.light.value_or(Headlight{});
+  // Rigidly first: a deformation would take a wrong pose for its own.
+  if (out.pose) few->climb(start_of_one, out.light, kPoseSteps, Free::pose);
   // What few control points can do, they do without straying.
   const Parameters of_one = few->climb(start_of_one, out.light, kFirstSteps);
 
@@ -256,14 +292,17 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
                     out.light.ambient, out.light.vignette));
   }
 
-  const auto fine = tissue_of(ct, labels, label_values, transfer, kFine.spacing_mm);
+  const auto fine = tissue_of(ct, labels, label_values, transfer, spacing_mm(kFine, ct));
   if (!fine) return fine.error();
   Prior prior = settings.prior;
   auto judged = Problem::make(views, *fine, control, kFine, prior, out);
   if (!judged) return judged.error();
   Problem& judge = *judged;
+  const std::optional<PoseUnknowns> rough_pose = out.pose;
+  if (out.pose) out.pose.emplace();
   out.similarity_before = judge.similarity(start, out.light);
   out.per_view_before = judge.views().per_view();
+  out.pose = rough_pose;
   constexpr int kTries = 3;
   for (int attempt = 0; attempt < kTries; ++attempt) {
     auto close = Problem::make(views, *fine, control, kFine, prior, out);
@@ -283,13 +322,17 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   out.worse_than_start = out.similarity_after < out.similarity_before || out.min_jacobian <= 0;
   if (out.worse_than_start) {
     out.parameters = start;
+    if (out.pose) out.pose.emplace();
     out.field = driven_field(control, start, *fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     out.similarity_after = out.similarity_before;
     out.per_view_after = out.per_view_before;
   }
+  out.centre_mm = judge.views().motion().centre_mm();
+  if (out.pose) out.patient_from_model = judge.views().motion().patient_from_model(*out.pose);
   if (settings.estimate_uncertainty && views.size() > 1) {
     ViewRegistration aside;  // its evaluations are not the registration's
+    aside.pose = out.pose;
     const auto spread = jackknife_mm(views, *coarse, control, out.parameters, out.light, prior, aside);
     if (!spread) return spread.error();
     out.uncertainty_mm = *spread;

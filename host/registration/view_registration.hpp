@@ -24,6 +24,8 @@ struct ViewRegistrationSettings {
   /// The lamp, where it is known; none: estimated from the views.
   std::optional<Headlight> light;
   bool estimate_uncertainty = true;
+  /// Whether a rigid motion common to all views is found together with the deformation.
+  bool refine_pose = false;
   Prior prior;
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
@@ -40,6 +42,11 @@ struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
   DisplacementField field;         ///< rest = deformed + u(deformed)
+  /// Of the given poses, where it is refined: camera_from_patient * patient_from_model is where the pictures were taken
+  /// from. The field is in the model's frame.
+  std::optional<PoseUnknowns> pose;
+  Transform<Patient, Patient> patient_from_model;
+  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< of the organ, about which it turns; model's frame
   Headlight light;
   double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
   std::vector<double> per_view_before, per_view_after;

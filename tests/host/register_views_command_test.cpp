@@ -103,6 +103,7 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
            {"\"gradient\"", "\"guess\"", {"optimiser", "simplex"}},
            {"\"gradient\"", "\"simplex\"\nsimilarity = \"taste\"", {"similarity", "ncc"}},
            {"\"gradient\"", "\"gradient\"\nunknowns = \"vertices\"", {"unknowns", "simplex"}},
+           {"\"gradient\"", "\"simplex\"\nrefine_pose = true", {"refine_pose", "gradient"}},
            {"\"gradient\"", "\"powell\"\nunknowns = \"corners\"", {"unknowns", "vertices"}},
            {"control_points = \\[.*\\]([^]*)\"gradient\"", "$1\"simplex\"", {"control_points", "auto"}},
            {"truth/control_points.json", "truth/truth.json", {"truth.json", "control_points.json"}},

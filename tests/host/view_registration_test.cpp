@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "host/registration/synthetic_view.hpp"
@@ -180,6 +181,54 @@ TEST(MultiView, GradientAgreesWithCentralDifferences) {
     const double slope = (8 * (at(kStep) - at(-kStep)) - (at(2 * kStep) - at(-2 * kStep))) / (12 * kStep);
     EXPECT_NEAR(dot(gradient, along), slope, 1e-3 * std::sqrt(dot(gradient, gradient))) << trial;
   }
+}
+
+/// With respect to a motion of all cameras, at poses and deformations far from the start. Steps are small, for blends
+/// between the grid's points have kinks where a sample goes from one cell to the next.
+TEST(MultiView, PoseGradientAgreesWithCentralDifferences) {
+  const auto tissue = tissue_of(organ(), nullptr, {}, plain(), 4);
+  ASSERT_TRUE(tissue);
+  const ControlGrid control({2, 2, 2});
+  const std::vector<VideoView> views{view_from({0, 0, 0}), view_from({0.4, 0.2, 0}), view_from({-0.3, 0.5, 1})};
+  Headlight light;
+  light.offset_in_camera_mm = {5, -3, 0};
+  auto multi = MultiView::make(views, *tissue, control, 1, {});
+  ASSERT_TRUE(multi) << multi.error().what;
+  std::mt19937 rng(8);
+  std::uniform_real_distribution<double> uniform(-4, 4);
+  for (unsigned trial = 0; trial < 4; ++trial) {
+    const Parameters p = random_parameters(control, 6, 30 + trial);
+    PoseUnknowns pose{}, gradient{};
+    for (double& x : pose) x = uniform(rng);
+    multi->set_pose(pose);
+    Parameters unused;
+    multi->value_and_gradient(p, light, unused, &gradient);
+    const double length = std::sqrt(std::inner_product(gradient.begin(), gradient.end(), gradient.begin(), 0.0));
+    for (std::size_t axis = 0; axis < pose.size(); ++axis) {
+      const auto at = [&](double step) {
+        PoseUnknowns moved = pose;
+        moved[axis] += step;
+        multi->set_pose(moved);
+        return multi->value(p, light);
+      };
+      constexpr double kStep_mm = 0.005;
+      const double slope = (at(kStep_mm) - at(-kStep_mm)) / (2 * kStep_mm);
+      EXPECT_NEAR(gradient[axis], slope, 1e-3 * length) << trial << " " << axis;
+    }
+  }
+}
+
+TEST(RigidMotion, TurnsAboutTheOrgansCentreAndShifts) {
+  const auto tissue = tissue_of(organ(), nullptr, {}, plain(), 4);
+  ASSERT_TRUE(tissue);
+  const RigidMotion motion(*tissue);
+  const double r = motion.gyration_mm();
+  EXPECT_GT(r, 15);
+  EXPECT_LT(r, 30);
+  const auto patient_from_model = motion.patient_from_model({1, 2, 3, 0.1 * r, 0, 0});
+  EXPECT_NEAR((patient_from_model * motion.centre_mm() - motion.centre_mm() - Eigen::Vector3d(1, 2, 3)).norm(), 0,
+              1e-12);
+  EXPECT_NEAR((rotation_log(patient_from_model.rotation()) - Eigen::Vector3d(0.1, 0, 0)).norm(), 0, 1e-12);
 }
 
 TEST(MultiView, IsTheSameToTheBitEveryTime) {
