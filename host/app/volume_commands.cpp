@@ -92,6 +92,7 @@ void add_volume(CLI::App& app, CommandStatus& status) {
   segment.add_flag("--largest", chosen->largest, "only the largest connected part");
   segment.add_option("--out", chosen->out, "labels to write: .nii.gz, .nrrd or .mha")->required();
   segment.callback([chosen, &status] { status.take(volume_segment(*chosen)); });
+  add_volume_from_surface(volume, status);
   add_volume_markers(volume, status);
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -35,6 +36,9 @@ class SurfaceIndex {
   SurfaceIndex(SurfaceIndex&&) noexcept;
   SurfaceIndex& operator=(SurfaceIndex&&) noexcept;
   [[nodiscard]] SurfacePoint nearest(const Eigen::Vector3d& point_mm) const;
+  /// How far it is to the surface along a direction of unit length; none where the ray misses it.
+  [[nodiscard]] std::optional<double> first_hit_mm(const Eigen::Vector3d& origin_mm,
+                                                   const Eigen::Vector3d& direction) const;
 
  private:
   struct Tree;

@@ -99,4 +99,23 @@ SurfacePoint SurfaceIndex::nearest(const Eigen::Vector3d& point_mm) const {
   return search.best;
 }
 
+std::optional<double> SurfaceIndex::first_hit_mm(const Eigen::Vector3d& origin_mm,
+                                                 const Eigen::Vector3d& direction) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit ray{};
+  ray.ray.org_x = static_cast<float>(origin_mm.x());
+  ray.ray.org_y = static_cast<float>(origin_mm.y());
+  ray.ray.org_z = static_cast<float>(origin_mm.z());
+  ray.ray.dir_x = static_cast<float>(direction.x());
+  ray.ray.dir_y = static_cast<float>(direction.y());
+  ray.ray.dir_z = static_cast<float>(direction.z());
+  ray.ray.tfar = std::numeric_limits<float>::infinity();
+  ray.ray.mask = ~0U;
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(tree_->scene, &context, &ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return static_cast<double>(ray.ray.tfar);
+}
+
 }  // namespace birdseye::host
