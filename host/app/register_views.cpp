@@ -32,14 +32,35 @@ struct Options {
   fs::path file, out, json;
 };
 
+/// The widest angle between two views, seen from the middle of the CT.
+double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
+  const Eigen::Vector3d middle(c.ct.size[0] - 1, c.ct.size[1] - 1, c.ct.size[2] - 1);
+  const Eigen::Vector3d centre_mm = c.ct.patient_from_voxel * Eigen::Vector3d(0.5 * middle);
+  std::vector<Eigen::Vector3d> towards;
+  for (const VideoView& view : c.views) {
+    const Eigen::Vector3d eye_mm = (view.camera_from_patient * found.patient_from_model).inverse().translation();
+    towards.push_back((eye_mm - centre_mm).normalized());
+  }
+  double least_cosine = 1;
+  for (const Eigen::Vector3d& a : towards) {
+    for (const Eigen::Vector3d& b : towards) least_cosine = std::min(least_cosine, a.dot(b));
+  }
+  return std::acos(std::max(-1.0, least_cosine)) * 180 / std::numbers::pi;
+}
+
 std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
-  constexpr double kSure_mm = 3, kGain = 0.01;
+  constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10;
   const char* const unit = c.similarity == "mi" ? " nats" : "";
   if (found.min_jacobian <= 0) return {"fail", "every deformation that was found folds: check the poses"};
   if (found.worse_than_start)
     return {"fail", "no deformation explains the views better than the start, which is what is written"};
   const double gain = found.similarity_after - found.similarity_before;
   if (c.views.size() == 1) return {"marginal", "a single view says little about depth: add others"};
+  if (const double deg = widest_deg(c, found); deg < kApart_deg) {
+    return {"marginal", fmt::format("the views are at most {:.1f} degrees apart, under {}, and so say little about "
+                                    "depth: add one from the side",
+                                    deg, kApart_deg)};
+  }
   if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
     return {"marginal", fmt::format("the surface moves by {:.1f} mm when a view is left out, over {} mm: add views",
                                     *found.uncertainty_mm, kSure_mm)};

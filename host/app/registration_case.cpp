@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -145,6 +146,12 @@ Result<void> read_model(const Table& table, RegistrationCase& out) {
   if (!refine_pose) return refine_pose.error();
   if (*refine_pose && out.optimiser != "gradient") return table.wrong("refine_pose", "needs optimiser = \"gradient\"");
   out.refine_pose = *refine_pose;
+  if (table.has("pose_prior")) {
+    const auto prior = table.get<double>("pose_prior");
+    if (!prior) return prior.error();
+    if (!(*prior >= 0) || !std::isfinite(*prior)) return table.wrong("pose_prior", "is 0 or more, as 0.01");
+    out.pose_prior = *prior;
+  }
   if (!table.has("initial")) return {};
   const auto initial = table.path("initial");
   if (!initial) return initial.error();

@@ -9,6 +9,7 @@
 #include "host/app/picture.hpp"
 #include "host/app/true_deformation.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/registration/multi_view.hpp"
 #include "host/registration/synthetic_view.hpp"
 #include "host/render/transfer_function.hpp"
 #include "host/volume/volume.hpp"
@@ -35,6 +36,7 @@ struct RegistrationCase {
   std::string similarity = "mi";
   int most_evaluations = 400;
   bool refine_pose = false;  ///< only with gradient
+  double pose_prior = Prior{}.pose;
   std::optional<DisplacementField> initial;
   std::vector<VideoView> views;
   std::vector<Picture> pictures;  ///< of the views, in colour

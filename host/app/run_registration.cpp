@@ -14,6 +14,7 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
     settings.level = c.level;
     settings.initial = c.initial;
     settings.refine_pose = c.refine_pose;
+    settings.prior.pose = c.pose_prior;
     settings.estimate_uncertainty = estimate_uncertainty;
     settings.progress = tell;
     return register_views(c.views, c.ct, labels, c.label_values, transfer, settings);

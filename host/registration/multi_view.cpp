@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <numeric>
+#include <tuple>
 
 namespace birdseye::host {
 
@@ -28,8 +29,16 @@ void MultiView::set_pose(const PoseUnknowns& pose) {
   for (SyntheticView& view : views_) view.look_from(motion_.patient_from_model(pose));
 }
 
-double MultiView::penalty_of_pose() const {
-  return prior_.pose * std::inner_product(pose_.begin(), pose_.end(), pose_.begin(), 0.0);
+double MultiView::penalty_of_pose(PoseUnknowns* gradient) const {
+  const double turn_mm = prior_.usual_turn_rad * motion_.gyration_mm();
+  double penalty = 0;
+  for (std::size_t i = 0; i < pose_.size(); ++i) {
+    const double usual_mm = i < 3 ? prior_.usual_shift_mm : turn_mm;
+    const double by = prior_.pose * pose_[i] / (usual_mm * usual_mm);
+    penalty += by * pose_[i];
+    if (gradient != nullptr) (*gradient)[i] = 2 * by;
+  }
+  return penalty;
 }
 
 void MultiView::deform(const std::vector<double>& parameters) {
@@ -73,7 +82,9 @@ double MultiView::value_and_gradient(const std::vector<double>& parameters, cons
   if (pose_gradient != nullptr) {
     for (std::size_t n = 1; n < views_.size(); ++n) on_cameras[0] += on_cameras[n];
     *pose_gradient = motion_.gradient(pose_, on_cameras[0]);
-    for (std::size_t i = 0; i < pose_.size(); ++i) (*pose_gradient)[i] -= 2 * prior_.pose * pose_[i];
+    PoseUnknowns by_penalty{};
+    std::ignore = penalty_of_pose(&by_penalty);
+    for (std::size_t i = 0; i < pose_.size(); ++i) (*pose_gradient)[i] -= by_penalty[i];
   }
   const double similarity =
       std::accumulate(per_view_.begin(), per_view_.end(), 0.0) / static_cast<double>(views_.size());

@@ -11,7 +11,8 @@ namespace birdseye::host {
 /// What keeps a deformation plausible where the pictures say nothing.
 struct Prior {
   double strain = 1;   ///< weight of ControlGrid::strain
-  double pose = 2e-5;  ///< of the sum of squares of PoseUnknowns: a pose 20 mm off costs 0.008 nats
+  double pose = 0.01;  ///< nats that a shift or a turn of the usual size costs, growing with its square
+  double usual_shift_mm = 5, usual_turn_rad = 0.09;  ///< by which given poses are off: 5 mm and 5 degrees
 };
 
 /// How well a deformation explains all views (the paper's Equation 6, as a mean), and its analytic gradient with
@@ -42,7 +43,8 @@ class MultiView {
   MultiView(const Tissue& tissue, const ControlGrid& control, const Prior& prior)
       : tissue_(tissue), control_(control), controlled_(control, tissue.points), motion_(tissue), prior_(prior) {}
   void deform(const std::vector<double>& parameters);
-  [[nodiscard]] double penalty_of_pose() const;
+  /// What the prior takes off for the pose, and its gradient.
+  [[nodiscard]] double penalty_of_pose(PoseUnknowns* gradient = nullptr) const;
 
   const Tissue& tissue_;
   const ControlGrid& control_;

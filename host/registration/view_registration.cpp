@@ -22,7 +22,7 @@ struct Stage {
   int least_points;  ///< along the volume's longest side
   int most_steps;
 };
-constexpr Stage kCoarse{96, 2000, 4, 32, 30}, kFine{128, 3500, 3, 43, 15};
+constexpr Stage kCoarse{96, 2000, 4, 48, 30}, kFine{128, 3500, 3, 64, 15};
 constexpr int kFirstSteps = 12, kPoseSteps = 30;
 /// What more control points must bring on pixels that were not used, nats.
 constexpr double kWorthwhile = 0.004;

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
+#include <sstream>
 
 #include "tests/support/command.hpp"
 #include "tests/support/scratch.hpp"
@@ -108,12 +109,68 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
            {"control_points = \\[.*\\]([^]*)\"gradient\"", "$1\"simplex\"", {"control_points", "auto"}},
            {"truth/control_points.json", "truth/truth.json", {"truth.json", "control_points.json"}},
            {"control_points = \\[.*\\]", "control_points = [0, 1, 1]", {"control_points"}},
+           {"level = ", "refine_pose = 1\nlevel = ", {"refine_pose", "type"}},
+           {"level = ", "pose_prior = -1.0\nlevel = ", {"pose_prior"}},
+           {"\\[truth\\]", "[truth]\npose = \"camera.yaml\"", {"camera.yaml"}},
+           {"view1.txt", "none.txt", {"view 1", "none.txt", "does not exist"}},
            {"label_values = \\[.*\\]", "label_values = []", {"label_values"}},
            {"image = \"view1.png\"", "image = \"camera.yaml\"", {"camera.yaml", "picture"}},
            {"camera_from_patient = \"view1.txt\"", "camera_from_patient = \"camera.yaml\"", {"camera.yaml"}},
            {"\\[model\\]", "[model", {"case.toml"}}}) {
     expect_refused("birdseye", arguments(changed(scratch, from, to), scratch), words, scratch / "out");
   }
+}
+
+TEST(RegisterViewsCommand, SaysWhenAllViewsAreFromOnePlace) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "x^", "");
+  // Half a pixel or so to the side of the first.
+  for (const char* name : {"view1", "view2"}) {
+    fs::copy_file(scratch / "c/view0.png", scratch / "c" / (std::string(name) + ".png"),
+                  fs::copy_options::overwrite_existing);
+    std::istringstream in(text_of(scratch / "c/view0.txt"));
+    std::vector<double> m(16);
+    for (double& number : m) in >> number;
+    m[3] += name[4] == '1' ? 0.2 : -0.2;
+    std::ofstream out(scratch / "c" / (std::string(name) + ".txt"));
+    for (std::size_t i = 0; i < 16; ++i) out << m[i] << (i % 4 == 3 ? "\n" : " ");
+  }
+  const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  EXPECT_EQ(json["verdict"], "marginal");
+  EXPECT_NE(json["reasons"][0].get<std::string>().find("degrees apart"), std::string::npos) << json["reasons"];
+}
+
+TEST(RegisterViewsCommand, RefusesPicturesThatSayNothing) {
+  const Scratch scratch;
+  for (const int grey : {0, 90}) {
+    const auto file = changed(scratch, "image = \"view1.png\"", "image = \"flat.pgm\"");
+    std::ofstream flat(scratch / "c/flat.pgm");
+    flat << "P2\n384 288\n255\n";
+    for (int i = 0; i < 384 * 288; ++i) flat << grey << "\n";
+    flat.close();
+    expect_refused("birdseye", arguments(file, scratch), {"flat.pgm", "constant"}, scratch / "out");
+  }
+  // A mask that leaves nothing to compare.
+  const auto file = changed(scratch, "mask = \"mask.png\"", "mask = \"flat.pgm\"");
+  expect_refused("birdseye", arguments(file, scratch), {"view0.png", "overlap", "nothing is left"}, scratch / "out");
+}
+
+TEST(RegisterViewsCommand, RefusesAnInitialFieldThatFolds) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "optimiser = \"gradient\"", "optimiser = \"gradient\"\ninitial = \"folds.mha\"");
+  std::ofstream field(scratch / "c/folds.mha", std::ios::binary);
+  field << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
+           "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = 10 10 10\nDimSize = 3 3 3\n"
+           "ElementNumberOfChannels = 3\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
+  // The middle goes 30 mm past its neighbours, which are 10 mm away.
+  for (int point = 0; point < 27; ++point) {
+    const float u[3] = {point == 13 ? 30.0F : 0.0F, 0, 0};
+    field.write(reinterpret_cast<const char*>(u), sizeof u);
+  }
+  field.close();
+  expect_refused("birdseye", arguments(file, scratch), {"folds.mha", "fold"}, scratch / "out");
 }
 
 TEST(RegisterViewsCommand, RefusesTwoViewsThatAreTheSame) {

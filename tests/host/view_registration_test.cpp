@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <random>
@@ -252,6 +253,40 @@ TEST(Tissue, RefusesWhatIsNotSeen) {
   Volume sheared = v;
   sheared.patient_from_voxel.linear().col(0) += 0.2 * sheared.patient_from_voxel.linear().col(1);
   EXPECT_FALSE(tissue_of(sheared, nullptr, {}, plain(), 4));
+}
+
+/// A prior that allows no deformation at all, and a start that explains the views exactly: what is found is worse, and
+/// what is returned is the start.
+TEST(RegisterViews, KeepsAStartThatIsBetter) {
+  const auto tissue = tissue_of(organ(), nullptr, {}, plain(), 2);
+  ASSERT_TRUE(tissue);
+  const ControlGrid control({1, 1, 1});
+  const Parameters moved{20, -12, 8};
+  std::vector<float> moves, warped;
+  ControlledGrid(control, tissue->points).displacements(moved, moves);
+  warp(*tissue, moves, warped);
+  std::vector<VideoView> views{view_from({0, 0, 0}), view_from({0.4, 0.2, 0})};
+  for (VideoView& view : views) {
+    SyntheticView synthetic(view, *tissue, 1);
+    const std::vector<double>& grey = synthetic.render(warped, {});
+    for (std::size_t i = 0; i < grey.size(); ++i)
+      view.grey[i] = static_cast<std::uint8_t>(std::clamp(200 * grey[i] + 50, 0.0, 255.0));
+  }
+  PatchOctree tree = *PatchOctree::uniform(3);
+  control.patch(moved, tissue->box_mm()).drive(tree);
+  Eigen::Affine3d patient_from_cube = tissue->patient_from_grid;
+  patient_from_cube.scale(tissue->box_mm());
+  ViewRegistrationSettings settings;
+  settings.control_points = {1, 1, 1};
+  settings.level = 3;
+  settings.initial = field_of(tree, patient_from_cube);
+  settings.light = Headlight{};
+  settings.prior.strain = 1e9;
+  const auto found = register_views(views, organ(), nullptr, {}, plain(), settings);
+  ASSERT_TRUE(found) << found.error().what;
+  EXPECT_TRUE(found->worse_than_start);
+  EXPECT_EQ(found->similarity_after, found->similarity_before);
+  for (std::size_t i = 0; i < moved.size(); ++i) EXPECT_NEAR(found->parameters[i], moved[i], 0.2);
 }
 
 TEST(RegisterViews, RefusesAViewThatSeesNothing) {
