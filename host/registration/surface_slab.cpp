@@ -83,8 +83,9 @@ Result<Volume> slab_behind(const Surface& surface, const SlabSettings& settings)
       for (int i = 0; i < out.size[0]; ++i) {
         double sum = 0;
         for (int part = 0; part < kSubdivisions * kSubdivisions * kSubdivisions; ++part) {
-          const Eigen::Vector3d offset(part % kSubdivisions, part / kSubdivisions % kSubdivisions,
-                                       part / (kSubdivisions * kSubdivisions));
+          const int di = part % kSubdivisions, dj = part / kSubdivisions % kSubdivisions;
+          const int dk = part / (kSubdivisions * kSubdivisions);
+          const Eigen::Vector3d offset(di, dj, dk);
           const Eigen::Vector3d at = Eigen::Vector3d(i, j, k) + (offset.array() + 0.5).matrix() / kSubdivisions -
                                      Eigen::Vector3d::Constant(0.5);
           sum += share_at(index, settings, out.patient_from_voxel * at);
