@@ -84,7 +84,7 @@ SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int re
           ++count;
         }
       }
-      if (2 * count <= reduction * reduction) continue;
+      if (count == 0 || 2 * count <= reduction * reduction) continue;
       const double middle = 0.5 * (reduction - 1);
       const auto direction =
           unproject(view.camera, Eigen::Vector2d(column * reduction + middle, row * reduction + middle));
@@ -325,9 +325,10 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
           }
         }
       }
-      const Eigen::Vector3d place(static_cast<double>(s.base % row) + static_cast<double>(s.t[0]),
-                                  static_cast<double>(s.base % slice / row) + static_cast<double>(s.t[1]),
-                                  static_cast<double>(s.base / slice) + static_cast<double>(s.t[2]));
+      const std::size_t x = s.base % row, y = s.base % slice / row, z = s.base / slice;
+      const Eigen::Vector3d place(static_cast<double>(x) + static_cast<double>(s.t[0]),
+                                  static_cast<double>(y) + static_cast<double>(s.t[1]),
+                                  static_cast<double>(z) + static_cast<double>(s.t[2]));
       band.on_rays.add(place.cwiseProduct(tissue_.spacing_mm),
                        Eigen::Vector3f(slope[0], slope[1], slope[2]).cast<double>().cwiseProduct(per_mm));
     }

@@ -199,8 +199,8 @@ TEST(RealStereo, TheLensesAreInvertedWhereTheOrganIsSeen) {
         }
       }
     }
-    std::printf("%s: no ray for %.1f %% of the picture\n", side.c_str(),
-                100.0 * without / (camera.width_px / 4 * (camera.height_px / 4)));
+    const int asked = camera.width_px / 4 * (camera.height_px / 4);
+    std::printf("%s: no ray for %.1f %% of the picture\n", side.c_str(), 100.0 * without / asked);
   }
 }
 
