@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "host/app/bench_machine.hpp"
 #include "host/app/bench_register.hpp"
@@ -20,6 +21,8 @@ namespace {
 using nlohmann::json;
 
 constexpr double kLamps_mm[] = {0, 30, 90};
+/// Of the curves: the lamp's place, and whether nothing lies behind the organ, as in a rendering.
+constexpr std::pair<double, bool> kScenes[] = {{0, false}, {30, false}, {90, false}, {0, true}};
 
 /// What the methods are tried under; all else is as in the main table.
 struct Condition {
@@ -66,8 +69,9 @@ std::vector<Condition> conditions(const StudyOptions& options) {
 /// Similarity along a line through the truth: the only control point is pushed on and held back along its own way.
 Result<json> cost_curves(SimulatedCase wanted) {
   json rows = json::array();
-  for (const double lamp_mm : kLamps_mm) {
+  for (const auto& [lamp_mm, plain] : kScenes) {
     wanted.light_offset_mm = lamp_mm;
+    wanted.plain_background = plain;
     const auto c = simulate(wanted);
     if (!c) return c.error();
     const auto transfer = load_transfer_function(c->transfer);
@@ -97,13 +101,14 @@ Result<json> cost_curves(SimulatedCase wanted) {
         peaks += values[i] > values[i - 1] && values[i] >= values[i + 1] ? 1 : 0;
       rows.push_back({{"similarity", measure},
                       {"light_offset_mm", lamp_mm},
+                      {"plain_background", plain},
                       {"peak_mm", along_mm[top]},
                       {"local_maxima", peaks},
                       {"moved_mm", middle_mm.norm()},
                       {"along_mm", along_mm},
                       {"values", values}});
-      fmt::print("cost curve, lamp {:2.0f} mm beside the lens, {:8}: highest {:+.1f} mm from the truth, {} maxima\n",
-                 lamp_mm, measure, along_mm[top], peaks);
+      fmt::print("cost curve, lamp {:2.0f} mm beside the lens{}, {:8}: highest {:+.1f} mm from the truth, {} maxima\n",
+                 lamp_mm, plain ? ", nothing behind" : "", measure, along_mm[top], peaks);
       std::fflush(stdout);
     }
   }
@@ -113,13 +118,15 @@ Result<json> cost_curves(SimulatedCase wanted) {
 /// Each curve between its own least and greatest value, for measures have other units.
 std::string cost_plot(const json& rows) {
   std::vector<Panel> panels;
-  for (const double lamp_mm : kLamps_mm) {
-    Panel panel{lamp_mm == 0 ? "lamp at the lens, as drawn" : fmt::format("lamp {} mm beside the lens", lamp_mm),
+  for (const auto& [lamp_mm, plain] : kScenes) {
+    Panel panel{plain          ? "Lamp at the lens, nothing behind"
+                : lamp_mm == 0 ? "Lamp at the lens, as drawn"
+                               : fmt::format("Lamp {} mm beside the lens", lamp_mm),
                 "mm past the truth",
                 "similarity, least to most",
                 {}};
     for (const json& row : rows) {
-      if (row["light_offset_mm"].get<double>() != lamp_mm) continue;
+      if (row["light_offset_mm"] != lamp_mm || row["plain_background"] != plain) continue;
       const auto values = row["values"].get<std::vector<double>>();
       const auto [least, most] = std::minmax_element(values.begin(), values.end());
       Curve curve{row["similarity"], {}};
@@ -129,13 +136,13 @@ std::string cost_plot(const json& rows) {
     }
     panels.push_back(std::move(panel));
   }
-  return plot_svg(panels, static_cast<int>(panels.size()));
+  return plot_svg(panels, 2);
 }
 
 std::string name_of(const json& row) {
   const auto optimiser = row["optimiser"].get<std::string>();
   if (optimiser == "gradient") return row["dof"] == 3 ? "ours, 3 DOF" : "ours, 81 DOF";
-  return optimiser + ", " + row["similarity"].get<std::string>();
+  return optimiser + " " + row["similarity"].get<std::string>();
 }
 
 /// Rows that differ from the usual in `key` alone.
@@ -171,7 +178,7 @@ std::string sweep_plot(const json& rows, const StudyOptions& options) {
           sweep_panel(rows, "Initial error", "amplitude_mm", "greatest motion of the surface, mm", false, true));
     }
   }
-  constexpr int kMostColumns = 3;
+  constexpr int kMostColumns = 2;
   return plot_svg(panels, std::min(kMostColumns, static_cast<int>(panels.size())));
 }
 

@@ -58,27 +58,28 @@ double median_of(const std::vector<Trial>& trials, double Trial::*field) {
 Result<RegistrationCase> simulate(const SimulatedCase& wanted) {
   const ScratchFolder scratch;
   const fs::path folder = scratch.path() / "case", log = scratch.path() / "log";
-  auto child = ChildProcess::start({(fs::read_symlink("/proc/self/exe").parent_path() / "birdseye-sim").string(),
-                                    "case",
-                                    "--out",
-                                    folder.string(),
-                                    "--seed",
-                                    std::to_string(wanted.seed),
-                                    "--phantom",
-                                    wanted.phantom,
-                                    "--views",
-                                    std::to_string(wanted.views),
-                                    "--size",
-                                    wanted.size,
-                                    "--dof",
-                                    fmt::format("{0}x{0}x{0}", wanted.inner),
-                                    "--amplitude-mm",
-                                    fmt::format("{}", wanted.amplitude_mm),
-                                    "--noise",
-                                    fmt::format("{}", wanted.noise),
-                                    "--light-offset-mm",
-                                    fmt::format("{}", wanted.light_offset_mm)},
-                                   log);
+  std::vector<std::string> command{(fs::read_symlink("/proc/self/exe").parent_path() / "birdseye-sim").string(),
+                                   "case",
+                                   "--out",
+                                   folder.string(),
+                                   "--seed",
+                                   std::to_string(wanted.seed),
+                                   "--phantom",
+                                   wanted.phantom,
+                                   "--views",
+                                   std::to_string(wanted.views),
+                                   "--size",
+                                   wanted.size,
+                                   "--dof",
+                                   fmt::format("{0}x{0}x{0}", wanted.inner),
+                                   "--amplitude-mm",
+                                   fmt::format("{}", wanted.amplitude_mm),
+                                   "--noise",
+                                   fmt::format("{}", wanted.noise),
+                                   "--light-offset-mm",
+                                   fmt::format("{}", wanted.light_offset_mm)};
+  if (wanted.plain_background) command.emplace_back("--plain-background");
+  auto child = ChildProcess::start(command, log);
   if (!child) return child.error();
   constexpr std::chrono::minutes kPatience{2};
   if (child->wait(std::chrono::steady_clock::now() + kPatience) != 0) {

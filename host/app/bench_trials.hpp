@@ -15,6 +15,7 @@ struct SimulatedCase {
   int seed = 1, inner = 1;  ///< inner control points an axis
   int views = 5;
   double amplitude_mm = 10, noise = 1, light_offset_mm = 0;
+  bool plain_background = false;  ///< nothing behind the organ
 };
 /// Errc::bad_value with the simulator's own words for a seed that it refuses.
 Result<RegistrationCase> simulate(const SimulatedCase& wanted);

@@ -9,7 +9,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kWidth = 380, kHeight = 270, kLeft = 52, kRight = 12, kTop = 44, kBottom = 42;
+constexpr double kWidth = 380, kHeight = 284, kLeft = 52, kRight = 12, kTop = 58, kBottom = 42;
 constexpr const char* kColours[] = {"#1b5e9e", "#d1622b", "#2c8a4b", "#8d4aa8", "#7a6a1e", "#555555"};
 
 struct Range {
@@ -77,7 +77,7 @@ std::string panel_svg(const Panel& panel, const std::vector<Panel>& all) {
                      kHeight - 8, panel.x_label);
   svg += fmt::format("<text transform='translate(13 {}) rotate(-90)' text-anchor='middle' fill='#555'>{}</text>",
                      (kTop + kHeight - kBottom) / 2, panel.y_label);
-  double legend = kLeft;
+  double legend = kLeft, line = 34;
   for (const Curve& curve : panel.curves) {
     const char* const colour = colour_of(curve.name, all);
     std::string points;
@@ -88,9 +88,14 @@ std::string panel_svg(const Panel& panel, const std::vector<Panel>& all) {
       if (curve.points.size() <= kFew)
         svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='2.6' fill='{}'/>", x(px), y(py), colour);
     }
-    svg += fmt::format("<text x='{:.0f}' y='34' fill='{}'>{}</text>", legend, colour, curve.name);
-    constexpr double kLetter = 6.6;
-    legend += kLetter * static_cast<double>(curve.name.size()) + 10;
+    constexpr double kLetter = 6.6, kLine = 14;
+    const double width = kLetter * static_cast<double>(curve.name.size()) + 10;
+    if (legend + width > kWidth) {
+      legend = kLeft;
+      line += kLine;
+    }
+    svg += fmt::format("<text x='{:.0f}' y='{}' fill='{}'>{}</text>", legend, line, colour, curve.name);
+    legend += width;
   }
   return svg;
 }
