@@ -87,8 +87,10 @@ Result<json> cost_curves(SimulatedCase wanted) {
       auto views = RenderedViews::make(c->views, *tissue, measure);
       if (!views) return views.error();
       std::vector<double> along_mm, values;
-      constexpr double kReach_mm = 12, kStep_mm = 0.8;
-      for (double at_mm = -kReach_mm; at_mm <= kReach_mm + 1e-9; at_mm += kStep_mm) {
+      constexpr int kSteps = 15;
+      constexpr double kStep_mm = 0.8;
+      for (int step = -kSteps; step <= kSteps; ++step) {
+        const double at_mm = step * kStep_mm;
         const Eigen::Vector3d point_mm = 8 * (middle_mm + at_mm * middle_mm.normalized());
         constexpr int kLevel = 4;
         along_mm.push_back(at_mm);
@@ -238,6 +240,7 @@ Result<void> register_study(const StudyOptions& options) {
     if (!curves) return curves.error();
     files.push_back({options.folder / "cost-curves.svg", cost_plot(*curves)});
     all["cost_curves"] = *std::move(curves);
+    if (auto written = write_files(files); !written) return written.error();
   }
   Progress progress;
   for (const Condition& condition : conditions(options)) {

@@ -16,14 +16,20 @@ struct Range {
   double low, high;
 };
 
-/// A distance between marks of 1, 2 or 5 times a power of ten: some four marks.
-double mark_distance(const Range& range) {
+/// Marks 1, 2 or 5 times a power of ten apart: some four of them.
+std::vector<double> marks_of(const Range& range) {
   const double rough = (range.high - range.low) / 4;
   const double unit = std::pow(10, std::floor(std::log10(rough)));
-  for (const double times : {1.0, 2.0, 5.0}) {
-    if (rough <= times * unit) return times * unit;
+  double apart = 10 * unit;
+  for (const double times : {5.0, 2.0, 1.0}) {
+    if (rough <= times * unit) apart = times * unit;
   }
-  return 10 * unit;
+  constexpr double kRounding = 1e-9;
+  const int first = static_cast<int>(std::ceil(range.low / apart - kRounding));
+  const int last = static_cast<int>(std::floor(range.high / apart + kRounding));
+  std::vector<double> marks;
+  for (int n = first; n <= last; ++n) marks.push_back(n * apart);
+  return marks;
 }
 
 Range range_of(const Panel& panel, bool of_x) {
@@ -60,16 +66,15 @@ std::string panel_svg(const Panel& panel, const std::vector<Panel>& all) {
     return kHeight - kBottom - (kHeight - kTop - kBottom) * (v - of_y.low) / (of_y.high - of_y.low);
   };
   std::string svg = fmt::format("<text x='{}' y='16' font-weight='bold'>{}</text>", kLeft, panel.title);
-  const double step_y = mark_distance(of_y), step_x = mark_distance(of_x);
-  for (double v = std::ceil(of_y.low / step_y) * step_y; v <= of_y.high; v += step_y) {
+  for (const double v : marks_of(of_y)) {
     svg +=
         fmt::format("<path d='M{} {:.1f}H{}' stroke='#e4e4e4'/><text x='{}' y='{:.1f}' text-anchor='end'>{:.4g}</text>",
-                    kLeft, y(v), kWidth - kRight, kLeft - 5, y(v) + 4, std::abs(v) < 1e-9 * step_y ? 0 : v);
+                    kLeft, y(v), kWidth - kRight, kLeft - 5, y(v) + 4, v);
   }
-  for (double v = std::ceil(of_x.low / step_x - 1e-9) * step_x; v <= of_x.high * (1 + 1e-9); v += step_x) {
+  for (const double v : marks_of(of_x)) {
     svg += fmt::format(
         "<path d='M{0:.1f} {1}v4' stroke='#888'/><text x='{0:.1f}' y='{2}' text-anchor='middle'>{3:.4g}</text>", x(v),
-        kHeight - kBottom, kHeight - kBottom + 17, std::abs(v) < 1e-9 * step_x ? 0 : v);
+        kHeight - kBottom, kHeight - kBottom + 17, v);
   }
   svg += fmt::format("<path d='M{0} {1}V{2}H{3}' fill='none' stroke='#888'/>", kLeft, kTop, kHeight - kBottom,
                      kWidth - kRight);
