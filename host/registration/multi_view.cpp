@@ -41,6 +41,17 @@ double MultiView::penalty_of_pose(PoseUnknowns* gradient) const {
   return penalty;
 }
 
+double MultiView::penalty(const std::vector<double>& parameters, double weight, std::vector<double>& gradient) const {
+  const double strain = control_.strain(parameters, tissue_.box_mm(), weight * prior_.strain, gradient);
+  const double per_square = prior_.stray / static_cast<double>(parameters.size());
+  double squares = 0;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    squares += parameters[i] * parameters[i];
+    gradient[i] += weight * 2 * per_square * parameters[i];
+  }
+  return prior_.strain * strain + per_square * squares;
+}
+
 void MultiView::deform(const std::vector<double>& parameters) {
   controlled_.displacements(parameters, moves_);
   warp(tissue_, moves_, warped_);
@@ -55,8 +66,7 @@ double MultiView::similarity(const std::vector<double>& parameters, const Headli
 
 double MultiView::value(const std::vector<double>& parameters, const Headlight& light) {
   std::vector<double> unused(parameters.size(), 0.0);
-  return similarity(parameters, light) - prior_.strain * control_.strain(parameters, tissue_.box_mm(), 0, unused) -
-         penalty_of_pose();
+  return similarity(parameters, light) - penalty(parameters, 0, unused) - penalty_of_pose();
 }
 
 double MultiView::value_and_gradient(const std::vector<double>& parameters, const Headlight& light,
@@ -88,8 +98,7 @@ double MultiView::value_and_gradient(const std::vector<double>& parameters, cons
   }
   const double similarity =
       std::accumulate(per_view_.begin(), per_view_.end(), 0.0) / static_cast<double>(views_.size());
-  return similarity - prior_.strain * control_.strain(parameters, tissue_.box_mm(), -prior_.strain, gradient) -
-         penalty_of_pose();
+  return similarity - penalty(parameters, -1, gradient) - penalty_of_pose();
 }
 
 }  // namespace birdseye::host

@@ -10,8 +10,9 @@ namespace birdseye::host {
 
 /// What keeps a deformation plausible where the pictures say nothing.
 struct Prior {
-  double strain = 1;   ///< weight of ControlGrid::strain
-  double pose = 0.01;  ///< nats that a shift or a turn of the usual size costs, growing with its square
+  double strain = 1;    ///< weight of ControlGrid::strain
+  double stray = 1e-5;  ///< of the mean square of the control points' displacements, mm: 30 mm cost 0.009 nats
+  double pose = 0.01;   ///< nats that a shift or a turn of the usual size costs, growing with its square
   double usual_shift_mm = 5, usual_turn_rad = 0.09;  ///< by which given poses are off: 5 mm and 5 degrees
 };
 
@@ -45,6 +46,8 @@ class MultiView {
   void deform(const std::vector<double>& parameters);
   /// What the prior takes off for the pose, and its gradient.
   [[nodiscard]] double penalty_of_pose(PoseUnknowns* gradient = nullptr) const;
+  /// And for the deformation; adds weight times its gradient.
+  double penalty(const std::vector<double>& parameters, double weight, std::vector<double>& gradient) const;
 
   const Tissue& tissue_;
   const ControlGrid& control_;
