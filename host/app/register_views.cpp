@@ -62,13 +62,13 @@ std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const 
                                     deg, kApart_deg)};
   }
   if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
-    return {"marginal", fmt::format("the surface moves by {:.1f} mm when a view is left out, over {} mm: add views",
+    return {"marginal", fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
                                     *found.uncertainty_mm, kSure_mm)};
   }
   if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f}{}", gain, unit)};
   std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);
   if (found.uncertainty_mm)
-    reason += fmt::format("; without any one view the surface moves by {:.1f} mm", *found.uncertainty_mm);
+    reason += fmt::format("; the surface is to be expected within {:.1f} mm", *found.uncertainty_mm);
   return {"pass", reason};
 }
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <nlopt.hpp>
+#include <numeric>
 
+#include "host/registration/confidence.hpp"
 #include "host/registration/patch_field.hpp"
 
 namespace birdseye::host {
@@ -67,21 +69,16 @@ class Problem {
     if (record_.pose) even.insert(even.end(), record_.pose->begin(), record_.pose->end());
     nlopt::opt optimiser(nlopt::LD_LBFGS, static_cast<unsigned>(even.size()));
     const auto objective = [&](const Parameters& x, Parameters& gradient) {
-      const Parameters parameters = control_.from_even({x.begin(), x.begin() + inner});
+      ++record_.gradient_evaluations;
       PoseUnknowns pose{};
       std::copy(x.begin() + inner, x.end(), pose.begin());
-      views_.set_pose(pose);
-      Parameters by_parameters;
-      ++record_.gradient_evaluations;
-      PoseUnknowns by_pose{};
-      const double value =
-          views_.value_and_gradient(parameters, light, by_parameters, record_.pose ? &by_pose : nullptr);
+      auto [value, by] = value_and_gradient(control_.from_even({x.begin(), x.begin() + inner}), pose, light);
       if (!gradient.empty()) {
-        gradient = control_.gradient_to_even(by_parameters);
+        gradient = control_.gradient_to_even({by.begin(), by.begin() + inner});
         if (free == Free::pose) std::fill(gradient.begin(), gradient.end(), 0.0);
-        if (record_.pose) gradient.insert(gradient.end(), by_pose.begin(), by_pose.end());
+        gradient.insert(gradient.end(), by.begin() + inner, by.end());
       }
-      record_.trace.push_back({reduction_, parameters.size(), value});
+      record_.trace.push_back({reduction_, static_cast<std::size_t>(inner), value});
       return value;
     };
     using Objective = decltype(objective);
@@ -98,6 +95,17 @@ class Problem {
     }
     if (record_.pose) std::copy(even.begin() + inner, even.end(), record_.pose->begin());
     return control_.from_even({even.begin(), even.begin() + inner});
+  }
+
+  /// By the control points, then by the pose's unknowns where it is refined.
+  std::pair<double, Parameters> value_and_gradient(const Parameters& parameters, const PoseUnknowns& pose,
+                                                   const Headlight& light) {
+    views_.set_pose(pose);
+    Parameters gradient;
+    PoseUnknowns by_pose{};
+    const double value = views_.value_and_gradient(parameters, light, gradient, record_.pose ? &by_pose : nullptr);
+    if (record_.pose) gradient.insert(gradient.end(), by_pose.begin(), by_pose.end());
+    return {value, gradient};
   }
 
   MultiView& views() { return views_; }
@@ -173,39 +181,59 @@ Result<void> check_views(const std::vector<VideoView>& views, Problem& problem, 
   return {};
 }
 
-/// How much the surface's displacement depends on each view.
-Result<double> jackknife_mm(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
-                            const Parameters& found, const Headlight& light, const Prior& prior,
-                            ViewRegistration& record) {
+/// How far the surface may be from where it is said to be, root mean square.
+double uncertainty_mm(Problem& problem, const Tissue& tissue, const ControlGrid& control,
+                      const ViewRegistration& found) {
+  constexpr std::size_t kEvery = 5;
   std::vector<std::size_t> surface;
+  std::size_t seen = 0;
   for (std::size_t v = 0; v < tissue.occupancy.size(); ++v) {
     constexpr float kInside = 0.7F;
-    if (tissue.occupancy[v] > kSurface && tissue.occupancy[v] < kInside) surface.push_back(v);
+    if (tissue.occupancy[v] > kSurface && tissue.occupancy[v] < kInside && seen++ % kEvery == 0) surface.push_back(v);
   }
-  const ControlledGrid grid(control, tissue.points);
-  std::vector<std::vector<float>> moves(views.size());
-  const std::optional<PoseUnknowns> pose = record.pose;
-  for (std::size_t out = 0; out < views.size(); ++out) {
-    std::vector<VideoView> others = views;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
-    auto problem = Problem::make(others, tissue, control, kCoarse, prior, record);
-    if (!problem) return problem.error();
-    constexpr int kSteps = 8;
-    record.pose = pose;
-    grid.displacements(problem->climb(found, light, kSteps), moves[out]);
-    if (record.pose) problem->views().motion().add_to(tissue, *record.pose, moves[out]);
+  // Directions: what few control points can change, and the pose.
+  constexpr int kFew = 3;
+  std::array<int, 3> inner = control.inner_points();
+  for (int& n : inner) n = std::min(n, kFew);
+  const ControlGrid few(inner);
+  const std::size_t deformations = few.parameters();
+  std::vector<Parameters> directions;
+  for (std::size_t n = 0; n < deformations; ++n) {
+    Parameters unit(deformations, 0.0);
+    unit[n] = 1;
+    directions.push_back(few.refine(few.from_even(unit), control));
   }
-  double sum = 0;
-  for (const std::size_t v : surface) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      double mean = 0;
-      for (const auto& move : moves)
-        mean += static_cast<double>(move[3 * v + axis]) / static_cast<double>(moves.size());
-      for (const auto& move : moves) sum += std::pow(static_cast<double>(move[3 * v + axis]) - mean, 2);
+  const auto parameters_at = [&](const Parameters& x) {
+    Parameters at = found.parameters;
+    for (std::size_t n = 0; n < deformations; ++n) {
+      for (std::size_t i = 0; i < at.size(); ++i) at[i] += x[n] * directions[n][i];
     }
-  }
-  const auto n = static_cast<double>(views.size());
-  return std::sqrt((n - 1) / n * sum / static_cast<double>(std::max<std::size_t>(1, surface.size())));
+    return at;
+  };
+  const auto pose_at = [&](const Parameters& x) {
+    PoseUnknowns pose = found.pose.value_or(PoseUnknowns{});
+    for (std::size_t n = deformations; n < x.size(); ++n) pose[n - deformations] += x[n];
+    return pose;
+  };
+  const ControlledGrid grid(control, tissue.points);
+  Summit summit;
+  summit.coordinates = deformations + (found.pose ? found.pose->size() : 0);
+  summit.gradient = [&](const Parameters& x) {
+    const Parameters by = problem.value_and_gradient(parameters_at(x), pose_at(x), found.light).second;
+    Parameters out;
+    for (const Parameters& direction : directions)
+      out.push_back(std::inner_product(direction.begin(), direction.end(), by.begin(), 0.0));
+    out.insert(out.end(), by.begin() + static_cast<std::ptrdiff_t>(found.parameters.size()), by.end());
+    return out;
+  };
+  summit.surface_moves = [&](const Parameters& x) {
+    std::vector<float> moves, out;
+    grid.displacements(parameters_at(x), moves);
+    if (found.pose) problem.views().motion().add_to(tissue, pose_at(x), moves);
+    for (const std::size_t v : surface) out.insert(out.end(), {moves[3 * v], moves[3 * v + 1], moves[3 * v + 2]});
+    return out;
+  };
+  return expected_error_mm(summit);
 }
 
 std::string times(const std::array<int, 3>& n) {
@@ -330,12 +358,10 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   }
   out.centre_mm = judge.views().motion().centre_mm();
   if (out.pose) out.patient_from_model = judge.views().motion().patient_from_model(*out.pose);
-  if (settings.estimate_uncertainty && views.size() > 1) {
-    ViewRegistration aside;  // its evaluations are not the registration's
-    aside.pose = out.pose;
-    const auto spread = jackknife_mm(views, *coarse, control, out.parameters, out.light, prior, aside);
-    if (!spread) return spread.error();
-    out.uncertainty_mm = *spread;
+  if (settings.estimate_uncertainty) {
+    auto summit = Problem::make(views, *coarse, control, kCoarse, prior, out);
+    if (!summit) return summit.error();
+    out.uncertainty_mm = uncertainty_mm(*summit, *coarse, control, out);
   }
   return out;
 }

@@ -53,8 +53,8 @@ struct ViewRegistration {
   int evaluations = 0, gradient_evaluations = 0;
   std::vector<TracePoint> trace;
   double min_jacobian = 1;
-  /// How far the organ's surface moves, root mean square, when one view is left out: the jackknife's standard
-  /// deviation. None for a single view, or where it was not asked for.
+  /// The error of the organ's surface that is to be expected, root mean square (confidence.hpp). None where it was not
+  /// asked for.
   std::optional<double> uncertainty_mm;
   std::string why_so_many_points;  ///< in words
   bool worse_than_start = false;   ///< the start is what is returned then
