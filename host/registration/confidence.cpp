@@ -9,7 +9,7 @@ namespace {
 
 /// Found on simulated livers, 3 degrees of freedom (docs/manual/registration.md): with it, expected and true errors
 /// agree there.
-constexpr double kIndependentPixels = 300;
+constexpr double kIndependentPixels = 400;
 /// How far an organ is off before any picture is seen, all coordinates together. Root mean square over its box, on
 /// whose faces nothing moves; an organ's surface within moves about twice as far.
 constexpr double kLoosest_mm = 3;

@@ -43,13 +43,12 @@ double MultiView::penalty_of_pose(PoseUnknowns* gradient) const {
 
 double MultiView::penalty(const std::vector<double>& parameters, double weight, std::vector<double>& gradient) const {
   const double strain = control_.strain(parameters, tissue_.box_mm(), weight * prior_.strain, gradient);
-  const double per_square = prior_.stray / static_cast<double>(parameters.size());
   double squares = 0;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     squares += parameters[i] * parameters[i];
-    gradient[i] += weight * 2 * per_square * parameters[i];
+    gradient[i] += weight * 2 * prior_.stray * parameters[i];
   }
-  return prior_.strain * strain + per_square * squares;
+  return prior_.strain * strain + prior_.stray * squares;
 }
 
 void MultiView::deform(const std::vector<double>& parameters) {

@@ -10,9 +10,9 @@ namespace birdseye::host {
 
 /// What keeps a deformation plausible where the pictures say nothing.
 struct Prior {
-  double strain = 1;    ///< weight of ControlGrid::strain
-  double stray = 1e-5;  ///< of the mean square of the control points' displacements, mm: 30 mm cost 0.009 nats
-  double pose = 0.01;   ///< nats that a shift or a turn of the usual size costs, growing with its square
+  double strain = 1;      ///< weight of ControlGrid::strain
+  double stray = 1.2e-7;  ///< of the sum of the control points' squared displacements, mm: 81 of 30 mm cost 0.009 nats
+  double pose = 0.01;     ///< nats that a shift or a turn of the usual size costs, growing with its square
   double usual_shift_mm = 5, usual_turn_rad = 0.09;  ///< by which given poses are off: 5 mm and 5 degrees
 };
 
