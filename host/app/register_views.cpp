@@ -49,11 +49,19 @@ double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
 }
 
 std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
-  constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10;
+  constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10, kNoise = 0.002;
   const char* const unit = c.similarity == "mi" ? " nats" : "";
-  if (found.min_jacobian <= 0) return {"fail", "every deformation that was found folds: check the poses"};
+  if (found.folded) return {"fail", "every deformation that was found folds: check the poses; the start is written"};
   if (found.worse_than_start)
     return {"fail", "no deformation explains the views better than the start, which is what is written"};
+  for (std::size_t n = 0; n < c.views.size(); ++n) {
+    const double gain = found.per_view_after[n] - found.per_view_before[n];
+    if (gain < -kNoise) {
+      return {"fail", fmt::format("{} is explained worse than before, by {:.3f}{}, for others' sake: check its picture "
+                                  "and its pose",
+                                  c.views[n].name, -gain, unit)};
+    }
+  }
   const double gain = found.similarity_after - found.similarity_before;
   if (c.views.size() == 1) return {"marginal", "a single view says little about depth: add others"};
   if (const double deg = widest_deg(c, found); deg < kApart_deg) {
@@ -64,6 +72,11 @@ std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const 
   if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
     return {"marginal", fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
                                     *found.uncertainty_mm, kSure_mm)};
+  }
+  if (found.lamp_at_limit) {
+    return {"marginal",
+            "the lamp that explains the views best is no laparoscope's: check that pictures, poses and CT "
+            "belong together"};
   }
   if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f}{}", gain, unit)};
   std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);

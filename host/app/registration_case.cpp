@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
 #include <sstream>
 #include <toml.hpp>
 
@@ -33,6 +35,9 @@ class Table {
   [[nodiscard]] Result<T> get(const char* key) const {
     if (!has(key)) return wrong(key, "is missing");
     try {
+      if constexpr (std::is_same_v<T, double>) {
+        if (table_.at(key).is_integer()) return static_cast<double>(table_.at(key).as_integer());
+      }
       return toml::find<T>(table_, key);
     } catch (const std::exception&) {
       return wrong(key, "is of another type");
@@ -62,6 +67,41 @@ class Table {
   std::string name_;
   const toml::value& table_;
 };
+
+/// A key that is not known is a slip of the pen, and would be taken for its default.
+Result<void> only_known_keys(const fs::path& file, const toml::value& all) {
+  static const std::map<std::string, std::set<std::string>> kKnown = {
+      {"volume", {"path", "label", "label_values", "transfer"}},
+      {"model",
+       {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
+        "most_evaluations"}},
+      {"view", {"image", "camera", "camera_from_patient", "mask"}},
+      {"truth", {"landmarks", "control_points", "pose"}}};
+  for (const auto& [name, content] : all.as_table()) {
+    const auto table = kKnown.find(name);
+    if (table == kKnown.end())
+      return Error{Errc::bad_value,
+                   fmt::format("{}: [{}] is not known; there are volume, model, view, truth", file.string(), name)};
+    const auto check = [&, &name = name](const toml::value& one) -> Result<void> {
+      if (!one.is_table()) return {};
+      for (const auto& [key, unused] : one.as_table()) {
+        if (table->second.count(key) == 0) {
+          return Error{Errc::bad_value, fmt::format("{}: [{}] {}: is not known; there are {}", file.string(), name, key,
+                                                    fmt::join(table->second, ", "))};
+        }
+      }
+      return {};
+    };
+    if (content.is_array()) {
+      for (const toml::value& one : content.as_array()) {
+        if (auto known = check(one); !known) return known.error();
+      }
+    } else if (auto known = check(content); !known) {
+      return known.error();
+    }
+  }
+  return {};
+}
 
 Result<void> read_volume(const Table& table, RegistrationCase& out) {
   const auto path = table.path("path");
@@ -149,7 +189,8 @@ Result<void> read_model(const Table& table, RegistrationCase& out) {
   if (table.has("pose_prior")) {
     const auto prior = table.get<double>("pose_prior");
     if (!prior) return prior.error();
-    if (!(*prior >= 0) || !std::isfinite(*prior)) return table.wrong("pose_prior", "is 0 or more, as 0.01");
+    constexpr double kMost = 100;
+    if (!(*prior >= 0 && *prior <= kMost)) return table.wrong("pose_prior", "is 0 to 100, as 0.01");
     out.pose_prior = *prior;
   }
   if (!table.has("initial")) return {};
@@ -165,7 +206,7 @@ Result<void> read_view(const Table& table, const fs::path& folder, RegistrationC
   VideoView view;
   const auto image = table.path("image");
   if (!image) return image.error();
-  view.name = fs::relative(*image, folder).string();
+  view.name = fs::relative(*image, folder.empty() ? "." : folder).string();
   const cv::Mat bgr = cv::imread(image->string(), cv::IMREAD_COLOR);
   if (bgr.empty()) return table.wrong("image", image->string() + " is no picture that can be read");
   const auto camera = table.path("camera");
@@ -202,10 +243,16 @@ Result<void> read_view(const Table& table, const fs::path& folder, RegistrationC
   auto overlap = overlap_mask(picture.rgb, bgr.cols, bgr.rows, left_out);
   if (!overlap) return Error{overlap.error().code, fmt::format("{}: {}", image->string(), overlap.error().what)};
   view.mask = *std::move(overlap);
+  constexpr double kLeast_percent = 1;
+  const auto counts = view.mask.size() - static_cast<std::size_t>(std::count(view.mask.begin(), view.mask.end(), 0));
+  if (100.0 * static_cast<double>(counts) < kLeast_percent * static_cast<double>(view.mask.size())) {
+    return table.wrong(
+        "image", fmt::format("only {} of {}'s pixels count, under {} %: too much is masked, black or glare", counts,
+                             view.name, kLeast_percent));
+  }
   for (const VideoView& other : out.views) {
-    if (other.grey == view.grey &&
-        (other.camera_from_patient.matrix() - view.camera_from_patient.matrix()).norm() < 1e-9)
-      return table.wrong("image", fmt::format("is the same view as {}; name each view once", other.name));
+    if (other.grey == view.grey)
+      return table.wrong("image", fmt::format("is the same picture as {}; name each view once", other.name));
   }
   out.pictures.push_back(std::move(picture));
   out.views.push_back(std::move(view));
@@ -240,6 +287,12 @@ Result<std::vector<Landmark>> read_landmarks(const fs::path& path) {
 }  // namespace
 
 Result<RegistrationCase> read_case(const fs::path& path) {
+  std::error_code no_file;
+  if (!fs::is_regular_file(path, no_file)) {
+    return Error{
+        Errc::unreadable,
+        fmt::format("{}: is no file; name the case's TOML file, as birdseye-sim case writes it", path.string())};
+  }
   toml::value all;
   try {
     all = toml::parse(path.string());
@@ -247,6 +300,7 @@ Result<RegistrationCase> read_case(const fs::path& path) {
     std::string what = problem.what();
     return Error{Errc::bad_format, fmt::format("{}: is no case: {}", path.string(), what.substr(0, what.find('\n')))};
   }
+  if (auto known = only_known_keys(path, all); !known) return known.error();
   RegistrationCase out;
   const toml::value none = toml::table{};
   const auto table = [&](const char* name) { return Table(path, name, all.contains(name) ? all.at(name) : none); };

@@ -80,7 +80,7 @@ std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageR
 std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const nlohmann::json& json) {
   std::string page =
       "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Registration to views</title><style>"
-      "body{font-family:sans-serif;max-width:70em;margin:1em auto}img{width:24%}table{border-collapse:collapse}"
+      "body{font-family:sans-serif;max-width:70em;margin:1em auto}img{width:49%}table{border-collapse:collapse}"
       "td,th{border:1px solid #ccc;padding:.2em .6em;text-align:left}</style></head><body>";
   page += fmt::format("<h1>Registration to {} views: {}</h1><p>{}</p>", c.views.size(),
                       json["verdict"].get<std::string>(), json["reasons"][0].get<std::string>());
@@ -90,7 +90,9 @@ std::string registration_report(const RegistrationCase& c, const ViewRegistratio
     if (value.is_string()) page += fmt::format("<tr><th>{}</th><td>{}</td></tr>", key, value.get<std::string>());
   }
   page += "</table><h2>Similarity on the way</h2>" + trace_svg(found.trace);
-  page += "<h2>Views</h2><p>Overlay before and after; difference of grey before and after.</p>";
+  page +=
+      "<h2>Views</h2><p>Overlay before and after; difference of grey before and after (red: the video is brighter; "
+      "grey: not compared).</p>";
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     page += fmt::format("<h3>{}: {:.4f} to {:.4f} nats</h3>", c.views[n].name, found.per_view_before[n],
                         found.per_view_after[n]);

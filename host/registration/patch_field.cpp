@@ -1,6 +1,7 @@
 #include "host/registration/patch_field.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 namespace birdseye::host {
 
@@ -12,10 +13,13 @@ Eigen::Affine3d patient_from_cube(const Tissue& tissue) {
 
 std::vector<double> closest_parameters(const DisplacementField& field, const ControlGrid& control,
                                        const Tissue& tissue) {
-  constexpr int kSide = 9;
-  const ControlledGrid grid(control, {kSide, kSide, kSide});
+  // Enough places for as many unknowns; those on the box's faces say nothing.
+  constexpr int kLeastSide = 9;
+  const auto& inner = control.inner_points();
+  const int side = std::max(kLeastSide, 2 * *std::max_element(inner.begin(), inner.end()) + 3);
+  const ControlledGrid grid(control, {side, side, side});
   const std::size_t count = control.parameters() / 3;
-  Eigen::MatrixXd basis(kSide * kSide * kSide, static_cast<Eigen::Index>(count));
+  Eigen::MatrixXd basis(side * side * side, static_cast<Eigen::Index>(count));
   std::vector<float> response;
   for (std::size_t c = 0; c < count; ++c) {
     std::vector<double> one(control.parameters(), 0.0);
@@ -26,8 +30,8 @@ std::vector<double> closest_parameters(const DisplacementField& field, const Con
   }
   Eigen::MatrixXd wanted(basis.rows(), 3);
   for (int p = 0; p < basis.rows(); ++p) {
-    const int i = p % kSide, j = p / kSide % kSide, k = p / kSide / kSide;
-    const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (kSide - 1);
+    const int i = p % side, j = p / side % side, k = p / side / side;
+    const Eigen::Vector3d share = Eigen::Vector3d(i, j, k) / (side - 1);
     const Eigen::Vector3d at = tissue.patient_from_grid * Eigen::Vector3d(share.cwiseProduct(tissue.box_mm()));
     wanted.row(p) = (tissue.patient_from_grid.linear().transpose() * field.displacement(at)).transpose();
   }

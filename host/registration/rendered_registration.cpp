@@ -168,7 +168,11 @@ Result<ViewRegistration> register_rendered(const std::vector<VideoView>& views, 
                                          settings.control_points[1], settings.control_points[2]);
   }
   Parameters start(unknowns.count(), 0.0);
-  if (settings.initial) start = unknowns.closest_to(*settings.initial);
+  if (settings.initial) {
+    start = unknowns.closest_to(*settings.initial);
+    if (least_determinant(unknowns.field(start)) <= 0)
+      return Error{Errc::bad_value, "the initial field folds as these unknowns give it again; give more of them"};
+  }
 
   Search search(unknowns, *rendered, out);
   out.similarity_before = search.value(start);
@@ -184,7 +188,7 @@ Result<ViewRegistration> register_rendered(const std::vector<VideoView>& views, 
       fmt::format("{} evaluations: {:.4f} to {:.4f}", out.evaluations, out.similarity_before, best.value));
   out.worse_than_start = best.value <= out.similarity_before;
   out.parameters = best.parameters;
-  out.field = unknowns.field(out.parameters);
+  out.field = out.worse_than_start && settings.initial ? *settings.initial : unknowns.field(out.parameters);
   out.min_jacobian = least_determinant(out.field);
   out.similarity_after = best.value;
   rendered->similarity(out.field);

@@ -121,7 +121,7 @@ class Problem {
 };
 
 /// The lamp under which a deformation explains the views best.
-Headlight find_light(Problem& problem, const Parameters& parameters, const Headlight& start) {
+Headlight find_light(Problem& problem, const Parameters& parameters, const Headlight& start, bool& at_limit) {
   const auto light_of = [](const Parameters& x) {
     Headlight light;
     light.offset_in_camera_mm = {10 * x[0], 10 * x[1], 0};
@@ -140,8 +140,9 @@ Headlight find_light(Problem& problem, const Parameters& parameters, const Headl
   optimiser.set_max_objective([](const Parameters& at, Parameters& gradient,
                                  void* data) { return (*static_cast<Objective*>(data))(at, gradient); },
                               const_cast<void*>(static_cast<const void*>(&objective)));
-  optimiser.set_lower_bounds({-6, -6, 0.5, 0.1, 0});
-  optimiser.set_upper_bounds({6, 6, 1.5, 5, 0.8});
+  const Parameters low{-6, -6, 0.5, 0.1, 0}, high{6, 6, 1.5, 5, 0.8};
+  optimiser.set_lower_bounds(low);
+  optimiser.set_upper_bounds(high);
   optimiser.set_initial_step({0.5, 0.5, 0.2, 0.5, 0.15});
   optimiser.set_maxeval(60);
   double value = 0;
@@ -149,6 +150,12 @@ Headlight find_light(Problem& problem, const Parameters& parameters, const Headl
     optimiser.optimize(x, value);
   } catch (const std::exception&) {
     // As above.
+  }
+  // Little ambient light and a lens without vignette are no limits but ends of what there is.
+  at_limit = false;
+  for (const std::size_t i : {0, 1, 2, 4}) {
+    const double near = 1e-3 * (high[i] - low[i]);
+    at_limit = at_limit || x[i] > high[i] - near || (i != 4 && x[i] < low[i] + near);
   }
   return light_of(x);
 }
@@ -307,13 +314,17 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   }
   const ControlGrid control(out.control_points);
   Parameters start(control.parameters(), 0.0);
-  if (settings.initial) start = closest_parameters(*settings.initial, control, *coarse);
+  if (settings.initial) {
+    start = closest_parameters(*settings.initial, control, *coarse);
+    if (least_determinant(driven_field(control, start, *coarse, settings.level)) <= 0)
+      return Error{Errc::bad_value, "the initial field folds as these control points give it again; give more of them"};
+  }
   Parameters rough = settings.initial ? start : one.refine(of_one, control);
   auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
   if (!wide) return wide.error();
   if (!settings.light) {
     // A rough fit first, so that the lamp does not stand in for a deformation.
-    out.light = find_light(*wide, wide->climb(rough, out.light, kFirstSteps), out.light);
+    out.light = find_light(*wide, wide->climb(rough, out.light, kFirstSteps), out.light, out.lamp_at_limit);
     settings.progress(
         fmt::format("lamp: {:.1f}, {:.1f} mm beside the lens, fall-off {:.1f}, ambient {:.2f}, vignette {:.2f}",
                     out.light.offset_in_camera_mm.x(), out.light.offset_in_camera_mm.y(), out.light.falloff,
@@ -347,19 +358,21 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   }
   out.similarity_after = judge.similarity(out.parameters, out.light);
   out.per_view_after = judge.views().per_view();
-  out.worse_than_start = out.similarity_after < out.similarity_before || out.min_jacobian <= 0;
+  out.folded = out.min_jacobian <= 0;
+  out.worse_than_start = out.similarity_after < out.similarity_before || out.folded;
   if (out.worse_than_start) {
     out.parameters = start;
     if (out.pose) out.pose.emplace();
-    out.field = driven_field(control, start, *fine, settings.level);
+    out.field = settings.initial ? *settings.initial : driven_field(control, start, *fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     out.similarity_after = out.similarity_before;
     out.per_view_after = out.per_view_before;
   }
   out.centre_mm = judge.views().motion().centre_mm();
   if (out.pose) out.patient_from_model = judge.views().motion().patient_from_model(*out.pose);
-  if (settings.estimate_uncertainty) {
-    auto summit = Problem::make(views, *coarse, control, kCoarse, prior, out);
+  if (settings.estimate_uncertainty && !out.worse_than_start) {
+    // By the usual prior: a stiffer one, against folds, knows no more of the organ.
+    auto summit = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
     if (!summit) return summit.error();
     out.uncertainty_mm = uncertainty_mm(*summit, *coarse, control, out);
   }

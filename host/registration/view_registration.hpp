@@ -54,15 +54,17 @@ struct ViewRegistration {
   std::vector<TracePoint> trace;
   double min_jacobian = 1;
   /// The error of the organ's surface that is to be expected, root mean square (confidence.hpp). None where it was not
-  /// asked for.
+  /// asked for or nothing better than the start was found.
   std::optional<double> uncertainty_mm;
   std::string why_so_many_points;  ///< in words
-  bool worse_than_start = false;   ///< the start is what is returned then
+  bool worse_than_start = false;   ///< the start is what is returned then: the initial field itself, or none
+  bool folded = false;             ///< and that is why: every deformation that was found folds
+  bool lamp_at_limit = false;      ///< the lamp is at the end of where it was searched
 };
 
 /// Deforms the tissue until synthetic views look like the video: L-BFGS with the analytic gradient, coarse to fine.
-/// Refuses, naming the view: one that sees nothing of the
-/// organ, a picture of a single grey; and a start that folds.
+/// Refuses, naming the view: one that sees nothing of the organ, a picture of a single grey; and a start that folds,
+/// also as the control points give it again.
 Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
                                         std::span<const int> label_values, const TransferFunction& transfer,
                                         const ViewRegistrationSettings& settings);

@@ -48,6 +48,8 @@ TEST(BenchRegisterCommand, RefusesWhatItDoesNotKnow) {
   const Scratch scratch;
   expect_refused("birdseye", "bench register --phantom foot --json " + (scratch / "r.json").string(),
                  {"phantom", "foot"}, scratch / "r.json");
+  expect_refused("birdseye", "bench register --views 1 --study " + (scratch / "s").string(), {"--study", "--views"},
+                 scratch / "s");
 }
 
 }  // namespace

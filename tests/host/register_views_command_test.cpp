@@ -116,6 +116,8 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
            {"label_values = \\[.*\\]", "label_values = []", {"label_values"}},
            {"image = \"view1.png\"", "image = \"camera.yaml\"", {"camera.yaml", "picture"}},
            {"camera_from_patient = \"view1.txt\"", "camera_from_patient = \"camera.yaml\"", {"camera.yaml"}},
+           {"level = ", "levle = ", {"[model] levle", "not known", "level"}},
+           {"\\[truth\\]", "[turth]", {"turth", "truth"}},
            {"\\[model\\]", "[model", {"case.toml"}}}) {
     expect_refused("birdseye", arguments(changed(scratch, from, to), scratch), words, scratch / "out");
   }
@@ -124,9 +126,14 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
 TEST(RegisterViewsCommand, SaysWhenAllViewsAreFromOnePlace) {
   const Scratch scratch;
   const auto file = changed(scratch, "x^", "");
-  // Half a pixel or so to the side of the first.
+  // Half a pixel or so to the side of the first, with other noise.
   for (const char* name : {"view1", "view2"}) {
-    fs::copy_file(scratch / "c/view0.png", scratch / "c" / (std::string(name) + ".png"),
+    const fs::path other = scratch / name;
+    const auto made =
+        run("birdseye-sim", "case --out " + other.string() +
+                                " --seed 5 --views 3 --size 384x288 --dof 3 --amplitude-mm 8 --noise 1." + name[4]);
+    ASSERT_EQ(made.code, 0) << made.output;
+    fs::copy_file(other / "view0.png", scratch / "c" / (std::string(name) + ".png"),
                   fs::copy_options::overwrite_existing);
     std::istringstream in(text_of(scratch / "c/view0.txt"));
     std::vector<double> m(16);
@@ -173,11 +180,30 @@ TEST(RegisterViewsCommand, RefusesAnInitialFieldThatFolds) {
   expect_refused("birdseye", arguments(file, scratch), {"folds.mha", "fold"}, scratch / "out");
 }
 
+TEST(RegisterViewsCommand, FailsWhereTwoViewsHaveEachOthersPose) {
+  const Scratch scratch;
+  const fs::path file = changed(scratch, "\"view0.txt\"([^]*)\"view1.txt\"", "\"view1.txt\"$1\"view0.txt\"");
+  const auto result = run("birdseye", arguments(file, scratch));
+  constexpr int kVerdictFail = 3;
+  EXPECT_EQ(result.code, kVerdictFail) << result.output;
+  EXPECT_NE(result.output.find("worse than before"), std::string::npos) << result.output;
+}
+
+TEST(RegisterViewsCommand, RefusesAPictureOfWhichNextToNothingCounts) {
+  const Scratch scratch;
+  make_case(scratch);
+  std::string mask(384 * 288, '\0');
+  for (std::size_t row = 140; row < 150; ++row) mask.replace(384 * row + 180, 10, 10, '\xff');
+  std::ofstream(scratch / "c/small.pgm", std::ios::binary) << "P5\n384 288\n255\n" << mask;
+  const fs::path file = changed(scratch, "\"mask.png\"", "\"small.pgm\"");
+  expect_refused("birdseye", arguments(file, scratch), {"view0.png", "100", "masked"}, scratch / "out");
+}
+
 TEST(RegisterViewsCommand, RefusesTwoViewsThatAreTheSame) {
   const Scratch scratch;
   const auto file = changed(scratch, "image = \"view1.png\"[^]*?camera_from_patient = \"view1.txt\"",
                             "image = \"view0.png\"\ncamera = \"camera.yaml\"\ncamera_from_patient = \"view0.txt\"");
-  expect_refused("birdseye", arguments(file, scratch), {"same view"}, scratch / "out");
+  expect_refused("birdseye", arguments(file, scratch), {"same picture"}, scratch / "out");
 }
 
 TEST(RegisterViewsCommand, RefusesACameraOfAnotherSize) {
