@@ -153,7 +153,7 @@ Headlight find_light(Problem& problem, const Parameters& parameters, const Headl
   }
   // Little ambient light and a lens without vignette are no limits but ends of what there is.
   at_limit = false;
-  for (const std::size_t i : {0, 1, 2, 4}) {
+  for (const std::size_t i : std::initializer_list<std::size_t>{0, 1, 2, 4}) {
     const double near = 1e-3 * (high[i] - low[i]);
     at_limit = at_limit || x[i] > high[i] - near || (i != 4 && x[i] < low[i] + near);
   }
