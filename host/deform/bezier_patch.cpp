@@ -6,11 +6,6 @@
 
 namespace birdseye::host {
 
-namespace {
-
-constexpr int kMostDegree = 16;
-
-/// B_0^n(t) to B_n^n(t), by the recurrence that raises the degree: stable, and it sums to one.
 std::array<double, kMostDegree + 1> bernstein(int degree, double t) {
   std::array<double, kMostDegree + 1> b{};
   b[0] = 1;
@@ -23,8 +18,6 @@ std::array<double, kMostDegree + 1> bernstein(int degree, double t) {
   }
   return b;
 }
-
-}  // namespace
 
 Result<BezierPatch> BezierPatch::create(const std::array<int, 3>& degree) {
   for (const int d : degree) {

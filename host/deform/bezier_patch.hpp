@@ -9,6 +9,11 @@
 
 namespace birdseye::host {
 
+inline constexpr int kMostDegree = 16;
+
+/// B_0^n(t) to B_n^n(t) of degree n, 0 beyond, by the recurrence that raises the degree: stable, and it sums to one.
+std::array<double, kMostDegree + 1> bernstein(int degree, double t);
+
 /// A tensor-product Bezier patch of displacements over the unit cube (the paper's section 5.3): few control points move
 /// the whole organ, smoothly. u(x) = sum_ijk B_i^l(x) B_j^m(y) B_k^n(z) d_ijk, with Bernstein polynomials of any degree
 /// l, m, n of 1 to 16 along each axis. Control points on the cube's surface hold still, so that the surface does too.

@@ -19,14 +19,8 @@ std::size_t at(int value) {
 
 /// B_1^n(t) to B_{n-1}^n(t) for the n - 1 inner points of degree n.
 std::vector<double> inner_bernstein(int inner, double t) {
-  const int degree = inner + 1;
-  std::vector<double> b(at(degree + 1), 0.0);
-  b[0] = 1;
-  for (int n = 1; n <= degree; ++n) {
-    for (int i = n; i > 0; --i) b[at(i)] = (1 - t) * b[at(i)] + t * b[at(i - 1)];
-    b[0] *= 1 - t;
-  }
-  return {b.begin() + 1, b.end() - 1};
+  const auto b = bernstein(inner + 1, t);
+  return {b.begin() + 1, b.begin() + 1 + inner};
 }
 
 /// The integrals of B_i^n B_j^n over [0, 1]: C(n, i) C(n, j) / C(2n, i + j) / (2n + 1).
@@ -46,6 +40,7 @@ Eigen::MatrixXd gram(int degree) {
 
 ControlGrid::ControlGrid(const std::array<int, 3>& inner_points) : inner_(inner_points) {
   assert(*std::min_element(inner_.begin(), inner_.end()) >= 1);
+  assert(*std::max_element(inner_.begin(), inner_.end()) < kMostDegree);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int n = inner_[axis] + 1;
     const Eigen::MatrixXd lower = gram(n - 1);

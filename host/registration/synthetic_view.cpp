@@ -67,6 +67,38 @@ Shading shade(const float g[3], const float l[3], float fall, float ambient) {
   return s;
 }
 
+/// A headlight as the grid has it.
+struct Lamp {
+  Lamp(const Headlight& light, const Eigen::Vector3d& place, double typical_mm)
+      : place_mm(place),
+        typical2(static_cast<float>(typical_mm * typical_mm)),
+        fall_power(static_cast<float>(-0.5 * kGamma * light.falloff)),
+        ambient(static_cast<float>(light.ambient)) {}
+  Eigen::Vector3d place_mm;
+  float typical2, fall_power, ambient;
+};
+
+struct LitPoint {
+  Stencil stencil;
+  Shading shading;
+  Eigen::Vector3f from_lamp_mm, direction;
+  float distance2;
+};
+LitPoint light_point(const Tissue& tissue, const std::vector<float>& occupancy, const Lamp& lamp, int x, int y, int z) {
+  LitPoint out{};
+  out.stencil = stencil_of(tissue, x, y, z);
+  const Stencil& s = out.stencil;
+  float g[3];
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    g[axis] = (occupancy[s.high[axis]] - occupancy[s.low[axis]]) * s.per_mm[axis];
+  out.from_lamp_mm = (Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm) - lamp.place_mm).cast<float>();
+  out.distance2 = std::max(1.0F, out.from_lamp_mm.squaredNorm());
+  out.direction = out.from_lamp_mm / std::sqrt(out.distance2);
+  const float fall = std::pow(out.distance2 / lamp.typical2, lamp.fall_power);
+  out.shading = shade(g, out.direction.data(), fall, lamp.ambient);
+  return out;
+}
+
 }  // namespace
 
 SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int reduction)
@@ -165,25 +197,15 @@ bool SyntheticView::beside_tissue(int x, int y, int z) const {
 
 void SyntheticView::light_points(const std::vector<float>& occupancy, const Headlight& light) {
   light_ = light;
-  const Eigen::Vector3d lamp = eye_mm_ + grid_from_camera_ * light.offset_in_camera_mm;
+  const Lamp lamp(light_, eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm, typical_mm_);
   const auto& n = tissue_.points;
-  const auto fall_power = static_cast<float>(-0.5 * kGamma * light.falloff);
-  const auto typical2 = static_cast<float>(typical_mm_ * typical_mm_);
   tbb::parallel_for(0, n[2], [&](int z) {
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x) {
         const std::size_t v = grid_index(n, x, y, z);
         points_[v] = {occupancy[v], 0};
         if (!beside_tissue(x, y, z)) continue;
-        const Stencil s = stencil_of(tissue_, x, y, z);
-        float g[3];
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          g[axis] = (occupancy[s.high[axis]] - occupancy[s.low[axis]]) * s.per_mm[axis];
-        const Eigen::Vector3f to = (Eigen::Vector3d(x, y, z).cwiseProduct(tissue_.spacing_mm) - lamp).cast<float>();
-        const float r2 = std::max(1.0F, to.squaredNorm());
-        const Eigen::Vector3f l = to / std::sqrt(r2);
-        const float fall = std::pow(r2 / typical2, fall_power);
-        points_[v].shade = shade(g, l.data(), fall, static_cast<float>(light.ambient)).value;
+        points_[v].shade = light_point(tissue_, occupancy, lamp, x, y, z).shading.value;
       }
     }
   });
@@ -338,24 +360,14 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
 
 void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const std::vector<float>& by_shade,
                                     std::vector<float>& by_occupancy, Wrench* on_lamp) const {
-  const Eigen::Vector3d lamp = eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm;
+  const Lamp lamp(light_, eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm, typical_mm_);
   const auto& n = tissue_.points;
-  const auto fall_power = static_cast<float>(-0.5 * kGamma * light_.falloff);
-  const auto typical2 = static_cast<float>(typical_mm_ * typical_mm_);
   for (int z = 0; z < n[2]; ++z) {
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x) {
         const std::size_t v = grid_index(n, x, y, z);
         if (by_shade[v] == 0 || points_[v].shade == 0) continue;
-        const Stencil s = stencil_of(tissue_, x, y, z);
-        float g[3];
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          g[axis] = (occupancy[s.high[axis]] - occupancy[s.low[axis]]) * s.per_mm[axis];
-        const Eigen::Vector3f to = (Eigen::Vector3d(x, y, z).cwiseProduct(tissue_.spacing_mm) - lamp).cast<float>();
-        const float r2 = std::max(1.0F, to.squaredNorm());
-        const Eigen::Vector3f l = to / std::sqrt(r2);
-        const float fall = std::pow(r2 / typical2, fall_power);
-        const Shading shading = shade(g, l.data(), fall, static_cast<float>(light_.ambient));
+        const auto [s, shading, to, l, r2] = light_point(tissue_, occupancy, lamp, x, y, z);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           const float by = by_shade[v] * shading.by_gradient[axis] * s.per_mm[axis];
           by_occupancy[s.high[axis]] += by;
@@ -365,8 +377,8 @@ void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const s
         // The way to the point, to, is from the lamp: it turns, and the light falls off along it.
         const Eigen::Vector3f by_l(shading.by_to_lamp);
         Eigen::Vector3f by_to = (by_l - by_l.dot(l) * l) / std::sqrt(r2);
-        if (r2 > 1) by_to += 2 * fall_power * shading.value / r2 * to;
-        on_lamp->add(lamp, -static_cast<double>(by_shade[v]) * by_to.cast<double>());
+        if (r2 > 1) by_to += 2 * lamp.fall_power * shading.value / r2 * to;
+        on_lamp->add(lamp.place_mm, -static_cast<double>(by_shade[v]) * by_to.cast<double>());
       }
     }
   }

@@ -15,16 +15,12 @@ namespace birdseye {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::contents_of;
 using testing::run;
 using testing::Scratch;
 
-std::string text_of(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 Eigen::Matrix4d matrix_of(const fs::path& path) {
-  std::istringstream in(std::regex_replace(text_of(path), std::regex("#.*"), ""));
+  std::istringstream in(std::regex_replace(contents_of(path), std::regex("#.*"), ""));
   Eigen::Matrix4d m;
   for (int i = 0; i < 16; ++i) in >> m(i / 4, i % 4);
   EXPECT_TRUE(in) << path;
@@ -69,13 +65,13 @@ nlohmann::json registered(const Scratch& scratch, const std::string& deformation
   }
   write_matrix(folder / "truth/pose.txt", disturbance.inverse().matrix());
   const std::string text =
-      std::regex_replace(text_of(folder / "case.toml"), std::regex("\\[model\\]"), "[model]\nrefine_pose = true");
+      std::regex_replace(contents_of(folder / "case.toml"), std::regex("\\[model\\]"), "[model]\nrefine_pose = true");
   std::ofstream(folder / "case.toml") << std::regex_replace(text, std::regex("\\[truth\\]"),
                                                             "[truth]\npose = \"truth/pose.txt\"");
   const auto result = run("birdseye", "register views --case " + (folder / "case.toml").string() + " --out " +
                                           (scratch / "out").string() + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 0) << result.output;
-  nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
   // The file says the same as the report, and the field remains one of the deformation alone.
   const Eigen::Matrix4d written = matrix_of(scratch / "out/pose.txt");
   for (std::size_t i = 0; i < 16; ++i)

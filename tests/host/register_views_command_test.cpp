@@ -12,14 +12,10 @@ namespace birdseye {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::contents_of;
 using testing::expect_refused;
 using testing::run;
 using testing::Scratch;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream in(path);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 /// Three small views of a liver that moved by 8 mm.
 fs::path make_case(const Scratch& scratch) {
@@ -33,7 +29,7 @@ fs::path make_case(const Scratch& scratch) {
 fs::path changed(const Scratch& scratch, const std::string& from, const std::string& to) {
   if (!fs::exists(scratch / "c")) make_case(scratch);
   if (!fs::exists(scratch / "whole.toml")) fs::copy(scratch / "c/case.toml", scratch / "whole.toml");
-  const std::string text = std::regex_replace(text_of(scratch / "whole.toml"), std::regex(from), to,
+  const std::string text = std::regex_replace(contents_of(scratch / "whole.toml"), std::regex(from), to,
                                               std::regex_constants::format_first_only);
   std::ofstream(scratch / "c/case.toml") << text;
   return scratch / "c/case.toml";
@@ -49,7 +45,7 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
   const auto result =
       run("birdseye", arguments(folder / "case.toml", scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
   EXPECT_GT(json["tre_before_mm_mean"], 3);
   EXPECT_LT(json["tre_after_mm_mean"], 1);
   EXPECT_LT(json["tre_after_mm_max"], 2);
@@ -78,7 +74,7 @@ TEST(RegisterViewsCommand, FindsItByValuesAlone) {
                             "optimiser = \"simplex\"\nmost_evaluations = 60\nsimilarity = \"nmi\"");
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_NE(result.code, 2) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
   EXPECT_EQ(json["optimiser"], "simplex");
   EXPECT_EQ(json["similarity"], "nmi");
   EXPECT_EQ(json["gradient_evaluations"], 0);
@@ -92,7 +88,7 @@ TEST(RegisterViewsCommand, StartsFromAField) {
       changed(scratch, "optimiser = \"gradient\"", "optimiser = \"gradient\"\ninitial = \"truth/field.mha\"");
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_NE(result.code, 2) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
   EXPECT_LT(json["tre_before_mm_mean"], 0.1);
   EXPECT_LT(json["tre_after_mm_mean"], 1);
 }
@@ -135,7 +131,7 @@ TEST(RegisterViewsCommand, SaysWhenAllViewsAreFromOnePlace) {
     ASSERT_EQ(made.code, 0) << made.output;
     fs::copy_file(other / "view0.png", scratch / "c" / (std::string(name) + ".png"),
                   fs::copy_options::overwrite_existing);
-    std::istringstream in(text_of(scratch / "c/view0.txt"));
+    std::istringstream in(contents_of(scratch / "c/view0.txt"));
     std::vector<double> m(16);
     for (double& number : m) in >> number;
     m[3] += name[4] == '1' ? 0.2 : -0.2;
@@ -144,7 +140,7 @@ TEST(RegisterViewsCommand, SaysWhenAllViewsAreFromOnePlace) {
   }
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(text_of(scratch / "r.json"));
+  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
   EXPECT_EQ(json["verdict"], "marginal");
   EXPECT_NE(json["reasons"][0].get<std::string>().find("degrees apart"), std::string::npos) << json["reasons"];
 }
@@ -210,7 +206,7 @@ TEST(RegisterViewsCommand, RefusesACameraOfAnotherSize) {
   const Scratch scratch;
   const auto file = changed(scratch, "x^", "");
   const std::string camera =
-      std::regex_replace(text_of(scratch / "c/camera.yaml"), std::regex("image_width: *384"), "image_width: 640");
+      std::regex_replace(contents_of(scratch / "c/camera.yaml"), std::regex("image_width: *384"), "image_width: 640");
   std::ofstream(scratch / "c/camera.yaml") << camera;
   expect_refused("birdseye", arguments(file, scratch), {"camera", "640x288", "384x288"}, scratch / "out");
 }

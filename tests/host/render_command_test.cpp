@@ -19,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using host::DisplacementField;
+using testing::contents_of;
 using testing::Display;
 using testing::expect_refused;
 using testing::run;
@@ -55,11 +56,6 @@ std::string video_frame(const Scratch& scratch, int width_px, int height_px) {
   return scratch.file("video.ppm", text);
 }
 
-std::string bytes_of(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 TEST(RenderCommand, AWindowShowsWhatAPictureHolds) {
   const Scratch scratch;
   const Display display;
@@ -74,8 +70,8 @@ TEST(RenderCommand, AWindowShowsWhatAPictureHolds) {
                            display.env());
     ASSERT_EQ(shown.code, 0) << shown.output;
     EXPECT_EQ(shown.output, "");
-    EXPECT_GT(bytes_of(picture).size(), 1000U);
-    EXPECT_EQ(bytes_of(window), bytes_of(picture)) << engine;
+    EXPECT_GT(contents_of(picture).size(), 1000U);
+    EXPECT_EQ(contents_of(window), contents_of(picture)) << engine;
   }
 }
 
@@ -117,7 +113,7 @@ TEST(RenderCommand, WithoutADriverAutoTakesTheCpuAndSaysSo) {
     ASSERT_EQ(result.code, 0) << result.output;
     EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 2) << result.output;  // and what it drew
     EXPECT_NE(result.output.find("engine cpu: OpenGL: " + missing), std::string::npos) << result.output;
-    EXPECT_EQ(bytes_of(scratch / "auto.png"), bytes_of(scratch / "cpu.png"));
+    EXPECT_EQ(contents_of(scratch / "auto.png"), contents_of(scratch / "cpu.png"));
   }
 }
 
@@ -216,7 +212,7 @@ std::string rgb_of(const fs::path& path) {
   const std::string raw = path.string() + ".rgb";
   const std::string line = "ffmpeg -v error -y -i " + path.string() + " -f rawvideo -pix_fmt rgb24 " + raw;
   EXPECT_EQ(std::system(line.c_str()), 0) << line;
-  return bytes_of(raw);
+  return contents_of(raw);
 }
 
 double mean_difference(const std::string& a, const std::string& b) {

@@ -149,16 +149,21 @@ TEST(ControlledGrid, PullsBackByItsTranspose) {
   EXPECT_NEAR(dot(p, back), there, 1e-4 * std::abs(there));
 }
 
+/// Of the organ, lit from beside the lens.
+struct ThreeViews {
+  Tissue tissue = *tissue_of(organ(), nullptr, {}, plain(), 4);
+  ControlGrid control = ControlGrid({2, 2, 2});
+  Headlight light = {{5, -3, 0}};
+  MultiView multi = *MultiView::make({view_from({0, 0, 0}), view_from({0.4, 0.2, 0}), view_from({-0.3, 0.5, 1})},
+                                     tissue, control, 1, {});
+};
+
 /// The gradient of all views' similarity, through information, compositing, light, sampling and the Bezier map.
 TEST(MultiView, GradientAgreesWithCentralDifferences) {
-  const auto tissue = tissue_of(organ(), nullptr, {}, plain(), 4);
-  ASSERT_TRUE(tissue);
-  const ControlGrid control({2, 2, 2});
-  const std::vector<VideoView> views{view_from({0, 0, 0}), view_from({0.4, 0.2, 0}), view_from({-0.3, 0.5, 1})};
-  Headlight light;
-  light.offset_in_camera_mm = {5, -3, 0};
-  auto multi = MultiView::make(views, *tissue, control, 1, {});
-  ASSERT_TRUE(multi) << multi.error().what;
+  ThreeViews at_organ;
+  const ControlGrid& control = at_organ.control;
+  const Headlight& light = at_organ.light;
+  MultiView* const multi = &at_organ.multi;
   std::mt19937 rng(7);
   std::normal_distribution<double> normal;
   for (unsigned trial = 0; trial < 4; ++trial) {
@@ -187,14 +192,10 @@ TEST(MultiView, GradientAgreesWithCentralDifferences) {
 /// With respect to a motion of all cameras, at poses and deformations far from the start. Steps are small, for blends
 /// between the grid's points have kinks where a sample goes from one cell to the next.
 TEST(MultiView, PoseGradientAgreesWithCentralDifferences) {
-  const auto tissue = tissue_of(organ(), nullptr, {}, plain(), 4);
-  ASSERT_TRUE(tissue);
-  const ControlGrid control({2, 2, 2});
-  const std::vector<VideoView> views{view_from({0, 0, 0}), view_from({0.4, 0.2, 0}), view_from({-0.3, 0.5, 1})};
-  Headlight light;
-  light.offset_in_camera_mm = {5, -3, 0};
-  auto multi = MultiView::make(views, *tissue, control, 1, {});
-  ASSERT_TRUE(multi) << multi.error().what;
+  ThreeViews at_organ;
+  const ControlGrid& control = at_organ.control;
+  const Headlight& light = at_organ.light;
+  MultiView* const multi = &at_organ.multi;
   std::mt19937 rng(8);
   std::uniform_real_distribution<double> uniform(-4, 4);
   for (unsigned trial = 0; trial < 4; ++trial) {

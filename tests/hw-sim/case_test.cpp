@@ -24,6 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
+using testing::contents_of;
 using testing::Scratch;
 
 CaseSettings small_case(const fs::path& folder) {
@@ -37,15 +38,10 @@ CaseSettings small_case(const fs::path& folder) {
   return settings;
 }
 
-std::string bytes(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::map<std::string, std::string> files_of(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = bytes(entry.path());
+    if (entry.is_regular_file()) files[fs::relative(entry.path(), folder).string()] = contents_of(entry.path());
   }
   return files;
 }
@@ -123,7 +119,7 @@ TEST(Case, TheFieldTakesTheDeformedLandmarksToRest) {
     EXPECT_GE(vessels, 10);
     EXPECT_EQ(tumours, 1);
     EXPECT_GT(furthest_mm, 3);
-    EXPECT_GT(nlohmann::json::parse(bytes(scratch / phantom / "truth" / "truth.json")).at("min_jacobian"), 0.3);
+    EXPECT_GT(nlohmann::json::parse(contents_of(scratch / phantom / "truth" / "truth.json")).at("min_jacobian"), 0.3);
   }
 }
 
@@ -181,8 +177,8 @@ TEST(Case, ALampBesideTheLensAndAStillOrganChangeThePictureAlone) {
   ASSERT_TRUE(write_case(settings));
   for (const char* other : {"lamp", "still"}) {
     for (const char* same : {"ct.nii.gz", "segmentation.nii.gz", "camera.yaml", "view0.txt", "view1.txt", "case.toml"})
-      EXPECT_EQ(bytes(scratch / "a" / same), bytes(scratch / other / same)) << other << " " << same;
-    EXPECT_NE(bytes(scratch / "a" / "view0.png"), bytes(scratch / other / "view0.png")) << other;
+      EXPECT_EQ(contents_of(scratch / "a" / same), contents_of(scratch / other / same)) << other << " " << same;
+    EXPECT_NE(contents_of(scratch / "a" / "view0.png"), contents_of(scratch / other / "view0.png")) << other;
   }
   for (const Landmark& l : read_landmarks(scratch / "still" / "truth" / "landmarks.csv"))
     EXPECT_EQ(l.rest_mm, l.deformed_mm);

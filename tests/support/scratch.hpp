@@ -8,6 +8,12 @@
 
 namespace birdseye::testing {
 
+/// All of a file, byte for byte.
+inline std::string contents_of(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
 /// A folder of its own for one test, removed after it.
 class Scratch {
  public:
