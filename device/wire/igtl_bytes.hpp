@@ -1,7 +1,5 @@
 #pragma once
 
-#include <igtlMessageBase.h>
-
 #include <cstdint>
 #include <optional>
 #include <span>

@@ -6,6 +6,7 @@
 #include <igtlTrackingDataMessage.h>
 #include <igtl_image.h>
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -78,6 +79,17 @@ Birds birds_of(igtl::TrackingDataMessage& message, DeviceTime time) {
   return birds;
 }
 
+/// By hand: the library's reads on until a zero byte, which nobody may have sent.
+Result<MaybeTold> status_of(const Header& header, std::span<const std::uint8_t> body) {
+  constexpr std::size_t kFixed = 30;  // code, subcode, name of the error
+  const std::size_t content = content_bytes(header, body);
+  if (content < kFixed) return unpack_failed("STATUS");
+  const auto at = body.subspan(body.size() - content);
+  const auto text = at.subspan(kFixed);
+  const bool ok = at[0] == 0 && at[1] == igtl::StatusMessage::STATUS_OK;
+  return MaybeTold(Event(Status{ok, {text.begin(), std::find(text.begin(), text.end(), 0)}}));
+}
+
 }  // namespace
 
 Result<std::uint64_t> body_bytes(std::span<const std::uint8_t> header) {
@@ -127,13 +139,12 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
     return MaybeTold(Event(*std::move(frame)));
   }
   if (birds) {
+    if (header->version != 1) return unpack_failed(type);  // the library would read the extended header as content
     const auto message = unpacked<igtl::TrackingDataMessage>(bytes);
     if (message == nullptr) return unpack_failed(type);
     return MaybeTold(Event(birds_of(*message, header->time)));
   }
-  const auto message = unpacked<igtl::StatusMessage>(bytes);
-  if (message == nullptr) return unpack_failed(type);
-  return MaybeTold(Event(Status{message->GetCode() == igtl::StatusMessage::STATUS_OK, message->GetStatusString()}));
+  return status_of(*header, body);
 }
 
 }  // namespace birdseye::wire
