@@ -179,6 +179,10 @@ void Appliance::pairing_loop(const std::stop_token& stop) {
   // not.
   const Duration patience = config_.pose.smoothing + config_.tracker.delay + Duration::from_ms(40);
   while (auto frame = frames_.pop(stop)) {
+    if (!frame->acquired_known) {  // nothing better is known here than that it was before it came
+      frame->acquired = frame->arrived;
+      frame->acquired_sigma = Duration::from_seconds(1 / config_.camera.rate_hz);
+    }
     wire::VideoFrame out;
     out.info.sequence = frame->sequence;
     out.info.acquired = frame->acquired;

@@ -42,6 +42,10 @@ Result<std::unique_ptr<FrameSource>> SocketCamera::open(const std::filesystem::p
   return std::unique_ptr<FrameSource>(new SocketCamera(std::move(fd), name));
 }
 
+std::string SocketCamera::describe() const {
+  return fmt::format("{}: frames from a program", name_);
+}
+
 Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& have, DeviceTime deadline) {
   while (have < buffer.size()) {
     pollfd entry{fd_.get(), POLLIN, 0};
@@ -86,6 +90,7 @@ Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
   frame.sequence = get<std::uint64_t>(header_, 24);
   frame.acquired = {get<std::int64_t>(header_, 32)};
   frame.acquired_sigma = {get<std::int64_t>(header_, 40)};
+  frame.acquired_known = frame.acquired.ns != 0 || frame.acquired_sigma.ns != 0;
   if (*format == PixelFormat::rgb8) {
     frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels_));
   } else {
@@ -94,6 +99,7 @@ Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
   }
   pixels_ = {};
   header_have_ = pixels_have_ = 0;
+  ++counters_.frames;
   return std::optional<Frame>(std::move(frame));
 }
 

@@ -14,6 +14,8 @@ class SocketCamera final : public FrameSource {
   static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path);
   Result<std::optional<Frame>> next(DeviceTime deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::string describe() const override;
+  [[nodiscard]] FrameCounters counters() const override { return counters_; }
 
  private:
   SocketCamera(UniqueFd fd, std::string name) : fd_(std::move(fd)), name_(std::move(name)) {}
@@ -21,6 +23,7 @@ class SocketCamera final : public FrameSource {
 
   UniqueFd fd_;
   std::string name_;
+  FrameCounters counters_;
   std::vector<std::uint8_t> header_, pixels_;  // a frame that the deadline cut is gone on with at the next call
   std::size_t header_have_ = 0, pixels_have_ = 0;
 };

@@ -138,6 +138,7 @@ Result<Frame> V4l2Camera::take() {
                                      : frame.arrived;
   frame.acquired = at_start ? stamp : stamp - Duration{period_.ns / 2};
   frame.acquired_sigma = {at_start && monotonic ? period_.ns / 10 : period_.ns / 2};
+  frame.acquired_known = true;
   const Buffer& memory = buffers_[buffer.index];
   const std::size_t expected = stride_ * static_cast<std::size_t>(height_px_);
   const bool whole = buffer.bytesused >= expected && (buffer.flags & V4L2_BUF_FLAG_ERROR) == 0;

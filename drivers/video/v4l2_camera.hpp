@@ -17,6 +17,8 @@ class V4l2Camera final : public FrameSource {
   ~V4l2Camera() override;
   Result<std::optional<Frame>> next(DeviceTime deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::string describe() const override { return name_; }
+  [[nodiscard]] FrameCounters counters() const override { return counters_; }
 
  private:
   struct Buffer {
@@ -30,6 +32,7 @@ class V4l2Camera final : public FrameSource {
 
   UniqueFd fd_;
   std::string name_;
+  FrameCounters counters_;
   std::vector<Buffer> buffers_;
   PixelFormat format_ = PixelFormat::rgb8;
   int width_px_ = 0, height_px_ = 0;
