@@ -54,7 +54,7 @@ class FakeFt232r {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return input_.empty(); });
   }
-  int transfers = 0;
+  int transfers_going = 0;
   bool claimed = false;
 
   class Port;
@@ -98,7 +98,7 @@ class FakeFt232r::Port final : public drivers::UsbPort {
     return count;
   }
   Result<void> start_reading(int transfers) override {
-    chip_->transfers = transfers;
+    chip_->transfers_going = transfers;
     return {};
   }
   Result<std::optional<drivers::UsbInput>> collect(DeviceTime deadline) override {

@@ -47,8 +47,8 @@ TEST(FtdiPort, OpensByTheSequenceAndNeverAssertsRts) {
                           SetupPacket{0xC0, 0x0A, 0x00, 0, 0, 0, 1, 0},
                           SetupPacket{0x40, 0x00, 0x01, 0, 0, 0, 0, 0},  // purge both
                           SetupPacket{0x40, 0x00, 0x02, 0, 0, 0, 0, 0}));
-  EXPECT_GE(chip->transfers, 4);
-  EXPECT_LE(chip->transfers, 8);
+  EXPECT_GE(chip->transfers_going, 4);
+  EXPECT_LE(chip->transfers_going, 8);
   EXPECT_THAT(port->describe(), HasSubstr("chip FT232R, 115385 baud, latency timer 1 ms"));
   EXPECT_THAT(port->describe(), HasSubstr("TRK001"));
 }
