@@ -104,6 +104,7 @@ void read_tracker(ConfigSection& section, Config& config) {
   read_filters(section, unit);
   read_plausibility(section, unit.plausibility);
   read_birds(section, config);
+  if (!section.sound()) return;
   for (const std::string& fault : drivers::minibird::faults_of(unit)) section.fail("", fault);
 }
 
@@ -198,7 +199,7 @@ Result<Config> read_config(const std::filesystem::path& path) {
       read(section, config);
       section.finish();
     }
-    if (!faults.none()) return Error{Errc::bad_value, faults.text()};
+    if (faults.count() > 0) return Error{Errc::bad_value, faults.text()};
     return config;
   } catch (const toml::syntax_error& problem) {
     // The first line of toml11's message says what; the rest draws the place.

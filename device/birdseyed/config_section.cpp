@@ -25,7 +25,7 @@ std::string ConfigFaults::text() const {
 }
 
 ConfigSection::ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table)
-    : faults_(&faults), name_(std::move(name)), table_(table) {}
+    : faults_(&faults), faults_before_(faults.count()), name_(std::move(name)), table_(table) {}
 
 const toml::value* ConfigSection::find(const char* key, bool required) {
   known_.insert(key);
@@ -40,7 +40,8 @@ bool ConfigSection::has(const char* key) const {
 
 void ConfigSection::fail(const char* key, const std::string& why) {
   const std::int64_t line = has(key) ? line_of(table_->as_table().at(key)) : table_ != nullptr ? line_of(*table_) : 0;
-  faults_->add(line, fmt::format("[{}] {}: {}", name_, key, why));
+  const std::string colon = *key == 0 ? "" : ": ";
+  faults_->add(line, fmt::format("[{}] {}{}{}", name_, key, colon, why));
 }
 
 void ConfigSection::text(const char* key, std::string& value, bool required) {

@@ -18,7 +18,7 @@ class ConfigFaults {
   explicit ConfigFaults(std::filesystem::path file) : file_(std::move(file)) {}
   /// line 0: of the file as a whole.
   void add(std::int64_t line, const std::string& text);
-  [[nodiscard]] bool none() const { return faults_.empty(); }
+  [[nodiscard]] std::size_t count() const { return faults_.size(); }
   [[nodiscard]] std::string text() const;  ///< in the order of the lines
 
  private:
@@ -49,7 +49,10 @@ class ConfigSection {
 
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] bool has(const char* key) const;
+  /// key "": of the section as a whole.
   void fail(const char* key, const std::string& why);
+  /// Nothing was wrong with it so far.
+  [[nodiscard]] bool sound() const { return faults_->count() == faults_before_; }
   /// Names the keys that nobody asked for. To be called last.
   void finish();
 
@@ -57,6 +60,7 @@ class ConfigSection {
   const toml::value* find(const char* key, bool required = false);
 
   ConfigFaults* faults_;
+  std::size_t faults_before_;
   std::string name_;
   const toml::value* table_;
   std::set<std::string> known_;

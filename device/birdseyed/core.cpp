@@ -48,14 +48,14 @@ Core::Counters Core::counters() const {
 }
 
 std::vector<wire::Packet> Core::take(const RawEvent& event) {
-  std::visit([this](const auto& what) { take(what); }, event);
+  std::visit([this](const auto& what) { note(what); }, event);
   const DeviceTime now = time_of(event);
   release_frames(now);
   publish_status(now);
   return std::exchange(out_, {});
 }
 
-void Core::take(const InstrumentChanged& changed) {
+void Core::note(const InstrumentChanged& changed) {
   board_.note(changed);
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
@@ -71,7 +71,7 @@ void Core::take(const InstrumentChanged& changed) {
   }
 }
 
-void Core::take(const TrackerBytes& bytes) {
+void Core::note(const TrackerBytes& bytes) {
   if (!assembler_) return;
   for (const Measurement& measurement : assembler_->push(bytes.chunk)) publish(measurement);
 }
@@ -105,7 +105,7 @@ void Core::publish(const Measurement& measurement) {
   if (timed) out_.push_back(wire::pack(birds, measurement.arrived));
 }
 
-void Core::take(const FrameCame& came) {
+void Core::note(const FrameCame& came) {
   const drivers::Frame& frame = came.frame;
   if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
@@ -121,7 +121,7 @@ void Core::take(const FrameCame& came) {
   }
 }
 
-void Core::take(const EdgesCame& came) {
+void Core::note(const EdgesCame& came) {
   for (const drivers::GpioEdge& edge : came.edges) {
     if (edge.input == drivers::GpioInput::pedal) {
       out_.push_back(wire::pack(wire::Pedal{edge.active, edge.at}));

@@ -51,11 +51,11 @@ class Core {
     bool in_status = false;
   };
 
-  void take(const InstrumentChanged& changed);
-  void take(const TrackerBytes& bytes);
-  void take(const FrameCame& came);
-  void take(const EdgesCame& edges);
-  void take(const Tick&) {}
+  void note(const InstrumentChanged& changed);
+  void note(const TrackerBytes& bytes);
+  void note(const FrameCame& came);
+  void note(const EdgesCame& edges);
+  void note(const Tick&) {}
   void publish(const drivers::minibird::Measurement& measurement);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void release_frames(DeviceTime now);

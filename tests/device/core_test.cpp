@@ -125,7 +125,8 @@ TEST(Core, EachFrameHasThePoseOfItsOwnTime) {
       const double taken_s = static_cast<double>(f.info.sequence) / 25;
       const Eigen::Vector3d true_mm = TrackerBytesSource::pose_at(taken_s).position_mm;
       // 628 mm/s: a millisecond is 0.6 mm.
-      if (taken_s > 3) EXPECT_LT((f.info.pose.tracker_from_sensor->translation() - true_mm).norm(), 0.7) << taken_s;
+      if (taken_s < 3) continue;
+      EXPECT_LT((f.info.pose.tracker_from_sensor->translation() - true_mm).norm(), 0.7) << taken_s;
     }
     EXPECT_GT(good, frames.size() - 5);
   }
@@ -183,7 +184,8 @@ TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
   for (const auto& status : only<wire::Status>(said)) times += status.text == "the line is gone" ? 1 : 0;
   EXPECT_EQ(times, 1);
   for (const auto& f : only<wire::VideoFrame>(said)) {
-    if (static_cast<double>(f.info.sequence) / 25 > 2.2) EXPECT_EQ(f.info.pose.kind, PoseKind::refused);
+    if (static_cast<double>(f.info.sequence) / 25 < 2.2) continue;
+    EXPECT_EQ(f.info.pose.kind, PoseKind::refused);
   }
 }
 
@@ -225,7 +227,7 @@ TEST(Recording, ReplaysToTheSameBytes) {
     ASSERT_EQ(a.size(), b.size());
     for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i].bytes(), b[i].bytes());
   }
-  EXPECT_FALSE(**reader->next());
+  EXPECT_FALSE(*reader->next());
   EXPECT_FALSE(reader->cut_short());
 }
 
