@@ -20,7 +20,7 @@ namespace birdseye::drivers {
 namespace {
 
 constexpr const char* kConsumer = "birdseyed";
-constexpr unsigned kKernelQueue = 16;  // edges that the kernel keeps of a line; more are lost there
+constexpr std::size_t kKernelQueue = 16;  // edges that the kernel keeps of a line; more are lost there
 /// A line that fills that queue at once is none of a strobe or a pedal (a loose wire picks up anything): it is read no
 /// oftener than this, and what the kernel drops meanwhile is no loss.
 constexpr Duration kFloodPause = Duration::from_ms(2);

@@ -16,8 +16,8 @@ static_assert(std::endian::native == std::endian::little);
 
 #define ALWAYS_INLINE [[gnu::always_inline]] inline
 
-constexpr int kPairs = 32;  // of pixels, done at a time in arrays that stay in the first-level cache
-constexpr int kPiece = 2 * kPairs;
+constexpr std::size_t kPairs = 32;  // of pixels, done at a time in arrays that stay in the first-level cache
+constexpr std::size_t kPiece = 2 * kPairs;
 
 using Bytes = std::array<std::uint8_t, kPiece>;
 /// Both bytes of a pair in one number, the first in the lower half.
@@ -98,26 +98,28 @@ ALWAYS_INLINE void piece_to_rgb(const std::uint8_t* luma, const std::uint8_t* ch
 
 ALWAYS_INLINE void yuv_row(const std::uint8_t* luma, const std::uint8_t* chroma, int width_px, YuvPacking packing,
                            const YuvMatrix& matrix, std::uint8_t* rgb) {
-  const int luma_bytes = packing == YuvPacking::two_planes ? 1 : 2;
-  int x = 0;
-  for (; x + kPiece <= width_px; x += kPiece) {
-    piece_to_rgb(luma + x * luma_bytes, chroma == nullptr ? nullptr : chroma + x, packing, matrix, rgb + 3 * x);
+  const auto width = static_cast<std::size_t>(width_px);
+  const bool planar = packing == YuvPacking::two_planes;
+  const std::size_t luma_bytes = planar ? 1 : 2;
+  std::size_t x = 0;
+  for (; x + kPiece <= width; x += kPiece) {
+    piece_to_rgb(luma + x * luma_bytes, planar ? chroma + x : luma, packing, matrix, rgb + 3 * x);
   }
-  if (x == width_px) return;
+  if (x == width) return;
   // The rest, padded: rows end in a whole pair of pixels.
-  const auto left = static_cast<std::size_t>(width_px - x);
+  const std::size_t left = width - x;
   const std::size_t even = left + left % 2;
   std::array<std::uint8_t, 2 * kPiece> last_luma{};
   std::array<std::uint8_t, kPiece> last_chroma{};
   std::array<std::uint8_t, 3 * kPiece> last_rgb;
-  std::memcpy(last_luma.data(), luma + x * luma_bytes, luma_bytes == 1 ? left : 2 * even);
-  if (chroma != nullptr) std::memcpy(last_chroma.data(), chroma + x, even);
+  std::memcpy(last_luma.data(), luma + x * luma_bytes, planar ? left : 2 * even);
+  if (planar) std::memcpy(last_chroma.data(), chroma + x, even);
   piece_to_rgb(last_luma.data(), last_chroma.data(), packing, matrix, last_rgb.data());
   std::memcpy(rgb + 3 * x, last_rgb.data(), 3 * left);
 }
 
 ALWAYS_INLINE void bgr_row(const std::uint8_t* bgr, int width_px, std::uint8_t* rgb) {
-  for (int x = 0; x < width_px; ++x) {
+  for (std::size_t x = 0; x < static_cast<std::size_t>(width_px); ++x) {
     rgb[3 * x] = bgr[3 * x + 2];
     rgb[3 * x + 1] = bgr[3 * x + 1];
     rgb[3 * x + 2] = bgr[3 * x];
@@ -125,7 +127,9 @@ ALWAYS_INLINE void bgr_row(const std::uint8_t* bgr, int width_px, std::uint8_t* 
 }
 
 ALWAYS_INLINE void grey_row(const std::uint8_t* grey, int width_px, std::uint8_t* rgb) {
-  for (int x = 0; x < width_px; ++x) rgb[3 * x] = rgb[3 * x + 1] = rgb[3 * x + 2] = grey[x];
+  for (std::size_t x = 0; x < static_cast<std::size_t>(width_px); ++x) {
+    rgb[3 * x] = rgb[3 * x + 1] = rgb[3 * x + 2] = grey[x];
+  }
 }
 
 #ifdef __x86_64__

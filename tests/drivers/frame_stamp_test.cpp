@@ -41,7 +41,8 @@ TEST(MidExposure, SigmaCoversWhatIsUnknown) {
         if (exposure_known) meaning.exposure = exposure;
         const DeviceTime stamp = start ? kStamp : kStamp + exposure + readout;
         const auto middle = mid_exposure(stamp, meaning);
-        const double error_ns = static_cast<double>((middle.at - (kStamp + Duration{exposure.ns / 2})).ns);
+        const std::int64_t half_ns = exposure.ns / 2;
+        const auto error_ns = static_cast<double>((middle.at - kStamp).ns - half_ns);
         sum += error_ns;
         squares += error_ns * error_ns;
         claimed_ns = static_cast<double>(middle.sigma.ns);
