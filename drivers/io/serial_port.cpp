@@ -115,6 +115,8 @@ std::optional<std::uint64_t> SerialPort::overruns() const {
 }
 
 /// A lost byte leaves no mark in the stream, only a count. Where it was nobody knows, so all that waits is dropped.
+/// The count is raised before the bytes behind the hole are there to be read; it is read before all that waits is
+/// dropped, so that a loss in between shows the next time.
 bool SerialPort::lost_bytes() {
   if (!overruns_) return false;
   const auto seen = overruns();

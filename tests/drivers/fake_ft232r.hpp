@@ -54,6 +54,11 @@ class FakeFt232r {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return input_.empty(); });
   }
+  /// Until whoever collects has been told that it is unplugged.
+  [[nodiscard]] bool seen_gone() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return told_gone_; });
+  }
   int transfers_going = 0;
   bool claimed = false;
 
@@ -70,7 +75,7 @@ class FakeFt232r {
   std::vector<drivers::SetupPacket> requests_;
   Bytes written_;
   std::uint8_t latency_ms_ = 16;
-  bool unplugged_ = false, woken_ = false;
+  bool unplugged_ = false, told_gone_ = false, woken_ = false;
 };
 
 class FakeFt232r::Port final : public drivers::UsbPort {
@@ -113,7 +118,11 @@ class FakeFt232r::Port final : public drivers::UsbPort {
       chip_->changed_.notify_all();
       return input;
     }
-    if (chip_->unplugged_) return gone();
+    if (chip_->unplugged_) {
+      chip_->told_gone_ = true;
+      chip_->changed_.notify_all();
+      return gone();
+    }
     return std::optional<drivers::UsbInput>();
   }
   void wake() override {
