@@ -336,6 +336,21 @@ TEST(TrackerFaults, SilenceLosesRecordsAndNothingElse) {
   for (const Delivery& delivery : lost.during) EXPECT_TRUE(whole(delivery));
 }
 
+TEST(TrackerFaults, AStuckUnitDoesWhatItHearsAndSaysNothing) {
+  TrackerSettings settings;
+  settings.faults = {fault(FaultKind::stuck_stream, 0.1, 0.4)};
+  Bench bench(settings);
+  bench.say(kStream);
+  bench.run(0.2);
+  bench.take();
+  bench.say({0x3F, 0x4F, 0x00});  // stop, and what is your status?
+  bench.run(0.5);
+  EXPECT_TRUE(bench.got.empty());
+  bench.say({0x4F, 0x00});
+  bench.run(0.01);
+  EXPECT_EQ(bench.bytes(), (Bytes{0x0A, 0xD0}));  // position/matrix, and no stream
+}
+
 TEST(TrackerFaults, FrozenRecordsRepeat) {
   TrackerSettings settings;
   settings.noise = {0.5, 0.2};
