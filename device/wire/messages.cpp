@@ -7,6 +7,7 @@
 #include <igtlStringMessage.h>
 #include <igtlTrackingDataMessage.h>
 #include <igtl_image.h>
+#include <igtl_tdata.h>
 
 #include <algorithm>
 #include <cstring>
@@ -116,23 +117,42 @@ typename M::Pointer unpacked(igtl::MessageHeader::Pointer header, std::span<cons
   return message;
 }
 
-/// The library believes the lengths inside a body, and a checksum is no proof of them. These are the bytes that they
-/// may speak of: in version 2 after an extended header, whose own size comes first.
-std::size_t content_bytes(std::span<const std::uint8_t> bytes) {
-  const std::span<const std::uint8_t> body = bytes.subspan(kHeaderBytes);
-  const bool extended = bytes[1] >= 2;
-  if (!extended) return body.size();
-  const std::size_t header = body.size() < 2 ? body.size() : static_cast<std::size_t>(body[0] << 8 | body[1]);
-  return body.size() - std::min(header, body.size());
-}
+// The library believes the lengths inside a body, and a checksum is no proof of them: what it would follow beyond the
+// end is looked at before it is let at a body.
 
 /// A STRING's body: encoding, length, text.
-bool string_is_whole(std::span<const std::uint8_t> bytes) {
+bool string_is_whole(std::span<const std::uint8_t> body) {
   constexpr std::size_t kFixed = 4;
-  const std::size_t content = content_bytes(bytes);
-  if (content < kFixed) return false;
-  const std::uint8_t* const at = bytes.data() + (bytes.size() - content);
-  return kFixed + static_cast<std::size_t>(at[2] << 8 | at[3]) <= content;
+  return body.size() >= kFixed && kFixed + static_cast<std::size_t>(body[2] << 8 | body[3]) <= body.size();
+}
+
+/// A STATUS's body: code, subcode, the error's name, and text to a zero.
+bool status_is_whole(std::span<const std::uint8_t> body) {
+  constexpr std::size_t kFixed = 30;
+  return body.size() > kFixed && body.back() == 0;
+}
+
+/// A TDATA's body: elements of equal size.
+bool tracking_data_is_whole(std::span<const std::uint8_t> body) {
+  return body.size() % IGTL_TDATA_ELEMENT_SIZE == 0;
+}
+
+bool image_is_whole(std::span<const std::uint8_t> body) {
+  return body.size() >= IGTL_IMAGE_HEADER_SIZE;
+}
+
+/// Empty where the matrix is no pose: nothing downstream may draw by it.
+std::optional<Transform<Tracker, Sensor>> pose_of(igtl::TrackingDataElement& element) {
+  igtl::Matrix4x4 matrix;
+  element.GetMatrix(matrix);
+  Eigen::Matrix4d m;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
+  }
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-4) || r.determinant() < 0) return std::nullopt;
+  // Through a quaternion: single precision leaves the rotation a little off orthonormal.
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
 }  // namespace
@@ -219,11 +239,15 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
   if (bytes.size() < kHeaderBytes) return unpack_failed("cut");
   std::memcpy(header->GetPackPointer(), bytes.data(), kHeaderBytes);
   header->Unpack();
+  // What we send has headers of version 1; the library does not know that those of version 2 go on in the body.
+  const bool ours = bytes[0] == 0 && bytes[1] == 1;
+  if (!ours) return std::optional<Event>();
+  const std::span<const std::uint8_t> body = bytes.subspan(kHeaderBytes);
   const std::string type = header->GetDeviceType();
   const std::string device = header->GetDeviceName();
   try {
     if (type == "STRING" && (device == kFrameInfoDevice || device == kHealthDevice)) {
-      if (!string_is_whole(bytes)) return unpack_failed("STRING");
+      if (!string_is_whole(body)) return unpack_failed("STRING");
       const auto message = unpacked<igtl::StringMessage>(header, bytes);
       if (message == nullptr) return unpack_failed("STRING");
       const nlohmann::json json = nlohmann::json::parse(message->GetString());
@@ -242,13 +266,14 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
       return std::optional<Event>(health);
     }
     if (type == "IMAGE" && device == kVideoDevice && info_) {
+      if (!image_is_whole(body)) return unpack_failed("IMAGE");
       const auto message = unpacked<igtl::ImageMessage>(header, bytes);
       if (message == nullptr) return unpack_failed("IMAGE");
       VideoFrame frame;
       int depth = 0;
       message->GetDimensions(frame.width_px, frame.height_px, depth);
       const auto size = static_cast<std::int64_t>(frame.width_px) * frame.height_px * 3;
-      const auto carried = static_cast<std::int64_t>(content_bytes(bytes)) - IGTL_IMAGE_HEADER_SIZE;
+      const auto carried = static_cast<std::int64_t>(body.size()) - IGTL_IMAGE_HEADER_SIZE;
       if (frame.width_px <= 0 || frame.height_px <= 0 || depth != 1 || message->GetNumComponents() != 3 ||
           message->GetScalarType() != igtl::ImageMessage::TYPE_UINT8 || message->GetImageSize() != size ||
           carried < size) {
@@ -260,6 +285,7 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
       return std::optional<Event>(std::move(frame));
     }
     if (type == "TDATA" && device == kBirdsDevice) {
+      if (!tracking_data_is_whole(body)) return unpack_failed("TDATA");
       const auto message = unpacked<igtl::TrackingDataMessage>(header, bytes);
       if (message == nullptr) return unpack_failed("TDATA");
       Birds birds;
@@ -267,20 +293,14 @@ Result<std::optional<Event>> Unpacker::push(std::span<const std::uint8_t> bytes)
       for (int i = 0; i < message->GetNumberOfTrackingDataElements(); ++i) {
         igtl::TrackingDataElement::Pointer element;
         message->GetTrackingDataElement(i, element);
-        igtl::Matrix4x4 matrix;
-        element->GetMatrix(matrix);
-        Eigen::Matrix4d m;
-        for (int row = 0; row < 4; ++row) {
-          for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
-        }
-        // Through a quaternion: single precision leaves the rotation a little off orthonormal.
-        birds.birds.push_back({element->GetName(),
-                               Transform<Tracker, Sensor>(Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>())),
-                                                          Eigen::Vector3d(m.topRightCorner<3, 1>()))});
+        const auto pose = pose_of(*element);
+        if (!pose) return unpack_failed("TDATA");
+        birds.birds.push_back({element->GetName(), *pose});
       }
       return std::optional<Event>(std::move(birds));
     }
     if (type == "STATUS" && device == kStatusDevice) {
+      if (!status_is_whole(body)) return unpack_failed("STATUS");
       const auto message = unpacked<igtl::StatusMessage>(header, bytes);
       if (message == nullptr) return unpack_failed("STATUS");
       return std::optional<Event>(
