@@ -5,6 +5,7 @@
 #include <igtlStatusMessage.h>
 #include <igtlTrackingDataMessage.h>
 #include <igtl_image.h>
+#include <igtl_tdata.h>
 
 #include <algorithm>
 #include <cstring>
@@ -59,7 +60,22 @@ Result<VideoFrame> frame_of(const Header& header, std::span<const std::uint8_t> 
                     std::make_shared<const std::vector<std::uint8_t>>(pixels, pixels + size)};
 }
 
-Birds birds_of(igtl::TrackingDataMessage& message, DeviceTime time) {
+/// Empty where the matrix is no pose: nothing downstream may draw by it.
+std::optional<Transform<Tracker, Sensor>> pose_of(igtl::TrackingDataElement& element) {
+  igtl::Matrix4x4 matrix;
+  element.GetMatrix(matrix);
+  Eigen::Matrix4d m;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
+  }
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-4) || r.determinant() < 0) return std::nullopt;
+  // Through a quaternion: single precision leaves the rotation a little off orthonormal.
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(m.topRightCorner<3, 1>()));
+}
+
+/// Empty where one of them is no pose.
+std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime time) {
   Birds birds;
   birds.acquired = time;
   for (int i = 0; i < message.GetNumberOfTrackingDataElements(); ++i) {
@@ -117,6 +133,8 @@ Result<MaybeTold> Unpacker::push_string(const std::string& device, const std::st
 Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
   const auto header = read_header(bytes, kLargestBody);
   if (!header || header->body_bytes + kHeaderBytes != bytes.size()) return unpack_failed("cut");
+  // What we send has headers of version 1; the library does not know that those of version 2 go on in the body.
+  if (header->version != 1) return MaybeTold();
   const auto body = bytes.subspan(kHeaderBytes);
   const std::string& type = header->type;
   const std::string& device = header->device;
@@ -139,10 +157,12 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
     return MaybeTold(Event(*std::move(frame)));
   }
   if (birds) {
-    if (header->version != 1) return unpack_failed(type);  // the library would read the extended header as content
+    if (body.size() % IGTL_TDATA_ELEMENT_SIZE != 0) return unpack_failed(type);  // the library would read on
     const auto message = unpacked<igtl::TrackingDataMessage>(bytes);
     if (message == nullptr) return unpack_failed(type);
-    return MaybeTold(Event(birds_of(*message, header->time)));
+    auto found = birds_of(*message, header->time);
+    if (!found) return unpack_failed(type);
+    return MaybeTold(Event(*std::move(found)));
   }
   return status_of(*header, body);
 }
