@@ -3,7 +3,6 @@
 #include <cmath>
 #include <random>
 
-#include "calibration/time/clock_line.hpp"
 #include "calibration/time/pose_history.hpp"
 
 namespace birdseye {
@@ -87,87 +86,6 @@ TEST(PoseHistory, RefusesSamplesOutOfOrderAndStaysBounded) {
   EXPECT_FALSE(history.push({99 * kPeriodNs}, moving(0)));
   EXPECT_FALSE(history.push({5 * kPeriodNs}, moving(0)));
   EXPECT_EQ(history.at({50 * kPeriodNs}).kind, PoseKind::refused);
-}
-
-ClockLine::Settings period_of(std::int64_t ns) {
-  ClockLine::Settings settings;
-  settings.period = {ns};
-  return settings;
-}
-
-/// Arrivals: measurement n at n * period, late by at least delay and by an exponential tail.
-struct Arrivals {
-  std::mt19937 rng{11};
-  std::exponential_distribution<double> tail{1.0 / 1.5e6};
-  std::int64_t at(std::int64_t n) { return n * kPeriodNs + 5'000'000 + static_cast<std::int64_t>(tail(rng)); }
-};
-
-TEST(ClockLine, TakesTheJitterOut) {
-  Arrivals arrivals;
-  ClockLine line(period_of(kPeriodNs));
-  double worst_ms = 0;
-  for (std::int64_t n = 0; n < 1000; ++n) {
-    const auto tick = line.push({arrivals.at(n)});
-    if (n > 200) worst_ms = std::max(worst_ms, std::abs(static_cast<double>(tick.time.ns - n * kPeriodNs) * 1e-6 - 5));
-  }
-  EXPECT_LT(worst_ms, 0.1);
-}
-
-TEST(ClockLine, FollowsAPeriodThatIsALittleOff) {
-  Arrivals arrivals;
-  ClockLine line(period_of(kPeriodNs + 500));  // 50 ppm slow
-  double worst_ms = 0;
-  for (std::int64_t n = 0; n < 5000; ++n) {
-    const auto tick = line.push({arrivals.at(n)});
-    if (n > 200) worst_ms = std::max(worst_ms, std::abs(static_cast<double>(tick.time.ns - n * kPeriodNs) * 1e-6 - 5));
-  }
-  EXPECT_LT(worst_ms, 0.25);
-}
-
-TEST(ClockLine, SurvivesLostMeasurementsKnownAndUnknown) {
-  for (const bool known : {true, false}) {
-    Arrivals arrivals;
-    ClockLine line(period_of(kPeriodNs));
-    double worst_ms = 0;
-    for (std::int64_t n = 0; n < 1000; ++n) {
-      if (n == 500 || n == 501) continue;
-      const auto tick = line.push({arrivals.at(n)}, known && n == 502 ? 2 : 0);
-      const bool settled = n > 200 && (n < 500 || n > 515);
-      if (settled) {
-        worst_ms = std::max(worst_ms, std::abs(static_cast<double>(tick.time.ns - n * kPeriodNs) * 1e-6 - 5));
-      }
-    }
-    EXPECT_LT(worst_ms, known ? 0.1 : 0.6) << known;
-  }
-}
-
-TEST(ClockLine, NeverHidesThatMeasurementsMayBeMissing) {
-  for (const std::int64_t lost : {1, 2, 3, 5, 20}) {
-    Arrivals arrivals;
-    ClockLine line(period_of(kPeriodNs));
-    int doubted = 0;
-    for (std::int64_t n = 0; n < 1000; ++n) {
-      if (n >= 500 && n < 500 + lost) continue;
-      const auto tick = line.push({arrivals.at(n)});
-      const auto error_ns = std::abs(tick.time.ns - 5'000'000 - n * kPeriodNs);
-      if (tick.sigma.ns > kPeriodNs * 7 / 10) {
-        if (n >= 500 && n < 540) ++doubted;
-        EXPECT_GT(tick.sigma.ns, error_ns - kPeriodNs / 20);
-      } else if (n > 200) {
-        EXPECT_LT(error_ns, 600'000) << lost << " lost, " << n;
-      }
-    }
-    EXPECT_GE(doubted, 5) << lost;
-    EXPECT_LE(doubted, 12) << lost;
-  }
-}
-
-TEST(ClockLine, BeginsAnewAfterAJumpBack) {
-  ClockLine line(period_of(kPeriodNs));
-  for (std::int64_t n = 0; n < 100; ++n) line.push({n * kPeriodNs});
-  const auto tick = line.push({80 * kPeriodNs});
-  EXPECT_EQ(tick.time.ns, 80 * kPeriodNs);
-  EXPECT_EQ(line.restarts(), 1U);
 }
 
 }  // namespace
