@@ -7,19 +7,22 @@ namespace birdseye {
 namespace {
 
 constexpr std::size_t kBlocks = 64;
-constexpr std::size_t kRecent = 48;
-constexpr std::size_t kEarlyOf = 8;       // within so many arrivals ...
+constexpr std::size_t kRecent = 96;
+constexpr std::int64_t kDecidedAfterNs = 300'000'000;  // late for less may be one busy machine, however many arrivals
+constexpr std::size_t kEarlyOf = 8;                    // within so many arrivals ...
 constexpr std::size_t kEarlyConfirms = 3;  // ... so many early ones are a line that moved, fewer are bad stamps
 /// An arrival may be this far under the line, for the line's own error has a tail of the exponential kind.
-constexpr double kEarlySigmas = 14;
+constexpr double kEarlySigmas = 9;
 /// What chance explains only once in e^18 times (10^8) is not chance; once in e^9 it is not to be relied on.
 constexpr double kDecided = 18, kDoubted = 9;
 /// Two lines must be better than one by this (nats) to be a change of drift.
-constexpr double kBend = 22;
+constexpr double kBend = 18;
 /// A change less than this may be one of the drift.
-constexpr double kSmallStepNs = 300e3;
+constexpr double kSmallStepNs = 600e3;
 
-std::int64_t floor_div(std::int64_t a, std::int64_t b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
+std::int64_t floor_div(std::int64_t a, std::int64_t b) {
+  return a >= 0 ? a / b : -((-a + b - 1) / b);
+}
 
 std::size_t half_octave(double late_ns) {
   return static_cast<std::size_t>(std::clamp(2 * std::log2(std::max(late_ns, 1.0) * 1e-3), 0.0, 47.0));
@@ -42,7 +45,8 @@ const char* to_string(ClockEvent::Kind kind) {
 }
 
 ClockLine::ClockLine(const Settings& settings) : settings_(settings), prior_{0, settings.drift_sigma_ppm * 1e3} {
-  const std::int64_t most = settings_.window.ns / static_cast<std::int64_t>(kBlocks) / std::max<std::int64_t>(1, settings_.period.ns);
+  const std::int64_t most =
+      settings_.window.ns / static_cast<std::int64_t>(kBlocks) / std::max<std::int64_t>(1, settings_.period.ns);
   while (full_span_ * 2 <= most) full_span_ *= 2;
 }
 
@@ -52,6 +56,10 @@ std::int64_t ClockLine::offset_of(const Arrival& arrival) const {
 
 double ClockLine::seconds_to(std::int64_t index) const {
   return static_cast<double>((index - anchor_index_) * settings_.period.ns) * 1e-9;
+}
+
+double ClockLine::true_period_ns() const {
+  return static_cast<double>(settings_.period.ns) * (1 + fit_.slope * 1e-9);
 }
 
 double ClockLine::line_at(std::int64_t index) const {
@@ -86,12 +94,14 @@ void ClockLine::report(ClockEvent event) {
 void ClockLine::restart(DeviceTime arrived) {
   blocks_.clear();
   recent_.clear();
+  past_drifts_.clear();
   change_.reset();
   span_ = 1;
   since_begin_ = 0;
   index_ = 0;
   origin_ns_ = arrived.ns;
   prior_ = {0, settings_.drift_sigma_ppm * 1e3};
+  calm_drifts_.fill({0, prior_.slope, prior_.sigma});
 }
 
 ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost) {
@@ -173,7 +183,7 @@ bool ClockLine::look_for_early(const Arrival& arrival) {
     first = i;
     jump = std::min(jump, recent_[i].late_ns);
   }
-  if (early >= kEarlyConfirms) begin_from(first, jump);
+  if (early >= kEarlyConfirms) begin_from(first, jump - fit_.spacing_ns / static_cast<double>(early), true);
   return true;
 }
 
@@ -192,7 +202,7 @@ double ClockLine::look_for_late() {
   }
   if (most_doubt < kDecided || run < settings_.slip_confirms) return most_doubt;
   const std::size_t first = recent_.size() - run;
-  if (recent_.back().arrived_ns - recent_[first].arrived_ns < 150'000'000) return most_doubt;
+  if (recent_.back().arrived_ns - recent_[first].arrived_ns < kDecidedAfterNs) return most_doubt;
   double before = recent_[first].late_ns, after = recent_.back().late_ns;
   for (std::size_t i = 0; i < run / 2; ++i) before = std::min(before, recent_[first + i].late_ns);
   for (std::size_t i = run / 2; i < run; ++i) after = std::min(after, recent_[first + i].late_ns);
@@ -200,14 +210,15 @@ double ClockLine::look_for_late() {
   const double spread = fit_.spacing_ns / static_cast<double>(run);
   // A machine that is behind and catches up, or falls behind further, has no new edge yet.
   if (std::abs(before - after) > 0.5 * least + 16 * spread) return most_doubt;
-  const double jump = least - spread, period = static_cast<double>(settings_.period.ns);
-  const double periods = std::round(jump / period);
-  const double tolerance = std::min(0.3 * period, 6 * spread + 8 * sigma_at(index_));
-  if (!numbered_ && periods >= 1 && std::abs(jump - periods * period) < tolerance) {
-    slip(run, static_cast<std::int64_t>(periods));
-  } else {
-    begin_from(first, jump);
+  const double period = true_period_ns(), periods = std::round((least - spread) / period);
+  const double over = least - periods * period, sigma = sigma_at(index_);
+  if (numbered_ || periods < 1 || over < -8 * sigma || over > std::min(0.4 * period, 7 * spread + 8 * sigma)) {
+    begin_from(first, least - spread, true);
+    return -1;
   }
+  slip(run, static_cast<std::int64_t>(periods));
+  // By a little more than a period: it is a slip by chance, or a step. The level is found anew.
+  if (over > 3 * spread + 8 * sigma) begin_from(first, over, false);
   return -1;
 }
 
@@ -248,29 +259,33 @@ void ClockLine::remember(const Arrival& arrival) {
 void ClockLine::slip(std::size_t run, std::int64_t periods) {
   const std::size_t first = recent_.size() - run;
   const std::int64_t by_ns = periods * settings_.period.ns;
+  const double less_late_ns = static_cast<double>(periods) * true_period_ns();
   report({ClockEvent::Kind::slip, {recent_[first].arrived_ns}, by_ns, 0});
   index_ += periods;
   for (std::size_t i = first; i < recent_.size(); ++i) {
     recent_[i].index += periods;
-    recent_[i].late_ns -= static_cast<double>(by_ns);
+    recent_[i].late_ns -= less_late_ns;
     if (recent_[i].held) add(recent_[i]);
     recent_[i].held = false;
   }
 }
 
 /// Drops the line, keeps its drift, and begins again with the latest arrivals.
-void ClockLine::begin_from(std::size_t first_recent, double jump_ns) {
-  const bool large = std::abs(jump_ns) > std::max(20 * sigma_at(index_), kSmallStepNs);
+void ClockLine::begin_from(std::size_t first_recent, double jump_ns, bool is_event) {
+  const bool large = !is_event || std::abs(jump_ns) > std::max(20 * sigma_at(index_), kSmallStepNs);
   const Arrival& start = recent_[first_recent];
   if (large) {
-    report({ClockEvent::Kind::step, {start.arrived_ns}, std::llround(jump_ns), 0});
+    if (is_event) report({ClockEvent::Kind::step, {start.arrived_ns}, std::llround(jump_ns), 0});
     change_.reset();
   } else if (!change_) {
-    change_ = Change{start.index, fit_.slope, fit_.slope_sigma, sigma_at(start.index),
+    change_ = Change{start.index, calm_drifts_[0].slope, calm_drifts_[0].slope_sigma, sigma_at(start.index),
                      anchor_offset_ns_ + std::llround(line_at(start.index))};
   }
   ++restarts_;
-  prior_ = {fit_.slope, large ? std::max(fit_.slope_sigma, 1e4) : settings_.drift_sigma_ppm * 1e3};
+  // The drift of before: the first arrivals after the jump may have bent the line.
+  prior_ = {calm_drifts_[0].slope,
+            large ? std::max(calm_drifts_[0].slope_sigma, 1e4) : settings_.drift_sigma_ppm * 1e3};
+  calm_drifts_.fill({index_, prior_.slope, prior_.sigma});
   blocks_.clear();
   span_ = 1;
   since_begin_ = 0;
@@ -317,8 +332,7 @@ void ClockLine::add(const Arrival& arrival) {
     }
     Block& into = merged.back();
     into.count += block.count;
-    const double rise =
-        fit_.slope * static_cast<double>((block.index - into.index) * settings_.period.ns) * 1e-9;
+    const double rise = fit_.slope * static_cast<double>((block.index - into.index) * settings_.period.ns) * 1e-9;
     if (static_cast<double>(block.offset_ns - into.offset_ns) < rise) {
       into.index = block.index;
       into.offset_ns = block.offset_ns;
@@ -350,6 +364,10 @@ void ClockLine::refit() {
   const auto all = points();
   if (const auto fit = fit_edge(all, prior_, seconds_to(index_), edge_settings())) {
     fit_ = *fit;
+    if (index_ - calm_drifts_[1].index >= static_cast<std::int64_t>(kRecent)) {
+      calm_drifts_[0] = calm_drifts_[1];
+      calm_drifts_[1] = {index_, fit_.slope, fit_.slope_sigma};
+    }
     return;
   }
   // Too few to know how much they jitter: anywhere within a period.
@@ -364,32 +382,65 @@ void ClockLine::refit() {
 
 void ClockLine::look_for_bend() {
   if (change_) explain_change();
+  compare_drift();
+  if (blocks_.size() < 16) return;
   const auto all = points();
   const std::span<const EdgePoint> whole(all);
   const double misfit = edge_misfit(whole, fit_.spacing_ns);
   for (const std::size_t latest : {std::size_t{8}, std::size_t{16}, std::size_t{32}}) {
     if (latest + 8 > whole.size()) break;
     const std::size_t earlier = whole.size() - latest;
-    const double apart = edge_misfit(whole.first(earlier), fit_.spacing_ns) +
-                         edge_misfit(whole.subspan(earlier), fit_.spacing_ns);
+    const double apart =
+        edge_misfit(whole.first(earlier), fit_.spacing_ns) + edge_misfit(whole.subspan(earlier), fit_.spacing_ns);
     if (misfit - apart < kBend) continue;
     const auto before = fit_edge(whole.first(earlier), prior_, all[earlier].x_s, edge_settings());
-    if (!before) return;
-    if (!change_) {
-      change_ = Change{blocks_[earlier].index, before->slope, before->slope_sigma, before->value_sigma_ns,
-                       anchor_offset_ns_ + std::llround(before->value_ns)};
-    }
-    prior_ = {before->slope, settings_.drift_sigma_ppm * 1e3};
-    blocks_.erase(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(earlier));
+    if (before) forget_before(earlier, before->slope, before->slope_sigma);
     return;
+  }
+}
+
+/// The drift has changed: drops the blocks before that one, and remembers the line they made.
+void ClockLine::forget_before(std::size_t block, double slope, double slope_sigma) {
+  const auto all = points();
+  const std::span<const EdgePoint> before(all);
+  const double at_s = seconds_to(blocks_[block].index);
+  const auto old = fit_edge(before.first(block), prior_, at_s, edge_settings());
+  if (!change_ && old) {
+    change_ = Change{blocks_[block].index, slope, slope_sigma, old->value_sigma_ns,
+                     anchor_offset_ns_ + std::llround(old->value_ns)};
+  }
+  prior_ = {fit_.slope, settings_.drift_sigma_ppm * 1e3};
+  blocks_.erase(blocks_.begin(), blocks_.begin() + static_cast<std::ptrdiff_t>(block));
+}
+
+/// A change too small to be seen as a bend shows when the window has left it behind.
+void ClockLine::compare_drift() {
+  if (blocks_.size() < kBlocks || change_) {
+    past_drifts_.clear();
+    return;
+  }
+  const auto window = static_cast<std::int64_t>(kBlocks) * full_span_;
+  const auto old = past_drifts_.empty() ? Drift{index_, 0, 0} : past_drifts_.front();
+  if (old.index <= index_ - window) {
+    const double turn = fit_.slope - old.slope;
+    if (std::abs(turn) > 6 * std::hypot(fit_.slope_sigma, old.slope_sigma) +
+                             5 * settings_.wander_ppm_per_s * 1e3 * settings_.window.seconds()) {
+      past_drifts_.clear();
+      forget_before(blocks_.size() - kBlocks / 4, old.slope, old.slope_sigma);
+      return;
+    }
+    past_drifts_.pop_front();
+  }
+  if (past_drifts_.empty() || past_drifts_.back().index <= index_ - window / 8) {
+    past_drifts_.push_back({index_, fit_.slope, fit_.slope_sigma});
   }
 }
 
 /// When enough has been seen after a change, says what it was.
 void ClockLine::explain_change() {
   const double since_s = static_cast<double>((index_ - change_->index) * settings_.period.ns) * 1e-9;
-  if (since_s < 1 || blocks_.size() < 12) return;
-  if (since_s > settings_.window.seconds()) {
+  if (since_s < 0.3 * settings_.window.seconds() || blocks_.size() < 16) return;
+  if (since_s > 1.5 * settings_.window.seconds()) {
     change_.reset();
     return;
   }
@@ -398,10 +449,11 @@ void ClockLine::explain_change() {
   const double turn = now->slope - change_->slope;
   const double jump = now->value_ns + static_cast<double>(anchor_offset_ns_ - change_->offset_ns);
   const DeviceTime at{origin_ns_ + change_->index * settings_.period.ns + change_->offset_ns};
-  if (std::abs(jump) > 100e3 && std::abs(jump) > 6 * std::hypot(now->value_sigma_ns, change_->value_sigma_ns)) {
-    report({ClockEvent::Kind::step, at, std::llround(jump), turn * 1e-3});
-  } else if (std::abs(turn) > 6 * std::hypot(now->slope_sigma, change_->slope_sigma)) {
+  // The turn first: where the line was given up too late, a change of drift has become a jump as well.
+  if (std::abs(turn) > 6 * std::hypot(now->slope_sigma, change_->slope_sigma)) {
     report({ClockEvent::Kind::drift_change, at, 0, turn * 1e-3});
+  } else if (std::abs(jump) > 100e3 && std::abs(jump) > 6 * std::hypot(now->value_sigma_ns, change_->value_sigma_ns)) {
+    report({ClockEvent::Kind::step, at, std::llround(jump), turn * 1e-3});
   } else {
     return;
   }

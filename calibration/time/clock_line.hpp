@@ -28,14 +28,15 @@ const char* to_string(ClockEvent::Kind kind);
 
 /// Gives a periodic measurement back its regular times. What arrives is late by a delay that is never negative and
 /// jitters; the earliest arrivals lie on a line, and that lower edge is the clock: its level and its slope (the
-/// instrument's drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for days.
+/// instrument's drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for
+/// days.
 class ClockLine {
  public:
   struct Settings {
     Duration period;  ///< nominal
     Duration window = Duration::from_ms(20'000);
-    std::size_t slip_confirms = 8;  ///< late arrivals, apart in time, that it takes at least to believe in a loss
-    double drift_sigma_ppm = 300;   ///< what is expected of the nominal period
+    std::size_t slip_confirms = 8;   ///< late arrivals, apart in time, that it takes at least to believe in a loss
+    double drift_sigma_ppm = 300;    ///< what is expected of the nominal period
     double wander_ppm_per_s = 0.02;  ///< by so much the drift may change, unnoticed within the window
     Duration resolution{1000};       ///< of arrivals
   };
@@ -50,7 +51,8 @@ class ClockLine {
 
   /// The next arrival, or one after some that are known to be lost.
   Tick push(DeviceTime arrived, std::int64_t lost = 0);
-  /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a restart.
+  /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a
+  /// restart.
   Tick push_numbered(DeviceTime arrived, std::int64_t index);
 
   /// By so much the true period is longer than the nominal one.
@@ -76,10 +78,16 @@ class ClockLine {
     std::int64_t offset_ns = 0;  ///< of the line given up
   };
 
+  struct Drift {
+    std::int64_t index = 0;
+    double slope = 0, slope_sigma = 0;
+  };
+
   void restart(DeviceTime arrived);
   Tick place(DeviceTime arrived);
   [[nodiscard]] std::int64_t offset_of(const Arrival& arrival) const;
   [[nodiscard]] double seconds_to(std::int64_t index) const;
+  [[nodiscard]] double true_period_ns() const;
   [[nodiscard]] double line_at(std::int64_t index) const;  ///< relative to the anchor
   [[nodiscard]] double sigma_at(std::int64_t index) const;
   [[nodiscard]] double doubt_of(double late_ns) const;
@@ -93,8 +101,10 @@ class ClockLine {
   bool look_for_early(const Arrival& arrival);
   double look_for_late();
   void slip(std::size_t run, std::int64_t periods);
-  void begin_from(std::size_t first_recent, double jump_ns);
+  void begin_from(std::size_t first_recent, double jump_ns, bool is_event);
   void look_for_bend();
+  void forget_before(std::size_t block, double slope, double slope_sigma);
+  void compare_drift();
   void explain_change();
   void report(ClockEvent event);
 
@@ -111,6 +121,8 @@ class ClockLine {
   std::int64_t fit_index_ = 0;
   std::array<double, 48> late_counts_{};  ///< by half octaves of lateness
   double late_total_ = 0;
+  std::array<Drift, 2> calm_drifts_{};  ///< of some 100 and 200 arrivals ago
+  std::deque<Drift> past_drifts_;
   std::optional<Change> change_;
   std::deque<ClockEvent> events_;
   std::uint64_t restarts_ = 0;

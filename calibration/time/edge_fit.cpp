@@ -13,7 +13,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 /// Half the width that holds 68.3 % of this posterior is less than its standard deviation, for it has an exponential
 /// tail to one side. 0.83 for an exponential alone; this is the ratio for a line's end, which mixes two of them.
-constexpr double kHalfWidth = 0.93;
+constexpr double kHalfWidth = 0.91;
 constexpr double kLean = 1.15;
 
 /// The lower convex hull, and the support of lines of a given slope under it; x relative to the points' weighted mean.

@@ -130,7 +130,7 @@ void Appliance::publish(const drivers::minibird::Measurement& measurement) {
     const auto& bird = measurement.birds[i];
     if (!bird || !bird->position_mm || !bird->rotation) continue;
     const Transform<Tracker, Sensor> pose(*bird->rotation, *bird->position_mm);
-    if (i == 0) scope_poses_.push(measurement.acquired, pose);
+    if (i == 0) scope_poses_.push(measurement.acquired, measurement.acquired_sigma, pose);
     birds.birds.push_back({config_.bird_names[i], pose});
   }
   server_->publish(wire::pack(birds));

@@ -6,10 +6,10 @@
 
 namespace birdseye::device {
 
-void ScopePoses::push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+void ScopePoses::push(DeviceTime acquired, Duration sigma, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   {
     const std::lock_guard lock(mutex_);
-    history_.push(acquired, tracker_from_sensor);
+    history_.push(acquired, sigma, tracker_from_sensor);
   }
   changed_.notify_all();
 }

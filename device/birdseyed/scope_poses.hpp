@@ -13,7 +13,7 @@ class ScopePoses {
  public:
   explicit ScopePoses(const PoseHistory::Settings& settings) : settings_(settings), history_(settings) {}
 
-  void push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  void push(DeviceTime acquired, Duration sigma, const Transform<Tracker, Sensor>& tracker_from_sensor);
   /// The pose at `time`. Waits, no longer than `deadline`, for the samples after it that its smoothing wants.
   PoseAnswer at(DeviceTime time, DeviceTime deadline, const std::stop_token& stop);
 

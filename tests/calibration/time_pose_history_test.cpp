@@ -22,7 +22,7 @@ PoseHistory filled(const PoseHistory::Settings& settings, int samples, double no
     const double t_s = i * kPeriodNs * 1e-9;
     const auto pose = moving(t_s);
     const Eigen::Vector3d error = noise_mm * Eigen::Vector3d(noise(rng), noise(rng), noise(rng));
-    EXPECT_TRUE(history.push({i * kPeriodNs}, {pose.rotation(), pose.translation() + error}));
+    EXPECT_TRUE(history.push({i * kPeriodNs}, {200'000}, {pose.rotation(), pose.translation() + error}));
   }
   return history;
 }
@@ -73,18 +73,80 @@ TEST(PoseHistory, SmoothingAveragesNoiseAndKnowsHowWell) {
 
 TEST(PoseHistory, DoesNotBridgeAHole) {
   PoseHistory history;
-  history.push({0}, moving(0));
-  history.push({100'000'000}, moving(0.1));
+  history.push({0}, {}, moving(0));
+  history.push({100'000'000}, {}, moving(0.1));
   EXPECT_EQ(history.at({50'000'000}).kind, PoseKind::refused);
+  const PoseAnswer after = history.at({110'000'000});
+  EXPECT_EQ(after.kind, PoseKind::refused) << "the speed is not known across the hole";
+  EXPECT_NE(after.reason.find("one pose alone"), std::string::npos);
+}
+
+TEST(PoseHistory, AHoleEndsTheSmoothingWindow) {
+  PoseHistory::Settings settings;
+  settings.smoothing = Duration::from_ms(200);
+  PoseHistory history(settings);
+  // It was held elsewhere before the hole.
+  for (int i = 0; i < 20; ++i) history.push({i * 10'000'000}, {}, moving(100));
+  for (int i = 30; i < 60; ++i) history.push({i * 10'000'000}, {}, moving(i * 0.01));
+  for (const std::int64_t ns : {310'000'000, 355'000'000, 600'000'000}) {
+    const PoseAnswer answer = history.at({ns});
+    ASSERT_TRUE(answer.tracker_from_sensor) << answer.reason;
+    EXPECT_LT((answer.tracker_from_sensor->translation() - moving(static_cast<double>(ns) * 1e-9).translation()).norm(),
+              1e-6);
+  }
+}
+
+TEST(PoseHistory, RefusesPosesWhoseTimeIsUnsure) {
+  PoseHistory history;
+  for (int i = 0; i < 10; ++i) history.push({i * kPeriodNs}, {i < 5 ? 300'000 : 12'000'000}, moving(0));
+  EXPECT_EQ(history.at({2 * kPeriodNs + 5}).kind, PoseKind::interpolated);
+  EXPECT_NEAR(static_cast<double>(history.at({2 * kPeriodNs + 5}).time_sigma.ns), 300'000, 1);
+  const PoseAnswer answer = history.at({8 * kPeriodNs});
+  EXPECT_EQ(answer.kind, PoseKind::refused);
+  EXPECT_FALSE(answer.tracker_from_sensor);
+  EXPECT_NE(answer.reason.find("12.0 ms"), std::string::npos) << answer.reason;
+}
+
+/// A hand that swings by 30 mm at 0.6 Hz (0.43 m/s^2 at most), and a tracker with noise.
+TEST(PoseHistory, APredictionKnowsHowItGetsWorse) {
+  constexpr double kNoise_mm = 0.5;
+  PoseHistory::Settings settings;
+  settings.smoothing = Duration::from_ms(40);
+  std::mt19937 rng(5);
+  std::normal_distribution<double> noise(0, kNoise_mm);
+  const auto swing = [](double t_s) { return Eigen::Vector3d(30 * std::sin(2 * M_PI * 0.6 * t_s), 0, 0); };
+  double last_sigma = 0;
+  for (const double ahead_s : {0.005, 0.02, 0.05, 0.09}) {
+    double within_2 = 0, sigma = 0;
+    constexpr int kTrials = 300;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      PoseHistory history(settings);
+      const double start_s = trial * 0.0137;
+      double t_s = start_s;
+      for (int i = 0; i < 30; ++i) {
+        t_s = start_s + i * kPeriodNs * 1e-9;
+        const Eigen::Vector3d error(noise(rng), noise(rng), noise(rng));
+        history.push({std::llround(t_s * 1e9)}, {}, {Eigen::Matrix3d::Identity(), swing(t_s) + error});
+      }
+      const PoseAnswer answer = history.at({std::llround((t_s + ahead_s) * 1e9)});
+      ASSERT_EQ(answer.kind, PoseKind::predicted);
+      const double error = answer.tracker_from_sensor->translation().x() - swing(t_s + ahead_s).x();
+      within_2 += std::abs(error) <= 2 * answer.position_sigma_mm ? 1 : 0;
+      sigma += answer.position_sigma_mm / kTrials;
+    }
+    EXPECT_GT(within_2 / kTrials, 0.9) << ahead_s;
+    EXPECT_GT(sigma, last_sigma);
+    last_sigma = sigma;
+  }
 }
 
 TEST(PoseHistory, RefusesSamplesOutOfOrderAndStaysBounded) {
   PoseHistory::Settings settings;
   settings.capacity = 10;
   PoseHistory history(settings);
-  for (int i = 0; i < 100; ++i) EXPECT_TRUE(history.push({i * kPeriodNs}, moving(0)));
-  EXPECT_FALSE(history.push({99 * kPeriodNs}, moving(0)));
-  EXPECT_FALSE(history.push({5 * kPeriodNs}, moving(0)));
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(history.push({i * kPeriodNs}, {200'000}, moving(0)));
+  EXPECT_FALSE(history.push({99 * kPeriodNs}, {200'000}, moving(0)));
+  EXPECT_FALSE(history.push({5 * kPeriodNs}, {200'000}, moving(0)));
   EXPECT_EQ(history.at({50 * kPeriodNs}).kind, PoseKind::refused);
 }
 
