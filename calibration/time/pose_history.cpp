@@ -149,13 +149,18 @@ void PoseHistory::fit(DeviceTime time, const Range& range, PoseAnswer& answer) c
     answer.position_sigma_mm = std::sqrt(squares / (3 * (weight - 2)) * (stt / determinant));
   }
   answer.speed_mm_s = slope.head<3>().norm();
-  // A constant acceleration that the line does not know: the newest sample's age, or the half of a hole.
-  double away_s = 0;
-  if (answer.kind == PoseKind::predicted) away_s = std::max(0.0, answer.age.seconds());
-  if (answer.kind == PoseKind::interpolated) {
-    away_s = 0.5 * (sample(range.reference).acquired - sample(range.reference - 1).acquired).seconds();
+  // What a constant acceleration does that the line does not know: past a window of width w it is off by
+  // a (t^2 + t w + w^2 / 6) / 2, within a hole by a quarter of its square.
+  double squares_s2 = 0;
+  if (answer.kind == PoseKind::predicted) {
+    const double ahead_s = answer.age.seconds();
+    const double window_s = (sample(range.end - 1).acquired - sample(range.begin).acquired).seconds();
+    squares_s2 = ahead_s * ahead_s + ahead_s * window_s + window_s * window_s / 6;
+  } else if (answer.kind == PoseKind::interpolated) {
+    const double hole_s = (sample(range.reference).acquired - sample(range.reference - 1).acquired).seconds();
+    squares_s2 = hole_s * hole_s / 4;
   }
-  answer.position_sigma_mm = std::hypot(answer.position_sigma_mm, 0.5 * settings_.acceleration_mm_s2 * away_s * away_s);
+  answer.position_sigma_mm = std::hypot(answer.position_sigma_mm, 0.5 * settings_.acceleration_mm_s2 * squares_s2);
   answer.tracker_from_sensor =
       Transform<Tracker, Sensor>(Eigen::Matrix3d(reference.rotation() * rotation_exp(value.tail<3>())),
                                  Eigen::Vector3d(reference.translation() + value.head<3>()));

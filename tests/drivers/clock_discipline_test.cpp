@@ -31,10 +31,10 @@ TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
 
 TEST(ClockDiscipline, FindsNetworkClocks) {
   const testing::Scratch scratch;
-  for (const char* name : {"ptp1", "ptp0", "ptp", "ptp_kvm", "tty0"}) std::ofstream(("x") / name) << "";
+  for (const char* name : {"ptp1", "ptp0", "ptp", "ptp_kvm", "tty0"}) std::ofstream(scratch / name) << "";
   const auto devices = ptp_devices(scratch.path());
   ASSERT_EQ(devices.size(), 2U);
-  EXPECT_EQ(devices[0], ("x") / "ptp0");
+  EXPECT_EQ(devices[0], scratch / "ptp0");
   EXPECT_TRUE(ptp_devices("/nowhere").empty());
 }
 
