@@ -183,7 +183,7 @@ bool ClockLine::look_for_early(const Arrival& arrival) {
     first = i;
     jump = std::min(jump, recent_[i].late_ns);
   }
-  if (early >= kEarlyConfirms) begin_from(first, jump - fit_.spacing_ns / static_cast<double>(early), true);
+  if (early >= kEarlyConfirms) begin_from(first, jump, true);
   return true;
 }
 
