@@ -133,6 +133,7 @@ void read_gpio(ConfigSection& section, Config& config) {
   drivers::GpioSettings& lines = config.gpio.lines;
   section.text("chip", lines.chip, section.present());
   section.text("strobe", lines.strobe);
+  config.core.frame_clock.strobe = !lines.strobe.empty();
   section.text("pedal", lines.pedal);
   section.text("led", lines.led);
   section.text("trigger", lines.trigger);
@@ -157,7 +158,7 @@ void read_pose(ConfigSection& section, Config& config) {
   section.milliseconds("max_gap_ms", pose.max_gap, 1000);
   section.milliseconds("smoothing_ms", pose.smoothing, 1000);
   section.milliseconds("wait_ms", config.core.pose_wait, 1000);
-  section.milliseconds("max_time_sigma_ms", config.core.most_time_sigma, 1000);
+  section.milliseconds("max_time_sigma_ms", pose.max_time_sigma, 1000);
 }
 
 void read_recording(ConfigSection& section, Config& config) {

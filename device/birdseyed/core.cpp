@@ -91,7 +91,7 @@ void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime 
 
 void Core::publish(const Measurement& measurement) {
   time_sigma_ = measurement.acquired_sigma;
-  const bool timed = measurement.acquired_sigma <= settings_.most_time_sigma;
+  const bool timed = measurement.acquired_sigma <= settings_.pose.max_time_sigma;
   wire::Birds birds;
   birds.acquired = measurement.acquired;
   for (std::size_t i = 0; i < std::min(measurement.birds.size(), birds_.size()); ++i) {
@@ -99,7 +99,7 @@ void Core::publish(const Measurement& measurement) {
     note_doubt(i, bird, measurement.arrived);
     if (!timed || !bird.pose || !bird.pose->position_mm || !bird.pose->rotation) continue;
     const Transform<Tracker, Sensor> pose(*bird.pose->rotation, *bird.pose->position_mm);
-    if (i == 0) scope_.push(measurement.acquired, pose);
+    if (i == 0) scope_.push(measurement.acquired, measurement.acquired_sigma, pose);
     birds.birds.push_back({settings_.bird_names[i], pose});
   }
   if (timed) out_.push_back(wire::pack(birds, measurement.arrived));
@@ -148,7 +148,7 @@ void Core::publish(const drivers::Frame& frame) {
   out.info.acquired = frame.acquired;
   out.info.acquired_sigma = frame.acquired_sigma;
   out.info.arrived = frame.arrived;
-  if (frame.acquired_known && frame.acquired_sigma <= settings_.most_time_sigma) {
+  if (frame.acquired_known && frame.acquired_sigma <= settings_.pose.max_time_sigma) {
     out.info.pose = scope_.at(frame.acquired);
     if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != Doubt::none)
       out.info.pose.reason += ": " + birds_[0].why;

@@ -20,8 +20,6 @@ struct CoreSettings {
   /// How long a frame may wait for measurements from after it, from its arrival on; 0: it goes at once, with a pose
   /// that may be predicted.
   Duration pose_wait{0};
-  /// A measurement whose time is known no better is not passed on: a laparoscope moves a millimetre in 10 ms.
-  Duration most_time_sigma = Duration::from_ms(10);
   FrameClock::Settings frame_clock;
 };
 

@@ -12,12 +12,16 @@ inline void to_json(nlohmann::json& json, const PoseHistory::Settings& settings)
   json = {{"capacity", settings.capacity},
           {"max_gap", settings.max_gap},
           {"max_prediction", settings.max_prediction},
+          {"max_time_sigma", settings.max_time_sigma},
+          {"acceleration_mm_s2", settings.acceleration_mm_s2},
           {"smoothing", settings.smoothing}};
 }
 inline void from_json(const nlohmann::json& json, PoseHistory::Settings& settings) {
   json.at("capacity").get_to(settings.capacity);
   json.at("max_gap").get_to(settings.max_gap);
   json.at("max_prediction").get_to(settings.max_prediction);
+  json.at("max_time_sigma").get_to(settings.max_time_sigma);
+  json.at("acceleration_mm_s2").get_to(settings.acceleration_mm_s2);
   json.at("smoothing").get_to(settings.smoothing);
 }
 
@@ -45,7 +49,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StreamLayout, birds, group_mode, button_byte,
 
 namespace birdseye::device {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameClock::Settings, rate_hz, delay, exposure)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CoreSettings, bird_names, pose, pose_wait, most_time_sigma, frame_clock)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameClock::Settings, rate_hz, delay, exposure, strobe)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CoreSettings, bird_names, pose, pose_wait, frame_clock)
 
 }  // namespace birdseye::device

@@ -8,6 +8,8 @@ void to_json(json& out, const FrameInfo& info) {
   json pose{{"kind", to_string(info.pose.kind)},
             {"reason", info.pose.reason},
             {"sigma_mm", info.pose.position_sigma_mm},
+            {"time_sigma_ns", info.pose.time_sigma.ns},
+            {"speed_mm_s", info.pose.speed_mm_s},
             {"age_ns", info.pose.age.ns},
             {"tracker_from_scope", nullptr}};
   if (info.pose.tracker_from_sensor) {
@@ -34,6 +36,8 @@ void from_json(const json& in, FrameInfo& info) {
   const auto kind = pose.at("kind").get<std::string>();
   pose.at("reason").get_to(info.pose.reason);
   pose.at("sigma_mm").get_to(info.pose.position_sigma_mm);
+  pose.at("time_sigma_ns").get_to(info.pose.time_sigma.ns);
+  pose.at("speed_mm_s").get_to(info.pose.speed_mm_s);
   pose.at("age_ns").get_to(info.pose.age.ns);
   const json& matrix = pose.at("tracker_from_scope");
   for (const PoseKind known : {PoseKind::exact, PoseKind::interpolated, PoseKind::predicted}) {

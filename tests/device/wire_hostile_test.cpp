@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "device/wire/client.hpp"
+#include "device/wire/igtl_bytes.hpp"
 #include "device/wire/server.hpp"
 
 namespace birdseye::wire {
@@ -47,8 +48,9 @@ std::vector<Bytes> one_of_each() {
                                     pack(Status{false, "the camera has gone"}, {5}), pack(Health{}, {5})};
   std::vector<Bytes> messages;
   for (const Packet& packet : packets) {
-    for (std::size_t at = 0; at < packet->size();) {
-      const std::span<const std::uint8_t> rest = std::span(*packet).subspan(at);
+    const Bytes bytes = packet.bytes();
+    for (std::size_t at = 0; at < bytes.size();) {
+      const std::span<const std::uint8_t> rest = std::span(bytes).subspan(at);
       const std::size_t size = kHeaderBytes + *body_bytes(rest.first(kHeaderBytes));
       messages.emplace_back(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(size));
       at += size;
