@@ -105,7 +105,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
                              {"exposure_ms", program.timing.exposure_ms},
                              {"bar_period_s", TestPattern::kBarPeriodS}};
   if (!program.truth.empty()) {
-    if (const auto written = replace_json(program.truth, truth); !written) return written;
+    if (auto written = replace_json(program.truth, truth); !written) return written;
   }
   announce({{"event", "ready"}, {"camera", program.socket.empty() ? program.device : program.socket}});
   camera.run(stop);
