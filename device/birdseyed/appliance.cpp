@@ -7,6 +7,7 @@
 
 #include "drivers/io/monotonic.hpp"
 #include "drivers/io/serial_port.hpp"
+#include "drivers/minibird/assembler.hpp"
 
 namespace birdseye::device {
 
@@ -91,17 +92,20 @@ wire::Status Appliance::status() const {
 
 void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<drivers::minibird::MiniBird> tracker) {
   DeviceTime heard = now();
+  drivers::minibird::MeasurementAssembler assembler(tracker->layout());
   drivers::minibird::MiniBirdCounters before;  // of the times before the tracker was last lost
   while (!stop.stop_requested()) {
     auto read = tracker->read(now() + kTick);
-    if (read && !read->empty()) heard = now();
+    if (read && *read) heard = now();
     if (read && now() - heard > kSilent) {
       read = Error{Errc::timeout, fmt::format("{}: the tracker has fallen silent; check its power and cable",
                                               config_.tracker_device.string())};
     }
     if (read) {
-      for (const auto& measurement : *read) publish(measurement);
-      const auto counters = tracker->counters();
+      if (*read) {
+        for (const auto& measurement : assembler.push(**read)) publish(measurement);
+      }
+      const auto counters = assembler.counters();
       phase_errors_ = before.phase_errors + counters.phase_errors;
       senseless_records_ = before.senseless_records + counters.senseless_records;
       continue;
@@ -114,6 +118,7 @@ void Appliance::tracker_loop(const std::stop_token& stop, std::unique_ptr<driver
       wait(kLookAgain, stop);
       if (auto again = open_tracker(config_, stop)) {
         tracker = *std::move(again);
+        assembler = drivers::minibird::MeasurementAssembler(tracker->layout());
         tell("tracker", true, "the tracker is back");
         heard = now();
       }
@@ -127,7 +132,7 @@ void Appliance::publish(const drivers::minibird::Measurement& measurement) {
   wire::Birds birds;
   birds.acquired = measurement.acquired;
   for (std::size_t i = 0; i < measurement.birds.size(); ++i) {
-    const auto& bird = measurement.birds[i];
+    const auto& bird = measurement.birds[i].pose;
     if (!bird || !bird->position_mm || !bird->rotation) continue;
     const Transform<Tracker, Sensor> pose(*bird->rotation, *bird->position_mm);
     if (i == 0) scope_poses_.push(measurement.acquired, pose);

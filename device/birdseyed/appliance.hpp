@@ -11,6 +11,7 @@
 #include "device/birdseyed/config.hpp"
 #include "device/birdseyed/scope_poses.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/minibird/measurement.hpp"
 
 namespace birdseye::device {
 

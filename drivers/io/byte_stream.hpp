@@ -21,6 +21,9 @@ class ByteStream {
   virtual void discard_input() = 0;
   /// False where the line has no RTS (a pseudo-terminal, a three-wire cable's adapter).
   virtual bool set_rts(bool asserted) = 0;
+  /// How often the line has said that bytes came damaged (overrun, parity, framing, break). Damaged bytes are not
+  /// delivered; a reader that sees the count change between two reads has lost its place.
+  [[nodiscard]] virtual std::uint64_t line_errors() const { return 0; }
   /// For messages: the device's path.
   [[nodiscard]] virtual const std::string& name() const = 0;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "drivers/io/monotonic.hpp"
 
@@ -16,30 +17,16 @@ std::uint16_t word_of(const Bytes& bytes) {
   return static_cast<std::uint16_t>(bytes[0] + 256U * bytes[1]);
 }
 
-Duration byte_time(int baud) {
-  return {std::int64_t{10} * 1'000'000'000 / baud};
-}
-
 /// Sleeps for span, or until stop is requested.
 void wait(Duration span, const std::stop_token& stop) {
   const DeviceTime until = now() + span;
   while (now() < until && !stop.stop_requested()) sleep_for(std::min(until - now(), Duration::from_ms(20)));
 }
 
-ClockLine::Settings line_settings(double rate_hz) {
-  ClockLine::Settings settings;
-  settings.period = Duration::from_seconds(1.0 / rate_hz);
-  return settings;
-}
-
 }  // namespace
 
 MiniBird::MiniBird(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings)
-    : line_(std::move(line)),
-      settings_(settings),
-      parser_(std::vector<RecordFormat>(static_cast<std::size_t>(settings.birds), settings.format), false,
-              settings.birds > 1),
-      clock_line_(line_settings(settings.rate_hz)) {}
+    : line_(std::move(line)), settings_(settings) {}
 
 MiniBird::~MiniBird() {
   // Leave the unit quiet for whoever opens the line next.
@@ -61,7 +48,14 @@ Result<std::unique_ptr<MiniBird>> MiniBird::start(std::unique_ptr<ByteStream> li
       return Error{Errc::timeout, fmt::format("{}: stopped while starting", bird->line_->name())};
     if (auto done = step(*bird, stop); !done) return done.error();
   }
-  bird->clock_line_ = ClockLine(line_settings(bird->info_.rate_hz));
+  bird->layout_.birds.assign(static_cast<std::size_t>(settings.birds),
+                             {settings.format, bird->info_.mm_per_count, into(settings.hemisphere)});
+  bird->layout_.group_mode = settings.birds > 1;
+  bird->layout_.rate_hz = bird->info_.rate_hz;
+  bird->layout_.baud = settings.baud;
+  bird->layout_.delay = settings.delay;
+  bird->layout_.plausibility = settings.plausibility;
+  bird->line_errors_ = bird->line_->line_errors();
   return bird;
 }
 
@@ -188,54 +182,16 @@ Result<void> MiniBird::configure() {
   return send({kStream});
 }
 
-MiniBirdCounters MiniBird::counters() const {
-  MiniBirdCounters counters = counters_;
-  counters.phase_errors = parser_.phase_errors();
-  counters.discarded_bytes = parser_.discarded_bytes();
-  return counters;
-}
-
-void MiniBird::finish(std::vector<Measurement>& out) {
-  const ClockLine::Tick tick = clock_line_.push(partial_->began);
-  out.push_back({tick.time - settings_.delay, tick.sigma, partial_->arrived, std::move(partial_->birds)});
-  ++counters_.measurements;
-  partial_.reset();
-}
-
-Result<std::vector<Measurement>> MiniBird::read(DeviceTime deadline) {
-  std::vector<Measurement> out;
-  std::array<std::uint8_t, 1024> chunk;
-  const auto birds = static_cast<std::size_t>(settings_.birds);
-  const std::int64_t byte_ns = byte_time(settings_.baud).ns;
-  const auto record_bytes = static_cast<std::int64_t>(2 * word_count(settings_.format) + (birds > 1 ? 1 : 0));
-  while (out.empty()) {
-    const auto got = line_->read(chunk, deadline);
-    if (!got) return got.error();
-    if (*got == 0) break;
-    const DeviceTime arrived = now();
-    for (const Record& record : parser_.push(std::span(chunk).first(*got))) {
-      const std::size_t address = birds > 1 ? record.address : 1;
-      // The rest of that cycle was lost; after a loss, who knows which cycle a record is of.
-      if (partial_ && (address <= partial_->last_address || record.phase_errors != partial_->phase_errors)) finish(out);
-      if (!partial_) {
-        // The bytes after this record in the chunk, the record itself and those of the birds before it had yet to come
-        // when the cycle's first byte began.
-        const std::int64_t bytes =
-            static_cast<std::int64_t>(record.end_offset) + record_bytes * static_cast<std::int64_t>(address);
-        partial_ = Partial{{arrived.ns - bytes * byte_ns}, arrived, {}, 0, record.phase_errors};
-        partial_->birds.resize(birds);
-      }
-      partial_->arrived = arrived;
-      partial_->last_address = address;
-      if (auto pose = decode_pose(settings_.format, record.words, info_.mm_per_count)) {
-        partial_->birds[address - 1] = *std::move(pose);
-      } else {
-        ++counters_.senseless_records;
-      }
-      if (address == birds) finish(out);
-    }
-  }
-  return out;
+Result<std::optional<Chunk>> MiniBird::read(DeviceTime deadline) {
+  std::array<std::uint8_t, 1024> bytes;
+  const auto got = line_->read(bytes, deadline);
+  if (!got) return got.error();
+  if (*got == 0) return std::optional<Chunk>();
+  Chunk chunk;
+  chunk.arrived = now();
+  chunk.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*got));
+  chunk.after_line_error = line_->line_errors() != std::exchange(line_errors_, line_->line_errors());
+  return std::optional<Chunk>(std::move(chunk));
 }
 
 }  // namespace birdseye::drivers::minibird

@@ -6,29 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "calibration/time/clock_line.hpp"
 #include "drivers/io/byte_stream.hpp"
-#include "drivers/minibird/record_parser.hpp"
+#include "drivers/minibird/settings.hpp"
+#include "drivers/minibird/stream_layout.hpp"
 
 namespace birdseye::drivers::minibird {
-
-struct MiniBirdSettings {
-  int birds = 1;  ///< 1: standalone; more: a flock in group mode
-  RecordFormat format = RecordFormat::position_matrix;
-  Hemisphere hemisphere = Hemisphere::forward;
-  double rate_hz = 103.3;
-  int baud = 115200;  ///< to tell when a byte began from when it had come
-  /// From the middle of a measurement to its first byte on the line, filters off.
-  Duration delay = Duration::from_ms(7) + Duration{500'000};
-
-  // The waits that field drivers use; tests shorten them.
-  Duration reset_hold = Duration::from_ms(1000);
-  Duration reset_settle = Duration::from_ms(2000);
-  Duration configure_wait = Duration::from_ms(600);
-  Duration run_wait = Duration::from_ms(200);
-  Duration reply_timeout = Duration::from_ms(500);
-  Duration answer_within = Duration::from_ms(5000);  ///< for the first answer after a reset
-};
 
 /// What the unit says of itself.
 struct MiniBirdInfo {
@@ -39,19 +21,6 @@ struct MiniBirdInfo {
   double mm_per_count = kMmPerCount36Inch;
   bool has_reset_line = false;
   std::string latched_error;  ///< in words; empty for none
-};
-
-/// The poses of all birds at one measurement.
-struct Measurement {
-  DeviceTime acquired;
-  Duration acquired_sigma;
-  DeviceTime arrived;  ///< of its last byte
-  /// One per bird, in the order of their addresses; empty where its record was lost or made no sense.
-  std::vector<std::optional<RecordPose>> birds;
-};
-
-struct MiniBirdCounters {
-  std::uint64_t measurements = 0, phase_errors = 0, discarded_bytes = 0, senseless_records = 0;
 };
 
 /// A miniBIRD, or a flock of them behind one port, streaming.
@@ -66,9 +35,11 @@ class MiniBird {
   MiniBird& operator=(const MiniBird&) = delete;
 
   [[nodiscard]] const MiniBirdInfo& info() const { return info_; }
-  [[nodiscard]] MiniBirdCounters counters() const;
-  /// The measurements that have come by the deadline, perhaps none; returns as soon as there is one.
-  Result<std::vector<Measurement>> read(DeviceTime deadline);
+  /// How the bytes that read() gives are to be understood.
+  [[nodiscard]] const StreamLayout& layout() const { return layout_; }
+  /// The bytes that have come, as soon as there are some; none at the deadline. Errc::disconnected when the line is
+  /// gone.
+  Result<std::optional<Chunk>> read(DeviceTime deadline);
 
  private:
   MiniBird(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings);
@@ -79,23 +50,12 @@ class MiniBird {
   Result<void> examine_unit();
   Result<void> configure();
   Result<void> set_rate();
-  void finish(std::vector<Measurement>& out);
-
-  struct Partial {
-    DeviceTime began;  ///< the first byte of the cycle was on the line
-    DeviceTime arrived;
-    std::vector<std::optional<RecordPose>> birds;
-    std::size_t last_address = 0;
-    std::uint64_t phase_errors = 0;  ///< of the parser when the cycle's first record was whole
-  };
 
   std::unique_ptr<ByteStream> line_;
   MiniBirdSettings settings_;
   MiniBirdInfo info_;
-  RecordParser parser_;
-  ClockLine clock_line_;
-  std::optional<Partial> partial_;
-  MiniBirdCounters counters_;
+  StreamLayout layout_;
+  std::uint64_t line_errors_ = 0;  ///< of the line, when it was last read
 };
 
 }  // namespace birdseye::drivers::minibird

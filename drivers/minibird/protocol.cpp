@@ -162,6 +162,13 @@ std::optional<Hemisphere> hemisphere_of(std::string_view name) {
   return std::nullopt;
 }
 
+Eigen::Vector3d into(Hemisphere hemisphere) {
+  for (const HemisphereRow& row : kHemispheres) {
+    if (row.hemisphere == hemisphere) return Eigen::Vector3d::Unit(row.axis / 6) * (row.sign == 0 ? 1 : -1);
+  }
+  return Eigen::Vector3d::UnitX();
+}
+
 Bytes select_format(RecordFormat format) {
   return {static_cast<std::uint8_t>(0x55 + static_cast<unsigned>(format))};
 }
@@ -201,6 +208,21 @@ Bytes set_rate_count(double rate_hz, double crystal_mhz) {
 
 double rate_of_count(std::uint16_t count, double crystal_mhz) {
   return 1000.0 / (4.0 * count * (8.0 / crystal_mhz) / 1000.0 + 0.3);
+}
+
+Bytes report_rate_command(int every) {
+  switch (every) {
+    case 1:
+      return {'Q'};
+    case 2:
+      return {'R'};
+    case 8:
+      return {'S'};
+    case 32:
+      return {'T'};
+    default:
+      return {};
+  }
 }
 
 Bytes set_group_mode(bool on) {

@@ -52,6 +52,8 @@ Eigen::Matrix3d rotation_from_angles(double azimuth_rad, double elevation_rad, d
 
 enum class Hemisphere { forward, aft, right, left, lower, upper };
 std::optional<Hemisphere> hemisphere_of(std::string_view name);
+Eigen::Vector3d into(
+    Hemisphere hemisphere);  ///< unit vector from the transmitter into it, along the transmitter's axes
 
 /// Commands that carry data; those that are one byte are below.
 using Bytes = std::vector<std::uint8_t>;
@@ -63,6 +65,7 @@ Bytes change_word(std::uint8_t parameter, std::uint16_t value);  ///< little end
 Bytes set_rate_hz(double rate_hz);                               ///< parameter 7: rate * 256
 Bytes set_rate_count(double rate_hz, double crystal_mhz);        ///< parameter 6, for older firmware
 double rate_of_count(std::uint16_t count, double crystal_mhz);
+Bytes report_rate_command(int every);  ///< Q, R, S or T for 1, 2, 8 or 32; empty for anything else
 Bytes set_group_mode(bool on);
 Bytes auto_configure(std::uint8_t units);
 /// q and r: rotations given as azimuth, elevation, roll in degrees, within 180.

@@ -107,7 +107,8 @@ TEST(Record, T10GroupAndButtonMode) {
   ASSERT_EQ(records.size(), 2U);
   EXPECT_EQ(records[0].button, 0x10);
   EXPECT_EQ(records[0].address, 1);
-  EXPECT_EQ(records[0].end_offset, 14U);
+  EXPECT_EQ(records[0].begin, 0);
+  EXPECT_EQ(records[1].begin, 14);
   EXPECT_EQ(records[1].button, 0);
   EXPECT_EQ(records[1].address, 2);
   EXPECT_EQ(records[1].words, (Words{-7284, 11376, 18204, -21848, 2728, -912}));
