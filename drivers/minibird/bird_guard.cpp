@@ -18,6 +18,7 @@ constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line 
 constexpr double kNoiseMemory = 1.0 / 64;                 // of the mean square, per reading
 constexpr double kNoiseSigmas = 3.5;
 constexpr double kMostNoiseMm = 5;  // beyond that it is not noise
+constexpr double kRestless = 0.2;   // of ways lead back where there is noise; without, hardly any
 constexpr double kMuchNearer = 3;   // the mirrored position, than the one reported
 
 Duration gap_between(DeviceTime earlier, DeviceTime later) {
@@ -55,7 +56,8 @@ std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_repeats(const std::vector<
   ++repeats_;
   if (limits_.frozen_after <= 0) return std::nullopt;
   const double moved_mm = speed_mm_s_ * std::min(gap_between(repeated_since_, time), kTrackHolds).seconds();
-  if (repeats_ < limits_.frozen_after && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
+  const bool noise_is_gone = repeats_ >= limits_.frozen_after && restless_ > kRestless;
+  if (!noise_is_gone && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
   return Verdict{Doubt::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
 }
 
@@ -125,6 +127,9 @@ void BirdGuard::follow(const Sample& sample) {
   candidate_.reset();
   agreeing_ = 0;
   if (repeats_ > 0 || track_.size() < 2) return;
+  const Eigen::Vector3d way_mm = track_.back().position_mm - track_[track_.size() - 2].position_mm;
+  restless_ += kNoiseMemory * ((way_mm.dot(last_way_mm_) < 0 ? 1 : 0) - restless_);
+  last_way_mm_ = way_mm;
   const double seconds = (track_.back().time - track_.front().time).seconds();
   speed_mm_s_ =
       seconds > 1e-4 ? (track_.back().position_mm - track_.front().position_mm).norm() / seconds : speed_mm_s_;

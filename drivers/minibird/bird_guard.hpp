@@ -52,7 +52,9 @@ class BirdGuard {
   std::vector<std::int16_t> last_words_;
   DeviceTime repeated_since_;
   int repeats_ = 0;
-  double speed_mm_s_ = 0;  ///< when the words last changed
+  double speed_mm_s_ = 0;                                  ///< when the words last changed
+  Eigen::Vector3d last_way_mm_ = Eigen::Vector3d::Zero();  ///< from the reading before
+  double restless_ = 0;                                    ///< how often, of late, a way led back: noise is there
 };
 
 }  // namespace birdseye::drivers::minibird

@@ -17,7 +17,8 @@ struct Plausibility {
   int step_confirms = 5;                    ///< so many readings in a row after a step, agreeing: it was one after all
   int start_confirms = 1;                   ///< the same at the start and after a gap
   Duration gap = Duration::from_ms(150);    ///< after so long without a good reading the sensor may be anywhere
-  /// Noise keeps a record from being repeated exactly: after so many that are, it is frozen. 0: no noise is expected.
+  /// Noise keeps a record from being repeated exactly: where there was some, after so many that are it is frozen. 0:
+  /// however often, it is not.
   int frozen_after = 100;
   double frozen_moved_mm = 2;        ///< and at once, where the speed until then would have moved it so far
   double hemisphere_border_mm = 15;  ///< so near the plane through the transmitter, p and -p are not told apart

@@ -135,21 +135,26 @@ TEST(BirdGuard, SaturationAndTheEndOfTheScaleAreNamed) {
   EXPECT_EQ(watch.see_often(50, kHere), 50);
 }
 
-TEST(BirdGuard, ARecordThatRepeatsIsFrozen) {
+TEST(BirdGuard, ARecordThatRepeatsWhereThereWasNoiseIsFrozen) {
   Watch watch;
-  watch.see(kHere, Matrix3d::Identity(), 0);
-  for (int i = 1; i < 100; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+  watch.see_often(60, kHere);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
   const BirdReading frozen = watch.see(kHere, Matrix3d::Identity(), 0);
   EXPECT_EQ(frozen.kind, Doubt::frozen);
   EXPECT_THAT(frozen.doubt, HasSubstr("101 times"));
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, Doubt::frozen);
   watch.see(kHere);
   EXPECT_EQ(watch.see_often(10, kHere), 10);
-  // Where no noise is expected, that is how it is.
-  Plausibility no_noise;
-  no_noise.frozen_after = 0;
-  Watch patient(no_noise);
-  patient.see(kHere, Matrix3d::Identity(), 0);
-  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(patient.see(kHere, Matrix3d::Identity(), 0).pose);
+}
+
+TEST(BirdGuard, WhereThereNeverWasNoiseARepeatedRecordIsASensorAtRest) {
+  Watch watch;
+  const auto see = [&watch](double y) { return watch.see({300, y, -40}, Matrix3d::Identity(), 0); };
+  see(0);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(see(0).pose) << i;
+  // It starts, gently, and comes to rest again.
+  for (int i = 0; i < 400; ++i) ASSERT_TRUE(see(50 - 50 * std::cos(i * 3.14159265 / 400)).pose) << i;
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(see(100).pose) << i;
 }
 
 TEST(BirdGuard, WhatMovedIsFrozenAtOnce) {
