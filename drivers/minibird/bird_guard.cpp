@@ -154,7 +154,7 @@ BirdGuard::Verdict BirdGuard::place(Sample sample) {
     return doubt_of_side(reported_mm, mirrored);
   }
   candidate_ = sample;
-  if (const Verdict side = doubt_of_side(reported_mm, mirrored); side.kind != Doubt::none) return side;
+  if (Verdict side = doubt_of_side(reported_mm, mirrored); side.kind != Doubt::none) return side;
   if (lost_sight) return {Doubt::unconfirmed, "not yet confirmed, after a start or a gap"};
   const Sample& last = track_.back();
   return {Doubt::step,

@@ -146,7 +146,7 @@ Result<void> MiniBird::reset() {
   info_.notes.clear();
   if (info_.has_reset_line) {
     line_->set_rts(true);
-    const auto held = dialogue_.pause(settings_.reset_hold);
+    auto held = dialogue_.pause(settings_.reset_hold);
     line_->set_rts(false);
     if (!held) return held;
     if (auto waited = dialogue_.pause(settings_.reset_settle); !waited) return waited;
