@@ -9,6 +9,7 @@
 #include "device/birdseyed/instrument_thread.hpp"
 #include "device/birdseyed/recorder.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/minibird/measurement.hpp"
 
 namespace birdseye::device {
 

@@ -81,16 +81,9 @@ std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime tim
   for (int i = 0; i < message.GetNumberOfTrackingDataElements(); ++i) {
     igtl::TrackingDataElement::Pointer element;
     message.GetTrackingDataElement(i, element);
-    igtl::Matrix4x4 matrix;
-    element->GetMatrix(matrix);
-    Eigen::Matrix4d m;
-    for (int row = 0; row < 4; ++row) {
-      for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
-    }
-    // Through a quaternion: single precision leaves the rotation a little off orthonormal.
-    birds.birds.push_back(
-        {element->GetName(), Transform<Tracker, Sensor>(Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>())),
-                                                        Eigen::Vector3d(m.topRightCorner<3, 1>()))});
+    const auto pose = pose_of(*element);
+    if (!pose) return std::nullopt;
+    birds.birds.push_back({element->GetName(), *pose});
   }
   return birds;
 }

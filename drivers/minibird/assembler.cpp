@@ -47,14 +47,14 @@ void MeasurementAssembler::begin_anew() {
   arrivals_.clear();
 }
 
-DeviceTime MeasurementAssembler::began(std::int64_t position) const {
+DeviceTime MeasurementAssembler::began(const Cycle& cycle) const {
   // Bytes come no faster than the line carries them, and late by what nobody knows: the earliest that any of the
   // chunks since allows is the nearest to the truth.
   const std::int64_t byte_ns = std::int64_t{10} * 1'000'000'000 / layout_.baud;
   std::optional<DeviceTime> earliest;
   for (const Arrival& arrival : arrivals_) {
-    if (arrival.end <= position) continue;
-    const DeviceTime allowed = arrival.at - Duration{(arrival.end - position) * byte_ns};
+    if (arrival.end <= cycle.first_record) continue;
+    const DeviceTime allowed = arrival.at - Duration{(arrival.end - cycle.first_record + cycle.before_it) * byte_ns};
     if (!earliest || allowed < *earliest) earliest = allowed;
   }
   return *earliest;
@@ -65,7 +65,8 @@ std::int64_t MeasurementAssembler::lost_before(const Cycle& cycle, DeviceTime be
   // The bytes between tell, if few of them were lost; the time tells, if this one is not late. What both say is safe:
   // that there were more, the clock line notices by itself.
   const auto cycle_length = static_cast<double>(cycle_bytes(layout_));
-  const std::int64_t by_bytes = std::llround(static_cast<double>(cycle.begin - *last_begin_) / cycle_length) - 1;
+  const std::int64_t by_bytes =
+      std::llround(static_cast<double>(cycle.first_record - cycle.before_it - *last_begin_) / cycle_length) - 1;
   const double periods = static_cast<double>((began - *last_tick_).ns) / static_cast<double>(period_.ns);
   const std::int64_t by_time = std::llround(std::floor(periods + 0.3)) - 1;
   return std::max<std::int64_t>(0, std::min(by_bytes, by_time));
@@ -79,11 +80,11 @@ void MeasurementAssembler::count_lost(DeviceTime tick) {
 }
 
 void MeasurementAssembler::finish(std::vector<Measurement>& out) {
-  const DeviceTime start = began(cycle_->begin);
+  const DeviceTime start = began(*cycle_);
   const std::int64_t lost = lost_before(*cycle_, start);
   const ClockLine::Tick tick = clock_line_.push(start, lost);
   count_lost(tick.time);
-  last_begin_ = cycle_->begin;
+  last_begin_ = cycle_->first_record - cycle_->before_it;
 
   Measurement measurement;
   measurement.acquired = tick.time - layout_.delay;
@@ -114,10 +115,9 @@ void MeasurementAssembler::take(Record record, DeviceTime arrived, std::vector<M
   // The rest of that cycle was lost; after a loss, who knows which cycle a record is of.
   if (cycle_ && (bird <= cycle_->last_bird || record.phase_errors != cycle_->phase_errors)) finish(out);
   if (!cycle_) {
-    cycle_ = Cycle{record.begin, arrived, {}, 0, record.phase_errors};
-    for (std::size_t before = 0; before < bird; ++before) {
-      cycle_->begin -= static_cast<std::int64_t>(record_bytes(layout_, before));
-    }
+    std::size_t before_it = 0;
+    for (std::size_t before = 0; before < bird; ++before) before_it += record_bytes(layout_, before);
+    cycle_ = Cycle{record.begin, static_cast<std::int64_t>(before_it), arrived, {}, 0, record.phase_errors};
     cycle_->records.resize(layout_.birds.size());
   }
   cycle_->arrived = arrived;

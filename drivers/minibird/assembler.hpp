@@ -29,7 +29,8 @@ class MeasurementAssembler {
     DeviceTime at;
   };
   struct Cycle {
-    std::int64_t begin;  ///< where in the stream its first byte is, or would be
+    std::int64_t first_record;  ///< where in the stream the first of its records that came begins
+    std::int64_t before_it;     ///< bytes of the birds before that one
     DeviceTime arrived;
     std::vector<std::optional<Record>> records;
     std::size_t last_bird = 0;
@@ -40,7 +41,7 @@ class MeasurementAssembler {
   void take(Record record, DeviceTime arrived, std::vector<Measurement>& out);
   void finish(std::vector<Measurement>& out);
   void begin_anew();
-  [[nodiscard]] DeviceTime began(std::int64_t position) const;
+  [[nodiscard]] DeviceTime began(const Cycle& cycle) const;
   [[nodiscard]] std::int64_t lost_before(const Cycle& cycle, DeviceTime began) const;
   void count_lost(DeviceTime tick);
 
@@ -52,7 +53,7 @@ class MeasurementAssembler {
   std::deque<Arrival> arrivals_;  ///< the last few, oldest first
   std::int64_t received_ = 0;     ///< bytes, since the stream began
   std::optional<Cycle> cycle_;
-  std::optional<std::int64_t> last_begin_;  ///< of the cycle before, in the stream
+  std::optional<std::int64_t> last_begin_;  ///< of the cycle before, where its first byte is or would be
   std::optional<DeviceTime> last_tick_;
   std::int64_t lost_ = 0;
   bool damaged_ = false;           ///< by a line error since the last measurement

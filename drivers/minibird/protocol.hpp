@@ -77,7 +77,8 @@ Bytes reference_frame_sincos_deg(double azimuth, double elevation, double roll);
 /// Puts the prefix that sends command to one unit of a flock: F0 + address up to 14, A0 address up to 126.
 Bytes to_unit(std::uint8_t address, const Bytes& command);
 
-inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kStreamStop = '?', kRun = 'F', kSleep = 'G', kBusReset = '/';
+inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kStreamStop = '?', kRun = 'F', kSleep = 'G', kBusReset = '/',
+                              kXon = 0x11;
 
 /// Parameters of EXAMINE and CHANGE that the driver uses.
 enum Parameter : std::uint8_t {
@@ -86,35 +87,29 @@ enum Parameter : std::uint8_t {
   kCrystal = 0x02,
   kScale = 0x03,
   kFilters = 0x04,
+  kAlphaMin = 0x05,
   kRateCount = 0x06,
   kRate = 0x07,
+  kDataReady = 0x08,
   kErrorCode = 0x0A,
   kVmTable = 0x0C,
+  kAlphaMax = 0x0D,
+  kSuddenChangeLock = 0x0E,
   kModel = 0x0F,
   kExpandedError = 0x10,
+  kFrameTurnsPosition = 0x11,
   kLineFrequency = 0x14,
   kHemisphere = 0x16,
+  kAngleAlign = 0x17,
+  kReferenceFrame = 0x18,
+  kUnitSerial = 0x19,
+  kSensorSerial = 0x1A,
+  kTransmitterSerial = 0x1B,
   kGroupMode = 0x23,
   kSystemStatus = 0x24,
   kAutoConfigure = 0x32,
 };
 /// Bytes of the reply to EXAMINE in normal addressing; empty for a parameter that has none.
 std::optional<std::size_t> examine_bytes(std::uint8_t parameter);
-
-/// The status word, bit by bit. Sources disagree on bit 12; `asleep` is what to trust.
-struct Status {
-  bool master, initialised, error, host_sync, expanded_addressing, crt_sync, no_sync, factory_test, xoff, asleep,
-      stream;
-  std::uint8_t format_code;
-};
-Status decode_status(std::uint16_t word);
-
-/// A unit's error code in words; nullptr-free: unknown codes say so.
-std::string error_text(std::uint8_t code);
-
-struct UnitStatus {
-  bool accessible, running, has_sensor, extended_range, has_transmitter;
-};
-UnitStatus decode_unit_status(std::uint8_t byte);
 
 }  // namespace birdseye::drivers::minibird

@@ -12,12 +12,13 @@ namespace birdseye::drivers::minibird {
 struct Plausibility {
   double most_speed_mm_s = 2000;
   double most_turn_deg_s = 1000;
-  double most_acceleration_mm_s2 = 30'000;  ///< against the line through the last readings
+  double most_acceleration_mm_s2 = 20'000;  ///< against the line through the last readings
   double slack_mm = 4, slack_deg = 5;       ///< on top of these, for noise
   int step_confirms = 5;                    ///< so many readings in a row after a step, agreeing: it was one after all
   int start_confirms = 1;                   ///< the same at the start and after a gap
-  Duration gap = Duration::from_ms(500);    ///< after so long without a good reading the sensor may be anywhere
-  /// Noise keeps a record from being repeated exactly: after so many that are, it is frozen. 0: no noise is expected.
+  Duration gap = Duration::from_ms(150);    ///< after so long without a good reading the sensor may be anywhere
+  /// Noise keeps a record from being repeated exactly: where there was some, after so many that are it is frozen. 0:
+  /// however often, it is not.
   int frozen_after = 100;
   double frozen_moved_mm = 2;        ///< and at once, where the speed until then would have moved it so far
   double hemisphere_border_mm = 15;  ///< so near the plane through the transmitter, p and -p are not told apart

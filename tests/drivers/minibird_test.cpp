@@ -105,7 +105,9 @@ class Stream {
 MiniBirdSettings quick(int birds) {
   MiniBirdSettings settings;
   settings.birds = birds;
-  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.run_wait = {};
+  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait = settings.run_wait =
+      settings.sleep_wait = {};
+  settings.quiet = Duration::from_ms(3);
   settings.reply_timeout = settings.answer_within = Duration::from_ms(20);
   return settings;
 }
@@ -129,6 +131,8 @@ TEST(MiniBird, StreamsTheTruePosesInEveryFormat) {
     EXPECT_EQ(bird.bird().info().revision_minor, 67);
     EXPECT_EQ(bird.bird().info().crystal_mhz, 40);             // 28 00
     EXPECT_DOUBLE_EQ(bird.bird().info().rate_hz, 103.296875);  // 4C 67
+    // The first after a start waits to be confirmed.
+    EXPECT_EQ(bird.read()->front().birds[0].kind, Doubt::unconfirmed);
     for (int cycle = 0; cycle < 5; ++cycle) {
       const auto read = bird.read();
       ASSERT_TRUE(read);

@@ -7,6 +7,7 @@
 
 #include "calibration/base/units.hpp"
 #include "drivers/minibird/record_parser.hpp"
+#include "drivers/minibird/unit_status.hpp"
 
 namespace birdseye::drivers::minibird {
 namespace {
