@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <ctime>
 #include <utility>
 
 #include "device/birdseyed/camera_thread.hpp"
 #include "device/birdseyed/gpio_thread.hpp"
 #include "device/birdseyed/tracker_thread.hpp"
+#include "drivers/io/clock_discipline.hpp"
 #include "drivers/io/monotonic.hpp"
 
 namespace birdseye::device {
@@ -75,6 +77,19 @@ void Appliance::make_messages(const std::stop_token& stop) {
   }
 }
 
+namespace {
+
+wire::WallClock read_wall_clock() {
+  const auto read = drivers::read_clock_discipline();
+  if (!read) return {};
+  timespec wall{};
+  clock_gettime(CLOCK_REALTIME, &wall);
+  const std::int64_t shift_ns = wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - now().ns;
+  return {true, read->synchronised, read->tai_known, read->max_error.ns, read->est_error.ns, shift_ns, read->source};
+}
+
+}  // namespace
+
 wire::Health Appliance::health(const Core::Counters& before, const Core::Counters& counters, double seconds) {
   const auto sent = server_.take_counters();
   const auto& tracker = counters.tracker;
@@ -98,6 +113,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.tracker_drift_ppm = counters.tracker_drift_ppm;
   health.camera_drift_ppm = counters.camera_drift_ppm;
   health.tracker_time_sigma_ms = counters.tracker_time_sigma_ms;
+  health.clock = read_wall_clock();
   if (recorder_) health.recording = recorder_->text();
   const std::lock_guard lock(told_mutex_);
   health.state = name_of(board_.state());

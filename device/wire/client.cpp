@@ -21,6 +21,10 @@ int remaining_ms(Client::Clock::time_point deadline) {
   return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
 }
 
+HostTime host_now() {
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(Client::Clock::now().time_since_epoch()).count()};
+}
+
 /// A connected socket, or -1.
 int try_connect(const addrinfo& address, Client::Clock::time_point deadline) {
   const int fd = ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -102,8 +106,47 @@ Result<void> Client::subscribe(const Subscription& subscription, Clock::time_poi
   return send(pack(subscription), deadline);
 }
 
+void Client::ask_the_time() {
+  const auto now = Clock::now();
+  if (now < next_question_) return;
+  // Often at first, so that the clocks are soon related; then as often as drift makes it worth while.
+  next_question_ = now + std::chrono::milliseconds(++questions_ < 20 ? 100 : 1000);
+  (void)send(pack(ClockPing{host_now().ns}), now);  // who cannot be asked will be found gone by reading
+}
+
+void Client::take(const ClockPong& pong) {
+  relation_.push({{pong.host_sent_ns}, pong.received, pong.sent, host_now()});
+}
+
+void Client::use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic) {
+  here_ = Discipline{discipline, wall_minus_monotonic};
+}
+
+std::optional<ClockChoice> Client::choose() const {
+  std::optional<Duration> exchange_sigma;
+  if (const auto related = relation_.device_from_host(host_now())) exchange_sigma = related->sigma;
+  if (!here_ || !there_)
+    return exchange_sigma ? std::optional(ClockChoice{ClockChoice::Way::exchange, *exchange_sigma, "by questions"})
+                          : std::nullopt;
+  return choose_clock(exchange_sigma, there_->discipline, here_->discipline);
+}
+
+std::string Client::clock_choice() const {
+  const auto choice = choose();
+  return choice ? choice->reason : "the appliance has not answered yet";
+}
+
+std::optional<RelatedTime<HostTime>> Client::host_from_device(DeviceTime time) const {
+  const auto choice = choose();
+  if (!choice) return std::nullopt;
+  if (choice->way == ClockChoice::Way::exchange) return relation_.host_from_device(time);
+  const Duration shift = there_->wall_minus_monotonic - here_->wall_minus_monotonic;
+  return RelatedTime<HostTime>{{time.ns + shift.ns}, choice->sigma};
+}
+
 Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
   for (;;) {
+    ask_the_time();
     auto whole = fill(kHeaderBytes, deadline);
     if (!whole) return whole.error();
     if (!*whole) return std::optional<Event>();
@@ -117,7 +160,14 @@ Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
     auto told = unpacker_.push(std::span(buffer_).first(size));
     if (!told) return Error{told.error().code, fmt::format("{}: {}", name_, told.error().what)};
     if (!*told) continue;
-    if (auto* event = std::get_if<Event>(&**told)) return std::optional<Event>(std::move(*event));
+    if (const auto* pong = std::get_if<ClockPong>(&**told)) {
+      take(*pong);
+      continue;
+    }
+    auto& event = std::get<Event>(**told);
+    if (const auto* health = std::get_if<Health>(&event); health != nullptr && health->clock.known)
+      there_ = Discipline{health->clock.discipline(), {health->clock.wall_minus_monotonic_ns}};
+    return std::optional<Event>(std::move(event));
   }
 }
 

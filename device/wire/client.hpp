@@ -4,6 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "calibration/time/clock_relation.hpp"
+#include "calibration/time/discipline.hpp"
 #include "device/wire/unpacker.hpp"
 
 namespace birdseye::wire {
@@ -24,16 +26,36 @@ class Client {
   /// Says what this client wants; without it, it gets everything.
   Result<void> subscribe(const Subscription& subscription, Clock::time_point deadline);
 
+  /// The appliance's time on this machine's CLOCK_MONOTONIC, with a sigma: by the narrowest of the questions that
+  /// next() asks it from time to time, or by clocks that a network protocol (PTP, NTP) keeps together at both ends,
+  /// whichever is surer. Empty until there was an answer.
+  [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
+  /// What this machine's kernel says of its clock; without it, only questions count. Monotonic + offset = wall clock.
+  void use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic);
+  /// Why the way that host_from_device() goes was chosen, in words.
+  [[nodiscard]] std::string clock_choice() const;
+
  private:
   Client(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
   Result<void> send(const Packet& packet, Clock::time_point deadline);
   Result<bool> fill(std::size_t size, Clock::time_point deadline);
+  void ask_the_time();
+  void take(const ClockPong& pong);
+  [[nodiscard]] std::optional<ClockChoice> choose() const;
 
   int fd_;
   std::string name_;
   std::vector<std::uint8_t> buffer_;
   std::size_t have_ = 0;
   Unpacker unpacker_;
+  ClockRelation relation_;
+  Clock::time_point next_question_{};
+  int questions_ = 0;
+  struct Discipline {
+    ClockDiscipline discipline;
+    Duration wall_minus_monotonic;
+  };
+  std::optional<Discipline> here_, there_;
 };
 
 }  // namespace birdseye::wire

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "calibration/time/discipline.hpp"
 #include "calibration/time/pose_history.hpp"
 
 /// What the appliance says to hosts, as OpenIGTLink messages (docs/manual/wire.md). Times are of the appliance's clock.
@@ -61,6 +62,17 @@ struct InstrumentHealth {
   std::uint64_t times_lost = 0;
 };
 
+/// What the appliance's kernel says of its clock (PTP, NTP), and how far the wall clock is from the clock of all
+/// stamps.
+struct WallClock {
+  bool known = false, synchronised = false, tai_known = false;
+  std::int64_t max_error_ns = 0, est_error_ns = 0, wall_minus_monotonic_ns = 0;
+  std::string source;
+  [[nodiscard]] ClockDiscipline discipline() const {
+    return {synchronised, {max_error_ns}, {est_error_ns}, tai_known, source};
+  }
+};
+
 struct Health {
   std::string state;  ///< starting, ready, degraded
   std::vector<InstrumentHealth> instruments;
@@ -71,6 +83,7 @@ struct Health {
   std::uint64_t messages_shed = 0, clients = 0, requests_refused = 0;
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   double latency_ms_p99_tracker = 0, latency_ms_p99_frame = 0;  ///< last byte in to last byte out, since the last
+  WallClock clock;
   std::string recording;  ///< the file, or why there is none; empty: not asked for
 };
 

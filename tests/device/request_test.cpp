@@ -184,5 +184,31 @@ TEST(Server, ASubscriptionLeavesFramesAway) {
   EXPECT_LT(frames, 490);
 }
 
+TEST(Client, RelatesTheAppliancesClockToItsOwn) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  EXPECT_FALSE(client->host_from_device(monotonic_now()));
+  while (!client->host_from_device(monotonic_now())) {
+    const auto event = client->next(Clock::now() + milliseconds(20));
+    ASSERT_TRUE(event) << event.error().what;
+  }
+  // Both ends are this machine's clock: what the exchange says must be within what it claims.
+  const DeviceTime now = monotonic_now();
+  const auto related = *client->host_from_device(now);
+  EXPECT_LT(std::abs(related.time.ns - now.ns), 4 * related.sigma.ns);
+  EXPECT_EQ(client->clock_choice(), "by questions");
+  // Clocks that a protocol keeps together to a few microseconds at both ends are surer than that.
+  client->use_discipline({true, {20'000}, {1'000}, true, "here"}, {1'700'000'000'000'000'000});
+  Health health;
+  health.clock = {true, true, true, 20'000, 1'000, 1'700'000'000'000'050'000, "there"};
+  server->publish(pack(health, {1}));
+  for (bool told = false; !told;) {
+    const auto event = client->next(Clock::now() + seconds(5));
+    ASSERT_TRUE(event && *event);
+    told = std::holds_alternative<Health>(**event);
+  }
+  EXPECT_EQ(client->host_from_device({1'000'000})->time.ns, 1'050'000);
+}
+
 }  // namespace
 }  // namespace birdseye::wire
