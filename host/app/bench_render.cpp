@@ -274,6 +274,7 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<Options>();
   CLI::App& bench = *app.add_subcommand("bench", "measure speed on this machine");
   bench.require_subcommand(1);
+  add_bench_device(bench, status);
   add_bench_similarity(bench, status);
   add_bench_register(bench, status);
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");

@@ -33,6 +33,7 @@ class ChildProcess {
   /// The exit code (128 + signal if it was killed); empty if it still runs at the deadline.
   std::optional<int> wait(std::chrono::steady_clock::time_point deadline);
   void stop();
+  [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:
   ChildProcess(pid_t pid, int fd, std::string name) : pid_(pid), fd_(fd), name_(std::move(name)) {}

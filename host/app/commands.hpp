@@ -20,6 +20,7 @@ struct CommandStatus {
 
 // One file per command: each adds its subcommand, whose callback sets status.
 void add_bench(CLI::App& app, CommandStatus& status);
+void add_bench_device(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_demo(CLI::App& app, CommandStatus& status);

@@ -1,14 +1,13 @@
 #include "host/app/simulated_cart.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "host/app/interrupt.hpp"
+#include "host/app/local_programs.hpp"
 #include "host/app/write_files.hpp"
 
 namespace birdseye::host {
@@ -16,28 +15,6 @@ namespace birdseye::host {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// A program that is installed, or built, beside this one.
-std::string beside_us(const std::string& name) {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path candidate = self.parent_path() / name;
-  return std::filesystem::exists(candidate, error) ? candidate.string() : name;
-}
-
-/// A TCP port that is free now on the loopback interface.
-Result<int> free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  const bool bound = fd >= 0 && ::bind(fd, reinterpret_cast<sockaddr*>(&address), size) == 0 &&
-                     ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  if (fd >= 0) ::close(fd);
-  if (!bound) return Error{Errc::in_use, "127.0.0.1: no TCP port is free", errno};
-  return static_cast<int>(ntohs(address.sin_port));
-}
 
 Result<CartSheet> read_sheet(const std::filesystem::path& path) {
   std::ifstream in(path);
@@ -64,6 +41,7 @@ baud = 115200
 birds = 2
 names = ["scope", "pointer"]
 rate_hz = 103.3
+frozen_after = 0
 hemisphere = "forward"
 record = "position_matrix"
 delay_ms = 7.5
@@ -82,6 +60,7 @@ port = {}
 max_age_ms = 100
 max_gap_ms = 60
 smoothing_ms = 40
+wait_ms = 90
 )",
                                       tty.string(), socket.string(), settings.width_px, settings.height_px,
                                       settings.video_rate_hz, port));
