@@ -7,7 +7,10 @@
 #include <string>
 
 #include "calibration/base/program.hpp"
+#include "drivers/io/monotonic.hpp"
 #include "hw-sim/case/registration_case.hpp"
+#include "hw-sim/ftdi/ft232r_program.hpp"
+#include "hw-sim/ftdi/tracker_on_line.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
 
@@ -69,6 +72,22 @@ int main(int argc, char** argv) {
     std::signal(SIGTERM, [](int) { g_stop = true; });
     std::signal(SIGINT, [](int) { g_stop = true; });
     take(hw_sim::run_cart(cart, g_stop));
+  });
+
+  hw_sim::Ft232rProgram adapter;
+  hw_sim::TrackerOnLine::Settings behind;
+  CLI::App& ft232r = *app.add_subcommand("ft232r", "a USB adapter with a tracker behind it, for QEMU's usb-redir");
+  ft232r.add_option("--unix", adapter.socket, "the socket of QEMU's device")->required();
+  ft232r.add_option("--serial", adapter.chip.serial, "the adapter's serial number");
+  ft232r.add_option("--receive-fifo", adapter.chip.receive_fifo_bytes,
+                    "bytes that wait for the host (the chip's 128); more forgives a host that stalls")
+      ->check(CLI::Range(64, 65536));
+  ft232r.add_option("--birds", behind.unit.birds, "in the flock")->check(CLI::Range(1, 14));
+  ft232r.callback([&] {
+    std::signal(SIGTERM, [](int) { g_stop = true; });
+    std::signal(SIGINT, [](int) { g_stop = true; });
+    hw_sim::TrackerOnLine tracker(behind, drivers::now());
+    take(hw_sim::run_ft232r(adapter, tracker, g_stop));
   });
 
   hw_sim::CaseSettings registration;
