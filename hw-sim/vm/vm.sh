@@ -19,7 +19,7 @@ if [ "$(id -u)" = 0 ]; then
   groups=--clear-groups
   if [ $accel = kvm ]; then groups=--groups=$(stat -c %g /dev/kvm); fi
   drop=(setpriv --reuid=nobody --regid=nogroup "$groups" --)
-  if "${drop[@]}" test -r "$PWD/$script" -a -x build/release/bin -a -r build/vm/initrd.cpio 2>/dev/null; then
+  if "${drop[@]}" test -r "$PWD/$script" -a -r build/vm/initrd.cpio 2>/dev/null; then
     as=("${drop[@]}")
     chown nobody "$out"
   else
@@ -33,7 +33,10 @@ timeout --kill-after=5 "${BIRDSEYE_VM_LIMIT_S:-120}" "${as[@]}" qemu-system-x86_
   -append "console=ttyS0 panic=-1 quiet nokaslr mitigations=off birdseye.tree=$PWD birdseye.script=$script" \
   -serial "file:$out/console.log" \
   -virtfs local,path=/,mount_tag=root,security_model=none,readonly=on,multidevs=remap \
-  -virtfs "local,path=$out,mount_tag=out,security_model=none,multidevs=remap" "$@" || status=$?
+  -virtfs "local,path=$out,mount_tag=out,security_model=none,multidevs=remap" "$@" &
+machine=$!
+trap 'kill $machine' TERM INT
+wait $machine || status=$?
 if [ -f "$out/code" ]; then exit "$(cat "$out/code")"; fi
 if [ $status = 0 ] || [ $status = 124 ] || [ $status = 137 ]; then exit 124; fi
 exit 125
