@@ -30,10 +30,24 @@ std::optional<Bytes> descriptor(std::uint8_t type, std::uint8_t index, const Ft2
                  1,    2,       3,    1};                // its strings; one configuration
   }
   if (type == kConfiguration && index == 0) {
-    return Bytes{9, kConfiguration, 32, 0, 1, 1, 0, 0xA0, 45,  // powered by the bus, 90 mA
-                 9, 4,    0,    0, 2,  0xFF, 0xFF, 0xFF, 2,    // one interface of the vendor's own kind
-                 7, 5,    0x81, 2, 64, 0,    0,                // bulk in
-                 7, 5,    0x02, 2, 64, 0,    0};               // bulk out
+    return Bytes{9,    kConfiguration,
+                 32,   0,
+                 1,    1,
+                 0,    0xA0,
+                 45,  // powered by the bus, 90 mA
+                 9,    4,
+                 0,    0,
+                 2,    0xFF,
+                 0xFF, 0xFF,
+                 2,  // one interface of the vendor's own kind
+                 7,    5,
+                 0x81, 2,
+                 64,   0,
+                 0,  // bulk in
+                 7,    5,
+                 0x02, 2,
+                 64,   0,
+                 0};  // bulk out
   }
   if (type == kString && index == 0) return Bytes{4, kString, 0x09, 0x04};  // there is English
   if (type == kString && index == 1) return string_descriptor(settings.manufacturer);

@@ -40,8 +40,8 @@ class Ft232r {
   /// Power on: all that the host has set is lost.
   void power_up(DeviceTime now);
 
-  /// A control transfer without its data, which no request of the chip has on its way out. The bytes to return (none for
-  /// an out transfer), or nothing where the chip refuses with a stall.
+  /// A control transfer without its data, which no request of the chip has on its way out. The bytes to return (none
+  /// for an out transfer), or nothing where the chip refuses with a stall.
   std::optional<std::vector<std::uint8_t>> control(const UsbSetup& setup, DeviceTime now);
   /// Bytes for the line, as many as there is room for; how many that was.
   std::size_t take(std::span<const std::uint8_t> bytes, DeviceTime now);

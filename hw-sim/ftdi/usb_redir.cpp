@@ -152,7 +152,8 @@ void UsbRedir::announce(DeviceTime now) {
   configuration_ = 0;
   Bytes interfaces;
   put(interfaces, 1, 4);
-  for (const std::uint8_t first : std::array<std::uint8_t, 4>{0x00, 0xFF, 0xFF, 0xFF}) {  // number, class, subclass, protocol
+  for (const std::uint8_t first :
+       std::array<std::uint8_t, 4>{0x00, 0xFF, 0xFF, 0xFF}) {  // number, class, subclass, protocol
     interfaces.push_back(first);
     interfaces.resize(interfaces.size() + 31, 0);
   }

@@ -11,8 +11,8 @@
 
 namespace birdseye::hw_sim {
 
-/// One connection to QEMU's usb-redir device, in which the chip is plugged in: the usbredir protocol, bytes in and bytes
-/// out. To QEMU this is the side with the real USB. No clock, no socket.
+/// One connection to QEMU's usb-redir device, in which the chip is plugged in: the usbredir protocol, bytes in and
+/// bytes out. To QEMU this is the side with the real USB. No clock, no socket.
 class UsbRedir {
  public:
   explicit UsbRedir(Ft232r& chip);

@@ -15,6 +15,8 @@ Cart::Cart(Machine& machine, const std::string& name, const std::string& config)
   std::ofstream(machine.out() / (name + ".toml"))
       << config << fmt::format("[wire]\nbind = \"0.0.0.0\"\nport = {}\n", Machine::kGuestPort);
   machine.must(fmt::format("start {0} {1}/birdseyed --config /run/out/{0}.toml", name, BIRDSEYE_BIN));
+  (void)some<wire::Birds>("first poses", 1);
+  (void)some<wire::VideoFrame>("first frame", 1);
 }
 
 Cart::~Cart() {
@@ -38,7 +40,9 @@ std::optional<wire::Event> Cart::any(Clock::time_point deadline) {
 }
 
 void Cart::complain(const std::string& what) {
-  ADD_FAILURE() << "no " << what << "; " << name_ << " says:\n" << machine_.run("tail -5 /run/out/" + name_ + ".log").output;
+  const Answer log = machine_.run("tail -5 /run/out/" + name_ + ".log");
+  ADD_FAILURE() << "no " << what << "; " << name_ << " says:\n" << log.output;
+  gone_ = log.code != 0 || machine_.run("[ -e /run/started/" + name_ + ".code ]").code == 0;
 }
 
 }  // namespace birdseye::vm

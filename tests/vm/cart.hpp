@@ -14,7 +14,7 @@ namespace birdseye::vm {
 /// birdseyed in the guest, and a host's end of its wire out here.
 class Cart {
  public:
-  /// config: the daemon's TOML but for [wire].
+  /// config: the daemon's TOML but for [wire]. Comes back once poses and frames do.
   Cart(Machine& machine, const std::string& name, const std::string& config);
   ~Cart();
   Cart(const Cart&) = delete;
@@ -24,7 +24,7 @@ class Cart {
   template <typename Kind, typename Wanted>
   std::optional<Kind> next(const std::string& what, Wanted&& wanted,
                            std::chrono::seconds patience = std::chrono::seconds(15)) {
-    const auto deadline = Clock::now() + patience;
+    const auto deadline = gone_ ? Clock::now() : Clock::now() + patience;
     while (auto event = any(deadline)) {
       if (const Kind* const kind = std::get_if<Kind>(&*event); kind != nullptr && wanted(*kind)) return *kind;
     }
@@ -41,6 +41,7 @@ class Cart {
     }
     return found;
   }
+
  private:
   std::optional<wire::Event> any(Clock::time_point deadline);
   void complain(const std::string& what);
@@ -48,6 +49,7 @@ class Cart {
   Machine& machine_;
   std::string name_;
   std::unique_ptr<wire::Client> client_;
+  bool gone_ = false;  ///< nothing is worth waiting for
 };
 
 }  // namespace birdseye::vm

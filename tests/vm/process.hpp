@@ -11,7 +11,8 @@ namespace birdseye::vm {
 
 using Clock = std::chrono::steady_clock;
 
-/// A program of its own that takes lines and gives lines. Ends with this object, or with this program however that ends.
+/// A program of its own that takes lines and gives lines. Ends with this object, or with this program however that
+/// ends.
 class Process {
  public:
   /// log: where its standard error goes.

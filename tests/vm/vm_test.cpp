@@ -37,8 +37,7 @@ double angle_of(const Birds& birds) {
 void expect_poses_that_tell_the_time(const std::vector<Birds>& all) {
   for (std::size_t i = 1; i < all.size(); ++i) {
     const double passed_s = (all[i].acquired - all[0].acquired).seconds();
-    const double late_s = std::remainder(
-        passed_s - (angle_of(all[i]) - angle_of(all[0])) / std::numbers::pi, 2.0);
+    const double late_s = std::remainder(passed_s - (angle_of(all[i]) - angle_of(all[0])) / std::numbers::pi, 2.0);
     EXPECT_LT(std::abs(late_s), 0.03) << "measurement " << i;
   }
 }
@@ -86,9 +85,8 @@ TEST_F(ThroughKernelTty, PosesComeWithTheirTime) {
 }
 
 TEST_F(ThroughKernelTty, FramesComeWithKernelStampsAndPoses) {
-  (void)cart().next<VideoFrame>("frame with a pose", [](const VideoFrame& f) {
-    return f.info.pose.kind == PoseKind::interpolated;
-  });
+  (void)cart().next<VideoFrame>("frame with a pose",
+                                [](const VideoFrame& f) { return f.info.pose.kind == PoseKind::interpolated; });
   const auto frames = cart().some<VideoFrame>("frames", 25);
   ASSERT_EQ(frames.size(), 25U);
   for (std::size_t i = 1; i < frames.size(); ++i) {
@@ -115,9 +113,8 @@ TEST_F(ThroughKernelTty, AnAdapterPulledOutIsMissedAndFoundAgainWhileFramesGoOn)
 TEST_F(ThroughKernelTty, ACameraPulledOutIsMissedAndFoundAgainWhilePosesGoOn) {
   // vivid fails every call from now on; its node goes and returns once nobody holds it.
   g_machine->must("v4l2-ctl -d /dev/video0 -c disconnect=1");
-  EXPECT_TRUE(cart().next<Status>("word of the camera's loss", [](const Status& s) {
-    return !s.ok && s.text.find("video0") != std::string::npos;
-  }));
+  EXPECT_TRUE(cart().next<Status>("word of the camera's loss",
+                                  [](const Status& s) { return !s.ok && s.text.find("video0") != std::string::npos; }));
   g_machine->must("until modprobe -r vivid; do sleep 0.1; done");
   EXPECT_EQ(cart().some<Birds>("poses", 50).size(), 50U);
   g_machine->must("start_vivid");
