@@ -1,34 +1,12 @@
-#include <fmt/core.h>
-
 #include <CLI/CLI.hpp>
-#include <atomic>
-#include <csignal>
-#include <cstdio>
 #include <string>
 
 #include "calibration/base/program.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "hw-sim/app/instruments.hpp"
+#include "hw-sim/app/stop_signal.hpp"
 #include "hw-sim/case/registration_case.hpp"
-#include "hw-sim/ftdi/ft232r_program.hpp"
-#include "hw-sim/ftdi/tracker_on_line.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
-
-namespace {
-
-std::atomic<bool> g_stop = false;
-
-birdseye::Result<void> parse_size(const std::string& text, int& width_px, int& height_px) {
-  int read = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%n", &width_px, &height_px, &read) == 2 &&
-      static_cast<std::size_t>(read) == text.size() && width_px >= 64 && height_px >= 64 && width_px <= 4096 &&
-      height_px <= 4096) {
-    return {};
-  }
-  return birdseye::Error{birdseye::Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"};
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   using namespace birdseye;
@@ -65,30 +43,16 @@ int main(int argc, char** argv) {
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {
-    if (const auto parsed = parse_size(size, cart.width_px, cart.height_px); !parsed) {
+    if (const auto parsed = hw_sim::parse_size(size, cart.width_px, cart.height_px); !parsed) {
       take(parsed);
       return;
     }
-    std::signal(SIGTERM, [](int) { g_stop = true; });
-    std::signal(SIGINT, [](int) { g_stop = true; });
-    take(hw_sim::run_cart(cart, g_stop));
+    take(hw_sim::run_cart(cart, hw_sim::stop_on_signal()));
   });
 
-  hw_sim::Ft232rProgram adapter;
-  hw_sim::TrackerOnLine::Settings behind;
-  CLI::App& ft232r = *app.add_subcommand("ft232r", "a USB adapter with a tracker behind it, for QEMU's usb-redir");
-  ft232r.add_option("--unix", adapter.socket, "the socket of QEMU's device")->required();
-  ft232r.add_option("--serial", adapter.chip.serial, "the adapter's serial number");
-  ft232r.add_option("--receive-fifo", adapter.chip.receive_fifo_bytes,
-                    "bytes that wait for the host (the chip's 128); more forgives a host that stalls")
-      ->check(CLI::Range(64, 65536));
-  ft232r.add_option("--birds", behind.unit.birds, "in the flock")->check(CLI::Range(1, 14));
-  ft232r.callback([&] {
-    std::signal(SIGTERM, [](int) { g_stop = true; });
-    std::signal(SIGINT, [](int) { g_stop = true; });
-    hw_sim::TrackerOnLine tracker(behind, drivers::now());
-    take(hw_sim::run_ft232r(adapter, tracker, g_stop));
-  });
+  hw_sim::add_minibird_command(app, take);
+  hw_sim::add_ft232r_command(app, take);
+  hw_sim::add_camera_command(app, take);
 
   hw_sim::CaseSettings registration;
   std::string dof = "3";
@@ -115,7 +79,7 @@ int main(int argc, char** argv) {
   make_case.add_flag("--plain-background", registration.plain_background, "black in place of the cavity's wall");
   make_case.callback([&] {
     const auto inner = hw_sim::parse_dof(dof);
-    const auto parsed = parse_size(size, registration.width_px, registration.height_px);
+    const auto parsed = hw_sim::parse_size(size, registration.width_px, registration.height_px);
     if (!inner || !parsed) {
       take(inner ? parsed : Result<void>(inner.error()));
       return;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/embree_scene.hpp"
 #include "hw-sim/camera/solid_noise.hpp"
 #include "hw-sim/phantom/grid.hpp"

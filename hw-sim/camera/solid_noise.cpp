@@ -1,6 +1,6 @@
 #include "hw-sim/camera/solid_noise.hpp"
 
-#include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/base/hashed.hpp"
 
 namespace birdseye::hw_sim {
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "hw-sim/base/hashed.hpp"
+
 namespace birdseye::hw_sim {
 
 namespace {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/base/hashed.hpp"
 
 namespace birdseye::hw_sim {
 

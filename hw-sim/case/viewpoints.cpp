@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "calibration/base/units.hpp"
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/look_at.hpp"
 
 namespace birdseye::hw_sim {

@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "drivers/io/monotonic.hpp"
 #include "drivers/io/unique_fd.hpp"
+#include "hw-sim/base/announce.hpp"
 #include "hw-sim/ftdi/usb_redir.hpp"
+#include "hw-sim/minibird/motion.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -26,8 +26,7 @@ constexpr Duration kLongestWait = Duration::from_ms(50);
 
 void tell(nlohmann::json event) {
   event["monotonic_ns"] = now().ns;
-  fmt::print("{}\n", event.dump());
-  std::fflush(stdout);
+  announce(event);
 }
 
 /// Empty while there is nobody.
@@ -78,12 +77,12 @@ class Commands {
 
 class Bench {
  public:
-  Bench(const Ft232rProgram& settings, SerialInstrument& instrument)
-      : settings_(settings), instrument_(instrument), chip_(settings.chip) {}
+  explicit Bench(const Ft232rProgram& program)
+      : program_(program), chip_(chip_of(program)), tracker_(tracker_of(program)) {}
 
   Result<void> run(const std::atomic<bool>& stop) {
     while (!stop) {
-      auto fd = connect(settings_.socket);
+      auto fd = connect(program_.socket);
       if (!fd) return fd.error();
       if (!*fd) {
         wait(-1, now() + kLongestWait);
@@ -91,7 +90,7 @@ class Bench {
       }
       UsbRedir usb(chip_);
       usb_ = &usb;
-      if (unplugged_) usb.unplug();
+      follow_cable();
       serve(fd->get(), stop);
       usb_ = nullptr;
     }
@@ -125,21 +124,29 @@ class Bench {
   }
 
   void move_bytes(DeviceTime time) {
-    if (const auto sent = chip_.sent(time); !sent.empty()) instrument_.receive(sent, time);
-    if (const auto bytes = instrument_.send(time); !bytes.empty()) chip_.receive(bytes, time);
+    if (const auto sent = chip_.sent(time); !sent.empty()) tracker_.receive(sent, time.ns);
+    for (const Delivery& delivery : tracker_.advance(time.ns)) {
+      if (delivery.line_error) chip_.damage(LineError::framing);
+      chip_.receive(delivery.bytes, {delivery.due_ns});
+    }
+    for (const FaultEvent& event : tracker_.take_events()) announce(event);
+    if (tracker_.plugged() == pulled_by_script_) {
+      pulled_by_script_ = !tracker_.plugged();
+      follow_cable();
+    }
   }
 
   DeviceTime next_event(DeviceTime time) const {
-    DeviceTime next = std::min(time + kLongestWait, instrument_.next_send());
+    DeviceTime next = std::min(time + kLongestWait, DeviceTime{tracker_.next_ns()});
     if (const auto sent = chip_.next_sent()) next = std::min(next, *sent);
     if (const auto due = usb_->next_event()) next = std::min(next, *due);
     return next;
   }
 
-  /// RTS is wired to the instrument's reset.
+  /// RTS is wired to the tracker's reset.
   void watch_lines() {
     if (chip_.rts() == rts_ && chip_.dtr() == dtr_) return;
-    if (chip_.rts() != rts_) instrument_.set_reset(chip_.rts(), now());
+    if (chip_.rts() != rts_) tracker_.set_reset(chip_.rts(), now().ns);
     rts_ = chip_.rts();
     dtr_ = chip_.dtr();
     tell({{"event", "lines"}, {"rts", rts_}, {"dtr", dtr_}});
@@ -173,10 +180,14 @@ class Bench {
       tell({{"event", "unknown"}, {"command", command}});
       return;
     }
-    unplugged_ = command == "unplug";
-    tell({{"event", "fault"}, {"name", "unplug"}, {"phase", unplugged_ ? "begin" : "end"}});
+    pulled_by_hand_ = command == "unplug";
+    tell({{"event", "fault"}, {"name", "unplug"}, {"phase", pulled_by_hand_ ? "begin" : "end"}});
+    follow_cable();
+  }
+
+  void follow_cable() {
     if (usb_ == nullptr) return;
-    if (unplugged_) {
+    if (pulled_by_hand_ || pulled_by_script_) {
       usb_->unplug();
     } else {
       usb_->plug(now());
@@ -184,18 +195,30 @@ class Bench {
     }
   }
 
-  const Ft232rProgram& settings_;
-  SerialInstrument& instrument_;
+  static Ft232rSettings chip_of(const Ft232rProgram& program) {
+    Ft232rSettings chip = program.chip;
+    chip.line_baud = program.tracker.baud;
+    return chip;
+  }
+  static TrackerScript tracker_of(const Ft232rProgram& program) {
+    TrackerSettings settings = program.tracker;
+    settings.baud = 1'000'000'000;  // its bytes take their time in the chip
+    const std::int64_t now_ns = now().ns;
+    return {settings, program.motion == "still" ? still_motion() : circle_motion({}, now_ns), now_ns};
+  }
+
+  const Ft232rProgram& program_;
   Ft232r chip_;
+  TrackerScript tracker_;
   UsbRedir* usb_ = nullptr;
   Commands commands_;
-  bool unplugged_ = false, rts_ = false, dtr_ = false;
+  bool pulled_by_hand_ = false, pulled_by_script_ = false, rts_ = false, dtr_ = false;
 };
 
 }  // namespace
 
-Result<void> run_ft232r(const Ft232rProgram& settings, SerialInstrument& instrument, const std::atomic<bool>& stop) {
-  return Bench(settings, instrument).run(stop);
+Result<void> run_ft232r(const Ft232rProgram& program, const std::atomic<bool>& stop) {
+  return Bench(program).run(stop);
 }
 
 }  // namespace birdseye::hw_sim

@@ -22,6 +22,8 @@ class PseudoTerminal {
   std::vector<std::uint8_t> read();
   /// Sends bytes; what the terminal's buffer cannot take is lost, as on a real line with nobody listening.
   void write(std::span<const std::uint8_t> bytes);
+  /// For poll(): readable when the host has sent something.
+  [[nodiscard]] int fd() const { return ours_; }
 
  private:
   PseudoTerminal(int ours, int theirs, std::filesystem::path link)

@@ -8,17 +8,6 @@
 
 namespace birdseye::hw_sim {
 
-namespace {
-
-std::uint64_t splitmix64(std::uint64_t x) {
-  x += 0x9E3779B97F4A7C15ULL;
-  x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-  x = (x ^ (x >> 27U)) * 0x94D049BB133111EBULL;
-  return x ^ (x >> 31U);
-}
-
-}  // namespace
-
 Grid Grid::around(const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm, double spacing_mm) {
   Grid grid;
   grid.origin_mm = low_mm;
@@ -89,22 +78,6 @@ Eigen::Vector3d march_to_level(const Field& field, double level, const Eigen::Ve
     }
   }
   return start_mm + length_mm * direction;
-}
-
-double hashed_uniform(std::uint64_t seed, std::uint64_t key) {
-  return static_cast<double>(splitmix64(splitmix64(seed) ^ key) >> 11U) * 0x1.0p-53;
-}
-
-double hashed_normal(std::uint64_t seed, std::uint64_t key) {
-  double sum = 0;
-  const std::uint64_t base = splitmix64(splitmix64(seed) ^ key);
-  for (std::uint64_t i = 0; i < 4; ++i) {
-    const std::uint64_t word = splitmix64(base + i);
-    for (unsigned shift = 0; shift < 63; shift += 21) {
-      sum += static_cast<double>((word >> shift) & 0x1FFFFFU) / static_cast<double>(0x200000U);
-    }
-  }
-  return sum - 6.0;
 }
 
 }  // namespace birdseye::hw_sim

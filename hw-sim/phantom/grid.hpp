@@ -50,9 +50,4 @@ Eigen::Vector3d gradient(const Field& field, const Eigen::Vector3d& point_mm, do
 Eigen::Vector3d march_to_level(const Field& field, double level, const Eigen::Vector3d& start_mm,
                                const Eigen::Vector3d& direction, double length_mm, double step_mm = 1.0);
 
-/// A number in [0, 1) from a key: the same on every machine and in any order of evaluation.
-double hashed_uniform(std::uint64_t seed, std::uint64_t key);
-/// Near-normal, mean 0, standard deviation 1 (sum of twelve uniforms).
-double hashed_normal(std::uint64_t seed, std::uint64_t key);
-
 }  // namespace birdseye::hw_sim

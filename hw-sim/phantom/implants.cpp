@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 
 namespace birdseye::hw_sim {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/phantom/shapes.hpp"
 
 namespace birdseye::hw_sim {

@@ -2,22 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "drivers/io/monotonic.hpp"
+#include "hw-sim/base/announce.hpp"
+#include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/world/frame_camera.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
-
-void announce(const nlohmann::json& event) {
-  fmt::print("{}\n", event.dump());
-  std::fflush(stdout);
-}
 
 /// What an operator knows: the board, the pointer, how many markers there are, how long it takes.
 nlohmann::json sheet_of(const World& world) {
@@ -68,6 +65,25 @@ std::string frames_csv(const World& world, double rate_hz) {
   return csv;
 }
 
+/// The flock of two, scope and pointer. Before zero_ns is set, and until then, the world stands still.
+TrackerScript tracker_of(const CartSettings& settings, const World& world, const std::atomic<std::int64_t>& zero_ns) {
+  TrackerSettings tracker;
+  tracker.unit.birds = 2;
+  tracker.noise = settings.noise;
+  tracker.seed = settings.seed;
+  const Motion motion = [&world, &zero_ns](std::size_t bird, std::int64_t at_ns) -> BirdPose {
+    const std::int64_t zero = zero_ns;
+    const double world_s = zero == 0 ? 0 : std::max(0.0, static_cast<double>(at_ns - zero) * 1e-9);
+    if (bird == 0) {
+      const auto scope = world.tracker_from_sensor(world_s);
+      return {scope.rotation(), scope.translation()};
+    }
+    const auto pointer = world.tracker_from_pointer(world_s);
+    return {pointer.rotation(), pointer.translation()};
+  };
+  return TrackerScript(tracker, motion, drivers::now().ns);
+}
+
 }  // namespace
 
 Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& stop) {
@@ -92,7 +108,7 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
     if (!written) return written.error();
   }
 
-  auto terminal = PseudoTerminal::open(settings.tty);
+  auto terminal = open_terminal(settings.tty);
   if (!terminal) return std::move(terminal).error();
   FrameCamera::Settings camera_settings;
   camera_settings.socket = settings.socket;
@@ -100,12 +116,14 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   camera_settings.rate_hz = settings.rate_hz;
   const auto camera = FrameCamera::listen(camera_settings, *world, **laparoscope);
   if (!camera) return camera.error();
-  SimulatedTracker tracker(std::move(*terminal), *world, settings.noise, settings.seed);
+  std::atomic<std::int64_t> world_zero_ns = 0;
+  TrackerLoop tracker(*std::move(terminal), tracker_of(settings, *world, world_zero_ns), {});
   announce({{"event", "ready"}});
 
   while (!stop && !(tracker.streaming() && (*camera)->ready())) drivers::sleep_until({drivers::now().ns + 10'000'000});
   const std::int64_t zero_ns = drivers::now().ns + 1'000'000'000;
-  tracker.start(zero_ns);
+  world_zero_ns = zero_ns;
+  tracker.align(zero_ns);
   (*camera)->start(zero_ns);
   for (const Stage& stage : world->stages()) {
     const std::int64_t begins_ns = zero_ns + static_cast<std::int64_t>(stage.begins_s * 1e9);

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "calibration/base/result.hpp"
-#include "hw-sim/world/tracker.hpp"
+#include "hw-sim/minibird/tracker_script.hpp"
 
 namespace birdseye::hw_sim {
 

@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "calibration/base/units.hpp"
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/look_at.hpp"
-#include "hw-sim/phantom/grid.hpp"
 #include "hw-sim/phantom/implants.hpp"
 
 namespace birdseye::hw_sim {

@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "calibration/geometry/camera_model.hpp"
+#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/case/landmarks.hpp"
 #include "hw-sim/case/subject.hpp"
 #include "hw-sim/case/tissue_map.hpp"

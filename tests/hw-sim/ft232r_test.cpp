@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "hw-sim/ftdi/descriptors.hpp"
-#include "hw-sim/ftdi/tracker_on_line.hpp"
 
 namespace birdseye::hw_sim {
 namespace {
@@ -271,25 +270,6 @@ TEST(Ft232r, AtTheWrongSpeedNeitherUnderstandsTheOther) {
   const auto packet = chip.packet(after_ms(7));
   EXPECT_EQ(packet->at(1), 0x68);
   EXPECT_NE(packet->at(2), 0x55);
-}
-
-TEST(TrackerOnLine, ResetSilencesItAndTakesItsSettings) {
-  TrackerOnLine tracker({}, kStart);
-  const auto say = [&](const Bytes& bytes, double ms) {
-    tracker.receive(bytes, after_ms(ms));
-    return tracker.send(after_ms(ms));
-  };
-  EXPECT_TRUE(say({'Z', 'B'}, 100).empty()) << "it has not started yet";
-  EXPECT_TRUE(say({'O', 1}, 499).empty());
-  EXPECT_THAT(say({'O', 1}, 600), ElementsAre(3, 0x43));
-  tracker.receive(Bytes{'V', '@'}, after_ms(600));
-  EXPECT_EQ(tracker.send(after_ms(700)).size() % 6, 0U);
-  tracker.set_reset(true, after_ms(700));
-  EXPECT_TRUE(say({'O', 1}, 1700).empty());
-  tracker.set_reset(false, after_ms(1700));
-  EXPECT_TRUE(say({'O', 1}, 2100).empty());
-  EXPECT_THAT(say({'O', 1}, 2300), ElementsAre(3, 0x43));
-  EXPECT_TRUE(say({}, 2500).empty()) << "it no longer streams";
 }
 
 }  // namespace

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/faults/fault.hpp"
+
+namespace birdseye::hw_sim {
+
+/// One JSON line on standard output, at once.
+void announce(const nlohmann::json& event);
+void announce(const FaultEvent& event);
+/// Replaces the file as a whole, so that whoever reads it never meets half of it.
+Result<void> replace_json(const std::filesystem::path& path, const nlohmann::json& json);
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace birdseye::hw_sim {
+
+/// Every fault that a script can name. Some are a tracker's, some a camera's, some either's
+/// (docs/manual/simulated-minibird.md).
+enum class FaultKind {
+  drop_byte,
+  duplicate_byte,
+  corrupt_byte,
+  wrong_phase_bit,
+  line_noise,
+  stuck_stream,
+  frozen_pose,
+  saturated,
+  zero_matrix,
+  hemisphere_flip,
+  metal_distortion,
+  power_cycle,
+  drift_step,
+  lost_record,
+  unplug,
+  clock_step,
+  drop_frames,
+  sequence_gap,
+  silence,
+  late_frames,
+  duplicate_frames,
+  garbage,
+  size_change,
+  torn_frame,
+};
+
+std::string_view fault_name(FaultKind kind);
+
+enum class FaultTarget { tracker, camera };
+
+/// One fault of a script. values: its parameters, each of those that the kind has, given or by default.
+struct Fault {
+  FaultKind kind = FaultKind::drop_byte;
+  double at_s = 0;              ///< after the start of streaming
+  std::optional<double> for_s;  ///< empty: once, or from then on, as the kind has it
+  std::map<std::string, double, std::less<>> values;
+  [[nodiscard]] double value(std::string_view name) const;
+};
+
+/// A fault has begun or ended.
+struct FaultEvent {
+  FaultKind kind;
+  FaultTarget target;
+  bool begin;
+  std::int64_t at_ns;  ///< on the clock of whoever drives the timeline
+};
+
+/// Which faults of a script hold at a time. Steps forward only.
+class FaultTimeline {
+ public:
+  FaultTimeline() = default;
+  FaultTimeline(std::vector<Fault> faults, FaultTarget target);
+
+  /// The script's second 0. Before it is known nothing begins; once known it stays.
+  void begin(std::int64_t zero_ns);
+  [[nodiscard]] bool begun() const { return zero_ns_.has_value(); }
+  void advance(std::int64_t now_ns);
+  /// The fault of this kind that holds now, the first of the script's where several do; null where none does.
+  [[nodiscard]] const Fault* active(FaultKind kind) const;
+  /// A fault that happens once has happened.
+  void done(FaultKind kind, std::int64_t now_ns);
+  /// When a fault begins or ends next.
+  [[nodiscard]] std::optional<std::int64_t> next_change_ns() const;
+  /// Begins and ends since the last call, in their order.
+  std::vector<FaultEvent> take_events();
+
+ private:
+  enum class State { waiting, active, over };
+  struct Entry {
+    Fault fault;
+    State state = State::waiting;
+  };
+  [[nodiscard]] std::int64_t begins_ns(const Fault& fault) const;
+  [[nodiscard]] std::optional<std::int64_t> ends_ns(const Fault& fault) const;
+
+  std::vector<Entry> entries_;
+  FaultTarget target_ = FaultTarget::tracker;
+  std::optional<std::int64_t> zero_ns_;
+  std::vector<FaultEvent> events_;
+};
+
+}  // namespace birdseye::hw_sim

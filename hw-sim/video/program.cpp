@@ -1,0 +1,116 @@
+#include "hw-sim/video/program.hpp"
+
+#include <sys/prctl.h>
+
+#include <algorithm>
+
+#include "drivers/io/monotonic.hpp"
+#include "hw-sim/base/announce.hpp"
+#include "hw-sim/video/frame_sink.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+constexpr std::int64_t kLongestWaitNs = 20'000'000;
+
+Result<std::unique_ptr<FrameSink>> open_sink(const CameraProgram& program) {
+  if (!program.socket.empty()) return listen_for_frames(program.socket, program.timing.seed);
+  return open_video_output(program.device, program.layout, program.width_px, program.height_px, program.timing.rate_hz,
+                           program.timing.seed);
+}
+
+/// Half of a length, even, and enough for the frame's number.
+int half(int length_px) {
+  return std::max(64, length_px / 2 / 2 * 2);
+}
+
+class Camera {
+ public:
+  Camera(const CameraProgram& program, std::unique_ptr<FrameSink> sink, std::int64_t zero_ns)
+      : program_(program),
+        sink_(std::move(sink)),
+        script_(program.timing, zero_ns),
+        zero_ns_(zero_ns),
+        whole_(program.layout, program.width_px, program.height_px),
+        half_(program.layout, half(program.width_px), half(program.height_px)) {}
+
+  void run(const std::atomic<bool>& stop) {
+    const std::int64_t end_ns =
+        program_.seconds > 0 ? zero_ns_ + static_cast<std::int64_t>(program_.seconds * 1e9) : INT64_MAX;
+    while (!stop) {
+      const FramePlan plan = script_.next();
+      if (plan.due_ns > end_ns) return;
+      wait(plan.due_ns, stop);
+      if (plan.lost || stop) continue;
+      if (sink_->busy()) {
+        ++skipped_;  // the reader is slow: the camera has no memory for another frame
+      } else if (sink_->connected()) {
+        show(plan);
+      }
+    }
+  }
+  [[nodiscard]] std::uint64_t sent() const { return sent_; }
+  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
+  [[nodiscard]] double rate_hz() const { return script_.rate_hz(); }
+
+ private:
+  void show(const FramePlan& plan) {
+    TestPattern& pattern = plan.half_size ? half_ : whole_;
+    const double exposed_s = static_cast<double>(plan.exposed_ns - zero_ns_) * 1e-9;
+    const double readout_s = program_.rolling ? 1.0 / program_.timing.rate_hz : 0;
+    const auto pixels = pattern.draw(plan.number, exposed_s, readout_s);
+    sink_->begin(plan, {pixels, pattern.layout(), pattern.width_px(), pattern.height_px()});
+    ++sent_;
+  }
+  void wait(std::int64_t until_ns, const std::atomic<bool>& stop) {
+    // Once at least: a camera that is late still sends, and hears that its reader has gone.
+    std::int64_t now_ns = 0;
+    do {
+      now_ns = drivers::now().ns;
+      if (sink_->connected()) script_.watched(now_ns);
+      script_.advance(now_ns);
+      if (script_.plugged() != plugged_) {
+        if (plugged_) sink_->unplug();
+        plugged_ = script_.plugged() && sink_->replug().has_value();
+      }
+      for (const FaultEvent& event : script_.take_events()) announce(event);
+      sink_->work(std::min(until_ns, now_ns + kLongestWaitNs));
+    } while (drivers::now().ns < until_ns && !stop);
+  }
+
+  const CameraProgram& program_;
+  std::unique_ptr<FrameSink> sink_;
+  CameraScript script_;
+  std::int64_t zero_ns_;
+  TestPattern whole_, half_;
+  bool plugged_ = true;
+  std::uint64_t sent_ = 0, skipped_ = 0;
+};
+
+}  // namespace
+
+Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& stop) {
+  auto sink = open_sink(program);
+  if (!sink) return sink.error();
+  ::prctl(PR_SET_TIMERSLACK, 1000UL, 0UL, 0UL, 0UL);  // frames leave on time, not when it suits the power supply
+  const std::int64_t zero_ns = drivers::now().ns;
+  Camera camera(program, *std::move(sink), zero_ns);
+  const nlohmann::json truth{{"zero_monotonic_ns", zero_ns},
+                             {"rate_hz", camera.rate_hz()},
+                             {"width_px", program.width_px},
+                             {"height_px", program.height_px},
+                             {"format", fourcc_of(program.layout)},
+                             {"rolling", program.rolling},
+                             {"exposure_ms", program.timing.exposure_ms},
+                             {"bar_period_s", TestPattern::kBarPeriodS}};
+  if (!program.truth.empty()) {
+    if (const auto written = replace_json(program.truth, truth); !written) return written;
+  }
+  announce({{"event", "ready"}, {"camera", program.socket.empty() ? program.device : program.socket}});
+  camera.run(stop);
+  announce({{"event", "end"}, {"frames_sent", camera.sent()}, {"frames_skipped", camera.skipped()}});
+  return {};
+}
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,183 @@
+#include "hw-sim/video/test_pattern.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+struct Named {
+  std::string_view name;
+  PixelLayout layout;
+};
+constexpr std::array<Named, 5> kLayouts{{{"RGB3", PixelLayout::rgb3},
+                                         {"YUYV", PixelLayout::yuyv},
+                                         {"UYVY", PixelLayout::uyvy},
+                                         {"NV12", PixelLayout::nv12},
+                                         {"GREY", PixelLayout::grey}}};
+
+struct Colour {
+  std::uint8_t r, g, b;
+};
+constexpr std::array<Colour, 8> kBars{{{190, 60, 60},
+                                       {170, 110, 60},
+                                       {150, 150, 60},
+                                       {60, 150, 70},
+                                       {60, 140, 150},
+                                       {60, 80, 170},
+                                       {130, 60, 150},
+                                       {110, 110, 110}}};
+
+struct Yuv {
+  std::uint8_t y, u, v;
+};
+
+/// ITU-R BT.601, limited range.
+Yuv yuv_of(const Colour& c) {
+  const auto byte = [](double value) { return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0))); };
+  return {byte(16 + 0.257 * c.r + 0.504 * c.g + 0.098 * c.b), byte(128 - 0.148 * c.r - 0.291 * c.g + 0.439 * c.b),
+          byte(128 + 0.439 * c.r - 0.368 * c.g - 0.071 * c.b)};
+}
+
+/// Bytes of one pixel in the first plane.
+std::size_t pixel_bytes(PixelLayout layout) {
+  switch (layout) {
+    case PixelLayout::rgb3:
+      return 3;
+    case PixelLayout::yuyv:
+    case PixelLayout::uyvy:
+      return 2;
+    default:
+      return 1;
+  }
+}
+
+/// Two neighbouring pixels of one colour, in the first plane.
+void put_pair(PixelLayout layout, std::uint8_t* at, const Colour& colour) {
+  const Yuv yuv = yuv_of(colour);
+  switch (layout) {
+    case PixelLayout::rgb3:
+      for (int i = 0; i < 2; ++i) {
+        at[3 * i] = colour.r;
+        at[3 * i + 1] = colour.g;
+        at[3 * i + 2] = colour.b;
+      }
+      break;
+    case PixelLayout::yuyv:
+      at[0] = at[2] = yuv.y;
+      at[1] = yuv.u;
+      at[3] = yuv.v;
+      break;
+    case PixelLayout::uyvy:
+      at[1] = at[3] = yuv.y;
+      at[0] = yuv.u;
+      at[2] = yuv.v;
+      break;
+    case PixelLayout::nv12:
+      at[0] = at[1] = yuv.y;
+      break;
+    case PixelLayout::grey:
+      at[0] = at[1] = static_cast<std::uint8_t>((colour.r * 2 + colour.g * 5 + colour.b) / 8);
+      break;
+  }
+}
+
+}  // namespace
+
+std::optional<PixelLayout> pixel_layout_of(std::string_view fourcc) {
+  for (const Named& named : kLayouts) {
+    if (named.name == fourcc) return named.layout;
+  }
+  return std::nullopt;
+}
+
+std::string_view fourcc_of(PixelLayout layout) {
+  return kLayouts[static_cast<std::size_t>(layout)].name;
+}
+
+std::size_t frame_bytes(PixelLayout layout, int width_px, int height_px) {
+  const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  return layout == PixelLayout::nv12 ? pixels + pixels / 2 : pixels * pixel_bytes(layout);
+}
+
+TestPattern::TestPattern(PixelLayout layout, int width_px, int height_px)
+    : layout_(layout),
+      width_px_(width_px),
+      height_px_(height_px),
+      base_(frame_bytes(layout, width_px, height_px)),
+      bar_at_(static_cast<std::size_t>(height_px), -1) {
+  const std::size_t bytes = pixel_bytes(layout);
+  const auto stride = static_cast<std::size_t>(width_px) * bytes;
+  const std::size_t pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
+  for (int x = 0; x < width_px; x += 2) {
+    const Colour& colour = kBars[static_cast<std::size_t>(x) * kBars.size() / static_cast<std::size_t>(width_px)];
+    put_pair(layout, base_.data() + static_cast<std::size_t>(x) * bytes, colour);
+    const Yuv yuv = yuv_of(colour);
+    for (std::size_t row = 0; layout == PixelLayout::nv12 && row < static_cast<std::size_t>(height_px) / 2; ++row) {
+      std::uint8_t* const at = base_.data() + pixels + row * stride + x;
+      at[0] = yuv.u;
+      at[1] = yuv.v;
+    }
+  }
+  for (std::size_t row = 1; row < static_cast<std::size_t>(height_px); ++row) {
+    std::memcpy(base_.data() + row * stride, base_.data(), stride);
+  }
+  frame_ = base_;
+}
+
+void TestPattern::fill(int row, int first, int count, bool white) {
+  const std::uint8_t level = white ? 255 : 0;
+  const std::size_t bytes = pixel_bytes(layout_);
+  const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px_) + static_cast<std::size_t>(first);
+  std::uint8_t* const out = frame_.data() + at * bytes;
+  const auto pixels = static_cast<std::size_t>(count);
+  if (layout_ == PixelLayout::yuyv || layout_ == PixelLayout::uyvy) {
+    const std::uint8_t luma = white ? 235 : 16;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      out[2 * i] = layout_ == PixelLayout::yuyv ? luma : 128;
+      out[2 * i + 1] = layout_ == PixelLayout::yuyv ? 128 : luma;
+    }
+    return;
+  }
+  const bool limited = layout_ == PixelLayout::nv12;
+  std::memset(out, limited ? (white ? 235 : 16) : level, pixels * bytes);
+  if (!limited || row % 2 != 0) return;
+  const auto plane = static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
+  const auto pair_row = static_cast<std::size_t>(row / 2) * static_cast<std::size_t>(width_px_);
+  std::memset(frame_.data() + plane + pair_row + static_cast<std::size_t>(first), 128, pixels);
+}
+
+void TestPattern::restore(int row, int first, int count) {
+  const std::size_t bytes = pixel_bytes(layout_);
+  const auto at = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px_) + static_cast<std::size_t>(first);
+  std::memcpy(frame_.data() + at * bytes, base_.data() + at * bytes, static_cast<std::size_t>(count) * bytes);
+  if (layout_ != PixelLayout::nv12 || row % 2 != 0) return;
+  const auto plane = static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_);
+  const auto chroma =
+      plane + static_cast<std::size_t>(row / 2) * static_cast<std::size_t>(width_px_) + static_cast<std::size_t>(first);
+  std::memcpy(frame_.data() + chroma, base_.data() + chroma, static_cast<std::size_t>(count));
+}
+
+std::span<const std::uint8_t> TestPattern::draw(std::uint64_t number, double exposed_s, double readout_s) {
+  for (int row = kNumberRows; row < height_px_; ++row) {
+    const double row_s = exposed_s + (static_cast<double>(row) / height_px_ - 0.5) * readout_s;
+    const double turns = row_s / kBarPeriodS;
+    // The bar is cut off at the right edge rather than carried over, so that each row holds one piece.
+    const int at = std::min(static_cast<int>(width_px_ * (turns - std::floor(turns))), width_px_ - 1) / 2 * 2;
+    int& was = bar_at_[static_cast<std::size_t>(row)];
+    if (was == at) continue;
+    if (was >= 0) restore(row, was, std::min(bar_px(), width_px_ - was));
+    fill(row, at, std::min(bar_px(), width_px_ - at), true);
+    was = at;
+  }
+  const int block = bar_px();
+  for (int row = 0; row < kNumberRows; ++row) {
+    for (int bit = 0; bit < 32; ++bit) fill(row, bit * block, block, ((number >> (31 - bit)) & 1U) != 0);
+  }
+  return frame_;
+}
+
+}  // namespace birdseye::hw_sim
