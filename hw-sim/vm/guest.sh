@@ -26,6 +26,13 @@ start_network() {
 start_vivid() {
   modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 vid_cap_nr=0
   wait_for /dev/video0
+  v4l2-ctl -d /dev/video0 -c timestamp_source=1
+}
+unplug_vivid() { echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind; }
+plug_vivid() {
+  echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+  wait_for /dev/video0
+  v4l2-ctl -d /dev/video0 -c timestamp_source=1
 }
 
 # /dev/video7: what is written to it comes out as a camera's pictures.

@@ -28,7 +28,7 @@ if [ "$(id -u)" = 0 ]; then
 fi
 
 status=0
-timeout --kill-after=5 "${BIRDSEYE_VM_LIMIT_S:-120}" "${as[@]}" qemu-system-x86_64 -accel $accel -m 512 -smp 1 \
+timeout --kill-after=5 "${BIRDSEYE_VM_LIMIT_S:-180}" "${as[@]}" qemu-system-x86_64 -accel $accel -m 512 -smp 1 \
   -display none -nodefaults -no-reboot -kernel build/vm/vmlinux -initrd build/vm/initrd.cpio \
   -append "console=ttyS0 panic=-1 quiet nokaslr mitigations=off birdseye.tree=$PWD birdseye.script=$script" \
   -serial "file:$out/console.log" \
