@@ -184,6 +184,8 @@ void add_camera_command(CLI::App& app, const Take& take) {
   command.add_option("--faults", options->faults, "script of faults (TOML)");
   command.add_option("--seed", timing.seed, "everything random follows from it");
   command.add_option("--truth", program.truth, "JSON file that says when frames are truly exposed");
+  command.add_option("--strobe", program.strobe,
+                     "file that is told pull-up and pull-down with each exposure, as of a line of Linux's gpio-sim");
   command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
   command.callback([options, take] { take(run(*options)); });
 }
