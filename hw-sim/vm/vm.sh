@@ -27,8 +27,9 @@ if [ "$(id -u)" = 0 ]; then
   fi
 fi
 
+# -cpu max: some libraries hold instructions that QEMU's default processor does not know.
 status=0
-timeout --kill-after=5 "${BIRDSEYE_VM_LIMIT_S:-180}" "${as[@]}" qemu-system-x86_64 -accel $accel -m 512 -smp 1 \
+timeout --kill-after=5 "${BIRDSEYE_VM_LIMIT_S:-180}" "${as[@]}" qemu-system-x86_64 -accel $accel -cpu max -m 512 -smp 1 \
   -display none -nodefaults -no-reboot -kernel build/vm/vmlinux -initrd build/vm/initrd.cpio \
   -append "console=ttyS0 panic=-1 quiet nokaslr mitigations=off birdseye.tree=$PWD birdseye.script=$script" \
   -serial "file:$out/console.log" \
