@@ -1,42 +1,130 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
+#include <optional>
+#include <vector>
 
 #include "calibration/time/clock.hpp"
+#include "calibration/time/edge_fit.hpp"
 
 namespace birdseye {
 
+/// What happened to a clock, other than jitter.
+struct ClockEvent {
+  enum class Kind {
+    step,          ///< the delay jumped by by_ns
+    slip,          ///< measurements were lost unseen (or came twice): by_ns is a whole number of periods
+    drift_change,  ///< the rate changed by by_ppm
+    restart,       ///< the count began anew: what was known of the line is dropped
+  };
+  Kind kind = Kind::step;
+  DeviceTime at;  ///< the first arrival that shows it
+  std::int64_t by_ns = 0;
+  double by_ppm = 0;
+};
+const char* to_string(ClockEvent::Kind kind);
+
 /// Gives a periodic measurement back its regular times. What arrives is late by a delay that is never negative and
-/// jitters; the earliest arrivals lie on a line of known slope (the period), and that lower envelope is the clock.
+/// jitters; the earliest arrivals lie on a line, and that lower edge is the clock: its level and its slope (the
+/// instrument's drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for
+/// days.
 class ClockLine {
  public:
   struct Settings {
-    Duration period;                ///< nominal; an error of 100 ppm costs a tenth of a millisecond a second
-    std::size_t window = 200;       ///< arrivals over which the envelope is taken
-    std::size_t slip_confirms = 8;  ///< arrivals in a row that are late by a period: measurements were lost
+    Duration period;  ///< nominal
+    Duration window = Duration::from_ms(20'000);
+    std::size_t slip_confirms = 8;   ///< late arrivals, apart in time, that it takes at least to believe in a loss
+    double drift_sigma_ppm = 300;    ///< what is expected of the nominal period
+    double wander_ppm_per_s = 0.02;  ///< by so much the drift may change, unnoticed within the window
+    Duration resolution{1000};       ///< of arrivals
   };
   struct Tick {
-    DeviceTime time;   ///< on the line
-    Duration sigma;    ///< how well the fastest arrivals agree on the line; late_by, where that is over 0.7 periods
-    Duration late_by;  ///< this arrival behind its tick
+    DeviceTime time;       ///< on the line
+    Duration sigma;        ///< of time: 68 % of ticks are this close. What it is late by, where that is in doubt
+    Duration late_by;      ///< this arrival behind its tick
+    bool certain = false;  ///< false while measurements may be missing or the line may have moved, and at the start
   };
 
-  explicit ClockLine(const Settings& settings) : settings_(settings) {}
+  explicit ClockLine(const Settings& settings);
 
   /// The next arrival, or one after some that are known to be lost.
   Tick push(DeviceTime arrived, std::int64_t lost = 0);
-  /// Times the line had to be begun anew because an arrival was early: the period was not what it was said to be.
+  /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a
+  /// restart.
+  Tick push_numbered(DeviceTime arrived, std::int64_t index);
+
+  /// By so much the true period is longer than the nominal one.
+  [[nodiscard]] double drift_ppm() const { return fit_.slope * 1e-3; }
+  [[nodiscard]] double drift_sigma_ppm() const;
+  /// What happened since the last call; the oldest are dropped beyond 64.
+  std::vector<ClockEvent> take_events();
+  /// Times the line had to be begun anew: steps and restarts.
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
 
  private:
-  [[nodiscard]] std::int64_t offset_of(DeviceTime arrived) const;
+  struct Arrival {
+    std::int64_t index = 0, arrived_ns = 0;
+    double late_ns = 0;  ///< behind the line when it came
+    bool held = false;   ///< not yet on the line, for it may be of a later measurement
+  };
+  struct Block {
+    std::int64_t id = 0, index = 0, offset_ns = 0, count = 0;  ///< index and offset of its earliest arrival
+  };
+  struct Change {
+    std::int64_t index = 0;  ///< where the line was given up
+    double slope = 0, slope_sigma = 0, value_sigma_ns = 0;
+    std::int64_t offset_ns = 0;  ///< of the line given up
+  };
+
+  struct Drift {
+    std::int64_t index = 0;
+    double slope = 0, slope_sigma = 0;
+  };
+
+  void restart(DeviceTime arrived);
+  Tick place(DeviceTime arrived);
+  [[nodiscard]] std::int64_t offset_of(const Arrival& arrival) const;
+  [[nodiscard]] double seconds_to(std::int64_t index) const;
+  [[nodiscard]] double true_period_ns() const;
+  [[nodiscard]] double line_at(std::int64_t index) const;  ///< relative to the anchor
+  [[nodiscard]] double sigma_at(std::int64_t index) const;
+  [[nodiscard]] double doubt_of(double late_ns) const;
+  [[nodiscard]] std::vector<EdgePoint> points() const;
+  [[nodiscard]] EdgeSettings edge_settings() const;
+  void add(const Arrival& arrival);
+  void refit();
+  void remember(const Arrival& arrival);
+  void tally(double late_ns);
+  void release();
+  bool look_for_early(const Arrival& arrival);
+  double look_for_late();
+  void slip(std::size_t run, std::int64_t periods);
+  void begin_from(std::size_t first_recent, double jump_ns, bool is_event);
+  void look_for_bend();
+  void forget_before(std::size_t block, double slope, double slope_sigma);
+  void compare_drift();
+  void explain_change();
+  void report(ClockEvent event);
 
   Settings settings_;
-  std::int64_t origin_ns_ = 0;
-  std::int64_t index_ = -1;
-  std::deque<std::int64_t> offsets_ns_;  ///< arrival - origin - index * period, newest last
-  std::size_t late_in_a_row_ = 0;
+  bool numbered_ = false;
+  std::int64_t origin_ns_ = 0, index_ = -1, first_number_ = 0;
+  std::int64_t anchor_index_ = 0, anchor_offset_ns_ = 0;  ///< doubles are relative to these
+  std::int64_t span_ = 1, full_span_ = 1;                 ///< arrivals in a block, now and at most
+  std::deque<Block> blocks_;
+  std::deque<Arrival> recent_;
+  std::size_t since_begin_ = 0;
+  EdgePrior prior_;
+  EdgeFit fit_;
+  std::int64_t fit_index_ = 0;
+  std::array<double, 48> late_counts_{};  ///< by half octaves of lateness
+  double late_total_ = 0;
+  std::array<Drift, 2> calm_drifts_{};  ///< of some 100 and 200 arrivals ago
+  std::deque<Drift> past_drifts_;
+  std::optional<Change> change_;
+  std::deque<ClockEvent> events_;
   std::uint64_t restarts_ = 0;
 };
 

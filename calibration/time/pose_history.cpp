@@ -21,9 +21,9 @@ const char* to_string(PoseKind kind) {
   return "refused";
 }
 
-bool PoseHistory::push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+bool PoseHistory::push(DeviceTime acquired, Duration sigma, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   if (!samples_.empty() && acquired <= samples_.back().acquired) return false;
-  samples_.push_back({acquired, tracker_from_sensor});
+  samples_.push_back({acquired, sigma, tracker_from_sensor});
   if (samples_.size() > settings_.capacity) samples_.pop_front();
   return true;
 }
@@ -63,27 +63,57 @@ PoseAnswer PoseHistory::at(DeviceTime time) const {
     }
     answer.kind = PoseKind::interpolated;
   }
-  if (settings_.smoothing.ns == 0 && answer.kind == PoseKind::exact) {
-    answer.tracker_from_sensor = after->pose;
-  } else {
-    fit(time, answer);
+  const Range range = around(time, after - samples_.begin());
+  if (answer.kind == PoseKind::predicted && range.end - range.begin < 2 && answer.age.ns > 0) {
+    answer.kind = PoseKind::refused;
+    answer.reason = "one pose alone does not tell where it goes";
+    return answer;
   }
+  judge_time(range, answer);
+  if (answer.kind == PoseKind::refused) return answer;
+  fit(time, range, answer);
+  if (settings_.smoothing.ns == 0 && answer.kind == PoseKind::exact) answer.tracker_from_sensor = after->pose;
   return answer;
 }
 
-void PoseHistory::fit(DeviceTime time, PoseAnswer& answer) const {
-  // The samples of the window; at least the two that surround the time, or the last two.
-  const auto first_after = std::lower_bound(samples_.begin(), samples_.end(), time,
-                                            [](const Sample& s, DeviceTime t) { return s.acquired < t; });
-  const auto mid = static_cast<std::ptrdiff_t>(first_after - samples_.begin());
+PoseHistory::Range PoseHistory::around(DeviceTime time, std::ptrdiff_t first_after) const {
   const auto count = static_cast<std::ptrdiff_t>(samples_.size());
-  std::ptrdiff_t begin = std::clamp<std::ptrdiff_t>(mid - 1, 0, std::max<std::ptrdiff_t>(0, count - 2));
-  std::ptrdiff_t end = std::min(begin + 2, count);
-  const auto sample = [&](std::ptrdiff_t i) -> const Sample& { return samples_[static_cast<std::size_t>(i)]; };
-  while (begin > 0 && time - sample(begin - 1).acquired <= settings_.smoothing) --begin;
-  while (end < count && sample(end).acquired - time <= settings_.smoothing) ++end;
+  const bool predicted = first_after == count;
+  Range range;
+  range.reference = std::min(first_after, count - 1);
+  const bool exact = !predicted && sample(first_after).acquired == time;
+  range.begin = exact || predicted ? range.reference : first_after - 1;
+  range.end = range.reference + 1;
+  const auto joined = [&](std::ptrdiff_t i) {
+    return sample(i + 1).acquired - sample(i).acquired <= settings_.max_gap;
+  };
+  // For a prediction at least two, to tell the speed, and the window's whole width before the newest.
+  const DeviceTime from =
+      predicted ? sample(count - 1).acquired - settings_.smoothing - settings_.smoothing : time - settings_.smoothing;
+  if (predicted && range.begin > 0 && joined(range.begin - 1)) --range.begin;
+  while (range.begin > 0 && sample(range.begin - 1).acquired >= from && joined(range.begin - 1)) --range.begin;
+  while (range.end < count && sample(range.end).acquired - time <= settings_.smoothing && joined(range.end - 1)) {
+    ++range.end;
+  }
+  return range;
+}
 
-  const Transform<Tracker, Sensor>& reference = sample(std::min(mid, count - 1)).pose;
+/// Neighbouring samples' times err together: the clock that gave them is one. Their sigmas do not average out.
+void PoseHistory::judge_time(const Range& range, PoseAnswer& answer) const {
+  double squares = 0;
+  for (std::ptrdiff_t i = range.begin; i < range.end; ++i) {
+    const double sigma_s = sample(i).sigma.seconds();
+    squares += sigma_s * sigma_s;
+  }
+  answer.time_sigma = Duration::from_seconds(std::sqrt(squares / static_cast<double>(range.end - range.begin)));
+  if (answer.time_sigma <= settings_.max_time_sigma) return;
+  answer.kind = PoseKind::refused;
+  answer.reason = fmt::format("its time is sure to {:.1f} ms only, and {:.1f} ms are asked for",
+                              answer.time_sigma.seconds() * 1e3, settings_.max_time_sigma.seconds() * 1e3);
+}
+
+void PoseHistory::fit(DeviceTime time, const Range& range, PoseAnswer& answer) const {
+  const Transform<Tracker, Sensor>& reference = sample(range.reference).pose;
   using Row = Eigen::Matrix<double, 6, 1>;
   double weight = 0, st = 0, stt = 0;
   Row sum = Row::Zero(), sum_t = Row::Zero();
@@ -93,7 +123,7 @@ void PoseHistory::fit(DeviceTime time, PoseAnswer& answer) const {
         rotation_log(reference.rotation().transpose() * s.pose.rotation());
     return row;
   };
-  for (std::ptrdiff_t i = begin; i < end; ++i) {
+  for (std::ptrdiff_t i = range.begin; i < range.end; ++i) {
     const double t = (sample(i).acquired - time).seconds();
     const Row row = row_of(sample(i));
     weight += 1;
@@ -111,13 +141,26 @@ void PoseHistory::fit(DeviceTime time, PoseAnswer& answer) const {
   }
   if (weight > 3) {
     double squares = 0;
-    for (std::ptrdiff_t i = begin; i < end; ++i) {
+    for (std::ptrdiff_t i = range.begin; i < range.end; ++i) {
       const double t = (sample(i).acquired - time).seconds();
       squares += (row_of(sample(i)) - value - t * slope).head<3>().squaredNorm();
     }
     // Variance of the fitted line at the time asked for, per axis.
     answer.position_sigma_mm = std::sqrt(squares / (3 * (weight - 2)) * (stt / determinant));
   }
+  answer.speed_mm_s = slope.head<3>().norm();
+  // What a constant acceleration does that the line does not know: past a window of width w it is off by
+  // a (t^2 + t w + w^2 / 6) / 2, within a hole by a quarter of its square.
+  double squares_s2 = 0;
+  if (answer.kind == PoseKind::predicted) {
+    const double ahead_s = answer.age.seconds();
+    const double window_s = (sample(range.end - 1).acquired - sample(range.begin).acquired).seconds();
+    squares_s2 = ahead_s * ahead_s + ahead_s * window_s + window_s * window_s / 6;
+  } else if (answer.kind == PoseKind::interpolated) {
+    const double hole_s = (sample(range.reference).acquired - sample(range.reference - 1).acquired).seconds();
+    squares_s2 = hole_s * hole_s / 4;
+  }
+  answer.position_sigma_mm = std::hypot(answer.position_sigma_mm, 0.5 * settings_.acceleration_mm_s2 * squares_s2);
   answer.tracker_from_sensor =
       Transform<Tracker, Sensor>(Eigen::Matrix3d(reference.rotation() * rotation_exp(value.tail<3>())),
                                  Eigen::Vector3d(reference.translation() + value.head<3>()));

@@ -21,9 +21,13 @@ const char* to_string(PoseKind kind);
 struct PoseAnswer {
   PoseKind kind = PoseKind::refused;
   std::optional<Transform<Tracker, Sensor>> tracker_from_sensor;  ///< empty exactly when refused
-  double position_sigma_mm = 0;  ///< per axis, from the scatter of the samples about the fit; 0 without smoothing
-  Duration age;                  ///< from the newest sample to the time asked for; negative where samples are newer
-  std::string reason;            ///< why refused or predicted, in words
+  /// Per axis: from the scatter of the samples about the fit (0 where there are too few), and from what the hand may
+  /// have done since, or between them. What the time's sigma does at this speed comes on top.
+  double position_sigma_mm = 0;
+  Duration time_sigma;    ///< of the samples used
+  double speed_mm_s = 0;  ///< 0 for a single sample
+  Duration age;           ///< from the newest sample to the time asked for; negative where samples are newer
+  std::string reason;     ///< why refused or predicted, in words
 };
 
 /// The recent poses of one bird, asked for at a time. Bounded; samples come in order of time.
@@ -33,8 +37,11 @@ class PoseHistory {
     std::size_t capacity = 4096;                       ///< 40 s of a miniBIRD: a frame may come late from a busy camera
     Duration max_gap = Duration::from_ms(60);          ///< wider holes are not bridged
     Duration max_prediction = Duration::from_ms(100);  ///< further ahead is refused
+    Duration max_time_sigma = Duration::from_ms(10);   ///< poses whose time is less sure are refused
+    double acceleration_mm_s2 = 500;  ///< what a hand's changes of speed come to, per axis: how prediction gets worse
     /// Half the width of a window of samples to which a line is fitted (position along it, rotation about one axis), to
-    /// average the tracker's noise. 0 interpolates between the two neighbours.
+    /// average the tracker's noise. 0 interpolates between the two neighbours. A prediction is made from the whole
+    /// window's width before the newest sample.
     Duration smoothing{0};
   };
 
@@ -42,16 +49,24 @@ class PoseHistory {
   explicit PoseHistory(const Settings& settings) : settings_(settings) {}
 
   /// False, and nothing kept, where acquired is not after the newest sample's.
-  bool push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  bool push(DeviceTime acquired, Duration sigma, const Transform<Tracker, Sensor>& tracker_from_sensor);
   [[nodiscard]] PoseAnswer at(DeviceTime time) const;
   [[nodiscard]] std::optional<DeviceTime> newest() const;
 
  private:
   struct Sample {
     DeviceTime acquired;
+    Duration sigma;
     Transform<Tracker, Sensor> pose;
   };
-  void fit(DeviceTime time, PoseAnswer& answer) const;
+  /// Samples begin to end, without a gap between them.
+  struct Range {
+    std::ptrdiff_t begin = 0, end = 0, reference = 0;
+  };
+  [[nodiscard]] const Sample& sample(std::ptrdiff_t i) const { return samples_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] Range around(DeviceTime time, std::ptrdiff_t first_after) const;
+  void fit(DeviceTime time, const Range& range, PoseAnswer& answer) const;
+  void judge_time(const Range& range, PoseAnswer& answer) const;
 
   Settings settings_;
   std::deque<Sample> samples_;

@@ -1,53 +1,51 @@
 #pragma once
 
 #include <atomic>
-#include <map>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <thread>
 
-#include "device/birdseyed/bounded_queue.hpp"
 #include "device/birdseyed/config.hpp"
-#include "device/birdseyed/scope_poses.hpp"
+#include "device/birdseyed/instrument_thread.hpp"
+#include "device/birdseyed/recorder.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/minibird/measurement.hpp"
 
 namespace birdseye::device {
 
-/// The appliance at work: one thread reads the tracker, one the camera, one pairs each frame with the scope's pose at
-/// its acquisition time and publishes, one reports health. An instrument that goes away or falls silent is said so
-/// on the wire, at once and every second, and looked for again until it is back.
+/// The appliance at work: a thread for each instrument hands over what comes, one makes messages of it and publishes
+/// them, one reports health each second. An instrument that is not there, goes away or falls silent is said so on the
+/// wire and looked for until it is back; the others go on.
 class Appliance {
  public:
-  /// Opens everything once: an instrument that is not there at the start, or a port in use, is an error.
-  static Result<std::unique_ptr<Appliance>> start(const Config& config, const std::stop_token& stop);
+  /// server: outlives the appliance, so that clients stay connected when the configuration is read again.
+  static Result<std::unique_ptr<Appliance>> start(const Config& config, wire::Server& server);
   ~Appliance();
   Appliance(const Appliance&) = delete;
   Appliance& operator=(const Appliance&) = delete;
 
-  [[nodiscard]] int port() const { return server_->port(); }
+  /// Every thread has shown itself lately.
+  [[nodiscard]] bool alive() const;
+  /// For the service manager: the state and what is wrong.
+  [[nodiscard]] std::string summary() const;
 
  private:
-  Appliance(Config config, std::unique_ptr<wire::Server> server);
-  static Result<std::unique_ptr<drivers::minibird::MiniBird>> open_tracker(const Config& config,
-                                                                           const std::stop_token& stop);
-  void tracker_loop(const std::stop_token& stop, std::unique_ptr<drivers::minibird::MiniBird> tracker);
-  void publish(const drivers::minibird::Measurement& measurement);
-  void video_loop(const std::stop_token& stop, std::unique_ptr<drivers::FrameSource> camera);
-  void pairing_loop(const std::stop_token& stop);
-  void health_loop(const std::stop_token& stop);
-  void tell(const char* instrument, bool ok, const std::string& text);
-  [[nodiscard]] wire::Status status() const;
+  Appliance(const Config& config, wire::Server& server, std::unique_ptr<Recorder> recorder);
+  void make_messages(const std::stop_token& stop);
+  void report_health(const std::stop_token& stop);
+  [[nodiscard]] wire::Health health(const Core::Counters& before, const Core::Counters& now, double seconds);
 
   Config config_;
-  std::unique_ptr<wire::Server> server_;
-  ScopePoses scope_poses_;
-  BoundedQueue<drivers::Frame> frames_;
-  std::atomic<std::uint64_t> measurements_ = 0, phase_errors_ = 0, senseless_records_ = 0;
-  std::atomic<std::uint64_t> frames_seen_ = 0, frames_lost_by_camera_ = 0;
-  mutable std::mutex faults_mutex_;
-  std::map<std::string, std::string> faults_;  ///< by instrument, while it has one
-  std::jthread tracker_thread_, video_thread_, pairing_thread_, health_thread_;
+  wire::Server& server_;
+  std::unique_ptr<Recorder> recorder_;  ///< null where nothing is recorded
+  EventQueue queue_;
+  InstrumentPost tracker_post_, camera_post_, gpio_post_;
+  std::atomic<std::int64_t> core_alive_ns_;
+  std::atomic<ApplianceState> state_ = ApplianceState::starting;
+  mutable std::mutex told_mutex_;  ///< of what the core's thread tells the one that reports
+  Core::Counters counters_;
+  InstrumentBoard board_;
+  std::vector<std::jthread> threads_;
 };
 
 }  // namespace birdseye::device

@@ -1,166 +1,177 @@
 #include "device/birdseyed/config.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <optional>
-#include <set>
-#include <toml.hpp>
 
+#include "device/birdseyed/config_section.hpp"
 #include "drivers/io/serial_port.hpp"
 
 namespace birdseye::device {
 
 namespace {
 
-/// One section of the file. Every key that is read is noted, so that what is left over can be named.
-class Section {
- public:
-  Section(const std::filesystem::path& file, std::string name, const toml::table& table)
-      : file_(file), name_(std::move(name)), table_(table) {}
+using drivers::minibird::AnglesDeg;
+using drivers::minibird::Hemisphere;
+using drivers::minibird::RecordFormat;
 
-  void text(const char* key, std::string& value, bool required = false) {
-    if (const toml::value* found = find(key, required)) {
-      if (found->is_string()) {
-        value = found->as_string().str;
-      } else {
-        fail(key, "needs text in quotes");
-      }
-    }
-  }
-  void number(const char* key, double& value, double low, double high) {
-    if (const toml::value* found = find(key, false)) {
-      if (found->is_floating() || found->is_integer()) {
-        value = found->is_floating() ? found->as_floating() : static_cast<double>(found->as_integer());
-        if (!(value >= low && value <= high))
-          fail(key, fmt::format("{:g} is not within {:g} and {:g}", value, low, high));
-      } else {
-        fail(key, "needs a number");
-      }
-    }
-  }
-  void integer(const char* key, int& value, int low, int high) {
-    if (const toml::value* found = find(key, false)) {
-      if (!found->is_integer()) {
-        fail(key, "needs a whole number");
-      } else if (found->as_integer() < low || found->as_integer() > high) {
-        fail(key, fmt::format("{} is not within {} and {}", found->as_integer(), low, high));
-      } else {
-        value = static_cast<int>(found->as_integer());
-      }
-    }
-  }
-  void milliseconds(const char* key, Duration& value, double high_ms) {
-    double ms = value.seconds() * 1e3;
-    number(key, ms, 0, high_ms);
-    value = Duration::from_seconds(ms * 1e-3);
-  }
-  void texts(const char* key, std::vector<std::string>& values) {
-    if (const toml::value* found = find(key, false)) {
-      if (!found->is_array()) return fail(key, "needs a list of names");
-      values.clear();
-      for (const toml::value& item : found->as_array()) {
-        if (!item.is_string()) return fail(key, "needs a list of names");
-        values.push_back(item.as_string().str);
-      }
-    }
-  }
-  void fail(const char* key, const std::string& why) {
-    if (!error_) error_ = Error{Errc::bad_value, fmt::format("{}: [{}] {}: {}", file_.string(), name_, key, why)};
-  }
-  /// The first thing that was wrong, or a key that nobody asked for.
-  std::optional<Error> finish() {
-    for (const auto& [key, value] : table_) {
-      if (!error_ && known_.count(key) == 0) {
-        error_ = Error{Errc::bad_value, fmt::format("{}: [{}] {}: unknown key; known are {}", file_.string(), name_,
-                                                    key, fmt::join(known_, ", "))};
-      }
-    }
-    return error_;
-  }
-
- private:
-  const toml::value* find(const char* key, bool required) {
-    known_.insert(key);
-    const auto found = table_.find(key);
-    if (found != table_.end()) return &found->second;
-    if (required) fail(key, "is missing");
-    return nullptr;
-  }
-
-  const std::filesystem::path& file_;
-  std::string name_;
-  const toml::table& table_;
-  std::set<std::string> known_;
-  std::optional<Error> error_;
-};
-
-void read_tracker(Section& section, Config& config) {
-  std::string device, record = "position_matrix", hemisphere = "forward";
-  section.text("device", device, true);
-  section.integer("baud", config.tracker.baud, 2400, 115200);
-  if (!drivers::is_serial_speed(config.tracker.baud)) {
-    section.fail("baud", fmt::format("{} is none of {}", config.tracker.baud, drivers::kSerialSpeeds));
-  }
-  section.integer("birds", config.tracker.birds, 1, 14);
-  section.texts("names", config.bird_names);
-  section.number("rate_hz", config.tracker.rate_hz, 14, 144);
-  section.text("hemisphere", hemisphere);
+std::optional<RecordFormat> read_record(ConfigSection& section) {
+  std::string record;
   section.text("record", record);
-  section.milliseconds("delay_ms", config.tracker.delay, 1000);
-  config.tracker_device = device;
-  if (const auto format = drivers::minibird::record_format_of(record);
-      format && drivers::minibird::has_position(*format) && drivers::minibird::has_orientation(*format)) {
-    config.tracker.format = *format;
-  } else {
-    section.fail("record",
-                 fmt::format("\"{}\" is none of position_angles, position_matrix, position_quaternion", record));
-  }
-  if (const auto side = drivers::minibird::hemisphere_of(hemisphere)) {
-    config.tracker.hemisphere = *side;
-  } else {
+  if (record.empty()) return std::nullopt;
+  const auto format = drivers::minibird::record_format_of(record);
+  if (format && drivers::minibird::has_position(*format) && drivers::minibird::has_orientation(*format)) return format;
+  section.fail("record",
+               fmt::format("\"{}\" is none of position_angles, position_matrix, position_quaternion", record));
+  return std::nullopt;
+}
+
+std::optional<Hemisphere> read_hemisphere(ConfigSection& section) {
+  std::string hemisphere;
+  section.text("hemisphere", hemisphere);
+  if (hemisphere.empty()) return std::nullopt;
+  const auto side = drivers::minibird::hemisphere_of(hemisphere);
+  if (!side)
     section.fail("hemisphere", fmt::format("\"{}\" is none of forward, aft, right, left, lower, upper", hemisphere));
-  }
-  if (config.bird_names.empty()) {
-    config.bird_names = {"scope"};
-    for (int i = 2; i <= config.tracker.birds; ++i) config.bird_names.push_back(fmt::format("bird{}", i));
-  }
-  if (static_cast<int>(config.bird_names.size()) != config.tracker.birds) {
-    section.fail("names", fmt::format("{} names for {} birds", config.bird_names.size(), config.tracker.birds));
-  }
-  // What the line can carry: ten bits a byte, and a byte for the address in a flock.
-  const auto bytes = static_cast<double>(2 * drivers::minibird::word_count(config.tracker.format) +
-                                         (config.tracker.birds > 1 ? 1 : 0)) *
-                     config.tracker.birds;
-  if (bytes * 10 * config.tracker.rate_hz > config.tracker.baud) {
-    section.fail("rate_hz", fmt::format("{:g} Hz of {} birds does not fit into {} baud", config.tracker.rate_hz,
-                                        config.tracker.birds, config.tracker.baud));
-  }
+  return side;
 }
 
-void read_camera(Section& section, Config& config) {
-  section.text("source", config.camera.source, true);
-  config.camera.width_px = 768;
-  config.camera.height_px = 576;
-  config.camera.rate_hz = 25;
-  section.integer("width", config.camera.width_px, 16, 8192);
-  section.integer("height", config.camera.height_px, 16, 8192);
-  section.number("rate_hz", config.camera.rate_hz, 1, 1000);
-  if (std::int64_t{config.camera.width_px} * config.camera.height_px > drivers::kMostPixels) {
+std::optional<AnglesDeg> read_angles(ConfigSection& section, const char* key) {
+  const auto values = section.numbers(key, 3, -180, 180);
+  if (values.empty()) return std::nullopt;
+  return AnglesDeg{values[0], values[1], values[2]};
+}
+
+void read_filters(ConfigSection& section, drivers::minibird::MiniBirdSettings& unit) {
+  drivers::minibird::FilterSettings filters;
+  const bool any = section.has("filter_dc") || section.has("filter_ac_wide") || section.has("filter_ac_narrow");
+  section.flag("filter_dc", filters.dc_adaptive);
+  section.flag("filter_ac_wide", filters.ac_wide_notch);
+  section.flag("filter_ac_narrow", filters.ac_narrow_notch);
+  if (any) unit.filters = filters;
+  section.integer("line_frequency_hz", unit.line_frequency_hz, 50, 60);
+}
+
+void read_plausibility(ConfigSection& section, drivers::minibird::Plausibility& limits) {
+  section.number("most_speed_mm_s", limits.most_speed_mm_s, 10, 100'000);
+  section.number("most_turn_deg_s", limits.most_turn_deg_s, 10, 100'000);
+  section.integer("frozen_after", limits.frozen_after, 0, 100'000);
+  section.number("hemisphere_border_mm", limits.hemisphere_border_mm, 0, 500);
+}
+
+void read_birds(ConfigSection& section, Config& config) {
+  auto& unit = config.tracker.minibird;
+  for (ConfigSection& bird : section.tables("bird")) {
+    drivers::minibird::BirdSettings settings;
+    settings.format = read_record(bird);
+    settings.hemisphere = read_hemisphere(bird);
+    settings.angle_align = read_angles(bird, "angle_align_deg");
+    bird.finish();
+    unit.per_bird.push_back(settings);
+  }
+  std::vector<std::string>& names = config.core.bird_names;
+  names.clear();
+  section.texts("names", names);
+  if (names.empty()) {
+    names = {"scope"};
+    for (int i = 2; i <= unit.birds; ++i) names.push_back(fmt::format("bird{}", i));
+  }
+  if (static_cast<int>(names.size()) != unit.birds)
+    section.fail("names", fmt::format("{} names for {} birds", names.size(), unit.birds));
+}
+
+void read_tracker(ConfigSection& section, Config& config) {
+  auto& unit = config.tracker.minibird;
+  section.text("device", config.tracker.line.device, true);
+  section.integer("baud", unit.baud, 2400, 115200);
+  config.tracker.line.baud = unit.baud;
+  section.integer("usb_latency_ms", config.tracker.line.usb_latency_ms, 1, 255);
+  if (!config.tracker.line.device.empty()) {
+    if (const auto sound = drivers::check_line(config.tracker.line); !sound)
+      section.fail(drivers::is_serial_speed(unit.baud) ? "device" : "baud", sound.error().what);
+  }
+  section.integer("birds", unit.birds, 1, 14);
+  section.number("rate_hz", unit.rate_hz, 14, 144);
+  section.integer("report_every", unit.report_every, 1, 32);
+  section.flag("wide_scale", unit.wide_scale);
+  unit.format = read_record(section).value_or(unit.format);
+  unit.hemisphere = read_hemisphere(section).value_or(unit.hemisphere);
+  section.milliseconds("delay_ms", unit.delay, 1000);
+  unit.reference_frame = read_angles(section, "reference_frame_deg");
+  section.flag("reference_frame_turns_position", unit.reference_frame_turns_position);
+  section.flag("warm_restart", unit.warm_restart);
+  read_filters(section, unit);
+  read_plausibility(section, unit.plausibility);
+  read_birds(section, config);
+  if (!section.sound()) return;
+  for (const std::string& fault : drivers::minibird::faults_of(unit)) section.fail("", fault);
+}
+
+void read_camera(ConfigSection& section, Config& config) {
+  drivers::CameraSettings& camera = config.camera;
+  camera.width_px = 768;
+  camera.height_px = 576;
+  camera.rate_hz = 25;
+  section.text("source", camera.source, true);
+  section.integer("width", camera.width_px, 16, 8192);
+  section.integer("height", camera.height_px, 16, 8192);
+  section.number("rate_hz", camera.rate_hz, 1, 1000);
+  section.text("format", camera.format);
+  section.number("exposure_us", camera.exposure_us, 1, 1e6);
+  section.integer("gain", camera.gain, -100'000, 100'000);
+  section.integer("white_balance_k", camera.white_balance_k, 1000, 20'000);
+  section.milliseconds("readout_ms", camera.readout, 1000);
+  section.milliseconds("delay_ms", config.core.frame_clock.delay, 1000);
+  section.milliseconds("exposure_ms", config.core.frame_clock.exposure, 1000);
+  config.core.frame_clock.rate_hz = camera.rate_hz;
+  if (std::int64_t{camera.width_px} * camera.height_px > drivers::kMostPixels)
     section.fail("width", "over 16 megapixels a frame, more than the wire carries");
-  }
 }
 
-void read_wire(Section& section, Config& config) {
-  section.text("bind", config.bind);
-  section.integer("port", config.port, 0, 65535);
+void read_gpio(ConfigSection& section, Config& config) {
+  drivers::GpioSettings& lines = config.gpio.lines;
+  section.text("chip", lines.chip, section.present());
+  section.text("strobe", lines.strobe);
+  config.core.frame_clock.strobe = !lines.strobe.empty();
+  section.text("pedal", lines.pedal);
+  section.text("led", lines.led);
+  section.text("trigger", lines.trigger);
+  section.milliseconds("pedal_debounce_ms", lines.pedal_debounce, 1000);
+  section.flag("strobe_active_low", lines.strobe_active_low);
+  section.flag("pedal_active_low", lines.pedal_active_low);
+  section.flag("led_active_low", lines.led_active_low);
+  section.flag("trigger_active_low", lines.trigger_active_low);
+  section.number("trigger_rate_hz", config.gpio.trigger_rate_hz, 0, 240);
+  if (config.gpio.trigger_rate_hz > 0 && lines.trigger.empty())
+    section.fail("trigger_rate_hz", "needs the line that is pulsed: trigger");
 }
 
-void read_pose(Section& section, Config& config) {
-  section.milliseconds("max_age_ms", config.pose.max_prediction, 1000);
-  section.milliseconds("max_gap_ms", config.pose.max_gap, 1000);
-  section.milliseconds("smoothing_ms", config.pose.smoothing, 1000);
+void read_wire(ConfigSection& section, Config& config) {
+  section.text("bind", config.wire.bind);
+  section.integer("port", config.wire.port, 0, 65535);
 }
+
+void read_pose(ConfigSection& section, Config& config) {
+  PoseHistory::Settings& pose = config.core.pose;
+  section.milliseconds("max_age_ms", pose.max_prediction, 1000);
+  section.milliseconds("max_gap_ms", pose.max_gap, 1000);
+  section.milliseconds("smoothing_ms", pose.smoothing, 1000);
+  section.milliseconds("wait_ms", config.core.pose_wait, 1000);
+  section.milliseconds("max_time_sigma_ms", pose.max_time_sigma, 1000);
+}
+
+void read_recording(ConfigSection& section, Config& config) {
+  std::string folder;
+  section.text("folder", folder, section.present());
+  config.record.folder = folder;
+  section.flag("frames", config.record.frames);
+  section.number("most_gb", config.record.most_gb, 0.001, 100'000);
+}
+
+constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] = {
+    {"tracker", read_tracker}, {"camera", read_camera}, {"gpio", read_gpio},
+    {"wire", read_wire},       {"pose", read_pose},     {"record", read_recording}};
 
 }  // namespace
 
@@ -171,28 +182,32 @@ Result<Config> read_config(const std::filesystem::path& path) {
   }
   try {
     const toml::value root = toml::parse(path.string());
-    Config config;
-    constexpr std::pair<const char*, void (*)(Section&, Config&)> kSections[] = {
-        {"tracker", read_tracker}, {"camera", read_camera}, {"wire", read_wire}, {"pose", read_pose}};
+    ConfigFaults faults(path);
     for (const auto& [name, value] : root.as_table()) {
       const bool known = std::any_of(std::begin(kSections), std::end(kSections),
                                      [&key = name](const auto& section) { return key == section.first; });
       if (!known || !value.is_table()) {
-        return Error{
-            Errc::bad_value,
-            fmt::format("{}: {}: unknown section; known are [tracker], [camera], [wire], [pose]", path.string(), name)};
+        faults.add(
+            static_cast<std::int64_t>(value.location().line()),
+            fmt::format("{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record]", name));
       }
     }
-    const toml::table none;
+    Config config;
     for (const auto& [name, read] : kSections) {
       const auto found = root.as_table().find(name);
-      Section section(path, name, found == root.as_table().end() ? none : found->second.as_table());
+      const bool table = found != root.as_table().end() && found->second.is_table();
+      ConfigSection section(faults, name, table ? &found->second : nullptr);
       read(section, config);
-      if (auto error = section.finish()) return *std::move(error);
+      section.finish();
     }
+    if (faults.count() > 0) return Error{Errc::bad_value, faults.text()};
     return config;
-  } catch (const std::exception& problem) {
+  } catch (const toml::syntax_error& problem) {
     // The first line of toml11's message says what; the rest draws the place.
+    const std::string what = problem.what();
+    return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML: {}", path.string(), problem.location().line(),
+                                               what.substr(0, what.find('\n')))};
+  } catch (const std::exception& problem) {
     const std::string what = problem.what();
     return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), what.substr(0, what.find('\n')))};
   }

@@ -2,28 +2,45 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "calibration/base/result.hpp"
-#include "calibration/time/pose_history.hpp"
-#include "drivers/minibird/minibird.hpp"
+#include "device/birdseyed/core.hpp"
+#include "device/birdseyed/gpio_thread.hpp"
+#include "drivers/io/open_line.hpp"
+#include "drivers/minibird/settings.hpp"
 #include "drivers/video/frame_source.hpp"
 
 namespace birdseye::device {
 
-/// What birdseyed is told by its configuration file (docs/manual/birdseyed.md).
-struct Config {
-  std::filesystem::path tracker_device;
-  drivers::minibird::MiniBirdSettings tracker;
-  std::vector<std::string> bird_names;  ///< one per bird; the first is the scope's
-  drivers::CameraSettings camera;
-  std::string bind = "127.0.0.1";
-  int port = 18944;
-  PoseHistory::Settings pose;
+struct TrackerConfig {
+  drivers::LineSettings line;
+  drivers::minibird::MiniBirdSettings minibird;
 };
 
-/// Reads TOML. An unknown section or key, a value of the wrong type or out of its range is an error that names the file
-/// and the setting.
+struct WireConfig {
+  std::string bind = "127.0.0.1";
+  int port = 18944;
+  bool operator==(const WireConfig&) const = default;
+};
+
+struct RecordConfig {
+  std::filesystem::path folder;  ///< empty: nothing is recorded
+  bool frames = true;
+  double most_gb = 20;  ///< of one file; then recording ends and the status says so
+};
+
+/// What birdseyed is told by its configuration file (docs/manual/birdseyed.md).
+struct Config {
+  TrackerConfig tracker;
+  drivers::CameraSettings camera;
+  GpioConfig gpio;
+  WireConfig wire;
+  CoreSettings core;
+  RecordConfig record;
+};
+
+/// Reads TOML. Whatever is wrong (unknown sections and keys, wrong types, values out of range) is told all at once, one
+/// line each, "FILE:LINE: [section] key: why".
 Result<Config> read_config(const std::filesystem::path& path);
 
 }  // namespace birdseye::device

@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <thread>
 
+#include "device/wire/igtl_bytes.hpp"
+
 namespace birdseye::wire {
 
 namespace {
@@ -77,6 +79,29 @@ Result<bool> Client::fill(std::size_t size, Clock::time_point deadline) {
   return true;
 }
 
+Result<void> Client::send(const Packet& packet, Clock::time_point deadline) {
+  std::span<const std::uint8_t> rest(*packet.head);
+  while (!rest.empty()) {
+    const ssize_t put = ::send(fd_, rest.data(), rest.size(), MSG_NOSIGNAL);
+    if (put > 0) {
+      rest = rest.subspan(static_cast<std::size_t>(put));
+      continue;
+    }
+    if (errno != EAGAIN && errno != EINTR) {
+      return Error{Errc::disconnected, fmt::format("{}: the appliance has gone", name_)};
+    }
+    pollfd entry{fd_, POLLOUT, 0};
+    if (::poll(&entry, 1, remaining_ms(deadline)) == 0 && Clock::now() >= deadline) {
+      return Error{Errc::timeout, fmt::format("{}: the appliance does not take what is sent to it", name_)};
+    }
+  }
+  return {};
+}
+
+Result<void> Client::subscribe(const Subscription& subscription, Clock::time_point deadline) {
+  return send(pack(subscription), deadline);
+}
+
 Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
   for (;;) {
     auto whole = fill(kHeaderBytes, deadline);
@@ -89,9 +114,10 @@ Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
     if (!whole) return whole.error();
     if (!*whole) return std::optional<Event>();
     have_ = 0;
-    auto event = unpacker_.push(std::span(buffer_).first(size));
-    if (!event) return Error{event.error().code, fmt::format("{}: {}", name_, event.error().what)};
-    if (*event) return event;
+    auto told = unpacker_.push(std::span(buffer_).first(size));
+    if (!told) return Error{told.error().code, fmt::format("{}: {}", name_, told.error().what)};
+    if (!*told) continue;
+    if (auto* event = std::get_if<Event>(&**told)) return std::optional<Event>(std::move(*event));
   }
 }
 

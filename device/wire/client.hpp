@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "device/wire/messages.hpp"
+#include "device/wire/unpacker.hpp"
 
 namespace birdseye::wire {
 
@@ -21,9 +21,12 @@ class Client {
 
   /// The next event; empty at the deadline; Errc::disconnected when the appliance has gone.
   Result<std::optional<Event>> next(Clock::time_point deadline);
+  /// Says what this client wants; without it, it gets everything.
+  Result<void> subscribe(const Subscription& subscription, Clock::time_point deadline);
 
  private:
   Client(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+  Result<void> send(const Packet& packet, Clock::time_point deadline);
   Result<bool> fill(std::size_t size, Clock::time_point deadline);
 
   int fd_;

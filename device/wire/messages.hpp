@@ -2,13 +2,10 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "calibration/base/result.hpp"
 #include "calibration/time/pose_history.hpp"
 
 /// What the appliance says to hosts, as OpenIGTLink messages (docs/manual/wire.md). Times are of the appliance's clock.
@@ -41,40 +38,54 @@ struct Birds {
   std::vector<Bird> birds;
 };
 
+/// Travels in a STRING beside the birds, where one of them gave none or the time is not sure.
+struct Doubt {
+  DeviceTime acquired;
+  std::string bird, why;
+};
+
+struct Pedal {
+  bool pressed = false;
+  DeviceTime at;
+};
+
 struct Status {
   bool ok = true;
   std::string text;
 };
 
+struct InstrumentHealth {
+  std::string name;   ///< tracker, camera, gpio
+  std::string state;  ///< absent, starting, running, silent
+  std::string text;   ///< what it is, or what is wrong with it, in words
+  std::uint64_t times_lost = 0;
+};
+
 struct Health {
-  double tracker_rate_hz = 0;
-  std::uint64_t measurements = 0, phase_errors = 0, senseless_records = 0;
-  std::uint64_t frames = 0, frames_dropped = 0, messages_shed = 0;
+  std::string state;  ///< starting, ready, degraded
+  std::vector<InstrumentHealth> instruments;
+  double tracker_rate_hz = 0, frame_rate_hz = 0;
+  std::uint64_t measurements = 0, measurements_lost = 0, phase_errors = 0, senseless_records = 0, doubted = 0;
+  std::uint64_t line_errors = 0, clock_events = 0;
+  std::uint64_t frames = 0, frames_dropped = 0;
+  std::uint64_t messages_shed = 0, clients = 0, requests_refused = 0;
+  double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
+  double latency_ms_p99_tracker = 0, latency_ms_p99_frame = 0;  ///< last byte in to last byte out, since the last
+  std::string recording;  ///< the file, or why there is none; empty: not asked for
 };
 
-using Event = std::variant<VideoFrame, Birds, Status, Health>;
+using Event = std::variant<VideoFrame, Birds, Doubt, Pedal, Status, Health>;
 
-/// One or more whole messages, to be sent together or not at all.
-using Packet = std::shared_ptr<const std::vector<std::uint8_t>>;
-Packet pack(const VideoFrame& frame);
-Packet pack(const Birds& birds);
-Packet pack(const Status& status, DeviceTime time);
-Packet pack(const Health& health, DeviceTime time);
-
-inline constexpr std::size_t kHeaderBytes = 58;
-inline constexpr std::uint64_t kLargestBody = 64U << 20U;
-
-/// Body size by a message's header; refuses what is no header and bodies over kLargestBody.
-Result<std::uint64_t> body_bytes(std::span<const std::uint8_t> header);
-
-/// Puts messages back together: a FrameInfo is held until its image comes. Messages that are not ours are passed over.
-class Unpacker {
- public:
-  /// message: header and body. Empty where it completes nothing.
-  Result<std::optional<Event>> push(std::span<const std::uint8_t> message);
-
- private:
-  std::optional<FrameInfo> info_;
-};
+inline constexpr const char* kBirdsDevice = "Birds";
+inline constexpr const char* kDoubtDevice = "Doubt";
+inline constexpr const char* kFrameInfoDevice = "FrameInfo";
+inline constexpr const char* kVideoDevice = "Laparoscope";
+inline constexpr const char* kPedalDevice = "Pedal";
+inline constexpr const char* kStatusDevice = "birdseyed";
+inline constexpr const char* kHealthDevice = "Health";
+// A client asks with these, in a STRING.
+inline constexpr const char* kClockPingDevice = "ClockPing";
+inline constexpr const char* kClockPongDevice = "ClockPong";
+inline constexpr const char* kSubscribeDevice = "Subscribe";
 
 }  // namespace birdseye::wire

@@ -8,7 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <vector>
 
@@ -16,7 +16,7 @@ namespace birdseye::wire {
 
 namespace {
 
-constexpr std::size_t kMostQueuedBytes = 32U << 20U;  // about a second of PAL video
+constexpr std::size_t kMostInboxBytes = 64U << 20U;
 constexpr std::size_t kMostClients = 16;
 
 }  // namespace
@@ -54,92 +54,119 @@ Server::Server(int fd, int wake_fd, int port) : fd_(fd), wake_fd_(wake_fd), port
 
 Server::~Server() {
   thread_.request_stop();
-  const std::uint64_t one = 1;
-  (void)!::write(wake_fd_, &one, sizeof one);
+  wake();
   if (thread_.joinable()) thread_.join();
-  for (const ClientQueue& client : clients_) ::close(client.fd);
   ::close(fd_);
   ::close(wake_fd_);
+}
+
+void Server::wake() const {
+  const std::uint64_t one = 1;
+  (void)!::write(wake_fd_, &one, sizeof one);
 }
 
 void Server::publish(const Packet& packet) {
   {
     const std::lock_guard lock(mutex_);
-    for (ClientQueue& client : clients_) {
-      if (!client.packets.empty() && client.bytes + packet->size() > kMostQueuedBytes) {
-        ++shed_;
-        continue;
-      }
-      client.packets.push_back(packet);
-      client.bytes += packet->size();
+    if (inbox_bytes_ + packet.size() > kMostInboxBytes) {
+      ++messages_shed_;
+      return;
     }
+    inbox_bytes_ += packet.size();
+    inbox_.push_back(packet);
   }
-  const std::uint64_t one = 1;
-  (void)!::write(wake_fd_, &one, sizeof one);
+  wake();
 }
 
-std::size_t Server::clients() const {
-  const std::lock_guard lock(mutex_);
-  return clients_.size();
+Server::Counters Server::take_counters() {
+  Counters counters{clients_count_, messages_shed_, clients_shed_, requests_refused_, 0, 0};
+  counters.latency_ms_p99_tracker = latencies_.tracker.take_p99_ms();
+  counters.latency_ms_p99_frame = latencies_.frame.take_p99_ms();
+  return counters;
 }
 
 void Server::accept_one() {
-  const int client = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-  if (client < 0) return;
-  const std::lock_guard lock(mutex_);
+  const int fd = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd < 0) return;
   if (clients_.size() >= kMostClients) {
-    ::close(client);
+    ::close(fd);
+    ++clients_shed_;
     return;
   }
   const int on = 1;
-  ::setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  clients_.push_back({client, {}, 0, 0});
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  clients_.emplace_back(fd);
+  if (last_status_) clients_.back().offer(*last_status_);
+  ++clients_count_;
 }
 
-bool Server::serve(ClientQueue& client, short events) {
-  if ((events & (POLLERR | POLLHUP | POLLNVAL)) != 0) return false;
-  if ((events & POLLIN) != 0) {
-    // Clients have nothing to ask of us yet; what they say is read so that their close is seen.
-    std::array<std::uint8_t, 4096> ignored;
-    const ssize_t got = ::recv(client.fd, ignored.data(), ignored.size(), 0);
-    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return false;
+void Server::distribute() {
+  std::deque<Packet> packets;
+  {
+    const std::lock_guard lock(mutex_);
+    packets.swap(inbox_);
+    inbox_bytes_ = 0;
   }
-  while (!client.packets.empty()) {
-    const std::vector<std::uint8_t>& first = *client.packets.front();
-    const ssize_t put =
-        ::send(client.fd, first.data() + client.sent_of_first, first.size() - client.sent_of_first, MSG_NOSIGNAL);
-    if (put < 0) return errno == EAGAIN || errno == EINTR;
-    client.sent_of_first += static_cast<std::size_t>(put);
-    if (client.sent_of_first < first.size()) return true;
-    client.bytes -= first.size();
-    client.sent_of_first = 0;
-    client.packets.pop_front();
+  for (const Packet& packet : packets) {
+    if (packet.kind == Packet::Kind::status) last_status_ = packet;
+    for (ClientLink& client : clients_) {
+      if (!client.offer(packet)) ++messages_shed_;
+    }
   }
-  return true;
+}
+
+void Server::answer(ClientLink& client, const Request& request) {
+  if (const auto* ping = std::get_if<ClockPing>(&request)) {
+    const DeviceTime now = monotonic_now();
+    client.offer(pack(ClockPong{ping->host_sent_ns, now, now}));
+  } else if (const auto* subscription = std::get_if<Subscription>(&request)) {
+    client.take(*subscription);
+  } else if (const auto* tracking = std::get_if<TrackingRequest>(&request)) {
+    client.take(*tracking);
+    client.offer(pack_tracking_reply(true));
+  } else if (std::holds_alternative<StatusRequest>(request)) {
+    if (last_status_) client.offer(*last_status_);
+  } else if (std::holds_alternative<DamagedRequest>(request)) {
+    ++requests_refused_;
+  }
+}
+
+bool Server::serve(ClientLink& client, short events) {
+  if ((events & (POLLERR | POLLNVAL)) != 0) return false;
+  if ((events & (POLLIN | POLLHUP)) != 0) {
+    const auto requests = client.receive();
+    if (!requests) {
+      if (requests.error().code == Errc::bad_format) ++requests_refused_;
+      return false;
+    }
+    for (const Request& request : *requests) answer(client, request);
+  }
+  if (client.stuck()) {
+    ++clients_shed_;
+    return false;
+  }
+  return client.send_some(latencies_);
 }
 
 void Server::run(const std::stop_token& stop) {
+  std::vector<pollfd> entries;
   while (!stop.stop_requested()) {
-    std::vector<pollfd> entries{{fd_, POLLIN, 0}, {wake_fd_, POLLIN, 0}};
-    {
-      const std::lock_guard lock(mutex_);
-      for (const ClientQueue& client : clients_) {
-        entries.push_back({client.fd, static_cast<short>(client.packets.empty() ? POLLIN : POLLIN | POLLOUT), 0});
-      }
+    entries.assign({{fd_, POLLIN, 0}, {wake_fd_, POLLIN, 0}});
+    for (const ClientLink& client : clients_)
+      entries.push_back({client.fd(), static_cast<short>(client.wants_to_write() ? POLLIN | POLLOUT : POLLIN), 0});
+    if (::poll(entries.data(), entries.size(), 200) < 0) continue;
+    if ((entries[1].revents & POLLIN) != 0) {
+      std::uint64_t count = 0;
+      (void)!::read(wake_fd_, &count, sizeof count);
     }
-    if (::poll(entries.data(), entries.size(), 200) <= 0) continue;
-    std::uint64_t count = 0;
-    (void)!::read(wake_fd_, &count, sizeof count);
-    {
-      const std::lock_guard lock(mutex_);
-      auto entry = entries.begin() + 2;
-      for (auto client = clients_.begin(); client != clients_.end() && entry != entries.end(); ++entry) {
-        if (serve(*client, entry->revents)) {
-          ++client;
-        } else {
-          ::close(client->fd);
-          client = clients_.erase(client);
-        }
+    distribute();
+    auto entry = entries.begin() + 2;
+    for (auto client = clients_.begin(); client != clients_.end(); ++entry) {
+      if (serve(*client, entry->revents)) {
+        ++client;
+      } else {
+        client = clients_.erase(client);
+        --clients_count_;
       }
     }
     if ((entries[0].revents & POLLIN) != 0) accept_one();

@@ -6,15 +6,17 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
-#include "device/wire/messages.hpp"
+#include "device/wire/client_link.hpp"
 
 namespace birdseye::wire {
 
-/// Sends packets to every client that is connected. A client that does not keep up loses packets (never parts of one),
-/// not the others: each has a bounded queue of its own.
+/// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
+/// not keep up loses packets (never parts of one), not the others; one that takes nothing for ten seconds, or does not
+/// speak the protocol, is disconnected.
 class Server {
  public:
   /// port 0 takes any that is free. A port in use is an error that names it and the setting.
@@ -25,25 +27,36 @@ class Server {
 
   void publish(const Packet& packet);
   [[nodiscard]] int port() const { return port_; }
-  [[nodiscard]] std::uint64_t messages_shed() const { return shed_; }
-  [[nodiscard]] std::size_t clients() const;
+
+  struct Counters {
+    std::uint64_t clients = 0, messages_shed = 0, clients_shed = 0, requests_refused = 0;
+    double latency_ms_p99_tracker = 0, latency_ms_p99_frame = 0;  ///< since they were last taken
+  };
+  Counters take_counters();
+  [[nodiscard]] std::size_t clients() const { return clients_count_; }
+  [[nodiscard]] std::uint64_t messages_shed() const { return messages_shed_; }
+  [[nodiscard]] std::uint64_t requests_refused() const { return requests_refused_; }
+  [[nodiscard]] std::uint64_t clients_shed() const { return clients_shed_; }
 
  private:
-  struct ClientQueue {
-    int fd;
-    std::deque<Packet> packets;
-    std::size_t sent_of_first = 0;
-    std::size_t bytes = 0;
-  };
   Server(int fd, int wake_fd, int port);
   void run(const std::stop_token& stop);
   void accept_one();
-  static bool serve(ClientQueue& client, short events);
+  void distribute();
+  void wake() const;
+  /// False: the client is to be disconnected.
+  bool serve(ClientLink& client, short events);
+  void answer(ClientLink& client, const Request& request);
 
   int fd_, wake_fd_, port_;
-  mutable std::mutex mutex_;
-  std::list<ClientQueue> clients_;
-  std::atomic<std::uint64_t> shed_ = 0;
+  std::atomic<std::size_t> clients_count_ = 0;
+  std::atomic<std::uint64_t> messages_shed_ = 0, clients_shed_ = 0, requests_refused_ = 0;
+  std::mutex mutex_;
+  std::deque<Packet> inbox_;  ///< published, not yet distributed
+  std::size_t inbox_bytes_ = 0;
+  Latencies latencies_;
+  std::list<ClientLink> clients_;      ///< of the thread below alone, as is what follows
+  std::optional<Packet> last_status_;  ///< a client that comes is told at once how things are
   std::jthread thread_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -21,8 +22,15 @@ class ByteStream {
   virtual void discard_input() = 0;
   /// False where the line has no RTS (a pseudo-terminal, a three-wire cable's adapter).
   virtual bool set_rts(bool asserted) = 0;
-  /// For messages: the device's path.
+  /// For messages: the device as the configuration names it.
   [[nodiscard]] virtual const std::string& name() const = 0;
+  /// How often the line has said that bytes came damaged (overrun, parity, framing, break) or has lost some itself.
+  /// Damaged bytes are not delivered; a reader that sees the count change between two reads has lost its place.
+  [[nodiscard]] virtual std::uint64_t line_errors() const { return 0; }
+  /// When the first byte of the last read came in, where the line knows better than "before read() returned".
+  [[nodiscard]] virtual std::optional<DeviceTime> arrival() const { return std::nullopt; }
+  /// One line of what was found and set at opening, for the log.
+  [[nodiscard]] virtual std::string describe() const { return name(); }
 };
 
 }  // namespace birdseye::drivers

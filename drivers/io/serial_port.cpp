@@ -2,16 +2,21 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/serial.h>
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <optional>
 #include <utility>
 
 #include "drivers/io/monotonic.hpp"
+#include "drivers/io/serial_latency.hpp"
 
 namespace birdseye::drivers {
 
@@ -43,13 +48,34 @@ Error open_error(const std::string& name, int failed) {
   }
 }
 
+/// A pseudo-terminal's exclusiveness would outlive a driver that was killed, for as long as its other end is open.
+bool is_pseudo_terminal(int fd) {
+  struct stat status {};
+  constexpr unsigned kFirst = 136, kLast = 143;
+  return ::fstat(fd, &status) == 0 && major(status.st_rdev) >= kFirst && major(status.st_rdev) <= kLast;
+}
+
+/// Raw, 8N1, no flow control; damaged bytes marked.
+termios raw_settings(termios settings, speed_t speed) {
+  ::cfmakeraw(&settings);
+  settings.c_iflag |= INPCK | PARMRK;
+  settings.c_cflag |= CLOCAL | CREAD;
+  settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB | PARENB);
+  settings.c_cc[VMIN] = 0;
+  settings.c_cc[VTIME] = 0;
+  ::cfsetispeed(&settings, speed);
+  ::cfsetospeed(&settings, speed);
+  return settings;
+}
+
 }  // namespace
 
 bool is_serial_speed(int baud) {
   return speed_of(baud).has_value();
 }
 
-Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path& device, int baud) {
+Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path& device, int baud,
+                                                     int usb_latency_ms) {
   const std::string name = device.string();
   const auto speed = speed_of(baud);
   if (!speed) {
@@ -62,34 +88,86 @@ Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path
     return Error{Errc::bad_value, fmt::format("{}: is not a serial port; see [tracker] device", name), errno};
   }
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return open_error(name, EBUSY);
-  ::cfmakeraw(&settings);
-  settings.c_cflag |= CLOCAL | CREAD;
-  settings.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB | PARENB);
-  settings.c_cc[VMIN] = 0;
-  settings.c_cc[VTIME] = 0;
-  ::cfsetispeed(&settings, *speed);
-  ::cfsetospeed(&settings, *speed);
-  if (::tcsetattr(fd.get(), TCSANOW, &settings) != 0) {
+  // Against programs that do not lock, too.
+  if (!is_pseudo_terminal(fd.get())) ::ioctl(fd.get(), TIOCEXCL);
+  settings = raw_settings(settings, *speed);
+  if (::tcsetattr(fd.get(), TCSANOW, &settings) != 0 || ::tcgetattr(fd.get(), &settings) != 0) {
     return Error{Errc::io, fmt::format("{}: does not take {} baud, 8N1", name, baud), errno};
   }
   std::unique_ptr<SerialPort> port(new SerialPort(std::move(fd), name));
   port->set_rts(false);
+  port->marked_ = (settings.c_iflag & PARMRK) != 0;
+  port->overruns_ = port->overruns();
+  port->description_ =
+      fmt::format("{}: {} baud, {}, {}", name, baud, port->marked_ ? "damaged bytes marked" : "damage goes unmarked",
+                  lower_latency(port->fd_.get(), latency_timer_of(device), usb_latency_ms));
   return port;
 }
 
+Error SerialPort::gone() const {
+  return {Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), errno};
+}
+
+std::optional<std::uint64_t> SerialPort::overruns() const {
+  serial_icounter_struct counts{};
+  if (::ioctl(fd_.get(), TIOCGICOUNT, &counts) != 0) return std::nullopt;
+  return static_cast<std::uint64_t>(counts.overrun) + static_cast<std::uint64_t>(counts.buf_overrun);
+}
+
+/// A lost byte leaves no mark in the stream, only a count. Where it was nobody knows, so all that waits is dropped.
+/// The count is raised before the bytes behind the hole are there to be read; it is read before all that waits is
+/// dropped, so that a loss in between shows the next time.
+bool SerialPort::lost_bytes() {
+  if (!overruns_) return false;
+  const auto seen = overruns();
+  if (!seen || *seen == *overruns_) return false;
+  line_errors_ += *seen - *overruns_;
+  overruns_ = seen;
+  discard_input();
+  return true;
+}
+
+std::size_t SerialPort::decode(std::span<std::uint8_t> into) {
+  while (raw_begin_ < raw_end_) {
+    const std::span<const std::uint8_t> raw(raw_.data() + raw_begin_, raw_end_ - raw_begin_);
+    if (!marked_) {
+      const std::size_t count = std::min(raw.size(), into.size());
+      std::copy_n(raw.begin(), count, into.begin());
+      raw_begin_ += count;
+      return count;
+    }
+    const SerialMarks::Step step = marks_.decode(raw, into);
+    raw_begin_ += step.used;
+    if (step.made > 0) {
+      damage_next_ = step.damaged;  // to be told with the bytes behind it, not with those before
+      return step.made;
+    }
+    if (step.damaged) ++line_errors_;
+  }
+  return 0;
+}
+
 Result<std::size_t> SerialPort::read(std::span<std::uint8_t> into, DeviceTime deadline) {
+  if (into.empty()) return std::size_t{0};
+  if (std::exchange(damage_next_, false)) ++line_errors_;
+  if (const std::size_t made = decode(into); made > 0) return made;
   bool hung_up = false;
   for (;;) {
-    const ssize_t got = ::read(fd_.get(), into.data(), into.size());
-    if (got > 0) return static_cast<std::size_t>(got);
-    // A line that has hung up is always ready to be read, and what is read is nothing.
-    if (hung_up || (got < 0 && errno != EAGAIN && errno != EINTR)) {
-      return Error{Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), errno};
+    const ssize_t got = ::read(fd_.get(), raw_.data(), raw_.size());
+    if (got > 0) {
+      raw_begin_ = 0;
+      raw_end_ = static_cast<std::size_t>(got);
+      const std::size_t made = lost_bytes() ? 0 : decode(into);
+      // Nothing but damage may go on for ever.
+      if (made > 0 || now() >= deadline) return made;
+      continue;
     }
+    // A line that has hung up is always ready to be read, and what is read is nothing.
+    if (hung_up || (got < 0 && errno != EAGAIN && errno != EINTR)) return gone();
     pollfd entry{fd_.get(), POLLIN, 0};
     const int ready = ::poll(&entry, 1, poll_ms(deadline));
     hung_up = ready > 0 && (entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
-    if (ready == 0 && now() >= deadline) return std::size_t{0};
+    if (!hung_up && now() >= deadline && (entry.revents & POLLIN) == 0) return std::size_t{0};
   }
 }
 
@@ -100,9 +178,7 @@ Result<void> SerialPort::write(std::span<const std::uint8_t> bytes, DeviceTime d
       bytes = bytes.subspan(static_cast<std::size_t>(put));
       continue;
     }
-    if (errno != EAGAIN && errno != EINTR) {
-      return Error{Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), errno};
-    }
+    if (put < 0 && errno != EAGAIN && errno != EINTR) return gone();
     pollfd entry{fd_.get(), POLLOUT, 0};
     if (::poll(&entry, 1, poll_ms(deadline)) == 0 && now() >= deadline) {
       return Error{Errc::timeout, fmt::format("{}: does not take commands", name_)};
@@ -113,6 +189,9 @@ Result<void> SerialPort::write(std::span<const std::uint8_t> bytes, DeviceTime d
 
 void SerialPort::discard_input() {
   ::tcflush(fd_.get(), TCIFLUSH);
+  raw_begin_ = raw_end_ = 0;
+  marks_ = {};
+  if (std::exchange(damage_next_, false)) ++line_errors_;
 }
 
 bool SerialPort::set_rts(bool asserted) {

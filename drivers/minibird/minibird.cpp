@@ -1,45 +1,44 @@
 #include "drivers/minibird/minibird.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <utility>
 
 #include "drivers/io/monotonic.hpp"
+#include "drivers/minibird/configuration.hpp"
 
 namespace birdseye::drivers::minibird {
 
 namespace {
 
-std::uint16_t word_of(const Bytes& bytes) {
-  return static_cast<std::uint16_t>(bytes[0] + 256U * bytes[1]);
+constexpr int kPoints = 3;
+constexpr double kRateAgrees = 0.005;
+
+bool is_one_cycle(const Bytes& bytes, const StreamLayout& layout) {
+  if (bytes.size() != cycle_bytes(layout)) return false;
+  std::size_t at = 0;
+  for (std::size_t bird = 0; bird < layout.birds.size(); ++bird) {
+    const std::size_t end = at + record_bytes(layout, bird);
+    for (std::size_t i = at; i < end; ++i) {
+      if ((bytes[i] >= 0x80U) != (i == at)) return false;
+    }
+    if (layout.group_mode && bytes[end - 1] != bird + 1) return false;
+    at = end;
+  }
+  return true;
 }
 
-Duration byte_time(int baud) {
-  return {std::int64_t{10} * 1'000'000'000 / baud};
-}
-
-/// Sleeps for span, or until stop is requested.
-void wait(Duration span, const std::stop_token& stop) {
-  const DeviceTime until = now() + span;
-  while (now() < until && !stop.stop_requested()) sleep_for(std::min(until - now(), Duration::from_ms(20)));
-}
-
-ClockLine::Settings line_settings(double rate_hz) {
-  ClockLine::Settings settings;
-  settings.period = Duration::from_seconds(1.0 / rate_hz);
-  return settings;
+void append(std::string& words, const std::string& more) {
+  if (!more.empty()) words += (words.empty() ? "" : "; ") + more;
 }
 
 }  // namespace
 
 MiniBird::MiniBird(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings)
-    : line_(std::move(line)),
-      settings_(settings),
-      parser_(std::vector<RecordFormat>(static_cast<std::size_t>(settings.birds), settings.format), false,
-              settings.birds > 1),
-      clock_line_(line_settings(settings.rate_hz)) {}
+    : line_(std::move(line)), settings_(settings), dialogue_(*line_, settings_.reply_timeout, settings_.quiet) {}
 
 MiniBird::~MiniBird() {
   // Leave the unit quiet for whoever opens the line next.
@@ -49,193 +48,325 @@ MiniBird::~MiniBird() {
 
 Result<std::unique_ptr<MiniBird>> MiniBird::start(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings,
                                                   const std::stop_token& stop) {
-  if (settings.birds < 1 || settings.birds > 14) {
-    return Error{Errc::bad_value,
-                 fmt::format("{}: {} birds; a flock in normal addressing has 1 to 14", line->name(), settings.birds)};
+  if (const auto faults = faults_of(settings); !faults.empty()) {
+    return Error{Errc::bad_value, fmt::format("{}: {}", line->name(), fmt::join(faults, "; "))};
   }
   std::unique_ptr<MiniBird> bird(new MiniBird(std::move(line), settings));
-  for (const auto step : {+[](MiniBird&b, const std::stop_token&s) { return b.reset(s); },
-                          +[](MiniBird&b, const std::stop_token&) { return b.examine_unit(); },
-                          +[](MiniBird&b, const std::stop_token&) { return b.configure(); }}) {
-    if (stop.stop_requested())
-      return Error{Errc::timeout, fmt::format("{}: stopped while starting", bird->line_->name())};
-    if (auto done = step(*bird, stop); !done) return done.error();
-  }
-  bird->clock_line_ = ClockLine(line_settings(bird->info_.rate_hz));
+  bird->dialogue_.obey(stop);
+  auto begun = bird->begin();
+  bird->dialogue_.obey({});
+  if (!begun) return begun.error();
   return bird;
 }
 
-Result<void> MiniBird::send(const Bytes& command) {
-  return line_->write(command, now() + settings_.reply_timeout);
+std::uint8_t MiniBird::address_of(std::size_t index) const {
+  return settings_.birds > 1 ? static_cast<std::uint8_t>(index + 1) : std::uint8_t{0};
 }
 
-Result<Bytes> MiniBird::ask(const Bytes& command, std::size_t reply_bytes) {
-  line_->discard_input();
-  if (auto sent = send(command); !sent) return sent.error();
-  Bytes reply;
-  const DeviceTime deadline = now() + settings_.reply_timeout;
-  std::array<std::uint8_t, 64> chunk;
-  while (reply.size() < reply_bytes) {
-    const auto got = line_->read(std::span(chunk).first(reply_bytes - reply.size()), deadline);
-    if (!got) return got.error();
-    if (*got == 0) {
-      return Error{Errc::timeout, fmt::format("{}: the tracker does not answer; check power, cable and baud rate (its "
-                                              "DIP switches), and that its FLY switch is on",
-                                              line_->name())};
+Result<void> MiniBird::begin() {
+  // Opening a port asserts RTS, which holds the unit in reset.
+  info_.has_reset_line = line_->set_rts(false);
+  info_.not_warm = "not wanted";
+  if (settings_.warm_restart) {
+    auto why_not = try_warm();
+    if (why_not) {
+      info_.not_warm = *why_not;
+    } else if (why_not.error().code == Errc::disconnected) {
+      return why_not.error();
+    } else {
+      info_.not_warm = why_not.error().what;  // a reset may help; if not, that says why
     }
-    for (std::size_t i = 0; i < *got; ++i) reply.push_back(chunk[i]);
   }
-  return reply;
+  info_.warm = info_.not_warm.empty();
+  if (!info_.warm) {
+    if (auto done = reset(); !done) return done;
+    if (auto done = configure(); !done) return done;
+  }
+  if (auto done = run(); !done) return done;
+  if (auto done = check_record(); !done) return done;
+  return stream();
 }
 
-Result<Bytes> MiniBird::ask_parameter(std::uint8_t parameter) {
-  return ask(examine(parameter), *examine_bytes(parameter));
-}
-
-Result<void> MiniBird::reset(const std::stop_token& stop) {
-  info_.has_reset_line = line_->set_rts(true);
-  if (info_.has_reset_line) {
-    wait(settings_.reset_hold, stop);
-    line_->set_rts(false);
-    wait(settings_.reset_settle, stop);
-  }
-  // A unit that streams stops on POINT, with one more record; one that boots says nothing until it is ready.
-  const DeviceTime deadline = now() + settings_.answer_within;
-  for (;;) {
-    if (auto sent = send({kPoint}); !sent) return sent;
-    std::array<std::uint8_t, 512> chunk;
-    const DeviceTime quiet_by = now() + settings_.reply_timeout;
-    for (;;) {
-      const auto got = line_->read(chunk, now() + Duration::from_ms(40));
-      if (!got) return got.error();
-      if (*got == 0 || now() > quiet_by) break;
-    }
-    const auto status = ask_parameter(kStatus);
-    if (status) return {};
-    if (status.error().code != Errc::timeout || now() >= deadline || stop.stop_requested()) return status.error();
-  }
-}
-
-Result<void> MiniBird::examine_unit() {
-  const auto revision = ask_parameter(kRevision);
+/// Why the unit cannot be left as it is; empty if it can.
+Result<std::string> MiniBird::try_warm() {
+  if (auto quiet = dialogue_.hush(); !quiet) return quiet.error();
+  const auto revision = dialogue_.ask_if_known(kRevision);
   if (!revision) return revision.error();
-  info_.revision_major = (*revision)[0];
-  info_.revision_minor = (*revision)[1];
-  const auto crystal = ask_parameter(kCrystal);
-  if (!crystal) return crystal.error();
-  info_.crystal_mhz = (*crystal)[0] == 0 ? 20 : (*crystal)[0];
-  const auto model = ask_parameter(kModel);
-  if (!model) return model.error();
-  info_.model.assign(model->begin(), model->end());
-  while (!info_.model.empty() && info_.model.back() == ' ') info_.model.pop_back();
+  if (!*revision) return std::string("it did not answer at once");
+  if (settings_.birds > 1) {
+    if (auto flock = check_flock(); !flock) return flock.error();
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(settings_.birds); ++i) {
+    auto odd = odd_status(i);
+    if (!odd || !odd->empty()) return odd;
+  }
+  if (auto examined = examine_units(); !examined) return examined.error();
+  if (auto noted = note_errors(); !noted) return noted.error();
+  const auto rate = settle_rate(dialogue_, settings_, info_.units.front(), true);
+  if (!rate) return rate.error();
+  if (std::abs(*rate - settings_.rate_hz) > kRateAgrees * settings_.rate_hz) {
+    return fmt::format("it measured at {:.1f} Hz", *rate);
+  }
+  std::vector<Setting> list;
+  for (std::size_t i = 0; i < info_.units.size(); ++i) {
+    for (Setting& setting : settings_of_unit(settings_, info_.units[i], i, info_.notes))
+      list.push_back(std::move(setting));
+  }
+  for (Setting& setting : settings_of_port(settings_, info_.units.front())) list.push_back(std::move(setting));
+  auto different = first_difference(dialogue_, list);
+  if (!different) return different.error();
+  if (!different->empty()) return fmt::format("it had another {}, or does not tell it", *different);
+  for (std::size_t i = 0; i < info_.units.size(); ++i) {
+    const auto scale = mm_per_count_of(dialogue_, address_of(i));
+    if (!scale) return scale.error();
+    info_.units[i].mm_per_count = *scale;
+  }
+  info_.mm_per_count = info_.units.front().mm_per_count;
+  info_.rate_hz = *rate;
+  layout_ = layout_of(settings_, info_.units, *rate);
+  return std::string();
+}
+
+/// What in a unit's status a warm restart does not mend; empty for nothing.
+Result<std::string> MiniBird::odd_status(std::size_t index) {
+  const auto reply = dialogue_.ask(kStatus, address_of(index));
+  if (!reply) return reply.error();
+  const Status status = decode_status(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
+  if (status.format_code != static_cast<std::uint8_t>(format_of(settings_, index))) {
+    return std::string("it had another record format");
+  }
+  if (status.xoff || status.host_sync || status.crt_sync || status.expanded_addressing || status.factory_test) {
+    return words_of(status);
+  }
+  return std::string();
+}
+
+Result<void> MiniBird::reset() {
+  info_.units.clear();
+  info_.notes.clear();
+  if (info_.has_reset_line) {
+    line_->set_rts(true);
+    auto held = dialogue_.pause(settings_.reset_hold);
+    line_->set_rts(false);
+    if (!held) return held;
+    if (auto waited = dialogue_.pause(settings_.reset_settle); !waited) return waited;
+  }
+  // A unit that boots says nothing until it is ready.
+  const DeviceTime deadline = now() + settings_.answer_within;
+  for (bool first = true;; first = false) {
+    auto quiet = dialogue_.hush();
+    if (quiet) {
+      const auto revision = dialogue_.ask_if_known(kRevision);
+      if (!revision) return revision.error();
+      // An answer to an earlier question may be yet to come.
+      if (*revision) return first ? Result<void>() : dialogue_.hush();
+    } else if (quiet.error().code != Errc::bad_format) {
+      return quiet;
+    }
+    if (now() < deadline) continue;
+    if (!quiet) return quiet;
+    const auto revision = dialogue_.ask(kRevision);
+    return revision ? Result<void>() : revision.error();
+  }
+}
+
+Result<void> MiniBird::gather_flock() {
+  if (auto sent = dialogue_.send({kBusReset}); !sent) return sent;
+  if (auto waited = dialogue_.pause(std::max(settings_.bus_reset_wait, settings_.configure_wait)); !waited)
+    return waited;
+  if (auto sent = dialogue_.send(auto_configure(static_cast<std::uint8_t>(settings_.birds))); !sent) return sent;
+  if (auto waited = dialogue_.pause(settings_.configure_wait); !waited) return waited;
+  return check_flock();
+}
+
+Result<void> MiniBird::check_flock() {
+  const auto flock = dialogue_.ask(kSystemStatus);
+  if (!flock) return flock.error();
+  for (std::size_t i = 0; i < flock->size(); ++i) {
+    const UnitStatus unit = decode_unit_status((*flock)[i]);
+    if (i >= static_cast<std::size_t>(settings_.birds)) {
+      if (unit.accessible) info_.notes.push_back(fmt::format("bird {} is on the bus, but not asked for", i + 1));
+      continue;
+    }
+    if (unit.accessible && unit.extended_range) {
+      return Error{Errc::unsupported, fmt::format("{}: unit {} is an extended-range controller, which this driver does "
+                                                  "not know; use a standard transmitter",
+                                                  line_->name(), i + 1)};
+    }
+    if (!unit.accessible || !unit.has_sensor) {
+      return Error{
+          Errc::not_found,
+          fmt::format("{}: bird {} of {} is {}; check its address switches, cable and FLY switch, or [tracker] "
+                      "birds",
+                      line_->name(), i + 1, settings_.birds, unit.accessible ? "without a sensor" : "not on the bus")};
+    }
+  }
   return {};
 }
 
-Result<void> MiniBird::set_rate() {
-  // Firmware after 3.63 takes the rate itself; older firmware a count of its crystal.
-  const bool by_rate = 256 * info_.revision_major + info_.revision_minor > 256 * 3 + 63;
-  if (auto sent = send(by_rate ? set_rate_hz(settings_.rate_hz) : set_rate_count(settings_.rate_hz, info_.crystal_mhz));
-      !sent) {
-    return sent;
+Result<void> MiniBird::examine_units() {
+  info_.units.clear();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(settings_.birds); ++i) {
+    auto unit = examine_unit(dialogue_, address_of(i));
+    if (!unit) return unit.error();
+    info_.units.push_back(*std::move(unit));
   }
-  const auto back = ask_parameter(by_rate ? kRate : kRateCount);
-  if (!back) return back.error();
-  info_.rate_hz = by_rate ? word_of(*back) / 256.0 : rate_of_count(word_of(*back), info_.crystal_mhz);
-  if (std::abs(info_.rate_hz - settings_.rate_hz) > 0.05 * settings_.rate_hz) {
-    return Error{Errc::bad_value, fmt::format("{}: the tracker measures at {:.1f} Hz and will not at {:.1f}; set "
-                                              "[tracker] rate_hz to what it does",
-                                              line_->name(), info_.rate_hz, settings_.rate_hz)};
+  const UnitInfo& master = info_.units.front();
+  info_.model = master.model;
+  info_.revision_major = master.revision_major;
+  info_.revision_minor = master.revision_minor;
+  info_.crystal_mhz = master.crystal_mhz;
+  return {};
+}
+
+/// Reads the latched errors. That an older firmware did not understand a question is none.
+Result<void> MiniBird::note_errors() {
+  info_.latched_error.clear();
+  for (std::size_t i = 0; i < info_.units.size(); ++i) {
+    auto errors = read_errors(dialogue_, address_of(i));
+    if (!errors) return errors.error();
+    std::erase_if(*errors, [](const UnitError& error) { return error.code == 6; });
+    for (const UnitError& error : *errors) {
+      std::string& noted = info_.units[i].latched_error;
+      if (noted.find(words_of(error)) == std::string::npos) append(noted, words_of(error));
+    }
+    if (info_.units[i].latched_error.empty()) continue;
+    append(info_.latched_error, settings_.birds > 1 ? fmt::format("bird {}: {}", i + 1, info_.units[i].latched_error)
+                                                    : info_.units[i].latched_error);
   }
   return {};
 }
 
 Result<void> MiniBird::configure() {
-  const auto birds = static_cast<std::uint8_t>(settings_.birds);
-  if (birds > 1) {
-    sleep_for(settings_.configure_wait);
-    if (auto sent = send(auto_configure(birds)); !sent) return sent;
-    sleep_for(settings_.configure_wait);
-    const auto flock = ask_parameter(kSystemStatus);
-    if (!flock) return flock.error();
-    for (std::uint8_t i = 0; i < birds; ++i) {
-      const UnitStatus unit = decode_unit_status((*flock)[i]);
-      if (!unit.accessible || !unit.has_sensor) {
-        return Error{Errc::not_found,
-                     fmt::format("{}: bird {} of {} is {}; check its address switches, cable and FLY "
-                                 "switch, or [tracker] birds",
-                                 line_->name(), i + 1, birds, unit.accessible ? "without a sensor" : "not on the bus")};
-      }
-    }
+  // The first thing said to it is a question: what is no miniBIRD shall not be sent commands that it may take for
+  // others.
+  if (auto known = examine_unit(dialogue_, 0); !known) return known.error();
+  if (settings_.birds > 1) {
+    if (auto flock = gather_flock(); !flock) return flock;
   }
-  if (auto rate = set_rate(); !rate) return rate;
-  for (std::uint8_t unit = 1; unit <= birds; ++unit) {
-    for (const Bytes& command : {select_format(settings_.format), select_hemisphere(settings_.hemisphere)}) {
-      if (auto sent = send(birds > 1 ? to_unit(unit, command) : command); !sent) return sent;
-    }
+  if (auto examined = examine_units(); !examined) return examined;
+  if (auto noted = note_errors(); !noted) return noted;
+  const auto rate = settle_rate(dialogue_, settings_, info_.units.front());
+  if (!rate) return rate.error();
+  for (std::size_t i = 0; i < info_.units.size(); ++i) {
+    UnitInfo& unit = info_.units[i];
+    const auto list = settings_of_unit(settings_, unit, i, info_.notes);
+    if (auto applied = apply(dialogue_, list, info_.has_reset_line); !applied) return applied;
+    const auto scale = mm_per_count_of(dialogue_, address_of(i));
+    if (!scale) return scale.error();
+    unit.mm_per_count = *scale;
   }
-  const auto scale = ask_parameter(kScale);
-  if (!scale) return scale.error();
-  info_.mm_per_count = word_of(*scale) == 0 ? kMmPerCount36Inch : kMmPerCount72Inch;
-  if (birds > 1) {
-    if (auto sent = send(set_group_mode(true)); !sent) return sent;
+  const auto port = settings_of_port(settings_, info_.units.front());
+  if (auto applied = apply(dialogue_, port, info_.has_reset_line); !applied) return applied;
+  if (auto noted = note_errors(); !noted) return noted;
+  info_.mm_per_count = info_.units.front().mm_per_count;
+  info_.rate_hz = *rate;
+  layout_ = layout_of(settings_, info_.units, *rate);
+  return {};
+}
+
+Result<void> MiniBird::run() {
+  // To the unit that has the port: in a flock that is the master, which runs them all.
+  if (auto sent = dialogue_.send({kXon}); !sent) return sent;
+  if (auto sent = dialogue_.send({kRun}); !sent) return sent;
+  return dialogue_.pause(settings_.run_wait);
+}
+
+Result<void> MiniBird::check_record() {
+  const std::size_t wanted = cycle_bytes(layout_);
+  const Duration on_the_line{static_cast<std::int64_t>(wanted) * 10 * 1'000'000'000 / settings_.baud};
+  Bytes last;
+  for (int i = 0; i < kPoints; ++i) {
+    line_->discard_input();
+    if (auto sent = dialogue_.send({kPoint}); !sent) return sent;
+    const auto heard = dialogue_.listen(4 * wanted, settings_.quiet, settings_.reply_timeout + on_the_line);
+    if (!heard) return heard.error();
+    if (is_one_cycle(*heard, layout_)) return {};
+    if (!heard->empty()) last = *heard;
   }
-  const auto error = ask_parameter(kErrorCode);
-  if (!error) return error.error();
-  if ((*error)[0] != 0) info_.latched_error = error_text((*error)[0]);
-  if (auto sent = send({kRun}); !sent) return sent;
-  sleep_for(settings_.run_wait);
+  if (last.empty()) {
+    return Error{Errc::timeout,
+                 fmt::format("{}: the tracker answers but sends no records; is its transmitter connected{}?",
+                             line_->name(), info_.latched_error.empty() ? "" : " (" + info_.latched_error + ")")};
+  }
+  return Error{Errc::bad_format,
+               fmt::format("{}: the tracker's records are not as set: {} bytes instead of {} ({}); switch "
+                           "it off and on",
+                           line_->name(), last.size(), wanted, shown(last))};
+}
+
+Result<void> MiniBird::stream() {
   line_->discard_input();
-  return send({kStream});
+  line_errors_ = line_->line_errors();
+  return dialogue_.send({kStream});
 }
 
-MiniBirdCounters MiniBird::counters() const {
-  MiniBirdCounters counters = counters_;
-  counters.phase_errors = parser_.phase_errors();
-  counters.discarded_bytes = parser_.discarded_bytes();
-  return counters;
+Result<std::optional<Chunk>> MiniBird::read(DeviceTime deadline) {
+  std::array<std::uint8_t, 4096> bytes;
+  const auto got = line_->read(bytes, deadline);
+  if (!got) return got.error();
+  const std::uint64_t errors = line_->line_errors();
+  if (*got == 0) return std::optional<Chunk>();
+  Chunk chunk;
+  chunk.arrived = now();
+  chunk.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*got));
+  chunk.after_line_error = std::exchange(line_errors_, errors) != errors;
+  chunk.after_restart = std::exchange(restarted_, false);
+  return std::optional<Chunk>(std::move(chunk));
 }
 
-void MiniBird::finish(std::vector<Measurement>& out) {
-  const ClockLine::Tick tick = clock_line_.push(partial_->began);
-  out.push_back({tick.time - settings_.delay, tick.sigma, partial_->arrived, std::move(partial_->birds)});
-  ++counters_.measurements;
-  partial_.reset();
-}
-
-Result<std::vector<Measurement>> MiniBird::read(DeviceTime deadline) {
-  std::vector<Measurement> out;
-  std::array<std::uint8_t, 1024> chunk;
-  const auto birds = static_cast<std::size_t>(settings_.birds);
-  const std::int64_t byte_ns = byte_time(settings_.baud).ns;
-  const auto record_bytes = static_cast<std::int64_t>(2 * word_count(settings_.format) + (birds > 1 ? 1 : 0));
-  while (out.empty()) {
-    const auto got = line_->read(chunk, deadline);
-    if (!got) return got.error();
-    if (*got == 0) break;
-    const DeviceTime arrived = now();
-    for (const Record& record : parser_.push(std::span(chunk).first(*got))) {
-      const std::size_t address = birds > 1 ? record.address : 1;
-      // The rest of that cycle was lost; after a loss, who knows which cycle a record is of.
-      if (partial_ && (address <= partial_->last_address || record.phase_errors != partial_->phase_errors)) finish(out);
-      if (!partial_) {
-        // The bytes after this record in the chunk, the record itself and those of the birds before it had yet to come
-        // when the cycle's first byte began.
-        const std::int64_t bytes =
-            static_cast<std::int64_t>(record.end_offset) + record_bytes * static_cast<std::int64_t>(address);
-        partial_ = Partial{{arrived.ns - bytes * byte_ns}, arrived, {}, 0, record.phase_errors};
-        partial_->birds.resize(birds);
-      }
-      partial_->arrived = arrived;
-      partial_->last_address = address;
-      if (auto pose = decode_pose(settings_.format, record.words, info_.mm_per_count)) {
-        partial_->birds[address - 1] = *std::move(pose);
-      } else {
-        ++counters_.senseless_records;
-      }
-      if (address == birds) finish(out);
-    }
+Result<Diagnosis> MiniBird::diagnose(const std::stop_token& stop) {
+  dialogue_.obey(stop);
+  auto diagnosis = look_for_trouble();
+  if (diagnosis && !diagnosis->needs_start) {
+    if (auto woken = wake(); !woken) diagnosis = woken.error();
   }
-  return out;
+  dialogue_.obey({});
+  return diagnosis;
+}
+
+Result<Diagnosis> MiniBird::look_for_trouble() {
+  if (auto quiet = dialogue_.hush(); !quiet) return quiet.error();
+  Diagnosis diagnosis;
+  for (std::size_t i = 0; i < info_.units.size(); ++i) {
+    const auto reply = dialogue_.ask(kStatus, address_of(i));
+    if (!reply) return reply.error();
+    const Status status = decode_status(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
+    const auto errors = read_errors(dialogue_, address_of(i));
+    if (!errors) return errors.error();
+    std::string words = words_of(status);
+    append(words, words_of(*errors));
+    if (status.format_code != static_cast<std::uint8_t>(format_of(settings_, i))) {
+      diagnosis.needs_start = true;
+      append(words, "it has lost its settings: was it switched off?");
+    }
+    for (const UnitError& error : *errors) {
+      diagnosis.errors.push_back(error);
+      if (is_fatal(error.code)) diagnosis.needs_start = true;
+    }
+    append(diagnosis.words, settings_.birds > 1 ? fmt::format("bird {}: {}", i + 1, words) : words);
+  }
+  for (const Setting& setting : settings_of_port(settings_, info_.units.front())) {
+    if (!setting.parameter) continue;
+    const auto reply = dialogue_.ask_if_known(*setting.parameter);
+    if (!reply) return reply.error();
+    if (!*reply || **reply == setting.value) continue;
+    diagnosis.needs_start = true;
+    append(diagnosis.words, fmt::format("it has lost its {}", setting.name));
+  }
+  return diagnosis;
+}
+
+Result<void> MiniBird::sleep() {
+  if (auto quiet = dialogue_.hush(); !quiet) return quiet;
+  if (auto sent = dialogue_.send({kSleep}); !sent) return sent;
+  return dialogue_.pause(settings_.sleep_wait);
+}
+
+Result<void> MiniBird::wake() {
+  if (auto done = run(); !done) return done;
+  restarted_ = true;
+  return stream();
 }
 
 }  // namespace birdseye::drivers::minibird

@@ -77,7 +77,7 @@ Result<Eigen::Matrix3d> rotation_from_matrix_words(std::span<const std::int16_t>
   Eigen::Matrix3d r;
   for (int i = 0; i < 9; ++i) r(i / 3, i % 3) = words[static_cast<std::size_t>(i)] * kPerFullScale;
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (off > 0.02 || r.determinant() < 0) {
+  if (off > 0.01 || r.determinant() < 0) {
     return Error{Errc::bad_value, "miniBIRD: a matrix that is no rotation; the sensor may be saturated or too close"};
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -162,6 +162,13 @@ std::optional<Hemisphere> hemisphere_of(std::string_view name) {
   return std::nullopt;
 }
 
+Eigen::Vector3d into(Hemisphere hemisphere) {
+  for (const HemisphereRow& row : kHemispheres) {
+    if (row.hemisphere == hemisphere) return Eigen::Vector3d::Unit(row.axis / 6) * (row.sign == 0 ? 1 : -1);
+  }
+  return Eigen::Vector3d::UnitX();
+}
+
 Bytes select_format(RecordFormat format) {
   return {static_cast<std::uint8_t>(0x55 + static_cast<unsigned>(format))};
 }
@@ -201,6 +208,21 @@ Bytes set_rate_count(double rate_hz, double crystal_mhz) {
 
 double rate_of_count(std::uint16_t count, double crystal_mhz) {
   return 1000.0 / (4.0 * count * (8.0 / crystal_mhz) / 1000.0 + 0.3);
+}
+
+Bytes report_rate_command(int every) {
+  switch (every) {
+    case 1:
+      return {'Q'};
+    case 2:
+      return {'R'};
+    case 8:
+      return {'S'};
+    case 32:
+      return {'T'};
+    default:
+      return {};
+  }
 }
 
 Bytes set_group_mode(bool on) {
@@ -282,71 +304,6 @@ std::optional<std::size_t> examine_bytes(std::uint8_t parameter) {
     default:
       return std::nullopt;
   }
-}
-
-Status decode_status(std::uint16_t word) {
-  const auto bit = [word](unsigned n) { return (word >> n & 1U) != 0; };
-  Status s{};
-  s.master = bit(15);
-  s.initialised = bit(14);
-  s.error = bit(13);
-  s.host_sync = bit(11);
-  s.expanded_addressing = bit(10);
-  s.crt_sync = bit(9);
-  s.no_sync = bit(8);
-  s.factory_test = bit(7);
-  s.xoff = bit(6);
-  s.asleep = bit(5);
-  s.stream = bit(0);
-  s.format_code = static_cast<std::uint8_t>(word >> 1U & 0xFU);
-  return s;
-}
-
-std::string error_text(std::uint8_t code) {
-  static constexpr std::array<std::string_view, 36> kTexts = {
-      "no error",
-      "RAM test failed",
-      "non-volatile memory write failed",
-      "board configuration data corrupt",
-      "transmitter data corrupt or transmitter not connected",
-      "sensor data corrupt or sensor not connected",
-      "invalid RS-232 command",
-      "not a bus master",
-      "no units accessible on the bus",
-      "unit not initialised",
-      "bus receive error between birds",
-      "RS-232 overrun or framing error",
-      "bus receive error from the host",
-      "no response from a unit on the bus",
-      "invalid host command on the bus",
-      "bus run-time error",
-      "invalid CPU speed",
-      "no data from a unit on the bus",
-      "illegal baud rate",
-      "unit acknowledge error",
-      "CPU overflow",
-      "CPU array bounds",
-      "CPU unused opcode",
-      "CPU escape opcode",
-      "CPU reserved interrupt 9",
-      "CPU reserved interrupt 10",
-      "CPU reserved interrupt 11",
-      "numeric processor error",
-      "CRT synchronisation error",
-      "transmitter not active or not accessible",
-      "extended-range transmitter not attached",
-      "CPU time overflow",
-      "sensor saturated: too close to the transmitter or in a strong field",
-      "unit configuration error",
-      "watchdog error",
-      "over-temperature",
-  };
-  return code < kTexts.size() ? std::string(kTexts[code]) : fmt::format("unknown error {}", code);
-}
-
-UnitStatus decode_unit_status(std::uint8_t byte) {
-  const auto bit = [byte](unsigned n) { return (byte >> n & 1U) != 0; };
-  return {bit(7), bit(6), bit(5), bit(4), bit(4) ? (byte & 0x0FU) != 0 : bit(0)};
 }
 
 }  // namespace birdseye::drivers::minibird

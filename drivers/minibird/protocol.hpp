@@ -52,6 +52,8 @@ Eigen::Matrix3d rotation_from_angles(double azimuth_rad, double elevation_rad, d
 
 enum class Hemisphere { forward, aft, right, left, lower, upper };
 std::optional<Hemisphere> hemisphere_of(std::string_view name);
+Eigen::Vector3d into(
+    Hemisphere hemisphere);  ///< unit vector from the transmitter into it, along the transmitter's axes
 
 /// Commands that carry data; those that are one byte are below.
 using Bytes = std::vector<std::uint8_t>;
@@ -63,6 +65,7 @@ Bytes change_word(std::uint8_t parameter, std::uint16_t value);  ///< little end
 Bytes set_rate_hz(double rate_hz);                               ///< parameter 7: rate * 256
 Bytes set_rate_count(double rate_hz, double crystal_mhz);        ///< parameter 6, for older firmware
 double rate_of_count(std::uint16_t count, double crystal_mhz);
+Bytes report_rate_command(int every);  ///< Q, R, S or T for 1, 2, 8 or 32; empty for anything else
 Bytes set_group_mode(bool on);
 Bytes auto_configure(std::uint8_t units);
 /// q and r: rotations given as azimuth, elevation, roll in degrees, within 180.
@@ -74,7 +77,8 @@ Bytes reference_frame_sincos_deg(double azimuth, double elevation, double roll);
 /// Puts the prefix that sends command to one unit of a flock: F0 + address up to 14, A0 address up to 126.
 Bytes to_unit(std::uint8_t address, const Bytes& command);
 
-inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kStreamStop = '?', kRun = 'F', kSleep = 'G', kBusReset = '/';
+inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kStreamStop = '?', kRun = 'F', kSleep = 'G', kBusReset = '/',
+                              kXon = 0x11;
 
 /// Parameters of EXAMINE and CHANGE that the driver uses.
 enum Parameter : std::uint8_t {
@@ -83,35 +87,29 @@ enum Parameter : std::uint8_t {
   kCrystal = 0x02,
   kScale = 0x03,
   kFilters = 0x04,
+  kAlphaMin = 0x05,
   kRateCount = 0x06,
   kRate = 0x07,
+  kDataReady = 0x08,
   kErrorCode = 0x0A,
   kVmTable = 0x0C,
+  kAlphaMax = 0x0D,
+  kSuddenChangeLock = 0x0E,
   kModel = 0x0F,
   kExpandedError = 0x10,
+  kFrameTurnsPosition = 0x11,
   kLineFrequency = 0x14,
   kHemisphere = 0x16,
+  kAngleAlign = 0x17,
+  kReferenceFrame = 0x18,
+  kUnitSerial = 0x19,
+  kSensorSerial = 0x1A,
+  kTransmitterSerial = 0x1B,
   kGroupMode = 0x23,
   kSystemStatus = 0x24,
   kAutoConfigure = 0x32,
 };
 /// Bytes of the reply to EXAMINE in normal addressing; empty for a parameter that has none.
 std::optional<std::size_t> examine_bytes(std::uint8_t parameter);
-
-/// The status word, bit by bit. Sources disagree on bit 12; `asleep` is what to trust.
-struct Status {
-  bool master, initialised, error, host_sync, expanded_addressing, crt_sync, no_sync, factory_test, xoff, asleep,
-      stream;
-  std::uint8_t format_code;
-};
-Status decode_status(std::uint16_t word);
-
-/// A unit's error code in words; nullptr-free: unknown codes say so.
-std::string error_text(std::uint8_t code);
-
-struct UnitStatus {
-  bool accessible, running, has_sensor, extended_range, has_transmitter;
-};
-UnitStatus decode_unit_status(std::uint8_t byte);
 
 }  // namespace birdseye::drivers::minibird

@@ -1,6 +1,6 @@
 #include "drivers/minibird/record_parser.hpp"
 
-#include <algorithm>
+#include <utility>
 
 namespace birdseye::drivers::minibird {
 
@@ -12,6 +12,7 @@ std::size_t RecordParser::record_bytes() const {
 }
 
 void RecordParser::reset() {
+  discarded_bytes_ += partial_.size();
   partial_.clear();
   expect_start_ = false;
 }
@@ -28,8 +29,8 @@ Record RecordParser::take() {
 
 std::vector<Record> RecordParser::push(std::span<const std::uint8_t> bytes) {
   std::vector<Record> records;
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    const std::uint8_t byte = bytes[i];
+  for (const std::uint8_t byte : bytes) {
+    const std::int64_t at = position_++;
     if ((byte & 0x80U) != 0) {
       if (!partial_.empty()) {
         // A record began before the last one was whole: bytes of that one were lost.
@@ -38,6 +39,7 @@ std::vector<Record> RecordParser::push(std::span<const std::uint8_t> bytes) {
         partial_.clear();
       }
       partial_.push_back(byte);
+      begin_ = at;
       expect_start_ = false;
     } else if (partial_.empty()) {
       if (expect_start_) ++phase_errors_;
@@ -49,8 +51,9 @@ std::vector<Record> RecordParser::push(std::span<const std::uint8_t> bytes) {
     }
     if (partial_.size() < record_bytes()) continue;
     Record record = take();
-    record.end_offset = bytes.size() - 1 - i;
+    record.begin = begin_;
     record.phase_errors = phase_errors_;
+    record.discarded_bytes = discarded_bytes_;
     partial_.clear();
     expect_start_ = true;
     if (group_mode_) {

@@ -13,9 +13,9 @@ struct Record {
   std::vector<std::int16_t> words;
   std::uint8_t button = 0;   ///< 0 where the records carry none
   std::uint8_t address = 0;  ///< the unit that sent it; 0 where the records carry none
-  std::uint64_t phase_errors =
-      0;                       ///< of the parser when the record was whole: a step between two means bytes were lost
-  std::size_t end_offset = 0;  ///< bytes of the pushed chunk after this record's last byte
+  std::int64_t begin = 0;    ///< of all bytes ever pushed, the index of its first
+  /// Of the parser when the record was whole: a step between two means that bytes were lost, or came to them.
+  std::uint64_t phase_errors = 0, discarded_bytes = 0;
 };
 
 /// The receiver: finds records in a stream of bytes by the phase bit, which only the first byte of a record has set.
@@ -28,7 +28,7 @@ class RecordParser {
   RecordParser(std::vector<RecordFormat> formats, bool button_mode, bool group_mode);
 
   std::vector<Record> push(std::span<const std::uint8_t> bytes);
-  /// Drops a partial record, as after a line error whose place is not known.
+  /// Drops a partial record, as after a line error whose place is not known, and hunts.
   void reset();
 
   [[nodiscard]] std::uint64_t phase_errors() const { return phase_errors_; }
@@ -42,7 +42,8 @@ class RecordParser {
   bool button_mode_, group_mode_;
   std::size_t turn_ = 0;
   std::vector<std::uint8_t> partial_;
-  bool expect_start_ = false;  ///< a record has just ended: the next byte must begin one
+  std::int64_t begin_ = 0, position_ = 0;  ///< of the partial record, and of the next byte, in all that was pushed
+  bool expect_start_ = false;              ///< a record has just ended: the next byte must begin one
   std::uint64_t phase_errors_ = 0, discarded_bytes_ = 0;
 };
 

@@ -15,27 +15,63 @@ namespace birdseye::drivers {
 struct Frame {
   std::shared_ptr<const std::vector<std::uint8_t>> rgb;
   int width_px = 0, height_px = 0;
-  std::uint64_t sequence = 0;  ///< the camera's own count: a hole is a frame the camera lost
-  DeviceTime acquired;         ///< the middle of the exposure
+  std::uint64_t sequence = 0;  ///< the camera's own count: a hole is a frame that was lost
+  /// The middle of the exposure, if acquired_known; else nothing is known but arrived, and these two are zero.
+  DeviceTime acquired;
   Duration acquired_sigma;
+  bool acquired_known = false;
   DeviceTime arrived;
+  Duration stamp_ahead;  ///< how far the camera's stamp lay ahead of arrived: some drivers stamp an end yet to come
 };
 
 /// Of one frame. More than any laparoscope's; three bytes each are less than the largest message of the wire.
 inline constexpr std::int64_t kMostPixels = std::int64_t{4096} * 4096;
 
-class FrameSource {
- public:
-  virtual ~FrameSource() = default;
-  /// The next frame; empty at the deadline; Errc::disconnected when the camera is gone.
-  virtual Result<std::optional<Frame>> next(DeviceTime deadline) = 0;
-  [[nodiscard]] virtual const std::string& name() const = 0;
-};
-
 struct CameraSettings {
   std::string source;  ///< v4l2:/dev/video0 or socket:/path
   int width_px = 0, height_px = 0;
   double rate_hz = 0;
+  // Below: Video4Linux only. Empty: as the camera has it.
+  std::string format = {};  ///< by its Video4Linux name (YUYV, MJPG, ...); empty: whichever costs least
+  std::optional<double> exposure_us = std::nullopt;
+  std::optional<int> gain = std::nullopt;  ///< in the camera's own units
+  std::optional<int> white_balance_k = std::nullopt;
+  std::optional<Duration> readout = std::nullopt;  ///< from the end of the exposure to the last pixel
+};
+
+/// Since the camera was opened.
+struct FrameCounters {
+  std::uint64_t frames = 0;      ///< given to the caller
+  std::uint64_t incomplete = 0;  ///< flagged damaged by the driver, cut short, or not to be decoded: dropped
+  std::uint64_t gaps = 0;        ///< frames missing by the camera's own count
+};
+
+/// What became of a wish about the camera's controls, a line of text each.
+struct ControlReport {
+  std::vector<std::string> done;     ///< "exposure 5000 us"
+  std::vector<std::string> refused;  ///< "gain: the camera has none"
+};
+
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+  /// The next frame; empty at the deadline; Errc::disconnected when the camera is gone: open it again.
+  virtual Result<std::optional<Frame>> next(DeviceTime deadline) = 0;
+  [[nodiscard]] virtual const std::string& name() const = 0;
+  /// One line: device, driver, format, size, rate, stamps.
+  [[nodiscard]] virtual std::string describe() const = 0;
+  [[nodiscard]] virtual FrameCounters counters() const = 0;
+  /// As the camera says, whatever was asked; 0: it does not say.
+  [[nodiscard]] virtual double rate_hz() const { return 0; }
+  /// When the camera says it and does not change it by itself.
+  [[nodiscard]] virtual std::optional<Duration> exposure() const { return std::nullopt; }
+  /// What became of exposure, gain and white balance as set.
+  [[nodiscard]] virtual ControlReport controls() const { return {}; }
+  /// Holds exposure, gain, white balance and focus as they are now, until unlock_controls().
+  virtual ControlReport lock_controls() { return {}; }
+  virtual ControlReport unlock_controls() { return {}; }
+  /// Stops and starts the stream, for a driver that has stopped giving frames and says nothing.
+  virtual Result<void> restart_stream() { return {}; }
 };
 
 /// Opens what settings.source names; an unknown kind is an error that says which there are.

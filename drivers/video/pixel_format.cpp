@@ -1,81 +1,155 @@
 #include "drivers/video/pixel_format.hpp"
 
-#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+
+#include "drivers/video/pixel_rows.hpp"
 
 namespace birdseye::drivers {
 
 namespace {
 
-constexpr std::uint32_t fourcc(char a, char b, char c, char d) {
-  return static_cast<std::uint32_t>(a) | static_cast<std::uint32_t>(b) << 8U | static_cast<std::uint32_t>(c) << 16U |
-         static_cast<std::uint32_t>(d) << 24U;
+constexpr std::uint32_t fourcc(const char (&name)[5]) {
+  std::uint32_t code = 0;
+  for (unsigned i = 0; i < 4; ++i) code |= static_cast<std::uint32_t>(name[i]) << 8U * i;
+  return code;
 }
 
-/// BT.601 in 8.8 fixed point.
-void yuv_to_rgb(int y, int u, int v, std::uint8_t* out) {
-  const int c = 298 * (y - 16) + 128;
-  const int d = u - 128;
-  const int e = v - 128;
-  const auto byte = [](int value) { return static_cast<std::uint8_t>(std::clamp(value >> 8, 0, 255)); };
-  out[0] = byte(c + 409 * e);
-  out[1] = byte(c - 100 * d - 208 * e);
-  out[2] = byte(c + 516 * d);
+struct Named {
+  std::uint32_t fourcc;
+  PixelFormat format;
+};
+// The first of each format is the one to ask for.
+constexpr std::array kNamed = {
+    Named{fourcc("RGB3"), PixelFormat::rgb8},  Named{fourcc("BGR3"), PixelFormat::bgr8},
+    Named{fourcc("YUYV"), PixelFormat::yuyv},  Named{fourcc("UYVY"), PixelFormat::uyvy},
+    Named{fourcc("NV12"), PixelFormat::nv12},  Named{fourcc("MJPG"), PixelFormat::mjpeg},
+    Named{fourcc("JPEG"), PixelFormat::mjpeg}, Named{fourcc("GREY"), PixelFormat::grey8},
+};
+
+/// Bytes of width_px pixels in one row of the first plane.
+std::size_t row_bytes(PixelFormat format, int width_px) {
+  const auto width = static_cast<std::size_t>(width_px);
+  switch (format) {
+    case PixelFormat::yuyv:
+    case PixelFormat::uyvy:
+      return 4 * ((width + 1) / 2);
+    case PixelFormat::nv12:
+    case PixelFormat::grey8:
+      return width;
+    case PixelFormat::mjpeg:
+      return 0;
+    default:
+      return 3 * width;
+  }
+}
+
+/// Kr and Kb of the recommendations; the rest follows from them.
+YuvMatrix matrix_of(const YuvColour& colour) {
+  double kr = 0.299;
+  double kb = 0.114;
+  if (colour.matrix == YuvColour::Matrix::bt709) kr = 0.2126, kb = 0.0722;
+  if (colour.matrix == YuvColour::Matrix::bt2020) kr = 0.2627, kb = 0.0593;
+  const double kg = 1 - kr - kb;
+  const double luma = colour.full_range ? 1 : 255.0 / 219;
+  const double chroma = colour.full_range ? 1 : 255.0 / 224;
+  const auto fixed = [](double factor) { return static_cast<std::int16_t>(std::lround(factor * 8192)); };
+  YuvMatrix m;
+  m.luma = fixed(luma);
+  m.red_of_v = fixed(2 * (1 - kr) * chroma);
+  m.green_of_u = fixed(-2 * (1 - kb) * kb / kg * chroma);
+  m.green_of_v = fixed(-2 * (1 - kr) * kr / kg * chroma);
+  m.blue_of_u = fixed(2 * (1 - kb) * chroma);
+  m.black = colour.full_range ? 0 : 16;
+  return m;
 }
 
 }  // namespace
 
 std::optional<PixelFormat> pixel_format_of_fourcc(std::uint32_t code) {
-  switch (code) {
-    case fourcc('R', 'G', 'B', '3'):
-      return PixelFormat::rgb8;
-    case fourcc('B', 'G', 'R', '3'):
-      return PixelFormat::bgr8;
-    case fourcc('Y', 'U', 'Y', 'V'):
-      return PixelFormat::yuyv;
-    case fourcc('G', 'R', 'E', 'Y'):
-      return PixelFormat::grey8;
-    default:
-      return std::nullopt;
+  for (const Named& named : kNamed) {
+    if (named.fourcc == code) return named.format;
   }
+  return std::nullopt;
 }
 
-std::size_t bytes_per_pixel(PixelFormat format) {
-  switch (format) {
-    case PixelFormat::yuyv:
-      return 2;
-    case PixelFormat::grey8:
-      return 1;
-    default:
-      return 3;
-  }
+std::optional<PixelFormat> pixel_format_of_name(const std::string& name) {
+  if (name.size() != 4) return std::nullopt;
+  std::uint32_t code = 0;
+  std::memcpy(&code, name.data(), 4);
+  return pixel_format_of_fourcc(code);
 }
 
-std::vector<std::uint8_t> to_rgb(std::span<const std::uint8_t> pixels, PixelFormat format, int width_px, int height_px,
-                                 std::size_t stride) {
-  const auto width = static_cast<std::size_t>(width_px);
-  std::vector<std::uint8_t> rgb(width * static_cast<std::size_t>(height_px) * 3);
-  for (std::size_t row = 0; row < static_cast<std::size_t>(height_px); ++row) {
-    const std::uint8_t* in = pixels.data() + row * stride;
-    std::uint8_t* out = rgb.data() + row * width * 3;
-    switch (format) {
+std::uint32_t fourcc_of(PixelFormat format) {
+  for (const Named& named : kNamed) {
+    if (named.format == format) return named.fourcc;
+  }
+  return 0;
+}
+
+std::string fourcc_name(std::uint32_t code) {
+  std::string name;
+  for (unsigned i = 0; i < 4; ++i) {
+    const unsigned letter = code >> 8U * i & 0xffU;
+    name += letter > ' ' && letter < 127 ? static_cast<char>(letter) : '.';
+  }
+  return name;
+}
+
+PixelLayout packed_layout(PixelFormat format, int width_px, int height_px) {
+  PixelLayout layout{format, width_px, height_px, row_bytes(format, width_px)};
+  if (format == PixelFormat::nv12) {
+    layout.chroma_offset = layout.stride * static_cast<std::size_t>(height_px);
+    layout.chroma_stride = 2 * ((static_cast<std::size_t>(width_px) + 1) / 2);
+  }
+  return layout;
+}
+
+std::size_t bytes_needed(const PixelLayout& layout) {
+  const auto height = static_cast<std::size_t>(layout.height_px);
+  if (layout.format == PixelFormat::mjpeg || height == 0) return 0;
+  const std::size_t first = layout.stride * (height - 1) + row_bytes(layout.format, layout.width_px);
+  if (layout.format != PixelFormat::nv12) return first;
+  const std::size_t chroma_row = 2 * ((static_cast<std::size_t>(layout.width_px) + 1) / 2);
+  return std::max(first, layout.chroma_offset + layout.chroma_stride * ((height + 1) / 2 - 1) + chroma_row);
+}
+
+void to_rgb(std::span<const std::uint8_t> pixels, const PixelLayout& layout, std::vector<std::uint8_t>& rgb) {
+  assert(pixels.size() >= bytes_needed(layout) && layout.format != PixelFormat::mjpeg);
+  const int width_px = layout.width_px;
+  const std::size_t rgb_stride = 3 * static_cast<std::size_t>(width_px);
+  rgb.resize(rgb_stride * static_cast<std::size_t>(layout.height_px));
+  const YuvMatrix matrix = matrix_of(layout.colour);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(layout.height_px); ++row) {
+    const std::uint8_t* in = pixels.data() + row * layout.stride;
+    std::uint8_t* out = rgb.data() + row * rgb_stride;
+    switch (layout.format) {
       case PixelFormat::rgb8:
-        std::copy_n(in, width * 3, out);
+        std::memcpy(out, in, rgb_stride);
         break;
       case PixelFormat::bgr8:
-        for (std::size_t x = 0; x < width; ++x) std::reverse_copy(in + 3 * x, in + 3 * x + 3, out + 3 * x);
+        bgr_row_to_rgb(in, width_px, out);
         break;
       case PixelFormat::grey8:
-        for (std::size_t x = 0; x < width; ++x) std::fill_n(out + 3 * x, 3, in[x]);
+        grey_row_to_rgb(in, width_px, out);
         break;
       case PixelFormat::yuyv:
-        for (std::size_t x = 0; x < width; ++x) {
-          const std::uint8_t* pair = in + 4 * (x / 2);
-          yuv_to_rgb(in[2 * x], pair[1], pair[3], out + 3 * x);
-        }
+        yuv_row_to_rgb(in, nullptr, width_px, YuvPacking::luma_first, matrix, out);
+        break;
+      case PixelFormat::uyvy:
+        yuv_row_to_rgb(in, nullptr, width_px, YuvPacking::chroma_first, matrix, out);
+        break;
+      case PixelFormat::nv12:
+        yuv_row_to_rgb(in, pixels.data() + layout.chroma_offset + row / 2 * layout.chroma_stride, width_px,
+                       YuvPacking::two_planes, matrix, out);
+        break;
+      case PixelFormat::mjpeg:
         break;
     }
   }
-  return rgb;
 }
 
 }  // namespace birdseye::drivers

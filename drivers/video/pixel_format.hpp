@@ -3,17 +3,43 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace birdseye::drivers {
 
-enum class PixelFormat { rgb8, bgr8, yuyv, grey8 };
+enum class PixelFormat { rgb8, bgr8, yuyv, uyvy, nv12, mjpeg, grey8 };
 
+/// By Video4Linux's code of four characters; those that are one by another name (JPEG, Y8) as well.
 std::optional<PixelFormat> pixel_format_of_fourcc(std::uint32_t fourcc);
-std::size_t bytes_per_pixel(PixelFormat format);
+std::optional<PixelFormat> pixel_format_of_name(const std::string& name);
+std::uint32_t fourcc_of(PixelFormat format);
+/// Its four characters; those that do not print as dots.
+std::string fourcc_name(std::uint32_t fourcc);
 
-/// Packed pixels of any of the formats -> RGB. YUYV is ITU-R BT.601, limited range. stride: bytes from row to row.
-std::vector<std::uint8_t> to_rgb(std::span<const std::uint8_t> pixels, PixelFormat format, int width_px, int height_px,
-                                 std::size_t stride);
+/// Which recommendation's luma and chroma, and whether black is 0 and white 255 (full range) or 16 and 235.
+struct YuvColour {
+  enum class Matrix { bt601, bt709, bt2020 } matrix = Matrix::bt601;
+  bool full_range = false;
+};
+
+/// How the pixels of a frame lie in memory. mjpeg has neither strides nor planes.
+struct PixelLayout {
+  PixelFormat format = PixelFormat::rgb8;
+  int width_px = 0, height_px = 0;
+  std::size_t stride = 0;         ///< bytes from row to row
+  std::size_t chroma_offset = 0;  ///< of nv12: where its plane of chroma begins
+  std::size_t chroma_stride = 0;
+  YuvColour colour = {};
+};
+
+/// Rows without padding, planes without a hole between them.
+PixelLayout packed_layout(PixelFormat format, int width_px, int height_px);
+/// From the first byte to the last of the last row, whose padding need not be there. 0 for mjpeg.
+std::size_t bytes_needed(const PixelLayout& layout);
+
+/// Pixels -> RGB, width * height * 3 bytes; chroma is that of the nearest sample. Asserts that there are as many bytes
+/// as needed. Of all formats but mjpeg, which JpegDecoder takes.
+void to_rgb(std::span<const std::uint8_t> pixels, const PixelLayout& layout, std::vector<std::uint8_t>& rgb);
 
 }  // namespace birdseye::drivers

@@ -9,14 +9,18 @@
 #include <cstring>
 
 #include "drivers/io/monotonic.hpp"
-#include "drivers/video/pixel_format.hpp"
+#include "drivers/video/jpeg_decoder.hpp"
 
 namespace birdseye::drivers {
 
 namespace {
 
 constexpr std::size_t kHeaderBytes = 64;
+constexpr std::uint64_t kMostJpegOverhead = 65'536;  // a picture of noise may be more than its pixels
 constexpr std::uint32_t kLargestSide = 8192;
+constexpr std::uint64_t kLargestGap = 1'000'000;    // beyond it the sender began to count anew
+constexpr std::int64_t kLatest_ns = 1LL << 62;      // 146 years after the start: times can be added without overflow
+constexpr std::int64_t kWorstSigma_ns = 1LL << 40;  // 18 minutes
 
 template <typename T>
 T get(const std::vector<std::uint8_t>& header, std::size_t offset) {
@@ -42,6 +46,12 @@ Result<std::unique_ptr<FrameSource>> SocketCamera::open(const std::filesystem::p
   return std::unique_ptr<FrameSource>(new SocketCamera(std::move(fd), name));
 }
 
+std::string SocketCamera::describe() const {
+  if (layout_.width_px == 0) return fmt::format("{}: a program, no frame yet", name_);
+  return fmt::format("{}: a program, {} {}x{}", name_, fourcc_name(fourcc_of(layout_.format)), layout_.width_px,
+                     layout_.height_px);
+}
+
 Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& have, DeviceTime deadline) {
   while (have < buffer.size()) {
     pollfd entry{fd_.get(), POLLIN, 0};
@@ -59,42 +69,89 @@ Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& 
 }
 
 Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
-  header_.resize(kHeaderBytes);
-  auto whole = fill(header_, header_have_, deadline);
-  if (!whole) return whole.error();
-  if (!*whole) return std::optional<Frame>();
+  for (;;) {
+    if (!payload_) {
+      header_.resize(kHeaderBytes);
+      const auto whole = fill(header_, header_have_, deadline);
+      if (!whole) return whole.error();
+      if (!*whole) return std::optional<Frame>();
+      if (auto read = read_header(); !read) return read.error();
+    }
+    const auto whole = fill(*payload_, payload_have_, deadline);
+    if (!whole) return whole.error();
+    if (!*whole) return std::optional<Frame>();
+    if (auto frame = finish()) return frame;
+  }
+}
+
+/// Nothing of it is believed before all of it makes sense.
+Result<void> SocketCamera::read_header() {
   const auto width = get<std::uint32_t>(header_, 8);
   const auto height = get<std::uint32_t>(header_, 12);
   const auto format = pixel_format_of_fourcc(get<std::uint32_t>(header_, 16));
+  const auto acquired_ns = get<std::int64_t>(header_, 32);
+  const auto sigma_ns = get<std::int64_t>(header_, 40);
   const auto payload = get<std::uint64_t>(header_, 48);
   const bool sized = width > 0 && height > 0 && width <= kLargestSide && height <= kLargestSide &&
                      std::int64_t{width} * height <= kMostPixels;
-  if (std::memcmp(header_.data(), "BEFRAME1", 8) != 0 || !format || !sized ||
-      payload != std::uint64_t{width} * height * bytes_per_pixel(*format)) {
+  const bool timed = acquired_ns >= 0 && acquired_ns <= kLatest_ns && sigma_ns >= 0 && sigma_ns <= kWorstSigma_ns;
+  bool sensible = std::memcmp(header_.data(), "BEFRAME1", 8) == 0 && format && sized && timed;
+  if (sensible) {
+    layout_ = packed_layout(*format, static_cast<int>(width), static_cast<int>(height));
+    const std::uint64_t raw = std::uint64_t{3} * width * height;
+    sensible = *format == PixelFormat::mjpeg ? payload > 0 && payload <= raw + kMostJpegOverhead
+                                             : payload == bytes_needed(layout_);
+  }
+  if (!sensible) {
     return Error{Errc::bad_format,
                  fmt::format("{}: what it sends is not a frame; see docs/manual/frame-socket.md", name_)};
   }
-  pixels_.resize(payload);
-  whole = fill(pixels_, pixels_have_, deadline);
-  if (!whole) return whole.error();
-  if (!*whole) return std::optional<Frame>();
+  payload_ = pool_.take();
+  payload_->resize(payload);
+  payload_have_ = 0;
+  return {};
+}
 
+/// Of header and payload as they lie there; empty when the pixels are damaged.
+std::optional<Frame> SocketCamera::finish() {
   Frame frame;
   frame.arrived = now();
-  frame.width_px = static_cast<int>(width);
-  frame.height_px = static_cast<int>(height);
+  frame.width_px = layout_.width_px;
+  frame.height_px = layout_.height_px;
   frame.sequence = get<std::uint64_t>(header_, 24);
+  count_gap(frame.sequence);
   frame.acquired = {get<std::int64_t>(header_, 32)};
   frame.acquired_sigma = {get<std::int64_t>(header_, 40)};
-  if (*format == PixelFormat::rgb8) {
-    frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels_));
+  frame.acquired_known = frame.acquired.ns != 0 || frame.acquired_sigma.ns != 0;
+  frame.stamp_ahead = std::max(frame.acquired - frame.arrived, Duration{});
+  frame.rgb = to_pixels();
+  header_have_ = 0;
+  ++(frame.rgb ? counters_.frames : counters_.incomplete);
+  if (!frame.rgb) return std::nullopt;
+  return frame;
+}
+
+/// RGB came where it stays; all else is converted into another buffer.
+std::shared_ptr<const PixelPool::Pixels> SocketCamera::to_pixels() {
+  auto payload = std::move(payload_);
+  if (layout_.format == PixelFormat::rgb8) return pool_.share(std::move(payload));
+  auto rgb = pool_.take();
+  bool whole = true;
+  if (layout_.format == PixelFormat::mjpeg) {
+    whole = decode_jpeg(*payload, layout_.width_px, layout_.height_px, *rgb);
   } else {
-    frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(
-        to_rgb(pixels_, *format, frame.width_px, frame.height_px, width * bytes_per_pixel(*format)));
+    to_rgb(*payload, layout_, *rgb);
   }
-  pixels_ = {};
-  header_have_ = pixels_have_ = 0;
-  return std::optional<Frame>(std::move(frame));
+  pool_.give_back(std::move(payload));
+  if (whole) return pool_.share(std::move(rgb));
+  pool_.give_back(std::move(rgb));
+  return nullptr;
+}
+
+void SocketCamera::count_gap(std::uint64_t sequence) {
+  const std::uint64_t ahead = last_sequence_ ? sequence - *last_sequence_ : 1;
+  if (ahead > 1 && ahead <= kLargestGap) counters_.gaps += ahead - 1;
+  last_sequence_ = sequence;
 }
 
 }  // namespace birdseye::drivers

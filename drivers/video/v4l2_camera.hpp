@@ -1,40 +1,66 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 
-#include "drivers/io/unique_fd.hpp"
 #include "drivers/video/frame_source.hpp"
+#include "drivers/video/frame_stamp.hpp"
 #include "drivers/video/pixel_format.hpp"
+#include "drivers/video/pixel_pool.hpp"
+#include "drivers/video/v4l2_device.hpp"
 
 namespace birdseye::drivers {
 
-/// A Video4Linux2 capture device, streaming into memory-mapped buffers. Takes RGB, BGR, YUYV or grey, in that order of
-/// liking. A frame's time is the driver's stamp (CLOCK_MONOTONIC); where that marks the end of the frame rather than
-/// the start of its exposure, half a frame period is taken off, and the sigma says that it was.
+/// A Video4Linux2 capture device, streaming into memory-mapped buffers. Of one thread. A frame's time is the driver's
+/// stamp where that is one of CLOCK_MONOTONIC, moved to the middle of the exposure as far as the exposure is known.
 class V4l2Camera final : public FrameSource {
  public:
-  static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& device, const CameraSettings& settings);
+  static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path, const CameraSettings& settings);
   ~V4l2Camera() override;
+
   Result<std::optional<Frame>> next(DeviceTime deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::string describe() const override;
+  [[nodiscard]] FrameCounters counters() const override { return counters_; }
+  [[nodiscard]] double rate_hz() const override { return rate_hz_; }
+  [[nodiscard]] std::optional<Duration> exposure() const override { return stamps_.exposure; }
+  [[nodiscard]] ControlReport controls() const override { return report_; }
+  ControlReport lock_controls() override;
+  ControlReport unlock_controls() override;
+  Result<void> restart_stream() override;
 
  private:
   struct Buffer {
     void* start = nullptr;
     std::size_t length = 0;
+    UniqueFd dmabuf;  // for whoever would take the pixels without a copy; empty where the driver has none
   };
-  V4l2Camera(UniqueFd fd, std::string name) : fd_(std::move(fd)), name_(std::move(name)) {}
-  Result<void> set_format(const CameraSettings& settings);
-  Result<void> start_streaming();
-  Result<Frame> take();
+  enum class StampKind { unseen, none, start_of_exposure, end_of_frame };
 
-  UniqueFd fd_;
+  V4l2Camera(V4l2Device device, std::string name) : device_(std::move(device)), name_(std::move(name)) {}
+  Result<void> set_up(const CameraSettings& settings);
+  Result<void> set_format(const CameraPlan& plan);
+  void set_rate(const CameraPlan& plan, std::optional<double> signal_hz);
+  Result<void> map_buffers();
+  Result<void> start_streaming();
+  Result<std::optional<Frame>> take();
+  void stamp(Frame& frame, const v4l2_buffer& buffer);
+  std::shared_ptr<const PixelPool::Pixels> pixels_of(const v4l2_buffer& buffer);
+  [[nodiscard]] Error gone() const;
+  [[nodiscard]] Error failed(const std::string& what) const;
+
+  V4l2Device device_;
   std::string name_;
+  CameraControls controls_{device_};
+  ControlReport report_;
   std::vector<Buffer> buffers_;
-  PixelFormat format_ = PixelFormat::rgb8;
-  int width_px_ = 0, height_px_ = 0;
-  std::size_t stride_ = 0;
-  Duration period_;
+  PixelLayout layout_;
+  PixelPool pool_;
+  double asked_hz_ = 0, rate_hz_ = 0;
+  StampMeaning stamps_;
+  StampKind stamp_kind_ = StampKind::unseen;
+  SequenceLine sequence_;
+  FrameCounters counters_;
 };
 
 }  // namespace birdseye::drivers

@@ -38,7 +38,7 @@ struct MiniBirdOptions {
 /// Settles what the command line gives as text.
 Result<void> finish(MiniBirdOptions& options) {
   TrackerSettings& tracker = options.program.tracker;
-  if (const auto parsed = parse_revision(options.revision, tracker.unit); !parsed) return parsed;
+  if (auto parsed = parse_revision(options.revision, tracker.unit); !parsed) return parsed;
   if (!options.faults.empty()) {
     auto script = read_fault_script(options.faults, Instruments::tracker, tracker.seed);
     if (!script) return script.error();
@@ -74,7 +74,7 @@ struct CameraOptions {
 
 Result<void> run(CameraOptions& options) {
   CameraProgram& program = options.program;
-  if (const auto parsed = parse_size(options.size, program.width_px, program.height_px); !parsed) return parsed;
+  if (auto parsed = parse_size(options.size, program.width_px, program.height_px); !parsed) return parsed;
   if (program.width_px % 2 != 0 || program.height_px % 2 != 0) {
     return Error{Errc::bad_value, "--size: give even numbers, as 1920x1080"};
   }

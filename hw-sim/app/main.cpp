@@ -40,6 +40,9 @@ int main(int argc, char** argv) {
   run.add_option("--seed", cart.seed, "everything random follows from it");
   run.add_option("--position-noise-mm", cart.noise.position_mm, "per axis and record")->check(CLI::Range(0.0, 50.0));
   run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
+  run.add_option("--distortion-mm", cart.distortion_mm, "largest displacement by metal in the room")
+      ->check(CLI::Range(0.0, 500.0));
+  run.add_option("--faults", cart.faults, "script of faults of either instrument (TOML)");
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {

@@ -11,6 +11,7 @@ namespace birdseye::hw_sim {
 namespace {
 
 constexpr double kGridMm = 25;
+constexpr int kSteps = 24;  // from the volume's low corner to its high one, along each axis
 const Eigen::Vector3d kLowMm(100, -300, -300), kHighMm(700, 300, 300);
 
 }  // namespace
@@ -26,10 +27,10 @@ FieldDistortion::FieldDistortion(double peak_mm, std::uint64_t seed) {
     bump.width_mm = uniform(120, 240);
   }
   double largest = 0;
-  for (double x = kLowMm.x(); x <= kHighMm.x(); x += kGridMm) {
-    for (double y = kLowMm.y(); y <= kHighMm.y(); y += kGridMm) {
-      for (double z = kLowMm.z(); z <= kHighMm.z(); z += kGridMm) {
-        largest = std::max(largest, displacement_mm({x, y, z}).norm());
+  for (int x = 0; x <= kSteps; ++x) {
+    for (int y = 0; y <= kSteps; ++y) {
+      for (int z = 0; z <= kSteps; ++z) {
+        largest = std::max(largest, displacement_mm(kLowMm + kGridMm * Eigen::Vector3d(x, y, z)).norm());
       }
     }
   }

@@ -44,7 +44,7 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   const auto write_truth = [&program, zero_ns](double rate_hz) -> Result<void> {
     return program.truth.empty() ? Result<void>() : replace_json(program.truth, truth_of(program, zero_ns, rate_hz));
   };
-  if (const auto written = write_truth(program.tracker.unit.rate_hz); !written) return written;
+  if (auto written = write_truth(program.tracker.unit.rate_hz); !written) return written;
 
   const Motion motion = program.motion == "still" ? still_motion() : circle_motion({}, zero_ns);
   TrackerLoop::Listeners listeners;

@@ -61,9 +61,10 @@ bool TrackerScript::silent(std::int64_t now_ns) const {
 
 void TrackerScript::receive(std::span<const std::uint8_t> bytes, std::int64_t now_ns) {
   if (silent(now_ns)) return;
+  faults_.advance(now_ns);
   for (const std::uint8_t byte : bytes) {
     std::vector<std::uint8_t> reply = unit_.receive(byte);
-    if (reply.empty()) continue;
+    if (reply.empty() || faults_.active(FaultKind::stuck_stream) != nullptr) continue;
     const auto wire_ns = static_cast<std::int64_t>(10e9 / settings_.baud * static_cast<double>(reply.size()));
     enqueue({now_ns + wire_ns, std::move(reply)});
   }
@@ -126,7 +127,7 @@ void TrackerScript::disturb_bytes(Delivery& delivery, std::int64_t now_ns) {
     delivery.bytes = disturbed(kind, delivery.bytes, settings_.seed, key);
     delivery.line_error = delivery.line_error || kind == FaultKind::line_noise;
   }
-  if (hits(FaultKind::lost_record)) delivery.bytes.clear();
+  if (hits(FaultKind::lost_record) || faults_.active(FaultKind::stuck_stream) != nullptr) delivery.bytes.clear();
 }
 
 void TrackerScript::measure(std::int64_t measured_ns) {
@@ -177,7 +178,7 @@ std::vector<Delivery> TrackerScript::advance(std::int64_t now_ns) {
   apply_power(now_ns);
   std::vector<Delivery> out;
   while (!pending_.empty() && pending_.front().due_ns <= now_ns) {
-    if (faults_.active(FaultKind::stuck_stream) == nullptr) out.push_back(std::move(pending_.front()));
+    out.push_back(std::move(pending_.front()));
     pending_.pop_front();
   }
   return out;

@@ -3,6 +3,7 @@
 #include <sys/prctl.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "drivers/io/monotonic.hpp"
@@ -43,7 +44,9 @@ class Camera {
     while (!stop) {
       const FramePlan plan = script_.next();
       if (plan.due_ns > end_ns) return;
-      wait(plan.due_ns, stop);
+      wait(plan.due_ns, stop, false);
+      // Jitter brings frames close together; the one before may need some of this one's time.
+      if (sink_->busy()) wait(plan.due_ns + std::llround(1e9 / script_.rate_hz()), stop, true);
       if (plan.lost || stop) continue;
       if (sink_->busy()) {
         ++skipped_;  // the reader is slow: the camera has no memory for another frame
@@ -65,7 +68,7 @@ class Camera {
     sink_->begin(plan, {pixels, pattern.layout(), pattern.width_px(), pattern.height_px()});
     ++sent_;
   }
-  void wait(std::int64_t until_ns, const std::atomic<bool>& stop) {
+  void wait(std::int64_t until_ns, const std::atomic<bool>& stop, bool only_while_busy) {
     // Once at least: a camera that is late still sends, and hears that its reader has gone.
     std::int64_t now_ns = 0;
     do {
@@ -78,7 +81,7 @@ class Camera {
       }
       for (const FaultEvent& event : script_.take_events()) announce(event);
       sink_->work(std::min(until_ns, now_ns + kLongestWaitNs));
-    } while (drivers::now().ns < until_ns && !stop);
+    } while (drivers::now().ns < until_ns && !stop && (!only_while_busy || sink_->busy()));
   }
 
   const CameraProgram& program_;
@@ -113,7 +116,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
                              {"exposure_ms", program.timing.exposure_ms},
                              {"bar_period_s", TestPattern::kBarPeriodS}};
   if (!program.truth.empty()) {
-    if (const auto written = replace_json(program.truth, truth); !written) return written;
+    if (auto written = replace_json(program.truth, truth); !written) return written;
   }
   announce({{"event", "ready"}, {"camera", program.socket.empty() ? program.device : program.socket}});
   if (strobe) strobe->start(program.timing, camera.rate_hz(), zero_ns);

@@ -60,11 +60,9 @@ void put_pair(PixelLayout layout, std::uint8_t* at, const Colour& colour) {
   const Yuv yuv = yuv_of(colour);
   switch (layout) {
     case PixelLayout::rgb3:
-      for (int i = 0; i < 2; ++i) {
-        at[3 * i] = colour.r;
-        at[3 * i + 1] = colour.g;
-        at[3 * i + 2] = colour.b;
-      }
+      at[0] = at[3] = colour.r;
+      at[1] = at[4] = colour.g;
+      at[2] = at[5] = colour.b;
       break;
     case PixelLayout::yuyv:
       at[0] = at[2] = yuv.y;

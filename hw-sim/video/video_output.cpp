@@ -45,6 +45,7 @@ class VideoOutput final : public FrameSink {
         seed_(seed) {}
 
   Result<void> open(int width_px, int height_px) {
+    now_width_px_ = 0;
     fd_ = UniqueFd(::open(device_.c_str(), O_RDWR | O_CLOEXEC));
     if (!fd_) {
       return Error{Errc::unreadable, fmt::format("{}: cannot be opened: {}", device_.string(), std::strerror(errno)),

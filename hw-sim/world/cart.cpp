@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "drivers/io/monotonic.hpp"
 #include "hw-sim/base/announce.hpp"
+#include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/world/frame_camera.hpp"
@@ -66,11 +69,15 @@ std::string frames_csv(const World& world, double rate_hz) {
 }
 
 /// The flock of two, scope and pointer. Before zero_ns is set, and until then, the world stands still.
-TrackerScript tracker_of(const CartSettings& settings, const World& world, const std::atomic<std::int64_t>& zero_ns) {
+TrackerScript tracker_of(const CartSettings& settings, const World& world, std::vector<Fault> faults,
+                         const std::atomic<std::int64_t>& zero_ns) {
   TrackerSettings tracker;
   tracker.unit.birds = 2;
   tracker.noise = settings.noise;
+  tracker.distortion_mm = settings.distortion_mm;
   tracker.seed = settings.seed;
+  tracker.faults = std::move(faults);
+  tracker.faults_from_streaming = false;
   const Motion motion = [&world, &zero_ns](std::size_t bird, std::int64_t at_ns) -> BirdPose {
     const std::int64_t zero = zero_ns;
     const double world_s = zero == 0 ? 0 : std::max(0.0, static_cast<double>(at_ns - zero) * 1e-9);
@@ -89,6 +96,12 @@ TrackerScript tracker_of(const CartSettings& settings, const World& world, const
 Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& stop) {
   const auto truth = read_phantom_truth(settings.phantom);
   if (!truth) return truth.error();
+  FaultScript faults;
+  if (!settings.faults.empty()) {
+    auto script = read_fault_script(settings.faults, Instruments::both, settings.seed);
+    if (!script) return script.error();
+    faults = *std::move(script);
+  }
   const auto liver = read_ply(settings.phantom / "surfaces" / "liver.ply");
   if (!liver) return liver.error();
   const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
@@ -114,10 +127,15 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   camera_settings.socket = settings.socket;
   camera_settings.lens = lens;
   camera_settings.rate_hz = settings.rate_hz;
+  camera_settings.seed = settings.seed;
+  camera_settings.faults = std::move(faults.camera);
   const auto camera = FrameCamera::listen(camera_settings, *world, **laparoscope);
   if (!camera) return camera.error();
   std::atomic<std::int64_t> world_zero_ns = 0;
-  TrackerLoop tracker(*std::move(terminal), tracker_of(settings, *world, world_zero_ns), {});
+  TrackerLoop::Listeners listeners;
+  listeners.on_fault = [](const FaultEvent& event) { announce(event); };
+  TrackerLoop tracker(*std::move(terminal), tracker_of(settings, *world, std::move(faults.tracker), world_zero_ns),
+                      listeners);
   announce({{"event", "ready"}});
 
   while (!stop && !(tracker.streaming() && (*camera)->ready())) drivers::sleep_until({drivers::now().ns + 10'000'000});

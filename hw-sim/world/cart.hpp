@@ -18,6 +18,8 @@ struct CartSettings {
   TrackerNoise noise;
   int width_px = 768, height_px = 576;
   double rate_hz = 25;
+  double distortion_mm = 0;      ///< of the tracker's field, where it is largest
+  std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
 };
 
 /// Runs the operation once, in real time, and announces its stages as JSON lines on standard output. It begins a second

@@ -1,17 +1,11 @@
 #include "hw-sim/world/frame_camera.hpp"
 
-#include <fmt/format.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
-
-#include <array>
-#include <cerrno>
+#include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <utility>
 
 #include "drivers/io/monotonic.hpp"
+#include "hw-sim/base/announce.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -19,38 +13,23 @@ namespace {
 
 constexpr std::size_t kQueueFrames = 160;
 constexpr std::size_t kReadyFrames = 60;
-
-template <typename T>
-void put(std::array<std::uint8_t, 64>& header, std::size_t offset, T value) {
-  std::memcpy(header.data() + offset, &value, sizeof value);  // little endian, as the format is
-}
+constexpr std::int64_t kListenNs = 20'000'000;
 
 }  // namespace
 
 Result<std::unique_ptr<FrameCamera>> FrameCamera::listen(const Settings& settings, const World& world,
                                                          Laparoscope& laparoscope) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string path = settings.socket.string();
-  if (path.size() >= sizeof address.sun_path) {
-    return Error{Errc::bad_value, fmt::format("{}: too long for a socket; give a shorter --socket", path)};
-  }
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  ::unlink(path.c_str());
-  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0 || ::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 || ::listen(fd, 1) != 0) {
-    const int failed = errno;
-    if (fd >= 0) ::close(fd);
-    return Error{Errc::unreadable, fmt::format("{}: cannot be listened at; does its folder exist?", path), failed};
-  }
-  return std::unique_ptr<FrameCamera>(new FrameCamera(settings, world, laparoscope, fd));
+  auto sink = listen_for_frames(settings.socket, settings.seed);
+  if (!sink) return sink.error();
+  return std::unique_ptr<FrameCamera>(new FrameCamera(settings, world, laparoscope, *std::move(sink)));
 }
 
-FrameCamera::FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope, int fd)
+FrameCamera::FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope,
+                         std::unique_ptr<FrameSink> sink)
     : settings_(std::move(settings)),
       world_(world),
       laparoscope_(laparoscope),
-      fd_(fd),
+      sink_(std::move(sink)),
       frames_(static_cast<std::uint64_t>(std::ceil(world.ends_s() * settings_.rate_hz))) {
   renderer_ = std::jthread([this](const std::stop_token& stop) { render(stop); });
   server_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
@@ -62,8 +41,6 @@ FrameCamera::~FrameCamera() {
   changed_.notify_all();
   if (renderer_.joinable()) renderer_.join();
   if (server_.joinable()) server_.join();
-  ::close(fd_);
-  ::unlink(settings_.socket.c_str());
 }
 
 bool FrameCamera::ready() const {
@@ -86,70 +63,84 @@ void FrameCamera::render(const std::stop_token& stop) {
     if (stop.stop_requested()) return;
     const double world_s = static_cast<double>(sequence) / settings_.rate_hz;
     const Transform<Tracker, Camera> pose = world_.tracker_from_camera(world_s);
-    Picture picture{sequence, world_.at_bench(world_s)
-                                  ? laparoscope_.look_at_bench((marker_from_tracker * pose).inverse(), sequence)
-                                  : laparoscope_.look_into_cavity((patient_from_tracker * pose).inverse(), sequence)};
+    Rendered rendered{sequence, world_.at_bench(world_s)
+                                    ? laparoscope_.look_at_bench((marker_from_tracker * pose).inverse(), sequence)
+                                    : laparoscope_.look_into_cavity((patient_from_tracker * pose).inverse(), sequence)};
     {
       const std::lock_guard lock(mutex_);
-      queue_.push_back(std::move(picture));
+      queue_.push_back(std::move(rendered));
     }
     changed_.notify_all();
   }
+}
+
+bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {
+  {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait(lock, stop, [&] { return !queue_.empty(); })) return false;
+    rendered = std::move(queue_.front());
+    queue_.pop_front();
+  }
+  changed_.notify_all();
+  return true;
+}
+
+Picture FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
+  const int width = settings_.lens.width_px, height = settings_.lens.height_px;
+  if (!half_size) return {rendered.rgb, PixelLayout::rgb3, width, height};
+  half_.clear();
+  for (int y = 0; y + 1 < height; y += 2) {
+    for (int x = 0; x + 1 < width; x += 2) {
+      const auto pixel = rendered.rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * width + x);
+      half_.insert(half_.end(), pixel, pixel + 3);
+    }
+  }
+  return {half_, PixelLayout::rgb3, width / 2, height / 2};
+}
+
+/// Faults of the plug up to now, then bytes out and readers in, until the time at the latest.
+void FrameCamera::follow(CameraScript& script, std::int64_t until_ns) {
+  const std::int64_t now_ns = drivers::now().ns;
+  script.advance(now_ns);
+  if (script.plugged() != plugged_) {
+    if (plugged_) sink_->unplug();
+    plugged_ = script.plugged() && sink_->replug().has_value();
+  }
+  for (const FaultEvent& event : script.take_events()) announce(event);
+  sink_->work(std::min(until_ns, now_ns + kListenNs));
+}
+
+void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop) {
+  const bool comes_back = !settings_.faults.empty();
+  Rendered rendered;
+  while (!stop.stop_requested() && sent_ < frames_) {
+    const FramePlan plan = script.next();
+    // A frame goes out whole, however slow its reader: the world is short, and none of it may be missed.
+    while (sink_->busy() && !stop.stop_requested()) follow(script, drivers::now().ns + kListenNs);
+    if (!take(rendered, stop)) return;
+    do {
+      follow(script, plan.due_ns);
+    } while (!stop.stop_requested() && drivers::now().ns < plan.due_ns);
+    if (!sink_->connected() && !comes_back) return;
+    if (!plan.lost && !sink_->busy()) sink_->begin(plan, picture_of(rendered, plan.half_size));
+    ++sent_;
+  }
+  while (sink_->busy() && !stop.stop_requested()) follow(script, drivers::now().ns + kListenNs);
 }
 
 void FrameCamera::serve(const std::stop_token& stop) {
-  int client = -1;
-  while (!stop.stop_requested() && client < 0) {
-    pollfd entry{fd_, POLLIN, 0};
-    if (::poll(&entry, 1, 50) > 0) client = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-  }
-  connected_ = client >= 0;
+  while (!stop.stop_requested() && !sink_->connected()) sink_->work(drivers::now().ns + kListenNs);
+  connected_ = sink_->connected();
   while (!stop.stop_requested() && zero_ns_ == 0) drivers::sleep_until({drivers::now().ns + 5'000'000});
-  while (!stop.stop_requested() && sent_ < frames_) {
-    Picture picture;
-    {
-      std::unique_lock lock(mutex_);
-      if (!changed_.wait(lock, stop, [&] { return !queue_.empty(); })) break;
-      picture = std::move(queue_.front());
-      queue_.pop_front();
-    }
-    changed_.notify_all();
-    const double due_s = static_cast<double>(picture.sequence) / settings_.rate_hz + settings_.delivery_ms * 1e-3;
-    drivers::sleep_until({zero_ns_ + static_cast<std::int64_t>(due_s * 1e9)});
-    if (!send(client, picture, stop)) break;
-    ++sent_;
-  }
+  CameraTiming timing;
+  timing.rate_hz = settings_.rate_hz;
+  timing.seed = settings_.seed;
+  timing.faults = settings_.faults;
+  CameraScript script(timing, zero_ns_);
+  script.watched(zero_ns_);
+  serve_world(script, stop);
+  sink_.reset();
   done_ = true;
-  if (client >= 0) ::close(client);
-}
-
-bool FrameCamera::send(int client, const Picture& picture, const std::stop_token& stop) const {
-  std::array<std::uint8_t, 64> header{};
-  std::memcpy(header.data(), "BEFRAME1", 8);
-  put(header, 8, static_cast<std::uint32_t>(settings_.lens.width_px));
-  put(header, 12, static_cast<std::uint32_t>(settings_.lens.height_px));
-  std::memcpy(header.data() + 16, "RGB3", 4);
-  put(header, 24, picture.sequence);
-  put(header, 32,
-      zero_ns_.load() + static_cast<std::int64_t>(static_cast<double>(picture.sequence) / settings_.rate_hz * 1e9));
-  put(header, 40, std::int64_t{100'000});
-  put(header, 48, static_cast<std::uint64_t>(picture.rgb.size()));
-  const auto all = [&](const std::uint8_t* data, std::size_t size) {
-    while (size > 0 && !stop.stop_requested()) {
-      const ssize_t put_bytes = ::send(client, data, size, MSG_NOSIGNAL);
-      if (put_bytes > 0) {
-        data += put_bytes;
-        size -= static_cast<std::size_t>(put_bytes);
-      } else if (errno == EAGAIN) {
-        pollfd entry{client, POLLOUT, 0};
-        ::poll(&entry, 1, 50);
-      } else if (errno != EINTR) {
-        return false;
-      }
-    }
-    return size == 0;
-  };
-  return all(header.data(), header.size()) && all(picture.rgb.data(), picture.rgb.size());
 }
 
 }  // namespace birdseye::hw_sim

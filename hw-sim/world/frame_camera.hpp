@@ -12,6 +12,7 @@
 
 #include "calibration/base/result.hpp"
 #include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/video/frame_sink.hpp"
 #include "hw-sim/world/world.hpp"
 
 namespace birdseye::hw_sim {
@@ -24,7 +25,8 @@ class FrameCamera {
     std::filesystem::path socket;
     CameraModel lens;
     double rate_hz = 25;
-    double delivery_ms = 12;  ///< from mid-exposure to the first byte on the socket
+    std::uint64_t seed = 1;
+    std::vector<Fault> faults;  ///< from the world's time 0 on; without any, the camera ends when its reader goes
   };
 
   /// Listens at once. The world and the laparoscope must outlive the camera.
@@ -43,23 +45,28 @@ class FrameCamera {
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
 
  private:
-  struct Picture {
-    std::uint64_t sequence;
+  struct Rendered {
+    std::uint64_t number;
     std::vector<std::uint8_t> rgb;
   };
-  FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope, int fd);
+  FrameCamera(Settings settings, const World& world, Laparoscope& laparoscope, std::unique_ptr<FrameSink> sink);
   void render(const std::stop_token& stop);
   void serve(const std::stop_token& stop);
-  bool send(int client, const Picture& picture, const std::stop_token& stop) const;
+  void serve_world(CameraScript& script, const std::stop_token& stop);
+  void follow(CameraScript& script, std::int64_t until_ns);
+  [[nodiscard]] bool take(Rendered& rendered, const std::stop_token& stop);
+  [[nodiscard]] Picture picture_of(const Rendered& rendered, bool half_size);
 
   Settings settings_;
   const World& world_;
   Laparoscope& laparoscope_;
-  int fd_;
+  std::unique_ptr<FrameSink> sink_;  ///< the server's own once it runs
+  bool plugged_ = true;
+  std::vector<std::uint8_t> half_;
   std::uint64_t frames_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::deque<Picture> queue_;
+  std::deque<Rendered> queue_;
   std::atomic<bool> connected_ = false, done_ = false;
   std::atomic<std::int64_t> zero_ns_ = 0;
   std::atomic<std::uint64_t> sent_ = 0;

@@ -39,13 +39,24 @@ std::string replaced(const std::string& from, const std::string& to) {
 TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
   const auto config = read(kSound);
   ASSERT_TRUE(config) << config.error().what;
-  EXPECT_EQ(config->tracker_device, "/dev/ttyUSB0");
-  EXPECT_EQ(config->tracker.birds, 2);
-  EXPECT_EQ(config->tracker.delay.ns, 7'500'000);
-  EXPECT_EQ(config->port, 18945);
-  EXPECT_EQ(config->bind, "127.0.0.1");
-  EXPECT_EQ(config->pose.smoothing.ns, 40'000'000);
+  EXPECT_EQ(config->tracker.line.device, "/dev/ttyUSB0");
+  EXPECT_EQ(config->tracker.minibird.birds, 2);
+  EXPECT_EQ(config->tracker.minibird.delay.ns, 7'500'000);
+  EXPECT_EQ(config->wire.port, 18945);
+  EXPECT_EQ(config->wire.bind, "127.0.0.1");
+  EXPECT_EQ(config->core.pose.smoothing.ns, 40'000'000);
   EXPECT_EQ(config->camera.width_px, 768);
+}
+
+TEST(Config, AllMistakesAreToldAtOnceWithTheirLines) {
+  const auto config = read("[tracker]\ndevice = \"/dev/ttyS0\"\nbaud = 1\n\n[camera]\nsource = 7\nzoom = 2\n[wires]\n");
+  ASSERT_FALSE(config);
+  const std::string& what = config.error().what;
+  for (const char* expected : {".toml:3: [tracker] baud", ".toml:6: [camera] source: needs text",
+                               ".toml:7: [camera] zoom: unknown key", ".toml:8: wires: unknown section"}) {
+    EXPECT_NE(what.find(expected), std::string::npos) << what;
+  }
+  EXPECT_EQ(std::count(what.begin(), what.end(), '\n'), 3) << what;
 }
 
 TEST(Config, EveryMistakeIsNamed) {
@@ -67,7 +78,6 @@ TEST(Config, EveryMistakeIsNamed) {
     const auto config = read(text);
     ASSERT_FALSE(config) << expected;
     EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
-    EXPECT_EQ(config.error().what.find('\n'), std::string::npos) << config.error().what;
   }
   EXPECT_EQ(read_config("/nonexistent.toml").error().code, Errc::not_found);
 }

@@ -10,6 +10,7 @@
 #include "calibration/geometry/transform.hpp"
 #include "drivers/io/monotonic.hpp"
 #include "drivers/io/serial_port.hpp"
+#include "drivers/minibird/assembler.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 #include "hw-sim/minibird/unit.hpp"
 
@@ -75,10 +76,38 @@ class UnitLine final : public ByteStream {
   std::deque<std::uint8_t> pending_;
 };
 
+/// The conversation and what makes sense of it, as the appliance has them.
+class Stream {
+ public:
+  Stream(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings)
+      : bird_(MiniBird::start(std::move(line), settings)) {
+    if (bird_) assembler_.emplace((*bird_)->layout());
+  }
+  explicit operator bool() const { return bird_.has_value(); }
+  [[nodiscard]] const Error& error() const { return bird_.error(); }
+  MiniBird& bird() { return **bird_; }
+  [[nodiscard]] MiniBirdCounters counters() const { return assembler_->counters(); }
+  Result<std::vector<Measurement>> read() {
+    for (int tries = 0; tries < 10; ++tries) {
+      const auto chunk = (*bird_)->read(now() + Duration::from_ms(100));
+      if (!chunk) return chunk.error();
+      if (!*chunk) continue;
+      if (auto measurements = assembler_->push(**chunk); !measurements.empty()) return measurements;
+    }
+    return std::vector<Measurement>();
+  }
+
+ private:
+  Result<std::unique_ptr<MiniBird>> bird_;
+  std::optional<MeasurementAssembler> assembler_;
+};
+
 MiniBirdSettings quick(int birds) {
   MiniBirdSettings settings;
   settings.birds = birds;
-  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.run_wait = {};
+  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait = settings.run_wait =
+      settings.sleep_wait = {};
+  settings.quiet = Duration::from_ms(3);
   settings.reply_timeout = settings.answer_within = Duration::from_ms(20);
   return settings;
 }
@@ -94,23 +123,25 @@ TEST(MiniBird, StreamsTheTruePosesInEveryFormat) {
     const auto truth = line->poses;
     MiniBirdSettings settings = quick(2);
     settings.format = *record_format_of(name);
-    const auto bird = MiniBird::start(std::move(line), settings);
+    Stream bird(std::move(line), settings);
     ASSERT_TRUE(bird) << bird.error().what;
-    EXPECT_EQ((*bird)->info().model, "6DFOB");
-    EXPECT_EQ((*bird)->info().latched_error, "");
-    EXPECT_EQ((*bird)->info().revision_major, 3);  // 03 43
-    EXPECT_EQ((*bird)->info().revision_minor, 67);
-    EXPECT_EQ((*bird)->info().crystal_mhz, 40);             // 28 00
-    EXPECT_DOUBLE_EQ((*bird)->info().rate_hz, 103.296875);  // 4C 67
+    EXPECT_EQ(bird.bird().info().model, "6DFOB");
+    EXPECT_EQ(bird.bird().info().latched_error, "");
+    EXPECT_EQ(bird.bird().info().revision_major, 3);  // 03 43
+    EXPECT_EQ(bird.bird().info().revision_minor, 67);
+    EXPECT_EQ(bird.bird().info().crystal_mhz, 40);             // 28 00
+    EXPECT_DOUBLE_EQ(bird.bird().info().rate_hz, 103.296875);  // 4C 67
+    // The first after a start waits to be confirmed.
+    EXPECT_EQ(bird.read()->front().birds[0].kind, Doubt::unconfirmed);
     for (int cycle = 0; cycle < 5; ++cycle) {
-      const auto read = (*bird)->read(now() + Duration::from_ms(100));
+      const auto read = bird.read();
       ASSERT_TRUE(read);
       ASSERT_EQ(read->size(), 1U);
       for (std::size_t i = 0; i < 2; ++i) {
-        ASSERT_TRUE(read->front().birds[i]) << name;
+        ASSERT_TRUE(read->front().birds[i].pose) << name;
         // Four counts of position; of a matrix word, four counts are 0.007 degrees, of an angle 0.09.
-        EXPECT_LT((*read->front().birds[i]->position_mm - truth[i].position_mm).cwiseAbs().maxCoeff(), 0.12);
-        EXPECT_LT(rotation_angle_between(*read->front().birds[i]->rotation, truth[i].rotation), 2e-3) << name;
+        EXPECT_LT((*read->front().birds[i].pose->position_mm - truth[i].position_mm).cwiseAbs().maxCoeff(), 0.12);
+        EXPECT_LT(rotation_angle_between(*read->front().birds[i].pose->rotation, truth[i].rotation), 2e-3) << name;
       }
     }
   }
@@ -120,16 +151,16 @@ TEST(MiniBird, WorksOnALineWithoutReset) {
   auto line = std::make_unique<UnitLine>(1);
   line->has_rts = false;
   line->poses = {pose(300, 0, 0, 0)};
-  const auto bird = MiniBird::start(std::move(line), quick(1));
+  Stream bird(std::move(line), quick(1));
   ASSERT_TRUE(bird) << bird.error().what;
-  EXPECT_FALSE((*bird)->info().has_reset_line);
-  EXPECT_EQ((*bird)->read(now() + Duration::from_ms(100))->size(), 1U);
+  EXPECT_FALSE(bird.bird().info().has_reset_line);
+  EXPECT_EQ(bird.read()->size(), 1U);
 }
 
 TEST(MiniBird, ASilentTrackerIsAnErrorThatNamesPortAndRemedy) {
   auto line = std::make_unique<UnitLine>(1);
   line->silent = true;
-  const auto bird = MiniBird::start(std::move(line), quick(1));
+  Stream bird(std::move(line), quick(1));
   ASSERT_FALSE(bird);
   EXPECT_EQ(bird.error().code, Errc::timeout);
   EXPECT_NE(bird.error().what.find("/dev/test"), std::string::npos);
@@ -137,7 +168,7 @@ TEST(MiniBird, ASilentTrackerIsAnErrorThatNamesPortAndRemedy) {
 }
 
 TEST(MiniBird, AMissingBirdIsNamed) {
-  const auto bird = MiniBird::start(std::make_unique<UnitLine>(2), quick(3));
+  Stream bird(std::make_unique<UnitLine>(2), quick(3));
   ASSERT_FALSE(bird);
   EXPECT_NE(bird.error().what.find("bird 3 of 3"), std::string::npos) << bird.error().what;
 }
@@ -146,19 +177,19 @@ TEST(MiniBird, ALostByteCostsOneRecordNotTheStream) {
   auto owned = std::make_unique<UnitLine>(2);
   UnitLine& line = *owned;
   line.poses = {pose(300, 0, 0, 0), pose(250, 0, 0, 0)};
-  const auto bird = MiniBird::start(std::move(owned), quick(2));
+  Stream bird(std::move(owned), quick(2));
   ASSERT_TRUE(bird) << bird.error().what;
   line.lose_bytes = 1;
   int whole = 0, cycles = 0;
   while (cycles < 20) {
-    const auto read = (*bird)->read(now() + Duration::from_ms(100));
+    const auto read = bird.read();
     ASSERT_TRUE(read);
     for (const Measurement& m : *read) {
       ++cycles;
-      if (m.birds[0] && m.birds[1]) ++whole;
+      if (m.birds[0].pose && m.birds[1].pose) ++whole;
     }
   }
-  EXPECT_EQ((*bird)->counters().phase_errors, 1U);
+  EXPECT_EQ(bird.counters().phase_errors, 1U);
   EXPECT_GE(whole, 18);
 }
 
@@ -166,45 +197,45 @@ TEST(MiniBird, RecordsOfTwoCyclesAreNotTakenForOne) {
   auto owned = std::make_unique<UnitLine>(2);
   UnitLine& line = *owned;
   line.poses = {pose(300, 0, 0, 0), pose(250, 0, 0, 0)};
-  const auto bird = MiniBird::start(std::move(owned), quick(2));
+  Stream bird(std::move(owned), quick(2));
   ASSERT_TRUE(bird) << bird.error().what;
   // Cut from within the second record of one cycle to within the first of the next: what is left is the first bird of
   // one cycle and the second bird of another.
   line.cut_from = 30;
   line.cut_to = 60;
   for (int cycles = 0; cycles < 8;) {
-    const auto read = (*bird)->read(now() + Duration::from_ms(100));
+    const auto read = bird.read();
     ASSERT_TRUE(read);
     for (const Measurement& m : *read) {
       ++cycles;
-      if (m.birds[0] && m.birds[1]) {
-        EXPECT_LT(std::abs((m.birds[0]->position_mm->x() - m.birds[1]->position_mm->x()) - 50), 0.3);
+      if (m.birds[0].pose && m.birds[1].pose) {
+        EXPECT_LT(std::abs((m.birds[0].pose->position_mm->x() - m.birds[1].pose->position_mm->x()) - 50), 0.3);
       }
     }
     // The scene moves on with every cycle, both birds alike: a pair of two cycles would show.
     for (auto& p : line.poses) p.position_mm.x() += 5;
   }
-  EXPECT_GE((*bird)->counters().phase_errors, 1U);
+  EXPECT_GE(bird.counters().phase_errors, 1U);
 }
 
 TEST(MiniBird, ASaturatedSensorGivesNoPose) {
   auto line = std::make_unique<UnitLine>(1);
   line->poses = {{Eigen::Matrix3d::Zero(), Eigen::Vector3d(100, 0, 0)}};
-  const auto bird = MiniBird::start(std::move(line), quick(1));
+  Stream bird(std::move(line), quick(1));
   ASSERT_TRUE(bird) << bird.error().what;
-  const auto read = (*bird)->read(now() + Duration::from_ms(100));
+  const auto read = bird.read();
   ASSERT_TRUE(read);
-  EXPECT_FALSE(read->front().birds[0]);
-  EXPECT_EQ((*bird)->counters().senseless_records, 1U);
+  EXPECT_FALSE(read->front().birds[0].pose);
+  EXPECT_EQ(bird.counters().senseless_records, 1U);
 }
 
 TEST(MiniBird, ALostLineIsAnError) {
   auto owned = std::make_unique<UnitLine>(1);
   UnitLine& line = *owned;
-  const auto bird = MiniBird::start(std::move(owned), quick(1));
+  Stream bird(std::move(owned), quick(1));
   ASSERT_TRUE(bird) << bird.error().what;
   line.unplugged = true;
-  EXPECT_EQ((*bird)->read(now() + Duration::from_ms(100)).error().code, Errc::disconnected);
+  EXPECT_EQ(bird.read().error().code, Errc::disconnected);
 }
 
 TEST(SerialPort, CarriesBytesAndSeesTheLineGo) {

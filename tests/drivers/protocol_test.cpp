@@ -7,6 +7,7 @@
 
 #include "calibration/base/units.hpp"
 #include "drivers/minibird/record_parser.hpp"
+#include "drivers/minibird/unit_status.hpp"
 
 namespace birdseye::drivers::minibird {
 namespace {
@@ -107,7 +108,8 @@ TEST(Record, T10GroupAndButtonMode) {
   ASSERT_EQ(records.size(), 2U);
   EXPECT_EQ(records[0].button, 0x10);
   EXPECT_EQ(records[0].address, 1);
-  EXPECT_EQ(records[0].end_offset, 14U);
+  EXPECT_EQ(records[0].begin, 0);
+  EXPECT_EQ(records[1].begin, 14);
   EXPECT_EQ(records[1].button, 0);
   EXPECT_EQ(records[1].address, 2);
   EXPECT_EQ(records[1].words, (Words{-7284, 11376, 18204, -21848, 2728, -912}));

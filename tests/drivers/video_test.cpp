@@ -3,6 +3,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <thread>
@@ -10,28 +11,11 @@
 #include "drivers/io/monotonic.hpp"
 #include "drivers/video/frame_source.hpp"
 #include "drivers/video/pixel_format.hpp"
+#include "drivers/video/pixel_pool.hpp"
+#include "tests/drivers/jpeg_pictures.hpp"
 
 namespace birdseye::drivers {
 namespace {
-
-TEST(PixelFormat, ConvertsToRgb) {
-  const std::vector<std::uint8_t> bgr{1, 2, 3, 4, 5, 6};
-  EXPECT_EQ(to_rgb(bgr, PixelFormat::bgr8, 2, 1, 6), (std::vector<std::uint8_t>{3, 2, 1, 6, 5, 4}));
-  const std::vector<std::uint8_t> grey{7, 8, 99, 9, 10, 99};  // a stride of three
-  EXPECT_EQ(to_rgb(grey, PixelFormat::grey8, 2, 2, 3),
-            (std::vector<std::uint8_t>{7, 7, 7, 8, 8, 8, 9, 9, 9, 10, 10, 10}));
-}
-
-TEST(PixelFormat, YuyvIsLimitedRangeBt601) {
-  // Black, white, and pure red (81, 90, 240), as the recommendation tables them.
-  const std::vector<std::uint8_t> yuyv{16, 128, 235, 128, 81, 90, 81, 240};
-  const auto rgb = to_rgb(yuyv, PixelFormat::yuyv, 4, 1, 8);
-  EXPECT_EQ(rgb[0], 0);
-  EXPECT_EQ(rgb[3], 255);
-  EXPECT_NEAR(rgb[6], 254, 2);
-  EXPECT_NEAR(rgb[7], 0, 2);
-  EXPECT_NEAR(rgb[8], 0, 2);
-}
 
 /// A program that listens at a socket and sends what it is given, in two halves with a pause between them.
 class Sender {
@@ -67,18 +51,34 @@ class Sender {
   std::jthread thread_;
 };
 
-std::vector<std::uint8_t> message() {
-  std::vector<std::uint8_t> bytes(64 + 24);
+template <typename T>
+void put(std::vector<std::uint8_t>& bytes, std::size_t offset, T value) {
+  std::memcpy(bytes.data() + offset, &value, sizeof value);
+}
+
+std::vector<std::uint8_t> message_of(const char* format, std::uint32_t width, std::uint32_t height,
+                                     const std::vector<std::uint8_t>& payload, std::uint64_t sequence = 9) {
+  std::vector<std::uint8_t> bytes(64 + payload.size());
   std::memcpy(bytes.data(), "BEFRAME1", 8);
-  bytes[8] = 4;
-  bytes[12] = 2;
-  std::memcpy(bytes.data() + 16, "RGB3", 4);
-  bytes[24] = 9;
-  bytes[32] = 77;
-  bytes[40] = 5;
-  bytes[48] = 24;
-  for (std::size_t i = 0; i < 24; ++i) bytes[64 + i] = static_cast<std::uint8_t>(i);
+  put(bytes, 8, width);
+  put(bytes, 12, height);
+  std::memcpy(bytes.data() + 16, format, 4);
+  put(bytes, 24, sequence);
+  put(bytes, 32, std::int64_t{77});
+  put(bytes, 40, std::int64_t{5});
+  put(bytes, 48, std::uint64_t{payload.size()});
+  std::copy(payload.begin(), payload.end(), bytes.begin() + 64);
   return bytes;
+}
+
+std::vector<std::uint8_t> message() {
+  std::vector<std::uint8_t> payload;
+  for (std::uint8_t i = 0; i < 24; ++i) payload.push_back(i);
+  return message_of("RGB3", 4, 2, payload);
+}
+
+DeviceTime soon() {
+  return now() + Duration::from_ms(5000);
 }
 
 TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
@@ -91,6 +91,7 @@ TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
   const auto frame = (*camera)->next(now() + Duration::from_ms(2000));
   ASSERT_TRUE(frame && *frame);
   EXPECT_EQ((*frame)->sequence, 9U);
+  EXPECT_TRUE((*frame)->acquired_known);
   EXPECT_EQ((*frame)->acquired.ns, 77);
   EXPECT_EQ((*frame)->acquired_sigma.ns, 5);
   EXPECT_EQ((*frame)->width_px, 4);
@@ -99,12 +100,103 @@ TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
 }
 
 TEST(SocketCamera, RefusesWhatIsNoFrame) {
+  const auto refuses = [](std::size_t offset, auto value) {
+    auto bytes = message();
+    put(bytes, offset, value);
+    const Sender sender(bytes);
+    const auto camera = open_camera(sender.settings());
+    ASSERT_TRUE(camera);
+    const auto frame = (*camera)->next(soon());
+    ASSERT_FALSE(frame) << "at " << offset;
+    EXPECT_EQ(frame.error().code, Errc::bad_format) << "at " << offset;
+  };
+  refuses(0, 'X');
+  refuses(8, std::uint32_t{0});
+  refuses(8, std::uint32_t{0x8000'0004});
+  refuses(12, std::uint32_t{8193});
+  refuses(16, 'X');
+  refuses(32, std::int64_t{-1});
+  refuses(32, std::int64_t{0x7fff'ffff'ffff'ffff});
+  refuses(40, std::int64_t{-5});
+  refuses(48, std::uint64_t{25});
+  refuses(48, std::uint64_t{0xffff'ffff'ffff'ffff});
+}
+
+TEST(SocketCamera, AFrameWithoutATimeHasNone) {
   auto bytes = message();
-  bytes[48] = 25;  // a payload that does not fit the size
+  put(bytes, 32, std::int64_t{0});
+  put(bytes, 40, std::int64_t{0});
   const Sender sender(bytes);
   const auto camera = open_camera(sender.settings());
   ASSERT_TRUE(camera);
-  EXPECT_EQ((*camera)->next(now() + Duration::from_ms(2000)).error().code, Errc::bad_format);
+  const auto frame = (*camera)->next(soon());
+  ASSERT_TRUE(frame && *frame);
+  EXPECT_FALSE((*frame)->acquired_known);
+  EXPECT_GT((*frame)->arrived.ns, 0);
+}
+
+TEST(SocketCamera, TakesEveryFormat) {
+  for (const char* format : {"BGR3", "YUYV", "UYVY", "NV12", "GREY"}) {
+    const PixelLayout layout = packed_layout(*pixel_format_of_name(format), 5, 3);
+    std::vector<std::uint8_t> payload(bytes_needed(layout));
+    for (std::size_t i = 0; i < payload.size(); ++i) payload[i] = static_cast<std::uint8_t>(40 + 7 * i);
+    const Sender sender(message_of(format, 5, 3, payload));
+    const auto camera = open_camera(sender.settings());
+    ASSERT_TRUE(camera);
+    const auto frame = (*camera)->next(soon());
+    ASSERT_TRUE(frame && *frame) << format;
+    std::vector<std::uint8_t> right;
+    to_rgb(payload, layout, right);
+    EXPECT_EQ(*(*frame)->rgb, right) << format;
+    EXPECT_NE((*camera)->describe().find(std::string(format) + " 5x3"), std::string::npos) << (*camera)->describe();
+  }
+}
+
+TEST(SocketCamera, DropsADamagedJpegAndCountsHoles) {
+  const auto whole = test::encode_jpeg(test::smooth_picture(32, 16), 32, 16);
+  const std::vector<std::uint8_t> cut(whole.begin(), whole.begin() + static_cast<long>(whole.size()) - 40);
+  std::vector<std::uint8_t> bytes = message_of("MJPG", 32, 16, whole, 1);
+  for (const auto& [payload, sequence] : {std::pair(cut, 2U), std::pair(whole, 6U), std::pair(whole, 1U)}) {
+    const auto next = message_of("MJPG", 32, 16, payload, sequence);
+    bytes.insert(bytes.end(), next.begin(), next.end());
+  }
+  const Sender sender(bytes);
+  const auto camera = open_camera(sender.settings());
+  ASSERT_TRUE(camera);
+  for (const std::uint64_t sequence : {1U, 6U, 1U}) {  // the last from a sender that began anew
+    const auto frame = (*camera)->next(soon());
+    ASSERT_TRUE(frame && *frame);
+    EXPECT_EQ((*frame)->sequence, sequence);
+    EXPECT_EQ((*frame)->rgb->size(), 32U * 16 * 3);
+  }
+  EXPECT_EQ((*camera)->counters().frames, 3U);
+  EXPECT_EQ((*camera)->counters().incomplete, 1U);
+  EXPECT_EQ((*camera)->counters().gaps, 3U);
+}
+
+TEST(PixelPool, ABufferComesBackWhenItsLastReaderLetsGo) {
+  PixelPool pool;
+  auto pixels = pool.take();
+  pixels->assign(1000, 1);
+  const PixelPool::Pixels* const first = pixels.get();
+  auto frame = pool.share(std::move(pixels));
+  auto reader = frame;
+  frame.reset();
+  const auto other = pool.take();
+  EXPECT_NE(other.get(), first);
+  reader.reset();
+  EXPECT_EQ(pool.take().get(), first);
+}
+
+TEST(PixelPool, MayGoBeforeItsReaders) {
+  std::shared_ptr<const PixelPool::Pixels> frame;
+  {
+    PixelPool pool;
+    auto pixels = pool.take();
+    pixels->assign(1000, 7);
+    frame = pool.share(std::move(pixels));
+  }
+  EXPECT_EQ(frame->at(999), 7);
 }
 
 TEST(Camera, UnknownAndMissingSourcesAreNamed) {

@@ -20,7 +20,8 @@ struct CommandResult {
 /// Runs one of our programs through the shell and waits for it. within: what the shell sets up for it, as
 /// "env NAME=value" or "xvfb-run -a".
 inline CommandResult run(const std::string& program, const std::string& arguments, const std::string& within = {}) {
-  const std::string line = within + " " + std::string(BIRDSEYE_BIN) + "/" + program + " " + arguments + " 2>&1";
+  const std::string line =
+      within + " " BIRDSEYE_EMULATOR " " + std::string(BIRDSEYE_BIN) + "/" + program + " " + arguments + " 2>&1";
   CommandResult result;
   std::FILE* pipe = ::popen(line.c_str(), "r");
   if (pipe == nullptr) return result;

@@ -1,0 +1,21 @@
+# What the host and the simulator's pictures need, and the appliance does not.
+find_package(TBB REQUIRED)
+find_package(Ceres REQUIRED)
+find_package(NLopt REQUIRED)
+find_package(embree 3 REQUIRED)
+find_package(assimp REQUIRED)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d aruco)
+find_package(ZLIB REQUIRED)
+pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
+find_package(glfw3 3.3 REQUIRED)
+find_package(ITK 5.2 REQUIRED COMPONENTS
+  ITKCommon ITKIOImageBase ITKIOGDCM ITKIONIFTI ITKIONRRD ITKIOMeta
+  ITKConnectedComponents ITKDistanceMap ITKImageGrid ITKIOMeshVTK ITKRegionGrowing ITKSmoothing ITKThresholding)
+# ITK without its use-file, which would put its headers and factories into every target: readers are registered by name.
+add_library(birdseye_itk INTERFACE)
+target_include_directories(birdseye_itk SYSTEM INTERFACE ${ITK_INCLUDE_DIRS})
+# Its own copy of Eigen and ours cannot meet in one file.
+target_compile_definitions(birdseye_itk INTERFACE ITK_USE_SYSTEM_EIGEN)
+target_compile_options(birdseye_itk INTERFACE
+  "$<$<CXX_COMPILER_ID:Clang>:SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/itk_with_clang.h>")
+target_link_libraries(birdseye_itk INTERFACE ${ITK_LIBRARIES})

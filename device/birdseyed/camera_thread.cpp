@@ -1,0 +1,70 @@
+#include "device/birdseyed/camera_thread.hpp"
+
+#include <fmt/format.h>
+
+#include "drivers/io/monotonic.hpp"
+
+namespace birdseye::device {
+
+namespace {
+
+using drivers::now;
+
+constexpr int kSilentPeriods = 8;                            // frames that do not come
+constexpr Duration kSilentAtLeast = Duration::from_ms(300);  // a busy machine is no silent camera
+constexpr int kRestarts = 2;  // of a stream that is silent, before the camera is closed and opened again
+
+Duration silence_of(const drivers::FrameSource& camera, const drivers::CameraSettings& settings) {
+  const double rate_hz = camera.rate_hz() > 0 ? camera.rate_hz() : settings.rate_hz;
+  return std::max(Duration::from_seconds(kSilentPeriods / rate_hz), kSilentAtLeast);
+}
+
+/// Until the camera is lost; why.
+Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settings, InstrumentPost& post,
+             const std::stop_token& stop) {
+  const auto running = [&] {
+    post.tell({.state = InstrumentState::running,
+               .text = camera.describe(),
+               .rate_hz = camera.rate_hz(),
+               .exposure = camera.exposure()});
+  };
+  const Duration silence = silence_of(camera, settings);
+  DeviceTime heard = now();
+  int restarts = 0;
+  running();
+  while (!stop.stop_requested()) {
+    post.alive();
+    auto frame = camera.next(now() + kPatience);
+    if (!frame) return frame.error();
+    if (*frame) {
+      if (std::exchange(restarts, 0) > 0) running();
+      heard = now();
+      post.push(FrameCame{**std::move(frame)});
+    } else if (now() - heard > silence) {
+      const std::string text = fmt::format("{}: the camera sends no frames", camera.name());
+      if (restarts++ == kRestarts) return {Errc::timeout, text};
+      post.tell({.state = InstrumentState::silent, .text = text});
+      if (auto restarted = camera.restart_stream(); !restarted) return restarted.error();
+      heard = now();
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    auto camera = drivers::open_camera(settings);
+    if (!camera) {
+      post.tell({.state = InstrumentState::absent, .text = camera.error().what});
+    } else if (const Error lost = stream(**camera, settings, post, stop); !stop.stop_requested()) {
+      post.tell(
+          {.state = lost.code == Errc::timeout ? InstrumentState::silent : InstrumentState::absent, .text = lost.what});
+    }
+    camera = Error{};  // closed before it is looked for again
+    wait(kLookAgain, stop);
+  }
+}
+
+}  // namespace birdseye::device

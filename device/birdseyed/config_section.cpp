@@ -1,0 +1,153 @@
+#include "device/birdseyed/config_section.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace birdseye::device {
+
+namespace {
+
+std::int64_t line_of(const toml::value& value) {
+  return static_cast<std::int64_t>(value.location().line());
+}
+
+}  // namespace
+
+void ConfigFaults::add(std::int64_t line, const std::string& text) {
+  const std::string place = line > 0 ? fmt::format("{}:{}", file_.string(), line) : file_.string();
+  faults_.emplace(line, fmt::format("{}: {}", place, text));
+}
+
+std::string ConfigFaults::text() const {
+  std::string all;
+  for (const auto& [line, fault] : faults_) all += (all.empty() ? "" : "\n") + fault;
+  return all;
+}
+
+ConfigSection::ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table)
+    : faults_(&faults), faults_before_(faults.count()), name_(std::move(name)), table_(table) {}
+
+const toml::value* ConfigSection::find(const char* key, bool required) {
+  known_.insert(key);
+  if (has(key)) return &table_->as_table().at(key);
+  if (required) fail(key, "is missing");
+  return nullptr;
+}
+
+bool ConfigSection::has(const char* key) const {
+  return table_ != nullptr && table_->as_table().count(key) != 0;
+}
+
+void ConfigSection::fail(const char* key, const std::string& why) {
+  const std::int64_t line = has(key) ? line_of(table_->as_table().at(key)) : table_ != nullptr ? line_of(*table_) : 0;
+  const std::string colon = *key == 0 ? "" : ": ";
+  faults_->add(line, fmt::format("[{}] {}{}{}", name_, key, colon, why));
+}
+
+void ConfigSection::text(const char* key, std::string& value, bool required) {
+  const toml::value* const found = find(key, required);
+  if (found == nullptr) return;
+  if (!found->is_string()) return fail(key, "needs text in quotes");
+  value = found->as_string().str;
+}
+
+void ConfigSection::number(const char* key, std::optional<double>& value, double low, double high) {
+  const toml::value* const found = find(key);
+  if (found == nullptr) return;
+  if (!found->is_floating() && !found->is_integer()) return fail(key, "needs a number");
+  value = found->is_floating() ? found->as_floating() : static_cast<double>(found->as_integer());
+  if (!(*value >= low && *value <= high)) fail(key, fmt::format("{:g} is not within {:g} and {:g}", *value, low, high));
+}
+
+void ConfigSection::number(const char* key, double& value, double low, double high) {
+  std::optional<double> read;
+  number(key, read, low, high);
+  if (read) value = *read;
+}
+
+void ConfigSection::integer(const char* key, std::optional<int>& value, int low, int high) {
+  const toml::value* const found = find(key);
+  if (found == nullptr) return;
+  if (!found->is_integer()) return fail(key, "needs a whole number");
+  if (found->as_integer() < low || found->as_integer() > high)
+    return fail(key, fmt::format("{} is not within {} and {}", found->as_integer(), low, high));
+  value = static_cast<int>(found->as_integer());
+}
+
+void ConfigSection::integer(const char* key, int& value, int low, int high) {
+  std::optional<int> read;
+  integer(key, read, low, high);
+  if (read) value = *read;
+}
+
+void ConfigSection::flag(const char* key, bool& value) {
+  const toml::value* const found = find(key);
+  if (found == nullptr) return;
+  if (!found->is_boolean()) return fail(key, "needs true or false");
+  value = found->as_boolean();
+}
+
+void ConfigSection::milliseconds(const char* key, std::optional<Duration>& value, double high_ms) {
+  std::optional<double> ms;
+  number(key, ms, 0, high_ms);
+  if (ms) value = Duration::from_seconds(*ms * 1e-3);
+}
+
+void ConfigSection::milliseconds(const char* key, Duration& value, double high_ms) {
+  std::optional<Duration> read;
+  milliseconds(key, read, high_ms);
+  if (read) value = *read;
+}
+
+void ConfigSection::texts(const char* key, std::vector<std::string>& values) {
+  const toml::value* const found = find(key);
+  if (found == nullptr) return;
+  if (!found->is_array()) return fail(key, "needs a list of names");
+  values.clear();
+  for (const toml::value& item : found->as_array()) {
+    if (!item.is_string()) return fail(key, "needs a list of names");
+    values.push_back(item.as_string().str);
+  }
+}
+
+std::vector<double> ConfigSection::numbers(const char* key, std::size_t count, double low, double high) {
+  const toml::value* const found = find(key);
+  if (found == nullptr) return {};
+  std::vector<double> values;
+  if (found->is_array()) {
+    for (const toml::value& item : found->as_array()) {
+      if (item.is_floating()) values.push_back(item.as_floating());
+      if (item.is_integer()) values.push_back(static_cast<double>(item.as_integer()));
+    }
+  }
+  const auto outside = [&](double v) { return !(v >= low && v <= high); };
+  if (values.size() == count && found->as_array().size() == count &&
+      std::none_of(values.begin(), values.end(), outside)) {
+    return values;
+  }
+  fail(key, fmt::format("needs a list of {} numbers within {:g} and {:g}", count, low, high));
+  return {};
+}
+
+std::vector<ConfigSection> ConfigSection::tables(const char* key) {
+  const toml::value* const found = find(key);
+  std::vector<ConfigSection> sections;
+  if (found == nullptr) return sections;
+  const bool tables = found->is_array() && std::all_of(found->as_array().begin(), found->as_array().end(),
+                                                       [](const toml::value& item) { return item.is_table(); });
+  if (!tables) {
+    fail(key, fmt::format("is given as [[{}.{}]]", name_, key));
+    return sections;
+  }
+  for (const toml::value& item : found->as_array()) sections.emplace_back(*faults_, name_ + "." + key, &item);
+  return sections;
+}
+
+void ConfigSection::finish() {
+  if (table_ == nullptr) return;
+  for (const auto& [key, value] : table_->as_table()) {
+    if (known_.count(key) == 0) fail(key.c_str(), fmt::format("unknown key; known are {}", fmt::join(known_, ", ")));
+  }
+}
+
+}  // namespace birdseye::device

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <toml.hpp>
+#include <vector>
+
+#include "calibration/time/clock.hpp"
+
+namespace birdseye::device {
+
+/// What is wrong with a file, one line each.
+class ConfigFaults {
+ public:
+  explicit ConfigFaults(std::filesystem::path file) : file_(std::move(file)) {}
+  /// line 0: of the file as a whole.
+  void add(std::int64_t line, const std::string& text);
+  [[nodiscard]] std::size_t count() const { return faults_.size(); }
+  [[nodiscard]] std::string text() const;  ///< in the order of the lines
+
+ private:
+  std::filesystem::path file_;
+  std::multimap<std::int64_t, std::string> faults_;
+};
+
+/// One table of a configuration file. A value that is absent leaves what was there; one of the wrong type or out of its
+/// range is a fault. Every key that is asked for is noted, so that what is left over can be named.
+class ConfigSection {
+ public:
+  /// table: null where the file has no such section.
+  ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table);
+
+  void text(const char* key, std::string& value, bool required = false);
+  void number(const char* key, double& value, double low, double high);
+  void number(const char* key, std::optional<double>& value, double low, double high);
+  void integer(const char* key, int& value, int low, int high);
+  void integer(const char* key, std::optional<int>& value, int low, int high);
+  void flag(const char* key, bool& value);
+  void milliseconds(const char* key, Duration& value, double high_ms);
+  void milliseconds(const char* key, std::optional<Duration>& value, double high_ms);
+  void texts(const char* key, std::vector<std::string>& values);
+  /// A list of exactly count numbers; empty where it is absent or wrong.
+  std::vector<double> numbers(const char* key, std::size_t count, double low, double high);
+  /// The tables of [[section.key]].
+  std::vector<ConfigSection> tables(const char* key);
+
+  [[nodiscard]] bool present() const { return table_ != nullptr; }
+  [[nodiscard]] bool has(const char* key) const;
+  /// key "": of the section as a whole.
+  void fail(const char* key, const std::string& why);
+  /// Nothing was wrong with it so far.
+  [[nodiscard]] bool sound() const { return faults_->count() == faults_before_; }
+  /// Names the keys that nobody asked for. To be called last.
+  void finish();
+
+ private:
+  const toml::value* find(const char* key, bool required = false);
+
+  ConfigFaults* faults_;
+  std::size_t faults_before_;
+  std::string name_;
+  const toml::value* table_;
+  std::set<std::string> known_;
+};
+
+}  // namespace birdseye::device

@@ -1,0 +1,180 @@
+#include "device/birdseyed/core.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace birdseye::device {
+
+namespace {
+
+using drivers::minibird::BirdReading;
+using drivers::minibird::Doubt;
+using drivers::minibird::Measurement;
+using drivers::minibird::MiniBirdCounters;
+
+constexpr Duration kDoubtToldEvery = Duration::from_ms(1000);
+constexpr Duration kDoubtInStatusAfter = Duration::from_ms(100);  // a record that is lost now and then is none of it
+constexpr std::size_t kMostWaitingFrames = 32;
+
+void add(MiniBirdCounters& sum, const MiniBirdCounters& more) {
+  sum.measurements += more.measurements;
+  sum.lost_measurements += more.lost_measurements;
+  sum.phase_errors += more.phase_errors;
+  sum.discarded_bytes += more.discarded_bytes;
+  sum.line_errors += more.line_errors;
+  sum.restarts += more.restarts;
+  sum.senseless_records += more.senseless_records;
+  for (std::size_t i = 0; i < sum.doubted.size(); ++i) sum.doubted[i] += more.doubted[i];
+}
+
+}  // namespace
+
+Core::Core(CoreSettings settings)
+    : settings_(std::move(settings)),
+      birds_(settings_.bird_names.size()),
+      scope_(settings_.pose),
+      frame_clock_(settings_.frame_clock) {}
+
+Core::Counters Core::counters() const {
+  Counters counters;
+  counters.tracker = counted_;
+  if (assembler_) add(counters.tracker, assembler_->counters());
+  counters.frames = frames_seen_;
+  counters.frames_lost = frames_lost_;
+  counters.clock_events = counters.tracker.restarts + frame_clock_.events();
+  counters.camera_drift_ppm = frame_clock_.drift_ppm();
+  counters.tracker_time_sigma_ms = time_sigma_.seconds() * 1e3;
+  return counters;
+}
+
+std::vector<wire::Packet> Core::take(const RawEvent& event) {
+  std::visit([this](const auto& what) { note(what); }, event);
+  const DeviceTime now = time_of(event);
+  release_frames(now);
+  publish_status(now);
+  return std::exchange(out_, {});
+}
+
+void Core::note(const InstrumentChanged& changed) {
+  board_.note(changed);
+  const bool running = changed.state == InstrumentState::running;
+  if (changed.instrument == Instrument::tracker) {
+    // What was half received will not be completed, and a unit that starts again has another beat.
+    if (assembler_) add(counted_, assembler_->counters());
+    assembler_.reset();
+    for (BirdState& bird : birds_) bird = {};
+    if (running && changed.layout) assembler_.emplace(*changed.layout);
+  }
+  if (changed.instrument == Instrument::camera && running) {
+    frame_clock_.restart(changed.rate_hz, changed.exposure);
+    next_sequence_.reset();
+  }
+}
+
+void Core::note(const TrackerBytes& bytes) {
+  if (!assembler_) return;
+  for (const Measurement& measurement : assembler_->push(bytes.chunk)) publish(measurement);
+}
+
+void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime at) {
+  BirdState& bird = birds_[index];
+  if (reading.kind != bird.doubt) {
+    bird = {reading.kind, reading.doubt, at, {}, false};
+  }
+  if (bird.doubt == Doubt::none) return;
+  if (bird.told.ns == 0 || at - bird.told > kDoubtToldEvery) {
+    bird.told = at;
+    out_.push_back(wire::pack(wire::Doubt{at, settings_.bird_names[index], reading.doubt}));
+  }
+  bird.in_status = at - bird.since > kDoubtInStatusAfter;
+}
+
+void Core::publish(const Measurement& measurement) {
+  time_sigma_ = measurement.acquired_sigma;
+  const bool timed = measurement.acquired_sigma <= settings_.pose.max_time_sigma;
+  wire::Birds birds;
+  birds.acquired = measurement.acquired;
+  for (std::size_t i = 0; i < std::min(measurement.birds.size(), birds_.size()); ++i) {
+    const BirdReading& bird = measurement.birds[i];
+    note_doubt(i, bird, measurement.arrived);
+    if (!timed || !bird.pose || !bird.pose->position_mm || !bird.pose->rotation) continue;
+    const Transform<Tracker, Sensor> pose(*bird.pose->rotation, *bird.pose->position_mm);
+    if (i == 0) scope_.push(measurement.acquired, measurement.acquired_sigma, pose);
+    birds.birds.push_back({settings_.bird_names[i], pose});
+  }
+  if (timed) out_.push_back(wire::pack(birds, measurement.arrived));
+}
+
+void Core::note(const FrameCame& came) {
+  const drivers::Frame& frame = came.frame;
+  if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
+  next_sequence_ = frame.sequence + 1;
+  ++frames_seen_;
+  frames_.push_back(frame);
+  const FrameClock::Time time = frame_clock_.time_of(frame);
+  frames_.back().acquired = time.acquired;
+  frames_.back().acquired_sigma = time.sigma;
+  frames_.back().acquired_known = time.certain;
+  if (frames_.size() > kMostWaitingFrames) {  // the wait that is configured is longer than frames may be kept for
+    publish(frames_.front());
+    frames_.pop_front();
+  }
+}
+
+void Core::note(const EdgesCame& came) {
+  for (const drivers::GpioEdge& edge : came.edges) {
+    if (edge.input == drivers::GpioInput::pedal) {
+      out_.push_back(wire::pack(wire::Pedal{edge.active, edge.at}));
+    } else {
+      frame_clock_.take(edge);
+    }
+  }
+}
+
+void Core::release_frames(DeviceTime now) {
+  while (!frames_.empty()) {
+    const drivers::Frame& frame = frames_.front();
+    const auto newest = scope_.newest();
+    const bool covered = newest && *newest >= frame.acquired + settings_.pose.smoothing;
+    if (!covered && settings_.pose_wait.ns > 0 && now < frame.arrived + settings_.pose_wait) return;
+    publish(frame);
+    frames_.pop_front();
+  }
+}
+
+void Core::publish(const drivers::Frame& frame) {
+  wire::VideoFrame out;
+  out.info.sequence = frame.sequence;
+  out.info.acquired = frame.acquired;
+  out.info.acquired_sigma = frame.acquired_sigma;
+  out.info.arrived = frame.arrived;
+  if (frame.acquired_known && frame.acquired_sigma <= settings_.pose.max_time_sigma) {
+    out.info.pose = scope_.at(frame.acquired);
+    if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != Doubt::none)
+      out.info.pose.reason += ": " + birds_[0].why;
+  } else {
+    out.info.pose.reason = "when the frame was taken is not known well enough";
+  }
+  out.info.frames_dropped = frames_lost_;
+  out.width_px = frame.width_px;
+  out.height_px = frame.height_px;
+  out.rgb = frame.rgb;
+  out_.push_back(wire::pack(out));
+}
+
+wire::Status Core::status() const {
+  std::string text = board_.faults();
+  for (std::size_t i = 0; i < birds_.size(); ++i) {
+    if (birds_[i].in_status) text += (text.empty() ? "" : "; ") + settings_.bird_names[i] + ": " + birds_[i].why;
+  }
+  return {text.empty(), text};
+}
+
+void Core::publish_status(DeviceTime now) {
+  const wire::Status status = this->status();
+  if (status.text == status_text_) return;
+  status_text_ = status.text;
+  out_.push_back(wire::pack(status, now));
+}
+
+}  // namespace birdseye::device

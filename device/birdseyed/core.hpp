@@ -1,0 +1,79 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/time/pose_history.hpp"
+#include "device/birdseyed/frame_clock.hpp"
+#include "device/birdseyed/instrument_board.hpp"
+#include "device/birdseyed/raw_event.hpp"
+#include "device/wire/packet.hpp"
+#include "drivers/minibird/assembler.hpp"
+
+namespace birdseye::device {
+
+struct CoreSettings {
+  std::vector<std::string> bird_names = {"scope"};  ///< by address; the first is the scope's
+  PoseHistory::Settings pose;
+  /// How long a frame may wait for measurements from after it, from its arrival on; 0: it goes at once, with a pose
+  /// that may be predicted.
+  Duration pose_wait{0};
+  FrameClock::Settings frame_clock;
+};
+
+/// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.
+class Core {
+ public:
+  explicit Core(CoreSettings settings);
+
+  /// The messages that an event brings about, in order.
+  std::vector<wire::Packet> take(const RawEvent& event);
+  /// Frames wait for poses: events, if only ticks, must go on.
+  [[nodiscard]] bool waiting() const { return !frames_.empty(); }
+
+  struct Counters {
+    drivers::minibird::MiniBirdCounters tracker;
+    std::uint64_t frames = 0, frames_lost = 0, clock_events = 0;
+    double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
+  };
+  [[nodiscard]] Counters counters() const;
+  [[nodiscard]] const InstrumentBoard& board() const { return board_; }
+
+ private:
+  struct BirdState {
+    drivers::minibird::Doubt doubt = drivers::minibird::Doubt::none;  ///< of the newest measurement
+    std::string why;
+    DeviceTime since, told;
+    bool in_status = false;
+  };
+
+  void note(const InstrumentChanged& changed);
+  void note(const TrackerBytes& bytes);
+  void note(const FrameCame& came);
+  void note(const EdgesCame& edges);
+  void note(const Tick&) {}
+  void publish(const drivers::minibird::Measurement& measurement);
+  void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
+  void release_frames(DeviceTime now);
+  void publish(const drivers::Frame& frame);
+  void publish_status(DeviceTime now);
+  [[nodiscard]] wire::Status status() const;
+
+  CoreSettings settings_;
+  InstrumentBoard board_;
+  std::optional<drivers::minibird::MeasurementAssembler> assembler_;
+  drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
+  std::vector<BirdState> birds_;
+  PoseHistory scope_;
+  FrameClock frame_clock_;
+  std::deque<drivers::Frame> frames_;  ///< waiting for poses
+  std::uint64_t frames_seen_ = 0, frames_lost_ = 0;
+  std::optional<std::uint64_t> next_sequence_;
+  Duration time_sigma_;
+  std::string status_text_ = "never said";
+  std::vector<wire::Packet> out_;
+};
+
+}  // namespace birdseye::device

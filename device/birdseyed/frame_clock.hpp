@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "calibration/time/clock_line.hpp"
+#include "calibration/time/strobe_matcher.hpp"
+#include "drivers/gpio/gpio_lines.hpp"
+#include "drivers/video/frame_source.hpp"
+
+namespace birdseye::device {
+
+/// When a frame was taken: by the strobe where there is one and it is surely this frame's, else by the camera's stamp,
+/// else from when frames arrive.
+class FrameClock {
+ public:
+  struct Settings {
+    double rate_hz = 25;
+    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least.
+    Duration delay{0};
+    /// For the strobe, which marks the exposure's start, where the camera does not say.
+    Duration exposure{0};
+    bool strobe = false;  ///< edges come
+  };
+  struct Time {
+    DeviceTime acquired;
+    Duration sigma;
+    bool certain = true;  ///< false: it has yet to be made out
+    std::string reason;   ///< why not, in words
+  };
+
+  explicit FrameClock(const Settings& settings);
+
+  /// A camera that (re)starts: what was learned of the old one is forgotten.
+  void restart(double rate_hz, std::optional<Duration> exposure);
+  void take(const drivers::GpioEdge& edge);
+  /// Of each frame, in order.
+  Time time_of(const drivers::Frame& frame);
+  /// Of the line under the arrivals; 0 where the camera stamps its frames.
+  [[nodiscard]] double drift_ppm() const { return line_ ? line_->drift_ppm() : 0; }
+  [[nodiscard]] std::uint64_t events() const { return events_; }
+
+ private:
+  [[nodiscard]] Duration period() const { return Duration::from_seconds(1 / settings_.rate_hz); }
+
+  Settings settings_;
+  Duration exposure_;
+  std::optional<ClockLine> line_;
+  std::optional<StrobeMatcher> strobe_;
+  std::uint64_t events_ = 0;
+};
+
+}  // namespace birdseye::device

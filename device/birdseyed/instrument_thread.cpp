@@ -1,0 +1,33 @@
+#include "device/birdseyed/instrument_thread.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "drivers/io/monotonic.hpp"
+
+namespace birdseye::device {
+
+void InstrumentPost::tell(InstrumentChanged changed) {
+  alive();
+  if (changed.state == state_ && changed.text == text_) return;
+  state_ = changed.state;
+  text_ = changed.text;
+  changed.instrument = instrument_;
+  changed.at = drivers::now();
+  const bool good = state_ == InstrumentState::running || state_ == InstrumentState::starting;
+  spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "{} {}: {}", name_of(instrument_), name_of(state_),
+              text_);
+  push(std::move(changed));
+}
+
+void InstrumentPost::alive() {
+  alive_ns_ = drivers::now().ns;
+}
+
+void wait(Duration span, const std::stop_token& stop) {
+  for (const DeviceTime until = drivers::now() + span; drivers::now() < until && !stop.stop_requested();)
+    drivers::sleep_for(std::min(until - drivers::now(), Duration::from_ms(20)));
+}
+
+}  // namespace birdseye::device

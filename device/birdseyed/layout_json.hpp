@@ -1,0 +1,55 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "device/birdseyed/core.hpp"
+
+/// What a recording keeps as JSON: how a tracker's bytes are to be read, and what the core was told.
+namespace birdseye {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Duration, ns)
+inline void to_json(nlohmann::json& json, const PoseHistory::Settings& settings) {
+  json = {{"capacity", settings.capacity},
+          {"max_gap", settings.max_gap},
+          {"max_prediction", settings.max_prediction},
+          {"max_time_sigma", settings.max_time_sigma},
+          {"acceleration_mm_s2", settings.acceleration_mm_s2},
+          {"smoothing", settings.smoothing}};
+}
+inline void from_json(const nlohmann::json& json, PoseHistory::Settings& settings) {
+  json.at("capacity").get_to(settings.capacity);
+  json.at("max_gap").get_to(settings.max_gap);
+  json.at("max_prediction").get_to(settings.max_prediction);
+  json.at("max_time_sigma").get_to(settings.max_time_sigma);
+  json.at("acceleration_mm_s2").get_to(settings.acceleration_mm_s2);
+  json.at("smoothing").get_to(settings.smoothing);
+}
+
+}  // namespace birdseye
+
+namespace birdseye::drivers::minibird {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plausibility, most_speed_mm_s, most_turn_deg_s, most_acceleration_mm_s2, slack_mm,
+                                   slack_deg, step_confirms, start_confirms, gap, frozen_after, frozen_moved_mm,
+                                   hemisphere_border_mm, flip_memory)
+inline void to_json(nlohmann::json& json, const BirdLayout& bird) {
+  const Eigen::Vector3d& into = bird.into_hemisphere;
+  json = {{"format", static_cast<int>(bird.format)},
+          {"mm_per_count", bird.mm_per_count},
+          {"into_hemisphere", {into.x(), into.y(), into.z()}}};
+}
+inline void from_json(const nlohmann::json& json, BirdLayout& bird) {
+  bird.format = static_cast<RecordFormat>(json.at("format").get<int>());
+  json.at("mm_per_count").get_to(bird.mm_per_count);
+  for (int i = 0; i < 3; ++i) bird.into_hemisphere[i] = json.at("into_hemisphere").at(static_cast<std::size_t>(i));
+}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StreamLayout, birds, group_mode, button_byte, rate_hz, baud, delay, plausibility)
+
+}  // namespace birdseye::drivers::minibird
+
+namespace birdseye::device {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameClock::Settings, rate_hz, delay, exposure, strobe)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CoreSettings, bird_names, pose, pose_wait, frame_clock)
+
+}  // namespace birdseye::device

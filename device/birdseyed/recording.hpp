@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "device/birdseyed/core.hpp"
+
+/// A file of raw events (docs/manual/recording.md): eight bytes of magic, then blocks of kind, size, payload, checksum.
+/// A block is whole or it is not: a file that was cut anywhere, as by a power cut, is good up to the last whole block.
+namespace birdseye::device {
+
+using Bytes = std::vector<std::uint8_t>;
+
+inline constexpr std::size_t kMagicBytes = 8;
+Bytes recording_magic();
+/// What the core was told; the first block of a file.
+Bytes block_of(const CoreSettings& settings);
+Bytes block_of(const RawEvent& event);
+
+/// Reads a file front to back.
+class RecordingReader {
+ public:
+  /// Refuses what is no recording, and one of another version.
+  static Result<RecordingReader> open(const std::filesystem::path& path);
+
+  [[nodiscard]] const CoreSettings& settings() const { return settings_; }
+  /// The next event; empty at the end. An error where a block is damaged: what follows cannot be trusted.
+  Result<std::optional<RawEvent>> next();
+  /// The file ended inside a block.
+  [[nodiscard]] bool cut_short() const { return cut_short_; }
+
+ private:
+  struct Block {
+    std::uint32_t kind = 0;
+    Bytes payload;
+  };
+  RecordingReader(std::ifstream in, std::string name) : in_(std::move(in)), name_(std::move(name)) {}
+  Result<std::optional<Block>> next_block();
+
+  std::ifstream in_;
+  std::string name_;
+  CoreSettings settings_;
+  bool cut_short_ = false;
+};
+
+}  // namespace birdseye::device

@@ -1,0 +1,72 @@
+#include "device/birdseyed/tracker_thread.hpp"
+
+#include <fmt/format.h>
+
+#include "drivers/io/monotonic.hpp"
+#include "drivers/io/open_line.hpp"
+
+namespace birdseye::device {
+
+namespace {
+
+using drivers::now;
+using drivers::minibird::MiniBird;
+
+constexpr Duration kSilent = Duration::from_ms(500);  // of a unit that streams: 7 to 72 cycles
+
+/// Until the tracker is lost; why.
+Error stream(MiniBird& tracker, const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop) {
+  DeviceTime heard = now();
+  while (!stop.stop_requested()) {
+    post.alive();
+    auto chunk = tracker.read(now() + kPatience);
+    if (!chunk) return chunk.error();
+    if (*chunk) {
+      heard = now();
+      post.push(TrackerBytes{**std::move(chunk)});
+    } else if (now() - heard > kSilent) {
+      return {Errc::timeout,
+              fmt::format("{}: the tracker has fallen silent; check its power and cable", config.line.device)};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<MiniBird>> open_tracker(const TrackerConfig& config, const std::stop_token& stop) {
+  auto line = drivers::open_line(config.line);
+  if (!line) return std::move(line).error();
+  return MiniBird::start(*std::move(line), config.minibird, stop);
+}
+
+std::string describe(const MiniBird& tracker, const std::string& device) {
+  const auto& info = tracker.info();
+  return fmt::format("{}: \"{}\" {}.{}, {} bird(s), {:.2f} Hz{}{}", device, info.model, info.revision_major,
+                     info.revision_minor, tracker.layout().birds.size(), info.rate_hz,
+                     info.has_reset_line ? "" : ", no reset line",
+                     info.latched_error.empty() ? "" : "; it had latched: " + info.latched_error);
+}
+
+void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    post.alive();
+    auto tracker = open_tracker(config, stop);
+    if (stop.stop_requested()) return;
+    if (!tracker) {
+      post.tell({.state = InstrumentState::absent, .text = tracker.error().what});
+      wait(kLookAgain, stop);
+      continue;
+    }
+    post.tell({.state = InstrumentState::running,
+               .text = describe(**tracker, config.line.device),
+               .layout = (*tracker)->layout()});
+    const Error lost = stream(**tracker, config, post, stop);
+    if (!stop.stop_requested()) {
+      post.tell(
+          {.state = lost.code == Errc::timeout ? InstrumentState::silent : InstrumentState::absent, .text = lost.what});
+    }
+  }
+}
+
+}  // namespace birdseye::device

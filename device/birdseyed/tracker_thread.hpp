@@ -1,0 +1,20 @@
+#pragma once
+
+#include <stop_token>
+
+#include "device/birdseyed/config.hpp"
+#include "device/birdseyed/instrument_thread.hpp"
+#include "drivers/minibird/minibird.hpp"
+
+namespace birdseye::device {
+
+/// Finds the tracker, starts it, hands over its bytes, and begins again when it is lost or falls silent. Until stop.
+void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop);
+
+/// Finds and starts it, once.
+Result<std::unique_ptr<drivers::minibird::MiniBird>> open_tracker(const TrackerConfig& config,
+                                                                  const std::stop_token& stop);
+/// One line of what it is.
+std::string describe(const drivers::minibird::MiniBird& tracker, const std::string& device);
+
+}  // namespace birdseye::device

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/clock.hpp"
+
+/// The bytes that every OpenIGTLink message has, for the files that pack and unpack; not part of the wire's interface.
+namespace birdseye::wire {
+
+inline constexpr std::size_t kHeaderBytes = 58;
+
+/// The protocol's checksum: CRC-64 of ECMA-182. ISA-L's, which is thirty times as fast as the library's own.
+/// crc: of the bytes before these.
+std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t crc = 0);
+
+/// The standard's stamp: seconds, and a fraction in units of 2^-32 s, rounded so that nanoseconds come back exactly.
+std::uint64_t stamp_from(DeviceTime time);
+DeviceTime time_from(std::uint64_t stamp);
+
+/// A message's header by hand: the library's own unpacking reports no failure.
+struct Header {
+  unsigned version = 0;
+  std::string type, device;
+  DeviceTime time;
+  std::uint64_t body_bytes = 0, crc = 0;
+};
+/// Refuses what is no header, and a body of more than most_bytes.
+Result<Header> read_header(std::span<const std::uint8_t> bytes, std::uint64_t most_bytes);
+
+/// The text of a STRING's body; empty where its lengths lie.
+std::optional<std::string> text_of_string(const Header& header, std::span<const std::uint8_t> body);
+
+/// Bytes of the content: in version 2 after an extended header, whose own size comes first.
+std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body);
+
+}  // namespace birdseye::wire

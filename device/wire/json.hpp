@@ -1,0 +1,28 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "device/wire/packet.hpp"
+
+/// The JSON inside the wire's STRINGs. Reading throws nlohmann::json::exception where a value is not what it should be.
+namespace birdseye::wire {
+
+void to_json(nlohmann::json& json, const FrameInfo& info);
+void from_json(const nlohmann::json& json, FrameInfo& info);
+void to_json(nlohmann::json& json, const Doubt& doubt);
+void from_json(const nlohmann::json& json, Doubt& doubt);
+void to_json(nlohmann::json& json, const Pedal& pedal);
+void from_json(const nlohmann::json& json, Pedal& pedal);
+void to_json(nlohmann::json& json, const ClockPong& pong);
+void from_json(const nlohmann::json& json, ClockPong& pong);
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClockPing, host_sent_ns)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Subscription, frames, tracking)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(InstrumentHealth, name, state, text, times_lost)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Health, state, instruments, tracker_rate_hz, frame_rate_hz, measurements,
+                                   measurements_lost, phase_errors, senseless_records, doubted, line_errors,
+                                   clock_events, frames, frames_dropped, messages_shed, clients, requests_refused,
+                                   tracker_drift_ppm, camera_drift_ppm, tracker_time_sigma_ms, latency_ms_p99_tracker,
+                                   latency_ms_p99_frame, recording)
+
+}  // namespace birdseye::wire

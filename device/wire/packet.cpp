@@ -1,0 +1,159 @@
+#include "device/wire/packet.hpp"
+
+#include <igtlStatusMessage.h>
+#include <igtlStringMessage.h>
+#include <igtlTrackingDataMessage.h>
+#include <igtl_header.h>
+#include <igtl_image.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/json.hpp"
+
+namespace birdseye::wire {
+
+namespace {
+
+void stamp(igtl::MessageBase& message, DeviceTime time) {
+  const std::uint64_t stamp = stamp_from(time);
+  message.SetTimeStamp(static_cast<unsigned>(stamp >> 32U), static_cast<unsigned>(stamp & 0xFFFFFFFFU));
+}
+
+void append(std::vector<std::uint8_t>& out, igtl::MessageBase& message) {
+  message.Pack();
+  const auto* bytes = static_cast<const std::uint8_t*>(message.GetPackPointer());
+  out.insert(out.end(), bytes, bytes + message.GetPackSize());
+}
+
+void append_string(std::vector<std::uint8_t>& out, const char* device, const nlohmann::json& json, DeviceTime time) {
+  const auto message = igtl::StringMessage::New();
+  message->SetDeviceName(device);
+  stamp(*message, time);
+  message->SetString(json.dump().c_str());
+  append(out, *message);
+}
+
+Packet string_packet(const char* device, const nlohmann::json& json, DeviceTime time) {
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_string(*out, device, json, time);
+  return {Packet::Kind::other, std::move(out), nullptr, {}};
+}
+
+void append_header(std::vector<std::uint8_t>& out, const char* type, const char* device, DeviceTime time,
+                   std::uint64_t body_bytes, std::uint64_t crc) {
+  igtl_header header{};
+  header.version = 1;
+  std::strncpy(header.name, type, sizeof header.name);
+  std::strncpy(header.device_name, device, sizeof header.device_name);
+  header.timestamp = stamp_from(time);
+  header.body_size = body_bytes;
+  header.crc = crc;
+  igtl_header_convert_byte_order(&header);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(&header);
+  out.insert(out.end(), bytes, bytes + sizeof header);
+}
+
+/// An IMAGE's header and that of its body, for pixels that are sent from where they are: the library would copy them
+/// twice and take their checksum a byte at a time.
+void append_image_heads(std::vector<std::uint8_t>& out, const VideoFrame& frame) {
+  igtl_image_header image{};
+  image.version = IGTL_IMAGE_HEADER_VERSION;
+  image.num_components = 3;
+  image.scalar_type = IGTL_IMAGE_STYPE_TYPE_UINT8;
+  image.endian = IGTL_IMAGE_ENDIAN_LITTLE;
+  image.coord = IGTL_IMAGE_COORD_RAS;
+  const std::uint16_t size[3] = {static_cast<std::uint16_t>(frame.width_px),
+                                 static_cast<std::uint16_t>(frame.height_px), 1};
+  std::copy_n(size, 3, image.size);
+  std::copy_n(size, 3, image.subvol_size);
+  image.matrix[0] = image.matrix[4] = image.matrix[8] = 1.0F;  // a pixel is a unit long and stands on the axes
+  igtl_image_convert_byte_order(&image);
+  const std::span image_bytes(reinterpret_cast<const std::uint8_t*>(&image), sizeof image);
+  append_header(out, "IMAGE", kVideoDevice, frame.info.acquired, sizeof image + frame.rgb->size(),
+                checksum(*frame.rgb, checksum(image_bytes)));
+  out.insert(out.end(), image_bytes.begin(), image_bytes.end());
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> Packet::bytes() const {
+  std::vector<std::uint8_t> all(*head);
+  if (pixels) all.insert(all.end(), pixels->begin(), pixels->end());
+  return all;
+}
+
+Packet pack(const VideoFrame& frame) {
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_string(*out, kFrameInfoDevice, frame.info, frame.info.acquired);
+  append_image_heads(*out, frame);
+  return {Packet::Kind::frame, std::move(out), frame.rgb, frame.info.arrived};
+}
+
+Packet pack(const Birds& birds, DeviceTime arrived) {
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  const auto message = igtl::TrackingDataMessage::New();
+  message->SetDeviceName(kBirdsDevice);
+  stamp(*message, birds.acquired);
+  for (const Bird& bird : birds.birds) {
+    auto element = igtl::TrackingDataElement::New();
+    element->SetName(bird.name.c_str());
+    element->SetType(igtl::TrackingDataElement::TYPE_6D);
+    igtl::Matrix4x4 matrix;
+    const Eigen::Matrix4d m = bird.tracker_from_sensor.matrix();
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 4; ++j) matrix[i][j] = static_cast<float>(m(i, j));
+    }
+    element->SetMatrix(matrix);
+    message->AddTrackingDataElement(element);
+  }
+  append(*out, *message);
+  return {Packet::Kind::tracking, std::move(out), nullptr, arrived};
+}
+
+Packet pack(const Doubt& doubt) {
+  return string_packet(kDoubtDevice, doubt, doubt.acquired);
+}
+
+Packet pack(const Pedal& pedal) {
+  return string_packet(kPedalDevice, pedal, pedal.at);
+}
+
+Packet pack(const Status& status, DeviceTime time) {
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  const auto message = igtl::StatusMessage::New();
+  message->SetDeviceName(kStatusDevice);
+  stamp(*message, time);
+  message->SetCode(status.ok ? igtl::StatusMessage::STATUS_OK : igtl::StatusMessage::STATUS_NOT_READY);
+  message->SetErrorName("");
+  message->SetStatusString(status.text.c_str());
+  append(*out, *message);
+  return {Packet::Kind::status, std::move(out), nullptr, {}};
+}
+
+Packet pack(const Health& health, DeviceTime time) {
+  return string_packet(kHealthDevice, health, time);
+}
+
+Packet pack(const ClockPing& ping) {
+  return string_packet(kClockPingDevice, ping, {});
+}
+
+Packet pack(const ClockPong& pong) {
+  return string_packet(kClockPongDevice, pong, pong.sent);
+}
+
+Packet pack(const Subscription& subscription) {
+  return string_packet(kSubscribeDevice, subscription, {});
+}
+
+Packet pack_tracking_reply(bool done) {
+  const std::uint8_t status = done ? 0 : 1;
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "RTS_TDATA", kBirdsDevice, {}, 1, checksum({&status, 1}));
+  out->push_back(status);
+  return {Packet::Kind::other, std::move(out), nullptr, {}};
+}
+
+}  // namespace birdseye::wire

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "device/wire/messages.hpp"
+
+namespace birdseye::wire {
+
+/// One or more whole messages, to be sent together or not at all. The pixels of a frame are not copied into it: they
+/// follow the head.
+struct Packet {
+  enum class Kind { status, tracking, frame, other };
+  Kind kind = Kind::other;
+  std::shared_ptr<const std::vector<std::uint8_t>> head;
+  std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< null for all but frames
+  DeviceTime arrived;                                       ///< the last byte of what it tells of; 0: of nothing
+
+  [[nodiscard]] std::size_t size() const { return head->size() + (pixels ? pixels->size() : 0); }
+  /// Everything as one run of bytes, for whoever wants to look at it.
+  [[nodiscard]] std::vector<std::uint8_t> bytes() const;
+};
+
+Packet pack(const VideoFrame& frame);
+/// arrived: of the measurement's last byte.
+Packet pack(const Birds& birds, DeviceTime arrived = {});
+Packet pack(const Doubt& doubt);
+Packet pack(const Pedal& pedal);
+Packet pack(const Status& status, DeviceTime time);
+Packet pack(const Health& health, DeviceTime time);
+
+/// The messages of one client's questions and their answers; times as each side's clock has them, ns.
+struct ClockPing {
+  std::int64_t host_sent_ns = 0;
+};
+struct ClockPong {
+  std::int64_t host_sent_ns = 0;
+  DeviceTime received, sent;
+};
+struct Subscription {
+  bool frames = true, tracking = true;
+};
+Packet pack(const ClockPing& ping);
+Packet pack(const ClockPong& pong);
+Packet pack(const Subscription& subscription);
+/// The answer to STT_TDATA and STP_TDATA: RTS_TDATA, with the status 0 (done) or 1.
+Packet pack_tracking_reply(bool done);
+
+}  // namespace birdseye::wire

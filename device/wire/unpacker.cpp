@@ -1,0 +1,163 @@
+#include "device/wire/unpacker.hpp"
+
+#include <fmt/format.h>
+#include <igtlImageMessage.h>
+#include <igtlStatusMessage.h>
+#include <igtlTrackingDataMessage.h>
+#include <igtl_image.h>
+#include <igtl_tdata.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/json.hpp"
+
+namespace birdseye::wire {
+
+namespace {
+
+using MaybeTold = std::optional<Unpacker::Told>;
+
+Error unpack_failed(const std::string& what) {
+  return {Errc::bad_format, fmt::format("a {} message that does not unpack; is the other side a birdseyed?", what)};
+}
+
+/// The message of type M that the bytes hold; null where they hold none. Their checksum has been checked.
+template <typename M>
+typename M::Pointer unpacked(std::span<const std::uint8_t> bytes) {
+  const auto header = igtl::MessageHeader::New();
+  header->InitPack();
+  std::memcpy(header->GetPackPointer(), bytes.data(), kHeaderBytes);
+  header->Unpack();
+  auto message = M::New();
+  message->SetMessageHeader(header);
+  message->AllocatePack();
+  const auto body = static_cast<std::size_t>(message->GetPackBodySize());
+  if (body + kHeaderBytes != bytes.size()) return nullptr;
+  std::memcpy(message->GetPackBodyPointer(), bytes.data() + kHeaderBytes, body);
+  if ((message->Unpack(0) & igtl::MessageHeader::UNPACK_BODY) == 0) return nullptr;
+  return message;
+}
+
+/// The library believes the lengths inside a body, and a checksum is no proof of them: they are held against the bytes
+/// that there are, and the pixels are taken from where they came in.
+Result<VideoFrame> frame_of(const Header& header, std::span<const std::uint8_t> body, FrameInfo info) {
+  const std::size_t content = content_bytes(header, body);
+  if (content < IGTL_IMAGE_HEADER_SIZE) return unpack_failed("IMAGE");
+  const auto at = body.subspan(body.size() - content);
+  igtl_image_header image{};
+  std::memcpy(&image, at.data(), IGTL_IMAGE_HEADER_SIZE);
+  igtl_image_convert_byte_order(&image);
+  const std::size_t size = std::size_t{image.size[0]} * image.size[1] * 3;
+  bool whole = image.size[0] > 0 && image.size[1] > 0 && image.size[2] == 1 && image.num_components == 3 &&
+               image.scalar_type == IGTL_IMAGE_STYPE_TYPE_UINT8 && content - IGTL_IMAGE_HEADER_SIZE >= size;
+  for (int i = 0; i < 3; ++i) whole = whole && image.subvol_size[i] == image.size[i] && image.subvol_offset[i] == 0;
+  if (!whole) return unpack_failed("IMAGE");
+  const std::uint8_t* const pixels = at.data() + IGTL_IMAGE_HEADER_SIZE;
+  return VideoFrame{std::move(info), image.size[0], image.size[1],
+                    std::make_shared<const std::vector<std::uint8_t>>(pixels, pixels + size)};
+}
+
+/// Empty where the matrix is no pose: nothing downstream may draw by it.
+std::optional<Transform<Tracker, Sensor>> pose_of(igtl::TrackingDataElement& element) {
+  igtl::Matrix4x4 matrix;
+  element.GetMatrix(matrix);
+  Eigen::Matrix4d m;
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
+  }
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-4) || r.determinant() < 0) return std::nullopt;
+  // Through a quaternion: single precision leaves the rotation a little off orthonormal.
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(m.topRightCorner<3, 1>()));
+}
+
+/// Empty where one of them is no pose.
+std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime time) {
+  Birds birds;
+  birds.acquired = time;
+  for (int i = 0; i < message.GetNumberOfTrackingDataElements(); ++i) {
+    igtl::TrackingDataElement::Pointer element;
+    message.GetTrackingDataElement(i, element);
+    const auto pose = pose_of(*element);
+    if (!pose) return std::nullopt;
+    birds.birds.push_back({element->GetName(), *pose});
+  }
+  return birds;
+}
+
+/// By hand: the library's reads on until a zero byte, which nobody may have sent.
+Result<MaybeTold> status_of(const Header& header, std::span<const std::uint8_t> body) {
+  constexpr std::size_t kFixed = 30;  // code, subcode, name of the error
+  const std::size_t content = content_bytes(header, body);
+  if (content < kFixed) return unpack_failed("STATUS");
+  const auto at = body.subspan(body.size() - content);
+  const auto text = at.subspan(kFixed);
+  const bool ok = at[0] == 0 && at[1] == igtl::StatusMessage::STATUS_OK;
+  return MaybeTold(Event(Status{ok, {text.begin(), std::find(text.begin(), text.end(), 0)}}));
+}
+
+}  // namespace
+
+Result<std::uint64_t> body_bytes(std::span<const std::uint8_t> header) {
+  const auto read = read_header(header, kLargestBody);
+  if (!read) return read.error();
+  return read->body_bytes;
+}
+
+Result<MaybeTold> Unpacker::push_string(const std::string& device, const std::string& text) {
+  try {
+    const auto json = nlohmann::json::parse(text);
+    if (device == kFrameInfoDevice) {
+      info_ = json.get<FrameInfo>();
+      return MaybeTold();
+    }
+    if (device == kHealthDevice) return MaybeTold(Event(json.get<Health>()));
+    if (device == kDoubtDevice) return MaybeTold(Event(json.get<Doubt>()));
+    if (device == kPedalDevice) return MaybeTold(Event(json.get<Pedal>()));
+    return MaybeTold(json.get<ClockPong>());
+  } catch (const nlohmann::json::exception&) {
+    return unpack_failed("STRING");
+  }
+}
+
+Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
+  const auto header = read_header(bytes, kLargestBody);
+  if (!header || header->body_bytes + kHeaderBytes != bytes.size()) return unpack_failed("cut");
+  // What we send has headers of version 1; the library does not know that those of version 2 go on in the body.
+  if (header->version != 1) return MaybeTold();
+  const auto body = bytes.subspan(kHeaderBytes);
+  const std::string& type = header->type;
+  const std::string& device = header->device;
+  const bool string =
+      type == "STRING" && (device == kFrameInfoDevice || device == kHealthDevice || device == kDoubtDevice ||
+                           device == kPedalDevice || device == kClockPongDevice);
+  const bool image = type == "IMAGE" && device == kVideoDevice && info_;
+  const bool birds = type == "TDATA" && device == kBirdsDevice;
+  const bool status = type == "STATUS" && device == kStatusDevice;
+  if (!string && !image && !birds && !status) return MaybeTold();
+  if (checksum(body) != header->crc) return unpack_failed(type);
+  if (string) {
+    const auto text = text_of_string(*header, body);
+    if (!text) return unpack_failed(type);
+    return push_string(device, *text);
+  }
+  if (image) {
+    auto frame = frame_of(*header, body, *std::exchange(info_, std::nullopt));
+    if (!frame) return frame.error();
+    return MaybeTold(Event(*std::move(frame)));
+  }
+  if (birds) {
+    if (body.size() % IGTL_TDATA_ELEMENT_SIZE != 0) return unpack_failed(type);  // the library would read on
+    const auto message = unpacked<igtl::TrackingDataMessage>(bytes);
+    if (message == nullptr) return unpack_failed(type);
+    auto found = birds_of(*message, header->time);
+    if (!found) return unpack_failed(type);
+    return MaybeTold(Event(*std::move(found)));
+  }
+  return status_of(*header, body);
+}
+
+}  // namespace birdseye::wire

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/discipline.hpp"
+
+struct timex;
+
+namespace birdseye::drivers {
+
+/// What adjtimex(2) filled in, and what it returned.
+ClockDiscipline decode_discipline(const timex& reading, int state);
+
+/// Asks the kernel. Changes nothing, and needs no privilege.
+Result<ClockDiscipline> read_clock_discipline();
+
+/// Network cards' own clocks (/dev/ptp0 ...): where there are any, PTP can stamp packets in hardware.
+std::vector<std::string> ptp_devices(const std::string& folder = "/dev");
+
+}  // namespace birdseye::drivers

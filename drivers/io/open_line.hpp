@@ -1,0 +1,24 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "drivers/io/byte_stream.hpp"
+
+namespace birdseye::drivers {
+
+struct LineSettings {
+  /// An absolute path (a serial port of the operating system), `usb:0403:6001` or `usb:0403:6001:SERIAL` (an FTDI
+  /// adapter without a kernel driver), `tcp:HOST:PORT` (a serial server) or `unix:/path` (a stream socket).
+  std::string device;
+  int baud = 115200;
+  int usb_latency_ms = 1;  ///< how long an FTDI adapter collects bytes before it passes them on, 1 to 255
+};
+
+/// Whether settings can be right at all, before anything is opened: what is wrong is said with all forms there are.
+Result<void> check_line(const LineSettings& settings);
+
+/// Takes seconds at most. Errors name the device and the remedy.
+Result<std::unique_ptr<ByteStream>> open_line(const LineSettings& settings);
+
+}  // namespace birdseye::drivers

@@ -1,0 +1,189 @@
+#include "drivers/minibird/bird_guard.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/base/units.hpp"
+
+namespace birdseye::drivers::minibird {
+
+namespace {
+
+constexpr std::size_t kTrack = 4;  // readings that a line is laid through
+// A line through so many readings misses the next on a parabola by five times a t^2 / 2.
+constexpr double kParabola = 2.5;
+constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line through readings foretells the next
+constexpr double kNoiseMemory = 1.0 / 64;                 // of the mean square, per reading
+constexpr double kNoiseSigmas = 3.5;
+constexpr double kMostNoiseMm = 5;  // beyond that it is not noise
+constexpr double kRestless = 0.2;   // of ways lead back where there is noise; without, hardly any
+constexpr double kMuchNearer = 3;   // the mirrored position, than the one reported
+
+Duration gap_between(DeviceTime earlier, DeviceTime later) {
+  return std::max(later - earlier, Duration{0});
+}
+
+double angle_deg(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return std::acos(std::clamp(((a.transpose() * b).trace() - 1) / 2, -1.0, 1.0)) / kRadPerDeg;
+}
+
+}  // namespace
+
+std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_words(const std::vector<std::int16_t>& words) const {
+  const auto first_of_rotation = words.begin() + (has_position(layout_.format) ? 3 : 0);
+  const bool zeroed = has_orientation(layout_.format) && words.end() - first_of_rotation != 3 &&
+                      std::all_of(first_of_rotation, words.end(), [](std::int16_t word) { return word == 0; });
+  if (zeroed) return Verdict{Doubt::saturated, "sensor saturated: too close to the transmitter or in a strong field"};
+  // The outputs stop at the end of the scale: the words 8000 and 7FFC.
+  const bool at_end =
+      std::any_of(words.begin(), first_of_rotation, [](std::int16_t word) { return word <= -32768 || word >= 32764; });
+  if (has_position(layout_.format) && at_end) {
+    return Verdict{Doubt::beyond_scale,
+                   fmt::format("position beyond the scale of {:.0f} mm", layout_.mm_per_count * 32768)};
+  }
+  return std::nullopt;
+}
+
+std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time) {
+  if (words != last_words_) {
+    last_words_ = words;
+    repeats_ = 0;
+    repeated_since_ = time;
+    return std::nullopt;
+  }
+  ++repeats_;
+  if (limits_.frozen_after <= 0) return std::nullopt;
+  const double moved_mm = speed_mm_s_ * std::min(gap_between(repeated_since_, time), kTrackHolds).seconds();
+  const bool noise_is_gone = repeats_ >= limits_.frozen_after && restless_ > kRestless;
+  if (!noise_is_gone && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
+  return Verdict{Doubt::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
+}
+
+bool BirdGuard::within_reach(const Sample& from, const Sample& to) const {
+  const double seconds = (gap_between(from.time, to.time) + from.sigma + to.sigma).seconds();
+  return (to.position_mm - from.position_mm).norm() <= limits_.slack_mm + limits_.most_speed_mm_s * seconds &&
+         angle_deg(from.rotation, to.rotation) <= limits_.slack_deg + limits_.most_turn_deg_s * seconds;
+}
+
+std::optional<Eigen::Vector3d> BirdGuard::predicted_mm(DeviceTime time) const {
+  if (track_.size() < kTrack || time - track_.front().time > kTrackHolds) return std::nullopt;
+  double mean_s = 0, square_s2 = 0;
+  Eigen::Vector3d mean_mm = Eigen::Vector3d::Zero(), moment = Eigen::Vector3d::Zero();
+  for (const Sample& s : track_) {
+    mean_s += (s.time - time).seconds() / kTrack;
+    mean_mm += s.position_mm / kTrack;
+  }
+  for (const Sample& s : track_) {
+    const double t = (s.time - time).seconds() - mean_s;
+    square_s2 += t * t;
+    moment += t * (s.position_mm - mean_mm);
+  }
+  if (square_s2 < 1e-9) return std::nullopt;
+  return Eigen::Vector3d(mean_mm - mean_s * (moment / square_s2));
+}
+
+bool BirdGuard::on_track(const Sample& sample) {
+  if (!within_reach(track_.back(), sample)) return false;
+  const auto predicted = predicted_mm(sample.time);
+  if (!predicted) return true;
+  const double seconds = (gap_between(track_.back().time, sample.time) + sample.sigma).seconds();
+  const double noise_mm = std::min(std::sqrt(noise_mm2_), kMostNoiseMm);
+  const double most_mm =
+      limits_.slack_mm + kParabola * limits_.most_acceleration_mm_s2 * seconds * seconds + kNoiseSigmas * noise_mm;
+  const double off_mm = (sample.position_mm - *predicted).norm();
+  const double counted_mm = std::min(off_mm, most_mm);  // a damaged reading is not noise, or not all of it
+  noise_mm2_ += kNoiseMemory * (counted_mm * counted_mm - noise_mm2_);
+  return off_mm <= most_mm;
+}
+
+bool BirdGuard::is_mirrored(const Sample& sample) const {
+  if (track_.empty() || !has_position(layout_.format)) return false;
+  const Sample& last = track_.back();
+  const Duration since = gap_between(last.time, sample.time);
+  if (since > limits_.flip_memory) return false;
+  const double as_told_mm = (sample.position_mm - last.position_mm).norm();
+  const double negated_mm = (-sample.position_mm - last.position_mm).norm();
+  const double turn_deg = angle_deg(last.rotation, sample.rotation);
+  return negated_mm * kMuchNearer < as_told_mm &&
+         turn_deg <= limits_.slack_deg + limits_.most_turn_deg_s * (since + sample.sigma).seconds();
+}
+
+BirdGuard::Verdict BirdGuard::doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const {
+  if (!has_position(layout_.format)) return {};
+  if (mirrored) return {Doubt::hemisphere_flip, "hemisphere flip: the position is the negative of where it was"};
+  const double side_mm = layout_.into_hemisphere.dot(reported_mm);
+  if (std::abs(side_mm) < limits_.hemisphere_border_mm) {
+    return {Doubt::hemisphere_border, fmt::format("near the hemisphere's border: {:.0f} mm", std::abs(side_mm))};
+  }
+  if (side_mm < 0) return {Doubt::outside_hemisphere, "outside the hemisphere that is set: has the unit lost it?"};
+  return {};
+}
+
+void BirdGuard::follow(const Sample& sample) {
+  track_.push_back(sample);
+  if (track_.size() > kTrack) track_.pop_front();
+  candidate_.reset();
+  agreeing_ = 0;
+  if (repeats_ > 0 || track_.size() < 2) return;
+  const Eigen::Vector3d way_mm = track_.back().position_mm - track_[track_.size() - 2].position_mm;
+  restless_ += kNoiseMemory * ((way_mm.dot(last_way_mm_) < 0 ? 1 : 0) - restless_);
+  last_way_mm_ = way_mm;
+  const double seconds = (track_.back().time - track_.front().time).seconds();
+  speed_mm_s_ =
+      seconds > 1e-4 ? (track_.back().position_mm - track_.front().position_mm).norm() / seconds : speed_mm_s_;
+}
+
+BirdGuard::Verdict BirdGuard::place(Sample sample) {
+  const Eigen::Vector3d reported_mm = sample.position_mm;
+  const bool mirrored = is_mirrored(sample);
+  if (mirrored) sample.position_mm = -reported_mm;
+  // Wrong by itself, and no place to follow: what is told as it should be would look like a flip from there.
+  if (Verdict side = doubt_of_side(reported_mm, mirrored); side.kind == Doubt::outside_hemisphere) return side;
+  const bool lost_sight = track_.empty() || gap_between(track_.back().time, sample.time) > limits_.gap;
+  if (!lost_sight && on_track(sample)) {
+    follow(sample);
+    return doubt_of_side(reported_mm, mirrored);
+  }
+  // Off the track. Either this is wrong, or the sensor is elsewhere: then the next readings agree with this one.
+  agreeing_ = candidate_ && within_reach(*candidate_, sample) ? agreeing_ + 1 : 0;
+  if (agreeing_ >= (lost_sight ? limits_.start_confirms : limits_.step_confirms)) {
+    track_.clear();
+    follow(sample);
+    return doubt_of_side(reported_mm, mirrored);
+  }
+  candidate_ = sample;
+  if (Verdict side = doubt_of_side(reported_mm, mirrored); side.kind != Doubt::none) return side;
+  if (lost_sight) return {Doubt::unconfirmed, "not yet confirmed, after a start or a gap"};
+  const Sample& last = track_.back();
+  return {Doubt::step,
+          fmt::format("a step of {:.0f} mm and {:.0f} deg in {:.0f} ms", (sample.position_mm - last.position_mm).norm(),
+                      angle_deg(last.rotation, sample.rotation), gap_between(last.time, sample.time).seconds() * 1e3)};
+}
+
+BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration sigma) {
+  BirdReading reading;
+  reading.button = record.button;
+  const auto withhold = [&reading](const Verdict& verdict) {
+    reading.kind = verdict.kind;
+    reading.doubt = verdict.words;
+    return reading;
+  };
+  if (const auto doubt = doubt_of_words(record.words)) return withhold(*doubt);
+  auto pose = decode_pose(layout_.format, record.words, layout_.mm_per_count);
+  if (!pose) return withhold({Doubt::senseless, pose.error().what});
+  if (const auto doubt = doubt_of_repeats(record.words, acquired)) return withhold(*doubt);
+  Sample sample;
+  sample.time = acquired;
+  sample.sigma = sigma;
+  if (pose->position_mm) sample.position_mm = *pose->position_mm;
+  if (pose->rotation) sample.rotation = *pose->rotation;
+  if (const Verdict verdict = place(sample); verdict.kind != Doubt::none) return withhold(verdict);
+  reading.kind = Doubt::none;
+  reading.doubt.clear();
+  reading.pose = *std::move(pose);
+  return reading;
+}
+
+}  // namespace birdseye::drivers::minibird

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "drivers/minibird/measurement.hpp"
+#include "drivers/minibird/record_parser.hpp"
+#include "drivers/minibird/stream_layout.hpp"
+
+namespace birdseye::drivers::minibird {
+
+/// Decides whether one bird's records make sense, each by itself and after those before it. It follows the sensor also
+/// through readings that it withholds, so that a position that has flipped to its negative stays known as one.
+class BirdGuard {
+ public:
+  BirdGuard(const BirdLayout& layout, const Plausibility& limits) : layout_(layout), limits_(limits) {}
+
+  BirdReading judge(const Record& record, DeviceTime acquired, Duration sigma);
+
+ private:
+  struct Sample {
+    Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    DeviceTime time;
+    Duration sigma;
+  };
+  struct Verdict {
+    Doubt kind = Doubt::none;
+    std::string words;
+  };
+
+  [[nodiscard]] std::optional<Verdict> doubt_of_words(const std::vector<std::int16_t>& words) const;
+  std::optional<Verdict> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
+  Verdict place(Sample sample);
+  [[nodiscard]] Verdict doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const;
+  /// Does the position, after the track, look like the negative of where the sensor is?
+  [[nodiscard]] bool is_mirrored(const Sample& sample) const;
+  [[nodiscard]] bool within_reach(const Sample& from, const Sample& to) const;
+  bool on_track(const Sample& sample);
+  [[nodiscard]] std::optional<Eigen::Vector3d> predicted_mm(DeviceTime time) const;
+  void follow(const Sample& sample);
+
+  BirdLayout layout_;
+  Plausibility limits_;
+  std::deque<Sample>
+      track_;             ///< where the sensor has been, newest last; positions are put back where they flipped from
+  double noise_mm2_ = 0;  ///< mean square of the readings about the line through those before
+  std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
+  int agreeing_ = 0;
+  std::vector<std::int16_t> last_words_;
+  DeviceTime repeated_since_;
+  int repeats_ = 0;
+  double speed_mm_s_ = 0;                                  ///< when the words last changed
+  Eigen::Vector3d last_way_mm_ = Eigen::Vector3d::Zero();  ///< from the reading before
+  double restless_ = 0;                                    ///< how often, of late, a way led back: noise is there
+};
+
+}  // namespace birdseye::drivers::minibird

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "calibration/time/clock.hpp"
+#include "drivers/minibird/protocol.hpp"
+
+namespace birdseye::drivers::minibird {
+
+/// Why a reading has no pose.
+enum class Doubt : std::uint8_t {
+  none,
+  lost,                ///< its record did not come whole
+  senseless,           ///< no rotation, or an impossible angle
+  saturated,           ///< an all-zero matrix or quaternion: too close, or a strong field
+  beyond_scale,        ///< a position at the end of its scale
+  frozen,              ///< the same record again and again
+  step,                ///< farther from the last than a sensor can move
+  hemisphere_flip,     ///< at the negative of where it was
+  hemisphere_border,   ///< so near the plane that it may flip
+  outside_hemisphere,  ///< where a unit that is set as we set it never reports
+  unconfirmed,         ///< the first after a start or a gap
+};
+inline constexpr std::size_t kDoubts = 11;
+std::string_view name_of(Doubt doubt);  ///< "hemisphere flip" and so on, for counters
+
+/// One bird at one measurement: a pose, or why there is none.
+struct BirdReading {
+  std::optional<RecordPose> pose;
+  std::string doubt = "its record was lost";  ///< in words; empty where there is a pose
+  Doubt kind = Doubt::lost;
+  std::uint8_t button = 0;
+};
+
+/// All birds at one measurement.
+struct Measurement {
+  DeviceTime acquired;
+  Duration acquired_sigma;
+  DeviceTime arrived;              ///< of its last byte
+  std::vector<BirdReading> birds;  ///< by address, 1 first
+};
+
+struct MiniBirdCounters {
+  std::uint64_t measurements = 0;
+  std::uint64_t lost_measurements = 0;  ///< that the clock line says must have been
+  std::uint64_t phase_errors = 0, discarded_bytes = 0, line_errors = 0, restarts = 0;
+  std::uint64_t senseless_records = 0;           ///< all that decode_pose() refused
+  std::array<std::uint64_t, kDoubts> doubted{};  ///< readings, by Doubt
+  [[nodiscard]] std::uint64_t of(Doubt doubt) const { return doubted[static_cast<std::size_t>(doubt)]; }
+};
+
+}  // namespace birdseye::drivers::minibird

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/clock.hpp"
+#include "drivers/video/frame_source.hpp"
+
+namespace birdseye::drivers {
+
+/// A camera's controls by Video4Linux's numbers (V4L2_CID_...).
+class ControlPort {
+ public:
+  struct Range {
+    int least = 0, most = 0;
+  };
+  virtual ~ControlPort() = default;
+  /// Empty: the camera has no such control.
+  virtual std::optional<Range> range(std::uint32_t id) = 0;
+  virtual std::optional<int> get(std::uint32_t id) = 0;
+  virtual Result<void> set(std::uint32_t id, int value) = 0;
+};
+
+/// Exposure, gain, white balance and focus: sets them, and holds what the camera would else change by itself.
+class CameraControls {
+ public:
+  explicit CameraControls(ControlPort& port) : port_(port) {}
+  ControlReport apply(const CameraSettings& settings);
+  /// Every automatism off, its value as it was when it was on. A second time nothing happens.
+  ControlReport lock();
+  /// The automatisms that lock() switched off, on again.
+  ControlReport unlock();
+  /// When nothing but us changes it.
+  [[nodiscard]] std::optional<Duration> exposure();
+
+ private:
+  struct Automatism;
+  static const Automatism kAutomatisms[];
+  static std::string value_text(std::uint32_t id, int value);
+  Result<void> switch_off(const Automatism& automatism);
+  void hold(const Automatism& automatism, ControlReport& report);
+  void set_value(const Automatism& automatism, int value, ControlReport& report);
+
+  ControlPort& port_;
+  std::map<std::uint32_t, int> before_lock_;  // of automatisms
+};
+
+}  // namespace birdseye::drivers

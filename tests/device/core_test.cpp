@@ -1,0 +1,292 @@
+#include "device/birdseyed/core.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "device/birdseyed/event_queue.hpp"
+#include "device/birdseyed/recording.hpp"
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/unpacker.hpp"
+#include "drivers/io/monotonic.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/tracker_bytes.hpp"
+
+namespace birdseye::device {
+namespace {
+
+using birdseye::testing::TrackerBytesSource;
+
+constexpr std::int64_t kZeroNs = 1'000'000'000'000;
+constexpr double kRateHz = 103.3;
+
+DeviceTime at(double seconds) {
+  return {kZeroNs + static_cast<std::int64_t>(seconds * 1e9)};
+}
+
+drivers::Frame frame(std::uint64_t sequence, double taken_s, double arrived_s) {
+  drivers::Frame f;
+  f.width_px = 4;
+  f.height_px = 2;
+  f.rgb = std::make_shared<const std::vector<std::uint8_t>>(24, static_cast<std::uint8_t>(sequence));
+  f.sequence = sequence;
+  f.acquired = at(taken_s);
+  f.acquired_sigma = {100'000};
+  f.acquired_known = true;
+  f.arrived = at(arrived_s);
+  return f;
+}
+
+InstrumentChanged tracker_runs(double seconds) {
+  return {.instrument = Instrument::tracker,
+          .state = InstrumentState::running,
+          .text = "a unit",
+          .at = at(seconds),
+          .layout = TrackerBytesSource::layout()};
+}
+
+InstrumentChanged camera_runs(double seconds) {
+  return {.instrument = Instrument::camera,
+          .state = InstrumentState::running,
+          .text = "a camera",
+          .at = at(seconds),
+          .rate_hz = 25};
+}
+
+/// Tracker and camera for a while, in the order of arrival; with arrivals up to 3 ms late.
+std::vector<RawEvent> session(double seconds, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> late(0, 0.003);
+  TrackerBytesSource source;
+  std::vector<RawEvent> events{tracker_runs(0), camera_runs(0)};
+  double previous = 0;
+  for (int i = 0; i < static_cast<int>(seconds * kRateHz); ++i) {
+    const double measured = i / kRateHz;
+    auto bytes = source.measure(measured);
+    const double sent = measured + 0.0075 + static_cast<double>(bytes.size()) * 10 / 115200;
+    previous = std::max(previous, sent + late(rng));
+    events.emplace_back(TrackerBytes{{std::move(bytes), at(previous)}});
+  }
+  for (std::uint64_t n = 0; static_cast<double>(n) / 25 < seconds; ++n) {
+    const double taken = static_cast<double>(n) / 25;
+    events.emplace_back(FrameCame{frame(n, taken, taken + 0.02)});
+  }
+  std::stable_sort(events.begin(), events.end(),
+                   [](const RawEvent& a, const RawEvent& b) { return time_of(a) < time_of(b); });
+  return events;
+}
+
+std::vector<wire::Event> unpacked(const std::vector<wire::Packet>& packets, wire::Unpacker& unpacker) {
+  std::vector<wire::Event> events;
+  for (const wire::Packet& packet : packets) {
+    const auto bytes = packet.bytes();
+    for (std::size_t from = 0; from < bytes.size();) {
+      const auto rest = std::span(bytes).subspan(from);
+      const std::size_t size = wire::kHeaderBytes + static_cast<std::size_t>(*wire::body_bytes(rest));
+      auto told = unpacker.push(rest.first(size));
+      EXPECT_TRUE(told);
+      if (told && *told) events.push_back(std::get<wire::Event>(**told));
+      from += size;
+    }
+  }
+  return events;
+}
+
+/// Everything that the core says to the events.
+std::vector<wire::Event> told(const std::vector<RawEvent>& events, const CoreSettings& settings = {}) {
+  Core core(settings);
+  wire::Unpacker unpacker;
+  std::vector<wire::Event> out;
+  for (const RawEvent& event : events) {
+    for (auto& said : unpacked(core.take(event), unpacker)) out.push_back(std::move(said));
+  }
+  return out;
+}
+
+template <typename T>
+std::vector<T> only(const std::vector<wire::Event>& events) {
+  std::vector<T> out;
+  for (const wire::Event& event : events) {
+    if (const auto* one = std::get_if<T>(&event)) out.push_back(*one);
+  }
+  return out;
+}
+
+TEST(Core, EachFrameHasThePoseOfItsOwnTime) {
+  for (const int wait_ms : {0, 60}) {
+    CoreSettings settings;
+    settings.pose_wait = Duration::from_ms(wait_ms);
+    const auto frames = only<wire::VideoFrame>(told(session(8, 1), settings));
+    ASSERT_GT(frames.size(), 190U);
+    std::size_t good = 0;
+    for (const auto& f : frames) {
+      if (!f.info.pose.tracker_from_sensor) continue;
+      ++good;
+      const double taken_s = static_cast<double>(f.info.sequence) / 25;
+      const Eigen::Vector3d true_mm = TrackerBytesSource::pose_at(taken_s).position_mm;
+      // 628 mm/s: a millisecond is 0.6 mm.
+      if (taken_s < 3) continue;
+      EXPECT_LT((f.info.pose.tracker_from_sensor->translation() - true_mm).norm(), 0.7) << taken_s;
+    }
+    EXPECT_GT(good, frames.size() - 5);
+  }
+}
+
+TEST(Core, TheSameEventsGiveTheSameBytes) {
+  const auto events = session(3, 2);
+  Core a({}), b({});
+  for (const RawEvent& event : events) {
+    const auto from_a = a.take(event);
+    const auto from_b = b.take(event);
+    ASSERT_EQ(from_a.size(), from_b.size());
+    for (std::size_t i = 0; i < from_a.size(); ++i) EXPECT_EQ(from_a[i].bytes(), from_b[i].bytes());
+  }
+}
+
+TEST(Core, WithoutMeasurementsAFrameLeavesAndSaysWhy) {
+  std::vector<RawEvent> events{camera_runs(0)};
+  for (std::uint64_t n = 0; n < 5; ++n) events.emplace_back(FrameCame{frame(n, 0.04 * static_cast<double>(n), 0.1)});
+  const auto frames = only<wire::VideoFrame>(told(events));
+  ASSERT_EQ(frames.size(), 5U);
+  for (const auto& f : frames) {
+    EXPECT_EQ(f.info.pose.kind, PoseKind::refused);
+    EXPECT_FALSE(f.info.pose.reason.empty());
+  }
+}
+
+TEST(Core, AFrameWaitsForPosesNoLongerThanItMay) {
+  CoreSettings settings;
+  settings.pose_wait = Duration::from_ms(60);
+  Core core(settings);
+  core.take(camera_runs(0));
+  const auto is_frame = [](const std::vector<wire::Packet>& packets) {
+    return std::any_of(packets.begin(), packets.end(),
+                       [](const wire::Packet& p) { return p.kind == wire::Packet::Kind::frame; });
+  };
+  EXPECT_FALSE(is_frame(core.take(FrameCame{frame(0, 1.0, 1.02)})));
+  EXPECT_TRUE(core.waiting());
+  EXPECT_FALSE(is_frame(core.take(Tick{at(1.07)})));
+  EXPECT_TRUE(is_frame(core.take(Tick{at(1.0801)})));
+  EXPECT_FALSE(core.waiting());
+}
+
+TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
+  auto events = session(4, 3);
+  const auto gone = [](const RawEvent& e) { return std::holds_alternative<TrackerBytes>(e) && time_of(e) > at(2); };
+  std::erase_if(events, gone);
+  events.insert(std::find_if(events.begin(), events.end(), [](const RawEvent& e) { return time_of(e) > at(2); }),
+                InstrumentChanged{.instrument = Instrument::tracker,
+                                  .state = InstrumentState::absent,
+                                  .text = "the line is gone",
+                                  .at = at(2)});
+  const auto said = told(events);
+  int times = 0;
+  for (const auto& status : only<wire::Status>(said)) times += status.text == "the line is gone" ? 1 : 0;
+  EXPECT_EQ(times, 1);
+  for (const auto& f : only<wire::VideoFrame>(said)) {
+    if (static_cast<double>(f.info.sequence) / 25 < 2.2) continue;
+    EXPECT_EQ(f.info.pose.kind, PoseKind::refused);
+  }
+}
+
+TEST(Core, APedalIsPassedOnWithItsTime) {
+  const auto pedals = only<wire::Pedal>(told({EdgesCame{{{drivers::GpioInput::pedal, true, at(1)}}, at(1.001)}}));
+  ASSERT_EQ(pedals.size(), 1U);
+  EXPECT_TRUE(pedals[0].pressed);
+  EXPECT_EQ(pedals[0].at, at(1));
+}
+
+TEST(Recording, ReplaysToTheSameBytes) {
+  auto events = session(3, 4);
+  events.insert(events.begin() + 100, Tick{at(0.9)});
+  events.insert(
+      events.begin() + 200,
+      EdgesCame{{{drivers::GpioInput::pedal, true, at(1)}, {drivers::GpioInput::strobe, false, at(1)}}, at(1)});
+  CoreSettings settings;
+  settings.pose.smoothing = Duration::from_ms(40);
+  settings.pose_wait = Duration::from_ms(60);
+  const birdseye::testing::Scratch scratch;
+  const auto path = scratch / "session.berec";
+  {
+    std::ofstream out(path, std::ios::binary);
+    const auto put = [&out](const Bytes& bytes) {
+      out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    };
+    put(recording_magic());
+    put(block_of(settings));
+    for (const RawEvent& event : events) put(block_of(event));
+  }
+  auto reader = RecordingReader::open(path);
+  ASSERT_TRUE(reader) << reader.error().what;
+  Core live(settings), again(reader->settings());
+  for (const RawEvent& event : events) {
+    const auto read = reader->next();
+    ASSERT_TRUE(read && *read);
+    const auto a = live.take(event);
+    const auto b = again.take(**read);
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i].bytes(), b[i].bytes());
+  }
+  EXPECT_FALSE(*reader->next());
+  EXPECT_FALSE(reader->cut_short());
+}
+
+TEST(Recording, IsGoodUpToWhereItWasCutOrDamaged) {
+  Bytes whole = recording_magic();
+  const auto put = [&whole](const Bytes& bytes) { whole.insert(whole.end(), bytes.begin(), bytes.end()); };
+  put(block_of(CoreSettings{}));
+  std::vector<std::size_t> ends;
+  for (int i = 0; i < 20; ++i) {
+    put(block_of(RawEvent(TrackerBytes{{{0x80, 1, 2, static_cast<std::uint8_t>(i)}, at(i)}})));
+    ends.push_back(whole.size());
+  }
+  const birdseye::testing::Scratch scratch;
+  std::mt19937 rng(5);
+  for (int trial = 0; trial < 300; ++trial) {
+    Bytes bytes = whole;
+    const std::size_t place = kMagicBytes + block_of(CoreSettings{}).size() + rng() % (whole.size() - ends[0]);
+    const bool cut = trial % 2 == 0;
+    if (cut) {
+      bytes.resize(place);
+    } else {
+      bytes[place] ^= static_cast<std::uint8_t>(1U << rng() % 8);
+    }
+    const auto path = scratch.file("r.berec", {bytes.begin(), bytes.end()});
+    auto reader = RecordingReader::open(path);
+    ASSERT_TRUE(reader);
+    const auto whole_blocks = std::count_if(ends.begin(), ends.end(), [&](std::size_t end) { return end <= place; });
+    std::ptrdiff_t read = 0;
+    for (;; ++read) {
+      const auto event = reader->next();
+      if (!event || !*event) break;
+      ASSERT_EQ(std::get<TrackerBytes>(**event).chunk.bytes.back(), read);
+    }
+    EXPECT_EQ(read, whole_blocks) << place;
+  }
+}
+
+TEST(EventQueue, DropsTheOldestFrameAndNothingElse) {
+  EventQueue queue;
+  queue.push(Tick{at(0)});
+  for (std::uint64_t n = 0; n < EventQueue::kMostFrames + 5; ++n) queue.push(FrameCame{frame(n, 0, 0)});
+  EXPECT_EQ(queue.frames_dropped(), 5U);
+  const DeviceTime soon = drivers::now() + Duration::from_ms(1000);
+  EXPECT_TRUE(std::holds_alternative<Tick>(*queue.pop(soon, {})));
+  EXPECT_EQ(std::get<FrameCame>(*queue.pop(soon, {})).frame.sequence, 5U);
+}
+
+TEST(EventQueue, AHoleInTheTrackersBytesIsMarked) {
+  EventQueue queue;
+  for (std::size_t n = 0; n < EventQueue::kMostEvents; ++n) queue.push(Tick{at(0)});
+  queue.push(TrackerBytes{{{1}, at(1)}});
+  EXPECT_EQ(queue.others_dropped(), 1U);
+  const DeviceTime soon = drivers::now() + Duration::from_ms(1000);
+  queue.pop(soon, {});
+  queue.push(TrackerBytes{{{2}, at(2)}});
+  std::optional<RawEvent> last;
+  while (auto event = queue.pop(drivers::now(), {})) last = std::move(event);
+  EXPECT_TRUE(std::get<TrackerBytes>(*last).chunk.after_line_error);
+}
+
+}  // namespace
+}  // namespace birdseye::device

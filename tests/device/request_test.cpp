@@ -1,0 +1,188 @@
+#include <gtest/gtest.h>
+#include <igtlStatusMessage.h>
+#include <igtlTrackingDataMessage.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "device/wire/client.hpp"
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/request.hpp"
+#include "device/wire/server.hpp"
+
+namespace birdseye::wire {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+template <typename M>
+std::vector<std::uint8_t> packed(M& message) {
+  message.Pack();
+  const auto* bytes = static_cast<const std::uint8_t*>(message.GetPackPointer());
+  return {bytes, bytes + message.GetPackSize()};
+}
+
+/// As the library of the protocol packs it, not as we do.
+std::vector<std::uint8_t> start_tracking(int interval_ms) {
+  const auto message = igtl::StartTrackingDataMessage::New();
+  message->SetDeviceName("");
+  message->SetResolution(interval_ms);
+  message->SetCoordinateName("Patient");
+  return packed(*message);
+}
+
+TEST(RequestReader, UnderstandsWhatTheLibrarySends) {
+  RequestReader reader;
+  const auto requests = reader.push(start_tracking(50));
+  ASSERT_TRUE(requests && requests->size() == 1);
+  const auto& tracking = std::get<TrackingRequest>(requests->front());
+  EXPECT_TRUE(tracking.start);
+  EXPECT_EQ(tracking.interval, Duration::from_ms(50));
+  const auto status = igtl::GetStatusMessage::New();
+  status->SetDeviceName("");
+  EXPECT_TRUE(std::holds_alternative<StatusRequest>(reader.push(packed(*status))->front()));
+}
+
+TEST(RequestReader, ComesToTheSameHoweverItIsCut) {
+  std::vector<std::uint8_t> all = start_tracking(20);
+  const auto ping = pack(ClockPing{1234567890123}).bytes();
+  all.insert(all.end(), ping.begin(), ping.end());
+  std::mt19937 rng(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    RequestReader reader;
+    std::vector<Request> got;
+    for (std::size_t at = 0; at < all.size();) {
+      const std::size_t n = std::min<std::size_t>(all.size() - at, 1 + rng() % 40);
+      const auto whole = reader.push(std::span(all).subspan(at, n));
+      ASSERT_TRUE(whole);
+      got.insert(got.end(), whole->begin(), whole->end());
+      at += n;
+    }
+    ASSERT_EQ(got.size(), 2U);
+    EXPECT_EQ(std::get<ClockPing>(got[1]).host_sent_ns, 1234567890123);
+    EXPECT_FALSE(reader.waiting());
+  }
+}
+
+TEST(RequestReader, RefusesDamageAndGarbage) {
+  auto bytes = pack(ClockPing{1}).bytes();
+  bytes.back() ^= 1;
+  RequestReader reader;
+  EXPECT_TRUE(std::holds_alternative<DamagedRequest>(reader.push(bytes)->front()));
+  const std::string http = "GET / HTTP/1.1\r\nHost: an-appliance-in-an-operating-room.example\r\n\r\n";
+  EXPECT_EQ(RequestReader().push({reinterpret_cast<const std::uint8_t*>(http.data()), http.size()}).error().code,
+            Errc::bad_format);
+  auto large = pack(ClockPing{1}).bytes();
+  large[46] = 1;  // a body of 16 MiB
+  EXPECT_FALSE(RequestReader().push(large));
+}
+
+/// A socket of somebody else's, to send what we would not.
+class RawClient {
+ public:
+  explicit RawClient(int port) : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    const timeval limit{5, 0};
+    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  }
+  ~RawClient() { ::close(fd_); }
+  void send(const std::vector<std::uint8_t>& bytes) const {
+    EXPECT_EQ(::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  }
+  /// The header of the next message; its body is passed over. Empty at the end of the connection.
+  [[nodiscard]] std::optional<Header> next() const {
+    std::vector<std::uint8_t> bytes(kHeaderBytes);
+    if (::recv(fd_, bytes.data(), bytes.size(), MSG_WAITALL) != static_cast<ssize_t>(bytes.size())) return std::nullopt;
+    const auto header = read_header(bytes, kLargestBody);
+    bytes.resize(header->body_bytes);
+    if (!bytes.empty()) ::recv(fd_, bytes.data(), bytes.size(), MSG_WAITALL);
+    return *header;
+  }
+
+ private:
+  int fd_;
+};
+
+void wait_for_clients(const Server& server, std::size_t count) {
+  const auto deadline = Clock::now() + seconds(5);
+  while (server.clients() != count && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_EQ(server.clients(), count);
+}
+
+TEST(Server, GarbageIsRefusedAndCountedAndTheOthersGoOn) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  const RawClient hostile(server->port());
+  wait_for_clients(*server, 2);
+  hostile.send(std::vector<std::uint8_t>(500, 0xFF));
+  EXPECT_FALSE(hostile.next());  // disconnected
+  wait_for_clients(*server, 1);
+  EXPECT_EQ(server->requests_refused(), 1U);
+  server->publish(pack(Status{true, "still here"}, {1}));
+  const auto event = good->next(Clock::now() + seconds(5));
+  ASSERT_TRUE(event && *event);
+  EXPECT_EQ(std::get<Status>(**event).text, "still here");
+}
+
+TEST(Server, AClientThatComesIsToldHowThingsAre) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  server->publish(pack(Status{false, "no camera"}, {1}));
+  std::this_thread::sleep_for(milliseconds(20));
+  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  EXPECT_EQ(std::get<Status>(**client->next(Clock::now() + seconds(5))).text, "no camera");
+}
+
+TEST(Server, TrackingMayBeAskedForAndStopped) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const RawClient client(server->port());
+  wait_for_clients(*server, 1);
+  const auto stop = igtl::StopTrackingDataMessage::New();
+  stop->SetDeviceName("");
+  client.send(packed(*stop));
+  EXPECT_EQ(client.next()->type, "RTS_TDATA");
+  server->publish(pack(Birds{{1}, {{"scope", {}}}}));
+  server->publish(pack(Status{true, ""}, {1}));
+  EXPECT_EQ(client.next()->type, "STATUS");
+  client.send(start_tracking(0));
+  EXPECT_EQ(client.next()->type, "RTS_TDATA");
+  server->publish(pack(Birds{{1}, {{"scope", {}}}}));
+  EXPECT_EQ(client.next()->type, "TDATA");
+}
+
+TEST(Server, ASubscriptionLeavesFramesAway) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  ASSERT_TRUE(client->subscribe({.frames = false, .tracking = true}, Clock::now() + seconds(1)));
+  VideoFrame frame;
+  frame.width_px = 4;
+  frame.height_px = 2;
+  frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(24);
+  // Published until the subscription has come through; from then on only the status gets there.
+  int frames = 0;
+  for (int quiet = 0, i = 0; quiet < 5 && i < 500; ++i) {
+    server->publish(pack(frame));
+    server->publish(pack(Status{true, std::to_string(i)}, {1}));
+    ++quiet;
+    for (;;) {
+      const auto event = client->next(Clock::now() + seconds(5));
+      ASSERT_TRUE(event && *event);
+      if (std::holds_alternative<Status>(**event)) break;
+      ++frames;
+      quiet = 0;
+    }
+  }
+  EXPECT_LT(frames, 490);
+}
+
+}  // namespace
+}  // namespace birdseye::wire

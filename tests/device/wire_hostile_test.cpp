@@ -1,0 +1,288 @@
+// What nobody sane would send: every message damaged in every way that seeds can think of, at both ends of the wire.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <igtl_util.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "device/wire/client.hpp"
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/server.hpp"
+
+namespace birdseye::wire {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::size_t kTypeAt = 2, kDeviceAt = 14, kBodySizeAt = 42, kChecksumAt = 50;
+
+void put_big_endian(Bytes& message, std::size_t at, std::uint64_t value) {
+  for (std::size_t i = 0; i < 8; ++i) message[at + i] = static_cast<std::uint8_t>(value >> (56 - 8 * i));
+}
+
+/// Body size and checksum made to fit what is there: only what the body says can still betray it.
+Bytes made_plausible(Bytes message) {
+  const std::size_t body = message.size() - kHeaderBytes;
+  put_big_endian(message, kBodySizeAt, body);
+  put_big_endian(message, kChecksumAt, crc64(message.data() + kHeaderBytes, body, 0));
+  return message;
+}
+
+/// One of every kind that the appliance sends, each a whole message of its own.
+std::vector<Bytes> one_of_each() {
+  VideoFrame frame;
+  frame.info.sequence = 7;
+  frame.info.pose.kind = PoseKind::interpolated;
+  frame.info.pose.tracker_from_sensor = Transform<Tracker, Sensor>();
+  frame.width_px = 16;
+  frame.height_px = 8;
+  frame.rgb = std::make_shared<const Bytes>(16 * 8 * 3, std::uint8_t{50});
+  const std::vector<Packet> packets{pack(frame), pack(Birds{{5}, {{"scope", {}}, {"pointer", {}}}}),
+                                    pack(Status{false, "the camera has gone"}, {5}), pack(Health{}, {5})};
+  std::vector<Bytes> messages;
+  for (const Packet& packet : packets) {
+    const Bytes bytes = packet.bytes();
+    for (std::size_t at = 0; at < bytes.size();) {
+      const std::span<const std::uint8_t> rest = std::span(bytes).subspan(at);
+      const std::size_t size = kHeaderBytes + *body_bytes(rest.first(kHeaderBytes));
+      messages.emplace_back(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(size));
+      at += size;
+    }
+  }
+  return messages;
+}
+
+/// A place in the message, more often one where lengths and counts live.
+std::size_t some_place(std::mt19937& random, std::size_t size) {
+  std::size_t reach = size;
+  if (random() % 2 == 0) reach = std::min<std::size_t>(size, kHeaderBytes + 80);
+  return random() % reach;
+}
+
+Bytes damaged(Bytes message, std::mt19937& random) {
+  constexpr std::array<std::uint8_t, 6> kTelling{0x00, 0x01, 0x7F, 0x80, 0xFE, 0xFF};
+  const auto rounds = 1 + random() % 4;
+  for (std::size_t i = 0; i < rounds && !message.empty(); ++i) {
+    const std::size_t at = some_place(random, message.size());
+    switch (random() % 6) {
+      case 0:
+        message[at] = static_cast<std::uint8_t>(random());
+        break;
+      case 1:
+        message[at] ^= static_cast<std::uint8_t>(1U << random() % 8U);
+        break;
+      case 2:
+        message[at] = kTelling[random() % kTelling.size()];
+        break;
+      case 3:
+        message.resize(at);
+        break;
+      case 4:
+        message.insert(message.end(), random() % 300, static_cast<std::uint8_t>(random()));
+        break;
+      default:
+        message.erase(message.begin() + static_cast<std::ptrdiff_t>(at));
+    }
+  }
+  return message;
+}
+
+/// What is believed must make sense, whatever the bytes were.
+void expect_sane(const Event& event) {
+  if (const auto* frame = std::get_if<VideoFrame>(&event)) {
+    EXPECT_EQ(frame->rgb->size(),
+              static_cast<std::size_t>(frame->width_px) * static_cast<std::size_t>(frame->height_px) * 3);
+    const auto& pose = frame->info.pose;
+    EXPECT_EQ(pose.kind == PoseKind::refused, !pose.tracker_from_sensor.has_value());
+    if (pose.tracker_from_sensor) {
+      EXPECT_TRUE(pose.tracker_from_sensor->matrix().allFinite());
+    }
+  }
+  if (const auto* birds = std::get_if<Birds>(&event)) {
+    for (const Bird& bird : birds->birds) {
+      const Eigen::Matrix4d m = bird.tracker_from_sensor.matrix();
+      const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+      EXPECT_TRUE(m.allFinite()) << bird.name;
+      EXPECT_TRUE((r * r.transpose()).isIdentity(1e-6)) << bird.name << "\n" << m;
+    }
+  }
+}
+
+TEST(WireHostile, DamageWithAWrongChecksumIsNeverBelieved) {
+  std::mt19937 random(20261121);
+  for (const Bytes& sound : one_of_each()) {
+    Unpacker unpacker;
+    (void)unpacker.push(one_of_each()[0]);  // a FrameInfo, so that an image would be believed
+    for (int i = 0; i < 2000; ++i) {
+      Bytes message = sound;
+      message[kHeaderBytes + random() % (message.size() - kHeaderBytes)] ^=
+          static_cast<std::uint8_t>(1 + random() % 255);
+      EXPECT_FALSE(unpacker.push(message));
+    }
+  }
+}
+
+TEST(WireHostile, ACutMessageIsRefused) {
+  for (const Bytes& sound : one_of_each()) {
+    for (std::size_t size = 0; size < sound.size(); ++size) {
+      const auto event = Unpacker().push(std::span(sound).first(size));
+      EXPECT_FALSE(event && *event) << size;
+    }
+  }
+}
+
+TEST(WireHostile, WithARightChecksumTheBodyIsStillNotTrusted) {
+  std::mt19937 random(7);
+  const std::vector<Bytes> each = one_of_each();
+  int believed = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    Unpacker unpacker;
+    if (random() % 2 == 0) (void)unpacker.push(each[0]);
+    Bytes message = damaged(each[random() % each.size()], random);
+    if (message.size() < kHeaderBytes) continue;
+    const auto event = unpacker.push(made_plausible(std::move(message)));
+    if (!event || !*event) continue;
+    ++believed;
+    expect_sane(std::get<Event>(**event));
+  }
+  EXPECT_GT(believed, 100);  // else it was the header alone that was tried
+}
+
+TEST(WireHostile, AnotherKindsBodyUnderOurNames) {
+  const std::vector<Bytes> each = one_of_each();
+  for (const Bytes& name : each) {
+    for (const Bytes& body : each) {
+      Bytes message(name.begin(), name.begin() + kHeaderBytes);
+      message.insert(message.end(), body.begin() + kHeaderBytes, body.end());
+      Unpacker unpacker;
+      (void)unpacker.push(each[0]);
+      const auto event = unpacker.push(made_plausible(message));
+      if (event && *event) expect_sane(std::get<Event>(**event));
+    }
+  }
+}
+
+TEST(WireHostile, AHeaderNeverPromisesMoreThanTheLargestBody) {
+  std::mt19937 random(11);
+  const Bytes sound = one_of_each()[0];
+  for (int i = 0; i < 100'000; ++i) {
+    Bytes header(sound.begin(), sound.begin() + kHeaderBytes);
+    for (std::uint64_t n = 1 + random() % 8; n > 0; --n)
+      header[random() % kHeaderBytes] = static_cast<std::uint8_t>(random());
+    if (const auto size = body_bytes(header)) {
+      EXPECT_LE(*size, kLargestBody);
+    }
+  }
+  EXPECT_FALSE(body_bytes(std::span(sound).first(kHeaderBytes - 1)));
+}
+
+/// A socket to, or of, the other end: what is written there is up to the test.
+class Raw {
+ public:
+  static Raw connected_to(int port) {
+    Raw raw(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address = loopback(port);
+    EXPECT_EQ(::connect(raw.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    return raw;
+  }
+  static Raw listening(int& port) {
+    Raw raw(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address = loopback(0);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::bind(raw.fd_, reinterpret_cast<const sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(raw.fd_, 1), 0);
+    EXPECT_EQ(::getsockname(raw.fd_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    port = ntohs(address.sin_port);
+    return raw;
+  }
+  [[nodiscard]] Raw accepted() const { return Raw(::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC)); }
+  void send(const Bytes& bytes) const { (void)!::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT); }
+  Raw(Raw&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Raw& operator=(Raw&&) = delete;
+  ~Raw() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+
+ private:
+  explicit Raw(int fd) : fd_(fd) {}
+  static sockaddr_in loopback(int port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return address;
+  }
+  int fd_;
+};
+
+TEST(WireHostile, AClientRefusesABadServerAndDoesNotHang) {
+  std::mt19937 random(13);
+  const std::vector<Bytes> each = one_of_each();
+  int port = 0;
+  const Raw listener = Raw::listening(port);
+  for (int i = 0; i < 200; ++i) {
+    const auto client = Client::connect("127.0.0.1", port, Clock::now() + seconds(5));
+    ASSERT_TRUE(client);
+    {
+      const Raw server = listener.accepted();
+      for (int n = 0; n < 4; ++n) server.send(damaged(each[random() % each.size()], random));
+    }
+    // Each answer is an event or an error; the server has gone, so an error must come within a few.
+    int events = 0;
+    for (;; ++events) {
+      ASSERT_LT(events, 10);
+      const auto event = (*client)->next(Clock::now() + seconds(20));
+      if (!event) break;
+      ASSERT_TRUE(*event);
+      expect_sane(std::get<Event>(**event));
+    }
+  }
+}
+
+TEST(WireHostile, AServerOutlivesBadClientsAndServesTheGoodOne) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  std::mt19937 random(17);
+  std::vector<Bytes> each = one_of_each();
+  // What asks: names that a server may know, with bodies that they should not have.
+  for (const char* type :
+       {"STT_TDATA", "STP_TDATA", "GET_STATUS", "GET_CAPABIL", "GET_IMAGE", "STT_QTDATA", "TIMESYNC"}) {
+    Bytes request(kHeaderBytes + 36, 0);
+    request[1] = 1;
+    std::copy_n(type, std::string_view(type).size(), request.begin() + kTypeAt);
+    request[kDeviceAt] = 'x';
+    each.push_back(made_plausible(request));
+  }
+  for (int i = 0; i < 150; ++i) {
+    const Raw bad = Raw::connected_to(server->port());
+    for (int n = 0; n < 6; ++n) {
+      Bytes message = damaged(each[random() % each.size()], random);
+      if (message.size() >= kHeaderBytes && random() % 2 == 0) message = made_plausible(std::move(message));
+      bad.send(message);
+    }
+    if (i % 10 != 0) continue;
+    // The good one is told something new each time; what else came to it is passed over.
+    const std::string text = "round " + std::to_string(i);
+    const auto deadline = Clock::now() + seconds(20);
+    bool heard = false;
+    while (!heard && Clock::now() < deadline) {
+      server->publish(pack(Status{true, text}, {i}));
+      const auto event = good->next(Clock::now() + milliseconds(100));
+      ASSERT_TRUE(event) << event.error().what;
+      if (!*event) continue;
+      const auto* status = std::get_if<Status>(&**event);
+      heard = status != nullptr && status->text == text;
+    }
+    EXPECT_TRUE(heard) << text;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::wire

@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include "hw-sim/faults/fault_script.hpp"
+#include "hw-sim/faults/fault_table.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::hw_sim {
+namespace {
+
+using testing::Scratch;
+
+std::string problem(const std::string& text, Instruments instruments = Instruments::both) {
+  const Scratch scratch;
+  const auto script = read_fault_script(scratch.file("f.toml", text), instruments, 1);
+  return script ? "" : script.error().what;
+}
+
+TEST(FaultScript, GivesEachInstrumentItsFaultsInTheirOrder) {
+  const Scratch scratch;
+  const auto script = read_fault_script(scratch.file("f.toml", R"(
+[[fault]]
+name = "drop_byte"
+at_s = 3
+for_s = 0.5
+chance = 0.25
+[[fault]]
+name = "saturated"
+at_s = 2.0
+for_s = 1
+[[fault]]
+name = "unplug"
+of = "camera"
+at_s = 1
+for_s = 0.1
+)"),
+                                        Instruments::both, 1);
+  ASSERT_TRUE(script) << script.error().what;
+  ASSERT_EQ(script->tracker.size(), 2U);
+  EXPECT_EQ(script->tracker[0].kind, FaultKind::saturated);
+  EXPECT_EQ(script->tracker[1].kind, FaultKind::drop_byte);
+  EXPECT_DOUBLE_EQ(script->tracker[1].value("chance"), 0.25);
+  ASSERT_EQ(script->camera.size(), 1U);
+  EXPECT_EQ(script->camera[0].kind, FaultKind::unplug);
+}
+
+TEST(FaultScript, EverythingWrongIsToldWithItsLine) {
+  const std::string all = problem(R"([[fault]]
+name = "drop_bytes"
+at_s = 1
+
+[[fault]]
+name = "drop_byte"
+at_s = -1
+chance = "often"
+
+[[fault]]
+name = "stuck_stream"
+at_s = 1
+reason = "none"
+
+[[fault]]
+name = "clock_step"
+at_s = 1
+)");
+  for (const char* words :
+       {"line 2: \"drop_bytes\"", "line 7: at_s", "line 8: chance", "line 10: stuck_stream: needs for_s",
+        "line 13: reason", "line 15: clock_step: either instrument"}) {
+    EXPECT_NE(all.find(words), std::string::npos) << words << "\n" << all;
+  }
+}
+
+TEST(FaultScript, RefusesWhatIsNoScript) {
+  EXPECT_NE(problem("[[fault]\n").find("line 1"), std::string::npos);
+  EXPECT_NE(problem("rate = 1\n").find("line 1: rate"), std::string::npos);
+  EXPECT_NE(problem("fault = 3\n").find("line 1: fault"), std::string::npos);
+  EXPECT_NE(problem("fault = [1]\n").find("line 1"), std::string::npos);
+  const std::string camera_fault = "[[fault]]\nname = \"silence\"\nat_s = 1\nfor_s = 1\n";
+  EXPECT_NE(problem(camera_fault, Instruments::tracker).find("no instrument"), std::string::npos);
+  EXPECT_EQ(problem(camera_fault, Instruments::camera), "");
+  EXPECT_EQ(read_fault_script("/nonexistent", Instruments::both, 1).error().code, Errc::not_found);
+}
+
+TEST(FaultScript, TimesDrawnAtRandomFollowFromTheSeed) {
+  const Scratch scratch;
+  const auto times = [&](std::uint64_t seed) {
+    const auto script =
+        read_fault_script(scratch.file("f.toml", "[[fault]]\nname = \"drop_byte\"\nbetween_s = [2, 20]\ntimes = 8\n"),
+                          Instruments::tracker, seed);
+    std::vector<double> at_s;
+    for (const Fault& fault : script->tracker) at_s.push_back(fault.at_s);
+    return at_s;
+  };
+  ASSERT_EQ(times(1).size(), 8U);
+  EXPECT_EQ(times(1), times(1));
+  EXPECT_NE(times(1), times(2));
+  for (const double at_s : times(1)) {
+    EXPECT_GE(at_s, 2);
+    EXPECT_LE(at_s, 20);
+  }
+}
+
+TEST(FaultTable, HasEveryKindOnce) {
+  for (int kind = 0; kind <= static_cast<int>(FaultKind::torn_frame); ++kind) {
+    const FaultSpec* const spec = fault_spec(fault_name(static_cast<FaultKind>(kind)));
+    ASSERT_NE(spec, nullptr) << fault_name(static_cast<FaultKind>(kind));
+    EXPECT_EQ(static_cast<int>(spec->kind), kind);
+  }
+  EXPECT_EQ(fault_table().size(), static_cast<std::size_t>(FaultKind::torn_frame) + 1);
+}
+
+TEST(FaultTimeline, BeginsEndsAndTellsOfIt) {
+  Fault lasting;
+  lasting.kind = FaultKind::saturated;
+  lasting.at_s = 1;
+  lasting.for_s = 0.5;
+  Fault once;
+  once.kind = FaultKind::drop_byte;
+  once.at_s = 1.2;
+  FaultTimeline timeline({once, lasting}, FaultTarget::tracker);
+  timeline.advance(5'000'000'000);
+  EXPECT_TRUE(timeline.take_events().empty());  // nothing streams yet
+  timeline.begin(5'000'000'000);
+  EXPECT_EQ(*timeline.next_change_ns(), 6'000'000'000);
+  timeline.advance(6'300'000'000);
+  EXPECT_NE(timeline.active(FaultKind::saturated), nullptr);
+  timeline.done(FaultKind::drop_byte, 6'310'000'000);
+  EXPECT_EQ(timeline.active(FaultKind::drop_byte), nullptr);
+  timeline.advance(7'000'000'000);
+  EXPECT_EQ(timeline.active(FaultKind::saturated), nullptr);
+  EXPECT_FALSE(timeline.next_change_ns());
+  const auto events = timeline.take_events();
+  ASSERT_EQ(events.size(), 4U);
+  EXPECT_EQ(events[0].at_ns, 6'000'000'000);
+  EXPECT_EQ(events[1].at_ns, 6'200'000'000);
+  EXPECT_FALSE(events[2].begin);
+  EXPECT_EQ(events[3].kind, FaultKind::saturated);
+  EXPECT_EQ(events[3].at_ns, 6'500'000'000);
+}
+
+}  // namespace
+}  // namespace birdseye::hw_sim

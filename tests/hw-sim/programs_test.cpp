@@ -1,0 +1,115 @@
+// birdseye-sim minibird and camera from the outside.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/support/command.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+using testing::contents_of;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+
+std::string example() {
+  const char* source = std::getenv("BIRDSEYE_SOURCE_DIR");
+  return std::string(source != nullptr ? source : ".") + "/docs/manual/examples/track.py";
+}
+
+/// Runs the manual's Python program against a simulator that the shell starts for it; device is what it opens, $out
+/// the file of what the simulator says.
+testing::CommandResult track(const Scratch& scratch, const std::string& options, const std::string& device) {
+  const std::string out = (scratch / "out").string();
+  return run("birdseye-sim", "minibird " + options + " --seconds 60 > " + out + " & sim=$!; out=" + out +
+                                 "; while ! grep -qs ready $out; do sleep 0.02; done; timeout 30 python3 " + example() +
+                                 " " + device + " 50; kill $sim; wait $sim");
+}
+
+void expect_circle(const testing::CommandResult& result) {
+  EXPECT_EQ(result.code, 0) << result.output;
+  std::istringstream lines(result.output);
+  std::string line;
+  ASSERT_TRUE(std::getline(lines, line));
+  EXPECT_EQ(line, "6DFOB");
+  int count = 0;
+  while (std::getline(lines, line)) {
+    double x = 0, y = 0, z = 0, azimuth = 0, elevation = 0, roll = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf %lf %lf mm %lf %lf %lf", &x, &y, &z, &azimuth, &elevation, &roll), 6)
+        << line;
+    EXPECT_NEAR(std::hypot(x - 400, y), 200, 0.4) << line;
+    const double around = std::atan2(y, x - 400) * 180 / M_PI;
+    EXPECT_NEAR(std::remainder(azimuth - around, 360), 0, 0.2) << line;
+    ++count;
+  }
+  EXPECT_EQ(count, 50);
+}
+
+TEST(Programs, TheManualsPythonProgramTracksAtATerminal) {
+  const Scratch scratch;
+  const std::string tty = (scratch / "tty").string();
+  expect_circle(track(scratch, "--tty " + tty + " --boot-ms 0", tty));
+}
+
+TEST(Programs, TheManualsPythonProgramTracksOverTcp) {
+  const Scratch scratch;
+  expect_circle(track(scratch, "--tcp 0 --boot-ms 0", "tcp:$(sed -n 's/.*\"tracker\":\"\\([^\"]*\\)\".*/\\1/p' $out)"));
+}
+
+TEST(Programs, TruthIsWrittenBeforeReadyIsSaid) {
+  const Scratch scratch;
+  const std::string truth = (scratch / "truth.json").string();
+  const auto result = run("birdseye-sim", "minibird --unix " + (scratch / "line").string() +
+                                              " --drift-ppm 100 --truth " + truth + " --seconds 0.05");
+  ASSERT_EQ(result.code, 0) << result.output;
+  EXPECT_EQ(nlohmann::json::parse(result.output)["event"], "ready");
+  const auto json = nlohmann::json::parse(contents_of(truth));
+  EXPECT_NEAR(json["rate_hz"].get<double>(), 103.3 * 1.0001, 1e-9);
+  EXPECT_EQ(json["radius_mm"], 200);
+  EXPECT_EQ(json["period_s"], 2);
+  EXPECT_EQ(json["centre_mm"], nlohmann::json({400, 0, 0}));
+  EXPECT_GT(json["zero_monotonic_ns"].get<std::int64_t>(), 0);
+}
+
+TEST(Programs, ACameraSaysWhereItIsAndWhatItSent) {
+  const Scratch scratch;
+  const std::string truth = (scratch / "truth.json").string();
+  const auto result = run("birdseye-sim", "camera --socket " + (scratch / "frames").string() +
+                                              " --size 128x96 --drift-ppm -50 --truth " + truth + " --seconds 0.05");
+  ASSERT_EQ(result.code, 0) << result.output;
+  EXPECT_NE(result.output.find("\"ready\""), std::string::npos);
+  EXPECT_NE(result.output.find("\"frames_sent\":0"), std::string::npos) << result.output;
+  EXPECT_NEAR(nlohmann::json::parse(contents_of(truth))["rate_hz"].get<double>(), 60 * (1 - 50e-6), 1e-9);
+}
+
+TEST(Programs, WrongOptionsAreNamed) {
+  const Scratch scratch;
+  const std::string tty = "--tty " + (scratch / "tty").string();
+  expect_refused("birdseye-sim", "minibird", {"--tcp"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --tcp 0", {"--tcp", "2 were given"});
+  expect_refused("birdseye-sim", "minibird --tcp somewhere", {"--tcp somewhere", "PORT"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --motion spiral", {"--motion"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --birds 0", {"--birds"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --revision three", {"--revision"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --faults /nonexistent", {"/nonexistent"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --truth /nonexistent/t.json", {"/nonexistent/t.json"});
+  expect_refused("birdseye-sim", "minibird " + tty + " --faults " + scratch.file("f", "[[fault]]\nname = \"fire\"\n"),
+                 {"line 2", "fire", "drop_byte"});
+  const std::string socket = "--socket " + (scratch / "frames").string();
+  expect_refused("birdseye-sim", "camera", {"--v4l2"});
+  expect_refused("birdseye-sim", "camera --v4l2 /dev/null", {"/dev/null", "v4l2loopback"});
+  expect_refused("birdseye-sim", "camera " + socket + " --format MJPG", {"--format", "NV12"});
+  expect_refused("birdseye-sim", "camera " + socket + " --size 101x100", {"--size", "even"});
+  expect_refused("birdseye-sim", "camera " + socket + " --size big", {"--size"});
+  expect_refused("birdseye-sim",
+                 "camera " + socket + " --faults " + scratch.file("g", "[[fault]]\nname = \"drop_byte\"\nat_s = 1\n"),
+                 {"line 1", "drop_byte", "no instrument"});
+}
+
+}  // namespace
+}  // namespace birdseye
