@@ -52,13 +52,16 @@ template <typename Self>
 class WithCart : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    if (g_machine->up()) cart_ = std::make_unique<Cart>(*g_machine, Self::kName, Self::kConfig);
+    if (!g_machine->up()) return;
+    Self::prepare();
+    cart_ = std::make_unique<Cart>(*g_machine, Self::kName, Self::kConfig);
   }
   static void TearDownTestSuite() { cart_.reset(); }
   void SetUp() override {
     if (!g_machine->up()) GTEST_FAIL() << "no virtual machine";
   }
   static Cart& cart() { return *cart_; }
+  static void prepare() {}
 
  private:
   static inline std::unique_ptr<Cart> cart_;
@@ -140,30 +143,41 @@ TEST_F(ThroughKernelTty, ACameraPulledOutIsMissedAndFoundAgainWhilePosesGoOn) {
   EXPECT_EQ(cart().some<VideoFrame>("frames", 10).size(), 10U);
 }
 
-// Once birdseyed opens its tracker by open_line, without DISABLED_.
-class DISABLED_ThroughLibusb : public WithCart<DISABLED_ThroughLibusb> {
+/// With pedal, LED and strobe, and frames from v4l2loopback, which does not say when they were taken: the strobe does.
+class ThroughLibusb : public WithCart<ThroughLibusb> {
  public:
   static constexpr const char* kName = "libusb";
   static constexpr const char* kConfig = R"(
 [tracker]
 device = "usb:0403:6001:CART0001"
 [camera]
-source = "v4l2:/dev/video0"
+source = "v4l2:/dev/video7"
 width = 320
 height = 180
 rate_hz = 25
+exposure_ms = 8
+[gpio]
+chip = "cart"
+strobe = "strobe"
+pedal = "pedal"
+led = "led"
 )";
+  static void prepare() {
+    g_machine->must("start camera " BIRDSEYE_BIN
+                    "/vm_instruments camera --v4l2 /dev/video7 --size 320x180 --rate 25 --format YUYV --exposure-ms 8 "
+                    "--strobe $(gpio_line strobe)/pull --truth /run/out/camera.json && wait_for /run/out/camera.json");
+  }
 };
 
-TEST_F(DISABLED_ThroughLibusb, TheKernelsDriverHasLetGo) {
+TEST_F(ThroughLibusb, TheKernelsDriverHasLetGo) {
   EXPECT_EQ(g_machine->must("basename $(readlink /sys/bus/usb/devices/1-1:1.0/driver)"), "usbfs");
 }
 
-TEST_F(DISABLED_ThroughLibusb, PosesComeWithTheirTime) {
+TEST_F(ThroughLibusb, PosesComeWithTheirTime) {
   expect_poses_that_tell_the_time(cart().some<Birds>("poses", 150));
 }
 
-TEST_F(DISABLED_ThroughLibusb, DamageOnTheLineMakesNoWrongPose) {
+TEST_F(ThroughLibusb, DamageOnTheLineMakesNoWrongPose) {
   for (const char* const damage : {"parity", "framing", "overrun", "break"}) {
     g_machine->adapter().send(damage);
     // Each pose is looked at, and none is off the circle.
@@ -171,8 +185,33 @@ TEST_F(DISABLED_ThroughLibusb, DamageOnTheLineMakesNoWrongPose) {
   }
 }
 
-TEST_F(DISABLED_ThroughLibusb, AnAdapterPulledOutIsMissedAndFoundAgainWhileFramesGoOn) {
+TEST_F(ThroughLibusb, AnAdapterPulledOutIsMissedAndFoundAgainWhileFramesGoOn) {
   expect_the_adapter_missed_and_found(cart(), "0403:6001");
+}
+
+TEST_F(ThroughLibusb, FramesComeFromTheLoopback) {
+  const auto frames = cart().some<VideoFrame>("frames", 50);
+  for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GT(frames[i].info.sequence, frames[i - 1].info.sequence);
+}
+
+TEST_F(ThroughLibusb, ThePedalIsTold) {
+  for (const bool pressed : {true, false, true, false}) {
+    g_machine->must(pressed ? "gpio_drive pedal up" : "gpio_drive pedal down");
+    const auto told = cart().next<wire::Pedal>("word of the pedal", [](const wire::Pedal&) { return true; });
+    ASSERT_TRUE(told);
+    EXPECT_EQ(told->pressed, pressed);
+  }
+}
+
+TEST_F(ThroughLibusb, TheLightIsSteadyWhileAllIsWellAndFlickersWhenItIsNot) {
+  const std::string look = "led=$(gpio_line led)/value; for i in {1..20}; do cat $led; sleep 0.03; done | sort -u";
+  g_machine->must("until [ $(gpio_value led) = 1 ]; do sleep 0.1; done");
+  EXPECT_EQ(g_machine->must(look), "1");
+  g_machine->adapter().send("unplug");
+  (void)cart().next<Status>("word of the tracker's loss", [](const Status& s) { return !s.ok; });
+  EXPECT_EQ(g_machine->must(look), "0\n1");
+  g_machine->adapter().send("plug");
+  (void)cart().next<Status>("word that all is well", [](const Status& s) { return s.ok; });
 }
 
 const auto* const kMachine = ::testing::AddGlobalTestEnvironment(new TheMachine);
