@@ -86,7 +86,7 @@ Result<void> UsbRedir::receive(std::span<const std::uint8_t> bytes, DeviceTime n
     if (length > kLargestPacket) return Error{Errc::bad_format, "a packet too long for usbredir; is QEMU there?"};
     if (head.size() < before + length) break;
     const std::uint64_t id = number(head, 8, before - 8);
-    if (const auto handled = handle(type, id, head.subspan(before, length), now); !handled) return handled;
+    if (auto handled = handle(type, id, head.subspan(before, length), now); !handled) return handled;
     used += before + length;
   }
   in_.erase(in_.begin(), in_.begin() + static_cast<std::ptrdiff_t>(used));
@@ -172,7 +172,7 @@ void UsbRedir::announce(DeviceTime now) {
     sizes[endpoint] = Ft232r::kPacket;
   }
   Bytes endpoints(kinds.begin(), kinds.end());
-  endpoints.resize(3 * 32, 0);  // intervals, and the interface of each
+  endpoints.resize(3 * kinds.size(), 0);  // intervals, and the interface of each
   for (const std::uint16_t size : sizes) put(endpoints, size, 2);
   send(kEndpointInfo, 0, endpoints);
 
@@ -207,11 +207,9 @@ void UsbRedir::control(std::uint64_t id, std::span<const std::uint8_t> body, Dev
 void UsbRedir::bulk(std::uint64_t id, std::span<const std::uint8_t> body) {
   const std::size_t length = number16(body, 2) | static_cast<std::size_t>(number16(body, 8)) << 16U;
   Transfer transfer{id, body[0], length, {}};
-  if (!plugged_) {
-    complete(transfer, kStall);
-  } else if (body[0] == 0x81) {
+  if (plugged_ && body[0] == 0x81) {
     reads_.push_back(std::move(transfer));
-  } else if (body[0] == 0x02) {
+  } else if (plugged_ && body[0] == 0x02) {
     const auto payload = body.subspan(kBulkHead);
     transfer.bytes.assign(payload.begin(), payload.end());
     writes_.push_back(std::move(transfer));
