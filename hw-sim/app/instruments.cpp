@@ -48,7 +48,7 @@ Result<void> finish(MiniBirdOptions& options) {
 }
 
 Result<void> run(MiniBirdOptions& options) {
-  if (const auto finished = finish(options); !finished) return finished;
+  if (auto finished = finish(options); !finished) return finished;
   return run_minibird(options.program, stop_on_signal());
 }
 
@@ -59,7 +59,7 @@ struct Ft232rOptions {
 };
 
 Result<void> run(Ft232rOptions& options) {
-  if (const auto finished = finish(options.behind); !finished) return finished;
+  if (auto finished = finish(options.behind); !finished) return finished;
   options.program.tracker = options.behind.program.tracker;
   options.program.motion = options.behind.program.motion;
   return run_ft232r(options.program, stop_on_signal());
