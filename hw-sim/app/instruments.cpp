@@ -5,6 +5,7 @@
 
 #include "hw-sim/app/stop_signal.hpp"
 #include "hw-sim/faults/fault_script.hpp"
+#include "hw-sim/ftdi/ft232r_program.hpp"
 #include "hw-sim/minibird/program.hpp"
 #include "hw-sim/video/program.hpp"
 
@@ -34,7 +35,8 @@ struct MiniBirdOptions {
   std::filesystem::path faults;
 };
 
-Result<void> run(MiniBirdOptions& options) {
+/// Settles what the command line gives as text.
+Result<void> finish(MiniBirdOptions& options) {
   TrackerSettings& tracker = options.program.tracker;
   if (auto parsed = parse_revision(options.revision, tracker.unit); !parsed) return parsed;
   if (!options.faults.empty()) {
@@ -42,7 +44,25 @@ Result<void> run(MiniBirdOptions& options) {
     if (!script) return script.error();
     tracker.faults = std::move(script->tracker);
   }
+  return {};
+}
+
+Result<void> run(MiniBirdOptions& options) {
+  if (auto finished = finish(options); !finished) return finished;
   return run_minibird(options.program, stop_on_signal());
+}
+
+/// The tracker behind a USB adapter.
+struct Ft232rOptions {
+  MiniBirdOptions behind;
+  Ft232rProgram program;
+};
+
+Result<void> run(Ft232rOptions& options) {
+  if (auto finished = finish(options.behind); !finished) return finished;
+  options.program.tracker = options.behind.program.tracker;
+  options.program.motion = options.behind.program.motion;
+  return run_ft232r(options.program, stop_on_signal());
 }
 
 struct CameraOptions {
@@ -82,16 +102,13 @@ Result<void> parse_size(const std::string& text, int& width_px, int& height_px) 
   return Error{Errc::bad_value, "--size: give WIDTHxHEIGHT of 64 to 4096 pixels, as 768x576"};
 }
 
-void add_minibird_command(CLI::App& app, const Take& take) {
-  auto options = std::make_shared<MiniBirdOptions>();
-  MiniBirdProgram& program = options->program;
+namespace {
+
+/// What a tracker can be told at any kind of line.
+void add_tracker_options(CLI::App& command, MiniBirdOptions& options) {
+  MiniBirdProgram& program = options.program;
   TrackerSettings& tracker = program.tracker;
   tracker.boot_ms = 1000;
-  CLI::App& command = *app.add_subcommand("minibird", "run a tracker at a serial line, in real time");
-  CLI::App& line = *command.add_option_group("line", "where a driver finds it")->require_option(1);
-  line.add_option("--tty", program.tty, "name for a pseudo-terminal");
-  line.add_option("--tcp", program.tcp, "[HOST:]PORT to listen at; port 0 takes a free one and says which");
-  line.add_option("--unix", program.unix_socket, "path of a Unix socket to listen at");
   command.add_option("--birds", tracker.unit.birds, "in the flock")->check(CLI::Range(1, 126));
   command.add_option("--motion", program.motion, "still or circle")->check(CLI::IsMember({"still", "circle"}));
   command.add_option("--position-noise-mm", tracker.noise.position_mm, "per axis and record")
@@ -106,12 +123,42 @@ void add_minibird_command(CLI::App& app, const Take& take) {
       ->check(CLI::Range(0.0, 60'000.0));
   command.add_option("--baud", tracker.baud, "of its DIP switches: how long bytes take")
       ->check(CLI::IsMember({2400, 4800, 9600, 19200, 38400, 57600, 115200}));
-  command.add_option("--revision", options->revision, "of its firmware, which says what parameters it knows");
+  command.add_option("--revision", options.revision, "of its firmware, which says what parameters it knows");
   command.add_option("--model", tracker.unit.model, "ten characters that it calls itself");
-  command.add_option("--faults", options->faults, "script of faults (TOML)");
+  command.add_option("--faults", options.faults, "script of faults (TOML)");
   command.add_option("--seed", tracker.seed, "everything random follows from it");
+}
+
+}  // namespace
+
+void add_minibird_command(CLI::App& app, const Take& take) {
+  auto options = std::make_shared<MiniBirdOptions>();
+  MiniBirdProgram& program = options->program;
+  CLI::App& command = *app.add_subcommand("minibird", "run a tracker at a serial line, in real time");
+  CLI::App& line = *command.add_option_group("line", "where a driver finds it")->require_option(1);
+  line.add_option("--tty", program.tty, "name for a pseudo-terminal");
+  line.add_option("--tcp", program.tcp, "[HOST:]PORT to listen at; port 0 takes a free one and says which");
+  line.add_option("--unix", program.unix_socket, "path of a Unix socket to listen at");
+  add_tracker_options(command, *options);
   command.add_option("--truth", program.truth, "JSON file that says where the birds truly are, and when");
   command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
+  command.callback([options, take] { take(run(*options)); });
+}
+
+void add_ft232r_command(CLI::App& app, const Take& take) {
+  auto options = std::make_shared<Ft232rOptions>();
+  Ft232rProgram& program = options->program;
+  CLI::App& command =
+      *app.add_subcommand("ft232r", "run a USB adapter with a tracker behind it, for QEMU's usb-redir, in real time");
+  command.add_option("--unix", program.socket, "the socket of QEMU's device, to connect to")->required();
+  command.add_option("--serial", program.chip.serial, "the adapter's serial number")
+      ->check(
+          CLI::Validator([](const std::string& text) { return text.size() <= 16 ? "" : "over 16 characters"; }, ""));
+  command
+      .add_option("--receive-fifo", program.chip.receive_fifo_bytes,
+                  "bytes that wait for the host (the chip's 128); more forgives a host that stalls")
+      ->check(CLI::Range(64, 65536));
+  add_tracker_options(command, options->behind);
   command.callback([options, take] { take(run(*options)); });
 }
 
@@ -137,6 +184,8 @@ void add_camera_command(CLI::App& app, const Take& take) {
   command.add_option("--faults", options->faults, "script of faults (TOML)");
   command.add_option("--seed", timing.seed, "everything random follows from it");
   command.add_option("--truth", program.truth, "JSON file that says when frames are truly exposed");
+  command.add_option("--strobe", program.strobe,
+                     "file that is told pull-up and pull-down with each exposure, as of a line of Linux's gpio-sim");
   command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
   command.callback([options, take] { take(run(*options)); });
 }

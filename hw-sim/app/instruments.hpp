@@ -16,6 +16,7 @@ Result<void> parse_size(const std::string& text, int& width_px, int& height_px);
 
 /// The instruments that run alone, in real time.
 void add_minibird_command(CLI::App& app, const Take& take);
+void add_ft232r_command(CLI::App& app, const Take& take);
 void add_camera_command(CLI::App& app, const Take& take);
 
 }  // namespace birdseye::hw_sim

@@ -54,6 +54,7 @@ int main(int argc, char** argv) {
   });
 
   hw_sim::add_minibird_command(app, take);
+  hw_sim::add_ft232r_command(app, take);
   hw_sim::add_camera_command(app, take);
 
   hw_sim::CaseSettings registration;

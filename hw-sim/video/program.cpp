@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "drivers/io/monotonic.hpp"
 #include "hw-sim/base/announce.hpp"
 #include "hw-sim/video/frame_sink.hpp"
+#include "hw-sim/video/strobe.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -96,6 +98,12 @@ class Camera {
 Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& stop) {
   auto sink = open_sink(program);
   if (!sink) return sink.error();
+  std::optional<Strobe> strobe;
+  if (!program.strobe.empty()) {
+    auto opened = Strobe::open(program.strobe);
+    if (!opened) return std::move(opened).error();
+    strobe = *std::move(opened);
+  }
   ::prctl(PR_SET_TIMERSLACK, 1000UL, 0UL, 0UL, 0UL);  // frames leave on time, not when it suits the power supply
   const std::int64_t zero_ns = drivers::now().ns;
   Camera camera(program, *std::move(sink), zero_ns);
@@ -111,6 +119,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
     if (auto written = replace_json(program.truth, truth); !written) return written;
   }
   announce({{"event", "ready"}, {"camera", program.socket.empty() ? program.device : program.socket}});
+  if (strobe) strobe->start(program.timing, camera.rate_hz(), zero_ns);
   camera.run(stop);
   announce({{"event", "end"}, {"frames_sent", camera.sent()}, {"frames_skipped", camera.skipped()}});
   return {};

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/ftdi/ft232r.hpp"
+#include "hw-sim/minibird/tracker_script.hpp"
+
+namespace birdseye::hw_sim {
+
+/// `birdseye-sim ft232r`.
+struct Ft232rProgram {
+  std::filesystem::path socket;  ///< of QEMU's usb-redir device
+  Ft232rSettings chip;
+  TrackerSettings tracker;  ///< at the other end of the adapter's line
+  std::string motion = "circle";
+};
+
+/// Plugs the adapter, with the tracker behind it, into QEMU and serves it in real time until `stop`; a QEMU that is
+/// not there yet, or goes, is waited for. Commands come on standard input, one a line: unplug, plug, overrun, parity,
+/// framing, break. What happens is told on standard output as JSON lines.
+Result<void> run_ft232r(const Ft232rProgram& program, const std::atomic<bool>& stop);
+
+}  // namespace birdseye::hw_sim

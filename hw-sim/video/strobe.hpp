@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <thread>
+
+#include "calibration/base/result.hpp"
+#include "drivers/io/unique_fd.hpp"
+#include "hw-sim/video/camera_script.hpp"
+
+namespace birdseye::hw_sim {
+
+/// The camera's strobe output: high while a frame is exposed, whether that frame ever leaves or not. It is told to a
+/// file as Linux's gpio-sim wants it for a line that the world outside drives: "pull-up" and "pull-down".
+class Strobe {
+ public:
+  static Result<Strobe> open(const std::filesystem::path& file);
+
+  /// From now on, until this object ends.
+  void start(const CameraTiming& timing, double true_rate_hz, std::int64_t zero_ns);
+
+ private:
+  explicit Strobe(drivers::UniqueFd fd) : fd_(std::move(fd)) {}
+
+  drivers::UniqueFd fd_;
+  std::jthread thread_;
+};
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,48 @@
+#include "tests/vm/cart.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <thread>
+
+namespace birdseye::vm {
+
+using namespace std::chrono_literals;
+
+Cart::Cart(Machine& machine, const std::string& name, const std::string& config) : machine_(machine), name_(name) {
+  // Not on the guest's view of the tree, which need not show what changes out here.
+  std::ofstream(machine.out() / (name + ".toml"))
+      << config << fmt::format("[wire]\nbind = \"0.0.0.0\"\nport = {}\n", Machine::kGuestPort);
+  machine.must(fmt::format("start {0} {1}/birdseyed --config /run/out/{0}.toml", name, BIRDSEYE_BIN));
+  (void)some<wire::Birds>("first poses", 1);
+  (void)some<wire::VideoFrame>("first frame", 1);
+}
+
+Cart::~Cart() {
+  client_.reset();
+  machine_.must("stop " + name_);
+}
+
+std::optional<wire::Event> Cart::any(Clock::time_point deadline) {
+  // The port is open out here long before anybody listens in there, so a connection that ends at once says nothing.
+  while (Clock::now() < deadline) {
+    if (!client_) {
+      if (auto client = wire::Client::connect("127.0.0.1", machine_.port(), deadline)) client_ = *std::move(client);
+    }
+    if (!client_) return std::nullopt;
+    auto event = client_->next(deadline);
+    if (event) return *std::move(event);
+    client_.reset();
+    std::this_thread::sleep_for(100ms);
+  }
+  return std::nullopt;
+}
+
+void Cart::complain(const std::string& what) {
+  const Answer log = machine_.run("tail -5 /run/out/" + name_ + ".log");
+  ADD_FAILURE() << "no " << what << "; " << name_ << " says:\n" << log.output;
+  gone_ = log.code != 0 || machine_.run("[ -e /run/started/" + name_ + ".code ]").code == 0;
+}
+
+}  // namespace birdseye::vm

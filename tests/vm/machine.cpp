@@ -1,0 +1,151 @@
+#include "tests/vm/machine.hpp"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <thread>
+
+namespace birdseye::vm {
+
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr auto kBootPatience = 60s;
+
+int free_port() {
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  const bool bound = ::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                     ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
+  ::close(fd);
+  return bound ? ntohs(address.sin_port) : 0;
+}
+
+/// -1 while nobody listens.
+int connect_to(const std::filesystem::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = path.string();
+  if (name.size() >= sizeof address.sun_path) return -1;
+  std::copy(name.begin(), name.end(), address.sun_path);
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
+  ::close(fd);
+  return -1;
+}
+
+std::vector<std::string> qemu_command(const std::filesystem::path& out, int port) {
+  const auto channel = [&](const std::string& name) {
+    return fmt::format("socket,id={},path={}/{}.sock,server=on,wait=off", name, out.string(), name);
+  };
+  return {"hw-sim/vm/vm.sh",
+          out.string(),
+          "hw-sim/vm/agent.sh",
+          "-device",
+          "virtio-serial-pci",
+          "-chardev",
+          channel("control"),
+          "-device",
+          "virtserialport,chardev=control,name=birdseye.control",
+          "-device",
+          "qemu-xhci",
+          "-chardev",
+          channel("adapter"),
+          "-device",
+          "usb-redir,chardev=adapter",
+          "-netdev",
+          fmt::format("user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{}-:{}", port, Machine::kGuestPort),
+          "-device",
+          "virtio-net-pci,netdev=net,romfile="};
+}
+
+}  // namespace
+
+Machine::Machine(const std::filesystem::path& out) : out_(out), port_(free_port()) {
+  std::filesystem::remove_all(out_);
+  std::filesystem::create_directories(out_);
+  qemu_ = std::make_unique<Process>(qemu_command(out_, port_), out_ / "qemu.log");
+  const auto deadline = Clock::now() + kBootPatience;
+  while ((control_ = connect_to(out_ / "control.sock")) < 0 && Clock::now() < deadline &&
+         qemu_->wait(Clock::now()) < 0) {
+    std::this_thread::sleep_for(20ms);
+  }
+  // An emulated processor stops now and then for longer than the chip's own fifo lasts.
+  adapter_ = std::make_unique<Process>(
+      std::vector<std::string>{std::string(BIRDSEYE_BIN) + "/birdseye-sim", "ft232r", "--unix",
+                               (out_ / "adapter.sock").string(), "--serial", kAdapterSerial, "--receive-fifo", "4096"},
+      out_ / "adapter.log");
+  if (control_ >= 0 && read_line(deadline) == "ready") return;
+  ADD_FAILURE() << "the virtual machine does not come up; see " << out_ << "/*.log";
+  if (control_ >= 0) ::close(control_);
+  control_ = -1;
+}
+
+Machine::~Machine() {
+  if (control_ < 0) return;
+  const std::string off = "off\n";
+  (void)!::write(control_, off.data(), off.size());
+  EXPECT_EQ(qemu_->wait(Clock::now() + 20s), 0) << "the virtual machine does not switch off; see " << out_;
+  ::close(control_);
+}
+
+bool Machine::read_until(std::size_t size, Clock::time_point deadline) {
+  while (buffer_.size() < size) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+    pollfd entry{control_, POLLIN, 0};
+    if (left.count() <= 0 || ::poll(&entry, 1, static_cast<int>(left.count())) <= 0) return false;
+    std::array<char, 4096> chunk;
+    const ssize_t got = ::read(control_, chunk.data(), chunk.size());
+    if (got <= 0) return false;
+    buffer_.append(chunk.data(), static_cast<std::size_t>(got));
+  }
+  return true;
+}
+
+std::string Machine::read_line(Clock::time_point deadline) {
+  std::size_t end = 0;
+  while ((end = buffer_.find('\n')) == std::string::npos) {
+    if (!read_until(buffer_.size() + 1, deadline)) return {};
+  }
+  std::string line = buffer_.substr(0, end);
+  buffer_.erase(0, end + 1);
+  return line;
+}
+
+Answer Machine::run(const std::string& command, std::chrono::seconds patience) {
+  if (!up()) return {};
+  const std::string line = command + "\n";
+  (void)!::write(control_, line.data(), line.size());
+  const auto deadline = Clock::now() + patience;
+  Answer answer;
+  std::size_t size = 0;
+  if (std::sscanf(read_line(deadline).c_str(), "%d %zu", &answer.code, &size) != 2 || !read_until(size, deadline)) {
+    // Whatever it says later would be taken for the answer to something else.
+    ::close(control_);
+    control_ = -1;
+    return {};
+  }
+  answer.output = buffer_.substr(0, size);
+  buffer_.erase(0, size);
+  return answer;
+}
+
+std::string Machine::must(const std::string& command, std::chrono::seconds patience) {
+  const Answer answer = run(command, patience);
+  EXPECT_EQ(answer.code, 0) << command << "\n" << answer.output;
+  return answer.output;
+}
+
+}  // namespace birdseye::vm
