@@ -109,6 +109,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.clients = sent.clients;
   health.requests_refused = sent.requests_refused;
   health.latency_ms_p99_tracker = sent.latency_ms_p99_tracker;
+  health.latency_ms_p99_tracker_beside_frames = sent.latency_ms_p99_tracker_beside_frames;
   health.latency_ms_p99_frame = sent.latency_ms_p99_frame;
   health.tracker_drift_ppm = counters.tracker_drift_ppm;
   health.camera_drift_ppm = counters.camera_drift_ppm;

@@ -87,7 +87,8 @@ bool ClientLink::send_some(Latencies& latencies) {
   if (sent_ < sending_->size()) return true;
   const bool frame = sending_->kind == Packet::Kind::frame;
   if (frame) queued_bytes_ -= sending_->size();
-  if (sending_->arrived.ns != 0) (frame ? latencies.frame : latencies.tracker).add(progress_ - sending_->arrived);
+  LatencyLog& tracker = subscription_.frames ? latencies.tracker_beside_frames : latencies.tracker;
+  if (sending_->arrived.ns != 0) (frame ? latencies.frame : tracker).add(progress_ - sending_->arrived);
   sending_.reset();
   return true;
 }

@@ -12,8 +12,11 @@ namespace birdseye::wire {
 /// CLOCK_MONOTONIC.
 DeviceTime monotonic_now();
 
+/// From the last byte in to the last byte handed to the operating system.
 struct Latencies {
-  LatencyLog tracker, frame;  ///< from the last byte in to the last byte handed to the operating system
+  LatencyLog tracker;                ///< of clients that take no frames
+  LatencyLog tracker_beside_frames;  ///< of those that do: a pose waits while a frame before it is on its way
+  LatencyLog frame;
 };
 
 /// One client's end at the server: what waits to be sent to it, and what it has begun to ask. Used by one thread.

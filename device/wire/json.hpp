@@ -25,6 +25,6 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Health, state, instruments, tracker_rate_hz, 
                                    measurements_lost, phase_errors, senseless_records, doubted, line_errors,
                                    clock_events, frames, frames_dropped, messages_shed, clients, requests_refused,
                                    tracker_drift_ppm, camera_drift_ppm, tracker_time_sigma_ms, latency_ms_p99_tracker,
-                                   latency_ms_p99_frame, clock, recording)
+                                   latency_ms_p99_tracker_beside_frames, latency_ms_p99_frame, clock, recording)
 
 }  // namespace birdseye::wire

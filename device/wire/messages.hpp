@@ -82,7 +82,9 @@ struct Health {
   std::uint64_t frames = 0, frames_dropped = 0;
   std::uint64_t messages_shed = 0, clients = 0, requests_refused = 0;
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
-  double latency_ms_p99_tracker = 0, latency_ms_p99_frame = 0;  ///< last byte in to last byte out, since the last
+  // From the last byte in to the last byte out, since the last report. Poses to clients that take frames too wait while
+  // a frame is on its way; the first figure is of those that do not.
+  double latency_ms_p99_tracker = 0, latency_ms_p99_tracker_beside_frames = 0, latency_ms_p99_frame = 0;
   WallClock clock;
   std::string recording;  ///< the file, or why there is none; empty: not asked for
 };

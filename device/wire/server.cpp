@@ -79,8 +79,9 @@ void Server::publish(const Packet& packet) {
 }
 
 Server::Counters Server::take_counters() {
-  Counters counters{clients_count_, messages_shed_, clients_shed_, requests_refused_, 0, 0};
+  Counters counters{clients_count_, messages_shed_, clients_shed_, requests_refused_, 0, 0, 0};
   counters.latency_ms_p99_tracker = latencies_.tracker.take_p99_ms();
+  counters.latency_ms_p99_tracker_beside_frames = latencies_.tracker_beside_frames.take_p99_ms();
   counters.latency_ms_p99_frame = latencies_.frame.take_p99_ms();
   return counters;
 }

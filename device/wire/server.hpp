@@ -30,7 +30,8 @@ class Server {
 
   struct Counters {
     std::uint64_t clients = 0, messages_shed = 0, clients_shed = 0, requests_refused = 0;
-    double latency_ms_p99_tracker = 0, latency_ms_p99_frame = 0;  ///< since they were last taken
+    // Since they were last taken; 0: there was none.
+    double latency_ms_p99_tracker = 0, latency_ms_p99_tracker_beside_frames = 0, latency_ms_p99_frame = 0;
   };
   Counters take_counters();
   [[nodiscard]] std::size_t clients() const { return clients_count_; }

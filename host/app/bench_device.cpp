@@ -87,11 +87,19 @@ class Listener {
   std::jthread thread_;
 };
 
-Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int clients) {
+/// clients that take everything; then, where they are wanted, one that takes poses alone.
+Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int clients, bool poses_alone = false) {
   std::vector<std::unique_ptr<Listener>> listeners;
   for (int i = 0; i < clients; ++i) {
     auto client = wire::Client::connect("127.0.0.1", rig.port(), Clock::now() + seconds(15));
     if (!client) return client.error();
+    listeners.push_back(std::make_unique<Listener>(*std::move(client)));
+  }
+  if (poses_alone) {
+    auto client = wire::Client::connect("127.0.0.1", rig.port(), Clock::now() + seconds(15));
+    if (!client) return client.error();
+    if (auto told = (*client)->subscribe({.frames = false, .tracking = true}, Clock::now() + seconds(1)); !told)
+      return told.error();
     listeners.push_back(std::make_unique<Listener>(*std::move(client)));
   }
   for (const auto deadline = Clock::now() + seconds(30); !listeners.front()->posed();) {
@@ -162,7 +170,7 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   settings.folder = folder / "load";
   auto rig = DeviceRig::start(settings);
   if (!rig) return rig.error();
-  auto listeners = listen(**rig, options.clients);
+  auto listeners = listen(**rig, options.clients, true);
   if (!listeners) return listeners.error();
   sleep_unless_interrupted(2);
   const auto begin = Clock::now();
@@ -176,21 +184,19 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   const double cpu_percent = 100 * ((*rig)->cpu_s() - cpu_before_s) / elapsed_s;
   const double memory_mb = (*rig)->resident_mb();
   std::uint64_t frames_lost = 0;
-  double tracker_ms = 0, frame_ms = 0;
   for (auto& listener : *listeners) {
     listener->stop();
     if (listener->ended) return *listener->ended;
     frames_lost += holes(listener->frames);
   }
   const Listener& first = *listeners->front();
-  std::vector<double> p99_tracker, p99_frame;
+  std::vector<double> p99_tracker, p99_beside, p99_frame;
   for (std::size_t i = 3; i < first.healths.size(); ++i) {
     p99_tracker.push_back(first.healths[i].latency_ms_p99_tracker);
+    p99_beside.push_back(first.healths[i].latency_ms_p99_tracker_beside_frames);
     p99_frame.push_back(first.healths[i].latency_ms_p99_frame);
   }
   if (p99_tracker.empty()) return Error{Errc::timeout, "no report of health came; give --seconds of 10 or more"};
-  tracker_ms = median(p99_tracker);
-  frame_ms = median(p99_frame);
   const wire::Health& last = first.healths.back();
   const double copy_percent =
       100 * settings.video_rate_hz * copy_s_per_frame(std::size_t{1920} * 1080 * 3, options.clients);
@@ -203,8 +209,9 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   out["cpu_percent_total"] = cpu_percent;
   out["cpu_percent_pixel_copy"] = copy_percent;
   out["cpu_percent"] = std::max(0.0, cpu_percent - copy_percent);
-  out["latency_ms_p99_tracker"] = tracker_ms;
-  out["latency_ms_p99_frame"] = frame_ms;
+  out["latency_ms_p99_tracker"] = median(p99_tracker);  // of each second's
+  out["latency_ms_p99_tracker_beside_frames"] = median(p99_beside);
+  out["latency_ms_p99_frame"] = median(p99_frame);
   out["resident_mb"] = memory_mb;
   out["resident_mb_max"] = most_mb;
   out["resident_mb_growth"] = memory_mb - memory_before_mb;
@@ -282,6 +289,7 @@ Result<void> measure_recovery(const std::filesystem::path& folder, nlohmann::jso
   Listener& listener = *listeners->front();
   listener.stop();
   double worst_s = 0;
+  out["recovery_s"] = nlohmann::json::object();
   const std::set<std::string> of_camera{"silence"};
   for (const FaultEvent& fault : (*rig)->faults()) {
     if (fault.begins) continue;
