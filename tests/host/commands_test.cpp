@@ -159,15 +159,20 @@ TEST(Commands, WrongUsageIsCode2) {
 TEST(Commands, BirdseyedRefusesWhatItCannotUseInOneLine) {
   const Scratch scratch;
   expect_refused("birdseyed", "--config " + (scratch / "none.toml").string(), {"none.toml"});
-  expect_refused("birdseyed", "--config " + scratch.file("key.toml", "[tracker]\ndevice = \"/dev/null\"\nbirdz = 2\n"),
-                 {"key.toml", "birdz", "unknown key"});
-  expect_refused(
-      "birdseyed",
-      "--config " +
-          scratch.file(
-              "cam.toml",
-              "[tracker]\ndevice = \"/dev/null\"\n[camera]\nsource = \"socket:/nonexistent\"\n[wire]\nport = 0\n"),
-      {"/nonexistent", "[camera] source"});
+  const std::string camera = "[camera]\nsource = \"socket:/nonexistent\"\n";
+  expect_refused("birdseyed",
+                 "--config " + scratch.file("key.toml", "[tracker]\ndevice = \"/dev/null\"\nbirdz = 2\n" + camera),
+                 {"key.toml:3", "birdz", "unknown key"});
+}
+
+TEST(Commands, BirdseyedProbesItsInstrumentsAndNamesEachThatItCannotUse) {
+  const Scratch scratch;
+  const std::string file = scratch.file(
+      "cam.toml", "[tracker]\ndevice = \"/dev/null\"\n[camera]\nsource = \"socket:/nonexistent\"\n[wire]\nport = 0\n");
+  const auto result = run("birdseyed", "--probe --config " + file);
+  EXPECT_EQ(result.code, 2);
+  for (const char* expected : {"/nonexistent", "[camera] source", "/dev/null"})
+    EXPECT_NE(result.output.find(expected), std::string::npos) << result.output;
 }
 
 TEST(Commands, DemoRefusesACtThatIsNotThere) {
