@@ -41,16 +41,18 @@ class ClockLine {
     Duration resolution{1000};       ///< of arrivals
   };
   struct Tick {
-    DeviceTime time;       ///< on the line
-    Duration sigma;        ///< of time: 68 % of ticks are this close. What it is late by, where that is in doubt
-    Duration late_by;      ///< this arrival behind its tick
-    bool certain = false;  ///< false while measurements may be missing or the line may have moved, and at the start
+    DeviceTime time;         ///< on the line
+    Duration sigma;          ///< of time: 68 % of ticks are this close. What it is late by, where that is in doubt
+    Duration late_by;        ///< this arrival behind its tick
+    std::int64_t index = 0;  ///< of the measurement, counting those that were lost
+    bool certain = false;    ///< false while measurements may be missing or the line may have moved, and at the start
   };
 
   explicit ClockLine(const Settings& settings);
 
-  /// The next arrival, or one after some that are known to be lost.
-  Tick push(DeviceTime arrived, std::int64_t lost = 0);
+  /// The next arrival, or one after some that are known to be lost. `perhaps_more`: there are signs that more were lost
+  /// since the one before than is known; lateness by whole periods is then believed sooner.
+  Tick push(DeviceTime arrived, std::int64_t lost = 0, bool perhaps_more = false);
   /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a
   /// restart.
   Tick push_numbered(DeviceTime arrived, std::int64_t index);
@@ -64,6 +66,8 @@ class ClockLine {
   [[nodiscard]] std::uint64_t restarts() const { return restarts_; }
 
  private:
+  static constexpr std::size_t kBlocks = 64, kRecent = 144;
+
   struct Arrival {
     std::int64_t index = 0, arrived_ns = 0;
     double late_ns = 0;  ///< behind the line when it came
@@ -71,6 +75,17 @@ class ClockLine {
   };
   struct Block {
     std::int64_t id = 0, index = 0, offset_ns = 0, count = 0;  ///< index and offset of its earliest arrival
+  };
+  /// The latest arrivals, that late all of them.
+  struct Run {
+    std::size_t length = 0;
+    double doubt = 0;                    ///< how little chance explains it, in nats
+    double before_ns = 0, after_ns = 0;  ///< the least late of its first half, and of its second
+    double spread_ns = 0;                ///< what the least of so many is late by on average
+    [[nodiscard]] double least_ns() const { return before_ns < after_ns ? before_ns : after_ns; }
+  };
+  struct Skip {
+    std::int64_t index = 0, periods = 0;
   };
   struct Change {
     std::int64_t index = 0;  ///< where the line was given up
@@ -90,6 +105,7 @@ class ClockLine {
   [[nodiscard]] double true_period_ns() const;
   [[nodiscard]] double line_at(std::int64_t index) const;  ///< relative to the anchor
   [[nodiscard]] double sigma_at(std::int64_t index) const;
+  [[nodiscard]] double may_be_the_next() const;
   [[nodiscard]] double doubt_of(double late_ns) const;
   [[nodiscard]] std::vector<EdgePoint> points() const;
   [[nodiscard]] EdgeSettings edge_settings() const;
@@ -100,6 +116,10 @@ class ClockLine {
   void release();
   bool look_for_early(const Arrival& arrival);
   double look_for_late();
+  [[nodiscard]] Run run_of(std::size_t length) const;
+  [[nodiscard]] std::int64_t periods_in(const Run& run) const;
+  [[nodiscard]] bool is_clear_slip(const Run& run, const Run& longest) const;
+  [[nodiscard]] bool is_clear_step(const Run& run) const;
   void slip(std::size_t run, std::int64_t periods);
   void begin_from(std::size_t first_recent, double jump_ns, bool is_event);
   void look_for_bend();
@@ -124,6 +144,9 @@ class ClockLine {
   std::array<Drift, 2> calm_drifts_{};  ///< of some 100 and 200 arrivals ago
   std::deque<Drift> past_drifts_;
   std::optional<Change> change_;
+  std::optional<std::int64_t> suspect_from_;  ///< where more may have been lost than is known
+  std::optional<std::int64_t> slip_from_;     ///< where a loss was last seen by the time alone
+  Skip skipped_;                              ///< the newest loss that was told or seen
   std::deque<ClockEvent> events_;
   std::uint64_t restarts_ = 0;
 };

@@ -17,6 +17,8 @@ constexpr double kNear = 0.4;
 /// By so many contradictions more than the best must every other delay have.
 constexpr int kClear = 3;
 constexpr int kMisses = 12;
+/// Over so many frames, the nominal period is not good enough to count edges by.
+constexpr std::int64_t kMostCounted = 2000;
 
 }  // namespace
 
@@ -109,13 +111,37 @@ void StrobeMatcher::learn() {
                              settings_.most_delay.seconds() * 1e3);
   } else if (second - fewest < kClear) {
     ambiguity_ = "delays that differ by a period fit as well; narrow the bounds on the delivery delay";
+  } else if (before_ && !is_as_before(best) && !is_clear_beyond_bounds(best, fewest)) {
+    ambiguity_ = "frames and strobe edges have been counted differently: the delay may have changed by a period";
   } else {
     delay_ns_ = best;
+    before_.reset();
     misses_ = 0;
   }
 }
 
+/// The delay that was lost is back, and nothing was counted differently meanwhile.
+bool StrobeMatcher::is_as_before(double delay_ns) const {
+  const auto period = static_cast<double>(settings_.period.ns);
+  if (std::abs(delay_ns - before_->delay_ns) > period / 4) return false;
+  const Frame& frame = frames_.back();
+  const std::int64_t counted = frame.number - before_->last.number;
+  const Edge* edge = nearest(frame.stamp - Duration{std::llround(delay_ns)});
+  return edge != nullptr && counted < kMostCounted &&
+         std::llround(static_cast<double>((edge->at - before_->last.edge).ns) / period) == counted;
+}
+
+/// A delay that has changed may have left its bounds: frames and edges alone must tell it from the next ones.
+bool StrobeMatcher::is_clear_beyond_bounds(double delay_ns, int its_contradictions) const {
+  for (const int periods : {-2, -1, 1, 2}) {
+    const double other = delay_ns + periods * static_cast<double>(settings_.period.ns);
+    if (other >= 0 && contradictions(other) - its_contradictions < kClear) return false;
+  }
+  return true;
+}
+
 void StrobeMatcher::forget() {
+  if (delay_ns_ && last_) before_ = Before{*last_, *delay_ns_};
   frames_.clear();
   delay_ns_.reset();
   last_.reset();
@@ -123,7 +149,10 @@ void StrobeMatcher::forget() {
 }
 
 StrobeMatcher::Match StrobeMatcher::match(DeviceTime stamp, std::int64_t number) {
-  if (!frames_.empty() && (number <= frames_.back().number || stamp <= frames_.back().stamp)) forget();
+  if (!frames_.empty() && (number <= frames_.back().number || stamp <= frames_.back().stamp)) {
+    forget();
+    before_.reset();  // another stream
+  }
   frames_.push_back({stamp, number});
   if (frames_.size() > kFrames) frames_.pop_front();
   if (!delay_ns_) learn();

@@ -13,7 +13,7 @@ namespace birdseye {
 /// when and frames know what. The delivery delay is not known, but stable: it is learnt from frames of which only one
 /// delay fits. A strobe and frames that are both regular fit any delay that differs by whole periods: then the bounds
 /// on the delay must leave one only, or exposures that were left out or a stream's beginning must tell, and until then
-/// no frame is paired.
+/// no frame is paired. Once frames and edges have been counted differently the bounds are not believed either.
 class StrobeMatcher {
  public:
   struct Settings {
@@ -55,7 +55,13 @@ class StrobeMatcher {
     DeviceTime edge;
     std::int64_t number = 0;
   };
+  struct Before {
+    Pair last;
+    double delay_ns = 0;
+  };
   void learn();
+  [[nodiscard]] bool is_as_before(double delay_ns) const;
+  [[nodiscard]] bool is_clear_beyond_bounds(double delay_ns, int its_contradictions) const;
   [[nodiscard]] std::optional<double> phase_ns() const;
   [[nodiscard]] int contradictions(double delay_ns) const;
   [[nodiscard]] const Edge* nearest(DeviceTime time) const;
@@ -66,6 +72,7 @@ class StrobeMatcher {
   std::deque<Frame> frames_;
   std::optional<double> delay_ns_;
   std::optional<Pair> last_;
+  std::optional<Before> before_;  ///< what was known when the delay was lost
   std::string ambiguity_ = "the delivery delay is not known yet";
   int misses_ = 0;
   std::uint64_t spurious_ = 0;

@@ -41,7 +41,11 @@ Core::Counters Core::counters() const {
   if (assembler_) add(counters.tracker, assembler_->counters());
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
-  counters.clock_events = counters.tracker.restarts + frame_clock_.events();
+  counters.clock_events = clock_events_ + frame_clock_.events();
+  if (assembler_) {
+    counters.clock_events += assembler_->clock_events();
+    counters.tracker_drift_ppm = assembler_->drift_ppm();
+  }
   counters.camera_drift_ppm = frame_clock_.drift_ppm();
   counters.tracker_time_sigma_ms = time_sigma_.seconds() * 1e3;
   return counters;
@@ -60,7 +64,10 @@ void Core::note(const InstrumentChanged& changed) {
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
     // What was half received will not be completed, and a unit that starts again has another beat.
-    if (assembler_) add(counted_, assembler_->counters());
+    if (assembler_) {
+      add(counted_, assembler_->counters());
+      clock_events_ += assembler_->clock_events();
+    }
     assembler_.reset();
     for (BirdState& bird : birds_) bird = {};
     if (running && changed.layout) assembler_.emplace(*changed.layout);
@@ -91,7 +98,7 @@ void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime 
 
 void Core::publish(const Measurement& measurement) {
   time_sigma_ = measurement.acquired_sigma;
-  const bool timed = measurement.acquired_sigma <= settings_.pose.max_time_sigma;
+  const bool timed = measurement.time_certain && measurement.acquired_sigma <= settings_.pose.max_time_sigma;
   wire::Birds birds;
   birds.acquired = measurement.acquired;
   for (std::size_t i = 0; i < std::min(measurement.birds.size(), birds_.size()); ++i) {

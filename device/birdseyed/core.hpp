@@ -65,6 +65,7 @@ class Core {
   InstrumentBoard board_;
   std::optional<drivers::minibird::MeasurementAssembler> assembler_;
   drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
+  std::uint64_t clock_events_ = 0;               ///< the same
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;

@@ -39,6 +39,7 @@ MiniBirdCounters MeasurementAssembler::counters() const {
 }
 
 void MeasurementAssembler::begin_anew() {
+  ++clock_events_;
   parser_.reset();
   clock_line_ = ClockLine(line_settings(period_));
   cycle_.reset();
@@ -67,39 +68,33 @@ std::int64_t MeasurementAssembler::lost_before(const Cycle& cycle, DeviceTime be
   const auto cycle_length = static_cast<double>(cycle_bytes(layout_));
   const std::int64_t by_bytes =
       std::llround(static_cast<double>(cycle.first_record - cycle.before_it - *last_begin_) / cycle_length) - 1;
-  const double periods = static_cast<double>((began - *last_tick_).ns) / static_cast<double>(period_.ns);
+  const double periods = static_cast<double>((began - last_tick_->time).ns) / static_cast<double>(period_.ns);
   const std::int64_t by_time = std::llround(std::floor(periods + 0.3)) - 1;
   return std::max<std::int64_t>(0, std::min(by_bytes, by_time));
-}
-
-void MeasurementAssembler::count_lost(DeviceTime tick) {
-  if (last_tick_) {
-    lost_ += std::llround(static_cast<double>((tick - *last_tick_).ns) / static_cast<double>(period_.ns)) - 1;
-  }
-  last_tick_ = tick;
 }
 
 void MeasurementAssembler::finish(std::vector<Measurement>& out) {
   const DeviceTime start = began(*cycle_);
   const std::int64_t lost = lost_before(*cycle_, start);
-  const ClockLine::Tick tick = clock_line_.push(start, lost);
-  count_lost(tick.time);
+  // After damage nobody knows how many measurements were lost but the clock line, and it only in time.
+  const bool damaged = std::exchange(damaged_, false) || cycle_->damage != damage_seen_;
+  damage_seen_ = cycle_->damage;
+  const ClockLine::Tick tick = clock_line_.push(start, lost, damaged);
+  clock_events_ += clock_line_.take_events().size();
+  if (last_tick_) lost_ += tick.index - last_tick_->index - 1;
+  last_tick_ = tick;
   last_begin_ = cycle_->first_record - cycle_->before_it;
 
   Measurement measurement;
   measurement.acquired = tick.time - layout_.delay;
   measurement.acquired_sigma = tick.sigma;
-  // After damage nobody knows how many measurements were lost, until the arrival agrees with the count.
-  const bool damaged = std::exchange(damaged_, false) || cycle_->damage != damage_seen_;
-  damage_seen_ = cycle_->damage;
-  if (damaged && std::abs((start - tick.time).ns) > period_.ns / 2) {
-    measurement.acquired_sigma = std::max(measurement.acquired_sigma, period_);
-  }
+  measurement.time_certain = tick.certain;
   measurement.arrived = cycle_->arrived;
   for (std::size_t bird = 0; bird < layout_.birds.size(); ++bird) {
     BirdReading reading;
     if (const auto& record = cycle_->records[bird]) {
-      reading = guards_[bird].judge(*record, measurement.acquired, measurement.acquired_sigma);
+      reading =
+          guards_[bird].judge(*record, measurement.acquired, measurement.acquired_sigma, measurement.time_certain);
     }
     ++counters_.doubted[static_cast<std::size_t>(reading.kind)];
     if (reading.kind == Doubt::senseless || reading.kind == Doubt::saturated) ++counters_.senseless_records;

@@ -22,6 +22,10 @@ class MeasurementAssembler {
   /// record of the next has come.
   std::vector<Measurement> push(const Chunk& chunk);
   [[nodiscard]] MiniBirdCounters counters() const;
+  /// By so much the unit's true period is longer than the nominal one.
+  [[nodiscard]] double drift_ppm() const { return clock_line_.drift_ppm(); }
+  /// Times the unit's beat did what jitter does not: steps, losses that only time showed, changes of drift, restarts.
+  [[nodiscard]] std::uint64_t clock_events() const { return clock_events_; }
 
  private:
   struct Arrival {
@@ -43,7 +47,6 @@ class MeasurementAssembler {
   void begin_anew();
   [[nodiscard]] DeviceTime began(const Cycle& cycle) const;
   [[nodiscard]] std::int64_t lost_before(const Cycle& cycle, DeviceTime began) const;
-  void count_lost(DeviceTime tick);
 
   StreamLayout layout_;
   Duration period_;
@@ -54,10 +57,11 @@ class MeasurementAssembler {
   std::int64_t received_ = 0;     ///< bytes, since the stream began
   std::optional<Cycle> cycle_;
   std::optional<std::int64_t> last_begin_;  ///< of the cycle before, where its first byte is or would be
-  std::optional<DeviceTime> last_tick_;
+  std::optional<ClockLine::Tick> last_tick_;
   std::int64_t lost_ = 0;
   bool damaged_ = false;           ///< by a line error since the last measurement
   std::uint64_t damage_seen_ = 0;  ///< Cycle::damage of the last measurement
+  std::uint64_t clock_events_ = 0;
   MiniBirdCounters counters_;
 };
 

@@ -68,7 +68,8 @@ bool BirdGuard::within_reach(const Sample& from, const Sample& to) const {
 }
 
 std::optional<Eigen::Vector3d> BirdGuard::predicted_mm(DeviceTime time) const {
-  if (track_.size() < kTrack || time - track_.front().time > kTrackHolds) return std::nullopt;
+  if (track_.size() < kTrack || !track_.front().time_certain || time - track_.front().time > kTrackHolds)
+    return std::nullopt;
   double mean_s = 0, square_s2 = 0;
   Eigen::Vector3d mean_mm = Eigen::Vector3d::Zero(), moment = Eigen::Vector3d::Zero();
   for (const Sample& s : track_) {
@@ -87,7 +88,7 @@ std::optional<Eigen::Vector3d> BirdGuard::predicted_mm(DeviceTime time) const {
 bool BirdGuard::on_track(const Sample& sample) {
   if (!within_reach(track_.back(), sample)) return false;
   const auto predicted = predicted_mm(sample.time);
-  if (!predicted) return true;
+  if (!predicted || !sample.time_certain) return true;
   const double seconds = (gap_between(track_.back().time, sample.time) + sample.sigma).seconds();
   const double noise_mm = std::min(std::sqrt(noise_mm2_), kMostNoiseMm);
   const double most_mm =
@@ -122,10 +123,15 @@ BirdGuard::Verdict BirdGuard::doubt_of_side(const Eigen::Vector3d& reported_mm, 
 }
 
 void BirdGuard::follow(const Sample& sample) {
-  track_.push_back(sample);
-  if (track_.size() > kTrack) track_.pop_front();
   candidate_.reset();
   agreeing_ = 0;
+  if (!track_.empty() && track_.front().time_certain != sample.time_certain) {
+    if (!sample.time_certain) return;
+    track_.clear();
+  }
+  track_.push_back(sample);
+  if (track_.size() > kTrack) track_.pop_front();
+  if (!sample.time_certain) return;
   if (repeats_ > 0 || track_.size() < 2) return;
   const Eigen::Vector3d way_mm = track_.back().position_mm - track_[track_.size() - 2].position_mm;
   restless_ += kNoiseMemory * ((way_mm.dot(last_way_mm_) < 0 ? 1 : 0) - restless_);
@@ -162,7 +168,7 @@ BirdGuard::Verdict BirdGuard::place(Sample sample) {
                       angle_deg(last.rotation, sample.rotation), gap_between(last.time, sample.time).seconds() * 1e3)};
 }
 
-BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration sigma) {
+BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain) {
   BirdReading reading;
   reading.button = record.button;
   const auto withhold = [&reading](const Verdict& verdict) {
@@ -177,6 +183,7 @@ BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration
   Sample sample;
   sample.time = acquired;
   sample.sigma = sigma;
+  sample.time_certain = time_certain;
   if (pose->position_mm) sample.position_mm = *pose->position_mm;
   if (pose->rotation) sample.rotation = *pose->rotation;
   if (const Verdict verdict = place(sample); verdict.kind != Doubt::none) return withhold(verdict);

@@ -17,7 +17,8 @@ class BirdGuard {
  public:
   BirdGuard(const BirdLayout& layout, const Plausibility& limits) : layout_(layout), limits_(limits) {}
 
-  BirdReading judge(const Record& record, DeviceTime acquired, Duration sigma);
+  /// Of a reading whose time is not certain the place is judged, but nobody's speed by it.
+  BirdReading judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain = true);
 
  private:
   struct Sample {
@@ -25,6 +26,7 @@ class BirdGuard {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     DeviceTime time;
     Duration sigma;
+    bool time_certain = true;
   };
   struct Verdict {
     Doubt kind = Doubt::none;
@@ -44,9 +46,9 @@ class BirdGuard {
 
   BirdLayout layout_;
   Plausibility limits_;
-  std::deque<Sample>
-      track_;             ///< where the sensor has been, newest last; positions are put back where they flipped from
-  double noise_mm2_ = 0;  ///< mean square of the readings about the line through those before
+  std::deque<Sample> track_;  ///< where the sensor has been, newest last; positions are put back where they flipped
+                              ///< from. The times of all of them are certain, or of none
+  double noise_mm2_ = 0;             ///< mean square of the readings about the line through those before
   std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
   int agreeing_ = 0;
   std::vector<std::int16_t> last_words_;

@@ -120,7 +120,49 @@ TEST(StrobeMatcher, ADelayThatChangesByAPeriodIsSaid) {
   const auto match = matcher.match({Camera::begin(100) + kPeriod + camera.delay}, 100);
   EXPECT_FALSE(match.acquired);
   EXPECT_NE(match.reason.find("counted differently"), std::string::npos);
-  EXPECT_FALSE(matcher.delay()) << "learnt anew, and only as good as its bounds";
+  EXPECT_FALSE(matcher.delay());
+}
+
+TEST(StrobeMatcher, ADelayThatChangesAcrossAGapIsNotLearntFromItsBoundsAlone) {
+  // By a period, by more and by less: what the bounds leave is then another delay, or the right one by chance.
+  for (const std::int64_t change : {kPeriod, kPeriod - 2'000'000, kPeriod / 2 + 1'500'000, -kPeriod + 1'000'000}) {
+    for (const bool delivered : {true, false}) {
+      StrobeMatcher matcher(narrow());
+      Camera camera;
+      camera.film(matcher, 100);
+      ASSERT_EQ(camera.wrong, 0);
+      ASSERT_GT(camera.paired, 80);
+      camera.delay += change;
+      camera.delivers = [&](int n) { return delivered || n > 130; };
+      camera.film(matcher, 300, 100);
+      EXPECT_EQ(camera.wrong, 0) << change;
+    }
+  }
+}
+
+TEST(StrobeMatcher, ADelayThatHasChangedIsLearntFromExposuresThatWereLeftOut) {
+  auto settings = narrow();
+  settings.least_delay = Duration{0};
+  settings.most_delay = Duration::from_ms(100);
+  StrobeMatcher matcher(settings);
+  Camera camera;
+  camera.exposes = [](int n) { return n % 50 != 49 && n % 50 != 29; };
+  camera.film(matcher, 200);
+  const int until_then = camera.paired;
+  EXPECT_GT(until_then, 40);
+  camera.delay += kPeriod;
+  camera.film(matcher, 300, 200);
+  EXPECT_EQ(camera.wrong, 0);
+  EXPECT_GT(camera.paired, until_then + 50);
+}
+
+TEST(StrobeMatcher, AStrobeThatIsGoneForAWhileComesBack) {
+  StrobeMatcher matcher(narrow());
+  Camera camera;
+  camera.edge_seen = [](int n) { return n < 100 || n > 160; };
+  camera.film(matcher, 300);
+  EXPECT_EQ(camera.wrong, 0);
+  EXPECT_GT(camera.paired, 170);
 }
 
 }  // namespace

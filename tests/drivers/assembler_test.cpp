@@ -110,7 +110,8 @@ TEST(Assembler, TenMinutesAtTheHighestRateLoseNothing) {
 }
 
 TEST(Assembler, ALostRecordNeverShiftsTimesUnsaid) {
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  int certain = 0, uncertain = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> chance(0, 1);
     std::exponential_distribution<double> late_ns(1 / 1.5e6);
@@ -134,11 +135,18 @@ TEST(Assembler, ALostRecordNeverShiftsTimesUnsaid) {
       // The line needs some arrivals to know what is early.
       if (!m.birds[0].pose || number_of(*m.birds[0].pose) < 100) continue;
       const double off_ns = static_cast<double>(std::abs(m.acquired.ns - wire.start_of(number_of(*m.birds[0].pose))));
-      EXPECT_LT(off_ns, 1.5e6 + 1.2 * static_cast<double>(m.acquired_sigma.ns)) << seed;
+      ++(m.time_certain ? certain : uncertain);
+      if (m.time_certain) {
+        EXPECT_LT(off_ns, 0.2e6 + 4 * static_cast<double>(m.acquired_sigma.ns)) << seed;
+      } else {
+        EXPECT_LT(off_ns, 1.5e6 + 1.2 * static_cast<double>(m.acquired_sigma.ns)) << seed;
+      }
     }
     EXPECT_NEAR(static_cast<double>(assembler.counters().lost_measurements), lost, 1) << seed;
     EXPECT_GT(lost, 4);
   }
+  // What is late by about a period is in doubt, and here cuts alone make some that late.
+  EXPECT_GT(certain, 8 * uncertain);
 }
 
 TEST(Assembler, RandomDamageNeverCrashesAndNeverYieldsAWildPose) {

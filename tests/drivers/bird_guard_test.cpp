@@ -36,7 +36,7 @@ class Watch {
   }
   BirdReading see(const Record& record) {
     seconds += kPeriodS;
-    return guard_.judge(record, {static_cast<std::int64_t>(seconds * 1e9)}, Duration{200'000});
+    return guard_.judge(record, {static_cast<std::int64_t>(seconds * 1e9)}, Duration{200'000}, time_certain);
   }
   /// So many readings at a place; how many of them have a pose.
   int see_often(int count, const Vector3d& position_mm) {
@@ -46,6 +46,7 @@ class Watch {
   }
 
   double seconds = 0;
+  bool time_certain = true;
 
  private:
   BirdGuard guard_;
@@ -64,6 +65,21 @@ TEST(BirdGuard, TheFirstReadingIsConfirmedByTheNext) {
   EXPECT_TRUE(second.pose);
   EXPECT_EQ(second.doubt, "");
   EXPECT_EQ(watch.see_often(1000, kHere), 1000);
+}
+
+TEST(BirdGuard, TimesThatAreNotCertainMakeNoTrack) {
+  Watch watch;
+  const auto moving = [](double s) { return Vector3d(300 + 400 * s, 80, -40); };
+  double now = 0;
+  const auto see = [&](double by_s) { return watch.see(moving(now += by_s)); };
+  for (int i = 0; i < 20; ++i) see(kPeriodS);
+  // Measurements are lost and their times not counted: for a while readings seem to come twice as fast.
+  watch.time_certain = false;
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(see(i == 0 ? 3 * kPeriodS : kPeriodS).pose) << i;
+  // Now they are counted.
+  watch.time_certain = true;
+  watch.seconds += 2 * kPeriodS;
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(see(kPeriodS).pose) << i;
 }
 
 TEST(BirdGuard, AHandThatMovesIsNotDoubted) {
