@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <latch>
 #include <filesystem>
 #include <thread>
 
@@ -20,7 +21,7 @@ namespace {
 /// A program that listens at a socket and sends what it is given, in two halves with a pause between them.
 class Sender {
  public:
-  explicit Sender(const std::vector<std::uint8_t>& bytes)
+  explicit Sender(const std::vector<std::uint8_t>& bytes, bool in_two = false)
       : path_(std::filesystem::temp_directory_path() / ("birdseye-test-" + std::to_string(::getpid()))) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -29,11 +30,12 @@ class Sender {
     fd_ = ::socket(AF_UNIX, SOCK_STREAM, 0);
     EXPECT_EQ(::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     EXPECT_EQ(::listen(fd_, 1), 0);
+    if (!in_two) rest_.count_down();
     thread_ = std::jthread([this, bytes] {
       const int client = ::accept(fd_, nullptr, nullptr);
       const std::size_t half = bytes.size() / 2;
       (void)!::write(client, bytes.data(), half);
-      sleep_for(Duration::from_ms(60));
+      rest_.wait();
       (void)!::write(client, bytes.data() + half, bytes.size() - half);
       ::close(client);
     });
@@ -43,11 +45,14 @@ class Sender {
     ::close(fd_);
     ::unlink(path_.c_str());
   }
+  /// Of bytes in two: sends the second half.
+  void send_rest() { rest_.count_down(); }
   [[nodiscard]] CameraSettings settings() const { return {"socket:" + path_.string(), 4, 2, 25}; }
 
  private:
   std::filesystem::path path_;
   int fd_;
+  std::latch rest_{1};
   std::jthread thread_;
 };
 
@@ -82,13 +87,14 @@ DeviceTime soon() {
 }
 
 TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
-  const Sender sender(message());
+  Sender sender(message(), true);
   const auto camera = open_camera(sender.settings());
   ASSERT_TRUE(camera) << camera.error().what;
   const auto early = (*camera)->next(now() + Duration::from_ms(20));
   ASSERT_TRUE(early);
   EXPECT_FALSE(*early);
-  const auto frame = (*camera)->next(now() + Duration::from_ms(2000));
+  sender.send_rest();
+  const auto frame = (*camera)->next(soon());
   ASSERT_TRUE(frame && *frame);
   EXPECT_EQ((*frame)->sequence, 9U);
   EXPECT_TRUE((*frame)->acquired_known);
@@ -96,7 +102,7 @@ TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
   EXPECT_EQ((*frame)->acquired_sigma.ns, 5);
   EXPECT_EQ((*frame)->width_px, 4);
   EXPECT_EQ((*(*frame)->rgb)[23], 23);
-  EXPECT_EQ((*camera)->next(now() + Duration::from_ms(2000)).error().code, Errc::disconnected);
+  EXPECT_EQ((*camera)->next(soon()).error().code, Errc::disconnected);
 }
 
 TEST(SocketCamera, RefusesWhatIsNoFrame) {
