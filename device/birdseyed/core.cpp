@@ -41,6 +41,7 @@ Core::Counters Core::counters() const {
   if (assembler_) add(counters.tracker, assembler_->counters());
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
+  counters.frames_repeated = frames_repeated_;
   counters.clock_events = counters.tracker.restarts + frame_clock_.events();
   counters.camera_drift_ppm = frame_clock_.drift_ppm();
   counters.tracker_time_sigma_ms = time_sigma_.seconds() * 1e3;
@@ -107,6 +108,10 @@ void Core::publish(const Measurement& measurement) {
 
 void Core::note(const FrameCame& came) {
   const drivers::Frame& frame = came.frame;
+  if (next_sequence_ && frame.sequence + 1 == *next_sequence_) {  // nothing new, whatever its pixels are
+    ++frames_repeated_;
+    return;
+  }
   if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
