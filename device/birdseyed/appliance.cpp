@@ -105,6 +105,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.clock_events = counters.clock_events;
   health.frames = counters.frames;
   health.frames_dropped = counters.frames_lost;
+  health.frames_repeated = counters.frames_repeated;
   health.messages_shed = sent.messages_shed;
   health.clients = sent.clients;
   health.requests_refused = sent.requests_refused;

@@ -41,6 +41,7 @@ Core::Counters Core::counters() const {
   if (assembler_) add(counters.tracker, assembler_->counters());
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
+  counters.frames_repeated = frames_repeated_;
   counters.clock_events = clock_events_ + frame_clock_.events();
   if (assembler_) {
     counters.clock_events += assembler_->clock_events();
@@ -114,6 +115,10 @@ void Core::publish(const Measurement& measurement) {
 
 void Core::note(const FrameCame& came) {
   const drivers::Frame& frame = came.frame;
+  if (next_sequence_ && frame.sequence + 1 == *next_sequence_) {  // nothing new, whatever its pixels are
+    ++frames_repeated_;
+    return;
+  }
   if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;

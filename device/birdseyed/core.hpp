@@ -35,7 +35,7 @@ class Core {
 
   struct Counters {
     drivers::minibird::MiniBirdCounters tracker;
-    std::uint64_t frames = 0, frames_lost = 0, clock_events = 0;
+    std::uint64_t frames = 0, frames_lost = 0, frames_repeated = 0, clock_events = 0;
     double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   };
   [[nodiscard]] Counters counters() const;
@@ -70,7 +70,7 @@ class Core {
   PoseHistory scope_;
   FrameClock frame_clock_;
   std::deque<drivers::Frame> frames_;  ///< waiting for poses
-  std::uint64_t frames_seen_ = 0, frames_lost_ = 0;
+  std::uint64_t frames_seen_ = 0, frames_lost_ = 0, frames_repeated_ = 0;
   std::optional<std::uint64_t> next_sequence_;
   Duration time_sigma_;
   std::string status_text_ = "never said";

@@ -41,11 +41,13 @@ class FrameClock {
   [[nodiscard]] std::uint64_t events() const { return events_; }
 
  private:
+  ClockLine::Tick push(std::optional<ClockLine>& line, DeviceTime at, std::int64_t number);
   [[nodiscard]] Duration period() const { return Duration::from_seconds(1 / settings_.rate_hz); }
 
   Settings settings_;
   Duration exposure_;
-  std::optional<ClockLine> line_;
+  std::optional<ClockLine> line_;    ///< under the arrivals of frames without a stamp
+  std::optional<ClockLine> stamps_;  ///< under the stamps: shows that they jump
   std::optional<StrobeMatcher> strobe_;
   std::uint64_t events_ = 0;
 };

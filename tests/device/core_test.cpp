@@ -197,6 +197,30 @@ TEST(Core, AFrameWaitsForPosesNoLongerThanItMay) {
   EXPECT_FALSE(core.waiting());
 }
 
+TEST(Core, AFrameThatCameBeforeIsCountedAndNotSentAgain) {
+  Core core({});
+  wire::Unpacker unpacker;
+  core.take(camera_runs(0));
+  std::vector<std::uint64_t> sent;
+  for (const std::uint64_t number : {0U, 1U, 1U, 2U, 2U, 0U}) {  // the last: it counts anew
+    for (const auto& image : only<wire::VideoFrame>(unpacked(core.take(FrameCame{frame(number, 1, 1.02)}), unpacker)))
+      sent.push_back(image.info.sequence);
+  }
+  EXPECT_EQ(sent, (std::vector<std::uint64_t>{0, 1, 2, 0}));
+  EXPECT_EQ(core.counters().frames_repeated, 2U);
+  EXPECT_EQ(core.counters().frames, 4U);
+}
+
+TEST(Core, StampsThatJumpAreAnEventOfTheClock) {
+  Core core({});
+  core.take(camera_runs(0));
+  for (std::uint64_t n = 0; n < 100; ++n) {
+    const double taken = static_cast<double>(n) / 25;
+    core.take(FrameCame{frame(n, n < 50 ? taken : taken + 0.02, taken + 0.03)});
+  }
+  EXPECT_GT(core.counters().clock_events, 0U);
+}
+
 TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
   auto events = session(4, 3);
   const auto gone = [](const RawEvent& e) { return std::holds_alternative<TrackerBytes>(e) && time_of(e) > at(2); };

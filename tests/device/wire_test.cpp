@@ -97,6 +97,16 @@ TEST(Wire, BirdsStatusAndHealth) {
   EXPECT_EQ(std::get<Health>(**ends.client->next(Clock::now() + seconds(5))).phase_errors, 2U);
 }
 
+TEST(Wire, AMeasurementWithoutAnyPoseComesEmpty) {
+  const Ends ends = connected();
+  ends.server->publish(pack(Birds{{7'000'000'000}, {}}));
+  const auto event = ends.client->next(Clock::now() + seconds(5));
+  ASSERT_TRUE(event) << event.error().what;
+  const auto birds = std::get<Birds>(**event);
+  EXPECT_EQ(birds.acquired.ns, 7'000'000'000);
+  EXPECT_TRUE(birds.birds.empty());
+}
+
 TEST(Wire, AClientThatDoesNotReadLosesWholeFramesOnly) {
   const Ends ends = connected();
   for (std::uint64_t i = 0; i < 60; ++i) ends.server->publish(pack(frame(i, 768, 576)));

@@ -52,15 +52,18 @@ TEST(Appliance, APortInUseIsNamed) {
                   {"port " + port, "in use"});
 }
 
-TEST(Appliance, ATrackerThatNeverAnswersIsNamed) {
+TEST(Appliance, AProbeNamesEachInstrumentThatCannotBeUsed) {
   const Scratch scratch;
   const auto terminal = hw_sim::PseudoTerminal::open(scratch / "tty");
   ASSERT_TRUE(terminal) << terminal.error().what;
   const SilentCamera camera((scratch / "camera").string());
-  expect_one_line(
-      run("birdseyed", "--config " + scratch.file("c.toml", config((scratch / "tty").string(),
-                                                                   "socket:" + (scratch / "camera").string(), 0))),
-      {"tty", "does not answer", "power, cable"});
+  const std::string path =
+      scratch.file("c.toml", config((scratch / "tty").string(), "socket:" + (scratch / "camera").string(), 0));
+  const auto result = run("birdseyed", "--probe --config " + path);
+  EXPECT_EQ(result.code, 2) << result.output;
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 2) << result.output;
+  for (const char* words : {"tty", "does not answer", "power, cable", "the camera sends no frames"})
+    EXPECT_NE(result.output.find(words), std::string::npos) << result.output;
 }
 
 }  // namespace

@@ -70,6 +70,15 @@ class Child {
     }
     return -1;
   }
+  /// Takes what it has said already, without waiting for more.
+  void catch_up() {
+    pollfd entry{output_fd_, POLLIN, 0};
+    while (::poll(&entry, 1, 0) > 0 && read_more(Clock::now() + std::chrono::seconds(1))) {
+    }
+  }
+  void signal(int number) const {
+    if (pid_ > 0) ::kill(pid_, number);
+  }
   /// Takes what comes until nothing came for that long: it has digested what it was sent.
   void until_quiet(std::chrono::milliseconds quiet) {
     while (read_more(Clock::now() + quiet)) {
