@@ -150,7 +150,8 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
     return MaybeTold(Event(*std::move(frame)));
   }
   if (birds) {
-    if (body.empty()) return MaybeTold(Event(Birds{header->time, {}}));  // no bird gave a pose; the library refuses that
+    if (body.empty())
+      return MaybeTold(Event(Birds{header->time, {}}));  // no bird gave a pose; the library refuses that
     if (body.size() % IGTL_TDATA_ELEMENT_SIZE != 0) return unpack_failed(type);  // the library would read on
     const auto message = unpacked<igtl::TrackingDataMessage>(bytes);
     if (message == nullptr) return unpack_failed(type);
