@@ -17,9 +17,10 @@ namespace {
 constexpr double kSigmas = 6;
 constexpr double kQuantumMm = 0.06;  // half a count in 914 mm, per axis, and rounding
 constexpr double kSpeedMmS = 200 * std::numbers::pi;
-constexpr double kTimeLimitS = 0.010;    // of [pose] max_time_sigma_ms: what TDATA promises
-constexpr double kRecoversWithinS = 15;  // a busy machine; the table tells what it was
-constexpr double kPredictedWorse = 3;    // a line through two readings, one of them wrong, 30 ms on
+constexpr double kTimeLimitS = 0.010;             // of [pose] max_time_sigma_ms: what TDATA promises
+constexpr double kMachineMm = kSpeedMmS * 0.005;  // a simulator that is not let run delivers late, unknown to anybody
+constexpr double kRecoversWithinS = 15;           // a busy machine; the table tells what it was
+constexpr double kPredictedWorse = 3;             // a line through two readings, one of them wrong, 30 ms on
 constexpr double kHoleS = 0.1;
 constexpr double kSteadyS = 0.5;
 
@@ -169,6 +170,7 @@ FaultRow judge(const FaultCase& fault, const FaultSpan& span, std::int64_t until
   row.how = fault.parameters.empty() ? fmt::format("{} s", fault.for_s)
                                      : fmt::format("{} s, {}", fault.for_s, fault.parameters);
   row.seen = text_of(fault.signs, fault.note);
+  if (!fault.awaits.empty()) row.seen += ". **Not met yet**: " + fault.awaits;
   const auto complain = [&](const std::string& what) { problems.push_back(row.fault + ": " + what); };
 
   std::optional<wire::Health> before;
@@ -195,7 +197,7 @@ FaultRow judge(const FaultCase& fault, const FaultSpan& span, std::int64_t until
       row.worst_mm = pose->off_mm;
       row.promised_mm = pose->bound_mm;
     }
-    if (pose->off_mm > pose->bound_mm && !fault.poses_lie) {
+    if (pose->off_mm > pose->bound_mm + kMachineMm && !fault.poses_lie) {
       complain(fmt::format("{} published {:.1f} mm off, more than the {:.1f} mm it promises, {:.3f} s after the begin",
                            std::holds_alternative<wire::Birds>(each.event) ? "TDATA" : "a frame's pose", pose->off_mm,
                            pose->bound_mm, seconds(pose->acquired.ns - span.begin_ns)));
@@ -211,14 +213,16 @@ FaultRow judge(const FaultCase& fault, const FaultSpan& span, std::int64_t until
   const auto tracking = recovery_s(seen, span.end_ns, until_ns, true);
   if (frames && tracking) row.recovery_s = std::max(0.0, std::max(*frames, *tracking) - fault.own_s);
   if (!row.recovery_s || *row.recovery_s > kRecoversWithinS) {
-    complain(fmt::format("not good again within {:.1f} s: frames {}, tracking {}", seconds(until_ns - span.end_ns),
-                         frames.value_or(-1), tracking.value_or(-1)));
+    row.slow.push_back(row.fault + fmt::format(": not good again within {:.1f} s: frames {}, tracking {}",
+                                               seconds(until_ns - span.end_ns), frames.value_or(-1),
+                                               tracking.value_or(-1)));
   }
   const double expected =
       (of_tracker ? FaultRig::kFrameRateHz : FaultRig::kTrackerRateHz) * seconds(until_ns - span.begin_ns);
   row.others_percent = std::min(100.0, 100 * others / expected);
   if (*row.others_percent < 90) {
-    complain(fmt::format("of the other instrument only {} of {:.0f} came meanwhile", others, expected));
+    row.slow.push_back(row.fault +
+                       fmt::format(": of the other instrument only {} of {:.0f} came meanwhile", others, expected));
   }
   return row;
 }

@@ -44,6 +44,7 @@ struct FaultRow {
   std::string fault, how, seen;
   std::optional<double> worst_mm, promised_mm;  ///< the published pose that came nearest to breaking its promise
   std::optional<double> recovery_s, others_percent;
+  std::vector<std::string> slow;  ///< complaints that may be of the machine
 };
 
 std::string script_of(const std::vector<FaultCase>& cases, double first_s, const std::string& of);
@@ -53,7 +54,7 @@ std::string text_of(const std::vector<Sign>& signs, const std::string& note);
 bool stood_still(const std::vector<Seen>& seen, const FaultSpan& span, std::int64_t until_ns, bool of_tracker);
 
 /// Holds what was said while a fault lasted, and after it until until_ns, against what must be; complaints go to
-/// problems.
+/// problems, those about how long things took to the row's.
 FaultRow judge(const FaultCase& fault, const FaultSpan& span, std::int64_t until_ns, bool of_tracker,
                std::int64_t circle_zero_ns, const std::vector<Seen>& seen, std::vector<std::string>& problems);
 
