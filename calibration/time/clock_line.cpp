@@ -8,6 +8,7 @@ namespace birdseye {
 namespace {
 
 /// What chance explains only once in e^9 times is not to be relied on.
+constexpr std::int64_t kGiveUpNs = 1'800'000'000;  // a doubt that lasts
 constexpr double kDoubted = 9, kSafeSigmas = 16;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) {
@@ -158,9 +159,37 @@ ClockLine::Tick ClockLine::place(DeviceTime arrived) {
   tick.index = index_;
   tick.certain =
       certain && since_begin_ > settings_.slip_confirms && static_cast<double>(tick.late_by.ns) <= may_be_the_next();
+  look_for_a_way_out(arrival, tick.certain);
   const double sigma = sigma_at(index_);
   tick.sigma = {std::llround(tick.certain ? sigma : std::max(sigma, std::abs(static_cast<double>(tick.late_by.ns))))};
   return tick;
+}
+
+/// What has been in doubt for long will not be made out: the line begins anew from here, whatever it was.
+void ClockLine::look_for_a_way_out(const Arrival& arrival, bool certain) {
+  if (certain || !doubted_since_ns_) {
+    doubted_since_ns_.reset();
+    if (!certain) doubted_since_ns_ = arrival.arrived_ns;
+    return;
+  }
+  if (arrival.arrived_ns - *doubted_since_ns_ < std::max(kGiveUpNs, 24 * settings_.period.ns)) return;
+  report({ClockEvent::Kind::restart, {arrival.arrived_ns}, 0, 0});
+  ++restarts_;
+  doubted_since_ns_ = arrival.arrived_ns;
+  blocks_.clear();
+  recent_.clear();
+  past_drifts_.clear();
+  change_.reset();
+  suspect_from_.reset();
+  slip_from_.reset();
+  skipped_ = {};
+  span_ = 1;
+  since_begin_ = 1;
+  prior_ = {0, settings_.drift_sigma_ppm * 1e3};
+  calm_drifts_.fill({index_, prior_.slope, prior_.sigma});
+  add(arrival);
+  refit();
+  remember(arrival);
 }
 
 void ClockLine::add(const Arrival& arrival) {

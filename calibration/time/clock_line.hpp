@@ -112,6 +112,7 @@ class ClockLine {
   void add(const Arrival& arrival);
   void refit();
   void remember(const Arrival& arrival);
+  void look_for_a_way_out(const Arrival& arrival, bool certain);
   void tally(double late_ns);
   void release();
   bool look_for_early(const Arrival& arrival);
@@ -136,6 +137,7 @@ class ClockLine {
   std::deque<Block> blocks_;
   std::deque<Arrival> recent_;
   std::size_t since_begin_ = 0;
+  std::optional<std::int64_t> doubted_since_ns_;  ///< the first of the arrivals of late that were not certain
   EdgePrior prior_;
   EdgeFit fit_;
   std::int64_t fit_index_ = 0;
