@@ -96,7 +96,9 @@ void StrobeMatcher::learn() {
   const auto period = static_cast<double>(settings_.period.ns), least = static_cast<double>(settings_.least_delay.ns);
   int fewest = std::numeric_limits<int>::max(), second = fewest;
   double best = 0;
-  for (double delay = *phase; delay <= static_cast<double>(settings_.most_delay.ns); delay += period) {
+  const auto periods = static_cast<int>(std::floor((static_cast<double>(settings_.most_delay.ns) - *phase) / period));
+  for (int n = 0; n <= periods; ++n) {
+    const double delay = *phase + n * period;
     if (delay < least) continue;
     const int found = contradictions(delay);
     if (found < fewest) {

@@ -88,7 +88,8 @@ void MeasurementAssembler::finish(std::vector<Measurement>& out) {
   Measurement measurement;
   measurement.acquired = tick.time - layout_.delay;
   measurement.acquired_sigma = tick.sigma;
-  // An arrival near its tick bounds the tick's error, whatever is undecided about the count: its sigma says by how much.
+  // An arrival near its tick bounds the tick's error, whatever is undecided about the count: its sigma says by how
+  // much.
   measurement.time_certain = tick.certain || tick.sigma.ns <= period_.ns * 6 / 10;
   measurement.arrived = cycle_->arrived;
   for (std::size_t bird = 0; bird < layout_.birds.size(); ++bird) {

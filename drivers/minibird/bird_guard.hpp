@@ -48,7 +48,7 @@ class BirdGuard {
   Plausibility limits_;
   std::deque<Sample> track_;  ///< where the sensor has been, newest last; positions are put back where they flipped
                               ///< from. The times of all of them are certain, or of none
-  double noise_mm2_ = 0;             ///< mean square of the readings about the line through those before
+  double noise_mm2_ = 0;      ///< mean square of the readings about the line through those before
   std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
   int agreeing_ = 0;
   std::vector<std::int16_t> last_words_;

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cstring>
-#include <latch>
 #include <filesystem>
+#include <latch>
 #include <thread>
 
 #include "drivers/io/monotonic.hpp"
