@@ -131,7 +131,7 @@ void Appliance::report_health(const std::stop_token& stop) {
   Core::Counters before;
   DeviceTime began = now();
   while (!stop.stop_requested()) {
-    wait(kHealthEvery, stop);
+    drivers::sleep_for(kHealthEvery, stop);
     Core::Counters counters;
     {
       const std::lock_guard lock(told_mutex_);

@@ -63,7 +63,7 @@ void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, c
           {.state = lost.code == Errc::timeout ? InstrumentState::silent : InstrumentState::absent, .text = lost.what});
     }
     camera = Error{};  // closed before it is looked for again
-    wait(kLookAgain, stop);
+    drivers::sleep_for(kLookAgain, stop);
   }
 }
 

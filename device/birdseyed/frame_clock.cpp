@@ -2,7 +2,7 @@
 
 namespace birdseye::device {
 
-FrameClock::FrameClock(const Settings& settings) : settings_(settings), exposure_(settings.exposure) {
+FrameClock::FrameClock(const Settings& settings) : settings_(settings) {
   restart(settings.rate_hz, settings.exposure);
 }
 

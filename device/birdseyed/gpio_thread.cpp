@@ -67,7 +67,7 @@ void run_gpio(const GpioConfig& config, const std::atomic<ApplianceState>& state
       post.tell({.state = InstrumentState::absent, .text = lines.error().what});
     }
     lines = Error{};
-    wait(kLookAgain, stop);
+    drivers::sleep_for(kLookAgain, stop);
   }
 }
 

@@ -25,9 +25,4 @@ void InstrumentPost::alive() {
   alive_ns_ = drivers::now().ns;
 }
 
-void wait(Duration span, const std::stop_token& stop) {
-  for (const DeviceTime until = drivers::now() + span; drivers::now() < until && !stop.stop_requested();)
-    drivers::sleep_for(std::min(until - drivers::now(), Duration::from_ms(20)));
-}
-
 }  // namespace birdseye::device

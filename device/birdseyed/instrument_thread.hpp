@@ -29,7 +29,5 @@ class InstrumentPost {
 
 inline constexpr Duration kPatience = Duration::from_ms(100);   ///< how soon a thread sees that it shall stop
 inline constexpr Duration kLookAgain = Duration::from_ms(400);  ///< for an instrument that is not there
-/// Sleeps for span, or until stop is requested.
-void wait(Duration span, const std::stop_token& stop);
 
 }  // namespace birdseye::device

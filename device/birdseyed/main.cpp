@@ -16,6 +16,7 @@
 #include "device/birdseyed/probe.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
+#include "drivers/io/monotonic.hpp"
 
 namespace {
 
@@ -93,7 +94,7 @@ int serve(const fs::path& path, Signals& signals) {
   device::notify_ready(appliance->summary());
   const auto stop = signals.stop();
   while (!stop.stop_requested() && appliance) {
-    device::wait(Duration::from_ms(500), stop);
+    drivers::sleep_for(Duration::from_ms(500), stop);
     if (signals.take_reload()) reload(path, *config, **server, appliance);
     if (!appliance) break;
     if (appliance->alive()) device::notify_alive();

@@ -18,7 +18,7 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
     if (!*event) break;
     const DeviceTime at = time_of(**event);
     if (!shift) shift = drivers::now() - at;
-    wait(at + *shift - drivers::now(), stop);
+    drivers::sleep_for(at + *shift - drivers::now(), stop);
     for (const wire::Packet& packet : core.take(**event)) server.publish(packet);
   }
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());

@@ -55,7 +55,7 @@ void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::s
     if (stop.stop_requested()) return;
     if (!tracker) {
       post.tell({.state = InstrumentState::absent, .text = tracker.error().what});
-      wait(kLookAgain, stop);
+      drivers::sleep_for(kLookAgain, stop);
       continue;
     }
     post.tell({.state = InstrumentState::running,

@@ -8,7 +8,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
 
-/// The bytes that every OpenIGTLink message has, for the files that pack and unpack; not part of the wire's interface.
+/// The bytes that every OpenIGTLink message has, and its checksum.
 namespace birdseye::wire {
 
 inline constexpr std::size_t kHeaderBytes = 58;

@@ -30,4 +30,13 @@ void sleep_for(Duration span) {
   nanosleep(&time, nullptr);
 }
 
+bool sleep_for(Duration span, const std::stop_token& stop) {
+  const DeviceTime until = now() + span;
+  while (now() < until) {
+    if (stop.stop_requested()) return false;
+    sleep_for(std::min(until - now(), Duration::from_ms(20)));
+  }
+  return true;
+}
+
 }  // namespace birdseye::drivers

@@ -36,11 +36,7 @@ Error Dialogue::stopped() const {
 }
 
 Result<void> Dialogue::pause(Duration span) {
-  const DeviceTime until = now() + span;
-  while (now() < until) {
-    if (stop_.stop_requested()) return stopped();
-    sleep_for(std::min(until - now(), kLook));
-  }
+  if (!sleep_for(span, stop_)) return stopped();
   return {};
 }
 

@@ -41,8 +41,8 @@ struct BirdReading {
 struct Measurement {
   DeviceTime acquired;
   Duration acquired_sigma;
-  /// False at the start, and while measurements may have been lost uncounted or the unit's beat may have moved:
-  /// acquired may then be off by far more than its sigma.
+  /// False while measurements may have been lost uncounted, or the unit's beat may have moved, and the arrival does not
+  /// bound the time: acquired may then be off by far more than its sigma.
   bool time_certain = true;
   DeviceTime arrived;              ///< of its last byte
   std::vector<BirdReading> birds;  ///< by address, 1 first

@@ -88,7 +88,7 @@ class Listener {
 };
 
 /// clients that take everything; then, where they are wanted, one that takes poses alone.
-Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int clients, bool poses_alone = false) {
+Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int clients, bool poses_alone) {
   std::vector<std::unique_ptr<Listener>> listeners;
   for (int i = 0; i < clients; ++i) {
     auto client = wire::Client::connect("127.0.0.1", rig.port(), Clock::now() + seconds(15));
@@ -109,6 +109,19 @@ Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int 
   }
   return listeners;
 }
+
+/// The instruments, birdseyed, and those who listen to it.
+struct Session {
+  static Result<Session> start(const DeviceRigSettings& settings, int clients, bool poses_alone = false) {
+    auto rig = DeviceRig::start(settings);
+    if (!rig) return rig.error();
+    auto listeners = listen(**rig, clients, poses_alone);
+    if (!listeners) return listeners.error();
+    return Session{*std::move(rig), *std::move(listeners)};
+  }
+  std::unique_ptr<DeviceRig> rig;
+  std::vector<std::unique_ptr<Listener>> listeners;
+};
 
 void sleep_unless_interrupted(double s) {
   for (const auto begin = Clock::now(); seconds_since(begin) < s && !interrupted();)
@@ -168,28 +181,27 @@ std::uint64_t holes(const std::vector<Listener::Heard>& frames) {
 Result<void> measure_load(const Options& options, const std::filesystem::path& folder, nlohmann::json& out) {
   DeviceRigSettings settings;
   settings.folder = folder / "load";
-  auto rig = DeviceRig::start(settings);
-  if (!rig) return rig.error();
-  auto listeners = listen(**rig, options.clients, true);
-  if (!listeners) return listeners.error();
+  auto session = Session::start(settings, options.clients, true);
+  if (!session) return session.error();
+  const DeviceRig& rig = *session->rig;
   sleep_unless_interrupted(2);
   const auto begin = Clock::now();
-  const double cpu_before_s = (*rig)->cpu_s(), memory_before_mb = (*rig)->resident_mb();
+  const double cpu_before_s = rig.cpu_s(), memory_before_mb = rig.resident_mb();
   double most_mb = memory_before_mb;
   while (seconds_since(begin) < options.seconds && !interrupted()) {
     sleep_unless_interrupted(1);
-    most_mb = std::max(most_mb, (*rig)->resident_mb());
+    most_mb = std::max(most_mb, rig.resident_mb());
   }
   const double elapsed_s = seconds_since(begin);
-  const double cpu_percent = 100 * ((*rig)->cpu_s() - cpu_before_s) / elapsed_s;
-  const double memory_mb = (*rig)->resident_mb();
+  const double cpu_percent = 100 * (rig.cpu_s() - cpu_before_s) / elapsed_s;
+  const double memory_mb = rig.resident_mb();
   std::uint64_t frames_lost = 0;
-  for (auto& listener : *listeners) {
+  for (auto& listener : session->listeners) {
     listener->stop();
     if (listener->ended) return *listener->ended;
     frames_lost += holes(listener->frames);
   }
-  const Listener& first = *listeners->front();
+  const Listener& first = *session->listeners.front();
   std::vector<double> p99_tracker, p99_beside, p99_frame;
   for (std::size_t i = 3; i < first.healths.size(); ++i) {
     p99_tracker.push_back(first.healths[i].latency_ms_p99_tracker);
@@ -231,14 +243,13 @@ Result<void> measure_time(const Options& options, const std::filesystem::path& f
   settings.jitter_ms = 5;
   settings.drift_ppm = 50;
   settings.stamps = false;
-  auto rig = DeviceRig::start(settings);
-  if (!rig) return rig.error();
-  auto listeners = listen(**rig, 1);
-  if (!listeners) return listeners.error();
+  auto session = Session::start(settings, 1);
+  if (!session) return session.error();
+  const DeviceRig& rig = *session->rig;
   sleep_unless_interrupted(std::max(10.0, options.seconds / 2));
-  Listener& listener = *listeners->front();
+  Listener& listener = *session->listeners.front();
   listener.stop();
-  const auto tracker = (*rig)->tracker_truth(), camera = (*rig)->camera_truth();
+  const auto tracker = rig.tracker_truth(), camera = rig.camera_truth();
   if (!tracker || !camera) return tracker ? camera.error() : tracker.error();
   constexpr double kTurn_s = 2, kQuantum_s = 0.00005;  // half a count of 0.11 mm at 628 mm/s
   double squares = 0;
@@ -281,17 +292,16 @@ Result<void> measure_recovery(const std::filesystem::path& folder, nlohmann::jso
       "for_s = 1\n[[fault]]\nname = \"hemisphere_flip\"\nat_s = 28\nfor_s = 1\n";
   settings.camera_faults =
       "[[fault]]\nname = \"silence\"\nat_s = 8\nfor_s = 1\n[[fault]]\nname = \"unplug\"\nat_s = 16\nfor_s = 1\n";
-  auto rig = DeviceRig::start(settings);
-  if (!rig) return rig.error();
-  auto listeners = listen(**rig, 1);
-  if (!listeners) return listeners.error();
+  auto session = Session::start(settings, 1);
+  if (!session) return session.error();
+  const DeviceRig& rig = *session->rig;
   sleep_unless_interrupted(33);
-  Listener& listener = *listeners->front();
+  Listener& listener = *session->listeners.front();
   listener.stop();
   double worst_s = 0;
   out["recovery_s"] = nlohmann::json::object();
   const std::set<std::string> of_camera{"silence"};
-  for (const FaultEvent& fault : (*rig)->faults()) {
+  for (const FaultEvent& fault : rig.faults()) {
     if (fault.begins) continue;
     const auto after = [&](const auto& times, const auto& time_of) {
       for (const auto& one : times) {

@@ -53,12 +53,13 @@ Result<std::unique_ptr<DeviceRig>> DeviceRig::start(const DeviceRigSettings& set
   const auto port = free_port();
   if (!port) return port.error();
   std::unique_ptr<DeviceRig> rig(new DeviceRig(settings, *port));
-  // A Unix socket's path is bounded to about a hundred bytes.
-  rig->rendezvous_ = std::filesystem::temp_directory_path() / fmt::format("birdseye-bench-{}", ::getpid());
+  auto rendezvous = RendezvousFolder::make();
+  if (!rendezvous) return std::move(rendezvous).error();
+  rig->rendezvous_ = *std::move(rendezvous);
   std::error_code ignored;
-  std::filesystem::create_directories(rig->rendezvous_, ignored);
   std::filesystem::create_directories(settings.folder, ignored);
-  const std::string tty = (rig->rendezvous_ / "tracker").string(), socket = (rig->rendezvous_ / "camera").string();
+  const std::string tty = (rig->rendezvous_->path() / "tracker").string(),
+                    socket = (rig->rendezvous_->path() / "camera").string();
   const std::string size = fmt::format("{}x{}", settings.width_px, settings.height_px);
   const std::string noise = fmt::format("{}", settings.noise_mm);
   if (auto started = rig->start_instrument("minibird", {"--tty", tty, "--boot-ms", "0", "--position-noise-mm", noise},
@@ -88,8 +89,6 @@ DeviceRig::~DeviceRig() {
   for (std::jthread& listener : listeners_) listener.join();
   if (appliance_) appliance_->stop();
   for (auto& instrument : instruments_) instrument->stop();
-  std::error_code ignored;
-  std::filesystem::remove_all(rendezvous_, ignored);
 }
 
 void DeviceRig::listen(ChildProcess& child, const std::stop_token& stop) {

@@ -12,6 +12,7 @@
 #include "calibration/time/clock.hpp"
 #include "device/wire/client.hpp"
 #include "host/app/child_process.hpp"
+#include "host/app/local_programs.hpp"
 
 namespace birdseye::host {
 
@@ -64,7 +65,7 @@ class DeviceRig {
 
   DeviceRigSettings settings_;
   int port_;
-  std::filesystem::path rendezvous_;
+  std::unique_ptr<RendezvousFolder> rendezvous_;
   std::vector<std::unique_ptr<ChildProcess>> instruments_;
   std::unique_ptr<ChildProcess> appliance_;
   mutable std::mutex mutex_;

@@ -1,11 +1,11 @@
 #include "host/app/local_programs.hpp"
 
 #include <netinet/in.h>
+#include <stdlib.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
 
 namespace birdseye::host {
 
@@ -27,6 +27,17 @@ Result<int> free_port() {
   if (fd >= 0) ::close(fd);
   if (!bound) return Error{Errc::in_use, "127.0.0.1: no TCP port is free", errno};
   return static_cast<int>(ntohs(address.sin_port));
+}
+
+Result<std::unique_ptr<RendezvousFolder>> RendezvousFolder::make() {
+  std::string path = (std::filesystem::temp_directory_path() / "birdseye-XXXXXX").string();
+  if (::mkdtemp(path.data()) == nullptr) return Error{Errc::unreadable, path + ": cannot be created", errno};
+  return std::unique_ptr<RendezvousFolder>(new RendezvousFolder(path));
+}
+
+RendezvousFolder::~RendezvousFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
 }
 
 }  // namespace birdseye::host

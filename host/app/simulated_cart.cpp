@@ -96,14 +96,10 @@ Result<void> SimulatedCart::make_patient(const SimulatedCartSettings& settings) 
 
 Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartSettings& settings) {
   const std::filesystem::path& folder = settings.folder;
-  // A Unix socket's path is bounded to about a hundred bytes, which a checkout deep in a tree can exceed.
-  auto rendezvous = std::make_unique<TemporaryFolder>();
-  rendezvous->path = std::filesystem::temp_directory_path() / fmt::format("birdseye-demo-{}", ::getpid());
-  std::error_code error;
-  std::filesystem::create_directories(rendezvous->path, error);
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be created", rendezvous->path.string())};
-  const std::filesystem::path socket = rendezvous->path / "camera";
-  const std::filesystem::path tty = rendezvous->path / "tracker";
+  auto rendezvous = RendezvousFolder::make();
+  if (!rendezvous) return std::move(rendezvous).error();
+  const std::filesystem::path socket = (*rendezvous)->path() / "camera";
+  const std::filesystem::path tty = (*rendezvous)->path() / "tracker";
 
   const Result<int> port = free_port();
   if (!port) return port.error();
@@ -146,14 +142,9 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (!appliance) return std::move(appliance).error();
 
   std::unique_ptr<SimulatedCart> cart(new SimulatedCart(std::move(*simulator), std::move(*sheet), *port));
-  cart->rendezvous_ = std::move(rendezvous);
+  cart->rendezvous_ = *std::move(rendezvous);
   cart->appliance_ = std::make_unique<ChildProcess>(std::move(*appliance));
   return cart;
-}
-
-SimulatedCart::TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  if (!path.empty()) std::filesystem::remove_all(path, ignored);
 }
 
 SimulatedCart::SimulatedCart(ChildProcess simulator, CartSheet sheet, int port)

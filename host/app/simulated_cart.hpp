@@ -13,6 +13,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
 #include "host/app/child_process.hpp"
+#include "host/app/local_programs.hpp"
 
 namespace birdseye::host {
 
@@ -61,15 +62,10 @@ class SimulatedCart {
   Result<void> finish(std::chrono::steady_clock::time_point deadline);
 
  private:
-  /// For the socket and the pseudo-terminal's name; removed with its owner.
-  struct TemporaryFolder {
-    std::filesystem::path path;
-    ~TemporaryFolder();
-  };
   SimulatedCart(ChildProcess simulator, CartSheet sheet, int port);
   void listen(const std::stop_token& stop);
 
-  std::unique_ptr<TemporaryFolder> rendezvous_;
+  std::unique_ptr<RendezvousFolder> rendezvous_;
   ChildProcess simulator_;
   std::unique_ptr<ChildProcess> appliance_;
   CartSheet sheet_;

@@ -6,11 +6,10 @@
 
 #include "device/birdseyed/event_queue.hpp"
 #include "device/birdseyed/recording.hpp"
-#include "device/wire/igtl_bytes.hpp"
-#include "device/wire/unpacker.hpp"
 #include "drivers/io/monotonic.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/tracker_bytes.hpp"
+#include "tests/support/wire_messages.hpp"
 
 namespace birdseye::device {
 namespace {
@@ -79,14 +78,10 @@ std::vector<RawEvent> session(double seconds, unsigned seed) {
 std::vector<wire::Event> unpacked(const std::vector<wire::Packet>& packets, wire::Unpacker& unpacker) {
   std::vector<wire::Event> events;
   for (const wire::Packet& packet : packets) {
-    const auto bytes = packet.bytes();
-    for (std::size_t from = 0; from < bytes.size();) {
-      const auto rest = std::span(bytes).subspan(from);
-      const std::size_t size = wire::kHeaderBytes + static_cast<std::size_t>(*wire::body_bytes(rest));
-      auto told = unpacker.push(rest.first(size));
-      EXPECT_TRUE(told) << (told ? "" : told.error().what);
+    for (const auto& message : birdseye::testing::messages_of(packet)) {
+      auto told = unpacker.push(message);
+      EXPECT_TRUE(told);
       if (told && *told) events.push_back(std::get<wire::Event>(**told));
-      from += size;
     }
   }
   return events;

@@ -1,7 +1,6 @@
 // What nobody sane would send: every message damaged in every way that seeds can think of, at both ends of the wire.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <igtl_util.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -12,28 +11,19 @@
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/server.hpp"
+#include "tests/support/wire_messages.hpp"
 
 namespace birdseye::wire {
 namespace {
 
+using birdseye::testing::made_plausible;
+using birdseye::testing::messages_of;
 using Bytes = std::vector<std::uint8_t>;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr std::size_t kTypeAt = 2, kDeviceAt = 14, kBodySizeAt = 42, kChecksumAt = 50;
-
-void put_big_endian(Bytes& message, std::size_t at, std::uint64_t value) {
-  for (std::size_t i = 0; i < 8; ++i) message[at + i] = static_cast<std::uint8_t>(value >> (56 - 8 * i));
-}
-
-/// Body size and checksum made to fit what is there: only what the body says can still betray it.
-Bytes made_plausible(Bytes message) {
-  const std::size_t body = message.size() - kHeaderBytes;
-  put_big_endian(message, kBodySizeAt, body);
-  put_big_endian(message, kChecksumAt, crc64(message.data() + kHeaderBytes, body, 0));
-  return message;
-}
 
 /// One of every kind that the appliance sends, each a whole message of its own.
 std::vector<Bytes> one_of_each() {
@@ -48,13 +38,7 @@ std::vector<Bytes> one_of_each() {
                                     pack(Status{false, "the camera has gone"}, {5}), pack(Health{}, {5})};
   std::vector<Bytes> messages;
   for (const Packet& packet : packets) {
-    const Bytes bytes = packet.bytes();
-    for (std::size_t at = 0; at < bytes.size();) {
-      const std::span<const std::uint8_t> rest = std::span(bytes).subspan(at);
-      const std::size_t size = kHeaderBytes + *body_bytes(rest.first(kHeaderBytes));
-      messages.emplace_back(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(size));
-      at += size;
-    }
+    for (Bytes& message : messages_of(packet)) messages.push_back(std::move(message));
   }
   return messages;
 }

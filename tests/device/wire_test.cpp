@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <igtl_util.h>
 
 #include <chrono>
 #include <thread>
@@ -7,11 +6,14 @@
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/server.hpp"
+#include "tests/support/wire_messages.hpp"
 
 namespace birdseye::wire {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using birdseye::testing::made_plausible;
+using birdseye::testing::messages_of;
 using std::chrono::seconds;
 
 VideoFrame frame(std::uint64_t sequence, int width = 32, int height = 20) {
@@ -155,34 +157,24 @@ TEST(Unpacker, DamageIsRefusedNotBelieved) {
   }
 }
 
-/// The n-th message of a packet, its checksum made right again: damage that only the lengths inside can show.
-std::vector<std::uint8_t> with_right_checksum(std::vector<std::uint8_t> message) {
-  const std::uint64_t crc = crc64(message.data() + kHeaderBytes, message.size() - kHeaderBytes, 0);
-  for (std::size_t i = 0; i < 8; ++i) message[50 + i] = static_cast<std::uint8_t>(crc >> (56 - 8 * i));
-  return message;
-}
-
 TEST(Unpacker, LengthsInsideABodyAreNotBelieved) {
-  const Packet packet = pack(frame(1));
-  const std::vector<std::uint8_t> bytes = packet.bytes();
-  const std::size_t info_bytes = kHeaderBytes + *body_bytes(bytes);
-  const std::vector<std::uint8_t> info(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(info_bytes));
-  std::vector<std::uint8_t> image(bytes.begin() + static_cast<std::ptrdiff_t>(info_bytes), bytes.end());
+  const auto messages = messages_of(pack(frame(1)));
+  ASSERT_EQ(messages.size(), 2U);
+  const std::vector<std::uint8_t>& info = messages[0];
+  std::vector<std::uint8_t> image = messages[1];
   Unpacker sound;
-  ASSERT_TRUE(sound.push(with_right_checksum(info)));
-  ASSERT_TRUE(sound.push(with_right_checksum(image)));
+  ASSERT_TRUE(sound.push(made_plausible(info)));
+  ASSERT_TRUE(sound.push(made_plausible(image)));
 
   std::vector<std::uint8_t> longer = info;
   longer[kHeaderBytes + 2] = 0xFF;  // the text's length
-  EXPECT_FALSE(Unpacker().push(with_right_checksum(longer)));
+  EXPECT_FALSE(Unpacker().push(made_plausible(longer)));
 
   // Pixels left away, and the body's length with them; the width and height still promise them.
   image.resize(image.size() - 1000);
-  const std::uint64_t body = image.size() - kHeaderBytes;
-  for (std::size_t i = 0; i < 8; ++i) image[42 + i] = static_cast<std::uint8_t>(body >> (56 - 8 * i));
   Unpacker unpacker;
   ASSERT_TRUE(unpacker.push(info));
-  EXPECT_FALSE(unpacker.push(with_right_checksum(image)));
+  EXPECT_FALSE(unpacker.push(made_plausible(image)));
 }
 
 TEST(Unpacker, AHeaderMayNotAskForMoreThanTheLargestBody) {

@@ -170,7 +170,6 @@ FaultRow judge(const FaultCase& fault, const FaultSpan& span, std::int64_t until
   row.how = fault.parameters.empty() ? fmt::format("{} s", fault.for_s)
                                      : fmt::format("{} s, {}", fault.for_s, fault.parameters);
   row.seen = text_of(fault.signs, fault.note);
-  if (!fault.awaits.empty()) row.seen += ". **Not met yet**: " + fault.awaits;
   const auto complain = [&](const std::string& what) { problems.push_back(row.fault + ": " + what); };
 
   std::optional<wire::Health> before;

@@ -35,7 +35,6 @@ struct FaultCase {
   double own_s = 0;         ///< that the unit needs for itself once the fault is over
   double extra_mm = 0;      ///< by which a pose may be off: what is plausible is not seen
   double extra_time_s = 0;  ///< a time that is wrong by so much, which nobody can know
-  std::string awaits = {};  ///< why complaints about it are only told
   bool poses_lie = false;   ///< a fault that nobody can see
 };
 
