@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <compare>
 #include <cstdint>
 
@@ -15,6 +16,11 @@ struct Duration {
   Duration operator+(Duration other) const { return {ns + other.ns}; }
   Duration operator-(Duration other) const { return {ns - other.ns}; }
 };
+
+/// The sigma of two independent errors together.
+inline Duration in_quadrature(Duration a, Duration b) {
+  return {std::llround(std::hypot(static_cast<double>(a.ns), static_cast<double>(b.ns)))};
+}
 
 /// An instant on one machine's CLOCK_MONOTONIC. Clock is a tag: instants of different clocks do not mix.
 template <typename Clock>

@@ -26,6 +26,10 @@ struct ClockEvent {
 };
 const char* to_string(ClockEvent::Kind kind);
 
+/// How well a time is known that a program reads once the kernel has woken it, beyond what a clock line sees: waking
+/// always takes something, 0.05 to 0.2 ms where it was measured (docs/clocks.md), and no line can tell it from delay.
+inline constexpr Duration kWakeSigma{100'000};
+
 /// Gives a periodic measurement back its regular times. What arrives is late by a delay that is never negative and
 /// jitters; the earliest arrivals lie on a line, and that lower edge is the clock: its level and its slope (the
 /// instrument's drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for

@@ -43,7 +43,7 @@ FrameClock::Time FrameClock::time_of(const drivers::Frame& frame) {
   }
   if (frame.acquired_known) return {frame.acquired, frame.acquired_sigma, true, {}};
   const ClockLine::Tick tick = push(line_, frame.arrived, number);
-  return {tick.time - settings_.delay, tick.sigma, tick.certain, tick.certain ? std::string() : unmatched};
+  return {tick.time - settings_.delay, in_quadrature(tick.sigma, kWakeSigma), tick.certain, tick.certain ? std::string() : unmatched};
 }
 
 }  // namespace birdseye::device

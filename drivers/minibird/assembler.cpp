@@ -87,7 +87,7 @@ void MeasurementAssembler::finish(std::vector<Measurement>& out) {
 
   Measurement measurement;
   measurement.acquired = tick.time - layout_.delay;
-  measurement.acquired_sigma = tick.sigma;
+  measurement.acquired_sigma = in_quadrature(tick.sigma, kWakeSigma);
   // An arrival near its tick bounds the tick's error, whatever is undecided about the count: its sigma says by how
   // much.
   measurement.time_certain = tick.certain || tick.sigma.ns <= period_.ns * 6 / 10;

@@ -13,6 +13,7 @@
 
 #include "host/app/bench_device_rig.hpp"
 #include "host/app/bench_machine.hpp"
+#include "host/app/bench_wakes.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/interrupt.hpp"
 #include "host/app/write_files.hpp"
@@ -184,6 +185,8 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   auto session = Session::start(settings, options.clients, true);
   if (!session) return session.error();
   const DeviceRig& rig = *session->rig;
+  const auto wakes = TwoWakes::start();
+  if (!wakes) return wakes.error();
   sleep_unless_interrupted(2);
   const auto begin = Clock::now();
   const double cpu_before_s = rig.cpu_s(), memory_before_mb = rig.resident_mb();
@@ -195,6 +198,7 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   const double elapsed_s = seconds_since(begin);
   const double cpu_percent = 100 * (rig.cpu_s() - cpu_before_s) / elapsed_s;
   const double memory_mb = rig.resident_mb();
+  const std::vector<double> p99_wakes = (*wakes)->stop();
   std::uint64_t frames_lost = 0;
   for (auto& listener : session->listeners) {
     listener->stop();
@@ -224,6 +228,7 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   out["latency_ms_p99_tracker"] = median(p99_tracker);  // of each second's
   out["latency_ms_p99_tracker_beside_frames"] = median(p99_beside);
   out["latency_ms_p99_frame"] = median(p99_frame);
+  out["latency_ms_p99_two_wakes"] = median(p99_wakes);  // of threads that do nothing, in the same seconds
   out["resident_mb"] = memory_mb;
   out["resident_mb_max"] = most_mb;
   out["resident_mb_growth"] = memory_mb - memory_before_mb;

@@ -44,7 +44,8 @@ std::vector<FaultCase> of_the_line() {
       {.name = "lost_record",
        .parameters = "chance = 0.3",
        .calm_s = 4,
-       .signs = {{Where::counter, "measurements_lost"}}},
+       .signs = {kClockEvents},
+       .note = "Health `measurements_lost` too, where the times tell how many"},
   };
 }
 

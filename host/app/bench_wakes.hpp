@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// What this machine takes to hand a byte from thread to thread to thread, 144 times a second, with nothing else to do:
+/// as often as a measurement changes hands on its way through birdseyed. The floor under birdseyed's own latency.
+class TwoWakes {
+ public:
+  static Result<std::unique_ptr<TwoWakes>> start();
+  ~TwoWakes();
+  TwoWakes(const TwoWakes&) = delete;
+  TwoWakes& operator=(const TwoWakes&) = delete;
+  /// Ends it. The 99th percentile of each whole second, ms.
+  std::vector<double> stop();
+
+ private:
+  explicit TwoWakes(const std::array<int, 4>& ends);
+  std::array<int, 4> ends_;  ///< two pipes, reading ends first
+  std::vector<double> ms_;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace birdseye::host
