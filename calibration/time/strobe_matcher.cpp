@@ -96,10 +96,8 @@ void StrobeMatcher::learn() {
   const auto period = static_cast<double>(settings_.period.ns), least = static_cast<double>(settings_.least_delay.ns);
   int fewest = std::numeric_limits<int>::max(), second = fewest;
   double best = 0;
-  const auto periods = static_cast<int>(std::floor((static_cast<double>(settings_.most_delay.ns) - *phase) / period));
-  for (int n = 0; n <= periods; ++n) {
-    const double delay = *phase + n * period;
-    if (delay < least) continue;
+  const auto most = static_cast<double>(settings_.most_delay.ns);
+  for (double delay = *phase + std::ceil((least - *phase) / period) * period; delay <= most; delay += period) {
     const int found = contradictions(delay);
     if (found < fewest) {
       second = std::exchange(fewest, found);
@@ -112,7 +110,7 @@ void StrobeMatcher::learn() {
     ambiguity_ = fmt::format("no delay from {:.0f} to {:.0f} ms fits frames and strobe", least * 1e-6,
                              settings_.most_delay.seconds() * 1e3);
   } else if (second - fewest < kClear) {
-    ambiguity_ = "delays that differ by a period fit as well; narrow the bounds on the delivery delay";
+    ambiguity_ = "delays that differ by a period fit frames and strobe as well";
   } else if (before_ && !is_as_before(best) && !is_clear_beyond_bounds(best, fewest)) {
     ambiguity_ = "frames and strobe edges have been counted differently: the delay may have changed by a period";
   } else {

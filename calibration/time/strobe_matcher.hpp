@@ -19,7 +19,8 @@ class StrobeMatcher {
   struct Settings {
     Duration period;  ///< of frames, nominal
     Duration exposure;
-    Duration least_delay{0};  ///< from the start of exposure to the frame's stamp, readout included
+    /// From the start of exposure to the frame's stamp. Negative where stamps may lie before it.
+    Duration least_delay{0};
     Duration most_delay = Duration::from_ms(150);
     Duration edge_sigma{20'000};  ///< kernel stamps of edges
     std::size_t learn_from = 12;  ///< pairs that must agree on the delay

@@ -122,11 +122,7 @@ void Core::note(const FrameCame& came) {
   if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
-  frames_.push_back(frame);
-  const FrameClock::Time time = frame_clock_.time_of(frame);
-  frames_.back().acquired = time.acquired;
-  frames_.back().acquired_sigma = time.sigma;
-  frames_.back().acquired_known = time.certain;
+  frames_.push_back({frame, frame_clock_.time_of(frame)});
   if (frames_.size() > kMostWaitingFrames) {  // the wait that is configured is longer than frames may be kept for
     publish(frames_.front());
     frames_.pop_front();
@@ -145,27 +141,29 @@ void Core::note(const EdgesCame& came) {
 
 void Core::release_frames(DeviceTime now) {
   while (!frames_.empty()) {
-    const drivers::Frame& frame = frames_.front();
+    const auto& [frame, time] = frames_.front();
     const auto newest = scope_.newest();
-    const bool covered = newest && *newest >= frame.acquired + settings_.pose.smoothing;
+    const bool covered = newest && *newest >= time.acquired + settings_.pose.smoothing;
     if (!covered && settings_.pose_wait.ns > 0 && now < frame.arrived + settings_.pose_wait) return;
-    publish(frame);
+    publish(frames_.front());
     frames_.pop_front();
   }
 }
 
-void Core::publish(const drivers::Frame& frame) {
+void Core::publish(const TimedFrame& timed) {
+  const auto& [frame, time] = timed;
   wire::VideoFrame out;
   out.info.sequence = frame.sequence;
-  out.info.acquired = frame.acquired;
-  out.info.acquired_sigma = frame.acquired_sigma;
+  out.info.acquired = time.acquired;
+  out.info.acquired_sigma = time.sigma;
   out.info.arrived = frame.arrived;
-  if (frame.acquired_known && frame.acquired_sigma <= settings_.pose.max_time_sigma) {
-    out.info.pose = scope_.at(frame.acquired);
+  if (time.certain && time.sigma <= settings_.pose.max_time_sigma) {
+    out.info.pose = scope_.at(time.acquired);
     if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != Doubt::none)
       out.info.pose.reason += ": " + birds_[0].why;
   } else {
     out.info.pose.reason = "when the frame was taken is not known well enough";
+    if (!time.reason.empty()) out.info.pose.reason += ": " + time.reason;
   }
   out.info.frames_dropped = frames_lost_;
   out.width_px = frame.width_px;

@@ -49,6 +49,11 @@ class Core {
     bool in_status = false;
   };
 
+  struct TimedFrame {
+    drivers::Frame frame;
+    FrameClock::Time time;
+  };
+
   void note(const InstrumentChanged& changed);
   void note(const TrackerBytes& bytes);
   void note(const FrameCame& came);
@@ -57,7 +62,7 @@ class Core {
   void publish(const drivers::minibird::Measurement& measurement);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void release_frames(DeviceTime now);
-  void publish(const drivers::Frame& frame);
+  void publish(const TimedFrame& timed);
   void publish_status(DeviceTime now);
   [[nodiscard]] wire::Status status() const;
 
@@ -69,7 +74,7 @@ class Core {
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;
-  std::deque<drivers::Frame> frames_;  ///< waiting for poses
+  std::deque<TimedFrame> frames_;  ///< waiting for poses
   std::uint64_t frames_seen_ = 0, frames_lost_ = 0, frames_repeated_ = 0;
   std::optional<std::uint64_t> next_sequence_;
   Duration time_sigma_;

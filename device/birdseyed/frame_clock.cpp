@@ -2,6 +2,14 @@
 
 namespace birdseye::device {
 
+namespace {
+
+/// How far before and after where it is expected a frame may follow its edge, in periods; less than one together, for
+/// otherwise nothing tells one edge from the next. More after than before: delays are known at the least.
+constexpr double kEarlier = 0.4, kLater = 0.55;
+
+}  // namespace
+
 FrameClock::FrameClock(const Settings& settings) : settings_(settings) {
   restart(settings.rate_hz, settings.exposure);
 }
@@ -12,9 +20,6 @@ void FrameClock::restart(double rate_hz, std::optional<Duration> exposure) {
   line_.reset();
   stamps_.reset();
   strobe_.reset();
-  if (!settings_.strobe) return;
-  StrobeMatcher::Settings strobe{period(), exposure_};
-  strobe_.emplace(strobe);
 }
 
 void FrameClock::take(const drivers::GpioEdge& edge) {
@@ -32,18 +37,39 @@ ClockLine::Tick FrameClock::push(std::optional<ClockLine>& line, DeviceTime at, 
   return tick;
 }
 
+StrobeMatcher::Match FrameClock::match(const drivers::Frame& frame, std::int64_t number) {
+  const bool by_stamps = frame.acquired_known;
+  if (!strobe_ || strobe_by_stamps_ != by_stamps) {
+    StrobeMatcher::Settings settings{period(), exposure_};
+    if (by_stamps || settings_.delay) {
+      const double expected_s = exposure_.seconds() / 2 + (by_stamps ? 0.0 : settings_.delay->seconds());
+      settings.least_delay = Duration::from_seconds(expected_s - kEarlier * period().seconds());
+      settings.most_delay = Duration::from_seconds(expected_s + kLater * period().seconds());
+    }
+    strobe_.emplace(settings);
+    strobe_by_stamps_ = by_stamps;
+  }
+  return strobe_->match(by_stamps ? frame.acquired : frame.arrived, number);
+}
+
 FrameClock::Time FrameClock::time_of(const drivers::Frame& frame) {
   const auto number = static_cast<std::int64_t>(frame.sequence);
   std::string unmatched;
   if (frame.acquired_known) push(stamps_, frame.acquired, number);
-  if (strobe_) {
-    const auto match = strobe_->match(frame.acquired_known ? frame.acquired : frame.arrived, number);
-    if (match.acquired) return {*match.acquired, match.sigma, true, {}};
-    unmatched = match.reason;
+  if (settings_.strobe) {
+    const auto found = match(frame, number);
+    if (found.acquired) return {*found.acquired, found.sigma, true, {}};
+    unmatched = found.reason;
   }
   if (frame.acquired_known) return {frame.acquired, frame.acquired_sigma, true, {}};
   const ClockLine::Tick tick = push(line_, frame.arrived, number);
-  return {tick.time - settings_.delay, in_quadrature(tick.sigma, kWakeSigma), tick.certain, tick.certain ? std::string() : unmatched};
+  const DeviceTime acquired = tick.time - settings_.delay.value_or(Duration{0});
+  const Duration sigma = in_quadrature(tick.sigma, kWakeSigma);
+  // Without a strobe, nobody cared for the delay; with one, a guess among times that are exact would go unseen.
+  if (settings_.strobe && !settings_.delay)
+    return {acquired, sigma, false, unmatched + ", and the camera's delay_ms is not set"};
+  if (!tick.certain) return {acquired, sigma, false, "frames come too unevenly"};
+  return {acquired, sigma, true, {}};
 }
 
 }  // namespace birdseye::device

@@ -11,13 +11,15 @@
 namespace birdseye::device {
 
 /// When a frame was taken: by the strobe where there is one and it is surely this frame's, else by the camera's stamp,
-/// else from when frames arrive.
+/// else from when frames arrive. Which edge is a frame's, its stamp tells, or its arrival less the delay: either must
+/// be right to half a period.
 class FrameClock {
  public:
   struct Settings {
     double rate_hz = 25;
-    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least.
-    Duration delay{0};
+    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least. Empty: not known,
+    /// taken for nothing unless there is a strobe.
+    std::optional<Duration> delay;
     /// For the strobe, which marks the exposure's start, where the camera does not say.
     Duration exposure{0};
     bool strobe = false;  ///< edges come
@@ -41,14 +43,16 @@ class FrameClock {
   [[nodiscard]] std::uint64_t events() const { return events_; }
 
  private:
+  StrobeMatcher::Match match(const drivers::Frame& frame, std::int64_t number);
   ClockLine::Tick push(std::optional<ClockLine>& line, DeviceTime at, std::int64_t number);
   [[nodiscard]] Duration period() const { return Duration::from_seconds(1 / settings_.rate_hz); }
 
   Settings settings_;
   Duration exposure_;
-  std::optional<ClockLine> line_;    ///< under the arrivals of frames without a stamp
-  std::optional<ClockLine> stamps_;  ///< under the stamps: shows that they jump
-  std::optional<StrobeMatcher> strobe_;
+  std::optional<ClockLine> line_;        ///< under the arrivals of frames without a stamp
+  std::optional<ClockLine> stamps_;      ///< under the stamps: shows that they jump
+  std::optional<StrobeMatcher> strobe_;  ///< from the first frame on
+  bool strobe_by_stamps_ = false;
   std::uint64_t events_ = 0;
 };
 

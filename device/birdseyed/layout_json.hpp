@@ -49,7 +49,16 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StreamLayout, birds, group_mode, button_byte,
 
 namespace birdseye::device {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FrameClock::Settings, rate_hz, delay, exposure, strobe)
+inline void to_json(nlohmann::json& json, const FrameClock::Settings& settings) {
+  json = {{"rate_hz", settings.rate_hz}, {"exposure", settings.exposure}, {"strobe", settings.strobe}};
+  if (settings.delay) json["delay"] = *settings.delay;
+}
+inline void from_json(const nlohmann::json& json, FrameClock::Settings& settings) {
+  json.at("rate_hz").get_to(settings.rate_hz);
+  json.at("exposure").get_to(settings.exposure);
+  json.at("strobe").get_to(settings.strobe);
+  if (json.contains("delay")) settings.delay = json.at("delay").get<Duration>();
+}
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CoreSettings, bird_names, pose, pose_wait, frame_clock)
 
 }  // namespace birdseye::device

@@ -12,7 +12,9 @@ namespace {
 Result<std::string> probe_tracker(const TrackerConfig& config, const std::stop_token& stop) {
   const auto tracker = open_tracker(config, stop);
   if (!tracker) return tracker.error();
-  return describe(**tracker, config.line.device);
+  const auto diagnosis = (*tracker)->diagnose(stop);
+  if (!diagnosis) return diagnosis.error();
+  return fmt::format("{}; it says of itself: {}", describe(**tracker, config.line.device), diagnosis->words);
 }
 
 Result<std::string> probe_camera(const drivers::CameraSettings& settings) {

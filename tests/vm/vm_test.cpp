@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "calibration/time/clock_line.hpp"
 #include "tests/vm/cart.hpp"
 #include "tests/vm/machine.hpp"
 
@@ -156,6 +158,7 @@ width = 320
 height = 180
 rate_hz = 25
 exposure_ms = 8
+delay_ms = 10
 [gpio]
 chip = "cart"
 strobe = "strobe"
@@ -192,6 +195,23 @@ TEST_F(ThroughLibusb, AnAdapterPulledOutIsMissedAndFoundAgainWhileFramesGoOn) {
 TEST_F(ThroughLibusb, FramesComeFromTheLoopback) {
   const auto frames = cart().some<VideoFrame>("frames", 50);
   for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GT(frames[i].info.sequence, frames[i - 1].info.sequence);
+}
+
+/// Middle of exposure by the strobe's edges, against the simulated camera's own times. Coarsely so, for the simulator
+/// pulls the line as late as an emulated processor wakes it; a time that an edge gave is known by its sigma.
+TEST_F(ThroughLibusb, TheStrobeTellsWhenFramesWereTaken) {
+  const auto truth = nlohmann::json::parse(g_machine->must("cat /run/out/camera.json"));
+  const double period_s = 1 / truth.at("rate_hz").get<double>();
+  const DeviceTime zero{truth.at("zero_monotonic_ns").get<std::int64_t>()};
+  const auto frames = cart().some<VideoFrame>("frames", 100);
+  std::vector<double> off_ms;
+  for (const auto& frame : frames) {
+    if (frame.info.acquired_sigma < kWakeSigma)
+      off_ms.push_back(1e3 * std::abs(std::remainder((frame.info.acquired - zero).seconds(), period_s)));
+  }
+  ASSERT_GE(off_ms.size(), frames.size() / 2);
+  std::nth_element(off_ms.begin(), off_ms.begin() + static_cast<std::ptrdiff_t>(off_ms.size() / 2), off_ms.end());
+  EXPECT_LT(off_ms[off_ms.size() / 2], 8);
 }
 
 TEST_F(ThroughLibusb, ThePedalIsTold) {
