@@ -45,7 +45,8 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
   std::unique_ptr<Appliance> appliance(new Appliance(config, server, std::move(recorder)));
   Appliance* const a = appliance.get();
   const auto begin = [a](InstrumentPost& post, auto run) {
-    post.tell({.state = InstrumentState::starting, .text = "looked for"});
+    post.tell({.state = InstrumentState::starting,
+               .text = fmt::format("the {} is being looked for", name_of(post.instrument()))});
     a->threads_.emplace_back([run](const std::stop_token& stop) { run(stop); });
   };
   begin(a->tracker_post_, [a](const std::stop_token& s) { run_tracker(a->config_.tracker, a->tracker_post_, s); });
@@ -64,11 +65,16 @@ Appliance::~Appliance() {
 
 void Appliance::make_messages(const std::stop_token& stop) {
   Core core(config_.core);
+  std::string status;
   while (!stop.stop_requested()) {
     auto event = queue_.pop(now() + (core.waiting() ? kTickWaiting : kTickIdle), stop);
     if (!event) event = Tick{now()};
     if (recorder_) recorder_->take(*event);
     for (const wire::Packet& packet : core.take(*event)) server_.publish(packet);
+    if (core.status_text() != status) {
+      status = core.status_text();
+      spdlog::info("status: {}", status.empty() ? "all is well" : status);
+    }
     core_alive_ns_ = now().ns;
     state_ = core.board().state();
     const std::lock_guard lock(told_mutex_);

@@ -31,13 +31,13 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
   const Duration silence = silence_of(camera, settings);
   DeviceTime heard = now();
   int restarts = 0;
-  running();
+  bool known = false;  // to run: a program that feeds a socket says what it sends with its first frame only
   while (!stop.stop_requested()) {
     post.alive();
     auto frame = camera.next(now() + kPatience);
     if (!frame) return frame.error();
     if (*frame) {
-      if (std::exchange(restarts, 0) > 0) running();
+      if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       heard = now();
       post.push(FrameCame{**std::move(frame)});
     } else if (now() - heard > silence) {

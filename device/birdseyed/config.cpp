@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "device/birdseyed/config_section.hpp"
+#include "device/wire/server.hpp"
 #include "drivers/io/serial_port.hpp"
 
 namespace birdseye::device {
@@ -77,7 +78,7 @@ void read_birds(ConfigSection& section, Config& config) {
     names = {"scope"};
     for (int i = 2; i <= unit.birds; ++i) names.push_back(fmt::format("bird{}", i));
   }
-  if (static_cast<int>(names.size()) != unit.birds)
+  if (section.sound() && static_cast<int>(names.size()) != unit.birds)
     section.fail("names", fmt::format("{} names for {} birds", names.size(), unit.birds));
 }
 
@@ -125,8 +126,26 @@ void read_camera(ConfigSection& section, Config& config) {
   section.milliseconds("delay_ms", config.core.frame_clock.delay, 1000);
   section.milliseconds("exposure_ms", config.core.frame_clock.exposure, 1000);
   config.core.frame_clock.rate_hz = camera.rate_hz;
+  if (const auto sound = drivers::check_camera(camera); !camera.source.empty() && !sound)
+    section.fail("", sound.error().what);
   if (std::int64_t{camera.width_px} * camera.height_px > drivers::kMostPixels)
     section.fail("width", "over 16 megapixels a frame, more than the wire carries");
+}
+
+void read_bias(ConfigSection& section, const char* key, drivers::GpioBias& bias) {
+  std::string text;
+  section.text(key, text);
+  if (text.empty()) return;
+  const std::pair<const char*, drivers::GpioBias> kinds[] = {{"as_is", drivers::GpioBias::as_is},
+                                                             {"pull_up", drivers::GpioBias::pull_up},
+                                                             {"pull_down", drivers::GpioBias::pull_down}};
+  for (const auto& [name, kind] : kinds) {
+    if (text == name) {
+      bias = kind;
+      return;
+    }
+  }
+  section.fail(key, fmt::format("\"{}\" is none of as_is, pull_up, pull_down", text));
 }
 
 void read_gpio(ConfigSection& section, Config& config) {
@@ -137,6 +156,8 @@ void read_gpio(ConfigSection& section, Config& config) {
   section.text("pedal", lines.pedal);
   section.text("led", lines.led);
   section.text("trigger", lines.trigger);
+  read_bias(section, "strobe_bias", lines.strobe_bias);
+  read_bias(section, "pedal_bias", lines.pedal_bias);
   section.milliseconds("pedal_debounce_ms", lines.pedal_debounce, 1000);
   section.flag("strobe_active_low", lines.strobe_active_low);
   section.flag("pedal_active_low", lines.pedal_active_low);
@@ -150,6 +171,8 @@ void read_gpio(ConfigSection& section, Config& config) {
 void read_wire(ConfigSection& section, Config& config) {
   section.text("bind", config.wire.bind);
   section.integer("port", config.wire.port, 0, 65535);
+  if (!wire::is_address(config.wire.bind))
+    section.fail("bind", fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", config.wire.bind));
 }
 
 void read_pose(ConfigSection& section, Config& config) {
@@ -177,7 +200,9 @@ constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] 
 
 Result<Config> read_config(const std::filesystem::path& path) {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) {
+  if (std::filesystem::is_directory(path, ignored))
+    return Error{Errc::not_found, fmt::format("{}: is a folder, not a configuration file", path.string())};
+  if (!std::filesystem::exists(path, ignored)) {
     return Error{Errc::not_found, fmt::format("{}: no such configuration file", path.string())};
   }
   try {
@@ -205,8 +230,8 @@ Result<Config> read_config(const std::filesystem::path& path) {
   } catch (const toml::syntax_error& problem) {
     // The first line of toml11's message says what; the rest draws the place.
     const std::string what = problem.what();
-    return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML: {}", path.string(), problem.location().line(),
-                                               what.substr(0, what.find('\n')))};
+    return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML (texts need quotes): {}", path.string(),
+                                               problem.location().line(), what.substr(0, what.find('\n')))};
   } catch (const std::exception& problem) {
     const std::string what = problem.what();
     return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), what.substr(0, what.find('\n')))};

@@ -39,6 +39,10 @@ bool ConfigSection::has(const char* key) const {
 }
 
 void ConfigSection::fail(const char* key, const std::string& why) {
+  if (*key == 0) {
+    if (const std::string first = why.substr(0, why.find_first_of(": ")); has(first.c_str()))
+      return fail(first.c_str(), why.substr(why.find_first_not_of(": ", first.size())));
+  }
   const std::int64_t line = has(key) ? line_of(table_->as_table().at(key)) : table_ != nullptr ? line_of(*table_) : 0;
   const std::string colon = *key == 0 ? "" : ": ";
   faults_->add(line, fmt::format("[{}] {}{}{}", name_, key, colon, why));

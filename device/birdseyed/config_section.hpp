@@ -49,7 +49,7 @@ class ConfigSection {
 
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] bool has(const char* key) const;
-  /// key "": of the section as a whole.
+  /// key "": the one that why begins with, else of the section as a whole.
   void fail(const char* key, const std::string& why);
   /// Nothing was wrong with it so far.
   [[nodiscard]] bool sound() const { return faults_->count() == faults_before_; }

@@ -40,6 +40,8 @@ class Core {
   };
   [[nodiscard]] Counters counters() const;
   [[nodiscard]] const InstrumentBoard& board() const { return board_; }
+  /// What STATUS last said: all that is amiss, nothing if all is well.
+  [[nodiscard]] const std::string& status_text() const { return status_text_; }
 
  private:
   struct BirdState {

@@ -1,5 +1,7 @@
 #include "device/birdseyed/frame_clock.hpp"
 
+#include <cmath>
+
 namespace birdseye::device {
 
 namespace {
@@ -63,12 +65,13 @@ FrameClock::Time FrameClock::time_of(const drivers::Frame& frame) {
   }
   if (frame.acquired_known) return {frame.acquired, frame.acquired_sigma, true, {}};
   const ClockLine::Tick tick = push(line_, frame.arrived, number);
-  const DeviceTime acquired = tick.time - settings_.delay.value_or(Duration{0});
-  const Duration sigma = in_quadrature(tick.sigma, kWakeSigma);
-  // Without a strobe, nobody cared for the delay; with one, a guess among times that are exact would go unseen.
+  // A delay that nobody has told is any from none to a period, as drivers/video/frame_stamp.cpp takes it.
+  const DeviceTime acquired = tick.time - settings_.delay.value_or(Duration{period().ns / 2});
+  const Duration unknown = settings_.delay ? Duration{0} : Duration::from_seconds(period().seconds() / std::sqrt(12.0));
+  const Duration sigma = in_quadrature(in_quadrature(tick.sigma, kWakeSigma), unknown);
   if (settings_.strobe && !settings_.delay)
     return {acquired, sigma, false, unmatched + ", and the camera's delay_ms is not set"};
-  if (!tick.certain) return {acquired, sigma, false, "frames come too unevenly"};
+  if (!tick.certain) return {acquired, sigma, false, "frames do not come at the camera's rate_hz"};
   return {acquired, sigma, true, {}};
 }
 

@@ -17,8 +17,8 @@ class FrameClock {
  public:
   struct Settings {
     double rate_hz = 25;
-    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least. Empty: not known,
-    /// taken for nothing unless there is a strobe.
+    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least. Empty: anything up to
+    /// a period; or, with a strobe, no time at all until the strobe gives one.
     std::optional<Duration> delay;
     /// For the strobe, which marks the exposure's start, where the camera does not say.
     Duration exposure{0};

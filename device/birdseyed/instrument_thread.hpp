@@ -13,6 +13,7 @@ class InstrumentPost {
  public:
   InstrumentPost(Instrument instrument, EventQueue& queue) : instrument_(instrument), queue_(queue) {}
 
+  [[nodiscard]] Instrument instrument() const { return instrument_; }
   void push(RawEvent event) { queue_.push(std::move(event)); }
   /// Tells a change of state, once: the same again is not news.
   void tell(InstrumentChanged changed);

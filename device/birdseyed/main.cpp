@@ -120,6 +120,7 @@ int replay(const fs::path& path, const fs::path& recording, const Signals& signa
 int main(int argc, char** argv) {
   CLI::App app{"birdseyed: tracker and camera of a laparoscope cart, on one clock, over OpenIGTLink", "birdseyed"};
   fs::path config_path, recording;
+  app.set_version_flag("--version", "birdseyed " BIRDSEYE_VERSION);
   bool check_only = false, probe_only = false;
   app.add_option("--config", config_path, "configuration file (TOML)")->required();
   CLI::Option* const check =

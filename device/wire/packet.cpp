@@ -2,9 +2,9 @@
 
 #include <igtlStatusMessage.h>
 #include <igtlStringMessage.h>
-#include <igtlTrackingDataMessage.h>
 #include <igtl_header.h>
 #include <igtl_image.h>
+#include <igtl_tdata.h>
 
 #include <algorithm>
 #include <cstring>
@@ -91,24 +91,24 @@ Packet pack(const VideoFrame& frame) {
   return {Packet::Kind::frame, std::move(out), frame.rgb, frame.info.arrived};
 }
 
+/// By hand: the library leaves a byte of each element as memory happens to be.
 Packet pack(const Birds& birds, DeviceTime arrived) {
-  auto out = std::make_shared<std::vector<std::uint8_t>>();
-  const auto message = igtl::TrackingDataMessage::New();
-  message->SetDeviceName(kBirdsDevice);
-  stamp(*message, birds.acquired);
-  for (const Bird& bird : birds.birds) {
-    auto element = igtl::TrackingDataElement::New();
-    element->SetName(bird.name.c_str());
-    element->SetType(igtl::TrackingDataElement::TYPE_6D);
-    igtl::Matrix4x4 matrix;
-    const Eigen::Matrix4d m = bird.tracker_from_sensor.matrix();
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) matrix[i][j] = static_cast<float>(m(i, j));
-    }
-    element->SetMatrix(matrix);
-    message->AddTrackingDataElement(element);
+  std::vector<igtl_tdata_element> elements(birds.birds.size());
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    const Bird& bird = birds.birds[i];
+    igtl_tdata_element& element = elements[i];
+    bird.name.copy(element.name, sizeof element.name);
+    element.type = IGTL_TDATA_TYPE_6D;
+    // Column by column, the position last.
+    const Eigen::Matrix<float, 3, 4> columns = bird.tracker_from_sensor.matrix().topRows<3>().cast<float>();
+    std::copy_n(columns.data(), 12, element.transform);
   }
-  append(*out, *message);
+  igtl_tdata_convert_byte_order(elements.data(), static_cast<int>(elements.size()));
+  const std::span body(reinterpret_cast<const std::uint8_t*>(elements.data()),
+                       elements.size() * sizeof(igtl_tdata_element));
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "TDATA", kBirdsDevice, birds.acquired, body.size(), checksum(body));
+  out->insert(out->end(), body.begin(), body.end());
   return {Packet::Kind::tracking, std::move(out), nullptr, arrived};
 }
 
@@ -126,6 +126,7 @@ Packet pack(const Status& status, DeviceTime time) {
   message->SetDeviceName(kStatusDevice);
   stamp(*message, time);
   message->SetCode(status.ok ? igtl::StatusMessage::STATUS_OK : igtl::StatusMessage::STATUS_NOT_READY);
+  message->SetSubCode(0);
   message->SetErrorName("");
   message->SetStatusString(status.text.c_str());
   append(*out, *message);

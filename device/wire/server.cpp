@@ -21,6 +21,11 @@ constexpr std::size_t kMostClients = 16;
 
 }  // namespace
 
+bool is_address(const std::string& text) {
+  in_addr address{};
+  return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
+}
+
 Result<std::unique_ptr<Server>> Server::listen(const std::string& bind_address, int port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;

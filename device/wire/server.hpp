@@ -14,6 +14,9 @@
 
 namespace birdseye::wire {
 
+/// An IPv4 address in dots, which Server::listen() takes.
+bool is_address(const std::string& text);
+
 /// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
 /// not keep up loses packets (never parts of one), not the others; one that takes nothing for ten seconds, or does not
 /// speak the protocol, is disconnected.

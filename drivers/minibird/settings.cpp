@@ -54,7 +54,7 @@ std::vector<std::string> faults_of(const MiniBirdSettings& settings) {
     return faults;
   }
   if (settings.per_bird.size() > static_cast<std::size_t>(settings.birds)) {
-    faults.push_back(fmt::format("{} birds are described, but birds = {}", settings.per_bird.size(), settings.birds));
+    faults.push_back(fmt::format("bird: {} are described, but birds = {}", settings.per_bird.size(), settings.birds));
   }
   if (!(settings.rate_hz >= 14 && settings.rate_hz <= 144)) {
     faults.push_back(fmt::format("rate_hz: {:g} is outside 14 to 144", settings.rate_hz));

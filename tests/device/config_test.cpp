@@ -72,6 +72,13 @@ TEST(Config, EveryMistakeIsNamed) {
       {replaced("birds = 2", "birds = 2\nrecord = \"matrix\""), "record"},
       {replaced("birds = 2", "birds = 2\nbaud = 31250"), "31250 is none of 2400"},
       {replaced("[wire]", "width = 8000\nheight = 8000\n[wire]"), "[camera] width: over 16 megapixels"},
+      {replaced("birds = 2", "birds = 2\nreport_every = 3"), ":4: [tracker] report_every: 3 is none of"},
+      {replaced("v4l2:/dev/video0", "/dev/video0"), "[camera] source: \"/dev/video0\": give v4l2:DEVICE"},
+      {replaced("v4l2:/dev/video0", "socket:"), "[camera] source: \"socket:\": give"},
+      {replaced("[wire]", "format = \"H264\"\n[wire]"), "[camera] format: \"H264\": none that is read"},
+      {replaced("[wire]", "[gpio]\nchip = \"c\"\npedal_bias = \"up\"\n[wire]"), "[gpio] pedal_bias: \"up\" is none of"},
+      {replaced("[wire]", "[wire]\nbind = \"here\""), "[wire] bind: \"here\": give an IPv4"},
+      {replaced("\"/dev/ttyUSB0\"", "/dev/ttyUSB0"), "texts need quotes"},
       {replaced("[wire]", "[wire"), "is not TOML"},
   };
   for (const auto& [text, expected] : cases) {
@@ -80,6 +87,7 @@ TEST(Config, EveryMistakeIsNamed) {
     EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
   }
   EXPECT_EQ(read_config("/nonexistent.toml").error().code, Errc::not_found);
+  EXPECT_NE(read_config("/tmp").error().what.find("is a folder"), std::string::npos);
 }
 
 }  // namespace
