@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "drivers/io/monotonic.hpp"
 
 namespace birdseye::device {
@@ -30,6 +33,7 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
   };
   const Duration silence = silence_of(camera, settings);
   DeviceTime heard = now();
+  std::optional<std::uint64_t> newest;
   int restarts = 0;
   bool known = false;  // to run: a program that feeds a socket says what it sends with its first frame only
   while (!stop.stop_requested()) {
@@ -38,10 +42,12 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
     if (!frame) return frame.error();
     if (*frame) {
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
-      heard = now();
+      // One frame over and over is no stream.
+      if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = now();
       post.push(FrameCame{**std::move(frame)});
-    } else if (now() - heard > silence) {
-      const std::string text = fmt::format("{}: the camera sends no frames", camera.name());
+    }
+    if (now() - heard > silence) {
+      const std::string text = fmt::format("{}: the camera sends no {}frames", camera.name(), *frame ? "new " : "");
       if (restarts++ == kRestarts) return {Errc::timeout, text};
       post.tell({.state = InstrumentState::silent, .text = text});
       if (auto restarted = camera.restart_stream(); !restarted) return restarted.error();

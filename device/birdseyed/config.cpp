@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <optional>
+#include <sstream>
 
 #include "device/birdseyed/config_section.hpp"
 #include "device/wire/server.hpp"
@@ -78,7 +80,7 @@ void read_birds(ConfigSection& section, Config& config) {
     names = {"scope"};
     for (int i = 2; i <= unit.birds; ++i) names.push_back(fmt::format("bird{}", i));
   }
-  if (section.sound() && static_cast<int>(names.size()) != unit.birds)
+  if (!section.failed("birds") && static_cast<int>(names.size()) != unit.birds)
     section.fail("names", fmt::format("{} names for {} birds", names.size(), unit.birds));
 }
 
@@ -105,7 +107,6 @@ void read_tracker(ConfigSection& section, Config& config) {
   read_filters(section, unit);
   read_plausibility(section, unit.plausibility);
   read_birds(section, config);
-  if (!section.sound()) return;
   for (const std::string& fault : drivers::minibird::faults_of(unit)) section.fail("", fault);
 }
 
@@ -126,8 +127,7 @@ void read_camera(ConfigSection& section, Config& config) {
   section.milliseconds("delay_ms", config.core.frame_clock.delay, 1000);
   section.milliseconds("exposure_ms", config.core.frame_clock.exposure, 1000);
   config.core.frame_clock.rate_hz = camera.rate_hz;
-  if (const auto sound = drivers::check_camera(camera); !camera.source.empty() && !sound)
-    section.fail("", sound.error().what);
+  for (const std::string& fault : drivers::faults_of(camera)) section.fail("", fault);
   if (std::int64_t{camera.width_px} * camera.height_px > drivers::kMostPixels)
     section.fail("width", "over 16 megapixels a frame, more than the wire carries");
 }
@@ -196,17 +196,44 @@ constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] 
     {"tracker", read_tracker}, {"camera", read_camera}, {"gpio", read_gpio},
     {"wire", read_wire},       {"pose", read_pose},     {"record", read_recording}};
 
-}  // namespace
+constexpr std::size_t kMostBytes = 256U << 10U;
+constexpr int kMostDepth = 64;
 
-Result<Config> read_config(const std::filesystem::path& path) {
+/// The reader of TOML goes into brackets as deep as they are: a file that is none must not end the daemon.
+bool is_too_deep(const std::string& text) {
+  int depth = 0, deepest = 0;
+  for (const char c : text) {
+    if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
+    if (c == ']' || c == '}') depth = std::max(0, depth - 1);
+  }
+  return deepest > kMostDepth;
+}
+
+Result<std::string> read_text(const std::filesystem::path& path) {
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: is a folder, not a configuration file", path.string())};
-  if (!std::filesystem::exists(path, ignored)) {
+  if (!std::filesystem::exists(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such configuration file", path.string())};
-  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text(kMostBytes + 1, 0);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file.is_open() || file.bad())
+    return Error{Errc::unreadable, fmt::format("{}: cannot be read; see its owner and mode", path.string())};
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMostBytes || is_too_deep(text))
+    return Error{Errc::bad_format, fmt::format("{}: is no configuration file of birdseyed", path.string())};
+  return text;
+}
+
+}  // namespace
+
+Result<Config> read_config(const std::filesystem::path& path) {
+  auto text = read_text(path);
+  if (!text) return text.error();
   try {
-    const toml::value root = toml::parse(path.string());
+    std::istringstream stream(*text);
+    const toml::value root = toml::parse(stream, path.string());
     ConfigFaults faults(path);
     for (const auto& [name, value] : root.as_table()) {
       const bool known = std::any_of(std::begin(kSections), std::end(kSections),
@@ -226,6 +253,7 @@ Result<Config> read_config(const std::filesystem::path& path) {
       section.finish();
     }
     if (faults.count() > 0) return Error{Errc::bad_value, faults.text()};
+    config.text = *std::move(text);
     return config;
   } catch (const toml::syntax_error& problem) {
     // The first line of toml11's message says what; the rest draws the place.

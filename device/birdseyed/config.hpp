@@ -31,6 +31,7 @@ struct RecordConfig {
 
 /// What birdseyed is told by its configuration file (docs/manual/birdseyed.md).
 struct Config {
+  std::string text;  ///< of the file
   TrackerConfig tracker;
   drivers::CameraSettings camera;
   GpioConfig gpio;

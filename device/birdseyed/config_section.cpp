@@ -25,7 +25,7 @@ std::string ConfigFaults::text() const {
 }
 
 ConfigSection::ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table)
-    : faults_(&faults), faults_before_(faults.count()), name_(std::move(name)), table_(table) {}
+    : faults_(&faults), name_(std::move(name)), table_(table) {}
 
 const toml::value* ConfigSection::find(const char* key, bool required) {
   known_.insert(key);
@@ -43,6 +43,7 @@ void ConfigSection::fail(const char* key, const std::string& why) {
     if (const std::string first = why.substr(0, why.find_first_of(": ")); has(first.c_str()))
       return fail(first.c_str(), why.substr(why.find_first_not_of(": ", first.size())));
   }
+  if (*key != 0 && !failed_.insert(key).second) return;
   const std::int64_t line = has(key) ? line_of(table_->as_table().at(key)) : table_ != nullptr ? line_of(*table_) : 0;
   const std::string colon = *key == 0 ? "" : ": ";
   faults_->add(line, fmt::format("[{}] {}{}{}", name_, key, colon, why));

@@ -49,10 +49,11 @@ class ConfigSection {
 
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] bool has(const char* key) const;
-  /// key "": the one that why begins with, else of the section as a whole.
+  /// key "": the one that why begins with, else of the section as a whole. A key fails once: what follows from that is
+  /// not told.
   void fail(const char* key, const std::string& why);
-  /// Nothing was wrong with it so far.
-  [[nodiscard]] bool sound() const { return faults_->count() == faults_before_; }
+  /// Something was wrong with it.
+  [[nodiscard]] bool failed(const std::string& key) const { return failed_.count(key) != 0; }
   /// Names the keys that nobody asked for. To be called last.
   void finish();
 
@@ -60,10 +61,9 @@ class ConfigSection {
   const toml::value* find(const char* key, bool required = false);
 
   ConfigFaults* faults_;
-  std::size_t faults_before_;
   std::string name_;
   const toml::value* table_;
-  std::set<std::string> known_;
+  std::set<std::string> known_, failed_;
 };
 
 }  // namespace birdseye::device

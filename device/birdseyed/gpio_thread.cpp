@@ -50,6 +50,7 @@ Error work(drivers::GpioLines& lines, const GpioConfig& config, const std::atomi
     if (auto set = lines.set_led(on); !set) return set.error();
   }
   (void)lines.set_led(false);
+  (void)lines.set_trigger(false);
   return {};
 }
 

@@ -1,6 +1,5 @@
 #include <fmt/core.h>
 #include <signal.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +12,7 @@
 
 #include "calibration/base/program.hpp"
 #include "device/birdseyed/appliance.hpp"
+#include "device/birdseyed/patient_stderr.hpp"
 #include "device/birdseyed/probe.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
@@ -63,6 +63,8 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
   auto read = device::read_config(path);
   if (!read) {
     spdlog::error("configuration not taken, going on with the one before: {}", read.error().what);
+  } else if (read->text == config.text) {
+    spdlog::info("configuration unchanged");
   } else if (read->wire != config.wire) {
     spdlog::error(
         "configuration not taken, going on with the one before: [wire] cannot change while clients are connected; "
@@ -138,7 +140,8 @@ int main(int argc, char** argv) {
       fmt::print("{}: sound\n", config_path.string());
       return 0;
     }
-    spdlog::set_default_logger(spdlog::stderr_color_mt("birdseyed"));
+    spdlog::set_default_logger(
+        std::make_shared<spdlog::logger>("birdseyed", std::make_shared<device::PatientStderr>()));
     Signals signals;
     if (probe_only) {
       const auto config = device::read_config(config_path);

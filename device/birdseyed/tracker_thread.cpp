@@ -4,6 +4,7 @@
 
 #include "drivers/io/monotonic.hpp"
 #include "drivers/io/open_line.hpp"
+#include "drivers/minibird/record_parser.hpp"
 
 namespace birdseye::device {
 
@@ -14,19 +15,25 @@ using drivers::minibird::MiniBird;
 
 constexpr Duration kSilent = Duration::from_ms(500);  // of a unit that streams: 7 to 72 cycles
 
-/// Until the tracker is lost; why.
+/// Until the tracker is lost; why. Bytes alone are no sign of life: another baud rate, or noise, has them too.
 Error stream(MiniBird& tracker, const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop) {
+  drivers::minibird::RecordParser records(tracker.layout());
   DeviceTime heard = now();
+  bool bytes = false;  // since then
   while (!stop.stop_requested()) {
     post.alive();
     auto chunk = tracker.read(now() + kPatience);
     if (!chunk) return chunk.error();
     if (*chunk) {
-      heard = now();
+      const bool whole = !records.push((*chunk)->bytes).empty();
+      bytes = !whole;
+      if (whole) heard = now();
       post.push(TrackerBytes{**std::move(chunk)});
-    } else if (now() - heard > kSilent) {
-      return {Errc::timeout,
-              fmt::format("{}: the tracker has fallen silent; check its power and cable", config.line.device)};
+    }
+    if (now() - heard > kSilent) {
+      return {Errc::timeout, fmt::format("{}: the tracker {}", config.line.device,
+                                         bytes ? "sends no whole record; check its cable, and what is near it"
+                                               : "has fallen silent; check its power and cable")};
     }
   }
   return {};
@@ -34,10 +41,11 @@ Error stream(MiniBird& tracker, const TrackerConfig& config, InstrumentPost& pos
 
 }  // namespace
 
-Result<std::unique_ptr<MiniBird>> open_tracker(const TrackerConfig& config, const std::stop_token& stop) {
+Result<std::unique_ptr<MiniBird>> open_tracker(const TrackerConfig& config, const std::stop_token& stop,
+                                               const std::function<void()>& still) {
   auto line = drivers::open_line(config.line);
   if (!line) return std::move(line).error();
-  return MiniBird::start(*std::move(line), config.minibird, stop);
+  return MiniBird::start(*std::move(line), config.minibird, stop, still);
 }
 
 std::string describe(const MiniBird& tracker, const std::string& device) {
@@ -51,7 +59,7 @@ std::string describe(const MiniBird& tracker, const std::string& device) {
 void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     post.alive();
-    auto tracker = open_tracker(config, stop);
+    auto tracker = open_tracker(config, stop, [&post] { post.alive(); });
     if (stop.stop_requested()) return;
     if (!tracker) {
       post.tell({.state = InstrumentState::absent, .text = tracker.error().what});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <stop_token>
 
 #include "device/birdseyed/config.hpp"
@@ -11,9 +12,10 @@ namespace birdseye::device {
 /// Finds the tracker, starts it, hands over its bytes, and begins again when it is lost or falls silent. Until stop.
 void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop);
 
-/// Finds and starts it, once.
+/// Finds and starts it, once; `still` is called while that lasts.
 Result<std::unique_ptr<drivers::minibird::MiniBird>> open_tracker(const TrackerConfig& config,
-                                                                  const std::stop_token& stop);
+                                                                  const std::stop_token& stop,
+                                                                  const std::function<void()>& still = {});
 /// One line of what it is.
 std::string describe(const drivers::minibird::MiniBird& tracker, const std::string& device);
 

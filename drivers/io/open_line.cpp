@@ -16,7 +16,7 @@ namespace birdseye::drivers {
 
 namespace {
 
-constexpr Duration kConnect = Duration::from_ms(3000);
+constexpr Duration kConnect = Duration::from_ms(1500);
 
 struct TcpAddress {
   std::string host;

@@ -8,12 +8,6 @@ namespace birdseye::drivers::minibird {
 
 namespace {
 
-std::vector<RecordFormat> formats_of(const StreamLayout& layout) {
-  std::vector<RecordFormat> formats;
-  for (const BirdLayout& bird : layout.birds) formats.push_back(bird.format);
-  return formats;
-}
-
 ClockLine::Settings line_settings(Duration period) {
   ClockLine::Settings settings;
   settings.period = period;
@@ -25,7 +19,7 @@ ClockLine::Settings line_settings(Duration period) {
 MeasurementAssembler::MeasurementAssembler(const StreamLayout& layout)
     : layout_(layout),
       period_(Duration::from_seconds(1.0 / layout.rate_hz)),
-      parser_(formats_of(layout), layout.button_byte, layout.group_mode),
+      parser_(layout),
       clock_line_(line_settings(period_)) {
   for (const BirdLayout& bird : layout_.birds) guards_.emplace_back(bird, layout_.plausibility);
 }

@@ -36,6 +36,7 @@ Error Dialogue::stopped() const {
 }
 
 Result<void> Dialogue::pause(Duration span) {
+  if (still_) still_();
   if (!sleep_for(span, stop_)) return stopped();
   return {};
 }
@@ -52,6 +53,7 @@ Result<Bytes> Dialogue::listen(std::size_t most, Duration quiet, Duration within
   std::array<std::uint8_t, 256> chunk;
   while (heard.size() < most) {
     if (stop_.stop_requested()) return stopped();
+    if (still_) still_();
     const DeviceTime deadline = std::min({last + quiet, end, now() + kLook});
     const auto got = line_.read(std::span(chunk).first(std::min(chunk.size(), most - heard.size())), deadline);
     if (!got) return got.error();

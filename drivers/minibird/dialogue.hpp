@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -17,7 +18,11 @@ class Dialogue {
   Dialogue(ByteStream& line, Duration reply_timeout, Duration quiet)
       : line_(line), reply_timeout_(reply_timeout), quiet_(quiet) {}
 
-  void obey(std::stop_token stop) { stop_ = std::move(stop); }
+  /// still: called every few ten ms while it talks, for whoever watches that nothing hangs.
+  void obey(std::stop_token stop, std::function<void()> still = {}) {
+    stop_ = std::move(stop);
+    still_ = std::move(still);
+  }
   [[nodiscard]] const std::string& name() const { return line_.name(); }
 
   /// unit: 0 for the one that has the port, else the address in a flock.
@@ -39,6 +44,7 @@ class Dialogue {
   ByteStream& line_;
   Duration reply_timeout_, quiet_;
   std::stop_token stop_;
+  std::function<void()> still_;
 };
 
 /// Bytes for a person: as text where they are text, else in hexadecimal.

@@ -47,12 +47,12 @@ MiniBird::~MiniBird() {
 }
 
 Result<std::unique_ptr<MiniBird>> MiniBird::start(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings,
-                                                  const std::stop_token& stop) {
+                                                  const std::stop_token& stop, const std::function<void()>& still) {
   if (const auto faults = faults_of(settings); !faults.empty()) {
     return Error{Errc::bad_value, fmt::format("{}: {}", line->name(), fmt::join(faults, "; "))};
   }
   std::unique_ptr<MiniBird> bird(new MiniBird(std::move(line), settings));
-  bird->dialogue_.obey(stop);
+  bird->dialogue_.obey(stop, still);
   auto begun = bird->begin();
   bird->dialogue_.obey({});
   if (!begun) return begun.error();

@@ -42,9 +42,11 @@ class MiniBird {
  public:
   /// Resets, examines and configures the unit, and starts its stream; one that is as wanted already is not reset.
   /// Errors name the port and the remedy: nothing answers (timeout), what answers is something else (bad_format), it
-  /// will not do what is wanted (bad_value). Takes up to seconds; stop ends it early.
+  /// will not do what is wanted (bad_value). Takes up to seconds, and half a minute
+  /// for a large flock; stop ends it early, and `still` is called all the while.
   static Result<std::unique_ptr<MiniBird>> start(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings,
-                                                 const std::stop_token& stop = {});
+                                                 const std::stop_token& stop = {},
+                                                 const std::function<void()>& still = {});
   /// Tells the unit to be quiet.
   ~MiniBird();
   MiniBird(const MiniBird&) = delete;

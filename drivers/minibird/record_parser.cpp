@@ -4,6 +4,19 @@
 
 namespace birdseye::drivers::minibird {
 
+namespace {
+
+std::vector<RecordFormat> formats_of(const StreamLayout& layout) {
+  std::vector<RecordFormat> formats;
+  for (const BirdLayout& bird : layout.birds) formats.push_back(bird.format);
+  return formats;
+}
+
+}  // namespace
+
+RecordParser::RecordParser(const StreamLayout& layout)
+    : RecordParser(formats_of(layout), layout.button_byte, layout.group_mode) {}
+
 RecordParser::RecordParser(std::vector<RecordFormat> formats, bool button_mode, bool group_mode)
     : formats_(std::move(formats)), button_mode_(button_mode), group_mode_(group_mode) {}
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "drivers/minibird/protocol.hpp"
+#include "drivers/minibird/stream_layout.hpp"
 
 namespace birdseye::drivers::minibird {
 
@@ -26,6 +27,8 @@ class RecordParser {
   /// The formats of the units, in the order of their addresses; one unit without group mode: one format. A record's
   /// length follows from the format of the unit whose turn it is.
   RecordParser(std::vector<RecordFormat> formats, bool button_mode, bool group_mode);
+
+  explicit RecordParser(const StreamLayout& layout);
 
   std::vector<Record> push(std::span<const std::uint8_t> bytes);
   /// Drops a partial record, as after a line error whose place is not known, and hunts.

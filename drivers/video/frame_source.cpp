@@ -8,20 +8,21 @@
 
 namespace birdseye::drivers {
 
-Result<void> check_camera(const CameraSettings& settings) {
+std::vector<std::string> faults_of(const CameraSettings& settings) {
+  std::vector<std::string> faults;
   const std::string& source = settings.source;
   const auto names = [&](const std::string& kind) { return source.starts_with(kind) && source.size() > kind.size(); };
   if (!names("v4l2:") && !names("socket:"))
-    return Error{Errc::bad_value, fmt::format("source \"{}\": give v4l2:DEVICE or socket:PATH", source)};
+    faults.push_back(fmt::format("source: \"{}\": give v4l2:DEVICE or socket:PATH", source));
   if (!settings.format.empty() && !pixel_format_of_name(settings.format)) {
-    return Error{Errc::bad_value,
-                 fmt::format("format \"{}\": none that is read here; see docs/manual/cameras.md", settings.format)};
+    faults.push_back(
+        fmt::format("format: \"{}\": none that is read here; see docs/manual/cameras.md", settings.format));
   }
-  return {};
+  return faults;
 }
 
 Result<std::unique_ptr<FrameSource>> open_camera(const CameraSettings& settings) {
-  if (auto sound = check_camera(settings); !sound) return sound.error();
+  if (const auto faults = faults_of(settings); !faults.empty()) return Error{Errc::bad_value, faults.front()};
   const std::string& source = settings.source;
   if (source.starts_with("v4l2:")) return V4l2Camera::open(source.substr(5), settings);
   return SocketCamera::open(source.substr(7));

@@ -74,8 +74,8 @@ class FrameSource {
   virtual Result<void> restart_stream() { return {}; }
 };
 
-/// Whether open_camera() could ever take them: known without a camera.
-Result<void> check_camera(const CameraSettings& settings);
+/// What open_camera() could never take, known without a camera: "key: why".
+std::vector<std::string> faults_of(const CameraSettings& settings);
 /// Opens what settings.source names; an unknown kind is an error that says which there are.
 Result<std::unique_ptr<FrameSource>> open_camera(const CameraSettings& settings);
 

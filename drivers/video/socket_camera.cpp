@@ -39,9 +39,13 @@ Result<std::unique_ptr<FrameSource>> SocketCamera::open(const std::filesystem::p
     return Error{Errc::bad_value, fmt::format("{}: too long for a socket; see [camera] source", name)};
   }
   std::memcpy(address.sun_path, name.c_str(), name.size() + 1);
-  UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  // A program whose queue is full would otherwise hold us for as long as it likes.
+  UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!fd || ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return Error{Errc::not_found, fmt::format("{}: no camera listens there; see [camera] source", name), errno};
+    return Error{Errc::not_found,
+                 fmt::format("{}: {}; see [camera] source", name,
+                             errno == EAGAIN ? "the camera takes nobody in" : "no camera listens there"),
+                 errno};
   }
   return std::unique_ptr<FrameSource>(new SocketCamera(std::move(fd), name));
 }
@@ -81,6 +85,7 @@ Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
     if (!whole) return whole.error();
     if (!*whole) return std::optional<Frame>();
     if (auto frame = finish()) return frame;
+    if (now() >= deadline) return std::optional<Frame>();
   }
 }
 

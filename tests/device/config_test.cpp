@@ -59,6 +59,19 @@ TEST(Config, AllMistakesAreToldAtOnceWithTheirLines) {
   EXPECT_EQ(std::count(what.begin(), what.end(), '\n'), 3) << what;
 }
 
+TEST(Config, AMistakeHidesNoOtherAndIsToldOnce) {
+  const auto config = read(
+      "[tracker]\ndevice = \"/dev/ttyS0\"\nbirds = \"two\"\nrate_hz = nan\nreport_every = 3\n"
+      "line_frequency_hz = 55\nnames = [\"a\", \"b\"]\n[camera]\nsource = \"x\"\nformat = \"y\"\n");
+  ASSERT_FALSE(config);
+  const std::string& what = config.error().what;
+  for (const char* expected :
+       {".toml:3: [tracker] birds", ".toml:4: [tracker] rate_hz: nan is not within", ".toml:5: [tracker] report_every",
+        ".toml:6: [tracker] line_frequency_hz", ".toml:9: [camera] source", ".toml:10: [camera] format"})
+    EXPECT_NE(what.find(expected), std::string::npos) << what;
+  EXPECT_EQ(std::count(what.begin(), what.end(), '\n'), 5) << what;
+}
+
 TEST(Config, EveryMistakeIsNamed) {
   const std::pair<std::string, std::string> cases[] = {
       {replaced("rate_hz", "rate_herz"), "rate_herz: unknown key"},
@@ -87,6 +100,7 @@ TEST(Config, EveryMistakeIsNamed) {
     EXPECT_NE(config.error().what.find(expected), std::string::npos) << config.error().what;
   }
   EXPECT_EQ(read_config("/nonexistent.toml").error().code, Errc::not_found);
+  EXPECT_EQ(read("a = " + std::string(50'000, '[')).error().code, Errc::bad_format);
   EXPECT_NE(read_config("/tmp").error().what.find("is a folder"), std::string::npos);
 }
 

@@ -1,6 +1,7 @@
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netdb.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -111,6 +112,7 @@ TEST(SocketLine, WatchesForADeadPeerAndHoldsNoByteBack) {
 }
 
 TEST(SocketLine, FindsAHostByName) {
+  if (::gethostbyname("localhost") == nullptr) GTEST_SKIP() << "this machine does not know localhost by name";
   const Listener listener = Listener::tcp();
   std::string device = listener.device;
   device.replace(4, 9, "localhost");
