@@ -16,7 +16,20 @@ for path in ./usr/bin/birdseyed ./etc/birdseye/birdseyed.toml ./usr/lib/systemd/
   echo "$contents" | grep -q "root/root .* $path\$" || fail "no $path in it, or not root's: $contents"
 done
 echo "$contents" | grep -q '^-rwxr-xr-x .*/usr/bin/birdseyed$' || fail "birdseyed is not to be run by everybody"
-[ "$(echo "$contents" | grep -c -v '/$')" -le 12 ] || fail "more in it than the appliance: $contents"
+[ "$(echo "$contents" | grep -v /usr/share/doc/ | grep -c -v '/$')" -le 8 ] || fail "more in it than the appliance: $contents"
+
+# Every link of the manual that comes with it leads somewhere, and so does the unit's.
+files=$build/package/files
+rm -rf "$files"
+dpkg-deb -x "$deb" "$files"
+for page in $(find "$files/usr/share/doc/birdseyed" -name '*.md'); do
+  for link in $(sed 's/](/\n](/g' "$page" | sed -n 's/^](\([^)#]*\).*/\1/p'); do
+    case $link in *://*) continue ;; esac
+    [ -e "$(dirname "$page")/$link" ] || fail "${page#"$files"} links to $link, which is not in the package"
+  done
+done
+documentation=$(sed -n 's|^Documentation=file://||p' "$source/packaging/birdseyed.service")
+[ -f "$files$documentation" ] || fail "no $documentation, which the unit names"
 
 depends=$(dpkg-deb -f "$deb" Depends)
 for package in libc6 libstdc++6 libopenigtlink libfmt; do
