@@ -10,10 +10,12 @@
 #include <thread>
 
 #include "drivers/io/monotonic.hpp"
+#include "drivers/io/unique_fd.hpp"
 #include "drivers/video/frame_source.hpp"
 #include "drivers/video/pixel_format.hpp"
 #include "drivers/video/pixel_pool.hpp"
 #include "tests/drivers/jpeg_pictures.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::drivers {
 namespace {
@@ -103,6 +105,27 @@ TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
   EXPECT_EQ((*frame)->width_px, 4);
   EXPECT_EQ((*(*frame)->rgb)[23], 23);
   EXPECT_EQ((*camera)->next(soon()).error().code, Errc::disconnected);
+}
+
+TEST(SocketCamera, AProgramThatTakesNobodyInIsSaidAtOnce) {
+  const testing::Scratch scratch;
+  const std::string path = (scratch / "camera").string();
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  const UniqueFd listener(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  ASSERT_EQ(::bind(listener.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(listener.get(), 0), 0);
+  std::vector<std::unique_ptr<FrameSource>> waiting;
+  for (;;) {
+    auto camera = open_camera({.source = "socket:" + path});
+    if (!camera) {
+      EXPECT_NE(camera.error().what.find("takes nobody in"), std::string::npos) << camera.error().what;
+      break;
+    }
+    waiting.push_back(*std::move(camera));
+    ASSERT_LT(waiting.size(), 10U);
+  }
 }
 
 TEST(SocketCamera, RefusesWhatIsNoFrame) {
