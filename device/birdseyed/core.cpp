@@ -42,11 +42,8 @@ Core::Counters Core::counters() const {
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
   counters.frames_repeated = frames_repeated_;
-  counters.clock_events = clock_events_ + frame_clock_.events();
-  if (assembler_) {
-    counters.clock_events += assembler_->clock_events();
-    counters.tracker_drift_ppm = assembler_->drift_ppm();
-  }
+  counters.clock_events = clock_events_;
+  if (assembler_) counters.tracker_drift_ppm = assembler_->drift_ppm();
   counters.camera_drift_ppm = frame_clock_.drift_ppm();
   counters.tracker_time_sigma_ms = time_sigma_.seconds() * 1e3;
   return counters;
@@ -65,10 +62,7 @@ void Core::note(const InstrumentChanged& changed) {
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
     // What was half received will not be completed, and a unit that starts again has another beat.
-    if (assembler_) {
-      add(counted_, assembler_->counters());
-      clock_events_ += assembler_->clock_events();
-    }
+    if (assembler_) add(counted_, assembler_->counters());
     assembler_.reset();
     for (BirdState& bird : birds_) bird = {};
     if (running && changed.layout) assembler_.emplace(*changed.layout);
@@ -82,6 +76,15 @@ void Core::note(const InstrumentChanged& changed) {
 void Core::note(const TrackerBytes& bytes) {
   if (!assembler_) return;
   for (const Measurement& measurement : assembler_->push(bytes.chunk)) publish(measurement);
+  tell(Instrument::tracker, assembler_->take_clock_events());
+}
+
+void Core::tell(Instrument instrument, const std::vector<ClockEvent>& events) {
+  for (const ClockEvent& event : events) {
+    ++clock_events_;
+    out_.push_back(wire::pack(
+        wire::ClockChange{event.at, name_of(instrument), to_string(event.kind), {event.by_ns}, event.by_ppm}));
+  }
 }
 
 void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime at) {
@@ -123,6 +126,7 @@ void Core::note(const FrameCame& came) {
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
   frames_.push_back({frame, frame_clock_.time_of(frame)});
+  tell(Instrument::camera, frame_clock_.take_events());
   if (frames_.size() > kMostWaitingFrames) {  // the wait that is configured is longer than frames may be kept for
     publish(frames_.front());
     frames_.pop_front();

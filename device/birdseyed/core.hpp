@@ -62,6 +62,7 @@ class Core {
   void note(const EdgesCame& edges);
   void note(const Tick&) {}
   void publish(const drivers::minibird::Measurement& measurement);
+  void tell(Instrument instrument, const std::vector<ClockEvent>& events);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void release_frames(DeviceTime now);
   void publish(const TimedFrame& timed);
@@ -72,7 +73,7 @@ class Core {
   InstrumentBoard board_;
   std::optional<drivers::minibird::MeasurementAssembler> assembler_;
   drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
-  std::uint64_t clock_events_ = 0;               ///< the same
+  std::uint64_t clock_events_ = 0;
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;

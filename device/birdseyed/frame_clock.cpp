@@ -35,7 +35,7 @@ ClockLine::Tick FrameClock::push(std::optional<ClockLine>& line, DeviceTime at, 
     line.emplace(settings);
   }
   const ClockLine::Tick tick = line->push_numbered(at, number);
-  events_ += line->take_events().size();
+  for (const ClockEvent& event : line->take_events()) events_.push_back(event);
   return tick;
 }
 

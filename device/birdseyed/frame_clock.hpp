@@ -2,6 +2,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "calibration/time/clock_line.hpp"
 #include "calibration/time/strobe_matcher.hpp"
@@ -40,7 +42,8 @@ class FrameClock {
   Time time_of(const drivers::Frame& frame);
   /// Of the line under the arrivals; 0 where the camera stamps its frames.
   [[nodiscard]] double drift_ppm() const { return line_ ? line_->drift_ppm() : 0; }
-  [[nodiscard]] std::uint64_t events() const { return events_; }
+  /// What happened to the camera's clock since the last call.
+  std::vector<ClockEvent> take_events() { return std::exchange(events_, {}); }
 
  private:
   StrobeMatcher::Match match(const drivers::Frame& frame, std::int64_t number);
@@ -53,7 +56,7 @@ class FrameClock {
   std::optional<ClockLine> stamps_;      ///< under the stamps: shows that they jump
   std::optional<StrobeMatcher> strobe_;  ///< from the first frame on
   bool strobe_by_stamps_ = false;
-  std::uint64_t events_ = 0;
+  std::vector<ClockEvent> events_;
 };
 
 }  // namespace birdseye::device

@@ -61,6 +61,21 @@ void from_json(const json& in, Doubt& doubt) {
   in.at("why").get_to(doubt.why);
 }
 
+void to_json(json& out, const ClockChange& change) {
+  out = {{"at_ns", change.at.ns},
+         {"clock", change.clock},
+         {"kind", change.kind},
+         {"by_ns", change.by.ns},
+         {"by_ppm", change.by_ppm}};
+}
+void from_json(const json& in, ClockChange& change) {
+  in.at("at_ns").get_to(change.at.ns);
+  in.at("clock").get_to(change.clock);
+  in.at("kind").get_to(change.kind);
+  in.at("by_ns").get_to(change.by.ns);
+  in.at("by_ppm").get_to(change.by_ppm);
+}
+
 void to_json(json& out, const Pedal& pedal) {
   out = {{"pressed", pedal.pressed}, {"at_ns", pedal.at.ns}};
 }

@@ -9,6 +9,8 @@ namespace birdseye::wire {
 
 void to_json(nlohmann::json& json, const FrameInfo& info);
 void from_json(const nlohmann::json& json, FrameInfo& info);
+void to_json(nlohmann::json& json, const ClockChange& change);
+void from_json(const nlohmann::json& json, ClockChange& change);
 void to_json(nlohmann::json& json, const Doubt& doubt);
 void from_json(const nlohmann::json& json, Doubt& doubt);
 void to_json(nlohmann::json& json, const Pedal& pedal);

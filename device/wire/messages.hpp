@@ -45,6 +45,15 @@ struct Doubt {
   std::string bird, why;
 };
 
+/// An instrument's clock did what jitter does not. Travels in a STRING.
+struct ClockChange {
+  DeviceTime at;      ///< of the first arrival that shows it
+  std::string clock;  ///< tracker, camera
+  std::string kind;   ///< step, slip, drift change, restart
+  Duration by;        ///< of a step or slip
+  double by_ppm = 0;  ///< of a change of drift
+};
+
 struct Pedal {
   bool pressed = false;
   DeviceTime at;
@@ -89,10 +98,11 @@ struct Health {
   std::string recording;  ///< the file, or why there is none; empty: not asked for
 };
 
-using Event = std::variant<VideoFrame, Birds, Doubt, Pedal, Status, Health>;
+using Event = std::variant<VideoFrame, Birds, Doubt, ClockChange, Pedal, Status, Health>;
 
 inline constexpr const char* kBirdsDevice = "Birds";
 inline constexpr const char* kDoubtDevice = "Doubt";
+inline constexpr const char* kClockChangeDevice = "ClockChange";
 inline constexpr const char* kFrameInfoDevice = "FrameInfo";
 inline constexpr const char* kVideoDevice = "Laparoscope";
 inline constexpr const char* kPedalDevice = "Pedal";

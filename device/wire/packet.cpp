@@ -116,6 +116,10 @@ Packet pack(const Doubt& doubt) {
   return string_packet(kDoubtDevice, doubt, doubt.acquired);
 }
 
+Packet pack(const ClockChange& change) {
+  return string_packet(kClockChangeDevice, change, change.at);
+}
+
 Packet pack(const Pedal& pedal) {
   return string_packet(kPedalDevice, pedal, pedal.at);
 }

@@ -26,6 +26,7 @@ Packet pack(const VideoFrame& frame);
 /// arrived: of the measurement's last byte.
 Packet pack(const Birds& birds, DeviceTime arrived = {});
 Packet pack(const Doubt& doubt);
+Packet pack(const ClockChange& change);
 Packet pack(const Pedal& pedal);
 Packet pack(const Status& status, DeviceTime time);
 Packet pack(const Health& health, DeviceTime time);

@@ -116,6 +116,7 @@ Result<MaybeTold> Unpacker::push_string(const std::string& device, const std::st
     }
     if (device == kHealthDevice) return MaybeTold(Event(json.get<Health>()));
     if (device == kDoubtDevice) return MaybeTold(Event(json.get<Doubt>()));
+    if (device == kClockChangeDevice) return MaybeTold(Event(json.get<ClockChange>()));
     if (device == kPedalDevice) return MaybeTold(Event(json.get<Pedal>()));
     return MaybeTold(json.get<ClockPong>());
   } catch (const nlohmann::json::exception&) {
@@ -133,7 +134,7 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
   const std::string& device = header->device;
   const bool string =
       type == "STRING" && (device == kFrameInfoDevice || device == kHealthDevice || device == kDoubtDevice ||
-                           device == kPedalDevice || device == kClockPongDevice);
+                           device == kClockChangeDevice || device == kPedalDevice || device == kClockPongDevice);
   const bool image = type == "IMAGE" && device == kVideoDevice && info_;
   const bool birds = type == "TDATA" && device == kBirdsDevice;
   const bool status = type == "STATUS" && device == kStatusDevice;

@@ -33,7 +33,7 @@ MiniBirdCounters MeasurementAssembler::counters() const {
 }
 
 void MeasurementAssembler::begin_anew() {
-  ++clock_events_;
+  if (last_tick_) clock_events_.push_back({ClockEvent::Kind::restart, last_tick_->time});
   parser_.reset();
   clock_line_ = ClockLine(line_settings(period_));
   cycle_.reset();
@@ -74,7 +74,7 @@ void MeasurementAssembler::finish(std::vector<Measurement>& out) {
   const bool damaged = std::exchange(damaged_, false) || cycle_->damage != damage_seen_;
   damage_seen_ = cycle_->damage;
   const ClockLine::Tick tick = clock_line_.push(start, lost, damaged);
-  clock_events_ += clock_line_.take_events().size();
+  for (const ClockEvent& event : clock_line_.take_events()) clock_events_.push_back(event);
   if (last_tick_) lost_ += tick.index - last_tick_->index - 1;
   last_tick_ = tick;
   last_begin_ = cycle_->first_record - cycle_->before_it;

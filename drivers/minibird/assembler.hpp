@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "calibration/time/clock_line.hpp"
@@ -24,8 +25,9 @@ class MeasurementAssembler {
   [[nodiscard]] MiniBirdCounters counters() const;
   /// By so much the unit's true period is longer than the nominal one.
   [[nodiscard]] double drift_ppm() const { return clock_line_.drift_ppm(); }
-  /// Times the unit's beat did what jitter does not: steps, losses that only time showed, changes of drift, restarts.
-  [[nodiscard]] std::uint64_t clock_events() const { return clock_events_; }
+  /// Where the unit's beat did what jitter does not, since the last call: steps, losses that only time showed, changes
+  /// of drift, restarts.
+  std::vector<ClockEvent> take_clock_events() { return std::exchange(clock_events_, {}); }
 
  private:
   struct Arrival {
@@ -61,7 +63,7 @@ class MeasurementAssembler {
   std::int64_t lost_ = 0;
   bool damaged_ = false;           ///< by a line error since the last measurement
   std::uint64_t damage_seen_ = 0;  ///< Cycle::damage of the last measurement
-  std::uint64_t clock_events_ = 0;
+  std::vector<ClockEvent> clock_events_;
   MiniBirdCounters counters_;
 };
 

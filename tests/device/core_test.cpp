@@ -208,12 +208,19 @@ TEST(Core, AFrameThatCameBeforeIsCountedAndNotSentAgain) {
 
 TEST(Core, StampsThatJumpAreAnEventOfTheClock) {
   Core core({});
+  wire::Unpacker unpacker;
   core.take(camera_runs(0));
+  std::vector<wire::ClockChange> told;
   for (std::uint64_t n = 0; n < 100; ++n) {
     const double taken = static_cast<double>(n) / 25;
-    core.take(FrameCame{frame(n, n < 50 ? taken : taken + 0.02, taken + 0.03)});
+    const FrameCame came{frame(n, n < 50 ? taken : taken + 0.02, taken + 0.03)};
+    for (const auto& change : only<wire::ClockChange>(unpacked(core.take(came), unpacker))) told.push_back(change);
   }
-  EXPECT_GT(core.counters().clock_events, 0U);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].clock, "camera");
+  EXPECT_EQ(told[0].kind, "step");
+  EXPECT_NEAR(told[0].by.seconds(), 0.02, 0.001);
+  EXPECT_EQ(core.counters().clock_events, 1U);
 }
 
 TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
