@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <ctime>
 #include <utility>
 
 #include "device/birdseyed/camera_thread.hpp"
@@ -88,9 +87,7 @@ namespace {
 wire::WallClock read_wall_clock() {
   const auto read = drivers::read_clock_discipline();
   if (!read) return {};
-  timespec wall{};
-  clock_gettime(CLOCK_REALTIME, &wall);
-  const std::int64_t shift_ns = wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - now().ns;
+  const std::int64_t shift_ns = drivers::wall_minus_monotonic().ns;
   return {true, read->synchronised, read->tai_known, read->max_error.ns, read->est_error.ns, shift_ns, read->source};
 }
 

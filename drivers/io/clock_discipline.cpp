@@ -7,7 +7,10 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
+
+#include "drivers/io/monotonic.hpp"
 
 namespace birdseye::drivers {
 
@@ -32,6 +35,12 @@ Result<ClockDiscipline> read_clock_discipline() {
                  errno};
   }
   return decode_discipline(reading, state);
+}
+
+Duration wall_minus_monotonic() {
+  timespec wall{};
+  clock_gettime(CLOCK_REALTIME, &wall);
+  return {wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - now().ns};
 }
 
 std::vector<std::string> ptp_devices(const std::string& folder) {

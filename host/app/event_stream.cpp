@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "drivers/io/clock_discipline.hpp"
+
 namespace birdseye::host {
 
 EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
@@ -13,6 +15,10 @@ void EventStream::read(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     auto event = client_->next(wire::Client::Clock::now() + std::chrono::milliseconds(100));
     const bool ended = !event;
+    if (!ended && *event && std::holds_alternative<wire::Health>(**event)) {
+      if (const auto clock = drivers::read_clock_discipline())
+        client_->use_discipline(*clock, drivers::wall_minus_monotonic());
+    }
     {
       const std::lock_guard lock(mutex_);
       if (ended) {
