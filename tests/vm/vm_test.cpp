@@ -164,6 +164,8 @@ chip = "cart"
 strobe = "strobe"
 pedal = "pedal"
 led = "led"
+trigger = "trigger"
+trigger_rate_hz = 5
 )";
   static void prepare() {
     g_machine->must("start camera " BIRDSEYE_BIN
@@ -221,6 +223,12 @@ TEST_F(ThroughLibusb, ThePedalIsTold) {
     ASSERT_TRUE(told);
     EXPECT_EQ(told->pressed, pressed);
   }
+}
+
+TEST_F(ThroughLibusb, TheTriggerIsPulsed) {
+  EXPECT_EQ(g_machine->must(
+                "trigger=$(gpio_line trigger)/value; for i in {1..40}; do cat $trigger; sleep 0.02; done | sort -u"),
+            "0\n1");
 }
 
 TEST_F(ThroughLibusb, TheLightIsSteadyWhileAllIsWellAndFlickersWhenItIsNot) {
