@@ -111,6 +111,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.frames_repeated = counters.frames_repeated;
   health.messages_shed = sent.messages_shed;
   health.clients = sent.clients;
+  health.clients_shed = sent.clients_shed;
   health.requests_refused = sent.requests_refused;
   health.latency_ms_p99_tracker = sent.latency_ms_p99_tracker;
   health.latency_ms_p99_tracker_beside_frames = sent.latency_ms_p99_tracker_beside_frames;

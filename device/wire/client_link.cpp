@@ -13,8 +13,6 @@ namespace birdseye::wire {
 
 namespace {
 
-constexpr std::size_t kMostQueuedBytes = 32U << 20U;  // about a second of PAL video, or five frames of 1080p
-constexpr std::size_t kMostSmall = 4096;              // packets
 constexpr std::size_t kSliceBytes = 256U << 10U;
 constexpr Duration kStuck = Duration::from_ms(10'000);
 constexpr Duration kHalfAsked = Duration::from_ms(5'000);
@@ -33,6 +31,11 @@ ClientLink::~ClientLink() {
   ::close(fd_);
 }
 
+void ClientLink::take(const Subscription& subscription) {
+  subscription_ = subscription;
+  if (!subscription_.frames) waiting_.forget_frames();
+}
+
 void ClientLink::take(const TrackingRequest& request) {
   subscription_.tracking = request.start;
   tracking_interval_ = request.interval;
@@ -48,49 +51,46 @@ bool ClientLink::wants(const Packet& packet) {
   return true;
 }
 
-bool ClientLink::offer(const Packet& packet) {
-  if (!wants(packet)) return true;
-  const bool idle = !wants_to_write();
-  const bool frame = packet.kind == Packet::Kind::frame;
-  const bool full = frame ? queued_bytes_ + packet.size() > kMostQueuedBytes : small_.size() >= kMostSmall;
-  if (full && !idle) return false;
-  if (idle) progress_ = monotonic_now();
-  if (frame) queued_bytes_ += packet.size();
-  (frame ? frames_ : small_).push_back(packet);
-  return true;
+std::size_t ClientLink::offer(const Packet& packet) {
+  if (!wants(packet)) return 0;
+  if (!wants_to_write()) progress_ = monotonic_now();
+  return waiting_.push(packet);
+}
+
+void ClientLink::add_pixels_to(std::vector<const std::vector<std::uint8_t>*>& pixels) const {
+  if (sends_frame()) pixels.push_back(sending_->pixels.get());
+  for (const Packet& packet : waiting_.frames()) pixels.push_back(packet.pixels.get());
 }
 
 bool ClientLink::send_some(Latencies& latencies) {
-  if (!sending_) {
-    std::deque<Packet>& from = small_.empty() ? frames_ : small_;
-    if (from.empty()) return true;
-    sending_ = std::move(from.front());
-    from.pop_front();
-    sent_ = 0;
-  }
-  const std::size_t head = sending_->head->size();
+  if (!wants_to_write()) return true;
+  const Packet& packet = sending_ ? *sending_ : waiting_.front();
+  const std::size_t head = packet.head->size();
   std::array<iovec, 2> parts{};
   std::size_t count = 0;
   const auto add = [&](const std::vector<std::uint8_t>& bytes, std::size_t from, std::size_t most) {
     // writev takes what it sends as something it might change.
     parts[count++] = {const_cast<std::uint8_t*>(bytes.data()) + from, std::min(bytes.size() - from, most)};
   };
-  if (sent_ < head) add(*sending_->head, sent_, kSliceBytes);
-  if (sending_->pixels) add(*sending_->pixels, sent_ > head ? sent_ - head : 0, kSliceBytes);
+  if (sent_ < head) add(*packet.head, sent_, kSliceBytes);
+  if (packet.pixels) add(*packet.pixels, sent_ > head ? sent_ - head : 0, kSliceBytes);
   msghdr message{};
   message.msg_iov = parts.data();
   message.msg_iovlen = count;
   const ssize_t put = ::sendmsg(fd_, &message, MSG_NOSIGNAL);
   if (put < 0) return errno == EAGAIN || errno == EINTR;
   progress_ = monotonic_now();
+  if (!sending_) sending_ = waiting_.pop();
   sent_ += static_cast<std::size_t>(put);
-  if (sent_ < sending_->size()) return true;
-  const bool frame = sending_->kind == Packet::Kind::frame;
-  if (frame) queued_bytes_ -= sending_->size();
-  LatencyLog& tracker = subscription_.frames ? latencies.tracker_beside_frames : latencies.tracker;
-  if (sending_->arrived.ns != 0) (frame ? latencies.frame : tracker).add(progress_ - sending_->arrived);
-  sending_.reset();
+  if (sent_ == sending_->size()) finish(latencies);
   return true;
+}
+
+void ClientLink::finish(Latencies& latencies) {
+  LatencyLog& tracker = subscription_.frames ? latencies.tracker_beside_frames : latencies.tracker;
+  if (sending_->arrived.ns != 0) (sends_frame() ? latencies.frame : tracker).add(progress_ - sending_->arrived);
+  sending_.reset();
+  sent_ = 0;
 }
 
 Result<std::vector<Request>> ClientLink::receive() {

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <deque>
 #include <optional>
+#include <vector>
 
 #include "device/wire/latency_log.hpp"
-#include "device/wire/packet.hpp"
+#include "device/wire/packet_queue.hpp"
 #include "device/wire/request.hpp"
 
 namespace birdseye::wire {
@@ -28,32 +28,40 @@ class ClientLink {
   ClientLink& operator=(const ClientLink&) = delete;
 
   [[nodiscard]] int fd() const { return fd_; }
-  [[nodiscard]] bool wants_to_write() const { return sending_ || !small_.empty() || !frames_.empty(); }
-  /// Queues a packet, if the client wants its kind; false where its queue is full and the packet is lost to it.
-  bool offer(const Packet& packet);
+  [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
+  /// Queues a packet, if the client wants its kind. How many older ones are lost to it for that.
+  std::size_t offer(const Packet& packet);
   /// Hands one slice to the operating system, so that a frame to one client does not keep the others waiting; small
-  /// packets go before frames that have not begun. False: the client has gone.
+  /// packets go before frames that have not begun. A packet has begun when its first byte was taken; from then on it is
+  /// sent whole. False: the client has gone.
   bool send_some(Latencies& latencies);
   /// What the client asked. An error: it has gone, or it does not speak the protocol.
   Result<std::vector<Request>> receive();
   /// Takes what a request changes about what this client gets.
-  void take(const Subscription& subscription) { subscription_ = subscription; }
+  void take(const Subscription& subscription);
   void take(const TrackingRequest& request);
   /// It has taken nothing for long although there was something, or left a message of its own half sent.
   [[nodiscard]] bool stuck() const;
 
+  [[nodiscard]] std::size_t frames_waiting() const { return waiting_.frames().size(); }
+  std::size_t shed_frame() { return waiting_.shed_frame(); }
+  [[nodiscard]] bool sends_frame() const { return sending_ && sending_->kind == Packet::Kind::frame; }
+  [[nodiscard]] DeviceTime last_progress() const { return progress_; }
+  /// The pixels of every frame that waits or is being sent.
+  void add_pixels_to(std::vector<const std::vector<std::uint8_t>*>& pixels) const;
+
  private:
   [[nodiscard]] bool wants(const Packet& packet);
+  void finish(Latencies& latencies);
 
   int fd_;
   RequestReader reader_;
   Subscription subscription_;
   Duration tracking_interval_{0};
   DeviceTime tracking_sent_;
-  std::deque<Packet> small_, frames_;
-  std::size_t queued_bytes_ = 0;
-  std::optional<Packet> sending_;
-  std::size_t sent_ = 0;  ///< bytes of sending_
+  PacketQueue waiting_;
+  std::optional<Packet> sending_;  ///< begun
+  std::size_t sent_ = 0;           ///< bytes of sending_
   DeviceTime progress_, asking_since_;
 };
 

@@ -89,7 +89,7 @@ struct Health {
   std::uint64_t measurements = 0, measurements_lost = 0, phase_errors = 0, senseless_records = 0, doubted = 0;
   std::uint64_t line_errors = 0, clock_events = 0;
   std::uint64_t frames = 0, frames_dropped = 0, frames_repeated = 0;
-  std::uint64_t messages_shed = 0, clients = 0, requests_refused = 0;
+  std::uint64_t messages_shed = 0, clients = 0, clients_shed = 0, requests_refused = 0;
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   // From the last byte in to the last byte out, since the last report. Poses to clients that take frames too wait while
   // a frame is on its way; the first figure is of those that do not.

@@ -10,13 +10,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <vector>
+#include <iterator>
+#include <utility>
 
 namespace birdseye::wire {
 
 namespace {
 
-constexpr std::size_t kMostInboxBytes = 64U << 20U;
+constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
 
 }  // namespace
@@ -73,18 +74,13 @@ void Server::wake() const {
 void Server::publish(const Packet& packet) {
   {
     const std::lock_guard lock(mutex_);
-    if (inbox_bytes_ + packet.size() > kMostInboxBytes) {
-      ++messages_shed_;
-      return;
-    }
-    inbox_bytes_ += packet.size();
-    inbox_.push_back(packet);
+    messages_shed_ += inbox_.push(packet);
   }
   wake();
 }
 
 Server::Counters Server::take_counters() {
-  Counters counters{clients_count_, messages_shed_, clients_shed_, requests_refused_, 0, 0, 0};
+  Counters counters{clients_count_, messages_shed_, requests_refused_, clients_shed_, 0, 0, 0};
   counters.latency_ms_p99_tracker = latencies_.tracker.take_p99_ms();
   counters.latency_ms_p99_tracker_beside_frames = latencies_.tracker_beside_frames.take_p99_ms();
   counters.latency_ms_p99_frame = latencies_.frame.take_p99_ms();
@@ -95,43 +91,78 @@ void Server::accept_one() {
   const int fd = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (fd < 0) return;
   if (clients_.size() >= kMostClients) {
+    ++clients_shed_;  // before the client can know
     ::close(fd);
-    ++clients_shed_;
     return;
   }
   const int on = 1;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
   clients_.emplace_back(fd);
-  if (last_status_) clients_.back().offer(*last_status_);
+  if (last_status_) offer(clients_.back(), *last_status_);
   ++clients_count_;
 }
 
-void Server::distribute() {
-  std::deque<Packet> packets;
+bool Server::distribute() {
+  PacketQueue packets;
   {
     const std::lock_guard lock(mutex_);
-    packets.swap(inbox_);
-    inbox_bytes_ = 0;
+    std::swap(packets, inbox_);
   }
-  for (const Packet& packet : packets) {
+  const bool frames = !packets.frames().empty();
+  while (!packets.empty()) {
+    const Packet packet = packets.pop();
     if (packet.kind == Packet::Kind::status) last_status_ = packet;
-    for (ClientLink& client : clients_) {
-      if (!client.offer(packet)) ++messages_shed_;
+    for (ClientLink& client : clients_) offer(client, packet);
+  }
+  return frames;
+}
+
+std::size_t Server::frame_bytes_held() const {
+  std::vector<const std::vector<std::uint8_t>*> pixels;
+  for (const ClientLink& client : clients_) client.add_pixels_to(pixels);
+  std::sort(pixels.begin(), pixels.end());
+  pixels.erase(std::unique(pixels.begin(), pixels.end()), pixels.end());
+  std::size_t bytes = 0;
+  for (const auto* of_one : pixels) bytes += of_one->size();
+  return bytes;
+}
+
+std::list<ClientLink>::iterator Server::put_out(std::list<ClientLink>::iterator client) {
+  --clients_count_;
+  return clients_.erase(client);
+}
+
+/// What waits goes first, but never the newest frame, which is the same for all. A frame that has begun goes only with
+/// its client: with the one that has taken nothing for the longest time.
+void Server::bound_frames() {
+  while (frame_bytes_held() > kMostFrameBytesHeld) {
+    const auto most = std::ranges::max_element(clients_, {}, &ClientLink::frames_waiting);
+    if (most->frames_waiting() > 1) {
+      messages_shed_ += most->shed_frame();
+      continue;
     }
+    auto stuck = clients_.end();
+    for (auto client = clients_.begin(); client != clients_.end(); ++client) {
+      const bool longer = stuck == clients_.end() || client->last_progress() < stuck->last_progress();
+      if (client->sends_frame() && longer) stuck = client;
+    }
+    if (stuck == clients_.end()) return;
+    put_out(stuck);
+    ++clients_shed_;
   }
 }
 
 void Server::answer(ClientLink& client, const Request& request) {
   if (const auto* ping = std::get_if<ClockPing>(&request)) {
     const DeviceTime now = monotonic_now();
-    client.offer(pack(ClockPong{ping->host_sent_ns, now, now}));
+    offer(client, pack(ClockPong{ping->host_sent_ns, now, now}));
   } else if (const auto* subscription = std::get_if<Subscription>(&request)) {
     client.take(*subscription);
   } else if (const auto* tracking = std::get_if<TrackingRequest>(&request)) {
     client.take(*tracking);
-    client.offer(pack_tracking_reply(true));
+    offer(client, pack_tracking_reply(true));
   } else if (std::holds_alternative<StatusRequest>(request)) {
-    if (last_status_) client.offer(*last_status_);
+    if (last_status_) offer(client, *last_status_);
   } else if (std::holds_alternative<DamagedRequest>(request)) {
     ++requests_refused_;
   }
@@ -165,16 +196,12 @@ void Server::run(const std::stop_token& stop) {
       std::uint64_t count = 0;
       (void)!::read(wake_fd_, &count, sizeof count);
     }
-    distribute();
+    const bool frames = distribute();
     auto entry = entries.begin() + 2;
     for (auto client = clients_.begin(); client != clients_.end(); ++entry) {
-      if (serve(*client, entry->revents)) {
-        ++client;
-      } else {
-        client = clients_.erase(client);
-        --clients_count_;
-      }
+      client = serve(*client, entry->revents) ? std::next(client) : put_out(client);
     }
+    if (frames) bound_frames();
     if ((entries[0].revents & POLLIN) != 0) accept_one();
   }
 }

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <deque>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -18,8 +17,8 @@ namespace birdseye::wire {
 bool is_address(const std::string& text);
 
 /// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
-/// not keep up loses packets (never parts of one), not the others; one that takes nothing for ten seconds, or does not
-/// speak the protocol, is disconnected.
+/// not keep up loses the oldest packets that wait for it (never parts of one), not the others; one that takes nothing
+/// for ten seconds, or does not speak the protocol, is disconnected.
 class Server {
  public:
   /// port 0 takes any that is free. A port in use is an error that names it and the setting.
@@ -32,21 +31,26 @@ class Server {
   [[nodiscard]] int port() const { return port_; }
 
   struct Counters {
-    std::uint64_t clients = 0, messages_shed = 0, clients_shed = 0, requests_refused = 0;
+    std::uint64_t clients = 0, messages_shed = 0, requests_refused = 0;
+    std::uint64_t clients_shed = 0;  ///< put out for taking nothing or holding too much, or refused for want of room
     // Since they were last taken; 0: there was none.
     double latency_ms_p99_tracker = 0, latency_ms_p99_tracker_beside_frames = 0, latency_ms_p99_frame = 0;
   };
   Counters take_counters();
   [[nodiscard]] std::size_t clients() const { return clients_count_; }
-  [[nodiscard]] std::uint64_t messages_shed() const { return messages_shed_; }
-  [[nodiscard]] std::uint64_t requests_refused() const { return requests_refused_; }
-  [[nodiscard]] std::uint64_t clients_shed() const { return clients_shed_; }
 
  private:
   Server(int fd, int wake_fd, int port);
   void run(const std::stop_token& stop);
   void accept_one();
-  void distribute();
+  /// Whether there were frames.
+  bool distribute();
+  void offer(ClientLink& client, const Packet& packet) { messages_shed_ += client.offer(packet); }
+  std::list<ClientLink>::iterator put_out(std::list<ClientLink>::iterator client);
+  /// Keeps the frames that all clients hold within one bound.
+  void bound_frames();
+  /// Each counted once, however many clients hold it.
+  [[nodiscard]] std::size_t frame_bytes_held() const;
   void wake() const;
   /// False: the client is to be disconnected.
   bool serve(ClientLink& client, short events);
@@ -56,8 +60,7 @@ class Server {
   std::atomic<std::size_t> clients_count_ = 0;
   std::atomic<std::uint64_t> messages_shed_ = 0, clients_shed_ = 0, requests_refused_ = 0;
   std::mutex mutex_;
-  std::deque<Packet> inbox_;  ///< published, not yet distributed
-  std::size_t inbox_bytes_ = 0;
+  PacketQueue inbox_;  ///< published, not yet distributed
   Latencies latencies_;
   std::list<ClientLink> clients_;      ///< of the thread below alone, as is what follows
   std::optional<Packet> last_status_;  ///< a client that comes is told at once how things are

@@ -127,7 +127,7 @@ TEST(Server, GarbageIsRefusedAndCountedAndTheOthersGoOn) {
   hostile.send(std::vector<std::uint8_t>(500, 0xFF));
   EXPECT_FALSE(hostile.next());  // disconnected
   wait_for_clients(*server, 1);
-  EXPECT_EQ(server->requests_refused(), 1U);
+  EXPECT_EQ(server->take_counters().requests_refused, 1U);
   server->publish(pack(Status{true, "still here"}, {1}));
   const auto event = good->next(Clock::now() + seconds(5));
   ASSERT_TRUE(event && *event);

@@ -170,8 +170,10 @@ TEST(WireHostile, AHeaderNeverPromisesMoreThanTheLargestBody) {
 /// A socket to, or of, the other end: what is written there is up to the test.
 class Raw {
  public:
-  static Raw connected_to(int port) {
+  static Raw connected_to(int port, int receive_buffer_bytes = 0) {
     Raw raw(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    if (receive_buffer_bytes > 0)
+      ::setsockopt(raw.fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer_bytes, sizeof receive_buffer_bytes);
     sockaddr_in address = loopback(port);
     EXPECT_EQ(::connect(raw.fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
     return raw;
@@ -188,6 +190,9 @@ class Raw {
   }
   [[nodiscard]] Raw accepted() const { return Raw(::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC)); }
   void send(const Bytes& bytes) const { (void)!::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT); }
+  /// Waits for the first byte of something.
+  [[nodiscard]] bool hears(milliseconds most) const { return peek(most) > 0; }
+  [[nodiscard]] bool ends(milliseconds most) const { return peek(most) == 0; }
   Raw(Raw&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   Raw& operator=(Raw&&) = delete;
   ~Raw() {
@@ -196,6 +201,12 @@ class Raw {
 
  private:
   explicit Raw(int fd) : fd_(fd) {}
+  [[nodiscard]] ssize_t peek(milliseconds most) const {
+    const timeval limit{most.count() / 1000, most.count() % 1000 * 1000};
+    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+    std::uint8_t byte = 0;
+    return ::recv(fd_, &byte, 1, MSG_PEEK);
+  }
   static sockaddr_in loopback(int port) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
@@ -266,6 +277,103 @@ TEST(WireHostile, AServerOutlivesBadClientsAndServesTheGoodOne) {
     }
     EXPECT_TRUE(heard) << text;
   }
+}
+
+/// Frames of a size, each with pixels of its own, and how many bytes of them somebody still holds.
+class Video {
+ public:
+  Video(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
+  Packet next() {
+    VideoFrame frame;
+    frame.info.sequence = pixels_.size();
+    frame.width_px = width_px_;
+    frame.height_px = height_px_;
+    frame.rgb = std::make_shared<const Bytes>(static_cast<std::size_t>(width_px_ * height_px_) * 3, std::uint8_t{50});
+    pixels_.push_back(frame.rgb);
+    return pack(frame);
+  }
+  [[nodiscard]] std::size_t bytes_held() const {
+    std::size_t bytes = 0;
+    for (const auto& pixels : pixels_) {
+      if (const auto held = pixels.lock()) bytes += held->size();
+    }
+    return bytes;
+  }
+
+ private:
+  int width_px_, height_px_;
+  std::vector<std::weak_ptr<const Bytes>> pixels_;
+};
+
+/// A client that the server knows of already.
+Raw taken_by(const Server& server, int receive_buffer_bytes = 0) {
+  const auto deadline = Clock::now() + seconds(20);
+  const auto before = server.clients();
+  Raw raw = Raw::connected_to(server.port(), receive_buffer_bytes);
+  while (server.clients() == before && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(1));
+  return raw;
+}
+
+/// Clients that come one after the other, begin a frame each and read no further.
+std::vector<Raw> silent_clients(Server& server, Video& video, int count) {
+  std::vector<Raw> silent;
+  for (int i = 0; i < count; ++i) {
+    silent.push_back(taken_by(server, 4096));
+    const auto deadline = Clock::now() + seconds(20);
+    server.publish(video.next());
+    while (!silent.back().hears(milliseconds(200)) && Clock::now() < deadline) server.publish(video.next());
+    for (int n = 0; n < 5; ++n) server.publish(video.next());
+  }
+  return silent;
+}
+
+constexpr std::size_t kMostHeld = 96U << 20U;
+
+/// The bound holds when what was published has been distributed, of which the newest is a part.
+void expect_bounded(const Video& video) {
+  const auto deadline = Clock::now() + seconds(20);
+  while (video.bytes_held() > kMostHeld && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(2));
+  EXPECT_LE(video.bytes_held(), kMostHeld);
+}
+
+TEST(WireHostile, SilentClientsHoldNoMoreThanTheBoundOverAll) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  Video video(1920, 1080);
+  const std::vector<Raw> silent = silent_clients(*server, video, 16);
+  expect_bounded(video);
+  const auto counters = server->take_counters();
+  EXPECT_GE(counters.clients, 13U);  // a frame that has begun each, and few others
+  EXPECT_GT(counters.messages_shed, 0U);
+}
+
+TEST(WireHostile, TheLongestSilentGoesWhereBegunFramesAloneAreTooMany) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  Video video(3840, 2160);
+  const std::vector<Raw> silent = silent_clients(*server, video, 6);
+  expect_bounded(video);
+  EXPECT_GE(server->take_counters().clients_shed, 1U);
+  // Who reads is served all the same.
+  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  const auto deadline = Clock::now() + seconds(30);
+  int frames = 0;
+  while (frames < 3 && Clock::now() < deadline) {
+    server->publish(video.next());
+    const auto event = good->next(Clock::now() + milliseconds(500));
+    ASSERT_TRUE(event) << event.error().what;
+    if (*event && std::holds_alternative<VideoFrame>(**event)) ++frames;
+  }
+  EXPECT_EQ(frames, 3);
+  expect_bounded(video);
+}
+
+TEST(WireHostile, WhoFindsNoRoomIsRefusedAndCounted) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  std::vector<Raw> clients;
+  for (int i = 0; i < 16; ++i) clients.push_back(taken_by(*server));
+  clients.push_back(Raw::connected_to(server->port()));
+  EXPECT_TRUE(clients.back().ends(seconds(20)));
+  EXPECT_EQ(server->take_counters().clients, 16U);
+  EXPECT_EQ(server->take_counters().clients_shed, 1U);
 }
 
 }  // namespace

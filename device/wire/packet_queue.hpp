@@ -1,0 +1,63 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <deque>
+#include <utility>
+
+#include "device/wire/packet.hpp"
+
+namespace birdseye::wire {
+
+/// Packets that wait and of which nothing has been sent. Bounded, and what is live wins: where there are too many of a
+/// kind, the oldest of that kind goes. Of STATUS only the newest waits, and it never goes.
+class PacketQueue {
+ public:
+  static constexpr std::size_t kMostFrames = 3;
+  static constexpr std::size_t kMostOfAKind = 256;  ///< of small ones: of poses more than two seconds
+
+  /// How many were shed for it. A STATUS takes the place of the one that waits, which then tells nobody anything.
+  std::size_t push(const Packet& packet) {
+    if (packet.kind == Packet::Kind::frame) {
+      frames_.push_back(packet);
+      return frames_.size() > kMostFrames ? shed_frame() : 0;
+    }
+    const auto same = [&](const Packet& other) { return other.kind == packet.kind; };
+    if (packet.kind == Packet::Kind::status) {
+      const auto waiting = std::ranges::find_if(small_, same);
+      if (waiting != small_.end()) {
+        *waiting = packet;
+        return 0;
+      }
+    }
+    small_.push_back(packet);
+    if (small_.size() <= kMostOfAKind || std::ranges::count_if(small_, same) <= std::ptrdiff_t{kMostOfAKind}) return 0;
+    small_.erase(std::ranges::find_if(small_, same));
+    return 1;
+  }
+  /// The oldest frame goes; how many that were.
+  std::size_t shed_frame() {
+    if (frames_.empty()) return 0;
+    frames_.pop_front();
+    return 1;
+  }
+  void forget_frames() { frames_.clear(); }
+
+  [[nodiscard]] bool empty() const { return small_.empty() && frames_.empty(); }
+  /// Small ones before frames, otherwise in the order in which they came.
+  [[nodiscard]] const Packet& front() const { return next().front(); }
+  Packet pop() {
+    std::deque<Packet>& from = small_.empty() ? frames_ : small_;
+    Packet packet = std::move(from.front());
+    from.pop_front();
+    return packet;
+  }
+  [[nodiscard]] const std::deque<Packet>& frames() const { return frames_; }
+
+ private:
+  [[nodiscard]] const std::deque<Packet>& next() const { return small_.empty() ? frames_ : small_; }
+
+  std::deque<Packet> small_, frames_;
+};
+
+}  // namespace birdseye::wire
