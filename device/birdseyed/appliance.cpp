@@ -24,25 +24,18 @@ constexpr Duration kAliveWithin = Duration::from_ms(30'000);  // a tracker that 
 
 }  // namespace
 
-Appliance::Appliance(const Config& config, wire::Server& server, std::unique_ptr<Recorder> recorder)
+Appliance::Appliance(const Config& config, wire::Server& server)
     : config_(config),
       server_(server),
-      recorder_(std::move(recorder)),
       tracker_post_(Instrument::tracker, queue_),
       camera_post_(Instrument::camera, queue_),
       gpio_post_(Instrument::gpio, queue_),
       core_alive_ns_(now().ns) {}
 
 Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::Server& server) {
-  std::unique_ptr<Recorder> recorder;
-  if (!config.record.folder.empty()) {
-    auto started = Recorder::start(config.record, config.core);
-    if (!started) return started.error();
-    recorder = *std::move(started);
-    spdlog::info("recording to {}", recorder->path().string());
-  }
-  std::unique_ptr<Appliance> appliance(new Appliance(config, server, std::move(recorder)));
+  std::unique_ptr<Appliance> appliance(new Appliance(config, server));
   Appliance* const a = appliance.get();
+  if (!config.record.folder.empty()) a->start_recording();
   const auto begin = [a](InstrumentPost& post, auto run) {
     post.tell({.state = InstrumentState::starting,
                .text = fmt::format("the {} is being looked for", name_of(post.instrument()))});
@@ -55,6 +48,18 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
   a->threads_.emplace_back([a](const std::stop_token& s) { a->make_messages(s); });
   a->threads_.emplace_back([a](const std::stop_token& s) { a->report_health(s); });
   return appliance;
+}
+
+/// Without a recording the appliance still does its work.
+void Appliance::start_recording() {
+  auto started = Recorder::start(config_.record, config_.core);
+  if (started) {
+    recorder_ = *std::move(started);
+    spdlog::info("recording to {}", recorder_->path().string());
+  } else {
+    not_recording_ = "not recording: " + started.error().what;
+    spdlog::error("{}", not_recording_);
+  }
 }
 
 Appliance::~Appliance() {
@@ -120,7 +125,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.camera_drift_ppm = counters.camera_drift_ppm;
   health.tracker_time_sigma_ms = counters.tracker_time_sigma_ms;
   health.clock = read_wall_clock();
-  if (recorder_) health.recording = recorder_->text();
+  health.recording = recorder_ ? recorder_->text() : not_recording_;
   const std::lock_guard lock(told_mutex_);
   health.state = name_of(board_.state());
   for (const Instrument instrument : {Instrument::tracker, Instrument::camera, Instrument::gpio}) {
@@ -158,7 +163,8 @@ bool Appliance::alive() const {
 std::string Appliance::summary() const {
   const std::lock_guard lock(told_mutex_);
   const std::string faults = board_.faults();
-  return fmt::format("{}{}{}", name_of(board_.state()), faults.empty() ? "" : ": ", faults);
+  return fmt::format("{}{}{}{}{}", name_of(board_.state()), faults.empty() ? "" : ": ", faults,
+                     not_recording_.empty() ? "" : "; ", not_recording_);
 }
 
 }  // namespace birdseye::device

@@ -30,7 +30,8 @@ class Appliance {
   [[nodiscard]] std::string summary() const;
 
  private:
-  Appliance(const Config& config, wire::Server& server, std::unique_ptr<Recorder> recorder);
+  Appliance(const Config& config, wire::Server& server);
+  void start_recording();
   void make_messages(const std::stop_token& stop);
   void report_health(const std::stop_token& stop);
   [[nodiscard]] wire::Health health(const Core::Counters& before, const Core::Counters& now, double seconds);
@@ -38,6 +39,7 @@ class Appliance {
   Config config_;
   wire::Server& server_;
   std::unique_ptr<Recorder> recorder_;  ///< null where nothing is recorded
+  std::string not_recording_;           ///< why there is none, where there should be
   EventQueue queue_;
   InstrumentPost tracker_post_, camera_post_, gpio_post_;
   std::atomic<std::int64_t> core_alive_ns_;

@@ -39,7 +39,8 @@ inline void to_json(nlohmann::json& json, const BirdLayout& bird) {
           {"into_hemisphere", {into.x(), into.y(), into.z()}}};
 }
 inline void from_json(const nlohmann::json& json, BirdLayout& bird) {
-  bird.format = static_cast<RecordFormat>(json.at("format").get<int>());
+  const int format = json.at("format").get<int>();
+  bird.format = static_cast<RecordFormat>(format > 0 && format < 256 ? format : 0);  // 0 is none: fault_of() tells
   json.at("mm_per_count").get_to(bird.mm_per_count);
   for (int i = 0; i < 3; ++i) bird.into_hemisphere[i] = json.at("into_hemisphere").at(static_cast<std::size_t>(i));
 }

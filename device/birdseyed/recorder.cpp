@@ -6,114 +6,283 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <system_error>
+#include <utility>
 
 #include "drivers/io/monotonic.hpp"
+#include "drivers/io/unique_fd.hpp"
 
 namespace birdseye::device {
 
 namespace {
 
-constexpr std::size_t kMostWaitingBytes = 256U << 20U;  // two thirds of a second of 1080p60
+constexpr std::chrono::milliseconds kLookEvery{100};
 constexpr Duration kSyncEvery = Duration::from_ms(500);
+constexpr std::size_t kSyncBytes = 16'000'000;  // more at once, and frames overrun the bound while they wait for it
+constexpr std::chrono::milliseconds kBeginWithin{1000};
+constexpr Duration kWriteAfterStop = Duration::from_ms(1000);
+constexpr std::chrono::milliseconds kEndWithin{2000};  // the last write and its sync included
+constexpr int kMostOfOneName = 1000;
+
+std::string words(int os_errno) {
+  return std::generic_category().message(os_errno);
+}
 
 std::size_t size_of(const RawEvent& event) {
-  const auto* came = std::get_if<FrameCame>(&event);
-  return 256 + (came != nullptr && came->frame.rgb ? came->frame.rgb->size() : 0);
+  std::size_t bytes = 256;
+  if (const auto* came = std::get_if<FrameCame>(&event); came != nullptr && came->frame.rgb)
+    bytes += came->frame.rgb->size();
+  if (const auto* came = std::get_if<TrackerBytes>(&event)) bytes += came->chunk.bytes.size();
+  return bytes;
 }
+
+class DiskFile : public RecordFile {
+ public:
+  explicit DiskFile(drivers::UniqueFd fd) : fd_(std::move(fd)) {}
+
+  int write(std::span<const std::uint8_t> bytes) override {
+    while (!bytes.empty()) {
+      const ssize_t put = ::write(fd_.get(), bytes.data(), bytes.size());
+      if (put < 0 && errno == EINTR) continue;
+      if (put <= 0) return put < 0 ? errno : ENOSPC;
+      bytes = bytes.subspan(static_cast<std::size_t>(put));
+    }
+    return 0;
+  }
+  int sync() override { return ::fdatasync(fd_.get()) == 0 || errno == EINVAL ? 0 : errno; }  // EINVAL: it cannot
+
+ private:
+  drivers::UniqueFd fd_;
+};
 
 }  // namespace
 
-Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, const CoreSettings& settings) {
+Result<NewRecordFile> create_record_file(const RecordConfig& config) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const auto path = config.folder / fmt::format("birdseyed-{:%Y%m%dT%H%M%SZ}.berec", fmt::gmtime(now));
+  const std::string name = fmt::format("birdseyed-{:%Y%m%dT%H%M%SZ}", fmt::gmtime(now));
   std::error_code ignored;
   std::filesystem::create_directories(config.folder, ignored);
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640);
-  if (fd < 0) {
-    return Error{Errc::unreadable,
-                 fmt::format("{}: cannot be written; see [record] folder and its permissions", path.string()), errno};
+  std::filesystem::path path = config.folder / (name + ".berec");
+  int os_errno = EEXIST;
+  for (int i = 2; os_errno == EEXIST && i <= kMostOfOneName; ++i) {
+    drivers::UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
+    if (fd) return NewRecordFile{std::make_unique<DiskFile>(std::move(fd)), path};
+    os_errno = errno;
+    if (os_errno == EEXIST) path = config.folder / fmt::format("{}-{}.berec", name, i);
   }
-  std::unique_ptr<Recorder> recorder(new Recorder(fd, path, config));
-  if (!recorder->write(recording_magic()) || !recorder->write(block_of(settings)))
-    return Error{Errc::io, fmt::format("{}: cannot be written; is the disk full?", path.string()), errno};
-  Recorder* const r = recorder.get();
-  r->thread_ = std::jthread([r](const std::stop_token& stop) { r->run(stop); });
+  return Error{Errc::unreadable,
+               fmt::format("{}: cannot be written ({}); see [record] folder and its permissions", path.string(),
+                           words(os_errno)),
+               os_errno};
+}
+
+/// What the thread and its recorder share. A thread that hangs keeps it, and nothing else of the program: not even the
+/// registry of loggers.
+class Recorder::Writer {
+ public:
+  Writer(RecordConfig config, CoreSettings settings, Create create)
+      : config_(std::move(config)), settings_(std::move(settings)), create_(std::move(create)) {}
+
+  void run();
+  /// The file's name, once it is begun.
+  Result<std::filesystem::path> wait_for_begin();
+  void take(const RawEvent& event);
+  [[nodiscard]] std::string ended() const;
+  /// True once the thread is through with the file; false where it hangs.
+  bool stop();
+
+ private:
+  Result<std::filesystem::path> begin();
+  void write_events();
+  bool write(const RawEvent& event);
+  void sync();
+  void end(const std::string& why);
+
+  const RecordConfig config_;
+  const CoreSettings settings_;
+  const Create create_;
+  const std::shared_ptr<spdlog::logger> log_ = spdlog::default_logger();
+
+  // The thread's alone.
+  std::unique_ptr<RecordFile> file_;
+  std::size_t written_bytes_ = 0, unsynced_bytes_ = 0;
+  DeviceTime synced_;
+
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable work_, told_;
+  std::optional<Result<std::filesystem::path>> begun_;
+  std::string name_;
+  std::deque<RawEvent> waiting_;
+  std::size_t held_bytes_ = 0, most_held_bytes_ = kMostHeldBytes;
+  std::string ended_;  ///< why; empty while it goes on
+  std::optional<DeviceTime> give_up_;
+  bool done_ = false;
+};
+
+Result<std::filesystem::path> Recorder::Writer::begin() {
+  auto created = create_(config_);
+  if (!created) return created.error();
+  file_ = std::move(created->file);
+  int failed = file_->write(recording_magic());
+  if (failed == 0) failed = file_->write(block_of(settings_));
+  if (failed == 0) return created->path;
+  std::error_code ignored;
+  std::filesystem::remove(created->path, ignored);
+  return Error{Errc::io, fmt::format("{}: cannot be written ({})", created->path.string(), words(failed)), failed};
+}
+
+void Recorder::Writer::run() {
+  auto begun = begin();
+  const bool good = begun.has_value();
+  {
+    const std::lock_guard lock(mutex_);
+    if (good) name_ = begun->string();
+    begun_.emplace(std::move(begun));
+  }
+  told_.notify_all();
+  if (good) write_events();
+  file_.reset();
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+  }
+  told_.notify_all();
+}
+
+Result<std::filesystem::path> Recorder::Writer::wait_for_begin() {
+  std::unique_lock lock(mutex_);
+  if (told_.wait_for(lock, kBeginWithin, [this] { return begun_.has_value(); })) return *begun_;
+  return Error{Errc::timeout,
+               fmt::format("{}: the disk does not answer; see [record] folder", config_.folder.string())};
+}
+
+void Recorder::Writer::write_events() {
+  synced_ = drivers::now();
+  std::size_t in_hand_bytes = 0;
+  for (;;) {
+    std::optional<RawEvent> event;
+    {
+      std::unique_lock lock(mutex_);
+      held_bytes_ -= std::exchange(in_hand_bytes, 0);
+      const auto ending = [this] { return give_up_ || !ended_.empty(); };
+      work_.wait_for(lock, kLookEvery, [&] { return !waiting_.empty() || ending(); });
+      if (waiting_.empty() && ending()) break;
+      if (give_up_ && drivers::now() > *give_up_) {
+        lock.unlock();
+        end("cut short, the disk was too slow for what waited");
+        break;
+      }
+      if (!waiting_.empty()) {
+        event = std::move(waiting_.front());
+        waiting_.pop_front();
+        in_hand_bytes = size_of(*event);
+      }
+    }
+    if (event && !write(*std::exchange(event, std::nullopt))) break;
+    if (unsynced_bytes_ > kSyncBytes || drivers::now() - synced_ > kSyncEvery) sync();
+  }
+  sync();
+}
+
+bool Recorder::Writer::write(const RawEvent& event) {
+  const Bytes block = block_of(event);
+  if (const int failed = file_->write(block); failed != 0) {
+    end(fmt::format("ended, the disk takes no more ({})", words(failed)));
+    return false;
+  }
+  written_bytes_ += block.size();
+  unsynced_bytes_ += block.size();
+  if (static_cast<double>(written_bytes_) <= config_.most_gb * 1e9) return true;
+  end(fmt::format("ended at {:g} GB, see [record] most_gb", config_.most_gb));
+  return false;
+}
+
+void Recorder::Writer::sync() {
+  if (unsynced_bytes_ == 0) return;
+  unsynced_bytes_ = 0;
+  // What the kernel could not write it may have thrown away, and it says so once.
+  if (const int failed = file_->sync(); failed != 0)
+    end(fmt::format("ended, the disk has lost some of it ({})", words(failed)));
+  synced_ = drivers::now();
+}
+
+void Recorder::Writer::end(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (const RawEvent& event : waiting_) held_bytes_ -= size_of(event);
+    waiting_.clear();
+    if (!ended_.empty()) return;  // the first cause is the one to be told
+    ended_ = fmt::format("{}: {}", name_, why);
+  }
+  log_->warn("recording: {}: {}", name_, why);
+}
+
+void Recorder::Writer::take(const RawEvent& event) {
+  if (!config_.frames && std::holds_alternative<FrameCame>(event)) return;
+  const std::size_t bytes = size_of(event);
+  std::string overrun;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!ended_.empty()) return;
+    most_held_bytes_ = std::max(most_held_bytes_, 2 * bytes + 1'000'000);
+    if (held_bytes_ + bytes <= most_held_bytes_) {
+      held_bytes_ += bytes;
+      waiting_.push_back(event);
+    } else {  // what waits is still written; what followed would have a hole before it
+      overrun = ended_ = fmt::format("{}: ended, the disk is too slow for these frames", name_);
+    }
+  }
+  work_.notify_one();
+  if (!overrun.empty()) log_->warn("recording: {}", overrun);
+}
+
+std::string Recorder::Writer::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+bool Recorder::Writer::stop() {
+  std::unique_lock lock(mutex_);
+  give_up_ = drivers::now() + kWriteAfterStop;
+  work_.notify_one();
+  return told_.wait_for(lock, kEndWithin, [this] { return done_; });
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, const CoreSettings& settings,
+                                                  Create create) {
+  std::unique_ptr<Recorder> recorder(new Recorder(std::make_shared<Writer>(config, settings, std::move(create))));
+  auto begun = recorder->writer_->wait_for_begin();
+  if (!begun) return begun.error();
+  recorder->path_ = *std::move(begun);
   return recorder;
 }
 
-Recorder::Recorder(int fd, std::filesystem::path path, const RecordConfig& config)
-    : fd_(fd), path_(std::move(path)), config_(config) {}
+Recorder::Recorder(std::shared_ptr<Writer> writer)
+    : writer_(std::move(writer)), thread_([shared = writer_] { shared->run(); }) {}
 
 Recorder::~Recorder() {
-  thread_.request_stop();
-  if (thread_.joinable()) thread_.join();
-  ::fdatasync(fd_);
-  ::close(fd_);
-}
-
-bool Recorder::write(const Bytes& bytes) {
-  std::span<const std::uint8_t> rest(bytes);
-  while (!rest.empty()) {
-    const ssize_t put = ::write(fd_, rest.data(), rest.size());
-    if (put < 0 && errno == EINTR) continue;
-    if (put <= 0) return false;
-    rest = rest.subspan(static_cast<std::size_t>(put));
+  if (writer_->stop()) {
+    thread_.join();
+  } else {
+    if (!path_.empty()) spdlog::warn("recording: {}: the disk does not answer; going on without it", path_.string());
+    thread_.detach();
   }
-  written_bytes_ += bytes.size();
-  return true;
-}
-
-void Recorder::end(const std::string& why) {
-  spdlog::warn("recording: {}", why);
-  const std::lock_guard lock(mutex_);
-  ended_ = why;
-  waiting_.clear();
-  waiting_bytes_ = 0;
 }
 
 void Recorder::take(const RawEvent& event) {
-  if (!config_.frames && std::holds_alternative<FrameCame>(event)) return;
-  {
-    const std::lock_guard lock(mutex_);
-    if (!ended_.empty() || overrun_) return;
-    overrun_ = waiting_bytes_ > kMostWaitingBytes;
-    waiting_bytes_ += size_of(event);
-    waiting_.push_back(event);
-  }
-  changed_.notify_one();
+  writer_->take(event);
 }
 
 std::string Recorder::text() const {
-  const std::lock_guard lock(mutex_);
-  return ended_.empty() ? path_.string() : ended_;
-}
-
-void Recorder::run(const std::stop_token& stop) {
-  DeviceTime synced = drivers::now();
-  for (;;) {
-    std::deque<RawEvent> events;
-    bool late = false;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, stop, std::chrono::milliseconds(200), [this] { return !waiting_.empty(); });
-      late = overrun_;
-      events.swap(waiting_);
-      waiting_bytes_ = 0;
-    }
-    for (const RawEvent& event : events) {
-      if (!write(block_of(event))) return end(fmt::format("{}: ended, the disk takes no more", path_.string()));
-    }
-    if (late) return end(fmt::format("{}: ended, the disk is too slow for these frames", path_.string()));
-    if (static_cast<double>(written_bytes_) > config_.most_gb * 1e9)
-      return end(fmt::format("{}: ended at {:g} GB, see [record] most_gb", path_.string(), config_.most_gb));
-    if (const DeviceTime now = drivers::now(); now - synced > kSyncEvery) {
-      ::fdatasync(fd_);
-      synced = now;
-    }
-    if (stop.stop_requested() && events.empty()) return;
-  }
+  const std::string ended = writer_->ended();
+  return ended.empty() ? path_.string() : ended;
 }
 
 }  // namespace birdseye::device

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
-#include <deque>
 #include <filesystem>
-#include <mutex>
+#include <functional>
+#include <memory>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -13,13 +12,38 @@
 
 namespace birdseye::device {
 
-/// Writes raw events to a file on a thread of its own. What was taken more than a second ago is on the disk: a power
-/// cut loses no more. A disk that does not keep up, is full, or goes away ends the recording and is said; it holds up
-/// nothing.
+/// What a recording is written to. Each call may take as long as a disk likes.
+class RecordFile {
+ public:
+  virtual ~RecordFile() = default;
+  /// All of it: 0, or errno.
+  virtual int write(std::span<const std::uint8_t> bytes) = 0;
+  /// Everything so far, so that a power cut does not lose it: 0, or errno.
+  virtual int sync() = 0;
+};
+
+struct NewRecordFile {
+  std::unique_ptr<RecordFile> file;
+  std::filesystem::path path;
+};
+
+/// birdseyed-<UTC date and time>.berec in the folder; with -2, -3 and so on where there is one of that name.
+Result<NewRecordFile> create_record_file(const RecordConfig& config);
+
+/// Writes raw events to a file on a thread of its own. A disk that keeps up has what was taken more than a second ago:
+/// a power cut loses no more. One that does not, is full, or goes away ends the recording and is said; it holds up
+/// nothing, the end included: a thread that hangs in a disk is let go.
 class Recorder {
  public:
-  /// Begins birdseyed-<UTC date and time>.berec in the folder.
-  static Result<std::unique_ptr<Recorder>> start(const RecordConfig& config, const CoreSettings& settings);
+  using Create = std::function<Result<NewRecordFile>(const RecordConfig&)>;
+
+  /// What waits for the disk, what is being written included: 64 MB, or two frames where these are larger.
+  static constexpr std::size_t kMostHeldBytes = 64'000'000;
+
+  /// An error where no file could be begun, within a second or at all.
+  static Result<std::unique_ptr<Recorder>> start(const RecordConfig& config, const CoreSettings& settings,
+                                                 Create create = create_record_file);
+  /// Writes what waits, for a second at most.
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -30,22 +54,13 @@ class Recorder {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
-  Recorder(int fd, std::filesystem::path path, const RecordConfig& config);
-  void run(const std::stop_token& stop);
-  void end(const std::string& why);
-  bool write(const Bytes& bytes);
+  class Writer;
 
-  int fd_;
+  explicit Recorder(std::shared_ptr<Writer> writer);
+
+  std::shared_ptr<Writer> writer_;  ///< the thread's too, which may be let go
   std::filesystem::path path_;
-  RecordConfig config_;
-  mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
-  std::deque<RawEvent> waiting_;
-  std::size_t waiting_bytes_ = 0;
-  bool overrun_ = false;  ///< the disk did not keep up: what follows would have a hole
-  std::string ended_;     ///< why; empty while it goes on
-  std::uint64_t written_bytes_ = 0;
-  std::jthread thread_;
+  std::thread thread_;
 };
 
 }  // namespace birdseye::device

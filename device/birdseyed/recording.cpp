@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "device/birdseyed/byte_codec.hpp"
@@ -86,8 +88,8 @@ Bytes payload_of(const Tick& tick) {
 
 InstrumentChanged changed_of(ByteReader& in) {
   InstrumentChanged changed;
-  changed.instrument = static_cast<Instrument>(in.get<std::uint8_t>() % kInstruments);
-  changed.state = static_cast<InstrumentState>(in.get<std::uint8_t>() % 5);
+  changed.instrument = static_cast<Instrument>(in.get<std::uint8_t>());
+  changed.state = static_cast<InstrumentState>(in.get<std::uint8_t>());
   changed.text = in.get_text();
   changed.at.ns = in.get<std::int64_t>();
   const std::string layout = in.get_text();
@@ -147,6 +149,104 @@ std::optional<RawEvent> event_of(std::uint32_t kind, const Bytes& payload) {
   return in.good() ? event : std::nullopt;
 }
 
+// A checksum says that a block is as it was written, not that a birdseyed wrote it. So what the core relies on, because
+// configuration and drivers see to it, is looked at again.
+
+constexpr std::size_t kMostBirds = 14;
+constexpr Duration kLongest = Duration::from_ms(10'000);
+
+bool is_rate(double hz) {
+  return hz >= 1e-3 && hz <= 1e6;  // false of NaN
+}
+
+bool is_wait(Duration duration) {
+  return duration.ns >= 0 && duration <= kLongest;
+}
+
+bool is_limit(double value) {
+  return value >= 0 && std::isfinite(value);
+}
+
+/// What is wrong, in words; empty where nothing is.
+std::string fault_of(const drivers::minibird::BirdLayout& bird) {
+  using drivers::minibird::RecordFormat;
+  switch (bird.format) {
+    case RecordFormat::position:
+    case RecordFormat::angles:
+    case RecordFormat::matrix:
+    case RecordFormat::position_angles:
+    case RecordFormat::position_matrix:
+    case RecordFormat::quaternion:
+    case RecordFormat::position_quaternion:
+      break;
+    default:
+      return "a bird's records of no known format";
+  }
+  if (!(bird.mm_per_count > 0) || !std::isfinite(bird.mm_per_count)) return "a bird's scale that is none";
+  return bird.into_hemisphere.allFinite() ? "" : "a hemisphere that is none";
+}
+
+std::string fault_of(const drivers::minibird::StreamLayout& layout, std::size_t names) {
+  if (layout.birds.empty() || layout.birds.size() > kMostBirds)
+    return fmt::format("a tracker of {} birds; there are 1 to {}", layout.birds.size(), kMostBirds);
+  if (layout.birds.size() != names)
+    return fmt::format("a tracker of {} birds for {} names", layout.birds.size(), names);
+  for (const auto& bird : layout.birds) {
+    if (auto fault = fault_of(bird); !fault.empty()) return fault;
+  }
+  if (!is_rate(layout.rate_hz)) return fmt::format("a tracker's rate of {} Hz", layout.rate_hz);
+  if (layout.baud <= 0) return fmt::format("a line of {} baud", layout.baud);
+  if (!is_wait(layout.delay)) return "a tracker's delay that is none";
+  const auto& limits = layout.plausibility;
+  for (const double limit : {limits.most_speed_mm_s, limits.most_turn_deg_s, limits.most_acceleration_mm_s2,
+                             limits.slack_mm, limits.slack_deg, limits.frozen_moved_mm, limits.hemisphere_border_mm}) {
+    if (!is_limit(limit)) return "a limit of plausibility that is none";
+  }
+  const bool counts = limits.step_confirms >= 0 && limits.start_confirms >= 0 && limits.frozen_after >= 0;
+  return counts && is_wait(limits.gap) && is_wait(limits.flip_memory) ? "" : "a limit of plausibility that is none";
+}
+
+std::string fault_of(const CoreSettings& settings) {
+  const auto& names = settings.bird_names;
+  if (names.empty() || names.size() > kMostBirds)
+    return fmt::format("{} names of birds; there are 1 to {}", names.size(), kMostBirds);
+  if (std::any_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); }))
+    return "a bird without a name";
+  const PoseHistory::Settings& pose = settings.pose;
+  if (pose.capacity == 0 || !is_limit(pose.acceleration_mm_s2)) return "limits of poses that are none";
+  for (const Duration wait :
+       {pose.max_gap, pose.max_prediction, pose.max_time_sigma, pose.smoothing, settings.pose_wait,
+        settings.frame_clock.exposure, settings.frame_clock.delay.value_or(Duration{})}) {
+    if (!is_wait(wait)) return fmt::format("a time of {:g} s", wait.seconds());
+  }
+  const double rate_hz = settings.frame_clock.rate_hz;
+  return is_rate(rate_hz) ? "" : fmt::format("a camera's rate of {} Hz", rate_hz);
+}
+
+std::string fault_of(const InstrumentChanged& changed, std::size_t names) {
+  if (static_cast<std::size_t>(changed.instrument) >= kInstruments || changed.state > InstrumentState::silent)
+    return "an instrument or a state that is unknown";
+  if (changed.rate_hz != 0 && !is_rate(changed.rate_hz))
+    return fmt::format("a camera's rate of {} Hz", changed.rate_hz);
+  if (changed.exposure && !is_wait(*changed.exposure))
+    return fmt::format("an exposure of {:g} s", changed.exposure->seconds());
+  return changed.layout ? fault_of(*changed.layout, names) : "";
+}
+
+std::string fault_of(const drivers::Frame& frame) {
+  const bool sized = frame.width_px > 0 && frame.height_px > 0 &&
+                     std::int64_t{frame.width_px} * frame.height_px <= drivers::kMostPixels;
+  const auto pixels = std::uint64_t{3} * static_cast<unsigned>(frame.width_px) * static_cast<unsigned>(frame.height_px);
+  if (sized && frame.rgb->size() == pixels) return "";
+  return fmt::format("a frame of {} x {} pixels in {} bytes", frame.width_px, frame.height_px, frame.rgb->size());
+}
+
+std::string fault_of(const RawEvent& event, std::size_t names) {
+  if (const auto* changed = std::get_if<InstrumentChanged>(&event)) return fault_of(*changed, names);
+  if (const auto* came = std::get_if<FrameCame>(&event)) return fault_of(came->frame);
+  return "";
+}
+
 }  // namespace
 
 Bytes recording_magic() {
@@ -177,7 +277,9 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   try {
     if (*first && (*first)->kind == kSettings) {
       reader.settings_ = nlohmann::json::parse((*first)->payload).get<CoreSettings>();
-      return reader;
+      const std::string fault = fault_of(reader.settings_);
+      if (fault.empty()) return reader;
+      return Error{Errc::bad_format, fmt::format("{}: was recorded with what makes no sense: {}", name, fault)};
     }
   } catch (const nlohmann::json::exception&) {
   }
@@ -217,7 +319,11 @@ Result<std::optional<RawEvent>> RecordingReader::next() {
   if (!block) return block.error();
   if (!*block) return std::optional<RawEvent>();
   try {
-    if (auto event = event_of((*block)->kind, (*block)->payload)) return event;
+    if (auto event = event_of((*block)->kind, (*block)->payload)) {
+      const std::string fault = fault_of(*event, settings_.bird_names.size());
+      if (fault.empty()) return event;
+      return Error{Errc::bad_format, fmt::format("{}: holds an event that makes no sense: {}", name_, fault)};
+    }
   } catch (const nlohmann::json::exception&) {
   }
   return Error{Errc::bad_format, fmt::format("{}: holds an event that makes no sense", name_)};

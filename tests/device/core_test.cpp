@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <random>
 
 #include "device/birdseyed/event_queue.hpp"
@@ -316,6 +318,75 @@ TEST(Recording, IsGoodUpToWhereItWasCutOrDamaged) {
     }
     EXPECT_EQ(read, whole_blocks) << place;
   }
+}
+
+/// What a file of these says: the reader's error, or nothing.
+std::string refusal(const CoreSettings& settings, const std::vector<RawEvent>& events) {
+  const birdseye::testing::Scratch scratch;
+  Bytes bytes = recording_magic();
+  const auto put = [&bytes](const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
+  put(block_of(settings));
+  for (const RawEvent& event : events) put(block_of(event));
+  auto reader = RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
+  if (!reader) return reader.error().what;
+  const auto next = reader->next();
+  return next ? "" : next.error().what;
+}
+
+std::string refusal(const RawEvent& event) {
+  return refusal(CoreSettings{}, {event});
+}
+
+TEST(Recording, OfSettingsThatMakeNoSenseIsRefused) {
+  EXPECT_EQ(refusal(CoreSettings{}, {}), "");
+  const auto with = [](auto change) {
+    CoreSettings settings;
+    change(settings);
+    return refusal(settings, {});
+  };
+  EXPECT_NE(with([](auto& s) { s.bird_names.clear(); }).find("0 names of birds"), std::string::npos);
+  EXPECT_NE(with([](auto& s) { s.bird_names.assign(15, "b"); }).find("15 names"), std::string::npos);
+  EXPECT_NE(with([](auto& s) { s.bird_names = {""}; }).find("without a name"), std::string::npos);
+  EXPECT_NE(with([](auto& s) { s.pose.capacity = 0; }).find("limits of poses"), std::string::npos);
+  EXPECT_NE(with([](auto& s) { s.frame_clock.rate_hz = 0; }).find("rate of 0 Hz"), std::string::npos);
+  EXPECT_NE(with([](auto& s) { s.pose_wait = {-1}; }).find("a time of"), std::string::npos);
+}
+
+TEST(Recording, OfALayoutThatMakesNoSenseIsRefused) {
+  const auto with = [](auto change) {
+    InstrumentChanged runs = tracker_runs(0);
+    change(*runs.layout);
+    return refusal(RawEvent(runs));
+  };
+  using drivers::minibird::RecordFormat;
+  EXPECT_EQ(with([](auto&) {}), "");
+  EXPECT_NE(with([](auto& l) { l.birds.clear(); }).find("a tracker of 0 birds"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.birds.resize(15); }).find("a tracker of 15 birds"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.birds.resize(2); }).find("2 birds for 1 names"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.birds[0].format = RecordFormat{6}; }).find("format"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.birds[0].mm_per_count = 0; }).find("scale"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.rate_hz = 0; }).find("rate of 0 Hz"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.rate_hz = 1e300; }).find("rate of"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.rate_hz = std::nan(""); }).find("makes no sense"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.baud = 0; }).find("0 baud"), std::string::npos);
+  EXPECT_NE(with([](auto& l) { l.plausibility.slack_mm = -1; }).find("plausibility"), std::string::npos);
+}
+
+TEST(Recording, OfAnEventThatMakesNoSenseIsRefused) {
+  EXPECT_EQ(refusal(FrameCame{frame(0, 1, 1)}), "");
+  FrameCame came{frame(0, 1, 1)};
+  came.frame.width_px = 5;
+  EXPECT_NE(refusal(came).find("5 x 2 pixels in 24 bytes"), std::string::npos);
+  came.frame.width_px = -4;
+  came.frame.height_px = -2;
+  EXPECT_NE(refusal(came).find("-4 x -2 pixels"), std::string::npos);
+  InstrumentChanged camera = camera_runs(0);
+  EXPECT_EQ(refusal(camera), "");
+  camera.rate_hz = std::numeric_limits<double>::infinity();
+  EXPECT_NE(refusal(camera).find("rate of inf Hz"), std::string::npos);
+  camera = camera_runs(0);
+  camera.instrument = static_cast<Instrument>(7);
+  EXPECT_NE(refusal(camera).find("unknown"), std::string::npos);
 }
 
 TEST(EventQueue, DropsTheOldestFrameAndNothingElse) {
