@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr std::size_t kTypeAt = 2, kDeviceAt = 14, kBodySizeAt = 42, kChecksumAt = 50;
+constexpr std::size_t kTypeAt = 2, kDeviceAt = 14;
 
 /// One of every kind that the appliance sends, each a whole message of its own.
 std::vector<Bytes> one_of_each() {
@@ -369,6 +369,7 @@ TEST(WireHostile, TheLongestSilentGoesWhereBegunFramesAloneAreTooMany) {
 TEST(WireHostile, WhoFindsNoRoomIsRefusedAndCounted) {
   const auto server = *Server::listen("127.0.0.1", 0);
   std::vector<Raw> clients;
+  clients.reserve(17);
   for (int i = 0; i < 16; ++i) clients.push_back(taken_by(*server));
   clients.push_back(Raw::connected_to(server->port()));
   EXPECT_TRUE(clients.back().ends(seconds(20)));
