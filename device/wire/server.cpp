@@ -19,6 +19,7 @@ namespace {
 
 constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
+constexpr int kMostUnsentBytes = 256 << 10;
 
 }  // namespace
 
@@ -97,6 +98,8 @@ void Server::accept_one() {
   }
   const int on = 1;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+  // What the kernel holds unsent is no longer ours to shed, and a pose waits behind it.
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsentBytes, sizeof kMostUnsentBytes);
   clients_.emplace_back(fd);
   if (last_status_) offer(clients_.back(), *last_status_);
   ++clients_count_;

@@ -204,7 +204,7 @@ class DoomedFile : public RecordFile {
     return made;
   });
   if (!recorder) ::_exit(1);
-  const DeviceTime deadline = drivers::now() + Duration::from_ms(30'000);
+  const DeviceTime deadline = drivers::now() + Duration::from_ms(10'000);
   for (std::uint8_t i = 0; counted.syncs < 3 || counted.writes < counted.synced_writes + 40; ++i) {
     if (drivers::now() > deadline) ::_exit(2);
     (*recorder)->take(bytes(i));
