@@ -42,7 +42,13 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
     a->threads_.emplace_back([run](const std::stop_token& stop) { run(stop); });
   };
   begin(a->tracker_post_, [a](const std::stop_token& s) { run_tracker(a->config_.tracker, a->tracker_post_, s); });
-  begin(a->camera_post_, [a](const std::stop_token& s) { run_camera(a->config_.camera, a->camera_post_, s); });
+  const ControlsLock lock{
+      [a] { return a->server_.camera_locked(); },
+      [a](bool locked, const drivers::ControlReport& report) {
+        a->server_.publish(wire::pack(wire::CameraControls{locked, report.done, report.refused}, now()));
+      }};
+  begin(a->camera_post_,
+        [a, lock](const std::stop_token& s) { run_camera(a->config_.camera, a->camera_post_, lock, s); });
   if (!config.gpio.lines.chip.empty())
     begin(a->gpio_post_, [a](const std::stop_token& s) { run_gpio(a->config_.gpio, a->state_, a->gpio_post_, s); });
   a->threads_.emplace_back([a](const std::stop_token& s) { a->make_messages(s); });

@@ -24,10 +24,11 @@ Duration silence_of(const drivers::FrameSource& camera, const drivers::CameraSet
 
 /// Until the camera is lost; why.
 Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settings, InstrumentPost& post,
-             const std::stop_token& stop) {
+             const ControlsLock& lock, const std::stop_token& stop) {
+  bool locked = false;
   const auto running = [&] {
     post.tell({.state = InstrumentState::running,
-               .text = camera.describe(),
+               .text = camera.describe() + (locked ? ", controls held" : ""),
                .rate_hz = camera.rate_hz(),
                .exposure = camera.exposure()});
   };
@@ -38,6 +39,11 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
   bool known = false;  // to run: a program that feeds a socket says what it sends with its first frame only
   while (!stop.stop_requested()) {
     post.alive();
+    if (lock.wanted() != locked) {
+      locked = !locked;
+      lock.tell(locked, locked ? camera.lock_controls() : camera.unlock_controls());
+      if (known) running();  // its exposure is known now, or no longer
+    }
     auto frame = camera.next(now() + kPatience);
     if (!frame) return frame.error();
     if (*frame) {
@@ -59,12 +65,13 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
 
 }  // namespace
 
-void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const std::stop_token& stop) {
+void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const ControlsLock& lock,
+                const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     auto camera = drivers::open_camera(settings);
     if (!camera) {
       post.tell({.state = InstrumentState::absent, .text = camera.error().what});
-    } else if (const Error lost = stream(**camera, settings, post, stop); !stop.stop_requested()) {
+    } else if (const Error lost = stream(**camera, settings, post, lock, stop); !stop.stop_requested()) {
       post.tell(
           {.state = lost.code == Errc::timeout ? InstrumentState::silent : InstrumentState::absent, .text = lost.what});
     }

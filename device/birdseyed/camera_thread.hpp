@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <stop_token>
 
 #include "device/birdseyed/instrument_thread.hpp"
@@ -7,7 +8,14 @@
 
 namespace birdseye::device {
 
+/// Who wants the camera's exposure, gain, white balance and focus held, and hears what became of that.
+struct ControlsLock {
+  std::function<bool()> wanted = [] { return false; };
+  std::function<void(bool locked, const drivers::ControlReport&)> tell = [](bool, const drivers::ControlReport&) {};
+};
+
 /// Finds the camera and hands over its frames, and begins again when it is lost. Until stop.
-void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const std::stop_token& stop);
+void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const ControlsLock& lock,
+                const std::stop_token& stop);
 
 }  // namespace birdseye::device

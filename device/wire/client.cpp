@@ -106,6 +106,10 @@ Result<void> Client::subscribe(const Subscription& subscription, Clock::time_poi
   return send(pack(subscription), deadline);
 }
 
+Result<void> Client::lock_camera(bool on, Clock::time_point deadline) {
+  return send(pack(CameraLock{on}), deadline);
+}
+
 void Client::ask_the_time() {
   const auto now = Clock::now();
   if (now < next_question_) return;

@@ -25,6 +25,9 @@ class Client {
   Result<std::optional<Event>> next(Clock::time_point deadline);
   /// Says what this client wants; without it, it gets everything.
   Result<void> subscribe(const Subscription& subscription, Clock::time_point deadline);
+  /// Has the camera's exposure, gain, white balance and focus held, or let go; what became of it comes as an event.
+  /// They are let go when the last client that held them leaves.
+  Result<void> lock_camera(bool on, Clock::time_point deadline);
 
   /// The appliance's time on this machine's CLOCK_MONOTONIC, with a sigma: by the narrowest of the questions that
   /// next() asks it from time to time, or by clocks that a network protocol (PTP, NTP) keeps together at both ends,

@@ -40,6 +40,8 @@ class ClientLink {
   /// Takes what a request changes about what this client gets.
   void take(const Subscription& subscription);
   void take(const TrackingRequest& request);
+  void take(const CameraLock& lock) { locks_camera_ = lock.on; }
+  [[nodiscard]] bool locks_camera() const { return locks_camera_; }
   /// It has taken nothing for long although there was something, or left a message of its own half sent.
   [[nodiscard]] bool stuck() const;
 
@@ -57,6 +59,7 @@ class ClientLink {
   int fd_;
   RequestReader reader_;
   Subscription subscription_;
+  bool locks_camera_ = false;
   Duration tracking_interval_{0};
   DeviceTime tracking_sent_;
   PacketQueue waiting_;

@@ -20,6 +20,8 @@ void from_json(const nlohmann::json& json, ClockPong& pong);
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClockPing, host_sent_ns)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Subscription, frames, tracking)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CameraLock, on)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CameraControls, locked, done, refused)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(InstrumentHealth, name, state, text, times_lost)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WallClock, known, synchronised, tai_known, max_error_ns, est_error_ns,
                                    wall_minus_monotonic_ns, source)

@@ -98,7 +98,13 @@ struct Health {
   std::string recording;  ///< the file, or why there is none; empty: not asked for
 };
 
-using Event = std::variant<VideoFrame, Birds, Doubt, ClockChange, Pedal, Status, Health>;
+/// What became of the camera's exposure, gain, white balance and focus, which a client had held or let go.
+struct CameraControls {
+  bool locked = false;
+  std::vector<std::string> done, refused;  ///< a line of text each
+};
+
+using Event = std::variant<VideoFrame, Birds, Doubt, ClockChange, Pedal, Status, Health, CameraControls>;
 
 inline constexpr const char* kBirdsDevice = "Birds";
 inline constexpr const char* kDoubtDevice = "Doubt";
@@ -112,5 +118,7 @@ inline constexpr const char* kHealthDevice = "Health";
 inline constexpr const char* kClockPingDevice = "ClockPing";
 inline constexpr const char* kClockPongDevice = "ClockPong";
 inline constexpr const char* kSubscribeDevice = "Subscribe";
+inline constexpr const char* kCameraLockDevice = "CameraLock";
+inline constexpr const char* kCameraControlsDevice = "CameraControls";  ///< the answer, to all
 
 }  // namespace birdseye::wire

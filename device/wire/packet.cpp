@@ -141,6 +141,10 @@ Packet pack(const Health& health, DeviceTime time) {
   return string_packet(kHealthDevice, health, time);
 }
 
+Packet pack(const CameraControls& controls, DeviceTime time) {
+  return string_packet(kCameraControlsDevice, controls, time);
+}
+
 Packet pack(const ClockPing& ping) {
   return string_packet(kClockPingDevice, ping, {});
 }
@@ -151,6 +155,10 @@ Packet pack(const ClockPong& pong) {
 
 Packet pack(const Subscription& subscription) {
   return string_packet(kSubscribeDevice, subscription, {});
+}
+
+Packet pack(const CameraLock& lock) {
+  return string_packet(kCameraLockDevice, lock, {});
 }
 
 Packet pack_tracking_reply(bool done) {

@@ -30,6 +30,7 @@ Packet pack(const ClockChange& change);
 Packet pack(const Pedal& pedal);
 Packet pack(const Status& status, DeviceTime time);
 Packet pack(const Health& health, DeviceTime time);
+Packet pack(const CameraControls& controls, DeviceTime time);
 
 /// The messages of one client's questions and their answers; times as each side's clock has them, ns.
 struct ClockPing {
@@ -44,7 +45,12 @@ struct Subscription {
 };
 Packet pack(const ClockPing& ping);
 Packet pack(const ClockPong& pong);
+/// Hold the camera's exposure, gain, white balance and focus for as long as this client is there, or until it lets go.
+struct CameraLock {
+  bool on = false;
+};
 Packet pack(const Subscription& subscription);
+Packet pack(const CameraLock& lock);
 /// The answer to STT_TDATA and STP_TDATA: RTS_TDATA, with the status 0 (done) or 1.
 Packet pack_tracking_reply(bool done);
 

@@ -13,6 +13,7 @@ Request string_request(const Header& header, std::span<const std::uint8_t> body)
   try {
     if (header.device == kClockPingDevice) return nlohmann::json::parse(*text).get<ClockPing>();
     if (header.device == kSubscribeDevice) return nlohmann::json::parse(*text).get<Subscription>();
+    if (header.device == kCameraLockDevice) return nlohmann::json::parse(*text).get<CameraLock>();
   } catch (const nlohmann::json::exception&) {
     return DamagedRequest{header.type};
   }

@@ -27,7 +27,8 @@ struct UnknownRequest {
 struct DamagedRequest {
   std::string type;
 };
-using Request = std::variant<ClockPing, Subscription, TrackingRequest, StatusRequest, UnknownRequest, DamagedRequest>;
+using Request =
+    std::variant<ClockPing, Subscription, CameraLock, TrackingRequest, StatusRequest, UnknownRequest, DamagedRequest>;
 
 /// What a client sends, put together from however it comes. Bounded: no request is longer than kLargestRequest.
 class RequestReader {

@@ -161,6 +161,8 @@ void Server::answer(ClientLink& client, const Request& request) {
     offer(client, pack(ClockPong{ping->host_sent_ns, now, now}));
   } else if (const auto* subscription = std::get_if<Subscription>(&request)) {
     client.take(*subscription);
+  } else if (const auto* lock = std::get_if<CameraLock>(&request)) {
+    client.take(*lock);
   } else if (const auto* tracking = std::get_if<TrackingRequest>(&request)) {
     client.take(*tracking);
     offer(client, pack_tracking_reply(true));
@@ -205,6 +207,7 @@ void Server::run(const std::stop_token& stop) {
       client = serve(*client, entry->revents) ? std::next(client) : put_out(client);
     }
     if (frames) bound_frames();
+    camera_locked_ = std::ranges::any_of(clients_, &ClientLink::locks_camera);
     if ((entries[0].revents & POLLIN) != 0) accept_one();
   }
 }

@@ -38,6 +38,8 @@ class Server {
   };
   Counters take_counters();
   [[nodiscard]] std::size_t clients() const { return clients_count_; }
+  /// A client that is here wants the camera's controls held.
+  [[nodiscard]] bool camera_locked() const { return camera_locked_; }
 
  private:
   Server(int fd, int wake_fd, int port);
@@ -58,6 +60,7 @@ class Server {
 
   int fd_, wake_fd_, port_;
   std::atomic<std::size_t> clients_count_ = 0;
+  std::atomic<bool> camera_locked_ = false;
   std::atomic<std::uint64_t> messages_shed_ = 0, clients_shed_ = 0, requests_refused_ = 0;
   std::mutex mutex_;
   PacketQueue inbox_;  ///< published, not yet distributed

@@ -8,6 +8,7 @@
 #include <igtl_tdata.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <utility>
 
@@ -118,6 +119,7 @@ Result<MaybeTold> Unpacker::push_string(const std::string& device, const std::st
     if (device == kDoubtDevice) return MaybeTold(Event(json.get<Doubt>()));
     if (device == kClockChangeDevice) return MaybeTold(Event(json.get<ClockChange>()));
     if (device == kPedalDevice) return MaybeTold(Event(json.get<Pedal>()));
+    if (device == kCameraControlsDevice) return MaybeTold(Event(json.get<CameraControls>()));
     return MaybeTold(json.get<ClockPong>());
   } catch (const nlohmann::json::exception&) {
     return unpack_failed("STRING");
@@ -132,9 +134,10 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
   const auto body = bytes.subspan(kHeaderBytes);
   const std::string& type = header->type;
   const std::string& device = header->device;
-  const bool string =
-      type == "STRING" && (device == kFrameInfoDevice || device == kHealthDevice || device == kDoubtDevice ||
-                           device == kClockChangeDevice || device == kPedalDevice || device == kClockPongDevice);
+  static constexpr std::array kStrings{kFrameInfoDevice, kHealthDevice,    kDoubtDevice,         kClockChangeDevice,
+                                       kPedalDevice,     kClockPongDevice, kCameraControlsDevice};
+  const bool string = type == "STRING" &&
+                      std::any_of(kStrings.begin(), kStrings.end(), [&](const char* name) { return device == name; });
   const bool image = type == "IMAGE" && device == kVideoDevice && info_;
   const bool birds = type == "TDATA" && device == kBirdsDevice;
   const bool status = type == "STATUS" && device == kStatusDevice;

@@ -66,7 +66,7 @@ class ACamera : public ::testing::Test {
   ACamera() : program_((scratch_ / "camera").string()) {
     thread_ = std::jthread([this](const std::stop_token& stop) {
       run_camera({.source = "socket:" + (scratch_ / "camera").string(), .width_px = 4, .height_px = 2, .rate_hz = 100},
-                 post_, stop);
+                 post_, lock_, stop);
     });
   }
   /// The text of the next change to that state, and whether a frame came before it.
@@ -85,6 +85,10 @@ class ACamera : public ::testing::Test {
 
   testing::Scratch scratch_;
   Program program_;
+  std::atomic<bool> lock_wanted_ = false;
+  std::atomic<int> locked_ = 0, unlocked_ = 0;
+  ControlsLock lock_{[this] { return lock_wanted_.load(); },
+                     [this](bool locked, const drivers::ControlReport&) { ++(locked ? locked_ : unlocked_); }};
   EventQueue queue_;
   InstrumentPost post_{Instrument::camera, queue_};
   std::jthread thread_;
@@ -104,6 +108,16 @@ TEST_F(ACamera, ThatRepeatsAFrameIsSilent) {
   EXPECT_NE(text.find("sends no new frames"), std::string::npos) << text;
   program_.sticks = false;
   next(InstrumentState::running);
+}
+
+TEST_F(ACamera, IsHeldOnceAndLetGoOnceAsIsWanted) {
+  next(InstrumentState::running);
+  lock_wanted_ = true;
+  EXPECT_NE(next(InstrumentState::running).first.find("controls held"), std::string::npos);
+  lock_wanted_ = false;
+  EXPECT_EQ(next(InstrumentState::running).first.find("controls held"), std::string::npos);
+  EXPECT_EQ(locked_, 1);
+  EXPECT_EQ(unlocked_, 1);
 }
 
 }  // namespace

@@ -210,5 +210,41 @@ TEST(Client, RelatesTheAppliancesClockToItsOwn) {
   EXPECT_EQ(client->host_from_device({1'000'000})->time.ns, 1'050'000);
 }
 
+TEST(Client, HoldsTheCamerasControlsForAsLongAsItIsThere) {
+  const auto server = *Server::listen("127.0.0.1", 0);
+  const auto comes_to = [&](bool locked) {
+    for (const auto deadline = Clock::now() + seconds(10); server->camera_locked() != locked;) {
+      if (Clock::now() > deadline) return false;
+      std::this_thread::sleep_for(milliseconds(2));
+    }
+    return true;
+  };
+  auto one = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  auto other = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  EXPECT_FALSE(server->camera_locked());
+  ASSERT_TRUE(one->lock_camera(true, Clock::now() + seconds(1)));
+  ASSERT_TRUE(other->lock_camera(true, Clock::now() + seconds(1)));
+  EXPECT_TRUE(comes_to(true));
+  one.reset();
+  while (server->clients() > 1) std::this_thread::sleep_for(milliseconds(2));
+  EXPECT_TRUE(server->camera_locked());
+  ASSERT_TRUE(other->lock_camera(false, Clock::now() + seconds(1)));
+  EXPECT_TRUE(comes_to(false));
+  ASSERT_TRUE(other->lock_camera(true, Clock::now() + seconds(1)));
+  EXPECT_TRUE(comes_to(true));
+  other.reset();
+  EXPECT_TRUE(comes_to(false));
+
+  auto listener = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  while (server->clients() == 0) std::this_thread::sleep_for(milliseconds(2));
+  server->publish(pack(CameraControls{true, {"gain 3"}, {"focus: the camera has none"}}, {1}));
+  const auto event = listener->next(Clock::now() + seconds(5));
+  ASSERT_TRUE(event && *event);
+  const auto& controls = std::get<CameraControls>(**event);
+  EXPECT_TRUE(controls.locked);
+  EXPECT_EQ(controls.done, std::vector<std::string>{"gain 3"});
+  EXPECT_EQ(controls.refused, std::vector<std::string>{"focus: the camera has none"});
+}
+
 }  // namespace
 }  // namespace birdseye::wire

@@ -45,4 +45,10 @@ void Cart::complain(const std::string& what) {
   gone_ = log.code != 0 || machine_.run("[ -e /run/started/" + name_ + ".code ]").code == 0;
 }
 
+void Cart::lock_camera(bool on) {
+  ASSERT_TRUE(client_);
+  const auto asked = client_->lock_camera(on, Clock::now() + std::chrono::seconds(5));
+  EXPECT_TRUE(asked) << asked.error().what;
+}
+
 }  // namespace birdseye::vm

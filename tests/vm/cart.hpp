@@ -31,6 +31,8 @@ class Cart {
     complain(what);
     return std::nullopt;
   }
+  /// Has the camera's controls held, or let go.
+  void lock_camera(bool on);
   template <typename Kind>
   std::vector<Kind> some(const std::string& what, std::size_t count) {
     std::vector<Kind> found;

@@ -131,6 +131,16 @@ TEST_F(ThroughKernelTty, FramesComeWithKernelStampsAndPoses) {
   }
 }
 
+TEST_F(ThroughKernelTty, ControlsAreHeldWhileAClientCalibrates) {
+  for (const bool on : {true, false}) {
+    cart().lock_camera(on);
+    const auto told = cart().next<wire::CameraControls>("word of the controls", [](const auto&) { return true; });
+    ASSERT_TRUE(told);
+    EXPECT_EQ(told->locked, on);
+    EXPECT_FALSE(told->done.empty() && told->refused.empty());
+  }
+}
+
 TEST_F(ThroughKernelTty, AnAdapterPulledOutIsMissedAndFoundAgainWhileFramesGoOn) {
   expect_the_adapter_missed_and_found(cart(), "ttyUSB0");
 }
