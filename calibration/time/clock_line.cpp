@@ -255,6 +255,7 @@ void ClockLine::refit() {
   const auto all = points();
   if (const auto fit = fit_edge(all, prior_, seconds_to(index_), edge_settings())) {
     fit_ = *fit;
+    if (since_begin_ >= kRecent) judge_drift();
     if (index_ - calm_drifts_[1].index >= static_cast<std::int64_t>(kRecent)) {
       calm_drifts_[0] = calm_drifts_[1];
       calm_drifts_[1] = {index_, fit_.slope, fit_.slope_sigma};

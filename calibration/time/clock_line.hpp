@@ -130,6 +130,7 @@ class ClockLine {
   void look_for_bend();
   void forget_before(std::size_t block, double slope, double slope_sigma);
   void compare_drift();
+  void judge_drift();
   void explain_change();
   void report(ClockEvent event);
 
@@ -150,6 +151,8 @@ class ClockLine {
   std::array<Drift, 2> calm_drifts_{};  ///< of some 100 and 200 arrivals ago
   std::deque<Drift> past_drifts_;
   std::optional<Change> change_;
+  std::optional<std::int64_t> jumped_at_;     ///< the index of the newest large jump
+  bool impossible_ = false;                   ///< the drift, which has been told
   std::optional<std::int64_t> suspect_from_;  ///< where more may have been lost than is known
   std::optional<std::int64_t> slip_from_;     ///< where a loss was last seen by the time alone
   Skip skipped_;                              ///< the newest loss that was told or seen

@@ -217,9 +217,12 @@ void ClockLine::begin_from(std::size_t first_recent, double jump_ns, bool is_eve
                      anchor_offset_ns_ + std::llround(line_at(start.index))};
   }
   ++restarts_;
-  // The drift of before: the first arrivals after the jump may have bent the line.
+  // The drift of before: the first arrivals after the jump may have bent the line. Jumps that follow each other are one
+  // drift that it does not know.
+  const bool again = jumped_at_ && (index_ - *jumped_at_) * settings_.period.ns < settings_.window.ns / 4;
+  if (large) jumped_at_ = index_;
   prior_ = {calm_drifts_[0].slope,
-            large ? std::max(calm_drifts_[0].slope_sigma, 1e4) : settings_.drift_sigma_ppm * 1e3};
+            large && !again ? std::max(calm_drifts_[0].slope_sigma, 1e4) : settings_.drift_sigma_ppm * 1e3};
   calm_drifts_.fill({index_, prior_.slope, prior_.sigma});
   slip_from_.reset();
   blocks_.clear();
@@ -291,6 +294,15 @@ void ClockLine::compare_drift() {
   if (past_drifts_.empty() || past_drifts_.back().index <= index_ - window / 8) {
     past_drifts_.push_back({index_, fit_.slope, fit_.slope_sigma});
   }
+}
+
+/// A drift that no clock has, however the line came to it: told once.
+void ClockLine::judge_drift() {
+  const double most = 4 * settings_.drift_sigma_ppm * 1e3, drift = std::abs(fit_.slope);
+  const bool impossible = drift - 6 * fit_.slope_sigma > most;
+  if (impossible && !impossible_)
+    report({ClockEvent::Kind::drift_change, {origin_ns_ + index_ * settings_.period.ns}, 0, fit_.slope * 1e-3});
+  impossible_ = impossible || (impossible_ && drift > most / 2);
 }
 
 /// When enough has been seen after a change, says what it was.

@@ -241,6 +241,21 @@ TEST(ClockLine, FollowsAChangeOfDrift) {
   }
 }
 
+TEST(ClockLine, ADriftThatNoClockHasIsToldHoweverYoungTheLine) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    SimulatedArrivals arrivals = instrument(seed, Jitter::exponential, 103.3, 0);
+    ClockLine line = line_for(arrivals);
+    const int begins = static_cast<int>(3 * arrivals.rate_hz);
+    for (int n = 0; n < 4 * begins; ++n) {
+      if (n == begins) arrivals.drift_ppm = 2000;
+      line.push(at(arrivals.arrival_of(arrivals.measure())));
+    }
+    // As a change of drift, or as the steps that it was taken for at first.
+    EXPECT_GE(line.take_events().size(), 1U) << seed;
+    EXPECT_NEAR(line.drift_ppm(), 2000, 100) << seed;
+  }
+}
+
 TEST(ClockLine, HoldsForADay) {
   SimulatedArrivals arrivals = instrument(5, Jitter::uniform, 4, 500);
   ClockLine line = line_for(arrivals);

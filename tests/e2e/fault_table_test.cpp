@@ -71,10 +71,7 @@ std::vector<FaultCase> of_the_unit() {
 
 std::vector<FaultCase> of_its_supply() {
   return {
-      {.name = "unplug",
-       .for_s = 1,
-       .calm_s = 7,
-       .signs = {status("the line is gone; was it unplugged?"), status("no such device; is the tracker plugged in")}},
+      {.name = "unplug", .for_s = 1, .calm_s = 7, .signs = {status("no such device; is the tracker plugged in")}},
       {.name = "power_cycle",
        .parameters = "boot_s = 0.5",
        .calm_s = 8,
