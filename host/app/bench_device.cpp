@@ -221,6 +221,7 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   out["records_lost"] = last.measurements_lost + last.senseless_records + last.phase_errors;
   out["measurements"] = last.measurements;
   out["frames_lost"] = frames_lost + last.messages_shed;
+  out["clients_shed"] = last.clients_shed;
   out["frames"] = last.frames;
   out["cpu_percent_total"] = cpu_percent;
   out["cpu_percent_pixel_copy"] = copy_percent;
@@ -251,7 +252,7 @@ Result<void> measure_time(const Options& options, const std::filesystem::path& f
   auto session = Session::start(settings, 1);
   if (!session) return session.error();
   const DeviceRig& rig = *session->rig;
-  sleep_unless_interrupted(std::max(10.0, options.seconds / 2));
+  sleep_unless_interrupted(std::clamp(options.seconds / 2, 10.0, 60.0));
   Listener& listener = *session->listeners.front();
   listener.stop();
   const auto tracker = rig.tracker_truth(), camera = rig.camera_truth();
