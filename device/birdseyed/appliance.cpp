@@ -123,6 +123,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.messages_shed = sent.messages_shed;
   health.clients = sent.clients;
   health.clients_shed = sent.clients_shed;
+  health.events_dropped = queue_.frames_dropped() + queue_.others_dropped();
   health.requests_refused = sent.requests_refused;
   health.latency_ms_p99_tracker = sent.latency_ms_p99_tracker;
   health.latency_ms_p99_tracker_beside_frames = sent.latency_ms_p99_tracker_beside_frames;

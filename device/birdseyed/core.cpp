@@ -14,7 +14,7 @@ using drivers::minibird::MiniBirdCounters;
 
 constexpr Duration kDoubtToldEvery = Duration::from_ms(1000);
 constexpr Duration kDoubtInStatusAfter = Duration::from_ms(100);  // a record that is lost now and then is none of it
-constexpr std::size_t kMostWaitingFrames = 32;
+constexpr std::size_t kMostWaitingFrames = 16;                    // 100 MB of 1080p, and over a quarter of a second
 
 void add(MiniBirdCounters& sum, const MiniBirdCounters& more) {
   sum.measurements += more.measurements;

@@ -25,7 +25,8 @@ void EventQueue::push(RawEvent event) {
       ++frames_dropped_;
     }
     auto* const bytes = std::get_if<TrackerBytes>(&event);
-    if (events_.size() >= kMostEvents) {
+    // What becomes of an instrument is told once, and comes seldom.
+    if (events_.size() >= kMostEvents && !std::holds_alternative<InstrumentChanged>(event)) {
       ++others_dropped_;
       tracker_bytes_dropped_ = tracker_bytes_dropped_ || bytes != nullptr;
       return;

@@ -13,10 +13,10 @@ namespace birdseye::device {
 
 /// From the instruments' threads to the one that makes messages. Bounded: of the frames that wait, the oldest goes when
 /// there are too many, for what is live matters more than what was; everything else is small and has a bound of
-/// minutes. What is dropped is counted.
+/// minutes, but for what becomes of instruments. What is dropped is counted.
 class EventQueue {
  public:
-  static constexpr std::size_t kMostFrames = 16;
+  static constexpr std::size_t kMostFrames = 8;  // 50 MB of 1080p
   static constexpr std::size_t kMostEvents = 16384;
 
   void push(RawEvent event);

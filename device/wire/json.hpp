@@ -26,12 +26,10 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(InstrumentHealth, name, state, text, times_lo
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WallClock, known, synchronised, tai_known, max_error_ns, est_error_ns,
                                    wall_minus_monotonic_ns, source)
 // What an older appliance does not count yet is 0.
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Health, state, instruments, tracker_rate_hz, frame_rate_hz,
-                                                measurements, measurements_lost, phase_errors, senseless_records,
-                                                doubted, line_errors, clock_events, frames, frames_dropped,
-                                                frames_repeated, messages_shed, clients, clients_shed, requests_refused,
-                                                tracker_drift_ppm, camera_drift_ppm, tracker_time_sigma_ms,
-                                                latency_ms_p99_tracker, latency_ms_p99_tracker_beside_frames,
-                                                latency_ms_p99_frame, clock, recording)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(
+    Health, state, instruments, tracker_rate_hz, frame_rate_hz, measurements, measurements_lost, phase_errors,
+    senseless_records, doubted, line_errors, clock_events, frames, frames_dropped, frames_repeated, messages_shed,
+    clients, clients_shed, requests_refused, events_dropped, tracker_drift_ppm, camera_drift_ppm, tracker_time_sigma_ms,
+    latency_ms_p99_tracker, latency_ms_p99_tracker_beside_frames, latency_ms_p99_frame, clock, recording)
 
 }  // namespace birdseye::wire

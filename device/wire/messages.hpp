@@ -90,6 +90,7 @@ struct Health {
   std::uint64_t line_errors = 0, clock_events = 0;
   std::uint64_t frames = 0, frames_dropped = 0, frames_repeated = 0;
   std::uint64_t messages_shed = 0, clients = 0, clients_shed = 0, requests_refused = 0;
+  std::uint64_t events_dropped = 0;  ///< what instruments gave faster than messages could be made of it
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   // From the last byte in to the last byte out, since the last report. Poses to clients that take frames too wait while
   // a frame is on its way; the first figure is of those that do not.

@@ -404,8 +404,10 @@ TEST(EventQueue, AHoleInTheTrackersBytesIsMarked) {
   for (std::size_t n = 0; n < EventQueue::kMostEvents; ++n) queue.push(Tick{at(0)});
   queue.push(TrackerBytes{{{1}, at(1)}});
   EXPECT_EQ(queue.others_dropped(), 1U);
+  queue.push(camera_runs(1));  // never dropped
+  EXPECT_EQ(queue.others_dropped(), 1U);
   const DeviceTime soon = drivers::now() + Duration::from_ms(1000);
-  queue.pop(soon, {});
+  for (int i = 0; i < 2; ++i) queue.pop(soon, {});
   queue.push(TrackerBytes{{{2}, at(2)}});
   std::optional<RawEvent> last;
   while (auto event = queue.pop(drivers::now(), {})) last = std::move(event);
