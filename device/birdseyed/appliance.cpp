@@ -8,7 +8,7 @@
 #include "device/birdseyed/camera_thread.hpp"
 #include "device/birdseyed/gpio_thread.hpp"
 #include "device/birdseyed/tracker_thread.hpp"
-#include "drivers/io/clock_discipline.hpp"
+#include "device/wire/clock_discipline.hpp"
 #include "drivers/io/monotonic.hpp"
 
 namespace birdseye::device {
@@ -96,9 +96,9 @@ void Appliance::make_messages(const std::stop_token& stop) {
 namespace {
 
 wire::WallClock read_wall_clock() {
-  const auto read = drivers::read_clock_discipline();
+  const auto read = wire::read_clock_discipline();
   if (!read) return {};
-  const std::int64_t shift_ns = drivers::wall_minus_monotonic().ns;
+  const std::int64_t shift_ns = wire::wall_minus_monotonic().ns;
   return {true, read->synchronised, read->tai_known, read->max_error.ns, read->est_error.ns, shift_ns, read->source};
 }
 

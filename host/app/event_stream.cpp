@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/io/clock_discipline.hpp"
+#include "device/wire/clock_discipline.hpp"
 
 namespace birdseye::host {
 
@@ -16,8 +16,8 @@ void EventStream::read(const std::stop_token& stop) {
     auto event = client_->next(wire::Client::Clock::now() + std::chrono::milliseconds(100));
     const bool ended = !event;
     if (!ended && *event && std::holds_alternative<wire::Health>(**event)) {
-      if (const auto clock = drivers::read_clock_discipline())
-        client_->use_discipline(*clock, drivers::wall_minus_monotonic());
+      if (const auto clock = wire::read_clock_discipline())
+        client_->use_discipline(*clock, wire::wall_minus_monotonic());
     }
     {
       const std::lock_guard lock(mutex_);

@@ -226,6 +226,19 @@ TEST_F(ThroughLibusb, TheStrobeTellsWhenFramesWereTaken) {
   EXPECT_LT(off_ms[off_ms.size() / 2], 8);
 }
 
+/// Of the kernel's test driver, which this cart does not use; each is negotiated, streamed and converted.
+TEST_F(ThroughLibusb, FormatsOfTheKernelAreTaken) {
+  const std::string config =
+      R"([tracker]\ndevice = "/dev/null"\n[camera]\nsource = "v4l2:/dev/video0"\nwidth = 320\nheight = 180\nrate_hz = 25\n)";
+  for (const std::string format : {"YUYV", "UYVY", "NV12", "GREY"}) {
+    g_machine->must("printf '" + config + "format = \"" + format + "\"\\n' > /run/format.toml");
+    const std::string said = g_machine->must(BIRDSEYE_BIN "/birdseyed --config /run/format.toml --probe 2>&1 || true");
+    EXPECT_NE(said.find("camera: /dev/video0"), std::string::npos) << said;
+    EXPECT_NE(said.find(format), std::string::npos) << said;
+    EXPECT_NE(said.find("320x180"), std::string::npos) << said;
+  }
+}
+
 TEST_F(ThroughLibusb, ThePedalIsTold) {
   for (const bool pressed : {true, false, true, false}) {
     g_machine->must(pressed ? "gpio_drive pedal up" : "gpio_drive pedal down");

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "drivers/io/clock_discipline.hpp"
+#include "device/wire/clock_discipline.hpp"
 #include "tests/support/scratch.hpp"
 
-namespace birdseye::drivers {
+namespace birdseye::wire {
 namespace {
 
 TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
@@ -39,4 +39,4 @@ TEST(ClockDiscipline, FindsNetworkClocks) {
 }
 
 }  // namespace
-}  // namespace birdseye::drivers
+}  // namespace birdseye::wire

@@ -1,4 +1,4 @@
-#include "drivers/io/clock_discipline.hpp"
+#include "device/wire/clock_discipline.hpp"
 
 #include <fmt/format.h>
 #include <sys/timex.h>
@@ -10,9 +10,9 @@
 #include <ctime>
 #include <filesystem>
 
-#include "drivers/io/monotonic.hpp"
+#include "device/wire/client_link.hpp"
 
-namespace birdseye::drivers {
+namespace birdseye::wire {
 
 ClockDiscipline decode_discipline(const timex& reading, int state) {
   ClockDiscipline discipline;
@@ -40,7 +40,7 @@ Result<ClockDiscipline> read_clock_discipline() {
 Duration wall_minus_monotonic() {
   timespec wall{};
   clock_gettime(CLOCK_REALTIME, &wall);
-  return {wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - now().ns};
+  return {wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - monotonic_now().ns};
 }
 
 std::vector<std::string> ptp_devices(const std::string& folder) {
@@ -57,4 +57,4 @@ std::vector<std::string> ptp_devices(const std::string& folder) {
   return devices;
 }
 
-}  // namespace birdseye::drivers
+}  // namespace birdseye::wire

@@ -8,7 +8,7 @@
 
 struct timex;
 
-namespace birdseye::drivers {
+namespace birdseye::wire {
 
 /// What adjtimex(2) filled in, and what it returned.
 ClockDiscipline decode_discipline(const timex& reading, int state);
@@ -22,4 +22,4 @@ Duration wall_minus_monotonic();
 /// Network cards' own clocks (/dev/ptp0 ...): where there are any, PTP can stamp packets in hardware.
 std::vector<std::string> ptp_devices(const std::string& folder = "/dev");
 
-}  // namespace birdseye::drivers
+}  // namespace birdseye::wire
