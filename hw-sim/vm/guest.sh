@@ -69,6 +69,18 @@ gpio_line() {
 gpio_drive() { echo "pull-$2" >"$(gpio_line "$1")/pull"; }  # gpio_drive NAME up|down
 gpio_value() { cat "$(gpio_line "$1")/value"; }
 
+# gpio_seen NAME: the values that the line takes within two seconds or so, "0", "1" or "0 1". Nothing is started meanwhile: that takes an
+# emulated processor longer than a light flickers.
+gpio_seen() {
+  local path value zero='' one='' end=$((SECONDS + 2))
+  path=$(gpio_line "$1")/value
+  while [ $SECONDS -lt $end ]; do
+    read -r value <"$path"
+    if [ "$value" = 0 ]; then zero=0; else one=1; fi
+  done
+  echo $zero $one
+}
+
 # gpio_pulses NAME COUNT SECONDS: that many rises, and falls half a period later.
 gpio_pulses() {
   local pull i

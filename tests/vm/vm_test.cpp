@@ -215,13 +215,14 @@ TEST_F(ThroughLibusb, TheStrobeTellsWhenFramesWereTaken) {
   const auto truth = nlohmann::json::parse(g_machine->must("cat /run/out/camera.json"));
   const double period_s = 1 / truth.at("rate_hz").get<double>();
   const DeviceTime zero{truth.at("zero_monotonic_ns").get<std::int64_t>()};
-  const auto frames = cart().some<VideoFrame>("frames", 100);
   std::vector<double> off_ms;
-  for (const auto& frame : frames) {
-    if (frame.info.acquired_sigma < kWakeSigma)
-      off_ms.push_back(1e3 * std::abs(std::remainder((frame.info.acquired - zero).seconds(), period_s)));
+  for (int seen = 0; seen < 400 && off_ms.size() < 25; ++seen) {
+    const auto frame = cart().next<VideoFrame>("a frame", [](const VideoFrame&) { return true; });
+    ASSERT_TRUE(frame);
+    if (frame->info.acquired_sigma < kWakeSigma)
+      off_ms.push_back(1e3 * std::abs(std::remainder((frame->info.acquired - zero).seconds(), period_s)));
   }
-  ASSERT_GE(off_ms.size(), frames.size() / 2);
+  ASSERT_EQ(off_ms.size(), 25U) << "frames are not paired with the strobe's edges";
   std::nth_element(off_ms.begin(), off_ms.begin() + static_cast<std::ptrdiff_t>(off_ms.size() / 2), off_ms.end());
   EXPECT_LT(off_ms[off_ms.size() / 2], 8);
 }
@@ -249,18 +250,15 @@ TEST_F(ThroughLibusb, ThePedalIsTold) {
 }
 
 TEST_F(ThroughLibusb, TheTriggerIsPulsed) {
-  EXPECT_EQ(g_machine->must(
-                "trigger=$(gpio_line trigger)/value; for i in {1..40}; do cat $trigger; sleep 0.02; done | sort -u"),
-            "0\n1");
+  EXPECT_EQ(g_machine->must("gpio_seen trigger"), "0 1");
 }
 
 TEST_F(ThroughLibusb, TheLightIsSteadyWhileAllIsWellAndFlickersWhenItIsNot) {
-  const std::string look = "led=$(gpio_line led)/value; for i in {1..20}; do cat $led; sleep 0.03; done | sort -u";
   g_machine->must("until [ $(gpio_value led) = 1 ]; do sleep 0.1; done");
-  EXPECT_EQ(g_machine->must(look), "1");
+  EXPECT_EQ(g_machine->must("gpio_seen led"), "1");
   g_machine->adapter().send("unplug");
   (void)cart().next<Status>("word of the tracker's loss", [](const Status& s) { return !s.ok; });
-  EXPECT_EQ(g_machine->must(look), "0\n1");
+  EXPECT_EQ(g_machine->must("gpio_seen led"), "0 1");
   g_machine->adapter().send("plug");
   (void)cart().next<Status>("word that all is well", [](const Status& s) { return s.ok; });
 }
