@@ -97,7 +97,10 @@ void StrobeMatcher::learn() {
   int fewest = std::numeric_limits<int>::max(), second = fewest;
   double best = 0;
   const auto most = static_cast<double>(settings_.most_delay.ns);
-  for (double delay = *phase + std::ceil((least - *phase) / period) * period; delay <= most; delay += period) {
+  const auto first = static_cast<int>(std::ceil((least - *phase) / period));
+  const auto last = static_cast<int>(std::floor((most - *phase) / period));
+  for (int n = first; n <= last; ++n) {
+    const double delay = *phase + n * period;
     const int found = contradictions(delay);
     if (found < fewest) {
       second = std::exchange(fewest, found);

@@ -46,14 +46,15 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
     }
     auto frame = camera.next(now() + kPatience);
     if (!frame) return frame.error();
-    if (*frame) {
+    const bool came = frame->has_value();
+    if (came) {
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       // One frame over and over is no stream.
       if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = now();
       post.push(FrameCame{**std::move(frame)});
     }
     if (now() - heard > silence) {
-      const std::string text = fmt::format("{}: the camera sends no {}frames", camera.name(), *frame ? "new " : "");
+      const std::string text = fmt::format("{}: the camera sends no {}frames", camera.name(), came ? "new " : "");
       if (restarts++ == kRestarts) return {Errc::timeout, text};
       post.tell({.state = InstrumentState::silent, .text = text});
       if (auto restarted = camera.restart_stream(); !restarted) return restarted.error();
