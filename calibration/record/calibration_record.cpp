@@ -1,0 +1,227 @@
+#include "calibration/record/calibration_record.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "calibration/record/checksum.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "birdseye calibration record";
+
+template <typename Matrix>
+Json rows_of(const Matrix& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    Json row = Json::array();
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) row.push_back(matrix(r, c));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// Throws, as the library's own accessors do, what parse_record() turns into an error.
+template <typename Matrix>
+Matrix matrix_of(const Json& rows) {
+  Matrix matrix;
+  if (rows.size() != static_cast<std::size_t>(matrix.rows())) throw std::range_error("a matrix of another size");
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    const Json& row = rows.at(static_cast<std::size_t>(r));
+    if (row.size() != static_cast<std::size_t>(matrix.cols())) throw std::range_error("a matrix of another size");
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) matrix(r, c) = row.at(static_cast<std::size_t>(c)).get<double>();
+  }
+  return matrix;
+}
+
+template <typename Matrix>
+Matrix covariance_of(const Json& rows) {
+  Matrix matrix = matrix_of<Matrix>(rows);
+  if (!matrix.isApprox(matrix.transpose(), 1e-6) || matrix.diagonal().minCoeff() < 0)
+    throw std::range_error("a covariance that is none");
+  return matrix;
+}
+
+Json json_of(const Provenance& p) {
+  return {
+      {"made_utc", p.made_utc}, {"software", p.software}, {"made_from", p.made_from}, {"verdict", name_of(p.grade)}};
+}
+Provenance provenance_of(const Json& json) {
+  Provenance p;
+  json.at("made_utc").get_to(p.made_utc);
+  json.at("software").get_to(p.software);
+  json.at("made_from").get_to(p.made_from);
+  const auto verdict = json.at("verdict").get<std::string>();
+  if (verdict != name_of(Grade::pass) && verdict != name_of(Grade::marginal))
+    throw std::range_error("a result whose verdict is \"" + verdict + "\"");
+  p.grade = verdict == name_of(Grade::pass) ? Grade::pass : Grade::marginal;
+  return p;
+}
+
+// The parameters of CameraModel in the order of its Jacobians.
+constexpr std::pair<const char*, double CameraModel::*> kParameters[] = {
+    {"fx_px", &CameraModel::fx_px}, {"fy_px", &CameraModel::fy_px}, {"cx_px", &CameraModel::cx_px},
+    {"cy_px", &CameraModel::cy_px}, {"k1", &CameraModel::k1},       {"k2", &CameraModel::k2},
+    {"p1", &CameraModel::p1},       {"p2", &CameraModel::p2},       {"k3", &CameraModel::k3}};
+
+Json json_of(const LensEntry& lens) {
+  Json json = json_of(lens.provenance);
+  json["model"] = lens.model;
+  json["width_px"] = lens.camera.width_px;
+  json["height_px"] = lens.camera.height_px;
+  for (const auto& [name, field] : kParameters) json[name] = lens.camera.*field;
+  json["covariance"] = rows_of(lens.covariance);
+  json["rms_px"] = lens.rms_px;
+  json["held_out_px"] = lens.held_out_px;
+  if (lens.rod_angle_deg) json["rod_angle_deg"] = *lens.rod_angle_deg;
+  return json;
+}
+LensEntry lens_of(const Json& json) {
+  LensEntry lens;
+  lens.provenance = provenance_of(json);
+  json.at("model").get_to(lens.model);
+  json.at("width_px").get_to(lens.camera.width_px);
+  json.at("height_px").get_to(lens.camera.height_px);
+  for (const auto& [name, field] : kParameters) json.at(name).get_to(lens.camera.*field);
+  if (const auto sound = check(lens.camera); !sound) throw std::range_error(sound.error().what);
+  lens.covariance = covariance_of<decltype(lens.covariance)>(json.at("covariance"));
+  json.at("rms_px").get_to(lens.rms_px);
+  json.at("held_out_px").get_to(lens.held_out_px);
+  if (json.contains("rod_angle_deg")) lens.rod_angle_deg = json.at("rod_angle_deg").get<double>();
+  return lens;
+}
+
+Json json_of(const HandEyeEntry& hand_eye) {
+  Json json = json_of(hand_eye.provenance);
+  json["camera_from_sensor"] = rows_of(hand_eye.camera_from_sensor.matrix());
+  json["covariance"] = rows_of(hand_eye.covariance);
+  json["rms_px"] = hand_eye.rms_px;
+  json["held_out_px"] = hand_eye.held_out_px;
+  json["held_out_mm"] = hand_eye.held_out_mm;
+  return json;
+}
+HandEyeEntry hand_eye_of(const Json& json) {
+  HandEyeEntry hand_eye;
+  hand_eye.provenance = provenance_of(json);
+  const auto matrix = matrix_of<Eigen::Matrix4d>(json.at("camera_from_sensor"));
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  if (!(rotation * rotation.transpose()).isIdentity(1e-6) || rotation.determinant() < 0 ||
+      matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    throw std::range_error("a camera_from_sensor that is no rigid transform");
+  hand_eye.camera_from_sensor = Transform<Camera, Sensor>::from_matrix(matrix);
+  hand_eye.covariance = covariance_of<decltype(hand_eye.covariance)>(json.at("covariance"));
+  json.at("rms_px").get_to(hand_eye.rms_px);
+  json.at("held_out_px").get_to(hand_eye.held_out_px);
+  json.at("held_out_mm").get_to(hand_eye.held_out_mm);
+  return hand_eye;
+}
+
+Json json_of(const TipEntry& tip) {
+  Json json = json_of(tip.provenance);
+  json["tip_in_sensor_mm"] = {tip.tip_in_sensor_mm.x(), tip.tip_in_sensor_mm.y(), tip.tip_in_sensor_mm.z()};
+  json["covariance_mm2"] = rows_of(tip.covariance_mm2);
+  json["rms_mm"] = tip.rms_mm;
+  return json;
+}
+TipEntry tip_of(const Json& json) {
+  TipEntry tip;
+  tip.provenance = provenance_of(json);
+  const auto place = json.at("tip_in_sensor_mm").get<std::array<double, 3>>();
+  tip.tip_in_sensor_mm = {place[0], place[1], place[2]};
+  tip.covariance_mm2 = covariance_of<Eigen::Matrix3d>(json.at("covariance_mm2"));
+  json.at("rms_mm").get_to(tip.rms_mm);
+  return tip;
+}
+
+Json json_of(const LatencyEntry& latency) {
+  Json json = json_of(latency.provenance);
+  json["offset_ms"] = latency.offset_ms;
+  json["offset_ci95_ms"] = {latency.ci95_low_ms, latency.ci95_high_ms};
+  json["drift_ppm"] = latency.drift_ppm;
+  return json;
+}
+LatencyEntry latency_of(const Json& json) {
+  LatencyEntry latency;
+  latency.provenance = provenance_of(json);
+  json.at("offset_ms").get_to(latency.offset_ms);
+  std::tie(latency.ci95_low_ms, latency.ci95_high_ms) = json.at("offset_ci95_ms").get<std::pair<double, double>>();
+  json.at("drift_ppm").get_to(latency.drift_ppm);
+  return latency;
+}
+
+CalibrationRecord record_of(const Json& json) {
+  CalibrationRecord record;
+  json.at("scope").get_to(record.scope);
+  json.at("hardware").at("tracker").get_to(record.tracker);
+  json.at("hardware").at("camera").get_to(record.camera);
+  if (json.contains("lens")) record.lens = lens_of(json.at("lens"));
+  if (json.contains("hand_eye")) record.hand_eye = hand_eye_of(json.at("hand_eye"));
+  if (json.contains("tip")) record.tip = tip_of(json.at("tip"));
+  if (json.contains("latency")) record.latency = latency_of(json.at("latency"));
+  return record;
+}
+
+}  // namespace
+
+bool CalibrationRecord::set_lens(LensEntry entry) {
+  const bool other = !lens || !(lens->camera == entry.camera);
+  lens = std::move(entry);
+  if (!other || !hand_eye) return false;
+  hand_eye.reset();
+  return true;
+}
+
+std::string record_text(const CalibrationRecord& record) {
+  Json json{{"format", kFormat}, {"version", CalibrationRecord::kVersion}, {"scope", record.scope}};
+  json["hardware"] = {{"tracker", record.tracker}, {"camera", record.camera}};
+  if (record.lens) json["lens"] = json_of(*record.lens);
+  if (record.hand_eye) json["hand_eye"] = json_of(*record.hand_eye);
+  if (record.tip) json["tip"] = json_of(*record.tip);
+  if (record.latency) json["latency"] = json_of(*record.latency);
+  json["checksum"] = checksum_of(json);
+  return json.dump(2) + "\n";
+}
+
+Result<CalibrationRecord> parse_record(const std::string& text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
+    return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
+  if (json.value("version", Json()) != CalibrationRecord::kVersion) {
+    return Error{Errc::bad_format, fmt::format("is a calibration record of version {}; this program reads version {}",
+                                               json.value("version", Json()).dump(), CalibrationRecord::kVersion)};
+  }
+  Json told = json;
+  told.erase("checksum");
+  if (json.value("checksum", Json()) != checksum_of(told)) {
+    return Error{Errc::bad_format,
+                 "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
+  }
+  try {
+    return record_of(json);
+  } catch (const std::exception& problem) {
+    return Error{Errc::bad_value, fmt::format("the calibration record makes no sense: {}", problem.what())};
+  }
+}
+
+std::string misfit(const std::string& what, const Identity& recorded, const Identity& told) {
+  if (recorded.empty())
+    return fmt::format(
+        "the record does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind "
+        "HOST",
+        what);
+  for (const auto& [key, value] : recorded) {
+    const auto found = told.find(key);
+    if (found == told.end())
+      return fmt::format("the record is of {} {} {}; this one does not tell its", what, key, value);
+    if (found->second != value)
+      return fmt::format("the record is of {} {} {}; this one's is {}", what, key, value, found->second);
+  }
+  return {};
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+
+namespace birdseye::calibration {
+
+/// What an instrument says it is, as "model", "sensor_serial" and so on. Empty: nothing is known of it.
+using Identity = std::map<std::string, std::string>;
+
+/// Where an entry of a record comes from.
+struct Provenance {
+  std::string made_utc;       ///< 2026-11-22T09:30:00Z
+  std::string software;       ///< birdseye and its version
+  std::string made_from;      ///< the board and how many views, in words
+  Grade grade = Grade::pass;  ///< pass or marginal: what failed is not put into a record
+};
+
+struct LensEntry {
+  Provenance provenance;
+  CameraModel camera;
+  std::string model;  ///< of the lens, as `calibrate camera --model` names it
+  /// Of fx fy cx cy k1 k2 p1 p2 k3; rows of terms that were not solved for are zero.
+  Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters> covariance;
+  double rms_px = 0, held_out_px = 0;
+  std::optional<double> rod_angle_deg;  ///< of an oblique scope, against the camera head
+};
+
+struct HandEyeEntry {
+  Provenance provenance;
+  Transform<Camera, Sensor> camera_from_sensor;
+  Eigen::Matrix<double, 6, 6> covariance;  ///< as the solver states it: rotation vector (rad), translation (mm)
+  double rms_px = 0, held_out_px = 0, held_out_mm = 0;
+};
+
+struct TipEntry {
+  Provenance provenance;
+  Eigen::Vector3d tip_in_sensor_mm;
+  Eigen::Matrix3d covariance_mm2;
+  double rms_mm = 0;
+};
+
+/// What is left between the times of frames and of poses: a frame said to be of time t shows what the tracker measured
+/// at t - offset.
+struct LatencyEntry {
+  Provenance provenance;
+  double offset_ms = 0, ci95_low_ms = 0, ci95_high_ms = 0, drift_ppm = 0;
+};
+
+/// All that was found of one scope on one cart. The text is JSON for people to read, with a checksum over what it says,
+/// so that one that was cut, mixed up or changed by hand is not taken.
+struct CalibrationRecord {
+  static constexpr int kVersion = 1;
+
+  std::string scope;         ///< its name or serial number, as its owner calls it
+  Identity tracker, camera;  ///< of the hardware it was made with
+  std::optional<LensEntry> lens;
+  std::optional<HandEyeEntry> hand_eye;
+  std::optional<TipEntry> tip;
+  std::optional<LatencyEntry> latency;
+
+  /// A hand-eye calibration holds for the lens it was made with: another lens takes it away. True: it did.
+  bool set_lens(LensEntry entry);
+};
+
+std::string record_text(const CalibrationRecord& record);
+/// Refuses what is no record, a later version, a checksum that does not fit, and numbers that make no sense.
+Result<CalibrationRecord> parse_record(const std::string& text);
+
+/// Why a record made with one instrument is not to be used with another, in words; empty where all that the record
+/// knows is as the instrument says. A record that knows nothing fits nothing, and what the instrument does not say
+/// cannot fit. what: "tracker", "camera".
+std::string misfit(const std::string& what, const Identity& recorded, const Identity& told);
+
+}  // namespace birdseye::calibration

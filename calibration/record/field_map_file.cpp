@@ -1,0 +1,87 @@
+#include "calibration/record/field_map_file.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "calibration/record/checksum.hpp"
+#include "calibration/record/field_map_json.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+constexpr const char* kFormat = "birdseye field map";
+constexpr int kVersion = 1;
+constexpr std::size_t kMostBytes = 4U << 20U;
+
+std::optional<Grade> grade_of(const std::string& name) {
+  for (const Grade grade : {Grade::pass, Grade::marginal}) {
+    if (name == name_of(grade)) return grade;
+  }
+  return std::nullopt;
+}
+
+Error no_map(const std::string& why) {
+  return {Errc::bad_format, fmt::format("is no map of the field, {}; make one with birdseye calibrate field", why)};
+}
+
+Result<FieldMapFile> map_of(const nlohmann::json& json) {
+  FieldMapNotes notes;
+  json.at("made_utc").get_to(notes.made_utc);
+  json.at("software").get_to(notes.software);
+  json.at("made_from").get_to(notes.made_from);
+  json.at("held_out_mm").get_to(notes.held_out_mm);
+  const auto grade = grade_of(json.at("verdict").get<std::string>());
+  if (!grade) return no_map("or one whose verdict was fail");
+  notes.grade = *grade;
+  auto map = FieldMap::from(json.at("map").get<FieldMapData>());
+  if (!map) return map.error();
+  return FieldMapFile{*std::move(map), std::move(notes)};
+}
+
+}  // namespace
+
+std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
+  nlohmann::json json{{"format", kFormat},
+                      {"version", kVersion},
+                      {"made_utc", notes.made_utc},
+                      {"software", notes.software},
+                      {"made_from", notes.made_from},
+                      {"verdict", name_of(notes.grade)},
+                      {"held_out_mm", notes.held_out_mm},
+                      {"map", map.data()}};
+  json["checksum"] = checksum_of(json);
+  return json.dump(1) + "\n";
+}
+
+Result<FieldMapFile> parse_field_map(const std::string& text) {
+  try {
+    nlohmann::json json = nlohmann::json::parse(text);
+    if (!json.is_object() || json.value("format", "") != kFormat) return no_map("it does not say that it is one");
+    if (json.at("version").get<int>() != kVersion)
+      return no_map(fmt::format("or of a version other than {}", kVersion));
+    const auto checksum = json.at("checksum").get<std::string>();
+    json.erase("checksum");
+    if (checksum != checksum_of(json)) return no_map("or was changed since it was made: its checksum does not fit");
+    return map_of(json);
+  } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
+    return no_map("or not a whole one");
+  }
+}
+
+Result<FieldMapFile> read_field_map(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text(kMostBytes, 0);
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!in.is_open() || in.bad())
+    return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  auto map = parse_field_map(text);
+  if (!map) return Error{map.error().code, path.string() + ": " + map.error().what};
+  return map;
+}
+
+}  // namespace birdseye::calibration

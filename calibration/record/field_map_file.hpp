@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/geometry/field_map.hpp"
+
+namespace birdseye::calibration {
+
+/// What a map's file says of where it comes from.
+struct FieldMapNotes {
+  std::string made_utc;   ///< 2026-11-22T09:30:00Z
+  std::string software;   ///< birdseye and its version
+  std::string made_from;  ///< how many measurements of what, in words
+  Grade grade = Grade::pass;
+  double held_out_mm = 0;
+};
+
+/// JSON with a checksum over all of it.
+std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes);
+
+struct FieldMapFile {
+  FieldMap map;
+  FieldMapNotes notes;
+};
+
+/// Refuses what is no such text, a later version, a checksum that does not fit, and a map that makes no sense.
+Result<FieldMapFile> parse_field_map(const std::string& text);
+/// The same of a file, which the error names.
+Result<FieldMapFile> read_field_map(const std::filesystem::path& path);
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+
+namespace birdseye::calibration {
+
+/// A place of a plate: where it is said to be and where it was measured today.
+struct CheckedPlace {
+  std::string name;
+  Eigen::Vector3d true_mm, measured_mm;
+};
+
+/// What one day's measurement of a plate says about the field.
+struct FieldCheck {
+  std::string when;          ///< of the day, for people
+  double rms_mm = 0;         ///< of the places after a rigid fit
+  double scale_percent = 0;  ///< by so much the tracker has distances longer than the plate
+  double worst_mm = 0;       ///< largest of the places
+  std::string worst_place;
+  std::vector<double> off_mm;  ///< each place; empty where it comes from a history
+};
+
+/// Refuses fewer than four places, and places on a line.
+Result<FieldCheck> check_field(const std::string& when, std::span<const CheckedPlace> places);
+
+/// Limits of a chart of single values (W. A. Shewhart; sigma from the mean moving range over 1.128): those of the
+/// first days.
+struct ControlLimits {
+  double mean = 0, sigma = 0;
+  int days = 0;
+};
+
+inline constexpr int kLearningDays = 8;  ///< the first days of a history say what is usual
+
+struct ControlChart {
+  ControlLimits rms_mm, scale_percent;  ///< days 0: not known yet
+};
+
+/// Of the first kLearningDays of a history that did not fail; empty until there are so many.
+std::optional<ControlChart> control_chart(std::span<const FieldCheck> history);
+
+/// What the last of the days is worth: against an absolute limit always, and against its own history by the Western
+/// Electric rules (1956): one value beyond 3 sigma, two of three beyond 2 sigma on one side, eight in a row on one side
+/// of the mean. An rms that is lower than usual is not held against the day.
+Verdict verdict_of(std::span<const FieldCheck> history);
+
+}  // namespace birdseye::calibration

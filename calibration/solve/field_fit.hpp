@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/geometry/field_map.hpp"
+#include "calibration/geometry/transform.hpp"
+
+namespace birdseye::calibration {
+
+/// A place of a board or plate whose position is known, and what the tracker made of a sensor there.
+struct FieldSample {
+  std::string name;                                   ///< for messages
+  Eigen::Vector3d true_mm = Eigen::Vector3d::Zero();  ///< in the board's frame
+  /// How the sensor was turned in the board's frame, up to a rotation that is the same for all samples: the identity
+  /// where it was held the same way at each place. Empty: not known; then orientation is not mapped.
+  std::optional<Eigen::Matrix3d> true_rotation;
+  Transform<Tracker, Sensor> measured;
+};
+
+struct FieldFitSettings {
+  std::optional<FieldBasis> basis;  ///< empty: whichever does best on what it was not shown
+};
+
+/// What one kind of map makes of regions it was not shown, mm RMS.
+struct FieldCandidate {
+  FieldBasis basis = FieldBasis::polynomial;
+  int order = 1;
+  double smoothing = 0;
+  double held_out_mm = std::numeric_limits<double>::infinity();
+};
+
+/// One measurement, before and after.
+struct FieldResidual {
+  std::string name;
+  Eigen::Vector3d measured_mm;
+  Eigen::Vector3d before_mm;    ///< measured less true
+  Eigen::Vector3d held_out_mm;  ///< the same after a map that was not shown the measurement's region
+  bool outlier = false;
+};
+
+struct FieldFit {
+  explicit FieldFit(FieldMap found) : map(std::move(found)) {}
+
+  FieldMap map;
+  bool from_pairs = false;  ///< of two sensors on one body, else of known places
+  FieldCandidate chosen;
+  std::vector<FieldCandidate> candidates;
+  std::vector<FieldResidual> residuals;       ///< all measurements, in their order
+  double before_mm = 0, before_worst_mm = 0;  ///< RMS and largest, without outliers
+  /// After correction, of regions that were left out. The noise of the measurements is in it.
+  double held_out_mm = 0, held_out_worst_mm = 0;
+  std::string worst;                               ///< its name
+  std::optional<double> before_deg, held_out_deg;  ///< RMS, where orientation was mapped
+  double mapped_part = 0;                          ///< of the box, 0..1
+  std::optional<Transform<Tracker, Marker>> tracker_from_board;
+  /// Grid: how much longer the tracker has distances than the board, as a factor. Pairs: 1.
+  double scale = 1;
+  /// Pairs: where sensor b is in a's frame, mm; and how well the body's turns span space, 0..1/3 (the least variance of
+  /// the direction from a to b).
+  std::optional<Eigen::Vector3d> a_from_b_mm;
+  double direction_spread = 0;
+  bool distance_known = true;  ///< pairs: without it the map's scale is as it was measured
+};
+
+/// The map that takes measured poses to where the board has them. The board's own place in the tracker's frame is not
+/// known: it is the rigid fit of all samples (K. S. Arun et al., 1987), and distortion is what is left. So a part of
+/// the distortion that moves everything alike counts as the board's place: it makes no difference to anything that is
+/// calibrated with the corrected tracker. All families of functions hold the affine maps, so that the choice of the
+/// rigid part loses nothing.
+/// Family, order and smoothing are those with the least error in regions that were left out (11 folds of scattered
+/// cells, each a fifth of the box wide); within 2 % the one with fewer functions. Samples more than 4.5 robust sigmas
+/// off are named and not used. Orientations, where known, get a map of the same family from
+/// w = log(R_board turned_i sensor R_i^T); its mean over samples that are all turned alike cannot be told from how the
+/// sensor sits in its holder and is taken for that.
+/// Refuses fewer than 30 samples, samples in a plane or thinner than 100 mm, places that are not finite, and units that
+/// differ (a factor beyond 0.8..1.25).
+Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
+
+/// Two sensors on one rigid body at the same moment.
+struct FieldPair {
+  std::string name;
+  Transform<Tracker, Sensor> a, b;
+};
+
+struct FieldPairSettings {
+  std::optional<FieldBasis> basis;
+  std::optional<double> distance_mm;  ///< between the sensors, where it is known
+};
+
+/// The map that makes the body rigid: with p and R corrected, R_a^T (p_b - p_a) and R_a^T R_b are the same in all
+/// pairs. This says nothing of a rigid motion of everything, which is fixed by asking that the map has none over the
+/// samples, nor of the scale unless the distance is known. Solved by Gauss-Newton over both maps and the sensors'
+/// distance; an orientation counts as much as 200 mm/rad would make of it. Held-out errors are those of p_b - p_a. At
+/// most 1500 pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors closer than 30 mm, and volumes thinner
+/// than 100 mm.
+Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const FieldPairSettings& settings = {});
+
+/// What a map is good for, from its own figures.
+Verdict verdict_of(const FieldFit& fit);
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+
+namespace birdseye::calibration {
+
+/// How a scope looks at a board, apart from where in the picture the board lies.
+struct ScopeView {
+  double tilt_rad = 0;       ///< the scope's axis against the board's normal
+  double direction_rad = 0;  ///< where its tip points over the board: from the board's x axis to its y axis
+  double turn_rad = 0;     ///< about its own axis, from x to y, after the tilt; 0: the board's x axis runs to the right
+  double distance_mm = 0;  ///< to the board's plane, along the axis
+  bool from_behind = false;  ///< the board's z axis points to the camera and not away from it
+};
+ScopeView scope_view(const Transform<Camera, Marker>& camera_from_marker);
+
+/// The other way round: the pose that looks so, the board's point `centre_mm` at `centre_tangent` (x / z, y / z in the
+/// camera frame) and as far along the axis as the view says.
+Transform<Camera, Marker> pose_of(const ScopeView& view, const Eigen::Vector3d& centre_mm,
+                                  const Eigen::Vector2d& centre_tangent);
+
+/// What to do with the scope to come from one pose to the other, for the person who holds it. Directions are those of
+/// the picture as it is now. To tilt the scope to the left is to lean its long axis so that the camera head goes to the
+/// picture's left while the tip keeps pointing at the board: the board's left side comes nearer. Clockwise is as seen
+/// along the scope from behind. centre_mm: the board's middle, frame Marker.
+std::string words_for(const Transform<Camera, Marker>& now, const Transform<Camera, Marker>& next,
+                      const CameraModel& camera, const Eigen::Vector3d& centre_mm);
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,187 @@
+// Stations that do not determine hand-eye, and input that cannot be used: each is named.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/hand_eye_bench.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+using ::testing::Contains;
+using testing::HandEyeBench;
+using testing::HandEyeScene;
+using ::testing::HasSubstr;
+
+const HandEyeScene kGood{.stations = 14, .corner_px = 0.2, .position_mm = 0.3, .angle_deg = 0.1};
+
+/// The verdict, which must be a fail that gives this reason and this advice.
+void expect_fail(const HandEyeInput& input, const std::string& reason, const std::string& advice) {
+  const auto result = calibrate_hand_eye(input);
+  ASSERT_TRUE(result) << result.error().what;
+  const Verdict verdict = judge(*result);
+  EXPECT_EQ(verdict.grade, Grade::fail);
+  EXPECT_THAT(verdict.reasons, Contains(HasSubstr(reason)));
+  EXPECT_THAT(verdict.next_steps, Contains(HasSubstr(advice)));
+}
+
+TEST(HandEyeInput, GoodStationsPass) {
+  const auto result = calibrate_hand_eye(HandEyeBench(kGood).input);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(judge(*result).grade, Grade::pass) << ::testing::PrintToString(judge(*result).reasons);
+}
+
+TEST(HandEyeInput, TooFewStations) {
+  HandEyeBench bench(kGood);
+  bench.input.stations.resize(2);
+  expect_fail(bench.input, "2 stations with board and pose, of at least 3", "take more stations");
+  bench.input.stations.resize(1);
+  expect_fail(bench.input, "1 stations", "take more stations");
+  bench.input.stations.clear();
+  EXPECT_EQ(calibrate_hand_eye(bench.input).error().code, Errc::bad_value);
+  HandEyeBench four(kGood);
+  four.input.stations.resize(4);
+  expect_fail(four.input, "4 stations used, of 5", "take 6 more");
+}
+
+TEST(HandEyeInput, TurnsAboutOneAxisAreNamedWithTheAxis) {
+  HandEyeScene scene = kGood;
+  scene.one_axis = true;
+  scene.position_mm = 1.8;
+  scene.angle_deg = 0.5;
+  const HandEyeBench bench(scene);
+  const auto result = calibrate_hand_eye(bench.input);
+  ASSERT_TRUE(result);
+  EXPECT_FALSE(result->solved);
+  // The line of sight, as the sensor sees it.
+  const Eigen::Vector3d axis = bench.camera_from_sensor.rotation().transpose().col(2);
+  EXPECT_GT(std::abs(axis.dot(result->observability.axes_in_sensor.col(0))), 0.99);
+  expect_fail(bench.input, "about one axis", "tilt the scope across that axis by 30 degrees");
+  expect_fail(bench.input, "near the camera's line of sight: the translation along it is open", "tilt");
+}
+
+TEST(HandEyeInput, NoTurnsAndNarrowTurns) {
+  HandEyeScene scene = kGood;
+  scene.tilt_rad = scene.roll_rad = 0.02;
+  expect_fail(HandEyeBench(scene).input, "hardly turned", "30 degrees or more, about different axes");
+  scene.tilt_rad = 0.11;
+  scene.roll_rad = 1;
+  const auto narrow = calibrate_hand_eye(HandEyeBench(scene).input);
+  ASSERT_TRUE(narrow && narrow->solved);
+  EXPECT_THAT(judge(*narrow).reasons, Contains(HasSubstr("nearly all turns are about one axis")));
+}
+
+TEST(HandEyeInput, TheSamePoseTwice) {
+  HandEyeBench bench(kGood);
+  bench.input.stations.push_back(bench.input.stations[3]);
+  bench.input.stations.back().name = "again";
+  const auto result = calibrate_hand_eye(bench.input);
+  ASSERT_TRUE(result && result->solved);
+  EXPECT_THAT(judge(*result).reasons, Contains(HasSubstr("the same pose as")));
+  // Only the tracker stood still: which of the pictures its pose belongs to, nobody knows.
+  HandEyeBench stuck(kGood);
+  stuck.input.stations[6].tracker_from_sensor = stuck.input.stations[5].tracker_from_sensor;
+  const auto without = calibrate_hand_eye(stuck.input);
+  ASSERT_TRUE(without && without->solved);
+  EXPECT_FALSE(without->stations[5].used);
+  EXPECT_FALSE(without->stations[6].used);
+  EXPECT_THAT(without->stations[6].why_not, HasSubstr("that of station 5 to the last digit, though the board moved"));
+  for (HandEyeStation& s : stuck.input.stations) s = stuck.input.stations[0];
+  expect_fail(stuck.input, "the same pose as", "take more stations");
+}
+
+TEST(HandEyeInput, PosesAndPicturesThatDoNotPair) {
+  HandEyeBench bench(kGood);
+  auto& stations = bench.input.stations;
+  const auto first = stations.front().tracker_from_sensor;
+  for (std::size_t i = 0; i + 1 < stations.size(); ++i)
+    stations[i].tracker_from_sensor = stations[i + 1].tracker_from_sensor;
+  stations.back().tracker_from_sensor = first;
+  expect_fail(bench.input, "do not belong together", "the pictures fit the poses that come 1 earlier");
+  HandEyeBench random(kGood);
+  for (HandEyeStation& s : random.input.stations)
+    s.tracker_from_sensor = {rotation_exp(random.normal3()), Eigen::Vector3d(100 * random.normal3())};
+  expect_fail(random.input, "do not belong together", "the pose of its own moment");
+}
+
+TEST(HandEyeInput, InvertedPoses) {
+  HandEyeBench bench(kGood);
+  for (HandEyeStation& s : bench.input.stations) {
+    const auto inverse = s.tracker_from_sensor.inverse();
+    s.tracker_from_sensor = {inverse.rotation(), inverse.translation()};
+  }
+  expect_fail(bench.input, "seem to be inverted", "tracker_from_sensor");
+}
+
+TEST(HandEyeInput, ABoardOfAnotherSize) {
+  const auto scaled = [](double by) {
+    HandEyeBench bench(kGood);
+    for (HandEyeStation& s : bench.input.stations) {
+      for (Eigen::Vector3d& p : s.view.points_in_marker_mm) p *= by;
+    }
+    return bench.input;
+  };
+  expect_fail(scaled(1000), "1000 times smaller than stated: poses in metres", "units");
+  expect_fail(scaled(0.001), "1000 times larger than stated", "units");
+  expect_fail(scaled(25.4), "inches", "units");
+  expect_fail(scaled(1 / 1.1), "mm, not 5.45", "measure the board's squares");
+  const auto result = calibrate_hand_eye(scaled(1 / 1.1));
+  ASSERT_TRUE(result);
+  EXPECT_NEAR(result->observability.board_scale, 1.1, 0.02);
+}
+
+TEST(HandEyeInput, NumbersThatAreNone) {
+  HandEyeBench bench(kGood);
+  auto& stations = bench.input.stations;
+  stations[1].tracker_from_sensor = {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), Eigen::Vector3d(0, NAN, 0)};
+  stations[2].tracker_from_sensor = {Eigen::Matrix3d(Eigen::Matrix3d::Zero()), Eigen::Vector3d::Zero()};
+  stations[3].view.points_px[7].x() = std::numeric_limits<double>::infinity();
+  stations[4].view = {};
+  stations[5].view.points_px.resize(4);
+  stations[5].view.points_in_marker_mm.resize(4);
+  stations[6].view.points_px.resize(11);  // the first row
+  stations[6].view.points_in_marker_mm.resize(11);
+  const auto result = calibrate_hand_eye(bench.input);
+  ASSERT_TRUE(result && result->solved);
+  EXPECT_THAT(result->stations[1].why_not, HasSubstr("rejected: its pose"));
+  EXPECT_THAT(result->stations[2].why_not, HasSubstr("no rotation"));
+  EXPECT_THAT(result->stations[3].why_not, HasSubstr("corner is not a finite number"));
+  EXPECT_THAT(result->stations[4].why_not, HasSubstr("the board is not seen"));
+  EXPECT_THAT(result->stations[5].why_not, HasSubstr("4 corners are seen"));
+  EXPECT_THAT(result->stations[6].why_not, HasSubstr("on one line"));
+  EXPECT_THAT(judge(*result).reasons, Contains(HasSubstr("6 of 14 stations cannot be used")));
+  for (HandEyeStation& s : stations) s.tracker_from_sensor = stations[1].tracker_from_sensor;
+  expect_fail(bench.input, "cannot be used", "take more stations");
+}
+
+TEST(HandEyeInput, WhatCannotBeUsedIsAnError) {
+  const HandEyeBench bench(kGood);
+  const auto refused = [](HandEyeInput input, const char* words) {
+    const auto result = calibrate_hand_eye(input);
+    ASSERT_FALSE(result) << words;
+    EXPECT_THAT(result.error().what, HasSubstr(words));
+  };
+  HandEyeInput input = bench.input;
+  input.camera.reset();
+  refused(input, "corners without a camera");
+  input = bench.input;
+  input.camera->fx_px = -1;
+  refused(input, "focal lengths");
+  input = bench.input;
+  input.stations[2].tracker_from_body = Transform<Tracker, TrackedBody>();
+  refused(input, "of station 0 the board is tracked");
+  input = bench.input;
+  input.stations[2].camera_from_marker = Transform<Camera, Marker>();
+  refused(input, "one holds corners, the other a camera's pose");
+  input = bench.input;
+  input.stations[1].view.points_px.pop_back();
+  refused(input, "87 corners seen, 88 on the board");
+  input = bench.input;
+  input.stations[1].right_view = input.stations[1].view;
+  refused(input, "no second lens");
+}
+
+}  // namespace
+}  // namespace birdseye::calibration

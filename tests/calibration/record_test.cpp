@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/example_record.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+CalibrationRecord example() {
+  return testing::example_record(640, 480, {{"model", "miniBIRD"}, {"bird1_sensor_serial", "4711"}},
+                                 {{"model", "Scope cam"}});
+}
+
+TEST(CalibrationRecord, IsReadBackExactly) {
+  const std::string text = record_text(example());
+  const auto read = parse_record(text);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(record_text(*read), text);
+  EXPECT_EQ(read->tracker, example().tracker);
+  EXPECT_EQ(read->lens->camera, example().lens->camera);
+  EXPECT_EQ(read->lens->covariance, example().lens->covariance);
+  EXPECT_EQ(read->hand_eye->camera_from_sensor.matrix(), example().hand_eye->camera_from_sensor.matrix());
+  EXPECT_EQ(read->tip->tip_in_sensor_mm, example().tip->tip_in_sensor_mm);
+  EXPECT_EQ(read->latency->ci95_low_ms, 82.6);
+  EXPECT_EQ(read->lens->provenance.grade, Grade::marginal);
+}
+
+TEST(CalibrationRecord, MayBeLaidOutAnewButNotChanged) {
+  std::string text = record_text(example());
+  std::string spaced;
+  for (const char c : text) {
+    spaced += c;
+    if (c == '\n') spaced += "   ";
+  }
+  EXPECT_TRUE(parse_record(spaced));
+  // Every digit counts, wherever it stands.
+  int digits = 0;
+  for (std::size_t i = text.find("\"scope\""); i < text.size(); ++i) {
+    if (text[i] < '1' || text[i] > '8') continue;
+    std::string changed = text;
+    ++changed[i];
+    const auto read = parse_record(changed);
+    if (read) {  // the digit was one too many to make another number
+      ASSERT_EQ(record_text(*read), text) << i;
+      continue;
+    }
+    EXPECT_NE(read.error().what.find("checksum"), std::string::npos) << read.error().what;
+    ++digits;
+  }
+  EXPECT_GT(digits, 500);
+}
+
+TEST(CalibrationRecord, ACutOrForeignFileIsNoRecord) {
+  const std::string text = record_text(example());
+  for (std::size_t length = 0; length + 2 < text.size(); length += 7)
+    EXPECT_FALSE(parse_record(text.substr(0, length))) << length;
+  EXPECT_FALSE(parse_record("{}"));
+  EXPECT_FALSE(parse_record("[1, 2]"));
+  std::string later = text;
+  later[later.find("\"version\": 1") + 11] = '2';
+  const auto read = parse_record(later);
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().what.find("version 2"), std::string::npos);
+}
+
+TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {
+  const auto refused = [](auto&& spoil, const std::string& word) {
+    CalibrationRecord record = example();
+    spoil(record);
+    const auto read = parse_record(record_text(record));
+    ASSERT_FALSE(read) << word;
+    EXPECT_NE(read.error().what.find(word), std::string::npos) << read.error().what;
+  };
+  refused([](auto& r) { r.lens->camera.fx_px = -1; }, "focal");
+  refused([](auto& r) { r.hand_eye->covariance(2, 2) = -1; }, "covariance");
+  refused([](auto& r) { r.hand_eye->covariance(0, 1) = 5; }, "covariance");
+  refused([](auto& r) { r.tip->provenance.grade = Grade::fail; }, "fail");
+  refused([](auto& r) { r.lens->camera.k1 = std::numeric_limits<double>::quiet_NaN(); }, "null");
+}
+
+TEST(CalibrationRecord, AnotherLensTakesTheHandEyeAway) {
+  CalibrationRecord record = example();
+  EXPECT_FALSE(record.set_lens(*example().lens));
+  EXPECT_TRUE(record.hand_eye);
+  LensEntry other = *example().lens;
+  other.camera.fx_px += 1;
+  EXPECT_TRUE(record.set_lens(other));
+  EXPECT_FALSE(record.hand_eye);
+  EXPECT_FALSE(record.set_lens(*example().lens));  // there is none to take away
+}
+
+TEST(CalibrationRecord, FitsOnlyTheInstrumentItKnows) {
+  const Identity recorded{{"model", "miniBIRD"}, {"bird1_sensor_serial", "4711"}};
+  EXPECT_EQ(misfit("tracker", recorded, recorded), "");
+  Identity more = recorded;
+  more["bird2_sensor_serial"] = "12";  // a pointer that has come since
+  EXPECT_EQ(misfit("tracker", recorded, more), "");
+  Identity other = recorded;
+  other["bird1_sensor_serial"] = "4712";
+  EXPECT_NE(misfit("tracker", recorded, other).find("4712"), std::string::npos);
+  EXPECT_NE(misfit("tracker", recorded, {{"model", "miniBIRD"}}).find("does not tell"), std::string::npos);
+  EXPECT_NE(misfit("tracker", {}, recorded).find("bind"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace birdseye::calibration
