@@ -138,7 +138,8 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   for (const Instrument instrument : {Instrument::tracker, Instrument::camera, Instrument::gpio}) {
     const auto& entry = board_.of(instrument);
     if (entry.state != InstrumentState::unused)
-      health.instruments.push_back({name_of(instrument), name_of(entry.state), entry.text, entry.times_lost});
+      health.instruments.push_back(
+          {name_of(instrument), name_of(entry.state), entry.text, entry.times_lost, entry.identity});
   }
   return health;
 }

@@ -30,7 +30,8 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
     post.tell({.state = InstrumentState::running,
                .text = camera.describe() + (locked ? ", controls held" : ""),
                .rate_hz = camera.rate_hz(),
-               .exposure = camera.exposure()});
+               .exposure = camera.exposure(),
+               .identity = camera.identity()});
   };
   const Duration silence = silence_of(camera, settings);
   DeviceTime heard = now();

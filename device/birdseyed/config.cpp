@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/config_section.hpp"
 #include "device/wire/server.hpp"
 #include "drivers/io/serial_port.hpp"
@@ -192,9 +193,46 @@ void read_recording(ConfigSection& section, Config& config) {
   section.number("most_gb", config.record.most_gb, 0.001, 100'000);
 }
 
-constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] = {
-    {"tracker", read_tracker}, {"camera", read_camera}, {"gpio", read_gpio},
-    {"wire", read_wire},       {"pose", read_pose},     {"record", read_recording}};
+/// The whole file, at most so many bytes.
+std::optional<std::string> text_of_file(const std::filesystem::path& path, std::size_t most_bytes) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(most_bytes + 1, 0);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file.is_open() || file.bad()) return std::nullopt;
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return text;
+}
+
+constexpr std::size_t kMostRecordBytes = 60'000;  // one message of the wire carries it
+
+void read_calibration(ConfigSection& section, Config& config) {
+  std::string field, path;
+  section.text("field", field);
+  if (!field.empty()) {
+    auto read = calibration::read_field_map(field);
+    if (read) {
+      config.core.field = std::move(read->map);
+    } else {
+      section.fail("field", read.error().what);
+    }
+  }
+  section.text("record", path);
+  if (path.empty()) return;
+  const auto text = text_of_file(path, kMostRecordBytes);
+  if (!text) return section.fail("record", path + ": cannot be read; see whether it is there, its owner and mode");
+  if (text->size() > kMostRecordBytes) return section.fail("record", path + ": is no calibration record");
+  if (const auto record = calibration::parse_record(*text); !record)
+    return section.fail("record", path + ": " + record.error().what);
+  config.core.calibration = *text;
+}
+
+constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] = {{"tracker", read_tracker},
+                                                                                   {"camera", read_camera},
+                                                                                   {"gpio", read_gpio},
+                                                                                   {"wire", read_wire},
+                                                                                   {"pose", read_pose},
+                                                                                   {"record", read_recording},
+                                                                                   {"calibration", read_calibration}};
 
 constexpr std::size_t kMostBytes = 256U << 10U;
 constexpr int kMostDepth = 64;
@@ -215,15 +253,11 @@ Result<std::string> read_text(const std::filesystem::path& path) {
     return Error{Errc::not_found, fmt::format("{}: is a folder, not a configuration file", path.string())};
   if (!std::filesystem::exists(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such configuration file", path.string())};
-  std::ifstream file(path, std::ios::binary);
-  std::string text(kMostBytes + 1, 0);
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!file.is_open() || file.bad())
-    return Error{Errc::unreadable, fmt::format("{}: cannot be read; see its owner and mode", path.string())};
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMostBytes || is_too_deep(text))
+  auto text = text_of_file(path, kMostBytes);
+  if (!text) return Error{Errc::unreadable, fmt::format("{}: cannot be read; see its owner and mode", path.string())};
+  if (text->size() > kMostBytes || is_too_deep(*text))
     return Error{Errc::bad_format, fmt::format("{}: is no configuration file of birdseyed", path.string())};
-  return text;
+  return *std::move(text);
 }
 
 }  // namespace
@@ -241,7 +275,9 @@ Result<Config> read_config(const std::filesystem::path& path) {
       if (!known || !value.is_table()) {
         faults.add(
             static_cast<std::int64_t>(value.location().line()),
-            fmt::format("{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record]", name));
+            fmt::format(
+                "{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record], [calibration]",
+                name));
       }
     }
     Config config;

@@ -33,12 +33,14 @@ Core::Core(CoreSettings settings)
     : settings_(std::move(settings)),
       birds_(settings_.bird_names.size()),
       scope_(settings_.pose),
-      frame_clock_(settings_.frame_clock) {}
+      frame_clock_(settings_.frame_clock),
+      calibration_(settings_.calibration) {}
 
 Core::Counters Core::counters() const {
   Counters counters;
   counters.tracker = counted_;
   if (assembler_) add(counters.tracker, assembler_->counters());
+  counters.tracker.doubted[static_cast<std::size_t>(Doubt::unmapped)] += unmapped_;
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
   counters.frames_repeated = frames_repeated_;
@@ -52,6 +54,7 @@ Core::Counters Core::counters() const {
 std::vector<wire::Packet> Core::take(const RawEvent& event) {
   std::visit([this](const auto& what) { note(what); }, event);
   const DeviceTime now = time_of(event);
+  if (const auto calibration = calibration_.take_change()) out_.push_back(wire::pack(*calibration, now));
   release_frames(now);
   publish_status(now);
   return std::exchange(out_, {});
@@ -59,6 +62,7 @@ std::vector<wire::Packet> Core::take(const RawEvent& event) {
 
 void Core::note(const InstrumentChanged& changed) {
   board_.note(changed);
+  calibration_.note(changed);
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
     // What was half received will not be completed, and a unit that starts again has another beat.
@@ -87,6 +91,23 @@ void Core::tell(Instrument instrument, const std::vector<ClockEvent>& events) {
   }
 }
 
+BirdReading Core::corrected(const BirdReading& reading) {
+  const auto& pose = reading.pose;
+  if (!settings_.field || !pose || !pose->position_mm || !pose->rotation) return reading;
+  const auto corrected = settings_.field->correct({*pose->rotation, *pose->position_mm});
+  BirdReading out = reading;
+  if (corrected) {
+    out.pose->rotation = corrected->tracker_from_sensor.rotation();
+    out.pose->position_mm = corrected->tracker_from_sensor.translation();
+  } else {
+    ++unmapped_;
+    out.pose.reset();
+    out.doubt = settings_.field->why_not(*pose->position_mm);
+    out.kind = Doubt::unmapped;
+  }
+  return out;
+}
+
 void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime at) {
   BirdState& bird = birds_[index];
   if (reading.kind != bird.doubt) {
@@ -106,7 +127,7 @@ void Core::publish(const Measurement& measurement) {
   wire::Birds birds;
   birds.acquired = measurement.acquired;
   for (std::size_t i = 0; i < std::min(measurement.birds.size(), birds_.size()); ++i) {
-    const BirdReading& bird = measurement.birds[i];
+    const BirdReading bird = corrected(measurement.birds[i]);
     note_doubt(i, bird, measurement.arrived);
     if (!timed || !bird.pose || !bird.pose->position_mm || !bird.pose->rotation) continue;
     const Transform<Tracker, Sensor> pose(*bird.pose->rotation, *bird.pose->position_mm);
@@ -125,6 +146,7 @@ void Core::note(const FrameCame& came) {
   if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
+  calibration_.note_frame(frame.width_px, frame.height_px);
   frames_.push_back({frame, frame_clock_.time_of(frame)});
   tell(Instrument::camera, frame_clock_.take_events());
   if (frames_.size() > kMostWaitingFrames) {  // the wait that is configured is longer than frames may be kept for
@@ -181,6 +203,7 @@ wire::Status Core::status() const {
   for (std::size_t i = 0; i < birds_.size(); ++i) {
     if (birds_[i].in_status) text += (text.empty() ? "" : "; ") + settings_.bird_names[i] + ": " + birds_[i].why;
   }
+  if (!calibration_.fault().empty()) text += (text.empty() ? "" : "; ") + calibration_.fault();
   return {text.empty(), text};
 }
 

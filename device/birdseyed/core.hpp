@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "calibration/geometry/field_map.hpp"
 #include "calibration/time/pose_history.hpp"
+#include "device/birdseyed/calibration_guard.hpp"
 #include "device/birdseyed/frame_clock.hpp"
 #include "device/birdseyed/instrument_board.hpp"
 #include "device/birdseyed/raw_event.hpp"
@@ -21,6 +23,8 @@ struct CoreSettings {
   /// that may be predicted.
   Duration pose_wait{0};
   FrameClock::Settings frame_clock;
+  std::string calibration;                     ///< a calibration record's text; empty: none
+  std::optional<calibration::FieldMap> field;  ///< corrects every pose, and doubts those that it does not reach
 };
 
 /// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.
@@ -63,6 +67,8 @@ class Core {
   void note(const Tick&) {}
   void publish(const drivers::minibird::Measurement& measurement);
   void tell(Instrument instrument, const std::vector<ClockEvent>& events);
+  /// The reading with the field's bend taken away, or in doubt where that is not known.
+  [[nodiscard]] drivers::minibird::BirdReading corrected(const drivers::minibird::BirdReading& reading);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void release_frames(DeviceTime now);
   void publish(const TimedFrame& timed);
@@ -73,10 +79,11 @@ class Core {
   InstrumentBoard board_;
   std::optional<drivers::minibird::MeasurementAssembler> assembler_;
   drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
-  std::uint64_t clock_events_ = 0;
+  std::uint64_t clock_events_ = 0, unmapped_ = 0;
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;
+  CalibrationGuard calibration_;
   std::deque<TimedFrame> frames_;  ///< waiting for poses
   std::uint64_t frames_seen_ = 0, frames_lost_ = 0, frames_repeated_ = 0;
   std::optional<std::uint64_t> next_sequence_;

@@ -13,6 +13,7 @@ void InstrumentBoard::note(const InstrumentChanged& changed) {
   if (entry.state == InstrumentState::running && !running) ++entry.times_lost;
   entry.state = changed.state;
   entry.text = changed.text;
+  if (running) entry.identity = changed.identity;
   entry.has_run = entry.has_run || running;
 }
 

@@ -21,6 +21,7 @@ class InstrumentBoard {
   struct Entry {
     InstrumentState state = InstrumentState::unused;
     std::string text;
+    std::map<std::string, std::string> identity;
     bool has_run = false;
     std::uint64_t times_lost = 0;
   };

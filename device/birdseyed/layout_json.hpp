@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calibration/record/field_map_json.hpp"
 #include "device/birdseyed/core.hpp"
 
 /// What a recording keeps as JSON: how a tracker's bytes are to be read, and what the core was told.
@@ -60,6 +61,25 @@ inline void from_json(const nlohmann::json& json, FrameClock::Settings& settings
   json.at("strobe").get_to(settings.strobe);
   if (json.contains("delay")) settings.delay = json.at("delay").get<Duration>();
 }
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CoreSettings, bird_names, pose, pose_wait, frame_clock)
+inline void to_json(nlohmann::json& json, const CoreSettings& settings) {
+  json = {{"bird_names", settings.bird_names},
+          {"pose", settings.pose},
+          {"pose_wait", settings.pose_wait},
+          {"frame_clock", settings.frame_clock},
+          {"calibration", settings.calibration}};
+  if (settings.field) json["field"] = settings.field->data();
+}
+/// Throws where a map is none: going on without it would publish other poses.
+inline void from_json(const nlohmann::json& json, CoreSettings& settings) {
+  json.at("bird_names").get_to(settings.bird_names);
+  json.at("pose").get_to(settings.pose);
+  json.at("pose_wait").get_to(settings.pose_wait);
+  json.at("frame_clock").get_to(settings.frame_clock);
+  json.at("calibration").get_to(settings.calibration);
+  if (!json.contains("field")) return;
+  auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());
+  if (!map) throw std::invalid_argument(map.error().what);
+  settings.field = *std::move(map);
+}
 
 }  // namespace birdseye::device

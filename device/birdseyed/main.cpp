@@ -14,6 +14,7 @@
 #include "device/birdseyed/appliance.hpp"
 #include "device/birdseyed/patient_stderr.hpp"
 #include "device/birdseyed/probe.hpp"
+#include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
 #include "drivers/io/monotonic.hpp"
@@ -63,7 +64,7 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
   auto read = device::read_config(path);
   if (!read) {
     spdlog::error("configuration not taken, going on with the one before: {}", read.error().what);
-  } else if (read->text == config.text) {
+  } else if (read->text == config.text && device::block_of(read->core) == device::block_of(config.core)) {
     spdlog::info("configuration unchanged");
   } else if (read->wire != config.wire) {
     spdlog::error(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
@@ -36,6 +37,8 @@ struct InstrumentChanged {
   /// Of a camera that runs; 0: it does not say.
   double rate_hz = 0;
   std::optional<Duration> exposure = std::nullopt;
+  /// Of one that runs: what tells it from another.
+  std::map<std::string, std::string> identity = {};
 };
 
 struct TrackerBytes {

@@ -41,6 +41,7 @@ Bytes payload_of(const InstrumentChanged& changed) {
   out.put(changed.rate_hz);
   out.put<std::uint8_t>(changed.exposure ? 1 : 0);
   out.put(changed.exposure.value_or(Duration{}).ns);
+  out.put_text(nlohmann::json(changed.identity).dump());
   return out.take();
 }
 
@@ -98,6 +99,7 @@ InstrumentChanged changed_of(ByteReader& in) {
   const bool exposed = in.get<std::uint8_t>() != 0;
   const Duration exposure{in.get<std::int64_t>()};
   if (exposed) changed.exposure = exposure;
+  nlohmann::json::parse(in.get_text()).get_to(changed.identity);
   return changed;
 }
 
@@ -250,7 +252,7 @@ std::string fault_of(const RawEvent& event, std::size_t names) {
 }  // namespace
 
 Bytes recording_magic() {
-  return {'B', 'E', 'R', 'E', 'C', '0', '0', '1'};
+  return {'B', 'E', 'R', 'E', 'C', '0', '0', '2'};
 }
 
 Bytes block_of(const CoreSettings& settings) {
@@ -281,7 +283,7 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
       if (fault.empty()) return reader;
       return Error{Errc::bad_format, fmt::format("{}: was recorded with what makes no sense: {}", name, fault)};
     }
-  } catch (const nlohmann::json::exception&) {
+  } catch (const std::exception&) {  // the parser's, or a map's that is none
   }
   return Error{Errc::bad_format, fmt::format("{}: does not say what it was recorded with", name)};
 }

@@ -39,6 +39,21 @@ Error stream(MiniBird& tracker, const TrackerConfig& config, InstrumentPost& pos
   return {};
 }
 
+/// By the address of each bird, as the wire and the configuration count them.
+std::map<std::string, std::string> identity_of(const drivers::minibird::MiniBirdInfo& info) {
+  std::map<std::string, std::string> identity{{"model", info.model}};
+  for (std::size_t i = 0; i < info.units.size(); ++i) {
+    const auto& unit = info.units[i];
+    const auto put = [&](const char* what, std::optional<int> serial) {
+      if (serial) identity[fmt::format("bird{}_{}_serial", i + 1, what)] = std::to_string(*serial);
+    };
+    put("unit", unit.unit_serial);
+    put("sensor", unit.sensor_serial);
+    put("transmitter", unit.transmitter_serial);
+  }
+  return identity;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<MiniBird>> open_tracker(const TrackerConfig& config, const std::stop_token& stop,
@@ -68,7 +83,8 @@ void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::s
     }
     post.tell({.state = InstrumentState::running,
                .text = describe(**tracker, config.line.device),
-               .layout = (*tracker)->layout()});
+               .layout = (*tracker)->layout(),
+               .identity = identity_of((*tracker)->info())});
     const Error lost = stream(**tracker, config, post, stop);
     if (!stop.stop_requested()) {
       post.tell(

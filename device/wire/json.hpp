@@ -22,7 +22,8 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ClockPing, host_sent_ns)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Subscription, frames, tracking)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CameraLock, on)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CameraControls, locked, done, refused)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(InstrumentHealth, name, state, text, times_lost)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(InstrumentHealth, name, state, text, times_lost, identity)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Calibration, in_force, why_not, record)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WallClock, known, synchronised, tai_known, max_error_ns, est_error_ns,
                                    wall_minus_monotonic_ns, source)
 // What an older appliance does not count yet is 0.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <variant>
@@ -69,6 +70,7 @@ struct InstrumentHealth {
   std::string state;  ///< absent, starting, running, silent
   std::string text;   ///< what it is, or what is wrong with it, in words
   std::uint64_t times_lost = 0;
+  std::map<std::string, std::string> identity;  ///< of the last one that ran: model, serial numbers
 };
 
 /// What the appliance's kernel says of its clock (PTP, NTP), and how far the wall clock is from the clock of all
@@ -105,7 +107,15 @@ struct CameraControls {
   std::vector<std::string> done, refused;  ///< a line of text each
 };
 
-using Event = std::variant<VideoFrame, Birds, Doubt, ClockChange, Pedal, Status, Health, CameraControls>;
+/// The scope's calibration, by the record that the appliance was told of. Travels in a STRING, to each client that
+/// comes and when it changes.
+struct Calibration {
+  bool in_force = false;  ///< the instruments are those that it was made with
+  std::string why_not;
+  std::string record;  ///< its text; empty unless it is in force
+};
+
+using Event = std::variant<VideoFrame, Birds, Doubt, ClockChange, Pedal, Status, Health, CameraControls, Calibration>;
 
 inline constexpr const char* kBirdsDevice = "Birds";
 inline constexpr const char* kDoubtDevice = "Doubt";
@@ -114,6 +124,7 @@ inline constexpr const char* kFrameInfoDevice = "FrameInfo";
 inline constexpr const char* kVideoDevice = "Laparoscope";
 inline constexpr const char* kPedalDevice = "Pedal";
 inline constexpr const char* kStatusDevice = "birdseyed";
+inline constexpr const char* kCalibrationDevice = "Calibration";
 inline constexpr const char* kHealthDevice = "Health";
 // A client asks with these, in a STRING.
 inline constexpr const char* kClockPingDevice = "ClockPing";

@@ -145,6 +145,12 @@ Packet pack(const CameraControls& controls, DeviceTime time) {
   return string_packet(kCameraControlsDevice, controls, time);
 }
 
+Packet pack(const Calibration& calibration, DeviceTime time) {
+  Packet packet = string_packet(kCalibrationDevice, calibration, time);
+  packet.kind = Packet::Kind::calibration;
+  return packet;
+}
+
 Packet pack(const ClockPing& ping) {
   return string_packet(kClockPingDevice, ping, {});
 }

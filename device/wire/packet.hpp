@@ -11,7 +11,7 @@ namespace birdseye::wire {
 /// One or more whole messages, to be sent together or not at all. The pixels of a frame are not copied into it: they
 /// follow the head.
 struct Packet {
-  enum class Kind { status, tracking, frame, other };
+  enum class Kind { status, calibration, tracking, frame, other };
   Kind kind = Kind::other;
   std::shared_ptr<const std::vector<std::uint8_t>> head;
   std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< null for all but frames
@@ -31,6 +31,7 @@ Packet pack(const Pedal& pedal);
 Packet pack(const Status& status, DeviceTime time);
 Packet pack(const Health& health, DeviceTime time);
 Packet pack(const CameraControls& controls, DeviceTime time);
+Packet pack(const Calibration& calibration, DeviceTime time);
 
 /// The messages of one client's questions and their answers; times as each side's clock has them, ns.
 struct ClockPing {

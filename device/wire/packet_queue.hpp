@@ -10,20 +10,20 @@
 namespace birdseye::wire {
 
 /// Packets that wait and of which nothing has been sent. Bounded, and what is live wins: where there are too many of a
-/// kind, the oldest of that kind goes. Of STATUS only the newest waits, and it never goes.
+/// kind, the oldest of that kind goes. Of STATUS and Calibration only the newest waits, and it never goes.
 class PacketQueue {
  public:
   static constexpr std::size_t kMostFrames = 3;
   static constexpr std::size_t kMostOfAKind = 256;  ///< of small ones: of poses more than two seconds
 
-  /// How many were shed for it. A STATUS takes the place of the one that waits, which then tells nobody anything.
+  /// How many were shed for it. One of these takes the place of the one that waits, which then tells nobody anything.
   std::size_t push(const Packet& packet) {
     if (packet.kind == Packet::Kind::frame) {
       frames_.push_back(packet);
       return frames_.size() > kMostFrames ? shed_frame() : 0;
     }
     const auto same = [&](const Packet& other) { return other.kind == packet.kind; };
-    if (packet.kind == Packet::Kind::status) {
+    if (packet.kind == Packet::Kind::status || packet.kind == Packet::Kind::calibration) {
       const auto waiting = std::ranges::find_if(small_, same);
       if (waiting != small_.end()) {
         *waiting = packet;

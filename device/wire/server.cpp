@@ -102,6 +102,7 @@ void Server::accept_one() {
   ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsentBytes, sizeof kMostUnsentBytes);
   clients_.emplace_back(fd);
   if (last_status_) offer(clients_.back(), *last_status_);
+  if (last_calibration_) offer(clients_.back(), *last_calibration_);
   ++clients_count_;
 }
 
@@ -115,6 +116,7 @@ bool Server::distribute() {
   while (!packets.empty()) {
     const Packet packet = packets.pop();
     if (packet.kind == Packet::Kind::status) last_status_ = packet;
+    if (packet.kind == Packet::Kind::calibration) last_calibration_ = packet;
     for (ClientLink& client : clients_) offer(client, packet);
   }
   return frames;

@@ -65,8 +65,9 @@ class Server {
   std::mutex mutex_;
   PacketQueue inbox_;  ///< published, not yet distributed
   Latencies latencies_;
-  std::list<ClientLink> clients_;      ///< of the thread below alone, as is what follows
-  std::optional<Packet> last_status_;  ///< a client that comes is told at once how things are
+  std::list<ClientLink> clients_;  ///< of the thread below alone, as is what follows
+  // A client that comes is told at once how things are.
+  std::optional<Packet> last_status_, last_calibration_;
   std::jthread thread_;
 };
 

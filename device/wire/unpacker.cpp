@@ -119,6 +119,7 @@ Result<MaybeTold> Unpacker::push_string(const std::string& device, const std::st
     if (device == kDoubtDevice) return MaybeTold(Event(json.get<Doubt>()));
     if (device == kClockChangeDevice) return MaybeTold(Event(json.get<ClockChange>()));
     if (device == kPedalDevice) return MaybeTold(Event(json.get<Pedal>()));
+    if (device == kCalibrationDevice) return MaybeTold(Event(json.get<Calibration>()));
     if (device == kCameraControlsDevice) return MaybeTold(Event(json.get<CameraControls>()));
     return MaybeTold(json.get<ClockPong>());
   } catch (const nlohmann::json::exception&) {
@@ -134,8 +135,8 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
   const auto body = bytes.subspan(kHeaderBytes);
   const std::string& type = header->type;
   const std::string& device = header->device;
-  static constexpr std::array kStrings{kFrameInfoDevice, kHealthDevice,    kDoubtDevice,         kClockChangeDevice,
-                                       kPedalDevice,     kClockPongDevice, kCameraControlsDevice};
+  static constexpr std::array kStrings{kFrameInfoDevice, kHealthDevice,    kDoubtDevice,          kClockChangeDevice,
+                                       kPedalDevice,     kClockPongDevice, kCameraControlsDevice, kCalibrationDevice};
   const bool string = type == "STRING" &&
                       std::any_of(kStrings.begin(), kStrings.end(), [&](const char* name) { return device == name; });
   const bool image = type == "IMAGE" && device == kVideoDevice && info_;

@@ -25,8 +25,9 @@ enum class Doubt : std::uint8_t {
   hemisphere_border,   ///< so near the plane that it may flip
   outside_hemisphere,  ///< where a unit that is set as we set it never reports
   unconfirmed,         ///< the first after a start or a gap
+  unmapped,            ///< where the field's map does not reach; found by who applies the map, never by the driver
 };
-inline constexpr std::size_t kDoubts = 11;
+inline constexpr std::size_t kDoubts = 12;
 std::string_view name_of(Doubt doubt);  ///< "hemisphere flip" and so on, for counters
 
 /// One bird at one measurement: a pose, or why there is none.

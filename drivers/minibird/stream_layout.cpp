@@ -17,7 +17,7 @@ std::size_t cycle_bytes(const StreamLayout& layout) {
 std::string_view name_of(Doubt doubt) {
   static constexpr std::array<std::string_view, kDoubts> kNames = {
       "none", "lost record",     "senseless",         "saturated",          "beyond scale", "frozen",
-      "step", "hemisphere flip", "hemisphere border", "outside hemisphere", "unconfirmed",
+      "step", "hemisphere flip", "hemisphere border", "outside hemisphere", "unconfirmed",  "unmapped field",
   };
   return kNames[static_cast<std::size_t>(doubt)];
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,8 @@ class FrameSource {
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// One line: device, driver, format, size, rate, stamps.
   [[nodiscard]] virtual std::string describe() const = 0;
+  /// What tells this camera from another: "model", and "serial" where it has one.
+  [[nodiscard]] virtual std::map<std::string, std::string> identity() const = 0;
   [[nodiscard]] virtual FrameCounters counters() const = 0;
   /// As the camera says, whatever was asked; 0: it does not say.
   [[nodiscard]] virtual double rate_hz() const { return 0; }

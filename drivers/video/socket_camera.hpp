@@ -17,6 +17,7 @@ class SocketCamera final : public FrameSource {
   Result<std::optional<Frame>> next(DeviceTime deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string describe() const override;
+  [[nodiscard]] std::map<std::string, std::string> identity() const override { return {{"model", "a program"}}; }
   [[nodiscard]] FrameCounters counters() const override { return counters_; }
 
  private:

@@ -253,6 +253,12 @@ std::shared_ptr<const PixelPool::Pixels> V4l2Camera::pixels_of(const v4l2_buffer
   return pool_.share(std::move(pixels));
 }
 
+std::map<std::string, std::string> V4l2Camera::identity() const {
+  std::map<std::string, std::string> identity{{"model", device_.card()}};
+  if (const std::string serial = device_.usb_serial(); !serial.empty()) identity["serial"] = serial;
+  return identity;
+}
+
 std::string V4l2Camera::describe() const {
   std::string format = fourcc_name(fourcc_of(layout_.format));
   const bool yuv =

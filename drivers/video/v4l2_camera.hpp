@@ -21,6 +21,7 @@ class V4l2Camera final : public FrameSource {
   Result<std::optional<Frame>> next(DeviceTime deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string describe() const override;
+  [[nodiscard]] std::map<std::string, std::string> identity() const override;
   [[nodiscard]] FrameCounters counters() const override { return counters_; }
   [[nodiscard]] double rate_hz() const override { return rate_hz_; }
   [[nodiscard]] std::optional<Duration> exposure() const override { return stamps_.exposure; }

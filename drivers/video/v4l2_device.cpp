@@ -3,10 +3,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 
 namespace birdseye::drivers {
 
@@ -57,6 +60,17 @@ Result<V4l2Device> V4l2Device::open(const std::string& path) {
   device.card_ = text_of(capability.card);
   device.driver_ = text_of(capability.driver);
   return device;
+}
+
+std::string V4l2Device::usb_serial() const {
+  struct stat node {};
+  if (::fstat(fd_.get(), &node) != 0 || !S_ISCHR(node.st_mode)) return {};
+  // The node's device is an interface of the USB device, whose folder holds its serial number.
+  const auto link = fmt::format("/sys/dev/char/{}:{}/device/../serial", major(node.st_rdev), minor(node.st_rdev));
+  std::ifstream file(link);
+  std::string serial;
+  std::getline(file, serial);
+  return serial;
 }
 
 int V4l2Device::control(unsigned long request, void* argument) const {

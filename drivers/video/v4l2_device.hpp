@@ -20,6 +20,8 @@ class V4l2Device final : public ControlPort {
   [[nodiscard]] int fd() const { return fd_.get(); }
   [[nodiscard]] const std::string& card() const { return card_; }
   [[nodiscard]] const std::string& driver() const { return driver_; }
+  /// Of the USB device behind the node, as the kernel tells it; empty where there is none.
+  [[nodiscard]] std::string usb_serial() const;
 
   /// 0, or -1 with errno; gone on with after a signal.
   int control(unsigned long request, void* argument) const;

@@ -5,6 +5,8 @@
 
 #include <fstream>
 
+#include "tests/support/example_record.hpp"
+
 namespace birdseye::device {
 namespace {
 
@@ -34,6 +36,24 @@ Result<Config> read(const std::string& text) {
 std::string replaced(const std::string& from, const std::string& to) {
   std::string text = kSound;
   return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(Config, TakesOnlyAWholeCalibrationRecord) {
+  const auto path =
+      std::filesystem::temp_directory_path() / ("birdseye-record-" + std::to_string(::getpid()) + ".json");
+  const std::string text = record_text(testing::example_record(768, 576, {{"model", "a"}}, {{"model", "b"}}));
+  const std::string with_record = kSound + std::string("[calibration]\nrecord = \"") + path.string() + "\"\n";
+  const auto missing = read(with_record);
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.error().what.find("[calibration] record: " + path.string()), std::string::npos)
+      << missing.error().what;
+  std::ofstream(path) << text.substr(0, text.size() - 9);
+  EXPECT_FALSE(read(with_record));
+  std::ofstream(path) << text;
+  const auto sound = read(with_record);
+  ASSERT_TRUE(sound) << sound.error().what;
+  EXPECT_EQ(sound->core.calibration, text);
+  std::filesystem::remove(path);
 }
 
 TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {

@@ -1,0 +1,248 @@
+// The field's map in the pose path: what the core publishes with one, and what the configuration makes of its file.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "calibration/record/field_map_file.hpp"
+#include "device/birdseyed/config.hpp"
+#include "device/birdseyed/core.hpp"
+#include "device/birdseyed/recording.hpp"
+#include "device/wire/igtl_bytes.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/tracker_bytes.hpp"
+#include "tests/support/wire_messages.hpp"
+
+namespace birdseye::device {
+namespace {
+
+using birdseye::testing::TrackerBytesSource;
+
+constexpr std::int64_t kZeroNs = 1'000'000'000'000;
+constexpr double kRateHz = 103.3;
+const Eigen::Vector3d kShift(3, -2, 1);
+
+/// Moves by kShift plus a hundredth of x, and turns about z; over all of the sensor's circle, or x up to high_x_mm.
+calibration::FieldMap map(double high_x_mm = 700) {
+  calibration::FieldMapData data;
+  data.functions.low_mm = {100, -300, -100};
+  data.functions.high_mm = {high_x_mm, 300, 200};
+  const double half = (high_x_mm - 100) / 2;
+  data.position_mm.assign(4, Eigen::Vector3d::Zero());
+  data.position_mm[0] = kShift + Eigen::Vector3d(0.01 * (100 + half), 0, 0);
+  data.position_mm[1] = {0.01 * half, 0, 0};
+  data.rotation_rad.assign(4, Eigen::Vector3d::Zero());
+  data.rotation_rad[0] = {0, 0, 1.0 / 30};
+  data.sigma_mm.assign(9 * 9 * 9, 0.7);
+  return *calibration::FieldMap::from(std::move(data));
+}
+
+DeviceTime at(double seconds) {
+  return {kZeroNs + static_cast<std::int64_t>(seconds * 1e9)};
+}
+
+std::vector<RawEvent> session(double seconds) {
+  TrackerBytesSource source;
+  std::vector<RawEvent> events{InstrumentChanged{.instrument = Instrument::tracker,
+                                                 .state = InstrumentState::running,
+                                                 .text = "a unit",
+                                                 .at = at(0),
+                                                 .layout = TrackerBytesSource::layout()},
+                               InstrumentChanged{.instrument = Instrument::camera,
+                                                 .state = InstrumentState::running,
+                                                 .text = "a camera",
+                                                 .at = at(0),
+                                                 .rate_hz = 25}};
+  int frames = 0;
+  for (int i = 0; i < static_cast<int>(seconds * kRateHz); ++i) {
+    const double measured = i / kRateHz;
+    for (; frames / 25.0 + 0.02 < measured + 0.01; ++frames) {
+      drivers::Frame frame;
+      frame.width_px = 4;
+      frame.height_px = 2;
+      frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(24, std::uint8_t{7});
+      frame.sequence = static_cast<std::uint64_t>(frames);
+      frame.acquired = at(frames / 25.0);
+      frame.acquired_sigma = {100'000};
+      frame.acquired_known = true;
+      frame.arrived = at(frames / 25.0 + 0.02);
+      events.emplace_back(FrameCame{frame});
+    }
+    events.emplace_back(TrackerBytes{{source.measure(measured), at(measured + 0.01)}});
+  }
+  return events;
+}
+
+std::vector<wire::Event> told(Core& core, const std::vector<RawEvent>& events) {
+  wire::Unpacker unpacker;
+  std::vector<wire::Event> out;
+  for (const RawEvent& event : events) {
+    for (const wire::Packet& packet : core.take(event)) {
+      for (const auto& message : birdseye::testing::messages_of(packet)) {
+        auto said = unpacker.push(message);
+        EXPECT_TRUE(said);
+        if (said && *said) out.push_back(std::get<wire::Event>(**said));
+      }
+    }
+  }
+  return out;
+}
+
+template <typename T>
+std::vector<T> only(const std::vector<wire::Event>& events) {
+  std::vector<T> out;
+  for (const wire::Event& event : events) {
+    if (const auto* one = std::get_if<T>(&event)) out.push_back(*one);
+  }
+  return out;
+}
+
+CoreSettings with(calibration::FieldMap field) {
+  CoreSettings settings;
+  settings.field = std::move(field);
+  return settings;
+}
+
+TEST(CoreWithAFieldMap, CorrectsEveryPose) {
+  const auto events = session(6);
+  Core plain({}), mapped(with(map()));
+  const auto before = only<wire::Birds>(told(plain, events)), after = only<wire::Birds>(told(mapped, events));
+  ASSERT_GT(after.size(), 500U);
+  ASSERT_EQ(before.size(), after.size());
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    const auto& measured = before[i].birds.at(0).tracker_from_sensor;
+    const auto& corrected = after[i].birds.at(0).tracker_from_sensor;
+    const Eigen::Vector3d wanted =
+        measured.translation() + kShift + Eigen::Vector3d(0.01 * measured.translation().x(), 0, 0);
+    EXPECT_LT((corrected.translation() - wanted).norm(), 1e-3);  // the wire's floats
+    EXPECT_LT((corrected.rotation() - rotation_exp({0, 0, 1.0 / 30}) * measured.rotation()).norm(), 1e-5);
+  }
+  EXPECT_EQ(mapped.counters().tracker.of(drivers::minibird::Doubt::unmapped), 0U);
+}
+
+TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
+  const auto events = session(6);
+  Core core(with(map()));
+  int judged = 0;
+  for (const auto& frame : only<wire::VideoFrame>(told(core, events))) {
+    if (frame.info.sequence < 75 || !frame.info.pose.tracker_from_sensor) continue;
+    ++judged;
+    const Eigen::Vector3d truth =
+        TrackerBytesSource::pose_at(static_cast<double>(frame.info.sequence) / 25).position_mm;
+    const Eigen::Vector3d wanted = truth + kShift + Eigen::Vector3d(0.01 * truth.x(), 0, 0);
+    EXPECT_LT((frame.info.pose.tracker_from_sensor->translation() - wanted).norm(), 0.7);
+  }
+  EXPECT_GT(judged, 50);
+}
+
+TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
+  const auto events = session(8);
+  Core core(with(map(450)));  // the circle goes to x = 600
+  const auto said = told(core, events);
+  const auto birds = only<wire::Birds>(said);
+  ASSERT_GT(birds.size(), 300U);
+  for (const auto& one : birds) EXPECT_LE(one.birds.at(0).tracker_from_sensor.translation().x(), 450 + 3 + 4.5 + 1e-3);
+  EXPECT_GT(core.counters().tracker.of(drivers::minibird::Doubt::unmapped), 200U);
+  bool doubted = false;
+  for (const auto& doubt : only<wire::Doubt>(said))
+    doubted = doubted || doubt.why.find("outside the mapped field (100..450") != std::string::npos;
+  EXPECT_TRUE(doubted);
+  bool in_status = false;
+  for (const auto& status : only<wire::Status>(said))
+    in_status = in_status || status.text.find("scope: at ") != std::string::npos;
+  EXPECT_TRUE(in_status);
+  int refused = 0;
+  for (const auto& frame : only<wire::VideoFrame>(said)) {
+    const double angle = 3.14159265358979 * static_cast<double>(frame.info.sequence) / 25;
+    if (400 + 200 * std::cos(angle) < 550 || frame.info.sequence < 75) continue;
+    ++refused;
+    EXPECT_EQ(frame.info.pose.kind, PoseKind::refused);
+    EXPECT_NE(frame.info.pose.reason.find("outside the mapped field"), std::string::npos) << frame.info.pose.reason;
+  }
+  EXPECT_GT(refused, 10);
+}
+
+TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
+  const auto events = session(4);
+  const CoreSettings settings = with(map(450));
+  const birdseye::testing::Scratch scratch;
+  Bytes bytes = recording_magic();
+  const auto put = [&bytes](const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
+  put(block_of(settings));
+  for (const RawEvent& event : events) put(block_of(event));
+  auto reader = RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
+  ASSERT_TRUE(reader) << reader.error().what;
+  ASSERT_TRUE(reader->settings().field);
+  Core live(settings), again(reader->settings());
+  for (const RawEvent& event : events) {
+    const auto read = reader->next();
+    ASSERT_TRUE(read && *read);
+    const auto a = live.take(event);
+    const auto b = again.take(**read);
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i].bytes(), b[i].bytes());
+  }
+}
+
+TEST(CoreWithAFieldMap, ARecordingWhoseMapIsNoneIsRefused) {
+  const Bytes good = block_of(with(map()));
+  constexpr std::size_t kHead = 12, kCheck = 8;
+  const auto settings = nlohmann::json::parse(good.begin() + kHead, good.end() - kCheck);
+  const birdseye::testing::Scratch scratch;
+  const auto opens = [&](const nlohmann::json& json) {
+    const std::string text = json.dump();
+    Bytes block(kHead);
+    block[0] = 1;
+    for (std::size_t i = 0; i < 8; ++i) block[4 + i] = static_cast<std::uint8_t>(text.size() >> 8 * i);
+    block.insert(block.end(), text.begin(), text.end());
+    const std::uint64_t check = wire::checksum(block);
+    for (std::size_t i = 0; i < kCheck; ++i) block.push_back(static_cast<std::uint8_t>(check >> 8 * i));
+    Bytes bytes = recording_magic();
+    bytes.insert(bytes.end(), block.begin(), block.end());
+    return RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()})).has_value();
+  };
+  EXPECT_TRUE(opens(settings));
+  auto short_of_one = settings, no_kind = settings;
+  short_of_one["field"]["position_mm"].erase(0);
+  EXPECT_FALSE(opens(short_of_one));
+  no_kind["field"]["kind"] = "splines";
+  EXPECT_FALSE(opens(no_kind));
+}
+
+std::string config_with(const std::string& field) {
+  return "[tracker]\ndevice = \"/dev/ttyS0\"\n[camera]\nsource = \"v4l2:/dev/video0\"\n[calibration]\nfield = \"" +
+         field + "\"\n";
+}
+
+TEST(ConfigOfAFieldMap, IsReadExactly) {
+  const birdseye::testing::Scratch scratch;
+  const auto file = scratch.file("field.json", calibration::field_map_text(map(), {"2026-11-22T09:30:00Z", "birdseye",
+                                                                                   "180 places", Grade::pass, 0.4}));
+  const auto config = read_config(scratch.file("c.toml", config_with(file)));
+  ASSERT_TRUE(config) << config.error().what;
+  ASSERT_TRUE(config->core.field);
+  for (const double x : {100.1, 300.7, 699.3})
+    EXPECT_EQ(*config->core.field->correction_mm({x, 1.0 / 3, 7}), *map().correction_mm({x, 1.0 / 3, 7}));
+}
+
+TEST(ConfigOfAFieldMap, AFileThatIsMissingOrDamagedIsAFaultWithItsLine) {
+  const birdseye::testing::Scratch scratch;
+  const std::string good =
+      calibration::field_map_text(map(), {"2026-11-22T09:30:00Z", "birdseye", "180 places", Grade::pass, 0.4});
+  const auto what = [&](const std::string& file) {
+    const auto config = read_config(scratch.file("c.toml", config_with(file)));
+    return config ? "it was taken" : config.error().what;
+  };
+  EXPECT_NE(what((scratch / "none.json").string()).find(":6: [calibration] field: "), std::string::npos)
+      << what((scratch / "none.json").string());
+  EXPECT_NE(what(scratch.path().string()).find("[calibration] field"), std::string::npos);
+  EXPECT_NE(what(scratch.file("cut.json", good.substr(0, good.size() / 2))).find("not a whole one"), std::string::npos);
+  std::string changed = good;
+  changed.replace(changed.find("0.7"), 3, "0.1");
+  EXPECT_NE(what(scratch.file("changed.json", changed)).find("checksum"), std::string::npos);
+  EXPECT_NE(what(scratch.file("other.json", "{\"a\": 1}")).find("birdseye calibrate field"), std::string::npos);
+  EXPECT_EQ(what(scratch.file("good.json", good)), "it was taken");
+}
+
+}  // namespace
+}  // namespace birdseye::device
