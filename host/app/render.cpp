@@ -14,6 +14,7 @@
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
 #include "host/overlay/compositor.hpp"
+#include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/ui/window.hpp"
 #include "host/volume/import.hpp"
@@ -23,10 +24,13 @@ namespace birdseye::host {
 
 namespace {
 
+/// As the lens took it; straight, the centre to scale; straight, the whole picture.
+constexpr const char* kDisplays[] = {"distorted", "undistorted", "undistorted-whole"};
+
 struct Options {
   std::filesystem::path volume, labels, camera, pose, path, deformation, over, out, movie, json;
   std::vector<int> keep;
-  std::string transfer = "abdomen", size = "900x900", engine = "cpu";
+  std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
   double clip = 0.5;
   double step_mm = 0.7, seconds = 4;
   bool window = false;
@@ -82,6 +86,16 @@ Result<Picture> behind_of(const CameraModel& camera, const std::filesystem::path
   return picture;
 }
 
+/// Where lines are to be shown straight: the picture behind resampled, and a lens to draw with that bends none.
+void straighten(RenderScene& scene, const std::string& display) {
+  if (display == kDisplays[0]) return;
+  const CameraModel straight =
+      pinhole_for(scene.camera, display == kDisplays[1] ? Kept::centre_scale : Kept::every_pixel);
+  scene.straighten.emplace(scene.camera, straight);
+  scene.behind.rgb = scene.straighten->apply(scene.behind.rgb);
+  scene.camera = straight;
+}
+
 Result<RenderScene> scene_of(const Options& options) {
   RenderScene scene;
   auto volume = shown_of(options);
@@ -91,6 +105,7 @@ Result<RenderScene> scene_of(const Options& options) {
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
   scene.behind = *std::move(behind);
+  straighten(scene, options.display);
   scene.settings.step_mm = options.step_mm;
   scene.film_s = options.seconds;
   if (options.deformation.empty()) return scene;
@@ -119,7 +134,7 @@ std::string transparent_png_of(ImageRgba image) {
 
 Result<void> write_still(const Options& options, const RenderScene& scene, Engine& engine) {
   const auto began = std::chrono::steady_clock::now();
-  const ImageRgba image = engine.render(scene.camera, scene.camera_from_patient, scene.settings);
+  const ImageRgba image = overlay_of(engine, scene, scene.camera_from_patient, scene.settings);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
   if (const std::string fault = engine.fault(); !fault.empty()) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", engine.name(), fault)};
@@ -132,6 +147,9 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
       {"engine", engine.name()},
       {"width_px", image.width_px},
       {"height_px", image.height_px},
+      {"display", options.display},
+      {"camera_matrix",
+       {{scene.camera.fx_px, 0, scene.camera.cx_px}, {0, scene.camera.fy_px, scene.camera.cy_px}, {0, 0, 1}}},
       {"render_ms", ms},
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
@@ -186,7 +204,13 @@ void add_render(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<Options>();
   CLI::App& command = *app.add_subcommand("render", "render a CT to a PNG");
   command.add_option("--volume", options->volume, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
-  command.add_option("--camera", options->camera, "lens, OpenCV YAML; without it a view that shows the whole volume");
+  CLI::Option* const camera = command.add_option("--camera", options->camera,
+                                                 "lens, OpenCV YAML; without it a view that shows the whole volume");
+  command
+      .add_option("--display", options->display,
+                  "distorted, as the lens took it (default), undistorted, the centre to scale, or undistorted-whole")
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kDisplays), std::end(kDisplays))))
+      ->needs(camera);
   CLI::Option* const pose = command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
   command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");

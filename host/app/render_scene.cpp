@@ -63,9 +63,16 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
   return {};
 }
 
+ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                     const RenderSettings& settings) {
+  ImageRgba image = engine.render(scene.camera, camera_from_patient, settings);
+  if (scene.straighten) scene.straighten->hide_unseen(image);
+  return image;
+}
+
 Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
              const RenderSettings& settings) {
-  const ImageRgba image = engine.render(scene.camera, camera_from_patient, settings);
+  const ImageRgba image = overlay_of(engine, scene, camera_from_patient, settings);
   return {image.width_px, image.height_px, composite(scene.behind.rgb, image, 1)};
 }
 

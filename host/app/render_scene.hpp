@@ -13,6 +13,7 @@
 #include "calibration/geometry/transform.hpp"
 #include "host/app/picture.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/volume.hpp"
 
@@ -29,7 +30,8 @@ struct RenderScene {
   RenderSettings settings;
   std::vector<Transform<Camera, Patient>> path;  ///< that a film goes along; may be none
   double film_s = 4;
-  Picture behind;  ///< of the camera's size: a frame of video, or black
+  Picture behind;                              ///< of the camera's size: a frame of video, or black
+  std::optional<FrameUndistorter> straighten;  ///< where the camera is a straight one in place of that of the video
 };
 
 /// Without lens and pose: from in front of the patient, head up; of a scan thinner than half its height or width, from
@@ -40,7 +42,11 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
 /// The middle of the volume's box, patient frame.
 Eigen::Vector3d middle_of(const Volume& volume);
 
-/// The scene from here, with settings of its own, over what is behind it.
+/// The scene from here, with settings of its own, where the lens of the video sees anything.
+ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                     const RenderSettings& settings);
+
+/// That over what is behind it.
 Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
              const RenderSettings& settings);
 

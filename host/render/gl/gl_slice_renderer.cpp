@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "calibration/geometry/lens_fold.hpp"
 #include "host/render/gl/slice_shaders.hpp"
 #include "host/render/gl/uniforms.hpp"
 
@@ -235,6 +236,11 @@ ImageRgba GlSliceRenderer::render(const CameraModel& camera, const Transform<Cam
   set(draw_, "lens", Eigen::Vector4d(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px));
   set(draw_, "distortion", Eigen::Vector4d(camera.k1, camera.k2, camera.p1, camera.p2));
   set(draw_, "k3", camera.k3);
+  if (!(camera == folded_)) {
+    fold_ = std::min(fold_radius(camera), kWidestTangent);
+    folded_ = camera;
+  }
+  set(draw_, "fold", fold_);
   set(draw_, "size_px", Eigen::Vector2d(camera.width_px, camera.height_px));
   set(draw_, "patient_gradient", Eigen::Matrix3d(patient_from_voxel.linear().inverse().transpose()));
   set(draw_, "patient_from_camera", Eigen::Matrix3d(patient_from_camera.rotation()));

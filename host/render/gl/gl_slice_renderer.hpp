@@ -59,6 +59,8 @@ class GlSliceRenderer {
   std::array<std::optional<Slices>, 3> slices_;
   std::size_t patches_drawn_ = 0;
   int width_px_ = 0, height_px_ = 0;
+  CameraModel folded_;  ///< whose fold fold_ is, which takes a while to find
+  double fold_ = 0;
 };
 
 }  // namespace birdseye::host

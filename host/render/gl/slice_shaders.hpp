@@ -66,11 +66,13 @@ uniform vec4 lamp;                // ambient, diffuse, specular, shininess
 uniform float per_surface_gradient;
 uniform vec4 clip;                // camera frame
 uniform float near_mm;
+uniform float fold;               // tangent of the angle where the lens folds: what lies beyond is not seen
 out vec4 colour;
 
 void main() {
   ivec3 size = textureSize(volume, 0);
   if (any(lessThan(source, vec3(0))) || any(greaterThan(source, vec3(size - 1)))) discard;
+  if (dot(in_camera.xy, in_camera.xy) > fold * fold * in_camera.z * in_camera.z) discard;
   if (length(in_camera) < near_mm || dot(clip.xyz, in_camera) + clip.w < 0) discard;
   vec3 place = (source + 0.5) / vec3(size);
   int hu = clamp(int(round(texture(volume, place).r)) + 1024, 0, 4095);
