@@ -110,7 +110,8 @@ void add_tracker_options(CLI::App& command, MiniBirdOptions& options) {
   TrackerSettings& tracker = program.tracker;
   tracker.boot_ms = 1000;
   command.add_option("--birds", tracker.unit.birds, "in the flock")->check(CLI::Range(1, 126));
-  command.add_option("--motion", program.motion, "still or circle")->check(CLI::IsMember({"still", "circle"}));
+  command.add_option("--motion", program.motion, "circle, pivot (a tip in a divot) or still")
+      ->check(CLI::IsMember({"circle", "pivot", "still"}));
   command.add_option("--position-noise-mm", tracker.noise.position_mm, "per axis and record")
       ->check(CLI::Range(0.0, 50.0));
   command.add_option("--angle-noise-deg", tracker.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));

@@ -42,8 +42,15 @@ int main(int argc, char** argv) {
   run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
   run.add_option("--distortion-mm", cart.distortion_mm, "largest displacement by metal in the room")
       ->check(CLI::Range(0.0, 500.0));
+  run.add_option("--sway-s", cart.pace.sway_s, "how long the scope is first turned to and fro over the board")
+      ->check(CLI::Range(0.0, 600.0));
+  run.add_option("--camera-delay-ms", cart.camera_delay_ms,
+                 "from exposure to arrival, of frames that then bear no stamp (default: stamped)")
+      ->check(CLI::Range(0.0, 1000.0));
   run.add_option("--faults", cart.faults, "script of faults of either instrument (TOML)");
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
+  run.add_option("--dwell-s", cart.pace.dwell_s, "how long the scope is held still at each station over the board")
+      ->check(CLI::Range(0.1, 20.0));
   run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {
     if (const auto parsed = hw_sim::parse_size(size, cart.width_px, cart.height_px); !parsed) {

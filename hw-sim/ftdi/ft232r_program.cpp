@@ -204,7 +204,7 @@ class Bench {
     TrackerSettings settings = program.tracker;
     settings.baud = 1'000'000'000;  // its bytes take their time in the chip
     const std::int64_t now_ns = now().ns;
-    return {settings, program.motion == "still" ? still_motion() : circle_motion({}, now_ns), now_ns};
+    return {settings, motion_named(program.motion, now_ns), now_ns};
   }
 
   const Ft232rProgram& program_;

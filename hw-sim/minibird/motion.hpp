@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <numbers>
+#include <string>
 
 #include "hw-sim/minibird/tracker_script.hpp"
 
@@ -18,9 +19,22 @@ struct Circle {
   [[nodiscard]] BirdPose pose(std::size_t bird, double t_s) const;
 };
 
+/// A pointer whose tip stands in a divot while its handle is led round in widening and narrowing cones and turned about
+/// its own length. All birds move alike, further ones beside the first.
+struct PivotMotion {
+  Eigen::Vector3d tip_in_sensor_mm{158, -6, 11}, pivot_in_tracker_mm{400, 20, 60};
+  double most_tilt_deg = 38, round_s = 3, widening_s = 11, spin_deg = 25;
+
+  [[nodiscard]] BirdPose pose(std::size_t bird, double t_s) const;
+};
+
 /// t counts from zero_ns.
 Motion circle_motion(const Circle& circle, std::int64_t zero_ns);
+Motion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns);
 /// Each bird for itself at (400, 60 * bird, 0) mm, not turned.
 Motion still_motion();
+
+/// "circle", "pivot" or "still", each with the parameters that it has by default; the circle for any other name.
+Motion motion_named(const std::string& name, std::int64_t zero_ns);
 
 }  // namespace birdseye::hw_sim

@@ -31,6 +31,13 @@ nlohmann::json truth_of(const MiniBirdProgram& program, std::int64_t zero_ns, do
     truth["radius_mm"] = circle.radius_mm;
     truth["phase_rad"] = circle.phase_rad;
   }
+  if (program.motion == "pivot") {
+    const PivotMotion pivot;
+    const Eigen::Vector3d& tip = pivot.tip_in_sensor_mm;
+    const Eigen::Vector3d& divot = pivot.pivot_in_tracker_mm;
+    truth["tip_in_sensor_mm"] = {tip.x(), tip.y(), tip.z()};
+    truth["pivot_in_tracker_mm"] = {divot.x(), divot.y(), divot.z()};
+  }
   return truth;
 }
 
@@ -46,7 +53,7 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   };
   if (auto written = write_truth(program.tracker.unit.rate_hz); !written) return written;
 
-  const Motion motion = program.motion == "still" ? still_motion() : circle_motion({}, zero_ns);
+  const Motion motion = motion_named(program.motion, zero_ns);
   TrackerLoop::Listeners listeners;
   listeners.on_fault = [](const FaultEvent& event) { announce(event); };
   listeners.on_rate = [&write_truth](double rate_hz) { (void)write_truth(rate_hz); };

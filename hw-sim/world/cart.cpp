@@ -105,7 +105,7 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   const auto liver = read_ply(settings.phantom / "surfaces" / "liver.ply");
   if (!liver) return liver.error();
   const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
-  const auto world = World::create(*truth, *liver, lens, settings.seed);
+  const auto world = World::create(*truth, *liver, lens, settings.seed, settings.pace);
   if (!world) return world.error();
   const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
   if (!laparoscope) return laparoscope.error();
@@ -128,6 +128,7 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   camera_settings.lens = lens;
   camera_settings.rate_hz = settings.rate_hz;
   camera_settings.seed = settings.seed;
+  camera_settings.delay_ms = settings.camera_delay_ms;
   camera_settings.faults = std::move(faults.camera);
   const auto camera = FrameCamera::listen(camera_settings, *world, **laparoscope);
   if (!camera) return camera.error();

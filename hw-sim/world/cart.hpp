@@ -6,6 +6,7 @@
 
 #include "calibration/base/result.hpp"
 #include "hw-sim/minibird/tracker_script.hpp"
+#include "hw-sim/world/world.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -18,6 +19,8 @@ struct CartSettings {
   TrackerNoise noise;
   int width_px = 768, height_px = 576;
   double rate_hz = 25;
+  Pace pace;
+  double camera_delay_ms = 0;    ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
   double distortion_mm = 0;      ///< of the tracker's field, where it is largest
   std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
 };

@@ -111,7 +111,6 @@ void FrameCamera::follow(CameraScript& script, std::int64_t until_ns) {
 }
 
 void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop) {
-  const bool comes_back = !settings_.faults.empty();
   Rendered rendered;
   while (!stop.stop_requested() && sent_ < frames_) {
     const FramePlan plan = script.next();
@@ -121,7 +120,6 @@ void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop)
     do {
       follow(script, plan.due_ns);
     } while (!stop.stop_requested() && drivers::now().ns < plan.due_ns);
-    if (!sink_->connected() && !comes_back) return;
     if (!plan.lost && !sink_->busy()) sink_->begin(plan, picture_of(rendered, plan.half_size));
     ++sent_;
   }
@@ -131,10 +129,15 @@ void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop)
 void FrameCamera::serve(const std::stop_token& stop) {
   while (!stop.stop_requested() && !sink_->connected()) sink_->work(drivers::now().ns + kListenNs);
   connected_ = sink_->connected();
-  while (!stop.stop_requested() && zero_ns_ == 0) drivers::sleep_until({drivers::now().ns + 5'000'000});
+  // Until the world begins no frame comes, and a reader may lose its patience and come again.
+  while (!stop.stop_requested() && zero_ns_ == 0) sink_->work(drivers::now().ns + 5'000'000);
   CameraTiming timing;
   timing.rate_hz = settings_.rate_hz;
   timing.seed = settings_.seed;
+  if (settings_.delay_ms > 0) {
+    timing.stamps = false;
+    timing.delivery_ms = settings_.delay_ms;
+  }
   timing.faults = settings_.faults;
   CameraScript script(timing, zero_ns_);
   script.watched(zero_ns_);

@@ -26,7 +26,8 @@ class FrameCamera {
     CameraModel lens;
     double rate_hz = 25;
     std::uint64_t seed = 1;
-    std::vector<Fault> faults;  ///< from the world's time 0 on; without any, the camera ends when its reader goes
+    double delay_ms = 0;        ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
+    std::vector<Fault> faults;  ///< from the world's time 0 on
   };
 
   /// Listens at once. The world and the laparoscope must outlive the camera.
@@ -40,7 +41,7 @@ class FrameCamera {
   [[nodiscard]] bool ready() const;
   /// The world's time 0, on CLOCK_MONOTONIC; frames start to flow.
   void start(std::int64_t world_zero_ns);
-  /// All frames of the world have been sent, or the listener has gone.
+  /// All frames of the world have had their time.
   [[nodiscard]] bool done() const { return done_; }
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 
@@ -20,7 +21,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kStations = 24;
-constexpr double kDwellS = 0.3, kMoveS = 0.14;            // at the board
+constexpr double kMoveS = 0.14;                           // from station to station over the board
 constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
 constexpr double kCarryS = 2;                             // of the scope from the board to the patient
 constexpr double kLookS = 7;
@@ -45,8 +46,10 @@ Transform<To, From> between(const Transform<To, From>& a, const Transform<To, Fr
 
 }  // namespace
 
-Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed) {
+Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
+                            const Pace& pace) {
   World world;
+  world.dwell_s_ = pace.dwell_s;
   world.truth_ = truth;
   // The bird sits on the scope's handle, its axes askew, 280 mm behind the lens.
   world.camera_from_sensor_ =
@@ -86,10 +89,16 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   world.tip_stops_in_tracker_mm_.push_back(park);
 
   const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
-  world.touch_s_ = kStations * (kDwellS + kMoveS);
+  world.calibrate_s_ = pace.sway_s;
+  world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS);
   world.look_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
-  world.stages_ = {
-      {"calibrate", 0}, {"touch", world.touch_s_}, {"look", world.look_s_}, {"end", world.look_s_ + kLookS}};
+  if (pace.sway_s > 0) world.stages_.push_back({"sway", 0});
+  for (const Stage& stage : std::initializer_list<Stage>{{"calibrate", world.calibrate_s_},
+                                                         {"touch", world.touch_s_},
+                                                         {"look", world.look_s_},
+                                                         {"end", world.look_s_ + kLookS}}) {
+    world.stages_.push_back(stage);
+  }
   if (const auto in_range = world.check_range(); !in_range) return in_range.error();
   return world;
 }
@@ -159,15 +168,34 @@ Transform<Tracker, Camera> World::sweep(double since_s) const {
   return tracker_from_patient_ * look_at<Patient>(eye, eye + direction, Vector3d(0, 0, -1), roll);
 }
 
+/// Over the board's middle, turned about two axes and rolled at paces that do not repeat, as a hand would.
+Transform<Tracker, Camera> World::sway(double world_s) const {
+  const double fade = ease(world_s) * ease(calibrate_s_ - world_s);  // from rest, and back to it
+  const auto wave = [world_s](double hz, double phase) {
+    return std::sin(2 * std::numbers::pi * hz * world_s + phase + 0.8 * std::sin(0.9 * world_s + 2 * phase));
+  };
+  const Vector3d turn_deg(9 * wave(0.83, 0) + 4 * wave(1.37, 1), 10 * wave(0.71, 2) + 4 * wave(1.19, 3),
+                          12 * wave(0.47, 4));
+  const Vector3d eye(0.5 * (board_.columns - 1) * board_.square_mm, 0.5 * (board_.rows - 1) * board_.square_mm, -95);
+  const Transform<Marker, Camera> still = look_at<Marker>(eye, Vector3d(eye.x(), eye.y(), 0), Vector3d(0, 1, 0), 0);
+  const Transform<Camera, Camera> turned(rotation_exp(fade * rotation_vector(turn_deg)),
+                                         Vector3d(fade * Vector3d(6 * wave(0.59, 5), 5 * wave(0.97, 6), 0)));
+  const Transform<Tracker, Camera> swaying = tracker_from_marker_ * still * turned;
+  // The last moment leads to the first station.
+  constexpr double kToStationS = 0.5;
+  return between(swaying, stations_.front(), ease((world_s - calibrate_s_ + kToStationS) / kToStationS));
+}
+
 Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
+  if (world_s < calibrate_s_) return sway(std::max(0.0, world_s));
   if (world_s >= look_s_) return sweep(std::min(world_s - look_s_, kLookS));
   if (world_s >= touch_s_) return between(stations_.back(), sweep(0), ease((world_s - touch_s_) / kCarryS));
-  const double beat = std::max(0.0, world_s) / (kDwellS + kMoveS);
+  const double beat = std::max(0.0, world_s - calibrate_s_) / (dwell_s_ + kMoveS);
   const auto station = std::min(static_cast<std::size_t>(beat), stations_.size() - 1);
-  const double into_s = (beat - static_cast<double>(station)) * (kDwellS + kMoveS);
+  const double into_s = (beat - static_cast<double>(station)) * (dwell_s_ + kMoveS);
   // The move to the next station ends the beat; the last one just stays.
   const std::size_t next = std::min(station + 1, stations_.size() - 1);
-  return between(stations_[station], stations_[next], ease((into_s - kDwellS) / kMoveS));
+  return between(stations_[station], stations_[next], ease((into_s - dwell_s_) / kMoveS));
 }
 
 Transform<Tracker, Sensor> World::tracker_from_sensor(double world_s) const {

@@ -13,19 +13,25 @@
 namespace birdseye::hw_sim {
 
 struct Stage {
-  std::string name;  ///< calibrate, touch, look or end
+  std::string name;  ///< sway, calibrate, touch, look or end
   double begins_s;
 };
 
-/// The scripted operation: where everything truly is at any world time. First the scope is held still over a board at
-/// one station after another, then the pointer rests at each fiducial in turn, then the scope, turning about its port
-/// in the abdominal wall, sweeps over the liver.
+/// How long the operator takes over the board.
+struct Pace {
+  double sway_s = 0;     ///< for which the scope is turned to and fro over it before anything else
+  double dwell_s = 0.3;  ///< for which it is held still at each station
+};
+
+/// The scripted operation: where everything truly is at any world time. If asked for, the scope is first turned to and
+/// fro over a board. Then it is held still over the board at one station after another, then the pointer rests at each
+/// fiducial in turn, then the scope, turning about its port in the abdominal wall, sweeps over the liver.
 class World {
  public:
   /// liver: its surface in the patient frame, which the scope looks at. Refused where the script would take a bird out
   /// of the tracker's range.
-  static Result<World> create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens,
-                              std::uint64_t seed);
+  static Result<World> create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
+                              const Pace& pace = {});
 
   [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
   [[nodiscard]] double ends_s() const { return stages_.back().begins_s; }
@@ -47,6 +53,7 @@ class World {
   void plan_stations(const CameraModel& lens, std::uint64_t seed);
   [[nodiscard]] Result<void> check_range() const;
   [[nodiscard]] Transform<Tracker, Camera> sweep(double since_s) const;
+  [[nodiscard]] Transform<Tracker, Camera> sway(double world_s) const;
 
   PhantomTruth truth_;
   Chessboard board_;
@@ -58,7 +65,7 @@ class World {
   std::vector<Transform<Tracker, Camera>> stations_;
   std::vector<Eigen::Vector3d> tip_stops_in_tracker_mm_;  ///< park, each fiducial, park
   std::vector<Stage> stages_;
-  double touch_s_ = 0, look_s_ = 0;
+  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, look_s_ = 0;
 };
 
 }  // namespace birdseye::hw_sim
