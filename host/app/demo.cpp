@@ -139,7 +139,7 @@ Result<ExitCode> demo(const Options& options) {
   EventStream stream(*std::move(client), kMostFramesWaiting);
   const auto plan = read_plan(out / "phantom", (*cart)->sheet().fiducials);
   if (!plan) return plan.error();
-  const auto board = calibration::parse_board((*cart)->sheet().board);
+  const auto board = calibration::parse_pattern((*cart)->sheet().board);
   if (!board) return board.error();
   auto film = Film::open(out / "overlay.mp4", settings.width_px, settings.height_px, settings.video_rate_hz);
   if (!film) return film.error();

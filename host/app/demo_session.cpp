@@ -1,8 +1,9 @@
 #include "host/app/demo_session.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include "calibration/solve/intrinsics.hpp"
+#include "calibration/solve/camera_calibration.hpp"
 #include "host/app/interrupt.hpp"
 #include "host/overlay/compositor.hpp"
 #include "host/registration/point_matching.hpp"
@@ -58,8 +59,11 @@ Result<void> DemoSession::take(const wire::Birds& birds) {
   const double since_s = (birds.acquired - first_measurement_).seconds();
   if (since_s > 0) figures.tracker_rate_hz = (measurements_ - 1) / since_s;
   const std::string stage = stage_at(birds.acquired);
+  if (stage == "calibrate") {
+    stations_.push(birds);
+    take_stations();
+  }
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name == "scope" && stage == "calibrate") stations_.push(birds.acquired, bird.tracker_from_sensor);
     if (bird.name == "pointer" && (stage == "touch" || stage == "look")) {
       const Eigen::Vector3d tip = bird.tracker_from_sensor * cart_.sheet().tip_in_pointer_mm;
       if (const auto touch = touch_detector_.push(birds.acquired, tip); touch && stage == "touch") {
@@ -71,22 +75,37 @@ Result<void> DemoSession::take(const wire::Birds& birds) {
   return {};
 }
 
+void DemoSession::take_stations() {
+  while (auto taken = stations_.take_station()) {
+    calibration::HandEyeStation station;
+    station.name = taken->view.name;
+    station.view = std::move(taken->view);
+    station.tracker_from_sensor = taken->tracker_from_sensor;
+    seen_.stations.push_back(std::move(station));
+  }
+}
+
 Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   stations_.finish();
-  const auto points = calibration::board_points_mm(board_);
-  const auto lens = calibration::solve_intrinsics(points, stations_.views(), size.width_px, size.height_px);
+  take_stations();
+  std::vector<calibration::PatternView> views;
+  views.reserve(seen_.stations.size());
+  for (const calibration::HandEyeStation& station : seen_.stations) views.push_back(station.view);
+  const auto lens = calibration::calibrate_camera(views, size.width_px, size.height_px);
   if (!lens) return Error{lens.error().code, "camera calibration: " + lens.error().what};
-  const auto hand_eye = calibration::solve_hand_eye(points, stations_.views(), stations_.tracker_from_sensor(),
-                                                    lens->camera_from_marker, lens->camera, stations_.uncertainty());
+  seen_.camera = lens->camera;
+  const auto hand_eye = calibration::calibrate_hand_eye(seen_);
   if (!hand_eye) return Error{hand_eye.error().code, "hand-eye calibration: " + hand_eye.error().what};
+  if (const Verdict verdict = calibration::judge(*hand_eye); verdict.grade == Grade::fail)
+    return Error{Errc::degenerate, fmt::format("hand-eye calibration: {}", fmt::join(verdict.reasons, "; "))};
   const auto fit = match_and_fit(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
   if (!fit) return Error{fit.error().code, "registration: " + fit.error().what};
   figures.camera_rms_px = lens->rms_px;
-  figures.hand_eye_rms_px = hand_eye->tracked_rms_px;
-  figures.board_views = static_cast<int>(stations_.views().size());
+  figures.hand_eye_rms_px = hand_eye->tracked_px;
+  figures.board_views = static_cast<int>(seen_.stations.size());
   figures.fre_mm = fit->fit.fre_rms_mm;
   figures.fiducial_residuals_mm = fit->fit.residuals_mm;
-  gate_.set_calibration({lens->rms_px, hand_eye->tracked_rms_px, fit->fit.fre_rms_mm});
+  gate_.set_calibration({lens->rms_px, hand_eye->tracked_px, fit->fit.fre_rms_mm});
   setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
@@ -94,7 +113,7 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
-                             figures.board_views, hand_eye->tracked_rms_px, fit->fit.fre_rms_mm));
+                             figures.board_views, hand_eye->tracked_px, fit->fit.fre_rms_mm));
   return {};
 }
 
@@ -127,7 +146,7 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
   const std::string stage = stage_at(frame.info.acquired);
   if (stage == "calibrate") {
     stations_.push(frame);
-    progress_(fmt::format("calibrating: {} views of the board", stations_.views().size()));
+    progress_(fmt::format("calibrating: {} views of the board", seen_.stations.size()));
   }
   if (stage != "look" && stage != "end") return {};
   if (!setup) {

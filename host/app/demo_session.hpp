@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "calibration/solve/hand_eye_calibration.hpp"
 #include "device/wire/messages.hpp"
-#include "host/app/board_stations.hpp"
+#include "host/app/calibrate/live_stations.hpp"
 #include "host/app/demo_report.hpp"
 #include "host/app/event_stream.hpp"
 #include "host/app/film.hpp"
@@ -51,8 +52,8 @@ struct KeptFrame {
 /// One run of the demo: takes the appliance's events in order and does what the stage asks for.
 class DemoSession {
  public:
-  DemoSession(SimulatedCart& cart, const calibration::BoardSpec& board, const Plan& plan, Film film, Progress& progress)
-      : cart_(cart), board_(board), plan_(plan), film_(std::move(film)), progress_(progress), stations_(board) {}
+  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, const Plan& plan, Film film, Progress& progress)
+      : cart_(cart), plan_(plan), film_(std::move(film)), progress_(progress), stations_(board, "scope") {}
 
   /// Until the operation has ended and its last frame has come.
   Result<void> run(EventStream& stream);
@@ -67,15 +68,16 @@ class DemoSession {
   [[nodiscard]] std::string stage_at(DeviceTime time) const;
   Result<void> take(const wire::Birds& birds);
   Result<void> take(const wire::VideoFrame& frame);
+  void take_stations();
   Result<void> calibrate_and_register(const CameraModel& size);
   Result<void> overlay(const wire::VideoFrame& frame);
 
   SimulatedCart& cart_;
-  calibration::BoardSpec board_;
   const Plan& plan_;
   Film film_;
   Progress& progress_;
-  BoardStations stations_;
+  LiveStations stations_;
+  calibration::HandEyeInput seen_;
   TouchDetector touch_detector_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
   OverlayGate gate_;

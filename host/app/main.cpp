@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CommandStatus status;
   add_bench(app, status);
+  add_calibrate(app, status);
   add_demo(app, status);
   add_register(app, status);
   add_render(app, status);

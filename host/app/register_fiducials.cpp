@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/base/units.hpp"
+#include "calibration/base/verdict.hpp"
 #include "calibration/solve/odd_points.hpp"
 #include "calibration/solve/point_error.hpp"
 #include "calibration/solve/point_fit.hpp"
@@ -36,31 +37,6 @@ struct Input {
   std::optional<Volume> volume;
   std::optional<Surface> surface;
   std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order holds
-};
-
-/// The worst grade of several, and why.
-class Judgement {
- public:
-  enum Grade { pass, marginal, fail };
-  void add(Grade grade, std::string reason) {
-    worst_ = std::max(worst_, grade);
-    reasons_.push_back(std::move(reason));
-  }
-  /// Over pass_mm it is marginal, over marginal_mm it fails.
-  void add(const std::string& what, double value_mm, double pass_mm, double marginal_mm, const char* remedy) {
-    if (value_mm <= pass_mm) return add(pass, fmt::format("{} {:.2f} mm, at most {} mm", what, value_mm, pass_mm));
-    const bool failed = value_mm > marginal_mm;
-    add(failed ? fail : marginal,
-        fmt::format("{} {:.2f} mm, over {} mm: {}", what, value_mm, failed ? marginal_mm : pass_mm, remedy));
-  }
-  [[nodiscard]] std::string verdict() const {
-    return worst_ == pass ? "pass" : worst_ == marginal ? "marginal" : "fail";
-  }
-  [[nodiscard]] const std::vector<std::string>& reasons() const { return reasons_; }
-
- private:
-  Grade worst_ = pass;
-  std::vector<std::string> reasons_;
 };
 
 /// All that was found out.
@@ -145,20 +121,19 @@ Result<Outcome> compute(const Options& options, Input& input) {
   return out;
 }
 
-Judgement judge(const Outcome& out) {
-  Judgement judgement;
+Verdict judge(const Outcome& out) {
+  Verdict verdict;
   // What a fiducial registration error means for a skin-marker registration of the liver.
-  judgement.add("fiducial registration error", out.fit.fre_rms_mm, 2, 5,
+  verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, 5,
                 out.fit.fre_rms_mm > 5 ? "are the points in the same order?" : "touch the worst marker again");
   for (std::size_t i = 0; i < out.tre_mm.size(); ++i) {
-    judgement.add(fmt::format("predicted error at target {}", i + 1), out.tre_mm[i], 3, 5,
+    verdict.judge(fmt::format("predicted error at target {}", i + 1), out.tre_mm[i], "mm", 3, 5,
                   "place markers round the target");
   }
   const bool wrong = out.odd.verdict == OddPointsVerdict::named || out.odd.verdict == OddPointsVerdict::suspected;
-  judgement.add(wrong ? Judgement::marginal : Judgement::pass, out.odd.told);
-  if (out.refinement)
-    judgement.add(out.refinement->accepted ? Judgement::pass : Judgement::marginal, out.refinement->told);
-  return judgement;
+  verdict.add(wrong ? Grade::marginal : Grade::pass, out.odd.told);
+  if (out.refinement) verdict.add(out.refinement->accepted ? Grade::pass : Grade::marginal, out.refinement->told);
+  return verdict;
 }
 
 nlohmann::json rows_of(const Eigen::Matrix4d& m) {
@@ -167,7 +142,7 @@ nlohmann::json rows_of(const Eigen::Matrix4d& m) {
   return rows;
 }
 
-nlohmann::json json_of(const Input& input, const Outcome& out, const Judgement& judgement) {
+nlohmann::json json_of(const Input& input, const Outcome& out, const Verdict& verdict) {
   nlohmann::json json;
   json["fre_rms_mm"] = out.fit.fre_rms_mm;
   json["residuals_mm"] = out.fit.residuals_mm;
@@ -202,12 +177,13 @@ nlohmann::json json_of(const Input& input, const Outcome& out, const Judgement& 
                        {"patient_from_tracker", rows_of(r.surface_pose.matrix())}};
   }
   json["patient_from_tracker"] = rows_of(out.patient_from_tracker().matrix());
-  json["verdict"] = judgement.verdict();
-  json["reasons"] = judgement.reasons();
+  json["verdict"] = name_of(verdict.grade);
+  json["reasons"] = verdict.reasons;
+  json["next_steps"] = verdict.next_steps;
   return json;
 }
 
-void print(const Input& input, const Outcome& out, const Judgement& judgement) {
+void print(const Input& input, const Outcome& out, const Verdict& verdict) {
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
     fmt::print("fiducial {:2}", i + 1);
     if (!input.ct_of_touch.empty()) fmt::print(" is CT marker {:2}", input.ct_of_touch[i] + 1);
@@ -223,8 +199,9 @@ void print(const Input& input, const Outcome& out, const Judgement& judgement) {
                out.range->most_mm, out.range->median_mm);
   }
   for (const calibration::OddPoint& p : out.odd.named) fmt::print("fiducial {} {}\n", p.index + 1, p.reason);
-  for (const std::string& reason : judgement.reasons()) fmt::print("{}\n", reason);
-  fmt::print("verdict: {}\n", judgement.verdict());
+  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
+  fmt::print("verdict: {}\n", name_of(verdict.grade));
 }
 
 Result<ExitCode> register_fiducials(const Options& options) {
@@ -232,7 +209,7 @@ Result<ExitCode> register_fiducials(const Options& options) {
   if (!input) return input.error();
   const auto out = compute(options, *input);
   if (!out) return out.error();
-  const Judgement judgement = judge(*out);
+  const Verdict verdict = judge(*out);
   std::string png;
   if (!options.map.empty()) {
     const Picture picture =
@@ -242,12 +219,12 @@ Result<ExitCode> register_fiducials(const Options& options) {
   }
   if (auto written = write_files({{options.out, pose_text(out->patient_from_tracker().matrix())},
                                   {options.map, std::move(png)},
-                                  {options.json, text_of(json_of(*input, *out, judgement))}});
+                                  {options.json, text_of(json_of(*input, *out, verdict))}});
       !written) {
     return written.error();
   }
-  print(*input, *out, judgement);
-  return judgement.verdict() == "fail" ? ExitCode::verdict_fail : ExitCode::success;
+  print(*input, *out, verdict);
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
 }  // namespace

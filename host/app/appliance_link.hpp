@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "device/wire/client.hpp"
+
+namespace birdseye::host {
+
+/// Connects to an appliance named as "HOST:PORT", or as "HOST" for the usual port. Waits for one that is starting for
+/// some seconds; the error names the address and what to look at.
+Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& address);
+
+}  // namespace birdseye::host

@@ -1,0 +1,187 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "calibration/base/units.hpp"
+#include "host/app/calibrate/commands.hpp"
+#include "host/app/calibrate/hand_eye_files.hpp"
+#include "host/app/calibrate/hand_eye_report.hpp"
+#include "host/app/calibrate/live_hand_eye.hpp"
+#include "host/app/calibrate/results.hpp"
+#include "host/app/text_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+struct Options {
+  HandEyeFiles files;
+  bool live = false;
+  LivePlan plan;
+  std::string unit = "mm";
+  double position_sigma_mm = 0, angle_sigma_deg = 0;
+  ResultPaths results;
+};
+
+Result<void> check(const Options& options) {
+  const HandEyeFiles& files = options.files;
+  const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.eye_poses.empty() ? 0 : 1);
+  if (sources != 1) return Error{Errc::bad_value, "give one of --images (with --board), --eye-poses and --live"};
+  if (files.eye_poses.empty() && files.board.empty())
+    return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
+  if (!options.live && files.poses.empty())
+    return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
+  if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
+    return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
+  return {};
+}
+
+/// A hand-eye goes into a record beside the lens it was made with, and no other.
+Result<void> check_record(const Options& options) {
+  const auto& path = options.results.record;
+  std::error_code ignored;
+  const bool there = std::filesystem::exists(path, ignored);
+  if (path.empty() || (!there && options.files.camera.empty())) return {};
+  std::optional<CameraModel> recorded;
+  if (there) {
+    const auto record = read_record(path);
+    if (!record) return record.error();
+    if (record->lens) recorded = record->lens->camera;
+  }
+  if (options.files.camera.empty()) return {};
+  const auto camera = read_camera(options.files.camera);
+  if (!camera) return camera.error();
+  if (recorded == *camera) return {};
+  return Error{Errc::bad_value,
+               fmt::format("{}: its lens is not that of {}: enter that first (birdseye calibrate camera --record), or "
+                           "leave out --camera",
+                           path.string(), options.files.camera.string())};
+}
+
+Result<HandEyeRecording> record_live(const Options& options) {
+  LivePlan plan = options.plan;
+  auto pattern = calibration::parse_pattern(options.files.board);
+  if (!pattern) return pattern.error();
+  plan.pattern = *std::move(pattern);
+  if (!options.files.camera.empty()) {
+    auto camera = read_camera(options.files.camera);
+    if (!camera) return camera.error();
+    plan.camera = *camera;
+  }
+  Progress progress;
+  auto session = guide_hand_eye(plan, progress);
+  if (!session) return session.error();
+  HandEyeRecording out;
+  out.input = std::move(session->input);
+  out.notes.push_back("ended: " + session->ended);
+  if (!plan.camera) {
+    if (session->lens) {
+      out.camera_verdict = calibration::judge_camera(*session->lens);
+    } else {
+      out.camera_verdict.add(Grade::fail, "no lens was found: " + session->lens_fault,
+                             "hold the scope still at more stations, tilted another way at each");
+    }
+    out.lens = std::move(session->lens);
+  }
+  return out;
+}
+
+/// Hand-eye, and the lens it was found with where that is new.
+RecordEntry entry_of(const Options& options, const HandEyeRecording& recording,
+                     const calibration::HandEyeResult& result) {
+  const std::string what =
+      options.files.board.empty() ? options.files.eye_poses.filename().string() : options.files.board;
+  return {fmt::format("{}, {} stations", what, recording.input.stations.size()),
+          [&](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
+            if (const auto& lens = recording.lens) {
+              record.hand_eye.reset();  // the new one is entered below
+              enter_lens(record, {provenance, lens->camera, name_of(lens->model), lens->covariance, lens->rms_px,
+                                  lens->held_out_px, std::nullopt});
+            }
+            record.hand_eye = calibration::HandEyeEntry{provenance,    result.camera_from_sensor, result.covariance,
+                                                        result.rms_px, result.held_out_px,        result.held_out_mm};
+          }};
+}
+
+void run(Options& options, CommandStatus& status) {
+  HandEyeFiles& files = options.files;
+  files.mm_per_unit = options.unit == "m" ? 1000 : 1;
+  if (const auto sound = check(options); !sound) return status.refuse(sound.error());
+  if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
+  auto recording = options.live ? record_live(options) : read_hand_eye_stations(files);
+  if (!recording) return status.refuse(recording.error());
+  if (options.position_sigma_mm > 0)
+    recording->input.tracker_noise =
+        calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
+  calibration::HandEyeResult result;
+  Verdict verdict;
+  if (recording->input.stations.empty() || (files.eye_poses.empty() && !recording->input.camera)) {
+    verdict = recording->camera_verdict;
+    if (verdict.grade != Grade::fail)
+      verdict.add(Grade::fail, "no picture shows the board together with a pose",
+                  "see that --board names the pattern in the pictures");
+  } else {
+    auto solved = calibration::calibrate_hand_eye(recording->input);
+    if (!solved) return status.refuse(solved.error());
+    result = *std::move(solved);
+    verdict = calibration::judge(result);
+  }
+  const Verdict& lens = recording->camera_verdict;
+  if (lens.grade != Grade::pass && recording->input.camera) {
+    verdict.add(lens.grade,
+                fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens.grade)),
+                "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
+  }
+  for (const std::string& note : recording->notes) fmt::print("{}\n", note);
+  if (recording->stream_correlation > 0 && result.solved)
+    fmt::print("the pictures' clock is {:.1f} +- {:.1f} ms behind the poses'\n",
+               1000 * (recording->stream_offset_s + result.time_offset_s.value_or(0)),
+               1000 * result.time_offset_sigma_s);
+  finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
+                     hand_eye_json(result, *recording), hand_eye_page(result, *recording), verdict, status,
+                     entry_of(options, *recording, result));
+}
+
+}  // namespace
+
+void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
+  auto options = std::make_shared<Options>();
+  HandEyeFiles& files = options->files;
+  CLI::App* command = calibrate.add_subcommand("hand-eye", "where the camera sits on its sensor");
+  command->add_option("--board", files.board, "pattern in the pictures, as chessboard:14x10:3mm")->type_name("SPEC");
+  command->add_option("--images", files.images, "pictures of the board, or folders of them")->type_name("PATH");
+  command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
+  command->add_option("--transform", files.transform, "which of a sequence's transforms that is");
+  command->add_option("--board-poses", files.board_poses, "tracked poses of what carries the board, if it moves")
+      ->type_name("PATH");
+  command->add_option("--board-transform", files.board_transform, "which of a sequence's transforms that is");
+  command->add_option("--camera", files.camera, "lens (OpenCV YAML); without it, calibrated from the pictures")
+      ->type_name("FILE");
+  command
+      ->add_option("--eye-poses", files.eye_poses,
+                   "instead of pictures, poses of the camera in the board's frame; by time if both have times")
+      ->type_name("PATH");
+  command->add_option("--unit", options->unit, "of lengths in files of poses")->check(CLI::IsMember({"mm", "m"}));
+  command->add_option("--position-sigma", options->position_sigma_mm, "the tracker's noise per axis, mm")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--angle-sigma", options->angle_sigma_deg, "the tracker's noise per axis, degrees")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--live", options->live, "be guided, with an appliance that runs, in place of files");
+  LivePlan& plan = options->plan;
+  command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")
+      ->type_name("HOST:PORT");
+  command->add_option("--bird", plan.bird, "with --live: the scope's bird, by its name (default: scope)");
+  command->add_option("--keep", plan.keep, "with --live: a folder for the stations' pictures and poses")
+      ->type_name("FOLDER");
+  command->add_option("--stations", plan.fewest_stations, "with --live: the fewest (default 12)")
+      ->check(CLI::Range(6, 100));
+  command->add_option("--most-stations", plan.most_stations, "with --live: then it ends in any case (default 40)")
+      ->check(CLI::Range(6, 200));
+  command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
+      ->check(CLI::Range(5.0, 7200.0));
+  add_result_options(*command, options->results, "camera_from_sensor, a 4x4 matrix, mm");
+  command->callback([options, &status] { run(*options, status); });
+}
+
+}  // namespace birdseye::host

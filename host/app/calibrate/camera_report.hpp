@@ -1,0 +1,20 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "calibration/solve/camera_calibration.hpp"
+#include "calibration/solve/stereo_calibration.hpp"
+#include "host/app/calibrate/report_page.hpp"
+
+namespace birdseye::host {
+
+/// The figures of one camera, as the manual names them.
+nlohmann::json camera_json(const calibration::CameraCalibration& calibration);
+nlohmann::json rejected_json(const std::vector<calibration::RejectedView>& rejected);
+/// What a pair adds to them.
+nlohmann::json stereo_json(const calibration::StereoCalibration& calibration);
+
+/// Pictures and tables of one camera; which: "" or "left camera: ", before each heading.
+void add_camera_to(ReportPage& page, const calibration::CameraCalibration& calibration, const std::string& which = {});
+
+}  // namespace birdseye::host

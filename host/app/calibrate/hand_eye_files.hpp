@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/solve/camera_calibration.hpp"
+#include "calibration/solve/hand_eye_calibration.hpp"
+#include "host/app/calibrate/pose_files.hpp"
+
+namespace birdseye::host {
+
+/// Where the stations of a hand-eye calibration lie.
+struct HandEyeFiles {
+  std::string board;                          ///< SPEC
+  std::vector<std::filesystem::path> images;  ///< none: eye_poses
+  std::filesystem::path camera;               ///< empty: calibrated from the images
+  std::filesystem::path poses, board_poses, eye_poses;
+  std::string transform, board_transform;
+  double mm_per_unit = 1;
+};
+
+/// The solver's input, and what there is to tell of how it came about.
+struct HandEyeRecording {
+  calibration::HandEyeInput input;
+  std::vector<std::string> notes;
+  std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images
+  Verdict camera_verdict;                              ///< on that
+  double stream_offset_s = 0;     ///< of two streams' clocks, found from their motion; the solver's adds to it
+  double stream_correlation = 0;  ///< 0 if there are no two streams
+};
+
+/// Reads and pairs pictures and poses: by their order, that of their names with numbers in them by value. As many
+/// pictures as poses are wanted, those that cannot be used counted. eye_poses are poses of the camera in the board's
+/// frame (marker_from_camera); where both they and poses have times they pair by time.
+Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files);
+
+}  // namespace birdseye::host

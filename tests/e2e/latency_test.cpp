@@ -1,0 +1,122 @@
+// `calibrate latency` over the simulated cart, and from files, from the outside.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/calibration/latency_streams.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/data.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+
+nlohmann::json read(const fs::path& path) {
+  return nlohmann::json::parse(std::ifstream(path));
+}
+
+/// t,x,y,z,qx,qy,qz,qw
+std::string csv_of(const calibration::simulated::Rotations& rows) {
+  std::ostringstream text;
+  text.precision(12);
+  for (const auto& row : rows) {
+    const Eigen::Quaterniond& q = row.base_from_body;
+    text << row.time_s << ",0,0,0," << q.x() << ',' << q.y() << ',' << q.z() << ',' << q.w() << '\n';
+  }
+  return text.str();
+}
+
+TEST(LatencyCommand, OfTwoFilesOfPosesAndWhatItRefuses) {
+  using namespace calibration::simulated;
+  const Scratch scratch;
+  const Hand hand(5);
+  StreamSettings tracker, eye;
+  tracker.noise_deg = 0.2;
+  eye.rate_hz = 25;
+  eye.offset_ms = 40;
+  const std::string a = scratch.file("a.csv", csv_of(record(hand, tracker)));
+  const std::string b = scratch.file("b.csv", csv_of(record(hand, eye)));
+  const std::string results = " --json " + (scratch / "l.json").string() + " --report " +
+                              (scratch / "l.html").string() + " --out " + (scratch / "l.toml").string();
+  const auto found = run("birdseye", "calibrate latency --poses " + a + " --eye-poses " + b + results);
+  ASSERT_EQ(found.code, 0) << found.output;
+  const nlohmann::json json = read(scratch / "l.json");
+  EXPECT_EQ(json["verdict"], "pass");
+  EXPECT_NEAR(json["offset_ms"].get<double>(), 40, 1);
+  EXPECT_LE(json["offset_ci95_ms"][0].get<double>(), 40);
+  EXPECT_GE(json["offset_ci95_ms"][1].get<double>(), 40);
+  EXPECT_NE(json["advice"].get<std::string>().find("ms too late against those of a.csv: subtract that"),
+            std::string::npos)
+      << json["advice"];
+  EXPECT_GT(fs::file_size(scratch / "l.html"), 20'000U);
+  EXPECT_TRUE(fs::exists(scratch / "l.toml"));
+
+  // A scope that is held still: no number is left, and what to do with the hands is said.
+  const Hand still(5, 0.1);
+  const std::string c = scratch.file("c.csv", csv_of(record(still, eye)));
+  fs::remove(scratch / "l.toml");
+  const auto failed = run("birdseye", "calibrate latency --poses " + a + " --eye-poses " + c + results);
+  EXPECT_EQ(failed.code, 3);
+  EXPECT_NE(failed.output.find("the eye poses hardly moves"), std::string::npos) << failed.output;
+  EXPECT_NE(failed.output.find("to and fro"), std::string::npos) << failed.output;
+  EXPECT_TRUE(read(scratch / "l.json")["offset_ms"].is_null());
+  EXPECT_FALSE(fs::exists(scratch / "l.toml"));
+
+  StreamSettings later = eye;
+  later.begin_s = 100;
+  const std::string d = scratch.file("d.csv", csv_of(record(hand, later)));
+  expect_refused("birdseye", "calibrate latency --poses " + a + " --eye-poses " + d, {"do not overlap", "100.0"});
+  expect_refused("birdseye", "calibrate latency", {"--server", "--recording", "--poses"});
+  expect_refused("birdseye", "calibrate latency --recording " + (scratch / "none.berec").string(), {"none.berec"});
+  expect_refused("birdseye", "calibrate latency --recording " + a, {"a.csv"});
+}
+
+/// Starts the cart, whose camera delivers 83 ms late and does not stamp, and birdseyed, which is told of no delay.
+constexpr const char* kScript = R"(cd "$1"; bin=$2; trap 'kill $(jobs -p) 2>/dev/null; wait' EXIT
+$bin/birdseye-sim phantom --out phantom > phantom.log 2>&1 || exit 9
+printf '[[fault]]\nname = "late_frames"\nat_s = 500\nfor_s = 1\nms = 1\n' > faults.toml
+$bin/birdseye-sim cart --phantom phantom --socket cam --tty tty --out . --size 384x288 --sway-s 18 --camera-delay-ms 83 \
+  --position-noise-mm 0.5 --angle-noise-deg 0.1 --faults faults.toml > sim.log 2>&1 &
+for n in $(seq 150); do grep -q ready sim.log && break; sleep 0.1; done
+$bin/birdseyed --config cart.toml > birdseyed.log 2>&1 &
+for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0.1; done
+$bin/birdseye calibrate latency --server 127.0.0.1:$3 --seconds 15 --delay-ms 0 --json l.json --report l.html --out l.toml
+code=$?; cat birdseyed.log | tail -3; exit $code
+)";
+
+TEST(LatencyCommand, OfTheSimulatedCart) {
+  const Scratch scratch;
+  const int port = 20000 + static_cast<int>(::getpid() % 20000);
+  const std::string config = scratch.file(
+      "cart.toml", "[tracker]\ndevice = \"" + (scratch / "tty").string() +
+                       "\"\nbaud = 115200\nbirds = 2\nnames = [\"scope\", \"pointer\"]\n"
+                       "rate_hz = 103.3\nfrozen_after = 0\nmost_speed_mm_s = 6000\nmost_turn_deg_s = 3000\n"
+                       "hemisphere = \"forward\"\nrecord = \"position_matrix\"\ndelay_ms = 7.5\n[camera]\n"
+                       "source = \"socket:" +
+                       (scratch / "cam").string() +
+                       "\"\nwidth = 384\nheight = 288\nrate_hz = 25\ndelay_ms = 0\n[wire]\n"
+                       "bind = \"127.0.0.1\"\nport = " +
+                       std::to_string(port) + "\n");
+  ASSERT_FALSE(config.empty());
+  const std::string script = scratch.file("cart.sh", kScript);
+  const auto found = run("birdseye", "--help > /dev/null; bash " + script + " " + (scratch / "").string() +
+                                         " " BIRDSEYE_BIN " " + std::to_string(port));
+  ASSERT_EQ(found.code, 0) << found.output;
+  const nlohmann::json json = read(scratch / "l.json");
+  // What a program needs to be woken is part of what birdseyed sees as delay: some 0.1 ms.
+  EXPECT_NEAR(json["offset_ms"].get<double>(), 83, 1);
+  EXPECT_LE(json["offset_ci95_ms"][0].get<double>(), 83.2);
+  EXPECT_GE(json["offset_ci95_ms"][1].get<double>(), 83);
+  EXPECT_NE(json["verdict"], "fail");
+  EXPECT_NEAR(json["camera_delay_ms"].get<double>(), 83, 1);
+}
+
+}  // namespace
+}  // namespace birdseye
