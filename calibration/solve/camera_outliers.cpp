@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -12,12 +14,6 @@ namespace {
 constexpr double kMedianOfRayleigh = 1.17741;  // median length of a two-dimensional normal error of sigma 1
 // No detector is finer; below it, rounding would be taken for scatter.
 constexpr double kFinest = 0.01 / 1920;  // of the width
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Scatter per axis, from the median length of residuals: of all points, and of each view's.
 struct Scatter {
@@ -33,10 +29,10 @@ Scatter scatter_of(const CameraModel& camera, const std::vector<SoundView>& view
   for (const SoundView& view : views) {
     std::vector<double>& lengths = out.lengths_px.emplace_back();
     for (const Eigen::Vector2d& r : residuals_px(camera, view.bundle)) lengths.push_back(r.norm());
-    out.view_px.push_back(std::max(finest_px, median(lengths) / kMedianOfRayleigh));
+    out.view_px.push_back(std::max(finest_px, median_of(lengths) / kMedianOfRayleigh));
     all.insert(all.end(), lengths.begin(), lengths.end());
   }
-  out.all_px = std::max(finest_px, median(all) / kMedianOfRayleigh);
+  out.all_px = std::max(finest_px, median_of(all) / kMedianOfRayleigh);
   return out;
 }
 
@@ -66,7 +62,7 @@ void fit_robustly(CameraModel& camera, std::vector<SoundView>& views, LensModel 
 bool reject_views(const CameraModel& camera, SoundViews& sound) {
   constexpr double kTimes = 5;  // a view that is merely blurred scatters two or three times as much as the others
   const Scatter scatter = scatter_of(camera, sound.views);
-  const double usual_px = median(scatter.view_px);
+  const double usual_px = median_of(scatter.view_px);
   std::vector<SoundView> kept;
   for (std::size_t v = 0; v < sound.views.size(); ++v) {
     if (scatter.view_px[v] > kTimes * usual_px) {

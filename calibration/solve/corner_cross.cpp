@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/solve/grid_points.hpp"
 #include "calibration/solve/picture_edges.hpp"

@@ -8,6 +8,8 @@
 
 #include "calibration/solve/corner_cross.hpp"
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

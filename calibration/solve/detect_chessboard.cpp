@@ -5,6 +5,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/median.hpp"
 #include "calibration/solve/corner_cross.hpp"
 #include "calibration/solve/picture_edges.hpp"
 

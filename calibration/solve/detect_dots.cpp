@@ -9,6 +9,8 @@
 
 #include "calibration/solve/dot_lattice.hpp"
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

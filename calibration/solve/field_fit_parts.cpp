@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace detail {
@@ -63,7 +65,7 @@ std::vector<bool> far_off(std::span<const Eigen::Vector3d> errors_mm, const std:
   for (std::size_t i = 0; i < errors_mm.size(); ++i) {
     if (used[i]) sizes.push_back(errors_mm[i].norm());
   }
-  const double limit_mm = std::max(least_mm, kOutlierSigmas * median(std::move(sizes)) / kMedianSigmas);
+  const double limit_mm = std::max(least_mm, kOutlierSigmas * median_of(std::move(sizes)) / kMedianSigmas);
   std::vector<bool> far(errors_mm.size());
   for (std::size_t i = 0; i < errors_mm.size(); ++i) far[i] = !(errors_mm[i].norm() <= limit_mm);
   return far;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration::detail {
 
 namespace {
@@ -149,14 +151,7 @@ double reach_mm(const FieldFunctions& box, std::span<const Eigen::Vector3d> plac
     }
     nearest.push_back(best);
   }
-  return std::max(kSpare * median(nearest), kPartOfDiagonal * (box.high_mm - box.low_mm).norm());
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return std::max(kSpare * median_of(nearest), kPartOfDiagonal * (box.high_mm - box.low_mm).norm());
 }
 
 }  // namespace birdseye::calibration::detail

@@ -77,6 +77,4 @@ std::vector<double> sigma_lattice(const FieldFunctions& box, std::span<const Eig
 /// something to spare, and no less than an eighth of the box's diagonal.
 double reach_mm(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm);
 
-double median(std::vector<double> values);
-
 }  // namespace birdseye::calibration::detail

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -13,13 +15,6 @@ constexpr std::size_t kLeastForPlane = 5;       // one more than an affine map n
 constexpr std::size_t kLeastForCurvature = 10;  // six unknowns each way
 
 }  // namespace
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double grey_at(const GreyView& picture, const Eigen::Vector2d& px) {
   const double x = std::clamp(px.x(), 0.0, picture.width_px - 1.001);

@@ -61,8 +61,6 @@ double uprightness(const std::vector<GridPoint>& points);
 double grey_at(const GreyView& picture, const Eigen::Vector2d& px);
 bool inside(const GreyView& picture, const Eigen::Vector2d& px, double margin_px);
 
-double median_of(std::vector<double> values);
-
 /// From this on a pixel counts as saturated: JPEG and scaling keep 255 from being reached.
 inline constexpr int kSaturated = 250;
 

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/lens_fold.hpp"
 #include "calibration/solve/guidance_words.hpp"
@@ -80,12 +81,6 @@ double fitting_distance_mm(const CameraModel& camera, const Eigen::Vector3d& ext
   return 0.5 * extent_mm.head<2>().norm() / (kShare * half_tangent);
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// How far two poses of the scope are apart: radians, and the move of its camera over the working distance.
 double apart(const Transform<Camera, Marker>& a, const Transform<Camera, Marker>& b, double working_mm) {
   const double move_mm = (a.inverse().translation() - b.inverse().translation()).norm();
@@ -104,7 +99,7 @@ Search search_for(std::span<const Station> stations, const CameraModel& camera, 
     distances.push_back(scope_view(station.camera_from_marker).distance_mm);
     s.least_share = std::min(s.least_share, seen_share(s, station.camera_from_marker, kFitted));
   }
-  s.working_mm = median(distances);
+  s.working_mm = median_of(distances);
   s.from_behind = scope_view(stations.front().camera_from_marker).from_behind;
   return s;
 }

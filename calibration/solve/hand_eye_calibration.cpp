@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/solve/hand_eye_observability.hpp"
 #include "calibration/solve/hand_eye_refinement.hpp"
@@ -19,12 +20,6 @@ namespace {
 constexpr double kOutlierChance = 1e-4;
 constexpr double kOutsideRegion = 0.05;
 constexpr std::size_t kFewest = 3;
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class Calibration {
  public:

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -97,12 +99,6 @@ double noise_arm_mm(std::span<const SummedStation> stations) {
     squares += s.camera_from_marker.translation().squaredNorm();
   }
   return kWorkingDistances * std::sqrt(squares / static_cast<double>(stations.size()));
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace

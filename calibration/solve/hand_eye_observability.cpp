@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/solve/hand_eye_start.hpp"
 
@@ -35,12 +36,6 @@ constexpr std::size_t kFewest = 3;
 
 Eigen::Matrix3d body_from_sensor(const SummedStation& s) {
   return s.chain.tracker_from_body.rotation().transpose() * s.chain.tracker_from_sensor.rotation();
-}
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
 
 struct Axes {
@@ -215,13 +210,12 @@ void judge_what_scale_hides(const StationsInOrder& in, double scale, double sigm
   const char* remedy = "measure the board's squares; take stations nearer and further, by a third of the distance";
   std::vector<double> distances_mm;
   for (const SummedStation& s : in.stations) distances_mm.push_back(s.camera_from_marker.translation().norm());
-  const auto middle = distances_mm.begin() + static_cast<std::ptrdiff_t>(distances_mm.size() / 2);
-  std::nth_element(distances_mm.begin(), middle, distances_mm.end());
-  if (!(sigma * *middle < kHiddenMm)) {
+  const double middle_mm = median_of(std::move(distances_mm));
+  if (!(sigma * middle_mm < kHiddenMm)) {
     found.findings.push_back({Grade::marginal,
                               fmt::format("these stations do not tell the board's size: if that is stated wrongly, the "
                                           "camera is off by {:.0f} mm before it shows",
-                                          2 * std::min(1.0, sigma) * *middle),
+                                          2 * std::min(1.0, sigma) * middle_mm),
                               remedy});
   } else if (std::abs(scale - 1) > std::max(2 * sigma, kScaleOff)) {
     found.findings.push_back({Grade::marginal, scale_in_words(scale, sigma, in.square_mm), remedy});

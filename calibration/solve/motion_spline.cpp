@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {
@@ -20,9 +21,7 @@ constexpr double kMostGapS = 0.15, kMostGapPeriods = 3.5;
 double median_interval_s(std::span<const double> times_s) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times_s.size(); ++i) intervals.push_back(times_s[i] - times_s[i - 1]);
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  return *middle;
+  return median_of(std::move(intervals));
 }
 
 /// The four cubic B-splines that are not zero at u in [0, 1) of their knot interval, or their slopes by u.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/transform.hpp"
 
@@ -80,9 +81,7 @@ void measure_times(std::vector<double> times_s, StreamMotion& motion) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times_s.size(); ++i) intervals.push_back(times_s[i] - times_s[i - 1]);
   motion.longest_gap_s = *std::max_element(intervals.begin(), intervals.end());
-  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::nth_element(intervals.begin(), middle, intervals.end());
-  motion.rate_hz = 1 / *middle;
+  motion.rate_hz = 1 / median_of(std::move(intervals));
 }
 
 /// Slopes of lines through columns of values within the window: of turns from the middle sample, or of places.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/base/median.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

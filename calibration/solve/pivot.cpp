@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 
+#include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 
 namespace birdseye::calibration {
@@ -88,15 +89,7 @@ Eigen::Vector3d shaft_of(const Eigen::Vector3d& tip_mm) {
   return tip_mm.norm() > kNone_mm ? Eigen::Vector3d(tip_mm.normalized()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
 }
 
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
-Eigen::Vector3d median_of(const std::vector<Eigen::Vector3d>& points) {
+Eigen::Vector3d median_point(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d out;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
@@ -113,7 +106,7 @@ std::vector<Eigen::Vector3d> median_pivots(const Poses& poses, const Eigen::Vect
   for (const PivotPose& pose : poses) places[pose.divot].push_back(pose.tracker_from_sensor * tip);
   std::vector<Eigen::Vector3d> pivots;
   pivots.reserve(places.size());
-  for (const auto& of_divot : places) pivots.push_back(median_of(of_divot));
+  for (const auto& of_divot : places) pivots.push_back(median_point(of_divot));
   return pivots;
 }
 
@@ -321,7 +314,7 @@ void find_slide(const Poses& poses, const std::vector<Eigen::Vector3d>& offsets,
       first.push_back(offsets[members[n]]);
       last.push_back(offsets[members[members.size() - 1 - n]]);
     }
-    const Eigen::Vector3d from = median_of(first), to = median_of(last);
+    const Eigen::Vector3d from = median_point(first), to = median_point(last);
     for (std::size_t n = 0; n < third; ++n) {
       scatter.push_back((first[n] - from).norm());
       scatter.push_back((last[n] - to).norm());

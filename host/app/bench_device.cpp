@@ -11,6 +11,7 @@
 #include <optional>
 #include <set>
 
+#include "calibration/base/median.hpp"
 #include "host/app/bench_device_rig.hpp"
 #include "host/app/bench_machine.hpp"
 #include "host/app/bench_wakes.hpp"
@@ -226,10 +227,10 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
   out["cpu_percent_total"] = cpu_percent;
   out["cpu_percent_pixel_copy"] = copy_percent;
   out["cpu_percent"] = std::max(0.0, cpu_percent - copy_percent);
-  out["latency_ms_p99_tracker"] = median(p99_tracker);  // of each second's
-  out["latency_ms_p99_tracker_beside_frames"] = median(p99_beside);
-  out["latency_ms_p99_frame"] = median(p99_frame);
-  out["latency_ms_p99_two_wakes"] = median(p99_wakes);  // of threads that do nothing, in the same seconds
+  out["latency_ms_p99_tracker"] = median_of(p99_tracker);  // of each second's
+  out["latency_ms_p99_tracker_beside_frames"] = median_of(p99_beside);
+  out["latency_ms_p99_frame"] = median_of(p99_frame);
+  out["latency_ms_p99_two_wakes"] = median_of(p99_wakes);  // of threads that do nothing, in the same seconds
   out["resident_mb"] = memory_mb;
   out["resident_mb_max"] = most_mb;
   out["resident_mb_growth"] = memory_mb - memory_before_mb;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "calibration/base/median.hpp"
 #include "host/render/cpu/kernels.hpp"
 
 namespace birdseye::host {
@@ -16,11 +17,6 @@ nlohmann::json bench_machine() {
   return {{"cores", tbb::info::default_concurrency()},
           {"isa", cpu::name_of(cpu::supported_isas().back())},
           {"kernel", machine.release}};
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
 }
 
 }  // namespace birdseye::host

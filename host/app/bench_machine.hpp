@@ -8,6 +8,4 @@ namespace birdseye::host {
 /// Of what ran: cores, instruction set, kernel.
 nlohmann::json bench_machine();
 
-double median(std::vector<double> values);
-
 }  // namespace birdseye::host

@@ -11,6 +11,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "calibration/base/median.hpp"
 #include "host/app/bench_machine.hpp"
 #include "host/app/bench_phantom.hpp"
 #include "host/app/commands.hpp"
@@ -57,7 +58,7 @@ Timing time_frames(int frames, const std::function<void(double azimuth_deg)>& fr
     wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count());
     cpu_ms.push_back(1e3 * (cpu_seconds() - cpu));
   }
-  return {median(wall_ms), median(cpu_ms)};
+  return {median_of(wall_ms), median_of(cpu_ms)};
 }
 
 /// Against the double-precision reference, over every 12th pixel of every 12th row.

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "calibration/base/median.hpp"
 #include "host/app/bench_machine.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/write_files.hpp"
@@ -83,7 +84,7 @@ struct Timer {
       value = work();
       times_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count());
     }
-    const double ms = median(std::move(times_ms));
+    const double ms = median_of(std::move(times_ms));
     best_ms = best_ms > 0 ? std::min(best_ms, ms) : ms;
   }
 };

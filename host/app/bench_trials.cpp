@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "calibration/base/median.hpp"
 #include "host/app/bench_machine.hpp"
 #include "host/app/child_process.hpp"
 #include "host/app/registration_error.hpp"
@@ -46,11 +47,11 @@ double mean_of(const std::vector<Trial>& trials, double Trial::*field) {
   return sum / static_cast<double>(std::max<std::size_t>(1, trials.size()));
 }
 
-double median_of(const std::vector<Trial>& trials, double Trial::*field) {
+double median_over(const std::vector<Trial>& trials, double Trial::*field) {
   std::vector<double> values;
   values.reserve(trials.size());
   for (const Trial& trial : trials) values.push_back(trial.*field);
-  return median(std::move(values));
+  return median_of(std::move(values));
 }
 
 }  // namespace
@@ -147,17 +148,17 @@ nlohmann::json summary_of(const std::vector<Trial>& trials) {
   std::sort(sorted.begin(), sorted.end());
   return {{"trials", trials.size()},
           {"success_rate", static_cast<double>(successes) / static_cast<double>(trials.size())},
-          {"epsilon_before_median", median_of(trials, &Trial::epsilon_before)},
-          {"epsilon_after_median", median_of(trials, &Trial::epsilon_after)},
-          {"epsilon_ratio_median", median(ratios)},
+          {"epsilon_before_median", median_over(trials, &Trial::epsilon_before)},
+          {"epsilon_after_median", median_over(trials, &Trial::epsilon_after)},
+          {"epsilon_ratio_median", median_of(ratios)},
           {"epsilon_ratios", sorted},
           {"tre_before_mm_mean", mean_of(trials, &Trial::tre_before_mm)},
           {"tre_after_mm_mean", mean_of(trials, &Trial::tre_after_mm)},
           {"surface_tre_after_mm_mean", mean_of(trials, &Trial::surface_after_mm)},
           {"inside_tre_after_mm_mean", mean_of(trials, &Trial::inside_after_mm)},
-          {"evaluations_median", median(evaluations)},
-          {"time_s_median", median_of(trials, &Trial::time_s)},
-          {"processor_s_median", median_of(trials, &Trial::processor_s)}};
+          {"evaluations_median", median_of(evaluations)},
+          {"time_s_median", median_over(trials, &Trial::time_s)},
+          {"processor_s_median", median_over(trials, &Trial::processor_s)}};
 }
 
 }  // namespace birdseye::host
