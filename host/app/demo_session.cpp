@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "calibration/base/median.hpp"
 #include "calibration/solve/camera_calibration.hpp"
 #include "host/app/interrupt.hpp"
 #include "host/overlay/compositor.hpp"
@@ -54,10 +55,15 @@ std::string DemoSession::stage_at(DeviceTime time) const {
   return name;
 }
 
+Result<void> DemoSession::finish() {
+  // Of the middle one: measurements that a busy machine had no time for do not make the tracker a slower one.
+  if (!tracker_periods_s_.empty()) figures.tracker_rate_hz = 1 / median_of(std::move(tracker_periods_s_));
+  return film_.finish();
+}
+
 Result<void> DemoSession::take(const wire::Birds& birds) {
-  if (measurements_++ == 0) first_measurement_ = birds.acquired;
-  const double since_s = (birds.acquired - first_measurement_).seconds();
-  if (since_s > 0) figures.tracker_rate_hz = (measurements_ - 1) / since_s;
+  if (last_measured_) tracker_periods_s_.push_back((birds.acquired - *last_measured_).seconds());
+  last_measured_ = birds.acquired;
   const std::string stage = stage_at(birds.acquired);
   if (stage == "calibrate") {
     stations_.push(birds);

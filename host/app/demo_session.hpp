@@ -57,7 +57,7 @@ class DemoSession {
 
   /// Until the operation has ended and its last frame has come.
   Result<void> run(EventStream& stream);
-  Result<void> finish() { return film_.finish(); }
+  Result<void> finish();
 
   DemoFigures figures;
   std::vector<OverlaidFrame> overlaid;
@@ -83,8 +83,8 @@ class DemoSession {
   OverlayGate gate_;
   std::unique_ptr<Engine> engine_;
   std::optional<std::uint64_t> first_sequence_;
-  DeviceTime first_measurement_;
-  int measurements_ = 0;
+  std::optional<DeviceTime> last_measured_;
+  std::vector<double> tracker_periods_s_;
 };
 
 }  // namespace birdseye::host
