@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -15,7 +14,6 @@ namespace {
 
 constexpr const char* kFormat = "birdseye field map";
 constexpr int kVersion = 1;
-constexpr std::size_t kMostBytes = 4U << 20U;
 
 std::optional<Grade> grade_of(const std::string& name) {
   for (const Grade grade : {Grade::pass, Grade::marginal}) {
@@ -70,18 +68,6 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
     return no_map("or not a whole one");
   }
-}
-
-Result<FieldMapFile> read_field_map(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string text(kMostBytes, 0);
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!in.is_open() || in.bad())
-    return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  auto map = parse_field_map(text);
-  if (!map) return Error{map.error().code, path.string() + ": " + map.error().what};
-  return map;
 }
 
 }  // namespace birdseye::calibration

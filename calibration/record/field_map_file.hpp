@@ -1,6 +1,5 @@
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "calibration/base/result.hpp"
@@ -28,7 +27,5 @@ struct FieldMapFile {
 
 /// Refuses what is no such text, a later version, a checksum that does not fit, and a map that makes no sense.
 Result<FieldMapFile> parse_field_map(const std::string& text);
-/// The same of a file, which the error names.
-Result<FieldMapFile> read_field_map(const std::filesystem::path& path);
 
 }  // namespace birdseye::calibration

@@ -203,18 +203,19 @@ std::optional<std::string> text_of_file(const std::filesystem::path& path, std::
   return text;
 }
 
+constexpr std::size_t kMostFieldBytes = 4U << 20U;
 constexpr std::size_t kMostRecordBytes = 60'000;  // one message of the wire carries it
 
 void read_calibration(ConfigSection& section, Config& config) {
   std::string field, path;
   section.text("field", field);
   if (!field.empty()) {
-    auto read = calibration::read_field_map(field);
-    if (read) {
-      config.core.field = std::move(read->map);
-    } else {
-      section.fail("field", read.error().what);
-    }
+    const auto map_text = text_of_file(field, kMostFieldBytes);
+    if (!map_text)
+      return section.fail("field", field + ": cannot be read; see whether it is there, its owner and mode");
+    auto parsed = calibration::parse_field_map(*map_text);
+    if (!parsed) return section.fail("field", field + ": " + parsed.error().what);
+    config.core.field = std::move(parsed->map);
   }
   section.text("record", path);
   if (path.empty()) return;

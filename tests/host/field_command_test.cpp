@@ -61,7 +61,7 @@ TEST(FieldCommand, FromTheTableToTheAppliance) {
   EXPECT_EQ(r["outliers"][0]["name"], "71");
   EXPECT_EQ(r["rejected"].size(), 2U) << r["rejected"];
   EXPECT_EQ(r["box_mm"].size(), 2U);
-  const auto map = calibration::read_field_map(out);
+  const auto map = calibration::parse_field_map(testing::contents_of(out));
   ASSERT_TRUE(map) << map.error().what;
   EXPECT_EQ(map->notes.held_out_mm, r["held_out_mm"]);
   const std::string page = testing::contents_of(scratch / "r.html");

@@ -33,13 +33,14 @@ Result<std::vector<CheckedPlace>> places_of(const Options& options) {
   if (!measured) return measured.error();
   std::optional<calibration::FieldMap> map;
   if (!options.field.empty()) {
-    auto read = calibration::read_field_map(options.field);
+    auto read = read_field_map(options.field);
     if (!read) return read.error();
     map = std::move(read->map);
   }
   std::vector<CheckedPlace> out;
   for (const auto& [name, place] : *measured) {
-    const auto known = std::find_if(plate->begin(), plate->end(), [&name = name](const auto& one) { return one.first == name; });
+    const auto known =
+        std::find_if(plate->begin(), plate->end(), [&name = name](const auto& one) { return one.first == name; });
     if (known == plate->end())
       return Error{Errc::bad_value, fmt::format("{}: \"{}\" is no place of {}; give both the same names",
                                                 options.measured.string(), name, options.plate.string())};

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <fstream>
 #include <optional>
+#include <sstream>
 
 #include "host/app/calibrate/pose_files.hpp"
 
@@ -196,6 +197,17 @@ Result<FieldPairs> read_field_pairs(const fs::path& a, const fs::path& b) {
                                               "recorded together, on one clock?",
                                               a.string(), b.string())};
   return out;
+}
+
+Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file.is_open() || file.bad())
+    return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
+  auto map = calibration::parse_field_map(text.str());
+  if (!map) return Error{map.error().code, path.string() + ": " + map.error().what};
+  return map;
 }
 
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const fs::path& path) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "calibration/record/field_map_file.hpp"
 #include "calibration/solve/field_check.hpp"
 #include "calibration/solve/field_fit.hpp"
 
@@ -36,6 +37,9 @@ struct FieldPairs {
 };
 /// Two files of poses, paired by their times (to 5 ms), or by their order where they have none.
 Result<FieldPairs> read_field_pairs(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// A map as birdseye calibrate field wrote it; an error names the file.
+Result<calibration::FieldMapFile> read_field_map(const std::filesystem::path& path);
 
 /// A table name, x, y, z: a plate's places as they are, or as they were touched.
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const std::filesystem::path& path);
