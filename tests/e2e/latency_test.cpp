@@ -8,6 +8,7 @@
 #include "tests/calibration/latency_streams.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -87,6 +88,10 @@ $bin/birdseye-sim cart --phantom phantom --socket cam --tty tty --out . --size 3
 for n in $(seq 150); do grep -q ready sim.log && break; sleep 0.1; done
 $bin/birdseyed --config cart.toml > birdseyed.log 2>&1 &
 for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0.1; done
+for what in latency "tip --bird pointer" "hand-eye --live --board chessboard:9x6:5mm"; do
+  $bin/birdseye calibrate $what --server 127.0.0.1:$3 --record other.json > other.log 2>&1
+  [ $? = 2 ] && grep -q "other.json: the record is bound to other hardware: " other.log || { cat other.log; exit 8; }
+done
 $bin/birdseye calibrate latency --server 127.0.0.1:$3 --seconds 15 --delay-ms 0 --json l.json --report l.html --out l.toml
 code=$?; cat birdseyed.log | tail -3; exit $code
 )";
@@ -105,6 +110,10 @@ TEST(LatencyCommand, OfTheSimulatedCart) {
                        "bind = \"127.0.0.1\"\nport = " +
                        std::to_string(port) + "\n");
   ASSERT_FALSE(config.empty());
+  // What is found on this cart is not entered into another's record.
+  const std::string other = scratch.file(
+      "other.json", calibration::record_text(testing::example_record(384, 288, {{"model", "trakSTAR"}}, {})));
+  ASSERT_FALSE(other.empty());
   const std::string script = scratch.file("cart.sh", kScript);
   const auto found = run("birdseye", "--help > /dev/null; bash " + script + " " + (scratch / "").string() +
                                          " " BIRDSEYE_BIN " " + std::to_string(port));

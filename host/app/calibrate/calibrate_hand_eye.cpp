@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
+#include "host/app/calibrate/appliance_hardware.hpp"
 #include "host/app/calibrate/commands.hpp"
 #include "host/app/calibrate/hand_eye_files.hpp"
 #include "host/app/calibrate/hand_eye_report.hpp"
@@ -109,6 +111,10 @@ void run(Options& options, CommandStatus& status) {
   files.mm_per_unit = options.unit == "m" ? 1000 : 1;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
+  if (options.live) {
+    const auto fits = check_bound_record(options.results.record, options.plan.server, {"tracker", "camera"});
+    if (!fits) return status.refuse(fits.error());
+  }
   auto recording = options.live ? record_live(options) : read_hand_eye_stations(files);
   if (!recording) return status.refuse(recording.error());
   if (options.position_sigma_mm > 0)
@@ -134,10 +140,11 @@ void run(Options& options, CommandStatus& status) {
                 "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
   }
   for (const std::string& note : recording->notes) fmt::print("{}\n", note);
-  if (recording->stream_correlation > 0 && result.solved)
-    fmt::print("the pictures' clock is {:.1f} +- {:.1f} ms behind the poses'\n",
-               1000 * (recording->stream_offset_s + result.time_offset_s.value_or(0)),
-               1000 * result.time_offset_sigma_s);
+  if (recording->stream_correlation > 0 && result.solved) {
+    const double late_ms = -1000 * (recording->stream_offset_s + result.time_offset_s.value_or(0));
+    fmt::print("the times of the pictures are {:.1f} +- {:.1f} ms too {} against those of the poses\n",
+               std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
+  }
   finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
                      hand_eye_json(result, *recording), hand_eye_page(result, *recording), verdict, status,
                      entry_of(options, *recording, result));

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/solve/latency.hpp"
+#include "host/app/calibrate/appliance_hardware.hpp"
 #include "host/app/calibrate/commands.hpp"
 #include "host/app/calibrate/latency_report.hpp"
 #include "host/app/calibrate/latency_streams.hpp"
@@ -21,8 +22,7 @@ using calibration::Latency;
 
 struct Options {
   fs::path recording, poses, eye_poses;
-  std::string server, transform, eye_transform;
-  bool metres = false;
+  std::string server, transform, eye_transform, unit = "mm";
   std::optional<double> delay_ms;
   LatencySource source;
   calibration::LatencySettings settings;
@@ -88,8 +88,8 @@ Result<Found> of_appliance(const Options& options, Progress& progress) {
 }
 
 Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& path, const std::string& transform,
-                                                               bool metres, Verdict& odd) {
-  const auto set = read_pose_set(path, transform, metres ? 1000 : 1);
+                                                               double mm_per_unit, Verdict& odd) {
+  const auto set = read_pose_set(path, transform, mm_per_unit);
   if (!set) return set.error();
   if (!set->timed)
     return Error{Errc::bad_value,
@@ -105,9 +105,10 @@ Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& p
 }
 
 Result<Found> of_files(const Options& options, Verdict& odd) {
-  const auto a = read_rotations(options.poses, options.transform, options.metres, odd);
+  const double mm_per_unit = options.unit == "m" ? 1000 : 1;
+  const auto a = read_rotations(options.poses, options.transform, mm_per_unit, odd);
   if (!a) return a.error();
-  const auto b = read_rotations(options.eye_poses, options.eye_transform, options.metres, odd);
+  const auto b = read_rotations(options.eye_poses, options.eye_transform, mm_per_unit, odd);
   if (!b) return b.error();
   auto latency = calibration::find_latency(*a, *b, options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
@@ -142,6 +143,10 @@ void run(const Options& options, CommandStatus& status) {
       1) {
     return status.refuse(
         {Errc::bad_value, "calibrate latency: give one of --server, --recording, or --poses with --eye-poses"});
+  }
+  if (!options.server.empty()) {
+    const auto fits = check_bound_record(options.paths.record, options.server, {"tracker", "camera"});
+    if (!fits) return status.refuse(fits.error());
   }
   const auto found = files ? of_files(options, odd) : of_appliance(options, progress);
   if (!found) return status.refuse(found.error());
@@ -191,7 +196,9 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
       ->needs(poses);
   command.add_option("--transform", options->transform, "which transform of --poses, of a PLUS sequence")->needs(poses);
   command.add_option("--eye-transform", options->eye_transform, "the same of --eye-poses")->needs(poses);
-  command.add_flag("--metres", options->metres, "lengths of both files are in metres")->needs(poses);
+  command.add_option("--unit", options->unit, "of lengths in both files")
+      ->check(CLI::IsMember({"mm", "m"}))
+      ->needs(poses);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
   command.callback([options, &status] {

@@ -2,9 +2,8 @@
 
 #include <Eigen/Core>
 #include <memory>
-#include <tuple>
 
-#include "host/app/appliance_link.hpp"
+#include "host/app/calibrate/appliance_hardware.hpp"
 #include "host/app/calibrate/commands.hpp"
 #include "host/app/calibrate/record_file.hpp"
 #include "host/app/write_files.hpp"
@@ -22,42 +21,15 @@ struct Options {
   std::string scope, bind;
 };
 
-/// What tracker and camera say they are, once both run.
+/// To what tracker and camera say they are, once both run.
 Result<void> bind_to(const std::string& address, CalibrationRecord& record) {
-  auto client = connect_appliance(address);
-  if (!client) return client.error();
-  const auto deadline = wire::Client::Clock::now() + std::chrono::seconds(10);
-  if (auto done = (*client)->subscribe({.frames = false, .tracking = false}, deadline); !done) return done;
-  std::string missing = "it has said nothing of its instruments";
-  for (;;) {
-    const auto event = (*client)->next(deadline);
-    if (!event) return event.error();
-    if (!*event) return Error{Errc::timeout, fmt::format("{}: the record is not bound: {}", address, missing)};
-    const auto* health = std::get_if<wire::Health>(&**event);
-    if (health == nullptr) continue;
-    Identity tracker, camera;
-    missing.clear();
-    for (const wire::InstrumentHealth& instrument : health->instruments) {
-      const bool needed = instrument.name == "tracker" || instrument.name == "camera";
-      if (needed && instrument.state != "running") missing = instrument.text;
-      if (instrument.name == "tracker") tracker = instrument.identity;
-      if (instrument.name == "camera") camera = instrument.identity;
-    }
-    if (!missing.empty()) continue;
-    for (const auto& [what, recorded, told] :
-         {std::tuple{"tracker", record.tracker, tracker}, std::tuple{"camera", record.camera, camera}}) {
-      const std::string why = recorded.empty() ? "" : calibration::misfit(what, recorded, told);
-      if (!why.empty())
-        return Error{
-            Errc::bad_value,
-            fmt::format("{}: the record is bound to other hardware: {}; calibrate this cart into a record of its "
-                        "own",
-                        address, why)};
-    }
-    record.tracker = tracker;
-    record.camera = camera;
-    return {};
-  }
+  auto told = ask_hardware(address, {"tracker", "camera"});
+  if (!told) return told.error();
+  if (auto fits = check_hardware(record, *told); !fits)
+    return Error{fits.error().code, fmt::format("{}: {}", address, fits.error().what)};
+  record.tracker = (*told)["tracker"];
+  record.camera = (*told)["camera"];
+  return {};
 }
 
 std::string words_of(const Identity& identity) {

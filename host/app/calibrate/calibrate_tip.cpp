@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calibration/solve/pivot_verdict.hpp"
+#include "host/app/calibrate/appliance_hardware.hpp"
 #include "host/app/calibrate/commands.hpp"
 #include "host/app/calibrate/live_poses.hpp"
 #include "host/app/calibrate/pose_files.hpp"
@@ -56,6 +57,10 @@ Result<PoseSet> read_set(const Options& options, const std::filesystem::path& pa
 Result<Input> read_input(const Options& options) {
   if (options.poses.empty() == options.server.empty())
     return Error{Errc::bad_value, "calibrate tip: give one of --poses and --server"};
+  if (!options.server.empty()) {
+    if (const auto fits = check_bound_record(options.results.record, options.server, {"tracker"}); !fits)
+      return fits.error();
+  }
   Progress progress;
   auto set = options.poses.empty() ? collect_poses(options.server, options.bird, options.seconds, progress)
                                    : read_set(options, options.poses);
@@ -66,7 +71,7 @@ Result<Input> read_input(const Options& options) {
   if (!options.phases.empty()) {
     const auto phases = parse_phases(options.phases);
     if (!phases) return phases.error();
-    auto divots = divots_of(*phases, input.set.poses);
+    auto divots = divots_of(*phases, input.set);
     if (!divots) return Error{divots.error().code, options.poses.string() + ": " + divots.error().what};
     std::vector<TimedPose> kept;
     for (std::size_t i = 0; i < divots->size(); ++i) {

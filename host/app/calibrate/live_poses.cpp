@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <set>
 
 #include "host/app/appliance_link.hpp"
@@ -53,8 +54,8 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
       if (!first) first = birds->acquired;
       since_s = (birds->acquired - *first).seconds();
       set.poses.push_back({fmt::format("pose {}", index), index - 1, since_s, since_s, one.tracker_from_sensor});
-      if (set.poses.size() % 20 == 0)
-        progress(fmt::format("{} poses, {:.0f} of {:.0f} s", set.poses.size(), since_s, seconds));
+      // Once a second: the progress does not repeat a line.
+      progress(fmt::format("poses of {} for {:.0f} of {:.0f} s", bird, std::floor(since_s), seconds));
     }
   }
   return set;

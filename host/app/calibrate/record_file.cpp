@@ -11,7 +11,9 @@ namespace birdseye::host {
 
 Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) return Error{Errc::unreadable, path.string() + ": cannot be read"};
+  if (!file)
+    return Error{Errc::unreadable,
+                 path.string() + ": cannot be read; give a record that birdseye calibrate has written (--record)"};
   std::ostringstream text;
   text << file.rdbuf();
   auto record = calibration::parse_record(text.str());

@@ -9,13 +9,28 @@
 
 namespace birdseye::host {
 
+namespace {
+
+/// Before the work rather than after it.
+std::string folder_is_there(const std::string& file) {
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  std::error_code ignored;
+  if (std::filesystem::is_directory(folder, ignored)) return "";
+  return fmt::format("{}: there is no folder {}; make it first", file, folder.string());
+}
+
+}  // namespace
+
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record) {
-  command.add_option("--out", paths.out, out_help)->type_name("FILE");
-  command.add_option("--json", paths.json, "figures, verdict and reasons")->type_name("FILE");
+  command.add_option("--out", paths.out, out_help)->type_name("FILE")->check(folder_is_there);
+  command.add_option("--json", paths.json, "figures, verdict and reasons")->type_name("FILE")->check(folder_is_there);
   if (record)
     command.add_option("--record", paths.record, "the scope's calibration record, which gets this as an entry")
-        ->type_name("FILE");
-  command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")->type_name("FILE");
+        ->type_name("FILE")
+        ->check(folder_is_there);
+  command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
+      ->type_name("FILE")
+      ->check(folder_is_there);
 }
 
 void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, ReportPage page,

@@ -42,8 +42,10 @@ Result<std::vector<Phase>> parse_phases(const std::string& text) {
   return phases;
 }
 
-Result<std::vector<std::optional<std::size_t>>> divots_of(const std::vector<Phase>& phases,
-                                                          const std::vector<TimedPose>& poses) {
+Result<std::vector<std::optional<std::size_t>>> divots_of(const std::vector<Phase>& phases, const PoseSet& set) {
+  const std::vector<TimedPose>& poses = set.poses;
+  // Those at the end may be among the rejected.
+  const std::size_t count = std::max(poses.empty() ? 0 : poses.back().index + 1, poses.size() + set.rejected.size());
   std::vector<std::optional<std::size_t>> divots(poses.size());
   for (std::size_t k = 0; k < phases.size(); ++k) {
     bool any = false;
@@ -51,6 +53,10 @@ Result<std::vector<std::optional<std::size_t>>> divots_of(const std::vector<Phas
       if (poses[i].index < phases[k].first || poses[i].index > phases[k].last) continue;
       divots[i] = k;
       any = true;
+    }
+    if (phases[k].last >= count) {
+      return Error{Errc::bad_value, fmt::format("--phases: {}-{} goes beyond the {} poses, counted from 0",
+                                                phases[k].first, phases[k].last, count)};
     }
     if (!any) {
       return Error{Errc::bad_value,

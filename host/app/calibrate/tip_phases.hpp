@@ -16,8 +16,8 @@ struct Phase {
 /// "77-162,172-253". Refuses what is no such list, ends in the wrong order and phases that overlap, naming the phase.
 Result<std::vector<Phase>> parse_phases(const std::string& text);
 
-/// In which divot each pose was, from 0; none where it was between phases. Refuses a phase without poses.
-Result<std::vector<std::optional<std::size_t>>> divots_of(const std::vector<Phase>& phases,
-                                                          const std::vector<TimedPose>& poses);
+/// In which divot each pose was, from 0; none where it was between phases. Refuses a phase without poses or beyond
+/// them.
+Result<std::vector<std::optional<std::size_t>>> divots_of(const std::vector<Phase>& phases, const PoseSet& set);
 
 }  // namespace birdseye::host
