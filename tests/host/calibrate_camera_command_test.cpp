@@ -8,6 +8,7 @@
 #include "tests/support/board_views.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/drawn_scope.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -19,6 +20,7 @@ using testing::expect_refused;
 using testing::hd_lens;
 using testing::run;
 using testing::Scratch;
+using testing::small_lens;
 
 nlohmann::json read(const fs::path& path) {
   return nlohmann::json::parse(std::ifstream(path));
@@ -115,7 +117,36 @@ TEST(CalibrateCameraCommand, TwoCameras) {
   EXPECT_TRUE(fs::exists(scratch / "r.yaml") && fs::exists(scratch / "rl.txt"));
   right.pop_back();
   expect_refused("birdseye", common + " --right-points " + write_points(scratch, "fewer", right),
-                 {"12", "11", "pairs"});
+                 {"image_points.11.txt (left)", "pair by name"});
+}
+
+TEST(CalibrateCameraCommand, LeftAndRightPicturesPairByName) {
+  const Scratch scratch;
+  testing::DrawnScope scope(scratch.path());
+  const Transform<Camera, Camera> right_from_left(rotation_exp({0.004, -0.03, 0.01}), {-4.4, 0.05, 0.1});
+  const auto boards = scope.views(11);
+  const testing::BoardPainter lens(small_lens());
+  for (std::size_t i = 0; i < boards.size(); ++i) {
+    // One too dark on either side: what is left is as many, and not the same moments.
+    scope.paint("l/cam0_" + std::to_string(i + 1) + ".png", lens, boards[i], i == 2 ? 12 : 200);
+    scope.paint(std::string(i < 9 ? "r/cam1_00" : "r/cam1_0") + std::to_string(i + 1) + ".png", lens,
+                right_from_left * boards[i], i == 6 ? 12 : 200);
+  }
+  const std::string command = "calibrate camera --board " + scope.board() + " --images " + (scratch / "l").string() +
+                              " --right-images " + (scratch / "r").string() + " --json " +
+                              (scratch / "c.json").string();
+  const auto done = run("birdseye", command);
+  ASSERT_EQ(done.code, 0) << done.output;
+  const nlohmann::json json = read(scratch / "c.json");
+  EXPECT_EQ(json["stereo"]["pairs_used"], 9);
+  EXPECT_NEAR(json["stereo"]["baseline_mm"].get<double>(), right_from_left.translation().norm(), 0.15);
+  ASSERT_EQ(json["views_rejected"].size(), 1U);
+  EXPECT_EQ(json["views_rejected"][0]["name"], "cam0_3.png");
+  ASSERT_EQ(json["right"]["views_rejected"].size(), 1U);
+  EXPECT_EQ(json["right"]["views_rejected"][0]["name"], "cam1_007.png");
+
+  fs::rename(scratch / "r/cam1_004.png", scratch / "r/cam1_012.png");
+  expect_refused("birdseye", command, {"cam0_4.png (left)", "cam1_012.png (right)"});
 }
 
 TEST(CalibrateCameraCommand, WhatIsReadableAndNotWorthALensFails) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -9,6 +10,7 @@
 #include "host/app/calibrate/picture_views.hpp"
 #include "host/app/calibrate/point_files.hpp"
 #include "host/app/calibrate/results.hpp"
+#include "host/app/calibrate/view_pairs.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
@@ -131,15 +133,33 @@ void calibrate_one(const CameraOptions& options, const CameraCalibrationSettings
   finish_with(options, *found, camera_json(*found), std::move(page), judge_camera(*found), status);
 }
 
-/// Brings views that both pictures have of one number, by the order of the files.
+/// All views, pictures in which nothing was found among them, that their partners may be told.
+std::vector<PatternView> every_view(const CameraInput& input) {
+  std::vector<PatternView> views = input.views;
+  for (const RejectedView& rejected : input.rejected) views.emplace_back().name = rejected.name;
+  return views;
+}
+
+/// What was rejected as a picture is not told a second time, as a view without points.
+void tell_once(const CameraInput& input, CameraCalibration& found) {
+  std::erase_if(found.rejected, [&](const RejectedView& view) {
+    return std::any_of(input.rejected.begin(), input.rejected.end(),
+                       [&](const RejectedView& picture) { return picture.name == view.name; });
+  });
+  add_rejected(input, found);
+}
+
 void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings& settings, const CameraInput& left,
                    const CameraInput& right, CommandStatus& status) {
-  auto found = calibrate_stereo(left.views, right.views, {left.width_px, left.height_px},
+  const std::vector<PatternView> left_views = every_view(left);
+  std::vector<PatternView> right_views = every_view(right);
+  if (const auto sound = pair_by_name(left_views, right_views); !sound) return status.refuse(sound.error());
+  auto found = calibrate_stereo(left_views, right_views, {left.width_px, left.height_px},
                                 {right.width_px, right.height_px}, settings);
   if (!found && found.error().code == Errc::degenerate) return finish_without(options, found.error(), left, status);
   if (!found) return status.refuse(found.error());
-  add_rejected(left, found->left);
-  add_rejected(right, found->right);
+  tell_once(left, found->left);
+  tell_once(right, found->right);
   const Verdict verdict = judge_stereo(*found);
   ReportPage page("Stereo camera calibration");
   page.table({{"pair", ""},
@@ -186,9 +206,12 @@ void add_calibrate_camera(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("FOLDER");
   command->add_option("--size", options->size, "of the pictures that --points come from, as 1920x1080")
       ->type_name("WxH");
-  command->add_option("--right-images", options->right_images, "the right camera's, in the order of the left one's")
+  command
+      ->add_option("--right-images", options->right_images,
+                   "the right camera's, which pair with the left one's by name")
       ->type_name("PATH");
-  command->add_option("--right-points", options->right_points, "the right camera's points")->type_name("FOLDER");
+  command->add_option("--right-points", options->right_points, "the right camera's points, likewise")
+      ->type_name("FOLDER");
   command
       ->add_option("--model", options->model,
                    "auto, pinhole, radial1, radial2, radial2_tangential2 or radial3_tangential2")
