@@ -9,9 +9,11 @@
 #include "calibration/solve/pattern_view.hpp"
 #include "calibration/solve/tracked_chain.hpp"
 
-namespace birdseye::calibration {
+namespace birdseye {
+struct RightCamera;  ///< the other camera of a stereo scope, as Camera, which is the left one
+}  // namespace birdseye
 
-struct RightCamera;  ///< frame: the second lens of a stereo scope, as OpenCV's camera
+namespace birdseye::calibration {
 
 /// The second lens of a stereo scope.
 struct StereoLens {

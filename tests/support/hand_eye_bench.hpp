@@ -69,9 +69,8 @@ struct HandEyeBench {
       } else {
         s.view = corners(lens, view, scene);
         if (scene.stereo)
-          s.right_view =
-              corners(input.right->camera,
-                      Transform<Camera, calibration::RightCamera>{} * (input.right->right_from_camera * view), scene);
+          s.right_view = corners(input.right->camera,
+                                 Transform<Camera, RightCamera>{} * (input.right->right_from_camera * view), scene);
       }
       input.stations.push_back(std::move(s));
     }

@@ -26,6 +26,20 @@ struct Options {
   ResultPaths results;
 };
 
+Result<void> check_right(const HandEyeFiles& files) {
+  if (files.right_camera.empty() != files.right_from_left.empty())
+    return Error{Errc::bad_value, "give --right-camera and --right-from-left together"};
+  if (files.right_images.empty()) {
+    if (files.right_camera.empty()) return {};
+    return Error{Errc::bad_value, "--right-images is missing: which pictures are the right camera's?"};
+  }
+  if (files.images.empty()) return Error{Errc::bad_value, "--right-images goes with --images, the left camera's"};
+  if (files.camera.empty() == files.right_camera.empty()) return {};
+  return Error{Errc::bad_value,
+               "with --right-images give --camera, --right-camera and --right-from-left, or none of them: both lenses "
+               "are then calibrated from the pictures"};
+}
+
 Result<void> check(const Options& options) {
   const HandEyeFiles& files = options.files;
   const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.eye_poses.empty() ? 0 : 1);
@@ -34,6 +48,7 @@ Result<void> check(const Options& options) {
     return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
   if (!options.live && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
+  if (const auto sound = check_right(files); !sound) return sound;
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
     return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
   return {};
@@ -164,6 +179,13 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("PATH");
   command->add_option("--board-transform", files.board_transform, "which of a sequence's transforms that is");
   command->add_option("--camera", files.camera, "lens (OpenCV YAML); without it, calibrated from the pictures")
+      ->type_name("FILE");
+  command->add_option("--right-images", files.right_images, "the right camera's, which pair with --images by name")
+      ->type_name("PATH");
+  command->add_option("--right-camera", files.right_camera, "the right lens, as --camera")->type_name("FILE");
+  command
+      ->add_option("--right-from-left", files.right_from_left,
+                   "4x4 matrix, left to right camera, mm: with --right-camera")
       ->type_name("FILE");
   command
       ->add_option("--eye-poses", files.eye_poses,

@@ -177,6 +177,25 @@ void add_convergence(const HandEyeResult& r, ReportPage& page) {
 
 }  // namespace
 
+namespace {
+
+std::size_t right_views_used(const HandEyeResult& r, const HandEyeRecording& recording) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < r.stations.size(); ++i)
+    count += r.stations[i].used && recording.input.stations[i].right_view ? 1 : 0;
+  return count;
+}
+
+json right_json(const HandEyeResult& r, const HandEyeRecording& recording) {
+  const auto& right_from_left = recording.input.right->right_from_camera;
+  return {{"camera_from_sensor", rows_of((right_from_left * r.camera_from_sensor).matrix())},
+          {"right_from_left", rows_of(right_from_left.matrix())},
+          {"baseline_mm", right_from_left.translation().norm()},
+          {"views_used", right_views_used(r, recording)}};
+}
+
+}  // namespace
+
 json hand_eye_json(const HandEyeResult& r, const HandEyeRecording& recording) {
   json out{{"stations_used", r.observability.stations - r.outliers.size()},
            {"turns_deg", json_of(r.observability.turns_deg)},
@@ -189,6 +208,7 @@ json hand_eye_json(const HandEyeResult& r, const HandEyeRecording& recording) {
     out.update(solution_json(r));
     const bool moving = recording.input.stations.front().tracker_from_body.has_value();
     out[moving ? "board_from_marker" : "tracker_from_marker"] = rows_of(r.body_from_marker.matrix());
+    if (recording.input.right) out["right"] = right_json(r, recording);
   }
   if (recording.stream_correlation > 0) {
     out["clock_offset_ms"] = 1000 * (recording.stream_offset_s + r.time_offset_s.value_or(0));
@@ -207,6 +227,9 @@ ReportPage hand_eye_page(const HandEyeResult& r, const HandEyeRecording& recordi
         "({:.2f}, {:.2f}, {:.2f}) mm; sigma of the rotation ({:.3f}, {:.3f}, {:.3f}) degrees.",
         t.x(), t.y(), t.z(), r.translation_sigma_mm().x(), r.translation_sigma_mm().y(), r.translation_sigma_mm().z(),
         r.rotation_sigma_deg().x(), r.rotation_sigma_deg().y(), r.rotation_sigma_deg().z()));
+    if (const auto& right = recording.input.right)
+      page.paragraph(fmt::format("A stereo scope: {} of the stations hold the right camera's view too, {:.2f} mm away.",
+                                 right_views_used(r, recording), right->right_from_camera.translation().norm()));
     add_pictures(r, recording, page);
   }
   page.heading("Stations");
