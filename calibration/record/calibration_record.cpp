@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibration/base/units.hpp"
+#include "calibration/geometry/rod.hpp"
 #include "calibration/record/checksum.hpp"
 
 namespace birdseye::calibration {
@@ -96,6 +100,31 @@ LensEntry lens_of(const Json& json) {
   return lens;
 }
 
+Json json_of(const Eigen::Vector3d& v) {
+  return {v.x(), v.y(), v.z()};
+}
+Eigen::Vector3d vector_of(const Json& json) {
+  const auto v = json.get<std::array<double, 3>>();
+  return {v[0], v[1], v[2]};
+}
+
+Json json_of(const RodEntry& rod) {
+  return {{"reference_angle_deg", rod.reference_angle_deg},
+          {"axis_in_sensor", json_of(rod.axis_in_sensor)},
+          {"axis_point_in_sensor_mm", json_of(rod.axis_point_in_sensor_mm)},
+          {"picture_turn", rod.picture_turn}};
+}
+RodEntry rod_of(const Json& json) {
+  RodEntry rod;
+  json.at("reference_angle_deg").get_to(rod.reference_angle_deg);
+  rod.axis_in_sensor = vector_of(json.at("axis_in_sensor"));
+  rod.axis_point_in_sensor_mm = vector_of(json.at("axis_point_in_sensor_mm"));
+  json.at("picture_turn").get_to(rod.picture_turn);
+  if (!(std::abs(rod.axis_in_sensor.norm() - 1) < 1e-6))
+    throw std::range_error("a rod whose axis is not of unit length");
+  return rod;
+}
+
 Json json_of(const HandEyeEntry& hand_eye) {
   Json json = json_of(hand_eye.provenance);
   json["camera_from_sensor"] = rows_of(hand_eye.camera_from_sensor.matrix());
@@ -103,6 +132,7 @@ Json json_of(const HandEyeEntry& hand_eye) {
   json["rms_px"] = hand_eye.rms_px;
   json["held_out_px"] = hand_eye.held_out_px;
   json["held_out_mm"] = hand_eye.held_out_mm;
+  if (hand_eye.rod) json["rod"] = json_of(*hand_eye.rod);
   return json;
 }
 HandEyeEntry hand_eye_of(const Json& json) {
@@ -118,12 +148,13 @@ HandEyeEntry hand_eye_of(const Json& json) {
   json.at("rms_px").get_to(hand_eye.rms_px);
   json.at("held_out_px").get_to(hand_eye.held_out_px);
   json.at("held_out_mm").get_to(hand_eye.held_out_mm);
+  if (json.contains("rod")) hand_eye.rod = rod_of(json.at("rod"));
   return hand_eye;
 }
 
 Json json_of(const TipEntry& tip) {
   Json json = json_of(tip.provenance);
-  json["tip_in_sensor_mm"] = {tip.tip_in_sensor_mm.x(), tip.tip_in_sensor_mm.y(), tip.tip_in_sensor_mm.z()};
+  json["tip_in_sensor_mm"] = json_of(tip.tip_in_sensor_mm);
   json["covariance_mm2"] = rows_of(tip.covariance_mm2);
   json["rms_mm"] = tip.rms_mm;
   return json;
@@ -131,8 +162,7 @@ Json json_of(const TipEntry& tip) {
 TipEntry tip_of(const Json& json) {
   TipEntry tip;
   tip.provenance = provenance_of(json);
-  const auto place = json.at("tip_in_sensor_mm").get<std::array<double, 3>>();
-  tip.tip_in_sensor_mm = {place[0], place[1], place[2]};
+  tip.tip_in_sensor_mm = vector_of(json.at("tip_in_sensor_mm"));
   tip.covariance_mm2 = covariance_of<Eigen::Matrix3d>(json.at("covariance_mm2"));
   json.at("rms_mm").get_to(tip.rms_mm);
   return tip;
@@ -167,6 +197,12 @@ CalibrationRecord record_of(const Json& json) {
 }
 
 }  // namespace
+
+std::optional<Transform<Camera, Sensor>> HandEyeEntry::camera_from_sensor_at(double rod_angle_deg) const {
+  if (!rod) return std::nullopt;
+  const RodScope scope{camera_from_sensor, rod->axis_in_sensor, rod->axis_point_in_sensor_mm, rod->picture_turn};
+  return scope.camera_from_sensor((rod_angle_deg - rod->reference_angle_deg) * kRadPerDeg);
+}
 
 bool CalibrationRecord::set_lens(LensEntry entry) {
   const bool other = !lens || !(lens->camera == entry.camera);

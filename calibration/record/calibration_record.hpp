@@ -33,11 +33,22 @@ struct LensEntry {
   std::optional<double> rod_angle_deg;  ///< of an oblique scope, against the camera head
 };
 
+/// How the rod of an oblique scope turns in the camera head: the model of RodScope. Angles as the person read them off.
+struct RodEntry {
+  double reference_angle_deg = 0;  ///< at which camera_from_sensor holds
+  Eigen::Vector3d axis_in_sensor{0, 0, 1}, axis_point_in_sensor_mm{0, 0, 0};
+  double picture_turn = 1;
+};
+
 struct HandEyeEntry {
   Provenance provenance;
-  Transform<Camera, Sensor> camera_from_sensor;
-  Eigen::Matrix<double, 6, 6> covariance;  ///< as the solver states it: rotation vector (rad), translation (mm)
+  Transform<Camera, Sensor> camera_from_sensor;  ///< with the rod, where there is one, at its reference angle
+  Eigen::Matrix<double, 6, 6> covariance;        ///< as the solver states it: rotation vector (rad), translation (mm)
   double rms_px = 0, held_out_px = 0, held_out_mm = 0;
+  std::optional<RodEntry> rod;  ///< none: camera_from_sensor holds at the one angle at which it was made
+
+  /// With the rod at another angle. Empty without a rod.
+  [[nodiscard]] std::optional<Transform<Camera, Sensor>> camera_from_sensor_at(double rod_angle_deg) const;
 };
 
 struct TipEntry {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "calibration/base/units.hpp"
+#include "calibration/geometry/rod.hpp"
 #include "tests/support/example_record.hpp"
 
 namespace birdseye::calibration {
@@ -22,6 +24,23 @@ TEST(CalibrationRecord, IsReadBackExactly) {
   EXPECT_EQ(read->tip->tip_in_sensor_mm, example().tip->tip_in_sensor_mm);
   EXPECT_EQ(read->latency->ci95_low_ms, 82.6);
   EXPECT_EQ(read->lens->provenance.grade, Grade::marginal);
+}
+
+TEST(CalibrationRecord, ARodTellsHandEyeAtOtherAngles) {
+  const auto read = parse_record(record_text(example()));
+  ASSERT_TRUE(read && read->hand_eye && read->hand_eye->rod);
+  const HandEyeEntry& entry = *read->hand_eye;
+  const auto at = [&](double deg) { return *entry.camera_from_sensor_at(deg); };
+  EXPECT_TRUE(at(30).matrix().isApprox(entry.camera_from_sensor.matrix(), 1e-12));
+  const RodScope scope{entry.camera_from_sensor, entry.rod->axis_in_sensor, entry.rod->axis_point_in_sensor_mm, 1};
+  EXPECT_TRUE(at(75).matrix().isApprox(scope.camera_from_sensor(45 * kRadPerDeg).matrix(), 1e-12));
+  EXPECT_GT(rotation_angle_between(at(75).rotation(), entry.camera_from_sensor.rotation()), 0.1);
+  // The rod's axis stays where it is, whatever the angle: its points are as far from the camera as they were.
+  const Eigen::Vector3d on_axis = entry.rod->axis_point_in_sensor_mm + 70 * entry.rod->axis_in_sensor;
+  EXPECT_NEAR((at(75) * on_axis).norm(), (entry.camera_from_sensor * on_axis).norm(), 1e-9);
+  HandEyeEntry without = entry;
+  without.rod.reset();
+  EXPECT_FALSE(without.camera_from_sensor_at(75));
 }
 
 TEST(CalibrationRecord, MayBeLaidOutAnewButNotChanged) {
@@ -73,6 +92,7 @@ TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {
   refused([](auto& r) { r.lens->camera.fx_px = -1; }, "focal");
   refused([](auto& r) { r.hand_eye->covariance(2, 2) = -1; }, "covariance");
   refused([](auto& r) { r.hand_eye->covariance(0, 1) = 5; }, "covariance");
+  refused([](auto& r) { r.hand_eye->rod->axis_in_sensor *= 2; }, "unit length");
   refused([](auto& r) { r.tip->provenance.grade = Grade::fail; }, "fail");
   refused([](auto& r) { r.lens->camera.k1 = std::numeric_limits<double>::quiet_NaN(); }, "null");
 }

@@ -6,9 +6,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "calibration/geometry/rod.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/drawn_scope.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -114,6 +116,96 @@ TEST(CalibrateHandEyeCommand, WhatDoesNotMakeAPairIsRefused) {
   expect_refused("birdseye", start + "--images . --right-camera x.yml --right-from-left y.txt",
                  {"--right-images is missing"});
   expect_refused("birdseye", start + "--live --right-images .", {"--right-images goes with --images"});
+}
+
+/// A 30 degree scope: its rod runs along the sensor's z, 12 mm beside it, and the camera sits 300 mm down.
+RodScope oblique_scope() {
+  RodScope scope;
+  scope.axis_in_sensor = Eigen::Vector3d(0.02, -0.01, 1).normalized();
+  scope.axis_point_in_sensor_mm = {12, -3, 0};
+  const Eigen::Matrix3d onto =
+      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(0, 0, 1), scope.axis_in_sensor).toRotationMatrix();
+  const Transform<Sensor, Camera> pose(Eigen::Matrix3d(onto * rotation_exp({30 * kRadPerDeg, 0, 0})),
+                                       Eigen::Vector3d(scope.axis_point_in_sensor_mm + 300 * scope.axis_in_sensor));
+  scope.camera_from_sensor_at_zero = pose.inverse();
+  return scope;
+}
+
+/// Stations of it at two angles of the rod, the first ones at 20 degrees: images/view1.png .., poses/1.txt .., the
+/// lens.
+struct DrawnRod {
+  static constexpr int kFirst = 11, kSecond = 10;
+  const Scratch scratch;
+  const RodScope truth = oblique_scope();
+  std::string command;
+
+  DrawnRod() {
+    DrawnScope scope(scratch.path());
+    const auto views = scope.views(kFirst + kSecond);
+    const BoardPainter lens(small_lens());
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const std::string number = std::to_string(i + 1);
+      scope.paint("images/view" + number + ".png", lens, views[i]);
+      scope.write_pose("poses/" + number + ".txt", views[i],
+                       truth.camera_from_sensor((i < kFirst ? 20 : 110) * kRadPerDeg));
+    }
+    scope.write_lens("lens.yml", small_lens());
+    command = "calibrate hand-eye --board " + scope.board() + " --poses " + (scratch / "poses").string() +
+              " --images " + (scratch / "images").string() + " --camera " + (scratch / "lens.yml").string() +
+              " --json " + (scratch / "x.json").string();
+  }
+  /// The option, with a file that states these angles, and last a line as given.
+  [[nodiscard]] std::string angles(double first_deg, double second_deg, const std::string& line = {}) const {
+    std::string text = "name,angle_deg\n";
+    for (int i = 0; i < kFirst + kSecond; ++i)
+      text += "view" + std::to_string(i + 1) + (i % 2 == 0 ? ".png" : "") + ", " +
+              std::to_string(i < kFirst ? first_deg : second_deg) + "\n";
+    return " --rod-angles " + scratch.file("angles.csv", text + line);
+  }
+};
+
+TEST(CalibrateHandEyeCommand, ARodTurnedByKnownAnglesGivesItsAxis) {
+  const DrawnRod drawn;
+  calibration::CalibrationRecord before = testing::example_record(640, 400, {}, {});
+  before.lens->camera = small_lens();
+  before.hand_eye.reset();
+  const std::string record = drawn.scratch.file("record.json", record_text(before));
+  const auto done = run("birdseye", drawn.command + drawn.angles(20, 110) + " --record " + record + " --report " +
+                                        (drawn.scratch / "x.html").string());
+  ASSERT_EQ(done.code, 0) << done.output;
+  const auto json = read(drawn.scratch / "x.json");
+  EXPECT_EQ(json["rod"]["reference_angle_deg"], 20);
+  EXPECT_EQ(json["rod"]["picture_turn"], 1);
+  EXPECT_EQ(json["rod"]["angles"].size(), 2U);
+  EXPECT_EQ(json["stations"].size(), static_cast<std::size_t>(DrawnRod::kFirst));
+  expect_near(json["camera_from_sensor"], drawn.truth.camera_from_sensor(20 * kRadPerDeg), 0.5, 0.1);
+  EXPECT_THAT(testing::contents_of(drawn.scratch / "x.html"), HasSubstr("The rod"));
+  // Whoever reads the record knows where the camera is at angles that were not calibrated.
+  const auto after = calibration::parse_record(testing::contents_of(record));
+  ASSERT_TRUE(after && after->hand_eye && after->hand_eye->rod);
+  for (const double deg : {20.0, 65.0, 110.0, 150.0}) {
+    const auto found = *after->hand_eye->camera_from_sensor_at(deg);
+    const auto truth = drawn.truth.camera_from_sensor(deg * kRadPerDeg);
+    EXPECT_LT((found.inverse().translation() - truth.inverse().translation()).norm(), 1) << deg;
+    EXPECT_LT(rotation_angle_between(found.rotation(), truth.rotation()) * kDegPerRad, 0.2) << deg;
+  }
+}
+
+TEST(CalibrateHandEyeCommand, AnglesOfTheRodThatAreWrongDoNotPass) {
+  const DrawnRod drawn;
+  const auto wrong = run("birdseye", drawn.command + drawn.angles(20, 80));
+  EXPECT_EQ(wrong.code, 3) << wrong.output;
+  EXPECT_THAT(wrong.output, HasSubstr("turned wrongly by"));
+  const auto one = run("birdseye", drawn.command + drawn.angles(20, 25));
+  EXPECT_EQ(one.code, 3) << one.output;
+  EXPECT_THAT(one.output, HasSubstr("at least 20 degrees apart"));
+  expect_refused("birdseye", drawn.command + drawn.angles(20, 110, "view99,20\n"), {"view99"});
+  expect_refused("birdseye", drawn.command + drawn.angles(20, 110, "view1,20,30\n"), {"view1,20 is none"});
+  expect_refused("birdseye", drawn.command + drawn.angles(20, 110, "view1.png,20\n"),
+                 {"angles.csv:23", "second angle"});
+  expect_refused("birdseye", drawn.command + drawn.angles(20, 110, "view1;20\n"), {"angles.csv:23"});
+  expect_refused("birdseye", drawn.command + " --rod-angles " + drawn.scratch.file("few.csv", "view1,20\n"),
+                 {"no angle for view2.png"});
 }
 
 TEST(CalibrateHandEyeCommand, PairsTwoStreamsOfPoses) {

@@ -9,6 +9,7 @@
 #include "host/app/calibrate/commands.hpp"
 #include "host/app/calibrate/hand_eye_files.hpp"
 #include "host/app/calibrate/hand_eye_report.hpp"
+#include "host/app/calibrate/hand_eye_rod.hpp"
 #include "host/app/calibrate/live_hand_eye.hpp"
 #include "host/app/calibrate/results.hpp"
 #include "host/app/text_files.hpp"
@@ -19,6 +20,7 @@ namespace {
 
 struct Options {
   HandEyeFiles files;
+  std::filesystem::path rod_angles;
   bool live = false;
   LivePlan plan;
   std::string unit = "mm";
@@ -49,6 +51,8 @@ Result<void> check(const Options& options) {
   if (!options.live && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
   if (const auto sound = check_right(files); !sound) return sound;
+  if (!options.rod_angles.empty() && files.images.empty())
+    return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
     return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
   return {};
@@ -104,9 +108,53 @@ Result<HandEyeRecording> record_live(const Options& options) {
   return out;
 }
 
+/// What is found from a recording, and what to think of it.
+struct Found {
+  calibration::HandEyeResult result;
+  std::optional<RodCalibration> rod;
+  Verdict verdict;
+};
+
+/// With a rod, recording keeps the stations of its reference angle, of which the result is.
+Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Found& out) {
+  auto rod = calibrate_rod(recording, angles);
+  if (!rod) return rod.error();
+  recording.input.stations = rod->at_reference().stations;
+  out.result = rod->at_reference().result;
+  out.verdict = rod->at_reference().verdict;
+  judge_rod(*rod, out.verdict);
+  recording.notes.push_back(
+      fmt::format("camera_from_sensor holds with the rod at {:g} degrees", rod->at_reference().angle_deg));
+  out.rod = *std::move(rod);
+  return {};
+}
+
+Result<Found> solve(const Options& options, const RodAngles& angles, HandEyeRecording& recording) {
+  Found out;
+  if (recording.input.stations.empty() || (options.files.eye_poses.empty() && !recording.input.camera)) {
+    out.verdict = recording.camera_verdict;
+    if (out.verdict.grade != Grade::fail)
+      out.verdict.add(Grade::fail, "no picture shows the board together with a pose",
+                      "see that --board names the pattern in the pictures");
+    return out;
+  }
+  if (!angles.empty()) {
+    if (const auto solved = solve_rod(angles, recording, out); !solved) return solved.error();
+  } else {
+    auto solved = calibration::calibrate_hand_eye(recording.input);
+    if (!solved) return solved.error();
+    out.result = *std::move(solved);
+    out.verdict = calibration::judge(out.result);
+  }
+  if (const Grade lens = recording.camera_verdict.grade; lens != Grade::pass) {
+    out.verdict.add(lens, fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens)),
+                    "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
+  }
+  return out;
+}
+
 /// Hand-eye, and the lens it was found with where that is new.
-RecordEntry entry_of(const Options& options, const HandEyeRecording& recording,
-                     const calibration::HandEyeResult& result) {
+RecordEntry entry_of(const Options& options, const HandEyeRecording& recording, const Found& found) {
   const std::string what =
       options.files.board.empty() ? options.files.eye_poses.filename().string() : options.files.board;
   return {fmt::format("{}, {} stations", what, recording.input.stations.size()),
@@ -116,9 +164,33 @@ RecordEntry entry_of(const Options& options, const HandEyeRecording& recording,
               enter_lens(record, {provenance, lens->camera, name_of(lens->model), lens->covariance, lens->rms_px,
                                   lens->held_out_px, std::nullopt});
             }
-            record.hand_eye = calibration::HandEyeEntry{provenance,    result.camera_from_sensor, result.covariance,
-                                                        result.rms_px, result.held_out_px,        result.held_out_mm};
+            const calibration::HandEyeResult& r = found.result;
+            record.hand_eye = calibration::HandEyeEntry{provenance,    r.camera_from_sensor, r.covariance, r.rms_px,
+                                                        r.held_out_px, r.held_out_mm,        std::nullopt};
+            if (found.rod && found.rod->scope) {
+              const RodScope& rod = *found.rod->scope;
+              record.hand_eye->rod = calibration::RodEntry{found.rod->at_reference().angle_deg, rod.axis_in_sensor,
+                                                           rod.axis_point_in_sensor_mm, rod.picture_turn};
+            }
           }};
+}
+
+void finish(const Options& options, const HandEyeRecording& recording, const Found& found, CommandStatus& status) {
+  const calibration::HandEyeResult& result = found.result;
+  for (const std::string& note : recording.notes) fmt::print("{}\n", note);
+  if (recording.stream_correlation > 0 && result.solved) {
+    const double late_ms = -1000 * (recording.stream_offset_s + result.time_offset_s.value_or(0));
+    fmt::print("the times of the pictures are {:.1f} +- {:.1f} ms too {} against those of the poses\n",
+               std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
+  }
+  nlohmann::json json = hand_eye_json(result, recording);
+  ReportPage page = hand_eye_page(result, recording);
+  if (found.rod) {
+    json["rod"] = rod_json(*found.rod);
+    add_rod_to(page, *found.rod);
+  }
+  finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
+                     std::move(json), std::move(page), found.verdict, status, entry_of(options, recording, found));
 }
 
 void run(Options& options, CommandStatus& status) {
@@ -130,39 +202,20 @@ void run(Options& options, CommandStatus& status) {
     const auto fits = check_bound_record(options.results.record, options.plan.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
   }
+  RodAngles angles;
+  if (!options.rod_angles.empty()) {
+    auto read = read_rod_angles(options.rod_angles);
+    if (!read) return status.refuse(read.error());
+    angles = *std::move(read);
+  }
   auto recording = options.live ? record_live(options) : read_hand_eye_stations(files);
   if (!recording) return status.refuse(recording.error());
   if (options.position_sigma_mm > 0)
     recording->input.tracker_noise =
         calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
-  calibration::HandEyeResult result;
-  Verdict verdict;
-  if (recording->input.stations.empty() || (files.eye_poses.empty() && !recording->input.camera)) {
-    verdict = recording->camera_verdict;
-    if (verdict.grade != Grade::fail)
-      verdict.add(Grade::fail, "no picture shows the board together with a pose",
-                  "see that --board names the pattern in the pictures");
-  } else {
-    auto solved = calibration::calibrate_hand_eye(recording->input);
-    if (!solved) return status.refuse(solved.error());
-    result = *std::move(solved);
-    verdict = calibration::judge(result);
-  }
-  const Verdict& lens = recording->camera_verdict;
-  if (lens.grade != Grade::pass && recording->input.camera) {
-    verdict.add(lens.grade,
-                fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens.grade)),
-                "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
-  }
-  for (const std::string& note : recording->notes) fmt::print("{}\n", note);
-  if (recording->stream_correlation > 0 && result.solved) {
-    const double late_ms = -1000 * (recording->stream_offset_s + result.time_offset_s.value_or(0));
-    fmt::print("the times of the pictures are {:.1f} +- {:.1f} ms too {} against those of the poses\n",
-               std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
-  }
-  finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
-                     hand_eye_json(result, *recording), hand_eye_page(result, *recording), verdict, status,
-                     entry_of(options, *recording, result));
+  const auto found = solve(options, angles, *recording);
+  if (!found) return status.refuse(found.error());
+  finish(options, *recording, *found, status);
 }
 
 }  // namespace
@@ -196,6 +249,10 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->check(CLI::PositiveNumber);
   command->add_option("--angle-sigma", options->angle_sigma_deg, "the tracker's noise per axis, degrees")
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--rod-angles", options->rod_angles,
+                   "of an oblique scope: at what its rod stood, as lines of picture,degrees")
+      ->type_name("FILE");
   command->add_flag("--live", options->live, "be guided, with an appliance that runs, in place of files");
   LivePlan& plan = options->plan;
   command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")

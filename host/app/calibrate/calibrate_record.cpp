@@ -54,7 +54,9 @@ void show(const CalibrationRecord& record) {
   if (const auto& hand_eye = record.hand_eye) {
     const Eigen::Vector3d t = hand_eye->camera_from_sensor.translation();
     show("hand-eye", hand_eye->provenance,
-         fmt::format("at ({:.1f}, {:.1f}, {:.1f}) mm, held-out {:.2f} mm", t.x(), t.y(), t.z(), hand_eye->held_out_mm));
+         fmt::format(
+             "at ({:.1f}, {:.1f}, {:.1f}) mm, held-out {:.2f} mm{}", t.x(), t.y(), t.z(), hand_eye->held_out_mm,
+             hand_eye->rod ? fmt::format(", rod at {:g} deg, may turn", hand_eye->rod->reference_angle_deg) : ""));
   }
   if (const auto& tip = record.tip) {
     const Eigen::Vector3d& t = tip->tip_in_sensor_mm;

@@ -28,6 +28,7 @@ struct HandEyeFiles {
 struct HandEyeRecording {
   calibration::HandEyeInput input;
   std::vector<std::string> notes;
+  std::vector<std::string> pictures;                   ///< names of all that were read, used or not
   std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images; of a stereo scope, the left
   Verdict camera_verdict;                              ///< on that
   double stream_offset_s = 0;     ///< of two streams' clocks, found from their motion; the solver's adds to it

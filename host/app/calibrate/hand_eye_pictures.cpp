@@ -105,6 +105,7 @@ Result<void> read_hand_eye_pictures(const HandEyeFiles& files, HandEyeRecording&
     HandEyeStation& s = out.input.stations.emplace_back();
     s.name = left[i].name;
     s.view = left[i];
+    out.pictures.push_back(s.name);
     if (right && !right->views[i].points_px.empty()) s.right_view = right->views[i];
   }
   if (pictures->used.empty()) return {};  // the solver says that too few are left
