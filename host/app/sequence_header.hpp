@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+// What PLUS calls the fields of a sequence and of its frames. A transform's field is its name, as "StylusToTracker",
+// with these at the end.
+inline constexpr std::string_view kTransformField = "Transform";
+inline constexpr std::string_view kTransformStatusField = "TransformStatus";
+inline constexpr std::string_view kTimestampField = "Timestamp";                      ///< s
+inline constexpr std::string_view kUnfilteredTimestampField = "UnfilteredTimestamp";  ///< s, as it arrived
+inline constexpr std::string_view kImageStatusField = "ImageStatus";
+inline constexpr std::string_view kFrameNumberField = "FrameNumber";
+inline constexpr std::string_view kStatusOk = "OK", kStatusInvalid = "INVALID";
+
+/// The header of a PLUS sequence: MetaImage (.igs.mha, .igs.mhd) or NRRD.
+struct SequenceHeader {
+  using Fields = std::map<std::string, std::string, std::less<>>;
+  Fields fields;                         ///< of the whole, as DimSize
+  std::map<std::size_t, Fields> frames;  ///< by number: what Seq_Frame0007_... says, as "StylusToTrackerTransform"
+  std::set<std::string> transforms;      ///< that any frame has, without "Transform" at the end
+  bool whole = false;                    ///< it came to its end, where it says where the pixels are
+  std::uint64_t data_offset = 0;         ///< from where on the file holds what comes after it
+};
+
+/// Refuses, naming the file, what is not there or cannot be opened. Whatever holds no such field is an empty header.
+Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path);
+
+std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key);
+
+}  // namespace birdseye::host
