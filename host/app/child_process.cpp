@@ -28,7 +28,7 @@ int remaining_ms(Clock::time_point deadline) {
 }  // namespace
 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, const std::filesystem::path& log,
-                                         Pipe pipe) {
+                                         Pipe pipe, Signals signals) {
   int fds[2] = {-1, -1};
   if (pipe != Pipe::none && ::pipe2(fds, O_CLOEXEC) != 0) return Error{Errc::io, "pipe: no descriptors left", errno};
   const bool child_writes = pipe == Pipe::stdout_from_child;
@@ -55,8 +55,12 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  if (signals == Signals::ours_alone) posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t pid = -1;
-  const int failed = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
+  const int failed = posix_spawnp(&pid, argv[0], &actions, &attributes, argv.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (theirs >= 0) ::close(theirs);
   if (failed != 0) {
@@ -120,6 +124,23 @@ Result<std::optional<std::string>> ChildProcess::read_line(Clock::time_point dea
       return Error{Errc::disconnected, fmt::format("{}: ended early; its log says why", name_)};
     }
   }
+}
+
+Result<std::size_t> ChildProcess::read(void* bytes, std::size_t size, Clock::time_point deadline) {
+  std::size_t have = 0;
+  while (have < size) {
+    pollfd entry{fd_, POLLIN, 0};
+    const int ready = ::poll(&entry, 1, remaining_ms(deadline));
+    if (ready == 0 && Clock::now() >= deadline) return Error{Errc::timeout, fmt::format("{}: gives nothing", name_)};
+    if (ready <= 0) continue;
+    const ssize_t got = ::read(fd_, static_cast<char*>(bytes) + have, size - have);
+    if (got > 0) {
+      have += static_cast<std::size_t>(got);
+    } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
+      break;
+    }
+  }
+  return have;
 }
 
 Result<void> ChildProcess::write(const void* bytes, std::size_t size, Clock::time_point deadline) {

@@ -16,16 +16,20 @@ namespace birdseye::host {
 class ChildProcess {
  public:
   enum class Pipe { none, stdin_to_child, stdout_from_child };
+  /// Whether Ctrl-C in our terminal ends the child too, or leaves it to us to let it finish.
+  enum class Signals { with_us, ours_alone };
 
   /// command: program and arguments; its standard error goes to log (appended).
   static Result<ChildProcess> start(const std::vector<std::string>& command, const std::filesystem::path& log,
-                                    Pipe pipe = Pipe::none);
+                                    Pipe pipe = Pipe::none, Signals signals = Signals::with_us);
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
 
   /// The next whole line of the child's standard output; empty at the deadline; Errc::disconnected at its end.
   Result<std::optional<std::string>> read_line(std::chrono::steady_clock::time_point deadline);
+  /// So many bytes of the child's standard output, or fewer at its end. Errc::timeout at the deadline.
+  Result<std::size_t> read(void* bytes, std::size_t size, std::chrono::steady_clock::time_point deadline);
   /// All of bytes to the child's standard input, or why not.
   Result<void> write(const void* bytes, std::size_t size, std::chrono::steady_clock::time_point deadline);
   void close_input();

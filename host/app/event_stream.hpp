@@ -9,17 +9,18 @@
 #include <thread>
 
 #include "device/wire/client.hpp"
+#include "host/app/event_source.hpp"
 
 namespace birdseye::host {
 
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
 /// past most_frames waiting, the oldest frame is dropped; the frames' own sequence numbers show the gap.
-class EventStream {
+class EventStream : public EventSource {
  public:
   EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames);
 
   /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
-  Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline);
+  Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline) override;
 
  private:
   void read(const std::stop_token& stop);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "host/app/child_process.hpp"
@@ -29,6 +30,25 @@ class Film {
   std::filesystem::path path_;
   std::filesystem::path temporary_;
   std::size_t frame_bytes_;
+};
+
+/// The frames of such a film, decoded by the ffmpeg program, in order.
+class FilmReader {
+ public:
+  static Result<FilmReader> open(const std::filesystem::path& path, int width_px, int height_px);
+
+  /// RGB, rows from the top; what comes before it is passed over. An error at the film's end, or where the index has
+  /// been read already.
+  Result<std::vector<std::uint8_t>> read(std::size_t index);
+
+ private:
+  FilmReader(ChildProcess decoder, std::filesystem::path path, std::size_t frame_bytes)
+      : decoder_(std::move(decoder)), path_(std::move(path)), frame_bytes_(frame_bytes) {}
+
+  ChildProcess decoder_;
+  std::filesystem::path path_;
+  std::size_t frame_bytes_;
+  std::size_t next_ = 0;
 };
 
 }  // namespace birdseye::host

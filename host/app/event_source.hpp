@@ -1,0 +1,19 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "calibration/base/result.hpp"
+#include "device/wire/messages.hpp"
+
+namespace birdseye::host {
+
+/// Where a session's events come from, in order: an appliance that runs (EventStream), or a recording.
+class EventSource {
+ public:
+  virtual ~EventSource() = default;
+  /// The next event; empty at the deadline; Errc::disconnected once it is at its end and all events are taken.
+  virtual Result<std::optional<wire::Event>> next(std::chrono::steady_clock::time_point deadline) = 0;
+};
+
+}  // namespace birdseye::host
