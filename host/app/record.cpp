@@ -1,0 +1,142 @@
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "calibration/base/verdict.hpp"
+#include "host/app/appliance_link.hpp"
+#include "host/app/commands.hpp"
+#include "host/app/event_stream.hpp"
+#include "host/app/interrupt.hpp"
+#include "host/app/progress.hpp"
+#include "host/app/recording/recording_writer.hpp"
+#include "host/app/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// Two seconds of 60 Hz for a disk that halts, of which the oldest go first.
+constexpr std::size_t kMostFramesWaiting = 120;
+constexpr auto kSilence = std::chrono::seconds(15);
+/// What the last lines and the sheet need, and other programs.
+constexpr std::uintmax_t kSpareBytes = std::uintmax_t{32} << 20U;
+
+struct Options {
+  std::string server, video = "raw";
+  fs::path out, json;
+  double seconds = 0;
+  bool pair = false;
+};
+
+/// How a recording ended.
+struct Ending {
+  std::string why;
+  bool asked_for = false;  ///< by --seconds or by a signal
+};
+
+/// Until there is a reason to end.
+Ending record(EventStream& stream, RecordingWriter& writer, const Options& options, Progress& progress) {
+  auto heard = Clock::now();
+  while (!interrupted()) {
+    const RecordingFigures& figures = writer.figures();
+    if (options.seconds > 0 && figures.seconds() >= options.seconds)
+      return {fmt::format("{:g} s are over", options.seconds), true};
+    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    if (!event) return {event.error().what};
+    if (!*event) {
+      if (Clock::now() - heard > kSilence)
+        return {fmt::format("{} sent neither frames nor poses for {} s; is it a birdseyed, and do its instruments run?",
+                            options.server, kSilence / std::chrono::seconds(1))};
+      continue;
+    }
+    const bool frame = std::holds_alternative<wire::VideoFrame>(**event);
+    if (frame || std::holds_alternative<wire::Birds>(**event)) heard = Clock::now();
+    std::error_code unknown;
+    if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
+      return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};
+    if (auto added = writer.add(**event); !added) return {added.error().what};
+    progress(fmt::format("{:.0f} s, {} frames, {} poses", figures.seconds(), figures.frames, figures.measurements));
+  }
+  return {"it was interrupted", true};
+}
+
+Verdict judge(const RecordingWriter& writer, const Ending& ending, bool finished) {
+  const RecordingFigures& figures = writer.figures();
+  Verdict verdict;
+  const bool none = figures.frames == 0 && figures.measurements == 0;
+  verdict.add(none ? Grade::fail : ending.asked_for ? Grade::pass : Grade::marginal, "ended because " + ending.why);
+  if (!finished) verdict.add(Grade::marginal, "not all of its files could be completed");
+  if (none) return verdict;
+  if (figures.frames == 0) verdict.add(Grade::marginal, "no frames came");
+  if (figures.measurements == 0) verdict.add(Grade::marginal, "no poses came");
+  const double all = static_cast<double>(figures.frames) + static_cast<double>(figures.frames_missing);
+  if (figures.frames_missing > 0) {
+    verdict.add(100 * static_cast<double>(figures.frames_missing) > all ? Grade::marginal : Grade::pass,
+                fmt::format("{} of {:.0f} frames are missing", figures.frames_missing, all));
+  }
+  for (const std::string& note : writer.notes()) verdict.add(Grade::marginal, note);
+  return verdict;
+}
+
+nlohmann::json json_of(const RecordingFigures& figures, const Verdict& verdict) {
+  return {
+      {"seconds", figures.seconds()},         {"frames", figures.frames},  {"frames_missing", figures.frames_missing},
+      {"measurements", figures.measurements}, {"events", figures.events},  {"poses", figures.poses},
+      {"verdict", name_of(verdict.grade)},    {"reasons", verdict.reasons}};
+}
+
+Result<ExitCode> run(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  note_interrupts();
+  ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
+  ::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is told as a full disk is
+  auto client = connect_appliance(options.server);
+  if (!client) return client.error();
+  auto writer = RecordingWriter::create({.folder = options.out,
+                                         .source = options.server,
+                                         .compressed = options.video == "compressed",
+                                         .pair = options.pair});
+  if (!writer) return writer.error();
+  Progress progress;
+  Ending ending;
+  {
+    EventStream stream(*std::move(client), kMostFramesWaiting);
+    ending = record(stream, **writer, options, progress);
+  }
+  progress.keep("completing the files");
+  const auto finished = (*writer)->finish(ending.why);
+  const Verdict verdict = judge(**writer, ending, finished.has_value());
+  const RecordingFigures& figures = (*writer)->figures();
+  if (auto written = write_file(options.json, text_of(json_of(figures, verdict))); !written) return written.error();
+  fmt::print("{}: {:.1f} s, {} frames, {} measurements\n", options.out.string(), figures.seconds(), figures.frames,
+             figures.measurements);
+  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, CommandStatus& status) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command = *app.add_subcommand("record", "keep video and poses for Slicer, PLUS and birdseye replay");
+  command.add_option("--server", options->server, "the appliance, HOST:PORT")->required();
+  command.add_option("--out", options->out, "folder, which is made")->required();
+  command.add_option("--seconds", options->seconds, "that it lasts (default: until it is interrupted)")
+      ->check(CLI::Range(0.1, 86400.0));
+  command.add_option("--video", options->video, "raw (default) or compressed: a film, which loses something")
+      ->check(CLI::IsMember({"raw", "compressed"}));
+  command.add_flag("--pair", options->pair, "leave header and pixels two files, for long recordings");
+  command.add_option("--json", options->json, "write the figures to this file");
+  command.callback([options, &status] {
+    const auto done = run(*options);
+    done ? void(status.code = *done) : status.refuse(done.error());
+  });
+}
+
+}  // namespace birdseye::host
