@@ -6,7 +6,6 @@
 #include "calibration/base/median.hpp"
 #include "calibration/solve/camera_calibration.hpp"
 #include "host/app/interrupt.hpp"
-#include "host/overlay/compositor.hpp"
 #include "host/registration/point_matching.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
@@ -111,37 +110,35 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   figures.board_views = static_cast<int>(seen_.stations.size());
   figures.fre_mm = fit->fit.fre_rms_mm;
   figures.fiducial_residuals_mm = fit->fit.residuals_mm;
-  gate_.set_calibration({lens->rms_px, hand_eye->tracked_px, fit->fit.fre_rms_mm});
   setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
   auto engine = make_engine("cpu", plan_.shown, *transfer);
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
+  RenderSettings settings;
+  settings.step_mm = 1.2;
+  drawing_.emplace(*setup, OverlayGate::Calibration{lens->rms_px, hand_eye->tracked_px, fit->fit.fre_rms_mm}, *engine_,
+                   settings);
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
                              figures.board_views, hand_eye->tracked_px, fit->fit.fre_rms_mm));
   return {};
 }
 
 Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
-  const OverlayGate::Decision decision = gate_.decide(frame.info.acquired, frame.info.pose);
-  std::vector<std::uint8_t> out = *frame.rgb;
-  if (decision.tracker_from_sensor && decision.strength > 0) {
-    const Transform<Camera, Patient> camera_from_patient =
-        setup->camera_from_sensor * decision.tracker_from_sensor->inverse() * setup->tracker_from_patient;
-    RenderSettings settings;
-    settings.step_mm = 1.2;
-    out = composite(*frame.rgb, engine_->render(setup->camera, camera_from_patient, settings), decision.strength);
+  const FrameOverlay::Drawn drawn = drawing_->draw(frame);
+  if (drawn.camera_from_patient) {
     if (overlaid.size() % kKeepEvery == 0) {
-      kept.push_back(
-          {frame.info.sequence, {frame.width_px, frame.height_px, *frame.rgb}, {frame.width_px, frame.height_px, out}});
+      kept.push_back({frame.info.sequence,
+                      {frame.width_px, frame.height_px, *frame.rgb},
+                      {frame.width_px, frame.height_px, drawn.rgb}});
     }
-    overlaid.push_back({frame.info.sequence, frame.info.acquired, camera_from_patient});
+    overlaid.push_back({frame.info.sequence, frame.info.acquired, *drawn.camera_from_patient});
     if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
   } else {
     ++figures.frames_without_overlay;
   }
-  return film_.add(out);
+  return film_.add(drawn.rgb);
 }
 
 Result<void> DemoSession::take(const wire::VideoFrame& frame) {

@@ -12,10 +12,10 @@
 #include "host/app/demo_report.hpp"
 #include "host/app/event_stream.hpp"
 #include "host/app/film.hpp"
+#include "host/app/frame_overlay.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/progress.hpp"
 #include "host/app/simulated_cart.hpp"
-#include "host/overlay/gate.hpp"
 #include "host/registration/touch_detector.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/volume.hpp"
@@ -30,13 +30,6 @@ struct Plan {
 };
 /// patient: a folder that the simulator made; its CT must show at least this many fiducials.
 Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials);
-
-/// What calibration and registration found; with it a frame's pose gives where the CT lies before the camera.
-struct Setup {
-  CameraModel camera;
-  Transform<Camera, Sensor> camera_from_sensor;
-  Transform<Tracker, Patient> tracker_from_patient;
-};
 
 struct OverlaidFrame {
   std::uint64_t sequence;
@@ -80,8 +73,8 @@ class DemoSession {
   calibration::HandEyeInput seen_;
   TouchDetector touch_detector_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
-  OverlayGate gate_;
   std::unique_ptr<Engine> engine_;
+  std::optional<FrameOverlay> drawing_;
   std::optional<std::uint64_t> first_sequence_;
   std::optional<DeviceTime> last_measured_;
   std::vector<double> tracker_periods_s_;

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   add_record(app, status);
   add_register(app, status);
   add_render(app, status);
+  add_replay(app, status);
   add_volume(app, status);
   return birdseye::run_program(app, argc, argv, [&status] { return static_cast<int>(status.code); });
 }

@@ -17,8 +17,6 @@
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/ui/window.hpp"
-#include "host/volume/import.hpp"
-#include "host/volume/labels.hpp"
 
 namespace birdseye::host {
 
@@ -36,17 +34,6 @@ struct Options {
   bool window = false;
   int frames = 0;
 };
-
-/// The CT, or of it what has one of the labels to keep.
-Result<Volume> shown_of(const Options& options) {
-  auto volume = import_volume(options.volume);
-  if (!volume || options.labels.empty()) return volume;
-  const auto labels = import_labels(options.labels, *volume);
-  if (!labels) return labels.error();
-  auto kept = keep_labels(*volume, *labels, options.keep);
-  if (!kept) return Error{kept.error().code, fmt::format("{}: {}", options.labels.string(), kept.error().what)};
-  return kept;
-}
 
 /// Where it is seen from, and through what.
 Result<void> look(RenderScene& scene, const Options& options) {
@@ -98,7 +85,7 @@ void straighten(RenderScene& scene, const std::string& display) {
 
 Result<RenderScene> scene_of(const Options& options) {
   RenderScene scene;
-  auto volume = shown_of(options);
+  auto volume = read_shown(options.volume, options.labels, options.keep);
   if (!volume) return volume.error();
   scene.volume = *std::move(volume);
   if (auto looked = look(scene, options); !looked) return looked.error();

@@ -6,6 +6,8 @@
 #include <cstdio>
 
 #include "host/overlay/compositor.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
 
 namespace birdseye::host {
 
@@ -26,6 +28,17 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
 }
 
 }  // namespace
+
+Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
+                          const std::vector<int>& keep) {
+  auto ct = import_volume(volume);
+  if (!ct || labels.empty()) return ct;
+  const auto label_of = import_labels(labels, *ct);
+  if (!label_of) return label_of.error();
+  auto kept = keep_labels(*ct, *label_of, keep);
+  if (!kept) return Error{kept.error().code, fmt::format("{}: {}", labels.string(), kept.error().what)};
+  return kept;
+}
 
 Eigen::Vector3d middle_of(const Volume& volume) {
   const auto [low, high] = bounds(volume);

@@ -34,6 +34,10 @@ struct RenderScene {
   std::optional<FrameUndistorter> straighten;  ///< where the camera is a straight one in place of that of the video
 };
 
+/// A CT; with labels, a label volume on its grid, of it what has one of those to keep.
+Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
+                          const std::vector<int>& keep);
+
 /// Without lens and pose: from in front of the patient, head up; of a scan thinner than half its height or width, from
 /// the feet as radiologists look at a slice. The volume fills the picture; what lies before share `clip` of its depth
 /// is cut away. size: WIDTHxHEIGHT.

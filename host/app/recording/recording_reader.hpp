@@ -22,6 +22,7 @@ class RecordingReader : public EventSource {
   struct Settings {
     double speed = 0;            ///< 1: as fast as it was recorded; 0: as fast as it is taken
     std::string transform = {};  ///< of a PLUS sequence: the scope's, where there are several
+    bool pictures = true;        ///< false: frames come without pixels
   };
 
   /// path: a folder that `birdseye record` made, or a .igs.mha or .igs.mhd. Refuses, naming it, what is neither.

@@ -18,6 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kUsualRateHz = 25;
+/// More than any tracker has: names are what somebody sends.
+constexpr std::size_t kMostBirds = 64;
 
 }  // namespace
 
@@ -69,6 +71,7 @@ Result<void> RecordingWriter::add_birds(const wire::Birds& birds) {
   note_time(birds.acquired);
   SequenceWriter::Fields fields = {{std::string(kTimestampField), seconds_text(birds.acquired.ns)}};
   for (const wire::Bird& bird : birds.birds) {
+    if (transform_of_.size() >= kMostBirds && !transform_of_.contains(bird.name)) continue;
     transform_of_.try_emplace(bird.name, transform_name(bird.name));
     histories_[bird.name].push(birds.acquired, {}, bird.tracker_from_sensor);
     ++figures_.poses[bird.name];

@@ -56,7 +56,7 @@ class SequenceWriter {
   /// rgb: rows from the top; empty where there are no pixels. What cannot be added leaves the frames before it.
   Result<void> add(const Fields& fields, std::span<const std::uint8_t> rgb);
   /// Makes one file of header and pixels, NAME.igs.mha, in place of the pair. For that time the disk holds both: where
-  /// there is no room the pair stays, and the error says so.
+  /// there is no room the pair stays, and the error says so. Nothing can be added after it.
   Result<void> join();
   [[nodiscard]] std::size_t frames() const { return frames_; }
   /// What to open.

@@ -1,0 +1,249 @@
+#include <fmt/format.h>
+#include <signal.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "calibration/base/verdict.hpp"
+#include "host/app/commands.hpp"
+#include "host/app/film.hpp"
+#include "host/app/interrupt.hpp"
+#include "host/app/picture.hpp"
+#include "host/app/progress.hpp"
+#include "host/app/recording/recording_reader.hpp"
+#include "host/app/render_scene.hpp"
+#include "host/app/replay_setup.hpp"
+#include "host/app/text_files.hpp"
+#include "host/app/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  ReplayInputs inputs;
+  fs::path volume, labels, deformation, out, json;
+  std::vector<int> keep;
+  std::string transfer = "tumour-and-vessels", engine = "cpu";
+  double step_mm = 1.2, film_hz = 0;
+  int every = 10;
+};
+
+struct Replayed {
+  std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
+  std::map<std::string, std::size_t> reasons;
+  std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
+  std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
+};
+
+std::string row_of(const wire::VideoFrame& frame, const FrameOverlay::Drawn& drawn) {
+  std::string reason = drawn.decision.reason;
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
+                                to_string(frame.info.pose.kind), drawn.decision.strength, reason);
+  if (drawn.camera_from_patient) {
+    const Eigen::Matrix4d m = drawn.camera_from_patient->matrix();
+    for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));
+  }
+  return row + "\n";
+}
+
+/// Draws every frame, and writes some.
+class Player {
+ public:
+  Player(const Options& options, FrameOverlay overlay, const CameraModel& camera)
+      : options_(options), overlay_(std::move(overlay)), camera_(camera) {}
+
+  Result<void> take(const wire::VideoFrame& frame) {
+    ++done.frames;
+    if (frame.width_px != camera_.width_px || frame.height_px != camera_.height_px) {
+      ++done.other_size;
+      return {};
+    }
+    const FrameOverlay::Drawn drawn = overlay_.draw(frame);
+    if (drawn.camera_from_patient) ++done.overlaid;
+    if (drawn.decision.strength >= 1) ++done.whole;
+    if (!drawn.decision.reason.empty()) ++done.reasons[drawn.decision.reason];
+    done.checksum =
+        static_cast<std::uint32_t>(::crc32(done.checksum, drawn.rgb.data(), static_cast<uInt>(drawn.rgb.size())));
+    done.table += row_of(frame, drawn);
+    if ((done.frames - 1) % static_cast<std::size_t>(options_.every) == 0) {
+      const fs::path file = options_.out / fmt::format("overlay-{:06}.png", frame.info.sequence);
+      if (auto put = write_file(file, png_of(drawn.rgb, frame.width_px, frame.height_px, 3)); !put) return put;
+    }
+    if (options_.film_hz <= 0) return {};
+    if (!film_) {
+      auto film = Film::open(options_.out / "overlay.mp4", frame.width_px, frame.height_px, options_.film_hz);
+      if (!film) return film.error();
+      film_ = *std::move(film);
+    }
+    return film_->add(drawn.rgb);
+  }
+  Result<void> finish() { return film_ ? film_->finish() : Result<void>(); }
+
+  Replayed done;
+
+ private:
+  const Options& options_;
+  FrameOverlay overlay_;
+  CameraModel camera_;
+  std::optional<Film> film_;
+};
+
+Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup) {
+  Verdict verdict;
+  if (done.overlaid == 0) {
+    verdict.add(Grade::fail, done.frames == 0 ? "the recording has no frames" : "no frame carries an overlay");
+  } else {
+    const double hidden = 100 * (1 - static_cast<double>(done.overlaid) / static_cast<double>(done.frames));
+    verdict.judge("frames without an overlay", hidden, "%", 10, 50, "see frames.csv for the reasons");
+  }
+  if (done.other_size > 0)
+    verdict.add(Grade::marginal, fmt::format("{} frames are of another size than the camera's", done.other_size));
+  if (reader.frames_lost() > 0)
+    verdict.add(Grade::marginal, fmt::format("{} frames are cut short or missing", reader.frames_lost()));
+  for (const std::string& note : reader.notes()) verdict.add(Grade::marginal, note);
+  for (const std::string& figure : setup.unknown)
+    verdict.add(Grade::pass, fmt::format("{} is not known and taken for perfect", figure));
+  return verdict;
+}
+
+nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const std::string& engine,
+                       const Verdict& verdict) {
+  nlohmann::json json = {{"frames", done.frames},
+                         {"frames_overlaid", done.overlaid},
+                         {"frames_overlaid_whole", done.whole},
+                         {"frames_of_other_size", done.other_size},
+                         {"reasons_of_frames", done.reasons},
+                         {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
+                         {"engine", engine},
+                         {"camera_rms_px", setup.calibration.camera_rms_px},
+                         {"tracked_rms_px", setup.calibration.tracked_rms_px},
+                         {"fre_mm", setup.calibration.fre_mm},
+                         {"touches", setup.touches_in_tracker_mm.size()},
+                         {"verdict", name_of(verdict.grade)},
+                         {"reasons", verdict.reasons}};
+  return json;
+}
+
+/// All of the recording through the overlay.
+Result<void> play(RecordingReader& reader, Player& player, Progress& progress) {
+  for (;;) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
+    const auto event = reader.next(Clock::now() + std::chrono::seconds(30));
+    if (!event && event.error().code == Errc::disconnected) return {};
+    if (!event) return event.error();
+    if (!*event) continue;
+    const auto* frame = std::get_if<wire::VideoFrame>(&**event);
+    if (frame == nullptr) continue;
+    if (auto taken = player.take(*frame); !taken) return taken;
+    if (player.done.frames % 20 == 0) progress(fmt::format("{} frames", player.done.frames));
+  }
+}
+
+Result<ExitCode> run(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
+  if (!reader) return reader.error();
+  const auto setup = read_replay_setup(options.inputs);
+  if (!setup) return setup.error();
+  const auto volume = read_shown(options.volume, options.labels, options.keep);
+  if (!volume) return volume.error();
+  const auto transfer = load_transfer_function(options.transfer);
+  if (!transfer) return transfer.error();
+  std::string why;
+  const auto engine = make_engine(options.engine, *volume, *transfer, &why);
+  if (!engine) return engine.error();
+  if (!why.empty()) fmt::print(stderr, "{}\n", why);
+  if (!options.deformation.empty()) {
+    const auto field = read_field(options.deformation);
+    if (!field) return field.error();
+    if (auto covers = check_covers(*field, *volume); !covers)
+      return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
+    (*engine)->deform(*field);
+  }
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", options.out.string())};
+  note_interrupts();
+  ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
+  Progress progress;
+  RenderSettings settings;
+  settings.step_mm = options.step_mm;
+  Player player(options, FrameOverlay(setup->setup, setup->calibration, **engine, settings), setup->setup.camera);
+  if (auto played = play(**reader, player, progress); !played) return played.error();
+  if (const std::string fault = (*engine)->fault(); !fault.empty())
+    return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
+  if (auto finished = player.finish(); !finished) return finished.error();
+  const Verdict verdict = judge(player.done, **reader, *setup);
+  const std::string json = text_of(json_of(player.done, *setup, (*engine)->name(), verdict));
+  const std::string registration = pose_text(setup->setup.tracker_from_patient.inverse().matrix());
+  if (auto written = write_files({{options.out / "frames.csv", player.done.table},
+                                  {options.out / "patient_from_tracker.txt", registration},
+                                  {options.out / "replay.json", json},
+                                  {options.json, json}});
+      !written) {
+    return written.error();
+  }
+  progress.keep(fmt::format("{} frames, {} with an overlay, pictures {:08x}: {}", player.done.frames,
+                            player.done.overlaid, player.done.checksum, name_of(verdict.grade)));
+  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
+}
+
+void add_inputs(CLI::App& command, ReplayInputs& inputs) {
+  command.add_option("recording", inputs.recording, "folder of birdseye record, or a .igs.mha")->required();
+  command.add_option("--transform", inputs.transform, "of a .igs.mha: which transform is the scope's");
+  command.add_option("--calibration", inputs.calibration, "record of the scope (default: the recording's own)");
+  command.add_option("--camera", inputs.camera, "lens, OpenCV YAML, in place of a record's");
+  command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm");
+  command.add_option("--registration", inputs.patient_from_tracker, "patient_from_tracker, of register fiducials");
+  command.add_option("--tracker-from-patient", inputs.tracker_from_patient, "its inverse, as the demo writes it");
+  CLI::Option* const fiducials = command.add_option(
+      "--fiducials", inputs.fiducials, "markers in the CT, which the pointer touches in the recording: registers anew");
+  command.add_option("--tip", inputs.tip, "the pointer's tip, x y z, mm (default: the record's)")->needs(fiducials);
+  command.add_option("--pointer", inputs.pointer, "the bird that touches (default pointer)")->needs(fiducials);
+  command.add_option("--touched", inputs.touched_s, "from and to, s: when it touches")->expected(2)->needs(fiducials);
+  command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views");
+  command.add_option("--camera-rms-px", inputs.camera_rms_px, "how well the lens is known, where no record says");
+  command.add_option("--hand-eye-rms-px", inputs.tracked_rms_px, "and hand-eye");
+  command.add_option("--fre-mm", inputs.fre_mm, "and the registration");
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, CommandStatus& status) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command = *app.add_subcommand("replay", "draw the CT over a recording, the same to the bit each time");
+  add_inputs(command, options->inputs);
+  command.add_option("--volume", options->volume, "the CT")->required();
+  CLI::Option* const labels = command.add_option("--labels", options->labels, "label volume on the CT's grid");
+  CLI::Option* const keep = command.add_option("--keep", options->keep, "the labels to show")->delimiter(',');
+  labels->needs(keep);
+  keep->needs(labels);
+  command.add_option("--transfer", options->transfer, "preset or JSON file (default tumour-and-vessels)");
+  command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm");
+  command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
+      ->check(CLI::IsMember(engine_names()));
+  command.add_option("--step-mm", options->step_mm, "between samples along a ray")->check(CLI::Range(0.05, 20.0));
+  command.add_option("--out", options->out, "folder for pictures, frames.csv and replay.json")->required();
+  command.add_option("--every", options->every, "writes one frame in so many as a picture (default 10)")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--film", options->film_hz, "also overlay.mp4, of so many frames a second")
+      ->check(CLI::Range(1.0, 1000.0));
+  command.add_option("--json", options->json, "write the figures to this file too");
+  command.callback([options, &status] {
+    const auto done = run(*options);
+    done ? void(status.code = *done) : status.refuse(done.error());
+  });
+}
+
+}  // namespace birdseye::host
