@@ -10,7 +10,8 @@ pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
 find_package(glfw3 3.3 REQUIRED)
 find_package(ITK 5.2 REQUIRED COMPONENTS
   ITKCommon ITKIOImageBase ITKIOGDCM ITKIONIFTI ITKIONRRD ITKIOMeta
-  ITKConnectedComponents ITKDistanceMap ITKImageGrid ITKIOMeshVTK ITKRegionGrowing ITKSmoothing ITKThresholding)
+  ITKConnectedComponents ITKDisplacementField ITKDistanceMap ITKImageGrid ITKIOMeshVTK
+  ITKIOTransformHDF5 ITKIOTransformInsightLegacy ITKRegionGrowing ITKSmoothing ITKThresholding)
 # ITK without its use-file, which would put its headers and factories into every target: readers are registered by name.
 add_library(birdseye_itk INTERFACE)
 target_include_directories(birdseye_itk SYSTEM INTERFACE ${ITK_INCLUDE_DIRS})

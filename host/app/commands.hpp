@@ -25,6 +25,7 @@ void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_calibrate(CLI::App& app, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
+void add_export(CLI::App& app, CommandStatus& status);
 void add_record(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
 void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `register`

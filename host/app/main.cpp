@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   add_bench(app, status);
   add_calibrate(app, status);
   add_demo(app, status);
+  add_export(app, status);
   add_record(app, status);
   add_register(app, status);
   add_render(app, status);

@@ -254,6 +254,10 @@ Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs 
     if (stored == StoredAs::float32) {
       io->SetComponentType(itk::IOComponentEnum::FLOAT);
       io->Write(image.values.data());
+    } else if (stored == StoredAs::int16) {
+      io->SetComponentType(itk::IOComponentEnum::SHORT);
+      const std::vector<std::int16_t> whole(image.values.begin(), image.values.end());
+      io->Write(whole.data());
     } else {
       io->SetComponentType(itk::IOComponentEnum::UCHAR);
       const std::vector<std::uint8_t> bytes(image.values.begin(), image.values.end());

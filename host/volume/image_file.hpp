@@ -24,7 +24,7 @@ struct ImageFile {
 /// geometry.
 Result<ImageFile> read_image(const std::filesystem::path& path, int components);
 
-enum class StoredAs { uint8, float32 };
+enum class StoredAs { uint8, int16, float32 };
 /// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha.
 Result<void> write_image(const std::filesystem::path& path, const ImageFile& image, StoredAs stored);
 

@@ -1,0 +1,212 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "calibration/base/verdict.hpp"
+#include "host/app/commands.hpp"
+#include "host/app/text_files.hpp"
+#include "host/app/write_files.hpp"
+#include "host/deform/deformed_volume.hpp"
+#include "host/deform/transform_file.hpp"
+#include "host/volume/image_file.hpp"
+#include "host/volume/import.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path registration, views, deformation, model_pose, volume, out, json;
+  std::string frame = "tracker";
+};
+
+/// What registrations found, and the CT.
+struct Registered {
+  std::optional<Transform<Patient, Tracker>> patient_from_tracker;
+  Transform<Patient, Patient> patient_from_model;
+  std::optional<DisplacementField> field;
+  std::optional<Volume> volume;
+};
+
+Result<Registered> read_registered(Options options) {
+  Registered read;
+  std::error_code ignored;
+  if (!options.views.empty()) {
+    if (!fs::is_regular_file(options.views / "field.mha", ignored)) {
+      return Error{Errc::not_found, fmt::format("{}: holds no field.mha; give the folder that register views wrote",
+                                                options.views.string())};
+    }
+    options.deformation = options.views / "field.mha";
+    if (fs::exists(options.views / "pose.txt", ignored)) options.model_pose = options.views / "pose.txt";
+  }
+  if (!options.registration.empty()) {
+    const auto matrix = read_pose(options.registration);
+    if (!matrix) return matrix.error();
+    read.patient_from_tracker = Transform<Patient, Tracker>::from_matrix(*matrix);
+  }
+  if (!options.model_pose.empty()) {
+    const auto matrix = read_pose(options.model_pose);
+    if (!matrix) return matrix.error();
+    read.patient_from_model = Transform<Patient, Patient>::from_matrix(*matrix);
+  }
+  if (!options.deformation.empty()) {
+    auto field = read_field(options.deformation);
+    if (!field) return field.error();
+    read.field = *std::move(field);
+  }
+  if (!options.volume.empty()) {
+    auto volume = import_volume(options.volume);
+    if (!volume) return volume.error();
+    read.volume = *std::move(volume);
+  }
+  if (read.field && read.volume) {
+    if (auto covers = check_covers(*read.field, *read.volume); !covers)
+      return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
+  }
+  return read;
+}
+
+/// ct_from_seen: of the frame that was asked for.
+Result<RestMap> map_of(const Options& options, const Registered& registered) {
+  RestMap map;
+  const Transform<Patient, Patient> ct_from_patient = registered.patient_from_model.inverse();
+  if (options.frame == "patient") {
+    map.ct_from_seen = ct_from_patient.matrix();
+  } else if (registered.patient_from_tracker) {
+    map.ct_from_seen = (ct_from_patient * *registered.patient_from_tracker).matrix();
+  } else {
+    return Error{Errc::bad_value,
+                 "--frame tracker needs --registration, as register fiducials writes it; or give --frame patient"};
+  }
+  if (registered.field) map.field = &*registered.field;
+  return map;
+}
+
+ImageFile image_of(const Volume& volume, const Eigen::Affine3d& seen_from_voxel) {
+  ImageFile image;
+  image.size = volume.size;
+  image.values.assign(volume.hu.begin(), volume.hu.end());
+  image.origin_mm = seen_from_voxel.translation();
+  image.spacing_mm = seen_from_voxel.linear().colwise().norm();
+  image.axes = seen_from_voxel.linear().colwise().normalized();
+  return image;
+}
+
+/// Places all over the CT, or the field, as they are seen.
+std::vector<Eigen::Vector3d> places(const Registered& registered, const RestMap& map) {
+  Eigen::Affine3d ct_from_unit = Eigen::Affine3d(Eigen::Scaling(200.0));
+  if (registered.volume) {
+    const auto& size = registered.volume->size;
+    ct_from_unit = registered.volume->patient_from_voxel * Eigen::Scaling(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0);
+  } else if (registered.field) {
+    const auto& size = registered.field->size;
+    ct_from_unit = registered.field->patient_from_lattice * Eigen::Scaling(size[0] - 1.0, size[1] - 1.0, size[2] - 1.0);
+  }
+  const Eigen::Affine3d seen_from_ct = Eigen::Affine3d(map.ct_from_seen).inverse();
+  constexpr int kSide = 9;
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(static_cast<std::size_t>(kSide) * kSide * kSide);
+  for (int n = 0; n < kSide * kSide * kSide; ++n) {
+    const Eigen::Vector3d step(n % kSide + 0.5, n / kSide % kSide + 0.5, n / (kSide * kSide) + 0.5);
+    points.emplace_back(seen_from_ct * ct_from_unit * Eigen::Vector3d(step / kSide));
+  }
+  return points;
+}
+
+/// How far ITK, reading the file, takes places from where we do, mm.
+Result<double> worst_difference(const fs::path& path, const Registered& registered, const RestMap& map) {
+  const std::vector<Eigen::Vector3d> points = places(registered, map);
+  const auto mapped = transform_by_file(path, points);
+  if (!mapped) return mapped.error();
+  double worst_mm = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) worst_mm = std::max(worst_mm, ((*mapped)[i] - map(points[i])).norm());
+  return worst_mm;
+}
+
+Result<ExitCode> run(const Options& options) {
+  if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  if (options.registration.empty() && options.views.empty() && options.deformation.empty()) {
+    return Error{Errc::bad_value,
+                 "give what was registered: --registration of register fiducials, --views of register views, or both"};
+  }
+  const auto registered = read_registered(options);
+  if (!registered) return registered.error();
+  const auto map = map_of(options, *registered);
+  if (!map) return map.error();
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", options.out.string())};
+
+  nlohmann::json files = nlohmann::json::object();
+  double worst_mm = 0;
+  const auto transform = [&](const std::string& name, const RestMap& what, const char* told) -> Result<void> {
+    if (auto written = write_transform(options.out / name, what); !written) return written;
+    const auto difference = worst_difference(options.out / name, *registered, what);
+    if (!difference) return difference.error();
+    worst_mm = std::max(worst_mm, *difference);
+    files[name] = told;
+    return {};
+  };
+  RestMap rigid = *map;
+  rigid.field = nullptr;
+  if (auto done = transform("rigid.tfm", rigid, "where the CT lies, undeformed"); !done) return done.error();
+  if (auto done = transform("registration.h5", *map, "where the CT lies, deformed if it is"); !done)
+    return done.error();
+  if (registered->field) {
+    if (auto written = write_field(options.out / "deformation.nrrd", *registered->field); !written)
+      return written.error();
+    files["deformation.nrrd"] = "the deformation alone, in the frame of the CT";
+  }
+  if (registered->volume) {
+    const Volume seen =
+        registered->field ? deformed_volume(*registered->volume, *registered->field) : *registered->volume;
+    const Eigen::Affine3d seen_from_voxel = Eigen::Affine3d(map->ct_from_seen).inverse() * seen.patient_from_voxel;
+    if (auto written = write_image(options.out / "ct.nrrd", image_of(seen, seen_from_voxel), StoredAs::int16); !written)
+      return written.error();
+    files["ct.nrrd"] = "the CT as it is seen: no transform is to be applied to it";
+  }
+  Verdict verdict;
+  verdict.judge("the files, read back by ITK, take places from where they should by", worst_mm, "mm", 1e-3, 1e-3,
+                "report this with the files");
+  const nlohmann::json json = {{"frame", options.frame},
+                               {"files", files},
+                               {"difference_mm_max", worst_mm},
+                               {"verdict", name_of(verdict.grade)},
+                               {"reasons", verdict.reasons}};
+  if (auto written = write_files({{options.out / "export.json", text_of(json)}, {options.json, text_of(json)}});
+      !written)
+    return written.error();
+  for (const auto& [name, told] : files.items())
+    fmt::print("{}: {}\n", (options.out / name).string(), told.get<std::string>());
+  fmt::print("verdict: {} ({})\n", name_of(verdict.grade), verdict.reasons.front());
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, CommandStatus& status) {
+  const auto options = std::make_shared<Options>();
+  CLI::App& command =
+      *app.add_subcommand("export", "the registered, deformed CT for 3D Slicer and other programs on ITK");
+  command.add_option("--registration", options->registration, "patient_from_tracker, of register fiducials");
+  CLI::Option* const views = command.add_option("--views", options->views, "folder of register views");
+  command.add_option("--deformation", options->deformation, "a displacement field by itself, LPS mm")->excludes(views);
+  command.add_option("--model-pose", options->model_pose, "patient_from_model, a 4x4 matrix")->excludes(views);
+  command.add_option("--volume", options->volume, "the CT: exported as it is seen");
+  command.add_option("--frame", options->frame, "where the CT is brought: tracker (default) or patient")
+      ->check(CLI::IsMember({"tracker", "patient"}));
+  command.add_option("--out", options->out, "folder")->required();
+  command.add_option("--json", options->json, "write the figures to this file too");
+  command.callback([options, &status] {
+    const auto done = run(*options);
+    done ? void(status.code = *done) : status.refuse(done.error());
+  });
+}
+
+}  // namespace birdseye::host
