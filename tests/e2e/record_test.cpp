@@ -1,0 +1,125 @@
+// `birdseye record` of the simulated cart, from the outside.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "host/app/calibrate/pose_files.hpp"
+#include "host/app/recording/recording_reader.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::contents_of;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+
+/// Starts the cart and birdseyed, and records three times at once: for four seconds, until Ctrl-C, until the appliance
+/// goes.
+constexpr const char* kScript = R"(cd "$1"; bin=$2; trap 'kill $(jobs -p) 2>/dev/null; wait' EXIT
+$bin/birdseye-sim phantom --out phantom > phantom.log 2>&1 || exit 9
+$bin/birdseye-sim cart --phantom phantom --socket cam --tty tty --out . --size 192x144 > sim.log 2>&1 &
+for n in $(seq 150); do grep -q ready sim.log && break; sleep 0.1; done
+$bin/birdseyed --config cart.toml > birdseyed.log 2>&1 &
+appliance=$!
+for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0.1; done
+record="$bin/birdseye record --server 127.0.0.1:$3"
+$record --out film --video compressed > film.log 2>&1 &
+film=$!
+$record --out gone > gone.log 2>&1 &
+gone=$!
+$record --out timed --seconds 4 --json timed.json; echo "timed $?"
+$record --out timed; echo "again $?"
+kill -INT $film; wait $film; echo "film $?"
+kill -KILL $appliance; wait $gone; echo "gone $?"
+cat film.log gone.log
+)";
+
+struct Played {
+  std::size_t frames = 0, birds = 0, posed = 0;
+  std::string ending;
+};
+
+Played play(const fs::path& path) {
+  Played played;
+  auto reader = host::RecordingReader::open(path, {});
+  EXPECT_TRUE(reader) << reader.error().what;
+  while (reader) {
+    const auto event = (*reader)->next(std::chrono::steady_clock::now() + std::chrono::seconds(20));
+    if (!event) {
+      played.ending = event.error().what;
+      EXPECT_EQ(event.error().code, Errc::disconnected) << played.ending;
+      break;
+    }
+    if (!*event) continue;
+    played.birds += std::holds_alternative<wire::Birds>(**event) ? 1 : 0;
+    const auto* frame = std::get_if<wire::VideoFrame>(&**event);
+    if (frame == nullptr) continue;
+    ++played.frames;
+    played.posed += frame->info.pose.tracker_from_sensor ? 1 : 0;
+    EXPECT_EQ(frame->rgb->size(), 3U * 192 * 144);
+  }
+  return played;
+}
+
+TEST(RecordCommand, OfTheSimulatedCart) {
+  const Scratch scratch;
+  const int port = 20000 + static_cast<int>(::getpid() % 20000);
+  const std::string config = scratch.file(
+      "cart.toml", "[tracker]\ndevice = \"" + (scratch / "tty").string() +
+                       "\"\nbaud = 115200\nbirds = 2\nnames = [\"scope\", \"pointer\"]\n"
+                       "rate_hz = 103.3\nfrozen_after = 0\nmost_speed_mm_s = 6000\nmost_turn_deg_s = 3000\n"
+                       "hemisphere = \"forward\"\nrecord = \"position_matrix\"\ndelay_ms = 7.5\n[camera]\n"
+                       "source = \"socket:" +
+                       (scratch / "cam").string() +
+                       "\"\nwidth = 192\nheight = 144\nrate_hz = 25\n[wire]\nbind = \"127.0.0.1\"\nport = " +
+                       std::to_string(port) + "\n");
+  ASSERT_FALSE(config.empty());
+  const std::string script = scratch.file("cart.sh", kScript);
+  const auto found = run("birdseye", "--help > /dev/null; bash " + script + " " + (scratch / "").string() +
+                                         " " BIRDSEYE_BIN " " + std::to_string(port));
+  for (const char* line : {"timed 0", "again 2", "holds a recording already", "film 0", "gone 0", "it was interrupted",
+                           "the appliance has gone"})
+    EXPECT_NE(found.output.find(line), std::string::npos) << line << "\n" << found.output;
+
+  const auto json = nlohmann::json::parse(contents_of(scratch / "timed.json"));
+  EXPECT_GE(json["seconds"], 3.9);
+  EXPECT_GT(json["frames"], 50);
+  EXPECT_GT(json["measurements"], 200);
+  const Played timed = play(scratch / "timed");
+  EXPECT_EQ(timed.frames, json["frames"].get<std::size_t>()) << timed.ending;
+  EXPECT_EQ(timed.birds, json["measurements"].get<std::size_t>());
+  EXPECT_GT(timed.posed, timed.frames / 2);
+  const auto sheet = nlohmann::json::parse(contents_of(scratch / "timed/recording.json"));
+  EXPECT_EQ(sheet["why"], "4 s are over");
+  EXPECT_EQ(sheet["instruments"][0]["identity"]["bird1_unit_serial"], "1001") << sheet["instruments"];
+  // What calibrations read, and Slicer and PLUS open.
+  const auto poses = host::read_pose_set(scratch / "timed/tracker.igs.mha", "ScopeToTracker");
+  ASSERT_TRUE(poses) << poses.error().what;
+  EXPECT_EQ(poses->poses.size(), json["poses"]["scope"].get<std::size_t>());
+  const Played video = play(scratch / "timed/video.igs.mha");
+  EXPECT_EQ(video.frames, timed.frames);
+  EXPECT_EQ(video.posed, timed.posed);
+
+  for (const char* name : {"film", "gone"}) {
+    const Played played = play(scratch / name);
+    EXPECT_GE(played.frames, timed.frames) << name << played.ending;
+    EXPECT_EQ(nlohmann::json::parse(contents_of(scratch / name / "recording.json"))["frames"], played.frames);
+  }
+}
+
+TEST(RecordCommand, WithoutAnApplianceNothingIsWritten) {
+  const Scratch scratch;
+  expect_refused("birdseye", "record --server nowhere.invalid:1 --out " + (scratch / "r").string(), {"nowhere.invalid"},
+                 scratch / "r");
+  expect_refused("birdseye", "record --server 127.0.0.1:x --out " + (scratch / "r").string(), {"HOST:PORT"},
+                 scratch / "r");
+}
+
+}  // namespace
+}  // namespace birdseye
