@@ -26,6 +26,7 @@ void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `be
 void add_calibrate(CLI::App& app, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
 void add_export(CLI::App& app, CommandStatus& status);
+void add_live(CLI::App& app, CommandStatus& status);
 void add_record(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
 void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `register`

@@ -27,38 +27,24 @@ constexpr std::size_t kMostFramesWaiting = 256;
 Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan) {
   const auto truth = read_simulated_truth(out / "truth");
   if (!truth) return truth.error();
-  struct Place {
-    Eigen::Vector2d true_px, overlaid_px;
-  };
-  std::map<std::uint64_t, Place> places;
+  std::map<std::uint64_t, std::pair<Eigen::Vector2d, Eigen::Vector2d>> places;
   for (const OverlaidFrame& frame : session.overlaid) {
-    const auto found = truth->camera_from_patient.find(frame.sequence);
-    if (found == truth->camera_from_patient.end()) {
+    const auto found = target_error(*truth, frame.sequence, session.setup->camera, frame.camera_from_patient,
+                                    plan.tumour_centre_in_patient_mm);
+    if (!found) {
       return Error{Errc::bad_format, fmt::format("{}: lacks frame {}, which was overlaid; run the demo again",
                                                  (out / "truth").string(), frame.sequence)};
     }
-    const Eigen::Vector3d true_mm = found->second * truth->tumour_centre_in_patient_mm;
-    const Eigen::Vector3d overlaid_mm = frame.camera_from_patient * plan.tumour_centre_in_patient_mm;
-    const auto true_px = project(truth->camera, true_mm);
-    const auto overlaid_px = project(session.setup->camera, overlaid_mm);
-    FrameError error;
-    error.time_s = (frame.acquired - session.overlaid.front().acquired).seconds();
-    error.target_mm = (overlaid_mm - true_mm).norm();
-    if (true_px && overlaid_px) {
-      error.overlay_px = (*overlaid_px - *true_px).norm();
-      places[frame.sequence] = {*true_px, *overlaid_px};
-    } else if (true_px || overlaid_px) {
-      // One of the two lies behind the camera: as wrong as a picture can be.
-      error.overlay_px = std::hypot(truth->camera.width_px, truth->camera.height_px);
-    }
-    session.figures.errors.push_back(error);
+    const double time_s = (frame.acquired - session.overlaid.front().acquired).seconds();
+    session.figures.errors.push_back({time_s, found->target_mm, found->overlay_px});
+    if (found->true_and_overlaid_px) places[frame.sequence] = *found->true_and_overlaid_px;
   }
   std::vector<Picture> videos, overlays;
   for (std::size_t i = 0; i < std::min<std::size_t>(6, session.kept.size()); ++i) {
     KeptFrame& frame = session.kept[i * session.kept.size() / std::min<std::size_t>(6, session.kept.size())];
     if (const auto place = places.find(frame.sequence); place != places.end()) {
-      draw_circle(frame.overlay, place->second.overlaid_px);
-      draw_cross(frame.overlay, place->second.true_px);
+      draw_circle(frame.overlay, place->second.second);
+      draw_cross(frame.overlay, place->second.first);
     }
     videos.push_back(frame.video);
     overlays.push_back(frame.overlay);

@@ -19,8 +19,10 @@ void EventStream::read(const std::stop_token& stop) {
       if (const auto clock = wire::read_clock_discipline())
         client_->use_discipline(*clock, wire::wall_minus_monotonic());
     }
+    const std::optional<ClockGap> gap = ended || !*event ? std::nullopt : gap_at(**event);
     {
       const std::lock_guard lock(mutex_);
+      if (gap) gap_ = gap;
       if (ended) {
         ended_ = event.error();
       } else if (*event) {
@@ -30,6 +32,19 @@ void EventStream::read(const std::stop_token& stop) {
     changed_.notify_one();
     if (ended) return;
   }
+}
+
+std::optional<ClockGap> EventStream::gap_at(const wire::Event& event) const {
+  const auto* frame = std::get_if<wire::VideoFrame>(&event);
+  if (frame == nullptr) return std::nullopt;
+  const auto related = client_->host_from_device(frame->info.acquired);
+  if (!related) return std::nullopt;
+  return ClockGap{Duration{related->time.ns - frame->info.acquired.ns}, related->sigma};
+}
+
+std::optional<ClockGap> EventStream::host_from_device() const {
+  const std::lock_guard lock(mutex_);
+  return gap_;
 }
 
 void EventStream::keep(wire::Event event) {

@@ -13,6 +13,11 @@
 
 namespace birdseye::host {
 
+/// This machine's CLOCK_MONOTONIC less the appliance's, and how sure that is.
+struct ClockGap {
+  Duration gap, sigma;
+};
+
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
 /// past most_frames waiting, the oldest frame is dropped; the frames' own sequence numbers show the gap.
 class EventStream : public EventSource {
@@ -21,10 +26,13 @@ class EventStream : public EventSource {
 
   /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
   Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline) override;
+  /// By how much this machine's clock is ahead of the appliance's, by the newest frame; empty until that is known.
+  [[nodiscard]] std::optional<ClockGap> host_from_device() const;
 
  private:
   void read(const std::stop_token& stop);
   void keep(wire::Event event);
+  [[nodiscard]] std::optional<ClockGap> gap_at(const wire::Event& event) const;
 
   /// Everything that is no frame is small, and comes a hundred times a second: a minute of it is bound enough.
   static constexpr std::size_t kMostOthers = 8192;
@@ -36,6 +44,7 @@ class EventStream : public EventSource {
   std::deque<wire::Event> events_;
   std::size_t frames_ = 0;
   std::optional<Error> ended_;
+  std::optional<ClockGap> gap_;
   std::jthread thread_;
 };
 

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   add_calibrate(app, status);
   add_demo(app, status);
   add_export(app, status);
+  add_live(app, status);
   add_record(app, status);
   add_register(app, status);
   add_render(app, status);

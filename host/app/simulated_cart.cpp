@@ -61,11 +61,11 @@ port = {}
 [pose]
 max_age_ms = 100
 max_gap_ms = 60
-smoothing_ms = 40
-wait_ms = 90
+smoothing_ms = {}
+wait_ms = {}
 )",
                                       tty.string(), socket.string(), settings.width_px, settings.height_px,
-                                      settings.video_rate_hz, port));
+                                      settings.video_rate_hz, port, settings.smoothing_ms, settings.wait_ms));
 }
 
 }  // namespace
@@ -104,27 +104,33 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   const Result<int> port = free_port();
   if (!port) return port.error();
 
-  auto simulator = ChildProcess::start({beside_us("birdseye-sim"),
-                                        "cart",
-                                        "--phantom",
-                                        (folder / "phantom").string(),
-                                        "--socket",
-                                        socket.string(),
-                                        "--tty",
-                                        tty.string(),
-                                        "--out",
-                                        folder.string(),
-                                        "--seed",
-                                        std::to_string(settings.seed),
-                                        "--position-noise-mm",
-                                        fmt::format("{}", settings.position_noise_mm),
-                                        "--angle-noise-deg",
-                                        fmt::format("{}", settings.angle_noise_deg),
-                                        "--size",
-                                        fmt::format("{}x{}", settings.width_px, settings.height_px),
-                                        "--rate",
-                                        fmt::format("{}", settings.video_rate_hz)},
-                                       folder / "simulator.log", ChildProcess::Pipe::stdout_from_child);
+  std::vector<std::string> command{beside_us("birdseye-sim"),
+                                   "cart",
+                                   "--phantom",
+                                   (folder / "phantom").string(),
+                                   "--socket",
+                                   socket.string(),
+                                   "--tty",
+                                   tty.string(),
+                                   "--out",
+                                   folder.string(),
+                                   "--seed",
+                                   std::to_string(settings.seed),
+                                   "--position-noise-mm",
+                                   fmt::format("{}", settings.position_noise_mm),
+                                   "--angle-noise-deg",
+                                   fmt::format("{}", settings.angle_noise_deg),
+                                   "--size",
+                                   fmt::format("{}x{}", settings.width_px, settings.height_px),
+                                   "--rate",
+                                   fmt::format("{}", settings.video_rate_hz),
+                                   "--dwell-s",
+                                   fmt::format("{}", settings.dwell_s),
+                                   "--look-s",
+                                   fmt::format("{}", settings.look_s)};
+  if (settings.drop_late) command.emplace_back("--drop-late");
+  if (!settings.faults.empty()) command.insert(command.end(), {"--faults", settings.faults.string()});
+  auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child);
   if (!simulator) return std::move(simulator).error();
   const auto line = simulator->read_line(Clock::now() + std::chrono::seconds(30));
   if (!line) return line.error();

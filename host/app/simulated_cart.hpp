@@ -25,6 +25,11 @@ struct SimulatedCartSettings {
   double angle_noise_deg = 0.1;
   int width_px = 768, height_px = 576;
   double video_rate_hz = 25;
+  double dwell_s = 0.3;                 ///< for which the scope is held still at each station over the board
+  double look_s = 7;                    ///< for which it sweeps over the liver
+  int smoothing_ms = 40, wait_ms = 90;  ///< [pose] of birdseyed: frames wait for the poses that are averaged
+  bool drop_late = false;               ///< frames that a busy machine has no time to trace; else they come late
+  std::filesystem::path faults;         ///< script of faults, or empty
 };
 
 /// What an operator of the cart knows without looking inside: the board, the pointer, how many fiducials there are.

@@ -3,11 +3,33 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace birdseye::host {
+
+std::optional<TargetError> target_error(const SimulatedTruth& truth, std::uint64_t sequence, const CameraModel& camera,
+                                        const Transform<Camera, Patient>& camera_from_patient,
+                                        const Eigen::Vector3d& tumour_in_patient_mm) {
+  const auto found = truth.camera_from_patient.find(sequence);
+  if (found == truth.camera_from_patient.end()) return std::nullopt;
+  const Eigen::Vector3d true_mm = found->second * truth.tumour_centre_in_patient_mm;
+  const Eigen::Vector3d overlaid_mm = camera_from_patient * tumour_in_patient_mm;
+  const auto true_px = project(truth.camera, true_mm);
+  const auto overlaid_px = project(camera, overlaid_mm);
+  TargetError error;
+  error.target_mm = (overlaid_mm - true_mm).norm();
+  if (true_px && overlaid_px) {
+    error.overlay_px = (*overlaid_px - *true_px).norm();
+    error.true_and_overlaid_px = {*true_px, *overlaid_px};
+  } else if (true_px || overlaid_px) {
+    // One of the two lies behind the camera: as wrong as a picture can be.
+    error.overlay_px = std::hypot(truth.camera.width_px, truth.camera.height_px);
+  }
+  return error;
+}
 
 Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder) {
   const auto wrong = [&](const char* name, const std::string& why) {

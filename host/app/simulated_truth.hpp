@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
@@ -17,6 +19,18 @@ struct SimulatedTruth {
   Eigen::Vector3d tumour_centre_in_patient_mm;
   std::map<std::uint64_t, Transform<Camera, Patient>> camera_from_patient;  ///< by the frame's sequence
 };
+
+/// How far an overlay puts the tumour's centre from where it truly is.
+struct TargetError {
+  double target_mm = 0, overlay_px = 0;
+  /// In the picture; both or none.
+  std::optional<std::pair<Eigen::Vector2d, Eigen::Vector2d>> true_and_overlaid_px;
+};
+/// Of one frame, overlaid with this lens from this pose; tumour_in_patient_mm: as the CT shows it. Empty where the
+/// truth knows no such frame.
+std::optional<TargetError> target_error(const SimulatedTruth& truth, std::uint64_t sequence, const CameraModel& camera,
+                                        const Transform<Camera, Patient>& camera_from_patient,
+                                        const Eigen::Vector3d& tumour_in_patient_mm);
 
 /// folder: the simulator's truth/.
 Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder);

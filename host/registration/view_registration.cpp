@@ -49,11 +49,12 @@ enum class Free { all, pose };
 class Problem {
  public:
   static Result<Problem> make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
-                              const Stage& stage, const Prior& prior, ViewRegistration& record) {
+                              const Stage& stage, const Prior& prior, ViewRegistration& record,
+                              const RegistrationWatch& watch) {
     const int reduction = reduction_of(stage, views.front());
     auto made = MultiView::make(views, tissue, control, reduction, prior);
     if (!made) return made.error();
-    return Problem(control, reduction, *std::move(made), record);
+    return Problem(control, reduction, *std::move(made), record, watch);
   }
 
   double similarity(const Parameters& parameters, const Headlight& light) {
@@ -69,6 +70,7 @@ class Problem {
     if (record_.pose) even.insert(even.end(), record_.pose->begin(), record_.pose->end());
     nlopt::opt optimiser(nlopt::LD_LBFGS, static_cast<unsigned>(even.size()));
     const auto objective = [&](const Parameters& x, Parameters& gradient) {
+      if (watch_.cancelled()) throw nlopt::forced_stop();
       ++record_.gradient_evaluations;
       PoseUnknowns pose{};
       std::copy(x.begin() + inner, x.end(), pose.begin());
@@ -79,6 +81,7 @@ class Problem {
         gradient.insert(gradient.end(), by.begin() + inner, by.end());
       }
       record_.trace.push_back({reduction_, static_cast<std::size_t>(inner), value});
+      watch_.step(record_.trace.back());
       return value;
     };
     using Objective = decltype(objective);
@@ -111,13 +114,15 @@ class Problem {
   MultiView& views() { return views_; }
 
  private:
-  Problem(const ControlGrid& control, int reduction, MultiView views, ViewRegistration& record)
-      : control_(control), reduction_(reduction), views_(std::move(views)), record_(record) {}
+  Problem(const ControlGrid& control, int reduction, MultiView views, ViewRegistration& record,
+          const RegistrationWatch& watch)
+      : control_(control), reduction_(reduction), views_(std::move(views)), record_(record), watch_(watch) {}
 
   const ControlGrid& control_;
   int reduction_;
   MultiView views_;
   ViewRegistration& record_;
+  const RegistrationWatch& watch_;
 };
 
 /// The lamp under which a deformation explains the views best.
@@ -260,10 +265,10 @@ Result<std::array<int, 3>> choose_control_points(const std::vector<VideoView>& v
     const std::array<int, 3> now{n, n, n};
     const ControlGrid control(now);
     found = ControlGrid(before).refine(found, control);
-    auto fit = Problem::make(fitted, tissue, control, kCoarse, settings.prior, record);
+    auto fit = Problem::make(fitted, tissue, control, kCoarse, settings.prior, record, settings.watch);
     if (!fit) return fit.error();
     found = fit->climb(found, light, kCoarse.most_steps);
-    auto judge = Problem::make(held_out, tissue, control, kCoarse, settings.prior, record);
+    auto judge = Problem::make(held_out, tissue, control, kCoarse, settings.prior, record, settings.watch);
     if (!judge) return judge.error();
     const double value = judge->similarity(found, light);
     settings.progress(fmt::format("{} control points: {:.4f} nats on held-out pixels", times(now), value));
@@ -277,6 +282,10 @@ Result<std::array<int, 3>> choose_control_points(const std::vector<VideoView>& v
   }
   record.why_so_many_points = fmt::format("{} control points, the most that are tried", times(best));
   return best;
+}
+
+Error called_off() {
+  return {Errc::disconnected, "the registration was called off; nothing of it is kept"};
 }
 
 }  // namespace
@@ -295,7 +304,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   const ControlGrid one({1, 1, 1});
   Parameters start_of_one(3, 0.0);
   if (settings.initial) start_of_one = closest_parameters(*settings.initial, one, *coarse);
-  auto few = Problem::make(views, *coarse, one, kCoarse, settings.prior, out);
+  auto few = Problem::make(views, *coarse, one, kCoarse, settings.prior, out, settings.watch);
   if (!few) return few.error();
   if (auto sound = check_views(views, *few, start_of_one); !sound) return sound.error();
   out.light = settings.light.value_or(Headlight{});
@@ -312,6 +321,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
     if (!chosen) return chosen.error();
     out.control_points = *chosen;
   }
+  if (settings.watch.cancelled()) return called_off();
   const ControlGrid control(out.control_points);
   Parameters start(control.parameters(), 0.0);
   if (settings.initial) {
@@ -320,7 +330,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
       return Error{Errc::bad_value, "the initial field folds as these control points give it again; give more of them"};
   }
   Parameters rough = settings.initial ? start : one.refine(of_one, control);
-  auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
+  auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out, settings.watch);
   if (!wide) return wide.error();
   if (!settings.light) {
     // A rough fit first, so that the lamp does not stand in for a deformation.
@@ -334,7 +344,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   const auto fine = tissue_of(ct, labels, label_values, transfer, spacing_mm(kFine, ct));
   if (!fine) return fine.error();
   Prior prior = settings.prior;
-  auto judged = Problem::make(views, *fine, control, kFine, prior, out);
+  auto judged = Problem::make(views, *fine, control, kFine, prior, out, settings.watch);
   if (!judged) return judged.error();
   Problem& judge = *judged;
   const std::optional<PoseUnknowns> rough_pose = out.pose;
@@ -344,11 +354,12 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   out.pose = rough_pose;
   constexpr int kTries = 3;
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    auto close = Problem::make(views, *fine, control, kFine, prior, out);
-    auto broad = Problem::make(views, *coarse, control, kCoarse, prior, out);
+    auto close = Problem::make(views, *fine, control, kFine, prior, out, settings.watch);
+    auto broad = Problem::make(views, *coarse, control, kCoarse, prior, out, settings.watch);
     if (!close || !broad) return (close ? broad : close).error();
     rough = broad->climb(rough, out.light, kCoarse.most_steps);
     out.parameters = close->climb(rough, out.light, kFine.most_steps);
+    if (settings.watch.cancelled()) return called_off();
     out.field = driven_field(control, out.parameters, *fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     if (out.min_jacobian > 0) break;
@@ -372,7 +383,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   if (out.pose) out.patient_from_model = judge.views().motion().patient_from_model(*out.pose);
   if (settings.estimate_uncertainty && !out.worse_than_start) {
     // By the usual prior: a stiffer one, against folds, knows no more of the organ.
-    auto summit = Problem::make(views, *coarse, control, kCoarse, settings.prior, out);
+    auto summit = Problem::make(views, *coarse, control, kCoarse, settings.prior, out, settings.watch);
     if (!summit) return summit.error();
     out.uncertainty_mm = uncertainty_mm(*summit, *coarse, control, out);
   }

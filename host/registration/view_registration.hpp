@@ -14,6 +14,19 @@
 
 namespace birdseye::host {
 
+/// One evaluation of the optimiser.
+struct TracePoint {
+  int reduction = 0;  ///< every so many pixels
+  std::size_t parameters = 0;
+  double similarity = 0;
+};
+
+/// Whoever waits for a registration: sees each step, and may call it off. Called on the registration's thread.
+struct RegistrationWatch {
+  std::function<void(const TracePoint&)> step = [](const TracePoint&) {};
+  std::function<bool()> cancelled = [] { return false; };
+};
+
 struct ViewRegistrationSettings {
   /// Inner control points along each axis; none: as many as the views support.
   std::optional<std::array<int, 3>> control_points;
@@ -29,13 +42,7 @@ struct ViewRegistrationSettings {
   Prior prior;
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
-};
-
-/// One evaluation of the optimiser.
-struct TracePoint {
-  int reduction = 0;  ///< every so many pixels
-  std::size_t parameters = 0;
-  double similarity = 0;
+  RegistrationWatch watch;
 };
 
 struct ViewRegistration {
@@ -64,7 +71,7 @@ struct ViewRegistration {
 
 /// Deforms the tissue until synthetic views look like the video: L-BFGS with the analytic gradient, coarse to fine.
 /// Refuses, naming the view: one that sees nothing of the organ, a picture of a single grey; and a start that folds,
-/// also as the control points give it again.
+/// also as the control points give it again. Errc::disconnected where the watch calls it off.
 Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
                                         std::span<const int> label_values, const TransferFunction& transfer,
                                         const ViewRegistrationSettings& settings);

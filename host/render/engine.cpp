@@ -5,8 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/gl/gl_ray_caster.hpp"
@@ -24,15 +25,24 @@ class CpuEngine final : public Engine {
   void undeform() override { caster_.undeform(); }
   ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                    const RenderSettings& settings) override {
-    if (!rays_ || !(rays_->camera() == camera)) rays_.emplace(camera);
-    return caster_.render(*rays_, camera_from_patient, settings);
+    return caster_.render(rays_of(camera), camera_from_patient, settings);
   }
   [[nodiscard]] std::string name() const override { return "cpu, " + cpu::name_of(cpu::supported_isas().back()); }
   [[nodiscard]] std::size_t bytes() const override { return caster_.bytes(); }
 
  private:
+  /// The rays of the last two cameras are kept: a window draws its inset between frames.
+  const LensRays& rays_of(const CameraModel& camera) {
+    if (rays_[1] && rays_[1]->camera() == camera) std::swap(rays_[0], rays_[1]);
+    if (!rays_[0] || !(rays_[0]->camera() == camera)) {
+      std::swap(rays_[0], rays_[1]);
+      rays_[0] = std::make_unique<LensRays>(camera);
+    }
+    return *rays_[0];
+  }
+
   RayCaster caster_;
-  std::optional<LensRays> rays_;
+  std::array<std::unique_ptr<LensRays>, 2> rays_;
 };
 
 template <typename Renderer>

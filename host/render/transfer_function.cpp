@@ -64,7 +64,7 @@ TransferPoint between(const Points& points, double hu) {
 
 }  // namespace
 
-TransferFunction::TransferFunction(const std::vector<TransferPoint>& points) {
+TransferFunction::TransferFunction(const std::vector<TransferPoint>& points) : points_(points) {
   table_.reserve(kEntries);
   seen_up_to_.reserve(kEntries + 1);
   seen_up_to_.push_back(0);

@@ -28,11 +28,14 @@ class TransferFunction {
   };
   /// At a whole HU, clamped to what a CT can hold.
   [[nodiscard]] const Entry& at(int hu) const;
+  /// As they were given.
+  [[nodiscard]] const std::vector<TransferPoint>& points() const { return points_; }
   /// Whether any HU of [low, high] is seen at all.
   [[nodiscard]] bool any_seen(int low, int high) const;
 
  private:
   static constexpr std::size_t kEntries = kHighestHu - kLowestHu + 1;
+  std::vector<TransferPoint> points_;
   std::vector<Entry> table_;
   std::vector<int> seen_up_to_;  ///< running count of entries that are seen
 };

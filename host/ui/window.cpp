@@ -7,16 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "host/ui/glfw_window.hpp"
+
 namespace birdseye::host {
 
 namespace {
-
-/// Why GLFW's last call failed, and what to do.
-Error missing(const std::string& what, const std::string& remedy) {
-  const char* why = nullptr;
-  glfwGetError(&why);
-  return {Errc::unsupported, "window: " + what + (why != nullptr ? std::string(" (") + why + ")" : "") + "; " + remedy};
-}
 
 Window& window_of(GLFWwindow* window) {
   return *static_cast<Window*>(glfwGetWindowUserPointer(window));
@@ -26,23 +21,10 @@ Window& window_of(GLFWwindow* window) {
 
 Result<std::unique_ptr<Window>> Window::open(const std::string& title, int width_px, int height_px) {
   hush_drivers();
-  if (glfwInit() == GLFW_FALSE) {
-    return missing("there is no display", "set DISPLAY, or write a picture with --out instead of --window");
-  }
-  std::unique_ptr<Window> made(new Window);                         // from here on its end is GLFW's
-  glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);  // as off-screen, so that the drivers are the same
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
-  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, GLFW_TRUE);
-  glfwWindowHint(GLFW_DEPTH_BITS, 0);
-  glfwWindowHint(GLFW_STENCIL_BITS, 0);
-  made->window_ = glfwCreateWindow(width_px, height_px, title.c_str(), nullptr, nullptr);
-  if (made->window_ == nullptr) {
-    return missing("the display has no OpenGL 4.5 core",
-                   "install libegl1 and libgl1-mesa-dri, or write a picture with --out instead of --window");
-  }
-  glfwMakeContextCurrent(made->window_);
+  std::unique_ptr<Window> made(new Window);  // from here on its end is GLFW's
+  auto opened = open_glfw_window(title, width_px, height_px, ", or write a picture with --out instead of --window");
+  if (!opened) return opened.error();
+  made->window_ = *opened;
   glfwSwapInterval(0);  // pictures come one by one, and a hidden window must not hold us
   made->begin();
   made->width_px_ = width_px;

@@ -129,6 +129,7 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   camera_settings.rate_hz = settings.rate_hz;
   camera_settings.seed = settings.seed;
   camera_settings.delay_ms = settings.camera_delay_ms;
+  camera_settings.drop_late = settings.drop_late;
   camera_settings.faults = std::move(faults.camera);
   const auto camera = FrameCamera::listen(camera_settings, *world, **laparoscope);
   if (!camera) return camera.error();

@@ -21,6 +21,7 @@ struct CartSettings {
   double rate_hz = 25;
   Pace pace;
   double camera_delay_ms = 0;    ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
+  bool drop_late = false;        ///< frames that are not traced in time
   double distortion_mm = 0;      ///< of the tracker's field, where it is largest
   std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
 };

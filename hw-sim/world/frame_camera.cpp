@@ -61,6 +61,7 @@ void FrameCamera::render(const std::stop_token& stop) {
       changed_.wait(lock, stop, [&] { return queue_.size() < kQueueFrames; });
     }
     if (stop.stop_requested()) return;
+    if (settings_.drop_late && sequence + 1 < frames_ && is_past(sequence)) continue;
     const double world_s = static_cast<double>(sequence) / settings_.rate_hz;
     const Transform<Tracker, Camera> pose = world_.tracker_from_camera(world_s);
     Rendered rendered{sequence, world_.at_bench(world_s)
@@ -72,6 +73,11 @@ void FrameCamera::render(const std::stop_token& stop) {
     }
     changed_.notify_all();
   }
+}
+
+bool FrameCamera::is_past(std::uint64_t sequence) const {
+  const auto after_zero_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(sequence) / settings_.rate_hz);
+  return zero_ns_ != 0 && drivers::now().ns > zero_ns_ + after_zero_ns;
 }
 
 bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {
@@ -113,10 +119,11 @@ void FrameCamera::follow(CameraScript& script, std::int64_t until_ns) {
 void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop) {
   Rendered rendered;
   while (!stop.stop_requested() && sent_ < frames_) {
-    const FramePlan plan = script.next();
+    FramePlan plan = script.next();
     // A frame goes out whole, however slow its reader: the world is short, and none of it may be missed.
     while (sink_->busy() && !stop.stop_requested()) follow(script, drivers::now().ns + kListenNs);
     if (!take(rendered, stop)) return;
+    for (; sent_ < rendered.number; ++sent_) plan = script.next();
     do {
       follow(script, plan.due_ns);
     } while (!stop.stop_requested() && drivers::now().ns < plan.due_ns);

@@ -26,7 +26,8 @@ class FrameCamera {
     CameraModel lens;
     double rate_hz = 25;
     std::uint64_t seed = 1;
-    double delay_ms = 0;        ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
+    double delay_ms = 0;     ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
+    bool drop_late = false;  ///< frames that are not traced in time are left out, as by a camera; else they come late
     std::vector<Fault> faults;  ///< from the world's time 0 on
   };
 
@@ -55,6 +56,8 @@ class FrameCamera {
   void serve(const std::stop_token& stop);
   void serve_world(CameraScript& script, const std::stop_token& stop);
   void follow(CameraScript& script, std::int64_t until_ns);
+  /// Whether a frame that is not traced yet should have been exposed by now.
+  [[nodiscard]] bool is_past(std::uint64_t sequence) const;
   [[nodiscard]] bool take(Rendered& rendered, const std::stop_token& stop);
   [[nodiscard]] Picture picture_of(const Rendered& rendered, bool half_size);
 

@@ -24,8 +24,8 @@ constexpr int kStations = 24;
 constexpr double kMoveS = 0.14;                           // from station to station over the board
 constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
 constexpr double kCarryS = 2;                             // of the scope from the board to the patient
-constexpr double kLookS = 7;
-constexpr double kRangeMm = 700;  // of the transmitter
+constexpr double kSweepS = 7;                             // there and back
+constexpr double kRangeMm = 700;                          // of the transmitter
 
 double ease(double u) {
   u = std::clamp(u, 0.0, 1.0);
@@ -92,11 +92,12 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   world.calibrate_s_ = pace.sway_s;
   world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS);
   world.look_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.ends_s_ = world.look_s_ + pace.look_s;
   if (pace.sway_s > 0) world.stages_.push_back({"sway", 0});
   for (const Stage& stage : std::initializer_list<Stage>{{"calibrate", world.calibrate_s_},
                                                          {"touch", world.touch_s_},
                                                          {"look", world.look_s_},
-                                                         {"end", world.look_s_ + kLookS}}) {
+                                                         {"end", world.ends_s_}}) {
     world.stages_.push_back(stage);
   }
   if (const auto in_range = world.check_range(); !in_range) return in_range.error();
@@ -155,7 +156,7 @@ Result<void> World::check_range() const {
 
 Transform<Tracker, Camera> World::sweep(double since_s) const {
   constexpr double kPortMm = 205, kTipFromFaceMm = 108;
-  const double phase = 2 * std::numbers::pi * since_s / kLookS;
+  const double phase = 2 * std::numbers::pi * since_s / kSweepS;
   const Vector3d out = towards_scope();
   const Vector3d port = look_at_in_patient_mm_ + kPortMm * out;
   const Vector3d right = out.cross(Vector3d::UnitZ()).normalized();
@@ -188,7 +189,7 @@ Transform<Tracker, Camera> World::sway(double world_s) const {
 
 Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
   if (world_s < calibrate_s_) return sway(std::max(0.0, world_s));
-  if (world_s >= look_s_) return sweep(std::min(world_s - look_s_, kLookS));
+  if (world_s >= look_s_) return sweep(std::min(world_s, ends_s_) - look_s_);
   if (world_s >= touch_s_) return between(stations_.back(), sweep(0), ease((world_s - touch_s_) / kCarryS));
   const double beat = std::max(0.0, world_s - calibrate_s_) / (dwell_s_ + kMoveS);
   const auto station = std::min(static_cast<std::size_t>(beat), stations_.size() - 1);

@@ -17,10 +17,11 @@ struct Stage {
   double begins_s;
 };
 
-/// How long the operator takes over the board.
+/// How long the operator takes over the board and the liver.
 struct Pace {
   double sway_s = 0;     ///< for which the scope is turned to and fro over it before anything else
   double dwell_s = 0.3;  ///< for which it is held still at each station
+  double look_s = 7;     ///< for which the scope sweeps over the liver
 };
 
 /// The scripted operation: where everything truly is at any world time. If asked for, the scope is first turned to and
@@ -34,7 +35,7 @@ class World {
                               const Pace& pace = {});
 
   [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
-  [[nodiscard]] double ends_s() const { return stages_.back().begins_s; }
+  [[nodiscard]] double ends_s() const { return ends_s_; }
   [[nodiscard]] bool at_bench(double world_s) const { return world_s < touch_s_; }
 
   [[nodiscard]] Transform<Tracker, Camera> tracker_from_camera(double world_s) const;
@@ -65,7 +66,7 @@ class World {
   std::vector<Transform<Tracker, Camera>> stations_;
   std::vector<Eigen::Vector3d> tip_stops_in_tracker_mm_;  ///< park, each fiducial, park
   std::vector<Stage> stages_;
-  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, look_s_ = 0;
+  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, look_s_ = 0, ends_s_ = 0;
 };
 
 }  // namespace birdseye::hw_sim

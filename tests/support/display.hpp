@@ -17,7 +17,7 @@ namespace birdseye::testing {
 /// side by side.
 class Display {
  public:
-  Display() {
+  explicit Display(const std::string& size = "640x480") {
     std::array<int, 2> fds{-1, -1};
     EXPECT_EQ(::pipe2(fds.data(), O_CLOEXEC), 0);
     child_ = ::fork();
@@ -26,7 +26,7 @@ class Display {
       const int nowhere = ::open("/dev/null", O_RDWR);
       ::dup2(fds[1], STDOUT_FILENO);
       ::dup2(nowhere, STDERR_FILENO);
-      ::execlp("Xvfb", "Xvfb", "-displayfd", "1", "-screen", "0", "640x480x24", "-nolisten", "tcp", nullptr);
+      ::execlp("Xvfb", "Xvfb", "-displayfd", "1", "-screen", "0", (size + "x24").c_str(), "-nolisten", "tcp", nullptr);
       ::_exit(127);
     }
     ::close(fds[1]);
@@ -47,6 +47,7 @@ class Display {
   Display& operator=(const Display&) = delete;
 
   /// For run(): a program within it opens its windows there.
+  [[nodiscard]] std::string name() const { return ":" + number_; }
   [[nodiscard]] std::string env() const { return "env -u WAYLAND_DISPLAY DISPLAY=:" + number_; }
 
  private:

@@ -84,11 +84,11 @@ Result<HandEyeRecording> record_live(const Options& options) {
   LivePlan plan = options.plan;
   auto pattern = calibration::parse_pattern(options.files.board);
   if (!pattern) return pattern.error();
-  plan.pattern = *std::move(pattern);
+  plan.guide.pattern = *std::move(pattern);
   if (!options.files.camera.empty()) {
     auto camera = read_camera(options.files.camera);
     if (!camera) return camera.error();
-    plan.camera = *camera;
+    plan.guide.camera = *camera;
   }
   Progress progress;
   auto session = guide_hand_eye(plan, progress);
@@ -96,7 +96,7 @@ Result<HandEyeRecording> record_live(const Options& options) {
   HandEyeRecording out;
   out.input = std::move(session->input);
   out.notes.push_back("ended: " + session->ended);
-  if (!plan.camera) {
+  if (!plan.guide.camera) {
     if (session->lens) {
       out.camera_verdict = calibration::judge_camera(*session->lens);
     } else {
@@ -257,12 +257,12 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   LivePlan& plan = options->plan;
   command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")
       ->type_name("HOST:PORT");
-  command->add_option("--bird", plan.bird, "with --live: the scope's bird, by its name (default: scope)");
-  command->add_option("--keep", plan.keep, "with --live: a folder for the stations' pictures and poses")
+  command->add_option("--bird", plan.guide.bird, "with --live: the scope's bird, by its name (default: scope)");
+  command->add_option("--keep", plan.guide.keep, "with --live: a folder for the stations' pictures and poses")
       ->type_name("FOLDER");
-  command->add_option("--stations", plan.fewest_stations, "with --live: the fewest (default 12)")
+  command->add_option("--stations", plan.guide.fewest_stations, "with --live: the fewest (default 12)")
       ->check(CLI::Range(6, 100));
-  command->add_option("--most-stations", plan.most_stations, "with --live: then it ends in any case (default 40)")
+  command->add_option("--most-stations", plan.guide.most_stations, "with --live: then it ends in any case (default 40)")
       ->check(CLI::Range(6, 200));
   command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
       ->check(CLI::Range(5.0, 7200.0));

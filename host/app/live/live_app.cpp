@@ -1,0 +1,212 @@
+#include "host/app/live/live_app.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "calibration/solve/pattern.hpp"
+#include "host/app/interrupt.hpp"
+#include "host/app/picture.hpp"
+#include "host/app/write_files.hpp"
+#include "host/render/transfer_function.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Clock = wire::Client::Clock;
+
+// Between pictures it is looked as often as this whether one has grown stale.
+constexpr auto kTick = std::chrono::milliseconds(12);
+constexpr Duration kRedraw = Duration::from_ms(50);  // for hands and figures, where there is no new frame
+
+HostTime now() {
+  return HostTime{std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count()};
+}
+
+RenderSettings usual_settings() {
+  RenderSettings settings;
+  settings.step_mm = 1.2;  // what two cores draw in time
+  return settings;
+}
+
+}  // namespace
+
+LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
+                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log)
+    : window_(std::move(window)),
+      source_(std::move(source)),
+      session_(std::move(settings)),
+      simulated_(std::move(simulated)),
+      script_(std::move(script)),
+      log_(std::move(log)) {
+  facts_.ages = &figures_.ages;
+  facts_.recorded = !source_->live();
+  session_.picture().set_render(usual_settings());
+}
+
+Result<void> LiveApp::run() {
+  note_interrupts();
+  const HostTime began = now();
+  while (!window_->closed() && !interrupted()) {
+    take_events();
+    note_simulator();
+    session_.set_link(source_->connected(), source_->words());
+    session_.tick();
+    note_patient();
+    draw();
+    draw_inset();
+    if (!window_->fault().empty())
+      return Error{Errc::io, "window: " + window_->fault() + "; the driver of the graphics card is at fault"};
+    const auto ended = follow_script();
+    if (!ended) return ended.error();
+    figures_.seconds = Duration{now().ns - began.ns}.seconds();
+    if (*ended) break;
+  }
+  figures_.frames_skipped = session_.picture().frames_skipped();
+  return {};
+}
+
+void LiveApp::take_events() {
+  const auto deadline = Clock::now() + kTick;
+  bool frame = false;
+  // Waits for a frame, then takes what has come besides: the newest frame is what is drawn.
+  while (auto event = source_->next(frame ? Clock::now() : deadline)) {
+    frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
+    session_.take(*event, now(), source_->host_from_device());
+  }
+}
+
+void LiveApp::note_simulator() {
+  SimulatedCart* const cart = source_->cart();
+  if (cart == nullptr || sheet_read_) return;
+  sheet_read_ = true;
+  const CartSheet& sheet = cart->sheet();
+  if (const auto pattern = calibration::parse_pattern(sheet.board))
+    session_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
+  session_.load(simulated_);
+}
+
+void LiveApp::note_patient() {
+  if (session_.patient() == nullptr || histogram_) return;
+  histogram_.emplace(session_.patient()->shown);
+  facts_.histogram = &*histogram_;
+  inset_.emplace(session_.patient()->shown);
+  if (session_.transfer()) editor_.set_points(session_.transfer()->points());
+}
+
+/// Some times a second, between frames: it is no part of what must be live.
+void LiveApp::draw_inset() {
+  constexpr Duration kEvery = Duration::from_ms(250);
+  Engine* const engine = session_.engine();
+  if (!inset_ || engine == nullptr || Duration{now().ns - inset_drawn_.ns} < kEvery) return;
+  inset_drawn_ = now();
+  const Picture picture = inset_->draw(*engine, session_.picture().camera_from_patient());
+  window_->set_picture(LiveWindow::Slot::inset, picture.rgb, picture.width_px, picture.height_px);
+}
+
+void LiveApp::draw() {
+  LivePicture& picture = session_.picture();
+  picture.draw();
+  const HostTime began = now();
+  // Judged as of when it will be seen: drawing the window takes its time too.
+  ShownPicture shown = picture.at(HostTime{began.ns + to_draw_.ns});
+  const bool news = shown.changes != drawn_changes_ || !shot_.empty();
+  if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
+  drawn_ = began;
+  const PanelWishes wishes = draw_window(shown);
+  if (shown.overlaid && !picture.at(now()).overlaid) {
+    // It took longer than it was thought to: what has grown stale on the way is not shown.
+    shown = picture.at(now());
+    draw_window(shown);
+  }
+  if (!shot_.empty()) {
+    snapshot(shot_);
+    shot_.clear();
+  }
+  window_->swap();
+  const HostTime swapped = now();
+  to_draw_ = Duration{swapped.ns - began.ns};
+  if (!shown.any) return grant(wishes);
+  const double age_ms = Duration{swapped.ns - picture.exposed().ns}.seconds() * 1e3;
+  if (shown.overlaid) figures_.oldest_overlay_ms = std::max(figures_.oldest_overlay_ms, age_ms);
+  const std::uint64_t sequence = picture.frame()->info.sequence;
+  if (drawn_sequence_ != sequence) {
+    drawn_sequence_ = sequence;
+    ++figures_.frames;
+    figures_.frames_overlaid += shown.overlaid ? 1 : 0;
+    figures_.ages.add(age_ms);
+    swaps_.push_back(swapped);
+    while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
+    facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
+    if (log_) {
+      log_->add(sequence, age_ms, shown.strength,
+                shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
+    }
+  }
+  grant(wishes);
+}
+
+PanelWishes LiveApp::draw_window(const ShownPicture& shown) {
+  if (shown.any && shown.changes != drawn_changes_) {
+    window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
+    drawn_changes_ = shown.changes;
+  }
+  window_->begin_frame();
+  facts_.frames_skipped = session_.picture().frames_skipped();
+  PanelWishes wishes = draw_panels(*window_, session_, shown, facts_, editor_);
+  window_->end_frame();
+  return wishes;
+}
+
+void LiveApp::grant(const PanelWishes& asked) {
+  PanelWishes wishes = asked;
+  if (scripted_.primary) wishes.primary = true;
+  if (scripted_.next) wishes.next = true;
+  if (scripted_.undo) wishes.undo = true;
+  if (scripted_.freeze) wishes.freeze = true;
+  if (scripted_.snapshot) wishes.snapshot = true;
+  if (scripted_.step) wishes.step = scripted_.step;
+  if (scripted_.opacity) wishes.opacity = scripted_.opacity;
+  if (scripted_.clip) wishes.clip = scripted_.clip;
+  scripted_ = {};
+  if (wishes.primary) session_.primary();
+  if (wishes.next) session_.go_on();
+  if (wishes.undo) session_.undo();
+  if (wishes.freeze) session_.set_frozen(!session_.frozen());
+  if (wishes.step) session_.go_to(*wishes.step);
+  if (wishes.opacity) {
+    facts_.opacity = *wishes.opacity;
+    session_.picture().set_opacity(facts_.opacity);
+  }
+  if (wishes.clip) facts_.clip = *wishes.clip;
+  if (wishes.plane) facts_.plane = *wishes.plane;
+  if ((wishes.clip || wishes.plane) && session_.patient() != nullptr) {
+    RenderSettings render = usual_settings();
+    if (facts_.clip) render.clip = clip_plane(facts_.plane, session_.patient()->shown);
+    session_.picture().set_render(render);
+  }
+  if (wishes.transfer) session_.set_transfer(TransferFunction(*wishes.transfer));
+  if (const auto preset = load_transfer_function(wishes.preset); !wishes.preset.empty() && preset) {
+    session_.set_transfer(*preset);
+    editor_.set_points(preset->points());
+  }
+  if (wishes.snapshot) shot_ = (log_ ? log_->folder() : ".") / fmt::format("snapshot-{:03}.png", ++shots_);
+}
+
+Result<bool> LiveApp::follow_script() {
+  if (!script_) return false;
+  const auto act = script_->next(session_, now());
+  if (!act) return act.error();
+  if (!act->key.empty()) add_key(act->key, facts_, scripted_);
+  if (!act->shot.empty()) shot_ = act->shot;
+  return act->end;
+}
+
+void LiveApp::snapshot(const std::filesystem::path& path) {
+  const LiveWindow::Shot shot = window_->shot();
+  const auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+  facts_.said = written ? "snapshot: " + path.string() : written.error().what;
+}
+
+}  // namespace birdseye::host

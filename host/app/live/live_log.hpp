@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+
+namespace birdseye::host {
+
+/// A line for each frame that was shown, in FOLDER/frames.csv: its number, age at the screen, and where its overlay was
+/// drawn from. It is written as it comes: an hour of it takes no memory.
+class LiveLog {
+ public:
+  /// folder: made if need be.
+  static Result<LiveLog> open(const std::filesystem::path& folder);
+  void add(std::uint64_t sequence, double age_ms, double strength,
+           const std::optional<Transform<Camera, Patient>>& camera_from_patient);
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// All written; an error where the disk was full.
+  Result<void> close();
+
+ private:
+  std::filesystem::path folder_;
+  std::ofstream file_;
+};
+
+/// What a simulated operation's overlay was off by, against the truth in folder/truth: of each overlaid frame of the
+/// log, the distance of the tumour's centre, mm. camera: the lens it was drawn with.
+Result<std::vector<double>> logged_target_errors_mm(const std::filesystem::path& log_folder,
+                                                    const std::filesystem::path& truth_folder,
+                                                    const CameraModel& camera,
+                                                    const Eigen::Vector3d& tumour_in_patient_mm);
+
+}  // namespace birdseye::host

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+
+#include "host/app/live/age_strip.hpp"
+#include "host/app/live/appearance.hpp"
+#include "host/app/live/live_session.hpp"
+#include "host/ui/live_window.hpp"
+
+namespace birdseye::host {
+
+/// What a person asked for in a frame of the window.
+struct PanelWishes {
+  bool primary = false, next = false, undo = false, freeze = false, snapshot = false;
+  std::optional<LiveStep> step;
+  std::optional<double> opacity;
+  std::optional<bool> clip;
+  std::optional<CuttingPlane> plane;
+  std::optional<std::vector<TransferPoint>> transfer;
+  std::string preset;
+};
+
+/// What the panels show beside the session.
+struct PanelFacts {
+  const AgeStrip* ages = nullptr;
+  double frames_per_s = 0;
+  std::uint64_t frames_skipped = 0;
+  double opacity = 1;
+  bool clip = false;
+  CuttingPlane plane;
+  const HuHistogram* histogram = nullptr;
+  bool recorded = false;  ///< the source is a recording
+  std::string said;       ///< a remark of the window's own: where a snapshot went
+};
+
+/// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
+PanelWishes draw_panels(const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
+                        const PanelFacts& facts, TransferEditor& editor);
+/// The wish that a key stands for: "space", "enter", "backspace", "f", "s", "1" to "7", "+", "-", "c".
+void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);
+
+}  // namespace birdseye::host

@@ -1,0 +1,68 @@
+#include "host/app/live/live_script.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace birdseye::host {
+
+namespace {
+
+std::optional<LiveStep> step_of(const std::string& name) {
+  for (std::size_t i = 0; i < kLiveSteps; ++i) {
+    if (name == name_of(static_cast<LiveStep>(i))) return static_cast<LiveStep>(i);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file) return Error{Errc::unreadable, path.string() + ": cannot be read"};
+  LiveScript script;
+  script.name_ = path.string();
+  std::string text;
+  for (int number = 1; std::getline(file, text); ++number) {
+    std::istringstream words(text.substr(0, text.find('#')));
+    Line line;
+    line.number = number;
+    if (!(words >> line.verb)) continue;
+    const bool timed = line.verb == "wait" || line.verb == "sleep";
+    bool sound = timed || line.verb == "key" || line.verb == "shot" || line.verb == "end";
+    if (line.verb != "sleep" && line.verb != "end") sound = sound && static_cast<bool>(words >> line.what);
+    if (timed) sound = sound && static_cast<bool>(words >> line.seconds) && line.seconds >= 0;
+    if (line.verb == "wait") sound = sound && step_of(line.what).has_value();
+    if (!sound) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"sleep SECONDS\", \"key NAME\", \"shot FILE\" or "
+                               "\"end\"",
+                               path.string(), number)};
+    }
+    script.lines_.push_back(std::move(line));
+  }
+  return script;
+}
+
+Result<LiveScript::Act> LiveScript::next(const LiveSession& session, HostTime now) {
+  if (lines_.empty()) return Act{};
+  if (!since_) since_ = now;
+  const Line& line = lines_.front();
+  const double waited_s = Duration{now.ns - since_->ns}.seconds();
+  if (line.verb == "wait" && !session.note(*step_of(line.what)).done) {
+    if (waited_s < line.seconds) return Act{};
+    return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.what,
+                                            line.seconds, session.note(*step_of(line.what)).line)};
+  }
+  if (line.verb == "sleep" && waited_s < line.seconds) return Act{};
+  Act act;
+  if (line.verb == "key") act.key = line.what;
+  if (line.verb == "shot") act.shot = line.what;
+  act.end = line.verb == "end";
+  lines_.pop_front();
+  since_.reset();
+  return act;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// A point of the CT with a name, patient frame.
+struct NamedPoint {
+  std::string name;
+  Eigen::Vector3d place_mm;
+};
+
+/// Where to read what is known of the patient before the operation.
+struct PatientFiles {
+  std::filesystem::path ct, labels;
+  std::vector<int> shown;           ///< the labels to show; empty: all of the CT
+  std::vector<int> targets;         ///< labels whose middles are landmarks to check by
+  std::vector<int> organ;           ///< labels of the organ that the video shows; empty: all of the CT
+  std::filesystem::path fiducials;  ///< points of the CT; empty: found in it
+  std::filesystem::path landmarks;  ///< a table name, x, y, z; or empty
+};
+
+struct PatientPlan {
+  Volume ct, shown;
+  std::optional<Volume> labels;
+  std::vector<int> organ;                              ///< labels of what the views show: it is matched with them
+  std::vector<Eigen::Vector3d> markers_in_patient_mm;  ///< the brightest first, where they were found
+  std::vector<NamedPoint> landmarks;
+};
+
+/// An error names the file.
+Result<PatientPlan> read_patient(const PatientFiles& files);
+
+}  // namespace birdseye::host
