@@ -50,7 +50,7 @@ Result<void> check(const Options& options) {
     return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
   if (!options.live && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
-  if (const auto sound = check_right(files); !sound) return sound;
+  if (const auto sound = check_right(files); !sound) return sound.error();
   if (!options.rod_angles.empty() && files.images.empty())
     return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
