@@ -112,7 +112,8 @@ std::vector<Eigen::Vector3d> places(const Registered& registered, const RestMap&
   std::vector<Eigen::Vector3d> points;
   points.reserve(static_cast<std::size_t>(kSide) * kSide * kSide);
   for (int n = 0; n < kSide * kSide * kSide; ++n) {
-    const Eigen::Vector3d step(n % kSide + 0.5, n / kSide % kSide + 0.5, n / (kSide * kSide) + 0.5);
+    const Eigen::Vector3i cell(n % kSide, n / kSide % kSide, n / (kSide * kSide));
+    const Eigen::Vector3d step = cell.cast<double>() + Eigen::Vector3d::Constant(0.5);
     points.emplace_back(seen_from_ct * ct_from_unit * Eigen::Vector3d(step / kSide));
   }
   return points;

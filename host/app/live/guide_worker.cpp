@@ -92,7 +92,7 @@ std::optional<wire::Event> GuideWorker::next(const std::stop_token& stop) {
   return event;
 }
 
-void GuideWorker::work(const std::stop_token& stop, GuidePlan plan) {
+void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {
   HandEyeGuide guide(plan, {[](const std::string&) {}, [this](const std::string& line) { tell(line); }});
   std::optional<Error> fault;
   while (!guide.ended() && !fault) {

@@ -36,7 +36,7 @@ class GuideWorker {
   std::optional<Result<GuidedCalibration>> take();
 
  private:
-  void work(const std::stop_token& stop, GuidePlan plan);
+  void work(const std::stop_token& stop, const GuidePlan& plan);
   [[nodiscard]] std::optional<wire::Event> next(const std::stop_token& stop);
   void tell(const std::string& line);
 
