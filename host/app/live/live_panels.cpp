@@ -26,6 +26,11 @@ ImVec4 colour_of(Grade grade) {
   return grade == Grade::pass ? kGood : grade == Grade::marginal ? kWarn : kBad;
 }
 
+/// ImGui carries OpenGL's names as pointers.
+ImTextureID texture(std::uintptr_t name) {
+  return reinterpret_cast<ImTextureID>(name);  // NOLINT(performance-no-int-to-ptr)
+}
+
 void say(const ImVec4& colour, const std::string& text) {
   ImGui::PushStyleColor(ImGuiCol_Text, colour);
   ImGui::PushTextWrapPos(0);
@@ -62,13 +67,14 @@ void draw_cells(const std::array<bool, N>& cells, std::size_t columns, float siz
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 at = ImGui::GetCursorScreenPos();
   for (std::size_t i = 0; i < N; ++i) {
-    const ImVec2 from(at.x + static_cast<float>(i % columns) * size, at.y + static_cast<float>(i / columns) * size);
+    const std::size_t row = i / columns;
+    const ImVec2 from(at.x + static_cast<float>(i % columns) * size, at.y + static_cast<float>(row) * size);
     const ImVec2 to(from.x + size - 2, from.y + size - 2);
     if (cells[i]) list->AddRectFilled(from, to, ImGui::GetColorU32(kGood));
     list->AddRect(from, to, ImGui::GetColorU32(kQuiet));
   }
-  const auto rows = static_cast<float>((N + columns - 1) / columns);
-  ImGui::Dummy(ImVec2(static_cast<float>(columns) * size, rows * size));
+  const std::size_t rows = (N + columns - 1) / columns;
+  ImGui::Dummy(ImVec2(static_cast<float>(columns) * size, static_cast<float>(rows) * size));
 }
 
 void draw_calibrate(const LiveSession& session, float scale) {
@@ -264,14 +270,13 @@ void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& s
         std::min(size.x / static_cast<float>(shown.width_px), size.y / static_cast<float>(shown.height_px));
     const ImVec2 shape(fit * static_cast<float>(shown.width_px), fit * static_cast<float>(shown.height_px));
     ImGui::SetCursorPos(ImVec2((size.x - shape.x) / 2, (size.y - shape.y) / 2));
-    ImGui::Image(reinterpret_cast<ImTextureID>(window.picture(LiveWindow::Slot::video)),
-                 shape);  // NOLINT(performance-no-int-to-ptr)
+    ImGui::Image(texture(window.picture(LiveWindow::Slot::video)), shape);
   }
   draw_banner(shown, session, recorded, ImVec2(at.side, 0), size.x, at.scale);
   if (const std::uintptr_t inset = window.picture(LiveWindow::Slot::inset); inset != 0) {
     const ImVec2 small(at.scale * InsetView::kWidthPx * 0.75F, at.scale * InsetView::kHeightPx * 0.75F);
     ImGui::SetCursorPos(ImVec2(size.x - small.x - 8 * at.scale, size.y - small.y - 8 * at.scale));
-    ImGui::Image(reinterpret_cast<ImTextureID>(inset), small);  // NOLINT(performance-no-int-to-ptr)
+    ImGui::Image(texture(inset), small);
   }
   ImGui::End();
   ImGui::PopStyleVar();
