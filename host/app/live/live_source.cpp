@@ -21,7 +21,7 @@ LiveSource::LiveSource(std::string name, Connect::Work connect)
   if (connect_) connecting_.start(connect_);
 }
 
-std::unique_ptr<LiveSource> LiveSource::of_appliance(std::string address) {
+std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address) {
   const auto connect = [address](const std::stop_token&, const Connect::Say&) -> Result<Link> {
     auto client = connect_appliance(address);
     if (!client) return client.error();

@@ -15,7 +15,7 @@ namespace birdseye::host {
 /// simulated cart of our own, which is started once. Never holds the caller up.
 class LiveSource {
  public:
-  static std::unique_ptr<LiveSource> of_appliance(std::string address);
+  static std::unique_ptr<LiveSource> of_appliance(const std::string& address);
   /// Makes the patient in settings.folder first.
   static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
 
