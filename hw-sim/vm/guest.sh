@@ -70,10 +70,11 @@ gpio_drive() { echo "pull-$2" >"$(gpio_line "$1")/pull"; }  # gpio_drive NAME up
 gpio_value() { cat "$(gpio_line "$1")/value"; }
 
 # gpio_seen NAME: the values that the line takes within two seconds or so, "0", "1" or "0 1". Nothing is started meanwhile: that takes an
-# emulated processor longer than a light flickers.
+# emulated processor longer than a light flickers, and to find the line may take it those seconds, so they count from there.
 gpio_seen() {
-  local path value zero='' one='' end=$((SECONDS + 2))
+  local path value zero='' one='' end
   path=$(gpio_line "$1")/value
+  end=$((SECONDS + 3))
   while [ $SECONDS -lt $end ]; do
     read -r value <"$path"
     if [ "$value" = 0 ]; then zero=0; else one=1; fi
