@@ -11,6 +11,7 @@
 #include "calibration/geometry/transform.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/lens.hpp"
+#include "tests/support/undistorted_by_opencv.hpp"
 
 namespace birdseye {
 namespace {
@@ -145,25 +146,9 @@ TEST(CameraModel, LiverSurfaceProjectsAsItsReadmeSays) {
 TEST(CameraModel, UndistortsAsOpenCvDid) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
-  const auto folder = *data / "camera_undistort_opencv";
   for (const std::string side : {"left", "right"}) {
-    cv::Mat k, d;
-    cv::FileStorage(folder / ("calib." + side + ".intrinsic.xml"), cv::FileStorage::READ).getFirstTopLevelNode() >> k;
-    cv::FileStorage(folder / ("calib." + side + ".distortion.xml"), cv::FileStorage::READ).getFirstTopLevelNode() >> d;
-    const cv::Mat picture = cv::imread(folder / (side + "01.jpg"), cv::IMREAD_GRAYSCALE);
-    const cv::Mat expected = cv::imread(folder / (side + "_cv_undistorted_4.1.1.26.png"), cv::IMREAD_GRAYSCALE);
+    const auto [c, picture, expected] = testing::undistorted_by_opencv(*data, side, cv::IMREAD_GRAYSCALE);
     ASSERT_FALSE(picture.empty() || expected.empty());
-    CameraModel c;
-    c.width_px = picture.cols;
-    c.height_px = picture.rows;
-    c.fx_px = k.at<double>(0, 0);
-    c.fy_px = k.at<double>(1, 1);
-    c.cx_px = k.at<double>(0, 2);
-    c.cy_px = k.at<double>(1, 2);
-    c.k1 = d.at<double>(0);
-    c.k2 = d.at<double>(1);
-    c.p1 = d.at<double>(2);
-    c.p2 = d.at<double>(3);
     // For each pixel of the straight picture, where the bent one has it; bilinear, black outside.
     double sum = 0;
     for (int y = 0; y < picture.rows; ++y) {

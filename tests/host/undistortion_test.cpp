@@ -14,6 +14,7 @@
 #include "calibration/geometry/lens_fold.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/strong_lens.hpp"
+#include "tests/support/undistorted_by_opencv.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -160,25 +161,9 @@ TEST(FrameUndistorter, MakesStraightLinesStraight) {
 TEST(FrameUndistorter, AgreesWithFramesThatOpenCvUndistorted) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
-  const auto folder = *data / "camera_undistort_opencv";
   for (const std::string side : {"left", "right"}) {
-    cv::Mat k, d;
-    cv::FileStorage(folder / ("calib." + side + ".intrinsic.xml"), cv::FileStorage::READ).getFirstTopLevelNode() >> k;
-    cv::FileStorage(folder / ("calib." + side + ".distortion.xml"), cv::FileStorage::READ).getFirstTopLevelNode() >> d;
-    const cv::Mat picture = cv::imread(folder / (side + "01.jpg"), cv::IMREAD_COLOR);
-    const cv::Mat expected = cv::imread(folder / (side + "_cv_undistorted_4.1.1.26.png"), cv::IMREAD_COLOR);
+    const auto [c, picture, expected] = testing::undistorted_by_opencv(*data, side, cv::IMREAD_COLOR);
     ASSERT_FALSE(picture.empty() || expected.empty());
-    CameraModel c;
-    c.width_px = picture.cols;
-    c.height_px = picture.rows;
-    c.fx_px = k.at<double>(0, 0);
-    c.fy_px = k.at<double>(1, 1);
-    c.cx_px = k.at<double>(0, 2);
-    c.cy_px = k.at<double>(1, 2);
-    c.k1 = d.at<double>(0);
-    c.k2 = d.at<double>(1);
-    c.p1 = d.at<double>(2);
-    c.p2 = d.at<double>(3);
     const FrameUndistorter straighten(c, pinhole_for(c, Kept::centre_scale));
     std::vector<std::uint8_t> straight = straighten.apply({picture.data, picture.total() * 3});
     const cv::Mat ours(picture.rows, picture.cols, CV_8UC3, straight.data());
