@@ -9,104 +9,26 @@
 #include "device/birdseyed/event_queue.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "drivers/io/monotonic.hpp"
+#include "tests/support/core_session.hpp"
 #include "tests/support/scratch.hpp"
-#include "tests/support/tracker_bytes.hpp"
-#include "tests/support/wire_messages.hpp"
 
 namespace birdseye::device {
 namespace {
 
+using birdseye::testing::at;
+using birdseye::testing::camera_runs;
+using birdseye::testing::frame;
+using birdseye::testing::kZeroNs;
+using birdseye::testing::only;
+using birdseye::testing::session;
+using birdseye::testing::told;
+using birdseye::testing::tracker_runs;
 using birdseye::testing::TrackerBytesSource;
+using birdseye::testing::unpacked;
 
-constexpr std::int64_t kZeroNs = 1'000'000'000'000;
-constexpr double kRateHz = 103.3;
-
-DeviceTime at(double seconds) {
-  return {kZeroNs + static_cast<std::int64_t>(seconds * 1e9)};
-}
-
-drivers::Frame frame(std::uint64_t sequence, double taken_s, double arrived_s) {
-  drivers::Frame f;
-  f.width_px = 4;
-  f.height_px = 2;
-  f.rgb = std::make_shared<const std::vector<std::uint8_t>>(24, static_cast<std::uint8_t>(sequence));
-  f.sequence = sequence;
-  f.acquired = at(taken_s);
-  f.acquired_sigma = {100'000};
-  f.acquired_known = true;
-  f.arrived = at(arrived_s);
-  return f;
-}
-
-InstrumentChanged tracker_runs(double seconds) {
-  return {.instrument = Instrument::tracker,
-          .state = InstrumentState::running,
-          .text = "a unit",
-          .at = at(seconds),
-          .layout = TrackerBytesSource::layout()};
-}
-
-InstrumentChanged camera_runs(double seconds) {
-  return {.instrument = Instrument::camera,
-          .state = InstrumentState::running,
-          .text = "a camera",
-          .at = at(seconds),
-          .rate_hz = 25};
-}
-
-/// Tracker and camera for a while, in the order of arrival; with arrivals up to 3 ms late.
-std::vector<RawEvent> session(double seconds, unsigned seed) {
-  std::mt19937 rng(seed);
-  std::uniform_real_distribution<double> late(0, 0.003);
-  TrackerBytesSource source;
-  std::vector<RawEvent> events{tracker_runs(0), camera_runs(0)};
-  double previous = 0;
-  for (int i = 0; i < static_cast<int>(seconds * kRateHz); ++i) {
-    const double measured = i / kRateHz;
-    auto bytes = source.measure(measured);
-    const double sent = measured + 0.0075 + static_cast<double>(bytes.size()) * 10 / 115200;
-    previous = std::max(previous, sent + late(rng));
-    events.emplace_back(TrackerBytes{{std::move(bytes), at(previous)}});
-  }
-  for (std::uint64_t n = 0; static_cast<double>(n) / 25 < seconds; ++n) {
-    const double taken = static_cast<double>(n) / 25;
-    events.emplace_back(FrameCame{frame(n, taken, taken + 0.02)});
-  }
-  std::stable_sort(events.begin(), events.end(),
-                   [](const RawEvent& a, const RawEvent& b) { return time_of(a) < time_of(b); });
-  return events;
-}
-
-std::vector<wire::Event> unpacked(const std::vector<wire::Packet>& packets, wire::Unpacker& unpacker) {
-  std::vector<wire::Event> events;
-  for (const wire::Packet& packet : packets) {
-    for (const auto& message : birdseye::testing::messages_of(packet)) {
-      auto told = unpacker.push(message);
-      EXPECT_TRUE(told);
-      if (told && *told) events.push_back(std::get<wire::Event>(**told));
-    }
-  }
-  return events;
-}
-
-/// Everything that the core says to the events.
 std::vector<wire::Event> told(const std::vector<RawEvent>& events, const CoreSettings& settings = {}) {
   Core core(settings);
-  wire::Unpacker unpacker;
-  std::vector<wire::Event> out;
-  for (const RawEvent& event : events) {
-    for (auto& said : unpacked(core.take(event), unpacker)) out.push_back(std::move(said));
-  }
-  return out;
-}
-
-template <typename T>
-std::vector<T> only(const std::vector<wire::Event>& events) {
-  std::vector<T> out;
-  for (const wire::Event& event : events) {
-    if (const auto* one = std::get_if<T>(&event)) out.push_back(*one);
-  }
-  return out;
+  return told(core, events);
 }
 
 TEST(Core, EachFrameHasThePoseOfItsOwnTime) {

@@ -9,17 +9,17 @@
 #include "device/birdseyed/core.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "device/wire/igtl_bytes.hpp"
+#include "tests/support/core_session.hpp"
 #include "tests/support/scratch.hpp"
-#include "tests/support/tracker_bytes.hpp"
-#include "tests/support/wire_messages.hpp"
 
 namespace birdseye::device {
 namespace {
 
+using birdseye::testing::only;
+using birdseye::testing::session;
+using birdseye::testing::told;
 using birdseye::testing::TrackerBytesSource;
 
-constexpr std::int64_t kZeroNs = 1'000'000'000'000;
-constexpr double kRateHz = 103.3;
 const Eigen::Vector3d kShift(3, -2, 1);
 
 /// Moves by kShift plus a hundredth of x, and turns about z; over all of the sensor's circle, or x up to high_x_mm.
@@ -37,66 +37,6 @@ calibration::FieldMap map(double high_x_mm = 700) {
   return *calibration::FieldMap::from(std::move(data));
 }
 
-DeviceTime at(double seconds) {
-  return {kZeroNs + static_cast<std::int64_t>(seconds * 1e9)};
-}
-
-std::vector<RawEvent> session(double seconds) {
-  TrackerBytesSource source;
-  std::vector<RawEvent> events{InstrumentChanged{.instrument = Instrument::tracker,
-                                                 .state = InstrumentState::running,
-                                                 .text = "a unit",
-                                                 .at = at(0),
-                                                 .layout = TrackerBytesSource::layout()},
-                               InstrumentChanged{.instrument = Instrument::camera,
-                                                 .state = InstrumentState::running,
-                                                 .text = "a camera",
-                                                 .at = at(0),
-                                                 .rate_hz = 25}};
-  int frames = 0;
-  for (int i = 0; i < static_cast<int>(seconds * kRateHz); ++i) {
-    const double measured = i / kRateHz;
-    for (; frames / 25.0 + 0.02 < measured + 0.01; ++frames) {
-      drivers::Frame frame;
-      frame.width_px = 4;
-      frame.height_px = 2;
-      frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(24, std::uint8_t{7});
-      frame.sequence = static_cast<std::uint64_t>(frames);
-      frame.acquired = at(frames / 25.0);
-      frame.acquired_sigma = {100'000};
-      frame.acquired_known = true;
-      frame.arrived = at(frames / 25.0 + 0.02);
-      events.emplace_back(FrameCame{frame});
-    }
-    events.emplace_back(TrackerBytes{{source.measure(measured), at(measured + 0.01)}});
-  }
-  return events;
-}
-
-std::vector<wire::Event> told(Core& core, const std::vector<RawEvent>& events) {
-  wire::Unpacker unpacker;
-  std::vector<wire::Event> out;
-  for (const RawEvent& event : events) {
-    for (const wire::Packet& packet : core.take(event)) {
-      for (const auto& message : birdseye::testing::messages_of(packet)) {
-        auto said = unpacker.push(message);
-        EXPECT_TRUE(said);
-        if (said && *said) out.push_back(std::get<wire::Event>(**said));
-      }
-    }
-  }
-  return out;
-}
-
-template <typename T>
-std::vector<T> only(const std::vector<wire::Event>& events) {
-  std::vector<T> out;
-  for (const wire::Event& event : events) {
-    if (const auto* one = std::get_if<T>(&event)) out.push_back(*one);
-  }
-  return out;
-}
-
 CoreSettings with(calibration::FieldMap field) {
   CoreSettings settings;
   settings.field = std::move(field);
@@ -104,7 +44,7 @@ CoreSettings with(calibration::FieldMap field) {
 }
 
 TEST(CoreWithAFieldMap, CorrectsEveryPose) {
-  const auto events = session(6);
+  const auto events = session(6, 1);
   Core plain({}), mapped(with(map()));
   const auto before = only<wire::Birds>(told(plain, events)), after = only<wire::Birds>(told(mapped, events));
   ASSERT_GT(after.size(), 500U);
@@ -121,7 +61,7 @@ TEST(CoreWithAFieldMap, CorrectsEveryPose) {
 }
 
 TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
-  const auto events = session(6);
+  const auto events = session(6, 2);
   Core core(with(map()));
   int judged = 0;
   for (const auto& frame : only<wire::VideoFrame>(told(core, events))) {
@@ -136,7 +76,7 @@ TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
 }
 
 TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
-  const auto events = session(8);
+  const auto events = session(8, 3);
   Core core(with(map(450)));  // the circle goes to x = 600
   const auto said = told(core, events);
   const auto birds = only<wire::Birds>(said);
@@ -163,7 +103,7 @@ TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
 }
 
 TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
-  const auto events = session(4);
+  const auto events = session(4, 4);
   const CoreSettings settings = with(map(450));
   const birdseye::testing::Scratch scratch;
   Bytes bytes = recording_magic();
