@@ -1,11 +1,11 @@
 // `calibrate latency` over the simulated cart, and from files, from the outside.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/calibration/latency_streams.hpp"
+#include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/example_record.hpp"
@@ -79,44 +79,32 @@ TEST(LatencyCommand, OfTwoFilesOfPosesAndWhatItRefuses) {
   expect_refused("birdseye", "calibrate latency --recording " + a, {"a.csv"});
 }
 
-/// Starts the cart, whose camera delivers 83 ms late and does not stamp, and birdseyed, which is told of no delay.
-constexpr const char* kScript = R"(cd "$1"; bin=$2; trap 'kill $(jobs -p) 2>/dev/null; wait' EXIT
-$bin/birdseye-sim phantom --out phantom > phantom.log 2>&1 || exit 9
-printf '[[fault]]\nname = "late_frames"\nat_s = 500\nfor_s = 1\nms = 1\n' > faults.toml
-$bin/birdseye-sim cart --phantom phantom --socket cam --tty tty --out . --size 384x288 --sway-s 18 --camera-delay-ms 83 \
-  --position-noise-mm 0.5 --angle-noise-deg 0.1 --faults faults.toml > sim.log 2>&1 &
-for n in $(seq 150); do grep -q ready sim.log && break; sleep 0.1; done
-$bin/birdseyed --config cart.toml > birdseyed.log 2>&1 &
-for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0.1; done
-for what in latency "tip --bird pointer" "hand-eye --live --board chessboard:9x6:5mm"; do
-  $bin/birdseye calibrate $what --server 127.0.0.1:$3 --record other.json > other.log 2>&1
+/// At a cart whose camera delivers late and does not stamp, beside a birdseyed that is told of no delay.
+constexpr const char* kMeasure =
+    R"(for what in latency "tip --bird pointer" "hand-eye --live --board chessboard:9x6:5mm"; do
+  $bin/birdseye calibrate $what --server $server --record other.json > other.log 2>&1
   [ $? = 2 ] && grep -q "other.json: the record is bound to other hardware: " other.log || { cat other.log; exit 8; }
 done
-$bin/birdseye calibrate latency --server 127.0.0.1:$3 --seconds 15 --delay-ms 0 --json l.json --report l.html --out l.toml
+$bin/birdseye calibrate latency --server $server --seconds 15 --delay-ms 0 --json l.json --report l.html --out l.toml
 code=$?; cat birdseyed.log | tail -3; exit $code
 )";
 
 TEST(LatencyCommand, OfTheSimulatedCart) {
   const Scratch scratch;
-  const int port = 20000 + static_cast<int>(::getpid() % 20000);
-  const std::string config = scratch.file(
-      "cart.toml", "[tracker]\ndevice = \"" + (scratch / "tty").string() +
-                       "\"\nbaud = 115200\nbirds = 2\nnames = [\"scope\", \"pointer\"]\n"
-                       "rate_hz = 103.3\nfrozen_after = 0\nmost_speed_mm_s = 6000\nmost_turn_deg_s = 3000\n"
-                       "hemisphere = \"forward\"\nrecord = \"position_matrix\"\ndelay_ms = 7.5\n[camera]\n"
-                       "source = \"socket:" +
-                       (scratch / "cam").string() +
-                       "\"\nwidth = 384\nheight = 288\nrate_hz = 25\ndelay_ms = 0\n[wire]\n"
-                       "bind = \"127.0.0.1\"\nport = " +
-                       std::to_string(port) + "\n");
-  ASSERT_FALSE(config.empty());
   // What is found on this cart is not entered into another's record.
   const std::string other = scratch.file(
       "other.json", calibration::record_text(testing::example_record(384, 288, {{"model", "trakSTAR"}}, {})));
   ASSERT_FALSE(other.empty());
-  const std::string script = scratch.file("cart.sh", kScript);
-  const auto found = run("birdseye", "--help > /dev/null; bash " + script + " " + (scratch / "").string() +
-                                         " " BIRDSEYE_BIN " " + std::to_string(port));
+  const std::string faults =
+      scratch.file("faults.toml", "[[fault]]\nname = \"late_frames\"\nat_s = 500\nfor_s = 1\nms = 1\n");
+  const auto found = testing::run_at_cart(scratch,
+                                          {.width_px = 384,
+                                           .height_px = 288,
+                                           .simulator = "--sway-s 18 --camera-delay-ms 83 --position-noise-mm 0.5 "
+                                                        "--angle-noise-deg 0.1 --faults " +
+                                                        faults,
+                                           .camera = "delay_ms = 0\n"},
+                                          kMeasure);
   ASSERT_EQ(found.code, 0) << found.output;
   const nlohmann::json json = read(scratch / "l.json");
   // What a program needs to be woken is part of what birdseyed sees as delay: some 0.1 ms.

@@ -1,12 +1,12 @@
 // `birdseye record` of the simulated cart, from the outside.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "host/app/calibrate/pose_files.hpp"
 #include "host/app/recording/recording_reader.hpp"
+#include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -16,19 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 using testing::contents_of;
 using testing::expect_refused;
-using testing::run;
 using testing::Scratch;
 
-/// Starts the cart and birdseyed, and records three times at once: for four seconds, until Ctrl-C, until the appliance
-/// goes.
-constexpr const char* kScript = R"(cd "$1"; bin=$2; trap 'kill $(jobs -p) 2>/dev/null; wait' EXIT
-$bin/birdseye-sim phantom --out phantom > phantom.log 2>&1 || exit 9
-$bin/birdseye-sim cart --phantom phantom --socket cam --tty tty --out . --size 192x144 > sim.log 2>&1 &
-for n in $(seq 150); do grep -q ready sim.log && break; sleep 0.1; done
-$bin/birdseyed --config cart.toml > birdseyed.log 2>&1 &
-appliance=$!
-for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0.1; done
-record="$bin/birdseye record --server 127.0.0.1:$3"
+/// Records three times at once: for four seconds, until Ctrl-C, until the appliance goes.
+constexpr const char* kThreeAtOnce = R"(record="$bin/birdseye record --server $server"
 $record --out film --video compressed > film.log 2>&1 &
 film=$!
 $record --out gone > gone.log 2>&1 &
@@ -69,20 +60,7 @@ Played play(const fs::path& path) {
 
 TEST(RecordCommand, OfTheSimulatedCart) {
   const Scratch scratch;
-  const int port = 20000 + static_cast<int>(::getpid() % 20000);
-  const std::string config = scratch.file(
-      "cart.toml", "[tracker]\ndevice = \"" + (scratch / "tty").string() +
-                       "\"\nbaud = 115200\nbirds = 2\nnames = [\"scope\", \"pointer\"]\n"
-                       "rate_hz = 103.3\nfrozen_after = 0\nmost_speed_mm_s = 6000\nmost_turn_deg_s = 3000\n"
-                       "hemisphere = \"forward\"\nrecord = \"position_matrix\"\ndelay_ms = 7.5\n[camera]\n"
-                       "source = \"socket:" +
-                       (scratch / "cam").string() +
-                       "\"\nwidth = 192\nheight = 144\nrate_hz = 25\n[wire]\nbind = \"127.0.0.1\"\nport = " +
-                       std::to_string(port) + "\n");
-  ASSERT_FALSE(config.empty());
-  const std::string script = scratch.file("cart.sh", kScript);
-  const auto found = run("birdseye", "--help > /dev/null; bash " + script + " " + (scratch / "").string() +
-                                         " " BIRDSEYE_BIN " " + std::to_string(port));
+  const auto found = testing::run_at_cart(scratch, {}, kThreeAtOnce);
   for (const char* line : {"timed 0", "again 2", "holds a recording already", "film 0", "gone 0", "it was interrupted",
                            "the appliance has gone"})
     EXPECT_NE(found.output.find(line), std::string::npos) << line << "\n" << found.output;
