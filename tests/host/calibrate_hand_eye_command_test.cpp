@@ -11,6 +11,7 @@
 #include "tests/support/data.hpp"
 #include "tests/support/drawn_scope.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -63,8 +64,8 @@ struct DrawnStereo {
                   light);
       scope.write_pose("poses/" + std::to_string(i + 1) + ".txt", left, kCameraFromSensor);
     }
-    scope.write_lens("left.yml", small_lens());
-    scope.write_lens("right.yml", small_lens(1.02));
+    testing::write_lens(scratch / "left.yml", small_lens());
+    testing::write_lens(scratch / "right.yml", small_lens(1.02));
     scope.write_matrix("relation.txt", kRightFromLeft);
     scope.write_matrix("exchanged.txt", kRightFromLeft.inverse());
     pictures = "calibrate hand-eye --board " + scope.board() + " --poses " + (scratch / "poses").string() +
@@ -149,7 +150,7 @@ struct DrawnRod {
       scope.write_pose("poses/" + number + ".txt", views[i],
                        truth.camera_from_sensor((i < kFirst ? 20 : 110) * kRadPerDeg));
     }
-    scope.write_lens("lens.yml", small_lens());
+    testing::write_lens(scratch / "lens.yml", small_lens());
     command = "calibrate hand-eye --board " + scope.board() + " --poses " + (scratch / "poses").string() +
               " --images " + (scratch / "images").string() + " --camera " + (scratch / "lens.yml").string() +
               " --json " + (scratch / "x.json").string();

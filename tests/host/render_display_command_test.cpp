@@ -8,8 +8,10 @@
 
 #include "host/overlay/undistortion.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
+#include "tests/support/strong_lens.hpp"
 
 namespace birdseye {
 namespace {
@@ -20,24 +22,8 @@ using testing::run;
 using testing::Scratch;
 using testing::small_ct;
 
-constexpr const char* kCamera =
-    "%YAML:1.0\n---\nimage_width: 160\nimage_height: 120\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   "
-    "dt: "
-    "d\n   data: [ 120., 0., 78., 0., 122., 61., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n  "
-    " "
-    "cols: 5\n   dt: d\n   data: [ -0.43, 0.24, 0., 0., 0. ]\n";
-
 CameraModel lens() {
-  CameraModel c;
-  c.width_px = 160;
-  c.height_px = 120;
-  c.fx_px = 120;
-  c.fy_px = 122;
-  c.cx_px = 78;
-  c.cy_px = 61;
-  c.k1 = -0.43;
-  c.k2 = 0.24;
-  return c;
+  return testing::strong_lens(160, 120);
 }
 
 std::vector<std::uint8_t> pixels_of(const fs::path& path) {
@@ -56,10 +42,11 @@ struct Case {
         frame +=
             {static_cast<char>(60 + x), static_cast<char>(60 + y), static_cast<char>((x / 20 + y / 20) % 2 * 90 + 30)};
     }
+    testing::write_lens(scratch / "lens.yaml", lens());
     common = "render --volume " + small_ct(scratch) + " --transfer skin --over " + scratch.file("frame.ppm", frame) +
              " --pose " + scratch.file("pose.txt", "1 0 0 14\n0 1 0 9\n0 0 1 50\n0 0 0 1\n");
   }
-  [[nodiscard]] std::string camera() const { return " --camera " + scratch.file("lens.yaml", kCamera); }
+  [[nodiscard]] std::string camera() const { return " --camera " + (scratch / "lens.yaml").string(); }
 };
 
 TEST(RenderDisplay, TheStraightPictureIsTheBentOneStraightened) {

@@ -63,15 +63,6 @@ class DrawnScope {
                  Transform<Tracker, Sensor>(turned, Eigen::Vector3d(exact.translation() + kShift_mm * normal3())));
   }
 
-  /// As `--camera` takes it.
-  void write_lens(const std::string& name, const CameraModel& lens) const {
-    cv::FileStorage file((folder_ / name).string(), cv::FileStorage::WRITE | cv::FileStorage::FORMAT_YAML);
-    file << "image_width" << lens.width_px << "image_height" << lens.height_px;
-    file << "camera_matrix"
-         << (cv::Mat_<double>(3, 3) << lens.fx_px, 0, lens.cx_px, 0, lens.fy_px, lens.cy_px, 0, 0, 1);
-    file << "distortion_coefficients" << (cv::Mat_<double>(1, 5) << lens.k1, lens.k2, lens.p1, lens.p2, lens.k3);
-  }
-
   template <typename To, typename From>
   void write_matrix(const std::string& name, const Transform<To, From>& transform) const {
     std::filesystem::create_directories((folder_ / name).parent_path());

@@ -10,14 +10,15 @@ namespace birdseye::testing {
 
 /// The lens of a laparoscope (k1, k2 as published for a Storz 3D, its picture wider than its published one is), which
 /// moves the picture's corners by tens of pixels.
-inline CameraModel strong_lens() {
+inline CameraModel strong_lens(int width_px = 384, int height_px = 288) {
+  const double scale = width_px / 384.0;
   CameraModel c;
-  c.width_px = 384;
-  c.height_px = 288;
-  c.fx_px = 300;
-  c.fy_px = 303;
-  c.cx_px = 185.3;
-  c.cy_px = 149.6;
+  c.width_px = width_px;
+  c.height_px = height_px;
+  c.fx_px = 300 * scale;
+  c.fy_px = 303 * scale;
+  c.cx_px = 185.3 * scale;
+  c.cy_px = 149.6 * scale;
   c.k1 = -0.4304;
   c.k2 = 0.2426;
   c.p1 = 0.002;
