@@ -22,7 +22,8 @@ const char* name_of(Grade grade) {
 void Verdict::add(Grade found, std::string reason, std::string next_step) {
   grade = std::max(grade, found);
   if (!reason.empty()) reasons.push_back(std::move(reason));
-  if (!next_step.empty()) next_steps.push_back(std::move(next_step));
+  const bool new_step = std::find(next_steps.begin(), next_steps.end(), next_step) == next_steps.end();
+  if (!next_step.empty() && new_step) next_steps.push_back(std::move(next_step));
 }
 
 void Verdict::judge(const std::string& figure, double value, const std::string& unit, double pass_up_to,

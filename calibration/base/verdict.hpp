@@ -16,7 +16,7 @@ struct Verdict {
   std::vector<std::string> reasons;     ///< each names the figure and its limit
   std::vector<std::string> next_steps;  ///< what would make it better, most useful first
 
-  /// One more finding: the grade is the worst of all, the texts are kept (empty ones are passed over).
+  /// One more finding: the grade is the worst of all, the texts are kept, a next step once (none that is empty).
   void add(Grade found, std::string reason, std::string next_step = {});
   /// A figure against two limits: above pass_up_to it is marginal, above marginal_up_to (or not finite) a fail. The
   /// reason is made from the figure: "held-out error 1.20 px, of at most 1.00". next_step is kept unless it passes.
