@@ -69,8 +69,7 @@ void judge(DemoFigures& figures) {
   std::vector<double> mm;
   for (const FrameError& error : figures.errors) mm.push_back(error.target_mm);
   if (mm.empty()) {
-    figures.verdict = "fail";
-    figures.reasons = {"no frame carried an overlay; see birdseyed.log"};
+    figures.verdict.add(Grade::fail, "no frame carried an overlay; see birdseyed.log");
     return;
   }
   const double worst_mm = *std::max_element(mm.begin(), mm.end());
@@ -84,12 +83,12 @@ void judge(DemoFigures& figures) {
       {hidden_percent, 10, 50, fmt::format("{:.0f} % of the frames carry no overlay", hidden_percent)},
       {dropped_percent, 5, 20, fmt::format("{:.0f} % of the frames were dropped", dropped_percent)},
   };
-  figures.verdict = "pass";
-  figures.reasons.push_back(fmt::format("{}; {} mm pass", limits[0].said, limits[0].pass));
+  figures.verdict.add(Grade::pass, fmt::format("{}; {} mm pass", limits[0].said, limits[0].pass));
   for (const Limit& limit : limits) {
     if (limit.value <= limit.pass) continue;
-    if (figures.verdict != "fail") figures.verdict = limit.value <= limit.marginal ? "marginal" : "fail";
-    if (&limit != &limits[0]) figures.reasons.push_back(fmt::format("{}; {} pass", limit.said, limit.pass));
+    const bool said = &limit == &limits[0];
+    figures.verdict.add(limit.value <= limit.marginal ? Grade::marginal : Grade::fail,
+                        said ? "" : fmt::format("{}; {} pass", limit.said, limit.pass));
   }
 }
 
@@ -151,9 +150,9 @@ Result<ExitCode> demo(const Options& options) {
   judge(session.figures);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();
-  progress.keep(fmt::format("{}: {}", session.figures.verdict, session.figures.reasons.front()));
+  progress.keep(fmt::format("{}: {}", name_of(session.figures.verdict.grade), session.figures.verdict.reasons.front()));
   fmt::print("{}\n", (out / "report.html").string());
-  return session.figures.verdict == "fail" ? ExitCode::verdict_fail : ExitCode::success;
+  return session.figures.verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
 }  // namespace

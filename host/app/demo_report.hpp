@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
 
 namespace birdseye::host {
 
@@ -31,8 +32,7 @@ struct DemoFigures {
   double position_noise_mm = 0;
   double angle_noise_deg = 0;
   double wall_s = 0;
-  std::string verdict;
-  std::vector<std::string> reasons;
+  Verdict verdict;
 };
 
 /// p in [0, 1]; the nearest-rank percentile; NaN of nothing.

@@ -48,41 +48,49 @@ double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
   return std::acos(std::max(-1.0, least_cosine)) * 180 / std::numbers::pi;
 }
 
-std::pair<std::string, std::string> verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
+Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
   constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10, kNoise = 0.002;
   const char* const unit = c.similarity == "mi" ? " nats" : "";
-  if (found.folded) return {"fail", "every deformation that was found folds: check the poses; the start is written"};
+  if (found.folded)
+    return {Grade::fail, {"every deformation that was found folds: check the poses; the start is written"}, {}};
   if (found.worse_than_start)
-    return {"fail", "no deformation explains the views better than the start, which is what is written"};
+    return {Grade::fail, {"no deformation explains the views better than the start, which is what is written"}, {}};
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     const double gain = found.per_view_after[n] - found.per_view_before[n];
     if (gain < -kNoise) {
-      return {"fail", fmt::format("{} is explained worse than before, by {:.3f}{}, for others' sake: check its picture "
-                                  "and its pose",
-                                  c.views[n].name, -gain, unit)};
+      return {Grade::fail,
+              {fmt::format("{} is explained worse than before, by {:.3f}{}, for others' sake: check its picture "
+                           "and its pose",
+                           c.views[n].name, -gain, unit)},
+              {}};
     }
   }
   const double gain = found.similarity_after - found.similarity_before;
-  if (c.views.size() == 1) return {"marginal", "a single view says little about depth: add others"};
+  if (c.views.size() == 1) return {Grade::marginal, {"a single view says little about depth: add others"}, {}};
   if (const double deg = widest_deg(c, found); deg < kApart_deg) {
-    return {"marginal", fmt::format("the views are at most {:.1f} degrees apart, under {}, and so say little about "
-                                    "depth: add one from the side",
-                                    deg, kApart_deg)};
+    return {Grade::marginal,
+            {fmt::format("the views are at most {:.1f} degrees apart, under {}, and so say little about "
+                         "depth: add one from the side",
+                         deg, kApart_deg)},
+            {}};
   }
   if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
-    return {"marginal", fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
-                                    *found.uncertainty_mm, kSure_mm)};
+    return {Grade::marginal,
+            {fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
+                         *found.uncertainty_mm, kSure_mm)},
+            {}};
   }
   if (found.lamp_at_limit) {
-    return {"marginal",
-            "the lamp that explains the views best is no laparoscope's: check that pictures, poses and CT "
-            "belong together"};
+    return {Grade::marginal,
+            {"the lamp that explains the views best is no laparoscope's: check that pictures, poses and CT "
+             "belong together"},
+            {}};
   }
-  if (gain < kGain) return {"marginal", fmt::format("similarity rose by only {:.3f}{}", gain, unit)};
+  if (gain < kGain) return {Grade::marginal, {fmt::format("similarity rose by only {:.3f}{}", gain, unit)}, {}};
   std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);
   if (found.uncertainty_mm)
     reason += fmt::format("; the surface is to be expected within {:.1f} mm", *found.uncertainty_mm);
-  return {"pass", reason};
+  return {Grade::pass, {reason}, {}};
 }
 
 /// Shift of the organ's centre, and turn.
@@ -198,9 +206,9 @@ Result<ExitCode> run(const Options& options) {
   const double time_s = progress.seconds();
 
   nlohmann::json json = json_of(c, *found, time_s);
-  const auto [verdict, reason] = verdict_of(c, *found);
-  json["verdict"] = verdict;
-  json["reasons"] = {reason};
+  const Verdict verdict = verdict_of(c, *found);
+  json["verdict"] = name_of(verdict.grade);
+  json["reasons"] = verdict.reasons;
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error)
@@ -209,7 +217,7 @@ Result<ExitCode> run(const Options& options) {
   auto files = pictures_of(c, *transfer, *found);
   if (!files) return files.error();
   files->push_back({"trace.svg", trace_svg(found->trace)});
-  files->push_back({"report.html", registration_report(c, *found, json)});
+  files->push_back({"report.html", registration_report(c, *found, verdict, json)});
   files->push_back({"result.json", text_of(json)});
   if (c.refine_pose) {
     files->push_back({"pose.txt",
@@ -220,12 +228,13 @@ Result<ExitCode> run(const Options& options) {
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();
-  progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), verdict, reason));
+  progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), name_of(verdict.grade),
+                            verdict.reasons.front()));
   if (json.contains("tre_after_mm_mean")) {
     fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",
                json["tre_before_mm_mean"].get<double>(), json["tre_after_mm_mean"].get<double>(), c.landmarks.size());
   }
-  return verdict == "fail" ? ExitCode::verdict_fail : ExitCode::success;
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
 }  // namespace

@@ -4,44 +4,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+
+#include "host/app/report/html_page.hpp"
+#include "host/app/report/line_plot.hpp"
 
 namespace birdseye::host {
 
 std::string trace_svg(const std::vector<TracePoint>& trace) {
-  constexpr double kWidth = 760, kHeight = 220, kLeft = 60, kBottom = 30, kTop = 10;
-  std::string svg = fmt::format(
-      "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {} {}' role='img' font-family='sans-serif' font-size='12'>"
-      "<rect width='100%' height='100%' fill='white'/>",
-      kWidth, kHeight);
-  if (trace.empty()) return svg + "</svg>";
-  const auto [least, most] = std::minmax_element(
-      trace.begin(), trace.end(), [](const TracePoint& a, const TracePoint& b) { return a.similarity < b.similarity; });
-  const double low = least->similarity, high = std::max(low + 1e-6, most->similarity);
-  const auto x = [&](std::size_t i) {
-    return kLeft + (kWidth - kLeft - 10) * static_cast<double>(i) /
-                       static_cast<double>(std::max<std::size_t>(1, trace.size() - 1));
-  };
-  const auto y = [&](double value) { return kTop + (kHeight - kTop - kBottom) * (1 - (value - low) / (high - low)); };
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Panel panel{
+      "Similarity at each evaluation, and degrees of freedom", "evaluations", "similarity", {{"similarity", {}}}};
+  panel.from_zero = false;
   // A line for each stage: values of different resolutions or numbers of unknowns cannot be compared.
-  std::string line;
   for (std::size_t i = 0; i < trace.size(); ++i) {
+    const auto x = static_cast<double>(i);
     const bool begins =
         i == 0 || trace[i].reduction != trace[i - 1].reduction || trace[i].parameters != trace[i - 1].parameters;
     if (begins) {
-      if (!line.empty()) svg += fmt::format("<polyline fill='none' stroke='#246' points='{}'/>", line);
-      line.clear();
-      svg += fmt::format("<text x='{:.0f}' y='{}' fill='#666'>{}</text>", x(i), kHeight - 16, trace[i].parameters);
+      panel.curves[0].points.emplace_back(kNone, kNone);
+      panel.marks.push_back({x, std::to_string(trace[i].parameters)});
     }
-    line += fmt::format("{:.1f},{:.1f} ", x(i), y(trace[i].similarity));
+    panel.curves[0].points.emplace_back(x, trace[i].similarity);
   }
-  svg += fmt::format("<polyline fill='none' stroke='#246' points='{}'/>", line);
-  svg += fmt::format("<text x='4' y='{:.0f}'>{:.3f}</text><text x='4' y='{:.0f}'>{:.3f}</text>", y(high) + 10, high,
-                     y(low), low);
-  return svg + fmt::format(
-                   "<text x='{}' y='{}' fill='#666'>evaluations; each line is one stage, with its degrees of "
-                   "freedom below; nats</text></svg>",
-                   kLeft, kHeight - 3);
+  return plot_svg({panel}, 1, {920, 300});
 }
 
 std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageRgba& overlay) {
@@ -77,29 +64,31 @@ std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageR
   return rgb;
 }
 
-std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const nlohmann::json& json) {
-  std::string page =
-      "<!doctype html><html lang='en'><head><meta charset='utf-8'><title>Registration to views</title><style>"
-      "body{font-family:sans-serif;max-width:70em;margin:1em auto}img{width:49%}table{border-collapse:collapse}"
-      "td,th{border:1px solid #ccc;padding:.2em .6em;text-align:left}</style></head><body>";
-  page += fmt::format("<h1>Registration to {} views: {}</h1><p>{}</p>", c.views.size(),
-                      json["verdict"].get<std::string>(), json["reasons"][0].get<std::string>());
-  page += "<table>";
+std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
+                                const nlohmann::json& json) {
+  HtmlPage page(fmt::format("Registration to {} views", c.views.size()));
+  page.set_verdict(verdict);
+  std::vector<std::vector<std::string>> rows{{"figure", ""}};
   for (const auto& [key, value] : json.items()) {
-    if (value.is_number()) page += fmt::format("<tr><th>{}</th><td>{:.6g}</td></tr>", key, value.get<double>());
-    if (value.is_string()) page += fmt::format("<tr><th>{}</th><td>{}</td></tr>", key, value.get<std::string>());
+    if (key == "verdict") continue;
+    if (value.is_number()) rows.push_back({key, fmt::format("{:.6g}", value.get<double>())});
+    if (value.is_string()) rows.push_back({key, value.get<std::string>()});
   }
-  page += "</table><h2>Similarity on the way</h2>" + trace_svg(found.trace);
-  page +=
-      "<h2>Views</h2><p>Overlay before and after; difference of grey before and after (red: the video is brighter; "
-      "grey: not compared).</p>";
+  page.table(rows);
+  page.heading("Similarity on the way");
+  page.svg(trace_svg(found.trace), "Each line is one stage; lines of different stages cannot be compared.");
+  page.heading("Views");
   for (std::size_t n = 0; n < c.views.size(); ++n) {
-    page += fmt::format("<h3>{}: {:.4f} to {:.4f} nats</h3>", c.views[n].name, found.per_view_before[n],
-                        found.per_view_after[n]);
+    std::vector<std::string> files;
     for (const char* kind : {"before", "after", "difference_before", "difference_after"})
-      page += fmt::format("<img src='view{}_{}.png' alt='{}'> ", n, kind, kind);
+      files.push_back(fmt::format("view{}_{}.png", n, kind));
+    page.picture_files(files,
+                       fmt::format("{}: similarity {:.4f} before, {:.4f} after. Left: before; right: after. Above: "
+                                   "the overlay; below: difference of grey (red: the video is brighter; blue: "
+                                   "darker; grey: not compared).",
+                                   c.views[n].name, found.per_view_before[n], found.per_view_after[n]));
   }
-  return page + "</body></html>\n";
+  return page.html();
 }
 
 }  // namespace birdseye::host

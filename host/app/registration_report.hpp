@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/base/verdict.hpp"
 #include "host/app/registration_case.hpp"
 #include "host/registration/view_registration.hpp"
 #include "host/render/scene.hpp"
@@ -18,6 +19,7 @@ std::string trace_svg(const std::vector<TracePoint>& trace);
 std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageRgba& overlay);
 
 /// A page that shows the pictures beside it.
-std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const nlohmann::json& json);
+std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
+                                const nlohmann::json& json);
 
 }  // namespace birdseye::host

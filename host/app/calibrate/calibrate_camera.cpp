@@ -102,10 +102,10 @@ void finish_without(const CameraOptions& options, const Error& error, const Came
                       {"views_rejected", rejected_json(input.rejected)},
                       {"image_width_px", input.width_px},
                       {"image_height_px", input.height_px}};
-  finish_calibration(options.paths, {}, std::move(json), ReportPage("Camera calibration"), verdict, status);
+  finish_calibration(options.paths, {}, std::move(json), HtmlPage("Camera calibration"), verdict, status);
 }
 
-void finish_with(const CameraOptions& options, const CameraCalibration& found, nlohmann::json json, ReportPage page,
+void finish_with(const CameraOptions& options, const CameraCalibration& found, nlohmann::json json, HtmlPage page,
                  const Verdict& verdict, CommandStatus& status) {
   if (options.rod_angle_deg) json["rod_angle_deg"] = *options.rod_angle_deg;
   const std::string made_from =
@@ -128,7 +128,7 @@ void calibrate_one(const CameraOptions& options, const CameraCalibrationSettings
   if (!found && found.error().code == Errc::degenerate) return finish_without(options, found.error(), input, status);
   if (!found) return status.refuse(found.error());
   add_rejected(input, *found);
-  ReportPage page("Camera calibration");
+  HtmlPage page("Camera calibration");
   add_camera_to(page, *found);
   finish_with(options, *found, camera_json(*found), std::move(page), judge_camera(*found), status);
 }
@@ -161,7 +161,7 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
   tell_once(left, found->left);
   tell_once(right, found->right);
   const Verdict verdict = judge_stereo(*found);
-  ReportPage page("Stereo camera calibration");
+  HtmlPage page("Stereo camera calibration");
   page.table({{"pair", ""},
               {"baseline, mm", fmt::format("{:.3f}", found->baseline_mm)},
               {"pairs used", std::to_string(found->pairs.size())},

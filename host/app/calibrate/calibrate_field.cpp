@@ -105,9 +105,9 @@ nlohmann::json json_of(const Fitted& fitted) {
   return json;
 }
 
-ReportPage page_of(const Fitted& fitted) {
+HtmlPage page_of(const Fitted& fitted) {
   const FieldFit& fit = fitted.fit;
-  ReportPage page("The tracker's field");
+  HtmlPage page("The tracker's field");
   page.paragraph(
       fmt::format("Made from {}. Held out means: a region's measurements corrected by a map that was not "
                   "shown that region.",

@@ -78,14 +78,15 @@ nlohmann::json json_of(const FieldCheck& check, const std::vector<CheckedPlace>&
   return json;
 }
 
-ReportPage page_of(const FieldCheck& check, const std::vector<CheckedPlace>& places,
-                   const std::vector<FieldCheck>& history) {
-  ReportPage page("The tracker's field, checked");
+HtmlPage page_of(const FieldCheck& check, const std::vector<CheckedPlace>& places,
+                 const std::vector<FieldCheck>& history) {
+  HtmlPage page("The tracker's field, checked");
   page.paragraph(fmt::format("{}: {} places, {:.2f} mm RMS, the largest {:.2f} mm at {}; distances {:+.2f} %.",
                              check.when, places.size(), check.rms_mm, check.worst_mm, check.worst_place,
                              check.scale_percent));
   page.heading("Day by day");
-  page.svg(field_chart_svg(history), "Red: more than 3 sigma from the mean of the first eight days.");
+  page.svg(field_chart_svg(history),
+           "Red: more than 3 sigma from the mean of the first eight days, those to the left of the dashed line.");
   page.heading("Today's places");
   std::vector<std::vector<std::string>> rows{{"place", "off"}};
   for (std::size_t i = 0; i < places.size(); ++i)

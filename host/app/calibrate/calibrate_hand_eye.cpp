@@ -184,7 +184,7 @@ void finish(const Options& options, const HandEyeRecording& recording, const Fou
                std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
   }
   nlohmann::json json = hand_eye_json(result, recording);
-  ReportPage page = hand_eye_page(result, recording);
+  HtmlPage page = hand_eye_page(result, recording);
   if (found.rod) {
     json["rod"] = rod_json(*found.rod);
     add_rod_to(page, *found.rod);

@@ -240,8 +240,8 @@ std::vector<std::vector<std::string>> odd_poses_table(const Outcome& found, cons
   return rows;
 }
 
-ReportPage page_of(const Outcome& found, const Input& input) {
-  ReportPage page("Pointer tip");
+HtmlPage page_of(const Outcome& found, const Input& input) {
+  HtmlPage page("Pointer tip");
   for (const std::string& note : input.set.notes) page.paragraph(note);
   if (found.pivot) {
     page.table(figures_table(*found.pivot));

@@ -6,7 +6,8 @@
 
 #include "calibration/base/units.hpp"
 #include "host/app/calibrate/residual_picture.hpp"
-#include "host/app/line_plot.hpp"
+#include "host/app/report/bar_chart.hpp"
+#include "host/app/report/line_plot.hpp"
 
 namespace birdseye::host {
 
@@ -42,7 +43,7 @@ nlohmann::json outliers_json(const CameraCalibration& c) {
   return out;
 }
 
-void add_tables(ReportPage& page, const CameraCalibration& c, const std::string& which) {
+void add_tables(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
   page.heading(which + "lens");
   std::vector<std::vector<std::string>> rows{{"parameter", "value", "sigma", "sigma between views"}};
   const CameraVector values = parameters_of(c.camera), sigma = c.sigma();
@@ -67,13 +68,13 @@ void add_tables(ReportPage& page, const CameraCalibration& c, const std::string&
   page.table(rows);
 }
 
-void add_views(ReportPage& page, const CameraCalibration& c, const std::string& which) {
+void add_views(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
   page.heading(which + "views");
   std::vector<Bar> bars;
   std::vector<std::vector<std::string>> rows{
       {"view", "points", "outliers", "rms, px", "held out, px", "tilt, degrees", "distance, mm", ""}};
   for (const FittedView& v : c.views) {
-    bars.push_back({v.name, v.held_out_px, 2 * v.held_out_px > 3 * c.held_out_px});
+    bars.push_back({v.name, v.held_out_px, 2 * v.held_out_px > 3 * c.held_out_px ? kRed : kBlue});
     rows.push_back({v.name, std::to_string(v.points), std::to_string(v.outliers), fmt::format("{:.3f}", v.rms_px),
                     fmt::format("{:.3f}", v.held_out_px), fmt::format("{:.0f}", v.tilt_deg),
                     fmt::format("{:.1f}", v.distance_mm), ""});
@@ -84,7 +85,7 @@ void add_views(ReportPage& page, const CameraCalibration& c, const std::string& 
   page.table(rows);
 }
 
-void add_regions_to(ReportPage& page, const CameraCalibration& c, const std::string& which) {
+void add_regions_to(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
   page.heading(which + "regions");
   std::vector<PixelResidual> means;
   std::vector<std::vector<std::string>> rows{{"column, row", "points", "rms, px", "mean x, px", "mean y, px"}};
@@ -171,7 +172,7 @@ nlohmann::json stereo_json(const StereoCalibration& c) {
           {"pairs_rejected", rejected_json(c.rejected)}};
 }
 
-void add_camera_to(ReportPage& page, const CameraCalibration& c, const std::string& which) {
+void add_camera_to(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
   page.paragraph(
       fmt::format("{}{} of {} points in {} views fitted to {:.3f} px rms; views that were held out to {:.3f} "
                   "px, which is {:.3f} mm at the boards' mean distance of {:.0f} mm.",

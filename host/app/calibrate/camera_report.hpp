@@ -4,7 +4,7 @@
 
 #include "calibration/solve/camera_calibration.hpp"
 #include "calibration/solve/stereo_calibration.hpp"
-#include "host/app/calibrate/report_page.hpp"
+#include "host/app/report/html_page.hpp"
 
 namespace birdseye::host {
 
@@ -15,6 +15,6 @@ nlohmann::json rejected_json(const std::vector<calibration::RejectedView>& rejec
 nlohmann::json stereo_json(const calibration::StereoCalibration& calibration);
 
 /// Pictures and tables of one camera; which: "" or "left camera: ", before each heading.
-void add_camera_to(ReportPage& page, const calibration::CameraCalibration& calibration, const std::string& which = {});
+void add_camera_to(HtmlPage& page, const calibration::CameraCalibration& calibration, const std::string& which = {});
 
 }  // namespace birdseye::host

@@ -8,7 +8,8 @@
 #include "calibration/base/units.hpp"
 #include "host/app/calibrate/residual_picture.hpp"
 #include "host/app/calibrate/station_picture.hpp"
-#include "host/app/line_plot.hpp"
+#include "host/app/report/bar_chart.hpp"
+#include "host/app/report/line_plot.hpp"
 
 namespace birdseye::host {
 
@@ -113,22 +114,26 @@ json solution_json(const HandEyeResult& r) {
   return out;
 }
 
-void add_station_table(const HandEyeResult& r, ReportPage& page) {
-  std::vector<std::vector<std::string>> rows{
-      {"station", "corners, px", "tracked, px", "held out, px", "held out, mm", "turn off, deg", "shift off, mm", ""}};
+void add_station_table(const HandEyeResult& r, HtmlPage& page) {
+  std::vector<std::vector<std::string>> rows{{"station", "held out, mm", "turn off, deg", "shift off, mm"}};
+  if (has_pictures(r))
+    rows.front() = {"station",      "corners, px",   "tracked, px",  "held out, px",
+                    "held out, mm", "turn off, deg", "shift off, mm"};
+  rows.front().emplace_back("");
   for (const HandEyeStationFit& s : r.stations) {
-    if (s.why_not.starts_with("rejected")) {
-      rows.push_back({s.name, "", "", "", "", "", "", s.why_not});
-      continue;
+    std::vector<std::string>& row = rows.emplace_back(1, s.name);
+    if (!s.why_not.starts_with("rejected")) {
+      std::vector<double> figures{s.held_out_mm, s.turn_off_deg, s.shift_off_mm};
+      if (has_pictures(r)) figures.insert(figures.begin(), {s.view_rms_px, s.tracked_px, s.held_out_px});
+      for (const double figure : figures) row.push_back(fmt::format("{:.2f}", figure));
     }
-    rows.push_back({s.name, fmt::format("{:.2f}", s.view_rms_px), fmt::format("{:.2f}", s.tracked_px),
-                    fmt::format("{:.2f}", s.held_out_px), fmt::format("{:.2f}", s.held_out_mm),
-                    fmt::format("{:.2f}", s.turn_off_deg), fmt::format("{:.2f}", s.shift_off_mm), s.why_not});
+    row.resize(rows.front().size());
+    row.back() = s.why_not;
   }
   page.table(rows);
 }
 
-void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, ReportPage& page) {
+void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, HtmlPage& page) {
   std::vector<StationMark> marks;
   std::vector<Bar> bars;
   std::vector<PixelResidual> residuals;
@@ -136,7 +141,7 @@ void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, Rep
     const bool odd = s.why_not.starts_with("outlier");
     if (!s.used && !odd) continue;
     marks.push_back({s.camera_from_marker, odd});
-    bars.push_back({s.name, s.held_out_mm, odd});
+    bars.push_back({s.name, s.held_out_mm, odd ? kRed : kBlue});
     for (std::size_t i = 0; i < s.seen_px.size(); ++i)
       residuals.push_back({s.seen_px[i], s.seen_px[i] - s.tracked_corner_px[i], odd});
   }
@@ -149,11 +154,17 @@ void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, Rep
              "Each corner, from where the tracker and the hand-eye of all the other stations put it to where it was "
              "seen. The arrows of one station point one way: that is the tracker's error at that moment.");
   constexpr std::size_t kMostBars = 60;
-  if (bars.size() <= kMostBars)
-    page.svg(bars_svg(bars, "held-out error at the board, mm"), "Each station, with the hand-eye of all the others.");
+  const char* const caption = "Each station, with the hand-eye of all the others.";
+  if (bars.size() <= kMostBars) {
+    page.svg(bars_svg(bars, "held-out error at the board, mm"), caption);
+    return;
+  }
+  Curve curve{"held out", {}};
+  for (std::size_t i = 0; i < bars.size(); ++i) curve.points.emplace_back(static_cast<double>(i + 1), bars[i].value);
+  page.svg(plot_svg({{"Held-out error at the board", "station", "error, mm", {curve}}}, 1, {920, 260}), caption);
 }
 
-void add_convergence(const HandEyeResult& r, ReportPage& page) {
+void add_convergence(const HandEyeResult& r, HtmlPage& page) {
   page.heading("How it was found");
   std::vector<std::vector<std::string>> rows{
       {"closed form", has_pictures(r) ? "tracked, px" : "tracked, mm", "from the answer, mm", "deg", ""}};
@@ -218,8 +229,8 @@ json hand_eye_json(const HandEyeResult& r, const HandEyeRecording& recording) {
   return out;
 }
 
-ReportPage hand_eye_page(const HandEyeResult& r, const HandEyeRecording& recording) {
-  ReportPage page("Hand-eye calibration");
+HtmlPage hand_eye_page(const HandEyeResult& r, const HandEyeRecording& recording) {
+  HtmlPage page("Hand-eye calibration");
   if (r.solved) {
     const Eigen::Vector3d t = r.camera_from_sensor.translation();
     page.paragraph(fmt::format(

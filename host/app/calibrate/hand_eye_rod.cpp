@@ -174,7 +174,7 @@ nlohmann::json rod_json(const RodCalibration& rod) {
   return out;
 }
 
-void add_rod_to(ReportPage& page, const RodCalibration& rod) {
+void add_rod_to(HtmlPage& page, const RodCalibration& rod) {
   page.heading("The rod");
   page.paragraph(
       fmt::format("All figures above are of the stations with the rod at {:g} degrees. Each other angle has a hand-eye "

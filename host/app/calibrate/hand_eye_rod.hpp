@@ -5,7 +5,7 @@
 
 #include "calibration/solve/rod_fit.hpp"
 #include "host/app/calibrate/hand_eye_files.hpp"
-#include "host/app/calibrate/report_page.hpp"
+#include "host/app/report/html_page.hpp"
 
 namespace birdseye::host {
 
@@ -40,6 +40,6 @@ Result<RodCalibration> calibrate_rod(const HandEyeRecording& recording, const Ro
 /// What the rod adds to the verdict of its reference.
 void judge_rod(const RodCalibration& rod, Verdict& verdict);
 nlohmann::json rod_json(const RodCalibration& rod);
-void add_rod_to(ReportPage& page, const RodCalibration& rod);
+void add_rod_to(HtmlPage& page, const RodCalibration& rod);
 
 }  // namespace birdseye::host

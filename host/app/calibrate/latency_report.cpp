@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host/app/line_plot.hpp"
+#include "host/app/report/line_plot.hpp"
 
 namespace birdseye::host {
 
@@ -75,7 +75,7 @@ Panel over_time(const Latency& latency) {
   band.points.insert(band.points.end(), back.rbegin(), back.rend());
   return {fmt::format("The offset over time, less {:.2f} ms", latency.offset_ms),
           "s from the middle of the recording",
-          "ms",
+          "offset, ms",
           {parts, fit, band}};
 }
 
@@ -105,9 +105,9 @@ nlohmann::json latency_json(const Latency& latency, const Verdict& verdict) {
   return json;
 }
 
-ReportPage latency_page(const Latency& latency, const Verdict& verdict, const StreamNames& names,
-                        const std::string& advice) {
-  ReportPage page("Latency of the " + names.b + " against the " + names.a);
+HtmlPage latency_page(const Latency& latency, const Verdict& verdict, const StreamNames& names,
+                      const std::string& advice) {
+  HtmlPage page("Latency of the " + names.b + " against the " + names.a);
   const bool meant = latency.determined && verdict.grade != Grade::fail;
   if (meant) page.paragraph(advice);
   std::vector<std::vector<std::string>> rows{{"figure", ""}};

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "calibration/solve/latency.hpp"
-#include "host/app/calibrate/report_page.hpp"
+#include "host/app/report/html_page.hpp"
 
 namespace birdseye::host {
 
@@ -17,7 +17,7 @@ struct StreamNames {
 /// The figures; offsets are null where the verdict is fail.
 nlohmann::json latency_json(const calibration::Latency& latency, const Verdict& verdict);
 /// Title and pictures: both motions before and after, the scan, the offset over time.
-ReportPage latency_page(const calibration::Latency& latency, const Verdict& verdict, const StreamNames& names,
-                        const std::string& advice);
+HtmlPage latency_page(const calibration::Latency& latency, const Verdict& verdict, const StreamNames& names,
+                      const std::string& advice);
 
 }  // namespace birdseye::host

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <span>
 #include <string>
-#include <vector>
 
 namespace birdseye::host {
 
@@ -15,7 +14,7 @@ struct PixelResidual {
 
 /// An SVG of the picture's frame with an arrow at each pixel from where the point was predicted towards where it was
 /// seen, drawn longer than it is: by `times`, or where that is 0 by the round number that makes the median arrow
-/// readable. A scale says by how much. Of more than some thousands every n-th is drawn.
+/// readable, cut where it would hide others. A scale says by how much. Of more than some thousands every n-th is drawn.
 std::string residual_picture_svg(std::span<const PixelResidual> residuals, int width_px, int height_px,
                                  double times = 0);
 
@@ -23,15 +22,5 @@ std::string residual_picture_svg(std::span<const PixelResidual> residuals, int w
 /// number in it; cells that hold none stay white.
 std::string coverage_picture_svg(std::span<const Eigen::Vector2d> points_px, int width_px, int height_px, int columns,
                                  int rows);
-
-struct Bar {
-  std::string name;
-  double value = 0;
-  bool odd = false;  ///< drawn in red
-};
-
-/// An SVG of bars, one below the other, with their names before and their values behind them. label: what they are, and
-/// the unit. limit: a line across them where it is above 0.
-std::string bars_svg(const std::vector<Bar>& bars, const std::string& label, double limit = 0);
 
 }  // namespace birdseye::host

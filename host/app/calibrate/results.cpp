@@ -33,7 +33,7 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
       ->check(folder_is_there);
 }
 
-void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, ReportPage page,
+void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
                         const Verdict& verdict, CommandStatus& status, const RecordEntry& entry) {
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;

@@ -7,8 +7,8 @@
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/calibrate/record_file.hpp"
-#include "host/app/calibrate/report_page.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/report/html_page.hpp"
 
 namespace birdseye::host {
 
@@ -23,7 +23,7 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
 /// Prints grade, reasons and next steps; writes json with `verdict`, `reasons` and `next_steps` added, and the page.
 /// out_text goes to --out and the entry into --record unless the grade is fail: a result without worth is not left
 /// where it could be used. Sets status by the grade, or to the error of a file that cannot be written.
-void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, ReportPage page,
+void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
                         const Verdict& verdict, CommandStatus& status, const RecordEntry& entry = {});
 
 }  // namespace birdseye::host

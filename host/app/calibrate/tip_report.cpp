@@ -8,6 +8,8 @@
 #include <cmath>
 
 #include "calibration/base/units.hpp"
+#include "host/app/report/axes.hpp"
+#include "host/app/report/svg.hpp"
 
 namespace birdseye::host {
 
@@ -15,25 +17,6 @@ namespace {
 
 using calibration::Pivot;
 using calibration::PivotPose;
-
-constexpr const char* kUsed = "#1b5e9e";
-constexpr const char* kOutlier = "#b3261e";
-
-std::string begin_svg(double width, double height) {
-  return fmt::format(
-      "<svg xmlns='http://www.w3.org/2000/svg' width='{0}' height='{1}' viewBox='0 0 {0} {1}' role='img' "
-      "font-family='DejaVu Sans, sans-serif' font-size='11'><rect width='100%' height='100%' fill='white'/>\n",
-      width, height);
-}
-
-/// 1, 2 or 5 times a power of ten, so that about `marks` of them make up `range`.
-double mark_of(double range, double marks) {
-  const double rough = range / marks, unit = std::pow(10, std::floor(std::log10(rough)));
-  for (const double times : {1.0, 2.0, 5.0}) {
-    if (rough <= times * unit) return times * unit;
-  }
-  return 10 * unit;
-}
 
 std::vector<bool> used_of(const Pivot& pivot) {
   std::vector<bool> used(pivot.residuals_mm.size(), true);
@@ -43,7 +26,7 @@ std::vector<bool> used_of(const Pivot& pivot) {
 
 /// A place for a pose; hollow where it would lie outside of the picture and stands at its edge.
 std::string dot(double x, double y, bool used, bool beyond) {
-  const char* colour = used ? kUsed : kOutlier;
+  const char* colour = used ? kBlue : kRed;
   return fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='{}' fill='{}' stroke='{}' fill-opacity='0.6'/>", x, y,
                      beyond ? 4 : 2.6, beyond ? "none" : colour, colour);
 }
@@ -51,77 +34,61 @@ std::string dot(double x, double y, bool used, bool beyond) {
 }  // namespace
 
 std::string tip_residuals_svg(const std::vector<PivotPose>& poses, const Pivot& pivot) {
-  constexpr double kWidth = 960, kHeight = 260, kLeft = 48, kRight = 10, kTop = 28, kBottom = 34;
-  std::string svg = begin_svg(kWidth, kHeight);
+  constexpr double kWidth = 960, kHeight = 280, kTop = 30;
   const double most = std::max(1e-9, *std::max_element(pivot.residuals_mm.begin(), pivot.residuals_mm.end()));
-  const double high = 1.05 * most, base = kHeight - kBottom;
   const auto count = static_cast<double>(poses.size());
-  const double step = (kWidth - kLeft - kRight) / count;
-  const auto y = [&](double mm) { return base - (base - kTop) * mm / high; };
-  const double mark = mark_of(high, 4);
-  for (int k = 0; k * mark <= high; ++k) {
-    const double v = k * mark;
-    svg +=
-        fmt::format("<path d='M{} {:.1f}H{}' stroke='#e4e4e4'/><text x='{}' y='{:.1f}' text-anchor='end'>{:.4g}</text>",
-                    kLeft, y(v), kWidth - kRight, kLeft - 5, y(v) + 4, v);
-  }
+  const Axes axes({Axes::kLeft, kTop, kWidth - Axes::kLeft - 10, kHeight - kTop - Axes::kBelow},
+                  {{0, count}, "pose, in the order in which they were recorded", 10},
+                  {{0, 1.05 * most}, "distance, mm"});
+  std::string svg = axes.svg();
+  const double bottom = axes.y_of(0);
   const auto used = used_of(pivot);
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const double x = kLeft + step * static_cast<double>(i);
-    svg +=
-        fmt::format("<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' fill='{}'/>", x + 0.1 * step,
-                    y(pivot.residuals_mm[i]), 0.8 * step, base - y(pivot.residuals_mm[i]), used[i] ? kUsed : kOutlier);
+    const double x = axes.x_of(static_cast<double>(i)), step = axes.x_of(1) - axes.x_of(0);
+    const double top = axes.y_of(pivot.residuals_mm[i]);
+    svg += fmt::format("<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' fill='{}'/>", x + 0.1 * step, top,
+                       0.8 * step, bottom - top, used[i] ? kBlue : kRed);
     if (pivot.robust.pivots_in_tracker_mm.size() == 1 || (i > 0 && poses[i].divot == poses[i - 1].divot)) continue;
-    svg += fmt::format("<path d='M{0:.1f} {1}V{2}' stroke='#888'/><text x='{3:.1f}' y='{4}'>divot {5}</text>", x, kTop,
-                       base + 5, x + 2, base + 14, poses[i].divot + 1);
+    svg += svg_line(x, kTop - 4, x, bottom, kGrey) +
+           svg_text(x + 3, kTop - 1, fmt::format("divot {}", poses[i].divot + 1), Anchor::start, kGrey);
   }
-  svg += fmt::format("<path d='M{0} {1:.1f}H{2}' stroke='#444' stroke-dasharray='5 4'/>", kLeft, y(pivot.robust.rms_mm),
-                     kWidth - kRight);
-  svg += fmt::format(
-      "<text x='{}' y='18' fill='#555'>mm; dashed: root mean square of the poses used, {:.2f} mm</text>"
-      "<text x='{}' y='{}' text-anchor='middle' fill='#555'>poses, in the order in which they were recorded</text>",
-      kLeft, pivot.robust.rms_mm, kWidth / 2, kHeight - 4);
-  return svg + "</svg>";
+  const double rms = axes.y_of(pivot.robust.rms_mm);
+  svg += svg_line(axes.area().left, rms, axes.area().left + axes.area().width, rms, kInk, kDashed);
+  svg += svg_text(axes.area().left, 14,
+                  fmt::format("dashed: root mean square of the poses used, {:.2f} mm", pivot.robust.rms_mm),
+                  Anchor::start, kGrey);
+  return svg_picture(kWidth, kHeight, svg);
 }
 
 std::string tip_cloud_svg(const Pivot& pivot) {
-  constexpr double kSide = 320, kMargin = 36;
-  constexpr double kHalf = kSide / 2 - kMargin;
+  constexpr double kSide = 250, kBetween = 8, kTop = 10;
   const auto used = used_of(pivot);
   double range_mm = 1e-6;
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (used[i]) range_mm = std::max(range_mm, pivot.offsets_mm[i].cwiseAbs().maxCoeff());
   }
   range_mm *= 1.15;
-  const double mark = mark_of(2 * range_mm, 5);
-  std::string svg = begin_svg(3 * kSide, kSide);
+  std::string svg;
   constexpr std::array<std::array<int, 2>, 3> kViews{{{0, 1}, {0, 2}, {1, 2}}};
   constexpr std::array<char, 3> kNames{'x', 'y', 'z'};
+  constexpr double kPanel = Axes::kLeft + kSide + kBetween;
   for (std::size_t n = 0; n < kViews.size(); ++n) {
     const int across = kViews[n][0], up = kViews[n][1];
-    svg += fmt::format("<g transform='translate({:.0f} {:.0f})'>", kSide * (static_cast<double>(n) + 0.5), kSide / 2);
-    svg += fmt::format("<rect x='{0}' y='{0}' width='{1}' height='{1}' fill='none' stroke='#888'/>", -kHalf, 2 * kHalf);
-    const int marks = static_cast<int>(range_mm / mark);
-    for (int k = -marks; k <= marks; ++k) {
-      const double v = k * mark;
-      const double at = v / range_mm * kHalf;
-      svg += fmt::format(
-          "<path d='M{0:.1f} {1}v{2}M{1} {0:.1f}h{2}' stroke='#ececec'/><text x='{0:.1f}' y='{3}' "
-          "text-anchor='middle'>{4:.3g}</text><text x='{5}' y='{6:.1f}' text-anchor='end'>{4:.3g}</text>",
-          at, -kHalf, 2 * kHalf, kHalf + 13, std::abs(v) < 1e-9 * range_mm ? 0.0 : v, -kHalf - 4, -at + 4);
-    }
-    svg += fmt::format("<circle r='{:.1f}' fill='none' stroke='#444' stroke-dasharray='5 4'/>",
-                       std::min(1.0, pivot.robust.rms_mm / range_mm) * kHalf);
+    const auto axis = [&](int which) {
+      return Axis{{-range_mm, range_mm}, fmt::format("{}, mm", kNames[static_cast<std::size_t>(which)]), 5};
+    };
+    const Axes axes({kPanel * static_cast<double>(n) + Axes::kLeft, kTop, kSide, kSide}, axis(across), axis(up));
+    svg += axes.svg();
+    svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='{:.1f}' fill='none' stroke='{}' {}/>", axes.x_of(0),
+                       axes.y_of(0), std::min(1.0, pivot.robust.rms_mm / range_mm) * kSide / 2, kInk, kDashed);
     for (std::size_t i = 0; i < used.size(); ++i) {
       const Eigen::Vector3d& o = pivot.offsets_mm[i];
-      const double x = std::clamp(o[across] / range_mm, -1.0, 1.0), y = std::clamp(o[up] / range_mm, -1.0, 1.0);
       const bool beyond = std::abs(o[across]) > range_mm || std::abs(o[up]) > range_mm;
-      svg += dot(x * kHalf, -y * kHalf, used[i], beyond);
+      svg += dot(axes.x_of(std::clamp(o[across], -range_mm, range_mm)),
+                 axes.y_of(std::clamp(o[up], -range_mm, range_mm)), used[i], beyond);
     }
-    svg += fmt::format("<text x='0' y='{}' text-anchor='middle' fill='#555'>{} right, {} up, mm</text></g>\n",
-                       -kHalf - 10, kNames[static_cast<std::size_t>(across)], kNames[static_cast<std::size_t>(up)]);
   }
-  return svg + "</svg>";
+  return svg_picture(3 * kPanel, kTop + kSide + Axes::kBelow, svg);
 }
 
 namespace {
@@ -164,7 +131,7 @@ std::string tilt_coverage_svg(const std::vector<PivotPose>& poses, const Pivot& 
     const double turn = std::atan2(leans[i].y(), leans[i].x()) / sector + kSides;
     if (leans[i].norm() >= kLeaning_deg) reached[static_cast<std::size_t>(std::lround(turn)) % kSides] = true;
   }
-  std::string svg = begin_svg(kSide, kSide) + fmt::format("<g transform='translate({0} {0})'>", kSide / 2);
+  std::string svg = fmt::format("<g transform='translate({0} {0})'>", kSide / 2);
   for (int k = 0; k < kSides; ++k) {
     if (reached[static_cast<std::size_t>(k)]) continue;
     const double from = (k - 0.5) * sector, to = (k + 0.5) * sector;
@@ -173,18 +140,13 @@ std::string tilt_coverage_svg(const std::vector<PivotPose>& poses, const Pivot& 
                        -kRadius * std::sin(to));
   }
   const int apart_deg = range_deg > 60 ? 20 : 10;
-  for (int ring = apart_deg; ring <= range_deg; ring += apart_deg) {
-    const double r = kRadius * ring / range_deg;
-    svg += fmt::format("<circle r='{:.1f}' fill='none' stroke='#ccc'/><text x='3' y='{:.1f}' fill='#555'>{}°</text>", r,
-                       -r - 2, ring);
-  }
-  svg += fmt::format("<circle r='{}' fill='none' stroke='#888'/>", kRadius);
+  svg += rings_svg(0, 0, kRadius, range_deg, apart_deg);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double length = leans[i].norm(), shown = std::min(1.0, length / range_deg);
     const Eigen::Vector2d at = length > 0 ? Eigen::Vector2d(kRadius * shown / length * leans[i]) : leans[i];
     svg += dot(at.x(), -at.y(), used[i], length > range_deg);
   }
-  return svg + "</g></svg>";
+  return svg_picture(kSide, kSide, svg + "</g>");
 }
 
 }  // namespace birdseye::host

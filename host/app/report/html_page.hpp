@@ -9,11 +9,11 @@
 
 namespace birdseye::host {
 
-/// The page of one calibration: a single HTML file that loads nothing, built from top to bottom. Texts are escaped;
-/// SVGs are not.
-class ReportPage {
+/// The page of a result: an HTML file that loads nothing from a network, with title, verdict and what is added to it,
+/// from top to bottom. Texts are escaped; SVGs are not.
+class HtmlPage {
  public:
-  explicit ReportPage(std::string title) : title_(std::move(title)) {}
+  explicit HtmlPage(std::string title) : title_(std::move(title)) {}
 
   void set_verdict(const Verdict& verdict) { verdict_ = verdict; }
   void heading(const std::string& text);
@@ -22,15 +22,17 @@ class ReportPage {
   void table(const std::vector<std::vector<std::string>>& rows);
   void svg(const std::string& svg, const std::string& caption);
   void picture(const Picture& picture, const std::string& caption);  ///< kept inside the page, as a PNG
+  /// Files that lie beside the page, two in a row where there are several.
+  void picture_files(const std::vector<std::string>& files, const std::string& caption);
+  void film_file(const std::string& file, const std::string& caption);
 
   [[nodiscard]] std::string html() const;
 
  private:
+  void figure(const std::string& content, const std::string& caption);
+
   std::string title_, body_;
   Verdict verdict_;
 };
-
-/// &, <, > and quotes as HTML writes them.
-std::string escape_html(const std::string& text);
 
 }  // namespace birdseye::host
