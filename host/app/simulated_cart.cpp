@@ -126,6 +126,8 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
                                    fmt::format("{}", settings.video_rate_hz),
                                    "--dwell-s",
                                    fmt::format("{}", settings.dwell_s),
+                                   "--pause-s",
+                                   fmt::format("{}", settings.pause_s),
                                    "--look-s",
                                    fmt::format("{}", settings.look_s)};
   if (settings.drop_late) command.emplace_back("--drop-late");

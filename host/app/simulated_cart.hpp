@@ -26,6 +26,7 @@ struct SimulatedCartSettings {
   int width_px = 768, height_px = 576;
   double video_rate_hz = 25;
   double dwell_s = 0.3;                 ///< for which the scope is held still at each station over the board
+  double pause_s = 0;                   ///< for which it then stays there, so that the calibration can be worked out
   double look_s = 7;                    ///< for which it sweeps over the liver
   int smoothing_ms = 40, wait_ms = 90;  ///< [pose] of birdseyed: frames wait for the poses that are averaged
   bool drop_late = false;               ///< frames that a busy machine has no time to trace; else they come late

@@ -51,6 +51,9 @@ int main(int argc, char** argv) {
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--dwell-s", cart.pace.dwell_s, "how long the scope is held still at each station over the board")
       ->check(CLI::Range(0.1, 20.0));
+  run.add_option("--pause-s", cart.pace.pause_s,
+                 "how long it then stays there, before the pointer touches the fiducials")
+      ->check(CLI::Range(0.0, 600.0));
   run.add_flag("--drop-late", cart.drop_late, "leave out frames that are not traced in time, as a camera would");
   run.add_option("--look-s", cart.pace.look_s, "how long the scope then sweeps over the liver (default 7)")
       ->check(CLI::Range(1.0, 86400.0));

@@ -90,7 +90,7 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
 
   const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
   world.calibrate_s_ = pace.sway_s;
-  world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS);
+  world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS) + pace.pause_s;
   world.look_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
   world.ends_s_ = world.look_s_ + pace.look_s;
   if (pace.sway_s > 0) world.stages_.push_back({"sway", 0});

@@ -21,6 +21,7 @@ struct Stage {
 struct Pace {
   double sway_s = 0;     ///< for which the scope is turned to and fro over it before anything else
   double dwell_s = 0.3;  ///< for which it is held still at each station
+  double pause_s = 0;    ///< for which it stays at the last one, while whoever calibrates works it out
   double look_s = 7;     ///< for which the scope sweeps over the liver
 };
 
