@@ -18,7 +18,7 @@ FrameOverlay::Drawn FrameOverlay::draw(const wire::VideoFrame& frame) {
     drawn.rgb = *frame.rgb;
     return drawn;
   }
-  drawn.camera_from_patient = setup_.camera_from_sensor * tracker_from_sensor->inverse() * setup_.tracker_from_patient;
+  drawn.camera_from_patient = setup_.camera_from_patient(*tracker_from_sensor);
   const ImageRgba overlay = engine_.render(setup_.camera, *drawn.camera_from_patient, settings_);
   drawn.rgb = composite(*frame.rgb, overlay, drawn.decision.strength);
   return drawn;

@@ -16,6 +16,11 @@ struct Setup {
   CameraModel camera;
   Transform<Camera, Sensor> camera_from_sensor;
   Transform<Tracker, Patient> tracker_from_patient;
+
+  [[nodiscard]] Transform<Camera, Patient> camera_from_patient(
+      const Transform<Tracker, Sensor>& tracker_from_sensor) const {
+    return camera_from_sensor * tracker_from_sensor.inverse() * tracker_from_patient;
+  }
 };
 
 /// Draws the CT over frames of video, where their poses are to be believed: the same frames in the same order give the

@@ -14,6 +14,7 @@
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
 #include "host/overlay/compositor.hpp"
+#include "host/overlay/surface_cues.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/ui/window.hpp"
@@ -30,8 +31,9 @@ struct Options {
   std::vector<int> keep;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
   double clip = 0.5;
-  double step_mm = 0.7, seconds = 4;
-  bool window = false;
+  double step_mm = 0.7, seconds = 4, opacity = 1;
+  std::vector<double> clip_plane;
+  bool window = false, surface_in_front = false;
   int frames = 0;
 };
 
@@ -94,6 +96,12 @@ Result<RenderScene> scene_of(const Options& options) {
   scene.behind = *std::move(behind);
   straighten(scene, options.display);
   scene.settings.step_mm = options.step_mm;
+  if (!options.clip_plane.empty()) {
+    const Eigen::Vector3d normal(options.clip_plane[0], options.clip_plane[1], options.clip_plane[2]);
+    if (!(normal.norm() > 0) || !std::isfinite(normal.norm() + options.clip_plane[3]))
+      return Error{Errc::bad_value, "--clip-plane: needs a direction that is not 0 0 0, and a finite distance"};
+    scene.settings.clip = ClipPlane{normal.normalized(), options.clip_plane[3] / normal.norm()};
+  }
   scene.film_s = options.seconds;
   if (options.deformation.empty()) return scene;
   if (*std::min_element(scene.volume.size.begin(), scene.volume.size.end()) < 2) {
@@ -141,9 +149,11 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
-  const std::string png = options.over.empty()
-                              ? transparent_png_of(image)
-                              : png_of(composite(scene.behind.rgb, image, 1), image.width_px, image.height_px, 3);
+  std::vector<std::uint8_t> in_front;
+  if (options.surface_in_front) in_front = surface_cues(scene.behind.rgb, image.width_px, image.height_px);
+  const std::string png = options.over.empty() ? transparent_png_of(image)
+                                               : png_of(composite(scene.behind.rgb, image, options.opacity, in_front),
+                                                        image.width_px, image.height_px, 3);
   if (!options.movie.empty()) {
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }
@@ -200,12 +210,24 @@ void add_render(CLI::App& app, CommandStatus& status) {
       ->needs(camera);
   CLI::Option* const pose = command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
-  command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
+  CLI::Option* const over =
+      command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
+  command.add_option("--opacity", options->opacity, "of what is drawn --over a picture (default 1)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->needs(over);
+  command
+      .add_flag("--surface-in-front", options->surface_in_front,
+                "its edges and highlights stay before what is drawn, which so reads as inside")
+      ->needs(over);
   command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over");
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");
   command.add_option("--clip", options->clip, "share of the depth cut away in the view without a camera (default 0.5)")
       ->check(CLI::Range(0.0, 0.99));
+  command
+      .add_option("--clip-plane", options->clip_plane,
+                  "X Y Z D: what has X x + Y y + Z z >= D is kept, patient frame, mm")
+      ->expected(4);
   command.add_option("--step-mm", options->step_mm, "between samples along a ray")->check(CLI::Range(0.05, 20.0));
   command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));

@@ -5,15 +5,17 @@
 
 namespace birdseye::host {
 
-std::vector<std::uint8_t> composite(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength) {
+std::vector<std::uint8_t> composite(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength,
+                                    std::span<const std::uint8_t> in_front) {
   // Eight bits of fraction: 256 is all of it.
-  const int w = static_cast<int>(std::lround(std::clamp(strength, 0.0, 1.0) * 256));
+  const int whole = static_cast<int>(std::lround(std::clamp(strength, 0.0, 1.0) * 256));
   std::vector<std::uint8_t> out(video.begin(), video.end());
   const std::size_t pixels = overlay.rgba.size() / 4;
   if (video.size() != 3 * pixels) return out;  // an overlay of another size would lie somewhere else
   for (std::size_t i = 0; i < pixels; ++i) {
     const std::uint8_t* const rgba = &overlay.rgba[4 * i];
     if (rgba[3] == 0) continue;
+    const int w = in_front.size() == pixels ? whole * (255 - in_front[i]) / 255 : whole;
     const int keep = 255 * 256 - rgba[3] * w;
     for (std::size_t c = 0; c < 3; ++c) {
       const int value = rgba[c] * w * 255 + video[3 * i + c] * keep;

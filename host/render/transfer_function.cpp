@@ -132,4 +132,14 @@ Result<TransferFunction> load_transfer_function(const std::string& name_or_path)
   }
 }
 
+std::string transfer_text(const TransferFunction& transfer) {
+  nlohmann::json points = nlohmann::json::array();
+  for (const TransferPoint& point : transfer.points()) {
+    points.push_back({{"hu", point.hu},
+                      {"rgb", {point.rgb.x(), point.rgb.y(), point.rgb.z()}},
+                      {"extinction_per_mm", point.extinction_per_mm}});
+  }
+  return nlohmann::json{{"points", points}}.dump(2) + "\n";
+}
+
 }  // namespace birdseye::host

@@ -43,5 +43,7 @@ class TransferFunction {
 /// By the name of a preset, or from a JSON file {"points": [{"hu":, "rgb": [r, g, b], "extinction_per_mm":}, ...]}.
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path);
 std::vector<std::string> transfer_presets();
+/// The text of a file that load_transfer_function reads back exactly.
+std::string transfer_text(const TransferFunction& transfer);
 
 }  // namespace birdseye::host

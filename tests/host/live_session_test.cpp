@@ -1,90 +1,26 @@
 // The workflow of the live window without a window: fed with events as an appliance sends them.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <thread>
 
 #include "host/app/live/live_script.hpp"
-#include "host/app/live/live_session.hpp"
-#include "tests/support/example_record.hpp"
-#include "tests/support/scratch.hpp"
-#include "tests/support/small_ct.hpp"
+#include "tests/support/live_operation.hpp"
 
 namespace birdseye::host {
 namespace {
 
+using birdseye::testing::connect_and_calibrate;
+using birdseye::testing::Hand;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kMs;
+using birdseye::testing::kTrackerFromPatient;
+using birdseye::testing::load;
+using birdseye::testing::operation_settings;
 using birdseye::testing::Scratch;
-
-constexpr std::int64_t kMs = 1'000'000;
-
-const std::vector<Eigen::Vector3d> kFiducials{{0, 0, 0}, {60, 5, 0}, {10, 70, 20}, {30, 20, 50}};
-const Transform<Tracker, Patient> kTrackerFromPatient(
-    Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix(), {300, 20, -40});
-
-LiveSettings settings(const Scratch& scratch) {
-  LiveSettings out;
-  out.patient.ct = birdseye::testing::small_ct(scratch);
-  std::ofstream fiducials(scratch / "fiducials.txt");
-  for (const Eigen::Vector3d& f : kFiducials) fiducials << f.transpose() << '\n';
-  out.patient.fiducials = scratch / "fiducials.txt";
-  out.patient.landmarks = scratch.file("landmarks.csv", "name,x,y,z\ntumour,30,30,20\n");
-  out.tip_in_pointer_mm = Eigen::Vector3d(0, 0, 150);
-  out.fiducials = kFiducials.size();
-  return out;
-}
-
-/// Waits for the CT, which another thread reads.
-void load(LiveSession& session) {
-  for (int i = 0; i < 1000 && session.patient() == nullptr && session.fault().empty(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    session.tick();
-  }
-  ASSERT_NE(session.patient(), nullptr) << session.fault();
-}
-
-/// The pointer's tip at places of the patient, one after the other.
-class Hand {
- public:
-  explicit Hand(LiveSession& session) : session_(session) {}
-  void rest_at(const Eigen::Vector3d& in_patient_mm, int samples) {
-    const Eigen::Vector3d to_mm = kTrackerFromPatient * in_patient_mm;
-    for (int i = 0; i < 30; ++i) push(at_mm_ + (to_mm - at_mm_) * (i / 29.0));
-    for (int i = 0; i < samples; ++i) push(to_mm);
-    at_mm_ = to_mm;
-  }
-
- private:
-  void push(const Eigen::Vector3d& tip_mm) {
-    wire::Birds birds;
-    birds.acquired = DeviceTime{time_ms_ * kMs};
-    time_ms_ += 10;
-    birds.birds.push_back(
-        {"pointer", Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), tip_mm - Eigen::Vector3d(0, 0, 150))});
-    session_.take(birds, HostTime{birds.acquired.ns}, std::nullopt);
-  }
-  LiveSession& session_;
-  Eigen::Vector3d at_mm_ = Eigen::Vector3d(0, 0, 900);
-  std::int64_t time_ms_ = 1000;
-};
-
-void connect_and_calibrate(LiveSession& session) {
-  wire::Health health;
-  health.state = "ready";
-  session.take(health, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
-  EXPECT_EQ(session.step(), LiveStep::calibrate);
-  wire::Calibration calibration;
-  calibration.in_force = true;
-  calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
-  session.take(calibration, HostTime{0}, std::nullopt);
-  EXPECT_TRUE(session.note(LiveStep::calibrate).done);
-  session.primary();
-  EXPECT_EQ(session.step(), LiveStep::fiducials);
-}
 
 TEST(LiveSession, GoesFromTheLinkToARegisteredPatient) {
   const Scratch scratch;
-  LiveSession session(settings(scratch));
+  LiveSession session(operation_settings(scratch));
   load(session);
   connect_and_calibrate(session);
   Hand hand(session);
@@ -116,9 +52,91 @@ TEST(LiveSession, GoesFromTheLinkToARegisteredPatient) {
   EXPECT_EQ(session.step(), LiveStep::run);
 }
 
+/// Four fiducials, and what was found of them is in out.
+void register_into(const std::filesystem::path& out, const Scratch& scratch) {
+  LiveSettings kept = operation_settings(scratch);
+  kept.out = out;
+  LiveSession session(kept);
+  load(session);
+  connect_and_calibrate(session);
+  Hand hand(session);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(session.note(LiveStep::fiducials).done);
+}
+
+LiveSettings resumed(const Scratch& scratch, const std::filesystem::path& from) {
+  LiveSettings out = operation_settings(scratch);
+  out.resume = from;
+  return out;
+}
+
+TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  LiveSession session(resumed(scratch, scratch.path()));
+  load(session);
+  EXPECT_EQ(session.fault(), "");
+  EXPECT_TRUE(session.note(LiveStep::fiducials).done);
+  EXPECT_EQ(session.step(), LiveStep::check);  // not the run: the patient may have been moved
+  EXPECT_FALSE(session.picture().setup().has_value()) << "without the scope's record there is no overlay";
+  wire::Calibration calibration;
+  calibration.in_force = true;
+  calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
+  session.take(calibration, HostTime{0}, std::nullopt);
+  ASSERT_TRUE(session.picture().setup().has_value());
+  const auto& found = session.picture().setup()->tracker_from_patient;
+  EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
+}
+
+TEST(LiveSession, AnotherPatientsRegistrationIsNotTakenUp) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  const LiveSettings wrong = resumed(scratch, scratch.path());
+  birdseye::testing::small_ct(scratch, 8);  // in the first one's place
+  LiveSession session(wrong);
+  load(session);
+  EXPECT_NE(session.fault().find("is of another CT"), std::string::npos) << session.fault();
+  EXPECT_FALSE(session.note(LiveStep::fiducials).done);
+}
+
+TEST(LiveSession, ATouchThatWasTakenBackIsNotTakenUp) {
+  const Scratch scratch;
+  {
+    LiveSettings kept = operation_settings(scratch);
+    kept.out = scratch.path();
+    LiveSession session(kept);
+    load(session);
+    connect_and_calibrate(session);
+    Hand hand(session);
+    for (std::size_t i = 0; i < 3; ++i) hand.rest_at(kFiducials[i], 80);
+    hand.rest_at({0, 0, 200}, 1);
+    ASSERT_TRUE(session.fre_mm().has_value());
+    session.undo_touch();
+  }
+  LiveSession session(resumed(scratch, scratch.path()));
+  load(session);
+  EXPECT_EQ(session.fault(), "");
+  EXPECT_FALSE(session.fre_mm().has_value());
+}
+
+TEST(LiveSession, ADamagedOperationIsNamed) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  for (const char* const file : {"operation.json", "patient_from_tracker.txt"}) {
+    const std::string whole = birdseye::testing::contents_of(scratch / file);
+    (void)scratch.file(file, whole.substr(0, whole.size() / 3));
+    LiveSession session(resumed(scratch, scratch.path()));
+    load(session);
+    EXPECT_NE(session.fault().find(file), std::string::npos) << session.fault();
+    EXPECT_FALSE(session.fre_mm().has_value());
+    (void)scratch.file(file, whole);
+  }
+}
+
 TEST(LiveSession, AWrongTouchShowsAndIsTakenBack) {
   const Scratch scratch;
-  LiveSession session(settings(scratch));
+  LiveSession session(operation_settings(scratch));
   load(session);
   connect_and_calibrate(session);
   Hand hand(session);
@@ -136,7 +154,7 @@ TEST(LiveSession, AWrongTouchShowsAndIsTakenBack) {
 
 TEST(LiveSession, SaysWhatIsWrongWithThePatientsFiles) {
   const Scratch scratch;
-  LiveSettings wrong = settings(scratch);
+  LiveSettings wrong = operation_settings(scratch);
   wrong.patient.ct = scratch / "nothere";
   LiveSession session(wrong);
   for (int i = 0; i < 1000 && session.fault().empty(); ++i) {
@@ -144,7 +162,7 @@ TEST(LiveSession, SaysWhatIsWrongWithThePatientsFiles) {
     session.tick();
   }
   EXPECT_NE(session.fault().find("nothere"), std::string::npos);
-  LiveSettings unknown = settings(scratch);
+  LiveSettings unknown = operation_settings(scratch);
   unknown.transfer = "no such preset";
   EXPECT_NE(LiveSession(unknown).fault().find("no such preset"), std::string::npos);
 }

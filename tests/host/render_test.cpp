@@ -246,6 +246,9 @@ TEST(Compositor, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
   const std::vector<std::uint8_t> video{10, 20, 30, 200, 100, 50, 7, 8, 9};
   const ImageRgba overlay{3, 1, {0, 0, 0, 0, 64, 0, 0, 128, 255, 255, 255, 255}};
   const auto full = composite(video, overlay, 1);
+  // What lies in front hides what is drawn: all of it, or none.
+  EXPECT_EQ(composite(video, overlay, 1, std::vector<std::uint8_t>(video.size() / 3, 255)), video);
+  EXPECT_EQ(composite(video, overlay, 1, std::vector<std::uint8_t>(video.size() / 3, 0)), full);
   EXPECT_EQ(full, (std::vector<std::uint8_t>{10, 20, 30, 164, 50, 25, 255, 255, 255}));
   EXPECT_EQ(composite(video, overlay, 0), video);
   const ImageRgba other{2, 1, {255, 255, 255, 255, 255, 255, 255, 255}};

@@ -12,7 +12,7 @@
 namespace birdseye::testing {
 
 /// A small CT with a bright ball in it, as a DICOM series.
-inline std::string small_ct(const Scratch& scratch) {
+inline std::string small_ct(const Scratch& scratch, double radius_mm = 12) {
   hw_sim::Grid grid;
   grid.size = {20, 20, 20};
   grid.spacing_mm = {2, 2, 2};
@@ -20,7 +20,7 @@ inline std::string small_ct(const Scratch& scratch) {
   std::vector<std::int16_t> hu;
   for (int k = 0; k < 20; ++k) {
     for (int j = 0; j < 20; ++j) {
-      for (int i = 0; i < 20; ++i) hu.push_back(grid.point(i, j, k).norm() < 12 ? 200 : -1000);
+      for (int i = 0; i < 20; ++i) hu.push_back(grid.point(i, j, k).norm() < radius_mm ? 200 : -1000);
     }
   }
   EXPECT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid, hu, 1));

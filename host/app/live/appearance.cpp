@@ -119,6 +119,7 @@ std::optional<std::vector<TransferPoint>> TransferEditor::draw(const HuHistogram
       changed = true;
     }
     ImGui::SameLine();
+    ImGui::AlignTextToFramePadding();
     ImGui::Text("%.0f HU", points_[chosen_].hu);
   }
   if (!changed) return std::nullopt;

@@ -185,6 +185,7 @@ Result<ExitCode> run(Options& options) {
 void add_live(CLI::App& app, CommandStatus& status) {
   auto options = std::make_shared<Options>();
   options->cart.dwell_s = 0.7;
+  options->cart.pause_s = 8;
   options->cart.look_s = 3600;
   options->cart.drop_late = true;
   options->cart.smoothing_ms = 12;  // what is averaged after a frame, the frame has to wait for
@@ -228,6 +229,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
       ->check(CLI::Range(0.5, 4.0));
   command->add_option("--script", options->script, "keys to press and pictures to take")->type_name("FILE");
   command->add_option("--out", options->live.out, "a folder for snapshots and the log of frames")->type_name("FOLDER");
+  command->add_option("--resume", options->live.resume, "the --out folder of a window that was closed: go on from it")
+      ->type_name("FOLDER");
   command->add_option("--json", options->json, "figures and verdict")->type_name("FILE");
   command->callback([options, &status] {
     const auto done = run(*options);

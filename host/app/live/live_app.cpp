@@ -6,6 +6,7 @@
 
 #include "calibration/solve/pattern.hpp"
 #include "host/app/interrupt.hpp"
+#include "host/app/live/snapshot.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/write_files.hpp"
 #include "host/render/transfer_function.hpp"
@@ -121,7 +122,7 @@ void LiveApp::draw() {
     draw_window(shown);
   }
   if (!shot_.empty()) {
-    snapshot(shot_);
+    snapshot(shot_, shown);
     shot_.clear();
   }
   window_->swap();
@@ -169,6 +170,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (scripted_.step) wishes.step = scripted_.step;
   if (scripted_.opacity) wishes.opacity = scripted_.opacity;
   if (scripted_.clip) wishes.clip = scripted_.clip;
+  if (scripted_.surface_in_front) wishes.surface_in_front = scripted_.surface_in_front;
   scripted_ = {};
   if (wishes.primary) session_.primary();
   if (wishes.next) session_.go_on();
@@ -180,6 +182,10 @@ void LiveApp::grant(const PanelWishes& asked) {
     session_.picture().set_opacity(facts_.opacity);
   }
   if (wishes.clip) facts_.clip = *wishes.clip;
+  if (wishes.surface_in_front) {
+    facts_.surface_in_front = *wishes.surface_in_front;
+    session_.picture().set_surface_in_front(facts_.surface_in_front);
+  }
   if (wishes.plane) facts_.plane = *wishes.plane;
   if ((wishes.clip || wishes.plane) && session_.patient() != nullptr) {
     RenderSettings render = usual_settings();
@@ -203,9 +209,28 @@ Result<bool> LiveApp::follow_script() {
   return act->end;
 }
 
-void LiveApp::snapshot(const std::filesystem::path& path) {
+/// The window as it is, and in a folder of the same name the picture with all that it was made of.
+void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& shown) {
   const LiveWindow::Shot shot = window_->shot();
-  const auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+  auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+  const LivePicture& picture = session_.picture();
+  if (written && picture.frame()) {
+    Snapshot parts;
+    parts.frame = &*picture.frame();
+    parts.shown = shown;
+    parts.setup = picture.setup();
+    parts.camera_from_patient = picture.camera_from_patient();
+    parts.render = picture.render();
+    parts.opacity = facts_.opacity;
+    parts.surface_in_front = facts_.surface_in_front;
+    parts.engine = session_.settings().engine;
+    parts.transfer = session_.transfer();
+    parts.patient = session_.settings().patient;
+    parts.deformation = session_.deformation() ? &session_.deformation()->field : nullptr;
+    parts.fre_mm = session_.fre_mm();
+    auto folder = path;
+    written = write_snapshot(folder.replace_extension(), parts);
+  }
   facts_.said = written ? "snapshot: " + path.string() : written.error().what;
 }
 

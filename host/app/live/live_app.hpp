@@ -47,7 +47,7 @@ class LiveApp {
   Result<bool> follow_script();
   void draw_inset();
   void note_patient();
-  void snapshot(const std::filesystem::path& path);
+  void snapshot(const std::filesystem::path& path, const ShownPicture& shown);
 
   std::unique_ptr<LiveWindow> window_;
   std::unique_ptr<LiveSource> source_;

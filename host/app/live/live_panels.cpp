@@ -182,6 +182,8 @@ void draw_run(const LiveSession& session, const PanelFacts& facts, TransferEdito
   float opacity = static_cast<float>(facts.opacity);
   ImGui::SetNextItemWidth(-80 * scale);
   if (ImGui::SliderFloat("opacity", &opacity, 0, 1, "%.2f")) wishes.opacity = opacity;
+  bool in_front = facts.surface_in_front;
+  if (ImGui::Checkbox("surface in front (G)", &in_front)) wishes.surface_in_front = in_front;
   draw_plane(facts, wishes);
   ImGui::SetNextItemWidth(-80 * scale);
   if (ImGui::BeginCombo("colours", "presets")) {
@@ -242,7 +244,7 @@ void draw_banner(const ShownPicture& shown, const LiveSession& session, bool rec
     text = "FROZEN: this is no live picture";
     colour = kWarn;
   } else if (shown.stale || !shown.any) {
-    text = shown.any ? "VIDEO STOPPED: " + shown.reason : shown.reason;
+    text = shown.any ? "NOT LIVE: " + shown.reason : shown.reason;
     colour = kBad;
   } else if (shown.overlaid && shown.reason.empty()) {
     text = fmt::format("overlay; FRE {:.1f} mm", session.fre_mm().value_or(0));
@@ -289,7 +291,8 @@ void draw_strip(const Layout& at, const LiveSession& session, const PanelFacts& 
   const std::vector<float> ages = facts.ages->newest();
   constexpr float kFullMs = 160;
   const ImVec2 chart((at.wide - at.side) * 0.52F, at.strip - 20 * at.scale);
-  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0, nullptr, 0, kFullMs, chart);
+  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0,
+                   fmt::format("up to {:.0f} ms", kFullMs).c_str(), 0, kFullMs, chart);
   ImGui::SameLine();
   ImGui::BeginGroup();
   say(kText, fmt::format("exposure to screen, ms: p50 {:.0f}  p95 {:.0f}  max {:.0f}", facts.ages->percentile_ms(0.5),
@@ -314,6 +317,7 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
   if (key == "f") wishes.freeze = true;
   if (key == "s") wishes.snapshot = true;
   if (key == "c") wishes.clip = !facts.clip;
+  if (key == "g") wishes.surface_in_front = !facts.surface_in_front;
   if (key == "+") wishes.opacity = std::min(1.0, facts.opacity + kNotch);
   if (key == "-") wishes.opacity = std::max(0.0, facts.opacity - kNotch);
   if (key.size() == 1 && key[0] >= '1' && key[0] < static_cast<char>('1' + kLiveSteps))

@@ -14,7 +14,7 @@ struct PanelWishes {
   bool primary = false, next = false, undo = false, freeze = false, snapshot = false;
   std::optional<LiveStep> step;
   std::optional<double> opacity;
-  std::optional<bool> clip;
+  std::optional<bool> clip, surface_in_front;
   std::optional<CuttingPlane> plane;
   std::optional<std::vector<TransferPoint>> transfer;
   std::string preset;
@@ -26,7 +26,7 @@ struct PanelFacts {
   double frames_per_s = 0;
   std::uint64_t frames_skipped = 0;
   double opacity = 1;
-  bool clip = false;
+  bool clip = false, surface_in_front = false;
   CuttingPlane plane;
   const HuHistogram* histogram = nullptr;
   bool recorded = false;  ///< the source is a recording
@@ -36,7 +36,7 @@ struct PanelFacts {
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
 PanelWishes draw_panels(const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
                         const PanelFacts& facts, TransferEditor& editor);
-/// The wish that a key stands for: "space", "enter", "backspace", "f", "s", "1" to "7", "+", "-", "c".
+/// The wish that a key stands for: "space", "enter", "backspace", "f", "s", "1" to "7", "+", "-", "c", "g".
 void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);
 
 }  // namespace birdseye::host

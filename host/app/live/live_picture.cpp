@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host/overlay/compositor.hpp"
+#include "host/overlay/surface_cues.hpp"
 
 namespace birdseye::host {
 
@@ -52,10 +53,11 @@ void LivePicture::draw() {
   kind_ = -1;
   if (!setup_ || engine_ == nullptr || !decision_.tracker_from_sensor || decision_.strength <= 0) return;
   if (frame_->width_px != setup_->camera.width_px || frame_->height_px != setup_->camera.height_px) return;
-  camera_from_patient_ =
-      setup_->camera_from_sensor * decision_.tracker_from_sensor->inverse() * setup_->tracker_from_patient;
+  camera_from_patient_ = setup_->camera_from_patient(*decision_.tracker_from_sensor);
+  std::vector<std::uint8_t> in_front;
+  if (surface_in_front_) in_front = surface_cues(*frame_->rgb, frame_->width_px, frame_->height_px);
   overlaid_ = composite(*frame_->rgb, engine_->render(setup_->camera, *camera_from_patient_, render_),
-                        decision_.strength * opacity_);
+                        decision_.strength * opacity_, in_front);
 }
 
 ShownPicture LivePicture::at(HostTime now) {

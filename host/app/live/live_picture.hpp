@@ -50,8 +50,14 @@ class LivePicture {
 
   /// engine: empty takes it away. Both must outlive this, or be taken away before.
   void set_engine(Engine* engine) { engine_ = engine; }
+  [[nodiscard]] const RenderSettings& render() const { return render_; }
   void set_render(const RenderSettings& render) {
     render_ = render;
+    redraw();
+  }
+  /// Whether the surface's edges and highlights stay before the overlay, so that it reads as inside.
+  void set_surface_in_front(bool in_front) {
+    surface_in_front_ = in_front;
     redraw();
   }
   void set_opacity(double opacity) {
@@ -87,6 +93,7 @@ class LivePicture {
   Engine* engine_ = nullptr;
   RenderSettings render_;
   double opacity_ = 1;
+  bool surface_in_front_ = false;
   std::optional<Setup> setup_;
   std::optional<wire::VideoFrame> frame_;
   HostTime exposed_;

@@ -49,6 +49,7 @@ void LiveSession::tick() {
       fault_.clear();
       make_engine_for(*patient_);
       fit();
+      resume();
     } else {
       fault_ = loaded->error().what;
     }
@@ -142,7 +143,7 @@ void LiveSession::take(const wire::Calibration& calibration) {
 
 void LiveSession::adopt(const calibration::CalibrationRecord& record) {
   if (record.tip && !settings_.tip_in_pointer_mm) settings_.tip_in_pointer_mm = record.tip->tip_in_sensor_mm;
-  if (!record.lens || !record.hand_eye) return;
+  if (!record.lens || !record.hand_eye || calibrated_here_) return;
   camera_ = record.lens->camera;
   camera_from_sensor_ = record.hand_eye->camera_from_sensor;
   known_.camera_rms_px = record.lens->rms_px;
@@ -188,10 +189,12 @@ void LiveSession::finish_guide(Result<GuidedCalibration> found) {
   camera_from_sensor_ = hand_eye.camera_from_sensor;
   known_.camera_rms_px = found->stations.lens ? found->stations.lens->rms_px : 0;
   known_.tracked_rms_px = hand_eye.tracked_px;
+  calibrated_here_ = true;
   note.done = true;
   note.line = fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(found->verdict.grade),
                           found->stations.input.stations.size(), hand_eye.held_out_mm);
   update_setup();
+  keep_operation();
   if (step_ == LiveStep::calibrate) go_to(LiveStep::fiducials);
 }
 
@@ -208,6 +211,7 @@ void LiveSession::add_touch(const Touch& touch) {
   if (settings_.fiducials != 0 && touches_.size() >= settings_.fiducials) return;
   touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
   fit();
+  keep_operation();
 }
 
 void LiveSession::touch() {
@@ -225,6 +229,7 @@ void LiveSession::touch() {
 void LiveSession::undo_touch() {
   if (!touches_.empty()) touches_.pop_back();
   fit();
+  keep_operation();
 }
 
 void LiveSession::fit() {

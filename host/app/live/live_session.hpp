@@ -34,6 +34,7 @@ struct LiveSettings {
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
   std::size_t fiducials = 0;                         ///< how many to touch; 0: as many as are wanted
   std::filesystem::path out;                         ///< where results go; empty: none are kept
+  std::filesystem::path resume;                      ///< out of an earlier window, to go on from; or empty
 };
 
 /// How a step stands.
@@ -126,7 +127,7 @@ class LiveSession {
   [[nodiscard]] const std::optional<ViewRegistration>& deformation() const { return deformation_; }
   [[nodiscard]] std::optional<CheckReading> check() const;
   [[nodiscard]] const PatientPlan* patient() const { return patient_ ? &*patient_ : nullptr; }
-  [[nodiscard]] const std::string& fault() const { return fault_; }
+  [[nodiscard]] const std::string& fault() const { return fault_.empty() ? keeping_fault_ : fault_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
   LivePicture& picture() { return picture_; }
   [[nodiscard]] const LivePicture& picture() const { return picture_; }
@@ -147,6 +148,8 @@ class LiveSession {
   void update_setup();
   void finish_deform(Result<ViewRegistration> found);
   void show_deformation();
+  void keep_operation();
+  void resume();
   [[nodiscard]] Eigen::Vector3d middle_mm() const;
   void make_engine_for(const PatientPlan& plan);
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
@@ -155,7 +158,8 @@ class LiveSession {
   LiveStep step_ = LiveStep::connect;
   std::array<StepNote, kLiveSteps> notes_;
   bool connected_ = false, frozen_ = false;
-  std::string link_words_, appliance_says_, fault_, registration_fault_;
+  bool calibrated_here_ = false;  ///< by the board: what the appliance has is older
+  std::string link_words_, appliance_says_, fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
 
   Background<Result<PatientPlan>> loading_;

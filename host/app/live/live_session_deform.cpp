@@ -128,12 +128,14 @@ void LiveSession::finish_deform(Result<ViewRegistration> found) {
   if (deformation_->uncertainty_mm)
     note.line += fmt::format("; the surface is known to {:.1f} mm", *deformation_->uncertainty_mm);
   show_deformation();
+  keep_operation();
 }
 
 void LiveSession::undo_deform() {
   deformation_.reset();
   at(LiveStep::deform) = {false, "undone: the CT is shown as it was taken"};
   show_deformation();
+  keep_operation();
 }
 
 void LiveSession::show_deformation() {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "host/app/calibrate/field_files.hpp"
+#include "host/app/live/operation.hpp"
 #include "host/app/text_files.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
@@ -37,6 +38,7 @@ Result<PatientPlan> read_patient(const PatientFiles& files) {
   auto ct = import_volume(files.ct);
   if (!ct) return ct.error();
   plan.ct = *std::move(ct);
+  plan.checksum = ct_checksum(plan.ct);
   if (files.labels.empty() && !(files.shown.empty() && files.targets.empty()))
     return Error{Errc::bad_value, "labels are named and no file of labels is given: give --labels"};
   if (!files.labels.empty()) {

@@ -28,6 +28,7 @@ struct PatientFiles {
 
 struct PatientPlan {
   Volume ct, shown;
+  std::string checksum;  ///< of the CT
   std::optional<Volume> labels;
   std::vector<int> organ;                              ///< labels of what the views show: it is matched with them
   std::vector<Eigen::Vector3d> markers_in_patient_mm;  ///< the brightest first, where they were found

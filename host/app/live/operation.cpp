@@ -1,0 +1,107 @@
+#include "host/app/live/operation.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "device/wire/igtl_bytes.hpp"
+#include "host/app/text_files.hpp"
+#include "host/app/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSheet = "operation.json";
+constexpr const char* kCamera = "camera.yaml";
+constexpr const char* kHandEye = "camera_from_sensor.txt";
+constexpr const char* kRegistration = "patient_from_tracker.txt";
+constexpr const char* kField = "field.mha";
+
+template <typename T>
+std::span<const std::uint8_t> bytes_of(const T* data, std::size_t count) {
+  return {reinterpret_cast<const std::uint8_t*>(data), count * sizeof(T)};
+}
+
+Result<Operation::Calibrated> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
+  auto camera = read_camera(folder / kCamera);
+  if (!camera) return camera.error();
+  const auto hand_eye = read_pose(folder / kHandEye);
+  if (!hand_eye) return hand_eye.error();
+  return Operation::Calibrated{*camera, Transform<Camera, Sensor>::from_matrix(*hand_eye),
+                               figures.at("camera_rms_px").get<double>(), figures.at("tracked_rms_px").get<double>()};
+}
+
+}  // namespace
+
+std::string ct_checksum(const Volume& ct) {
+  std::uint64_t crc = wire::checksum(bytes_of(ct.hu.data(), ct.hu.size()));
+  crc = wire::checksum(bytes_of(ct.size.data(), ct.size.size()), crc);
+  const Eigen::Matrix4d place = ct.patient_from_voxel.matrix();
+  crc = wire::checksum(bytes_of(place.data(), 16), crc);
+  return fmt::format("{:016x}", crc);
+}
+
+Result<void> write_operation(const fs::path& folder, const Operation& operation) {
+  std::error_code ignored;
+  nlohmann::json sheet{{"made_utc", operation.made_utc}, {"ct_checksum", operation.ct_checksum}};
+  std::vector<FileText> files;
+  if (const auto& found = operation.calibrated) {
+    sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px}, {"tracked_rms_px", found->tracked_rms_px}};
+    files.push_back({folder / kCamera, camera_text(found->camera)});
+    files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
+  }
+  if (const auto& found = operation.registered) {
+    sheet["registered"] = {{"fre_mm", found->fre_mm}};
+    files.push_back({folder / kRegistration, pose_text(found->patient_from_tracker.matrix())});
+  }
+  sheet["deformed"] = operation.deformation.has_value();
+  if (operation.deformation) {
+    if (auto written = write_field(folder / kField, *operation.deformation); !written) return written;
+  } else {
+    fs::remove(folder / kField, ignored);  // export would take an old one for the present
+  }
+  if (!operation.registered) fs::remove(folder / kRegistration, ignored);
+  files.push_back({folder / kSheet, text_of(sheet)});
+  return write_files(files);
+}
+
+Result<Operation> read_operation(const fs::path& folder) {
+  const fs::path path = folder / kSheet;
+  std::ifstream in(path);
+  if (!in) {
+    return Error{Errc::not_found,
+                 fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
+  }
+  try {
+    const nlohmann::json sheet = nlohmann::json::parse(in);
+    Operation out;
+    sheet.at("made_utc").get_to(out.made_utc);
+    sheet.at("ct_checksum").get_to(out.ct_checksum);
+    if (sheet.contains("calibrated")) {
+      auto found = read_calibrated(folder, sheet.at("calibrated"));
+      if (!found) return found.error();
+      out.calibrated = *std::move(found);
+    }
+    if (sheet.contains("registered")) {
+      const auto matrix = read_pose(folder / kRegistration);
+      if (!matrix) return matrix.error();
+      out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix),
+                        sheet.at("registered").at("fre_mm").get<double>()};
+    }
+    if (sheet.at("deformed").get<bool>()) {
+      auto field = read_field(folder / kField);
+      if (!field) return field.error();
+      out.deformation = *std::move(field);
+    }
+    return out;
+  } catch (const nlohmann::json::exception& wrong) {
+    return Error{Errc::bad_format, fmt::format("{}: is damaged ({}); register anew", path.string(), wrong.what())};
+  }
+}
+
+}  // namespace birdseye::host

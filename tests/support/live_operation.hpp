@@ -1,0 +1,90 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include "host/app/live/live_session.hpp"
+#include "tests/support/example_record.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/small_ct.hpp"
+
+/// An operation as the live window meets it, without appliance and window: a small patient, and a hand with the
+/// pointer.
+namespace birdseye::testing {
+
+using host::LiveSession;
+using host::LiveSettings;
+using host::LiveStep;
+
+inline constexpr std::int64_t kMs = 1'000'000;
+
+inline const std::vector<Eigen::Vector3d> kFiducials{{0, 0, 0}, {60, 5, 0}, {10, 70, 20}, {30, 20, 50}};
+inline const Transform<Tracker, Patient> kTrackerFromPatient(
+    Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix(), {300, 20, -40});
+
+inline LiveSettings operation_settings(const Scratch& scratch) {
+  LiveSettings out;
+  out.patient.ct = small_ct(scratch);
+  std::ofstream fiducials(scratch / "fiducials.txt");
+  for (const Eigen::Vector3d& f : kFiducials) fiducials << f.transpose() << '\n';
+  out.patient.fiducials = scratch / "fiducials.txt";
+  out.patient.landmarks = scratch.file("landmarks.csv", "name,x,y,z\ntumour,30,30,20\n");
+  out.tip_in_pointer_mm = Eigen::Vector3d(0, 0, 150);
+  out.fiducials = kFiducials.size();
+  return out;
+}
+
+/// Waits for the CT, which another thread reads.
+inline void load(LiveSession& session) {
+  for (int i = 0; i < 1000 && session.patient() == nullptr && session.fault().empty(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    session.tick();
+  }
+  ASSERT_NE(session.patient(), nullptr) << session.fault();
+}
+
+/// The pointer's tip at places of the patient, one after the other.
+class Hand {
+ public:
+  explicit Hand(LiveSession& session) : session_(session) {}
+  void rest_at(const Eigen::Vector3d& in_patient_mm, int samples) {
+    const Eigen::Vector3d to_mm = kTrackerFromPatient * in_patient_mm;
+    for (int i = 0; i < 30; ++i) push(at_mm_ + (to_mm - at_mm_) * (i / 29.0));
+    for (int i = 0; i < samples; ++i) push(to_mm);
+    at_mm_ = to_mm;
+  }
+
+ private:
+  void push(const Eigen::Vector3d& tip_mm) {
+    wire::Birds birds;
+    birds.acquired = DeviceTime{time_ms_ * kMs};
+    time_ms_ += 10;
+    birds.birds.push_back(
+        {"pointer", Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), tip_mm - Eigen::Vector3d(0, 0, 150))});
+    session_.take(birds, HostTime{birds.acquired.ns}, std::nullopt);
+  }
+  LiveSession& session_;
+  Eigen::Vector3d at_mm_ = Eigen::Vector3d(0, 0, 900);
+  std::int64_t time_ms_ = 1000;
+};
+
+inline void connect_and_calibrate(LiveSession& session) {
+  wire::Health health;
+  health.state = "ready";
+  session.take(health, HostTime{0}, std::nullopt);
+  session.set_link(true, "connected");
+  EXPECT_EQ(session.step(), LiveStep::calibrate);
+  wire::Calibration calibration;
+  calibration.in_force = true;
+  calibration.record = calibration::record_text(example_record(768, 576, {}, {}));
+  session.take(calibration, HostTime{0}, std::nullopt);
+  EXPECT_TRUE(session.note(LiveStep::calibrate).done);
+  session.primary();
+  EXPECT_EQ(session.step(), LiveStep::fiducials);
+}
+
+}  // namespace birdseye::testing
