@@ -25,6 +25,7 @@ struct Options {
   PatientFiles simulated;  ///< once it is made
   LiveWindow::Settings window;
   fs::path tip, script, json, recording;
+  double speed = 1;
   std::string size = "1280x720", video = "512x384";
 };
 
@@ -154,7 +155,7 @@ Result<ExitCode> run(Options& options) {
   if (!window) return window.error();
   std::unique_ptr<LiveSource> source;
   if (!options.recording.empty()) {
-    auto opened = LiveSource::of_recording(options.recording);
+    auto opened = LiveSource::of_recording(options.recording, options.speed);
     if (!opened) return opened.error();
     source = *std::move(opened);
   } else {
@@ -194,6 +195,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--server", options->server, "the appliance")->type_name("HOST:PORT");
   command->add_option("--recording", options->recording, "what birdseye record wrote, or a PLUS sequence: played again")
       ->type_name("PATH");
+  command->add_option("--speed", options->speed, "of the recording: 2 plays it twice as fast (default 1)")
+      ->check(CLI::Range(0.05, 20.0));
   command->add_flag("--simulate", options->simulate, "a simulated cart and patient of its own, in --out");
   command->add_option("--seed", options->cart.seed, "with --simulate: another patient and other noise");
   command->add_option("--faults", options->cart.faults, "with --simulate: a script of faults")->type_name("FILE");

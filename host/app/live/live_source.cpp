@@ -60,9 +60,9 @@ void LiveSource::take_link(Result<Link> link) {
   words_ = "connected to " + name_;
 }
 
-Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path) {
+Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed) {
   RecordingReader::Settings settings;
-  settings.speed = 1;
+  settings.speed = speed;
   auto reader = RecordingReader::open(path, settings);
   if (!reader) return reader.error();
   std::unique_ptr<LiveSource> source(new LiveSource(path.string(), {}));

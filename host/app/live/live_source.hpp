@@ -20,7 +20,7 @@ class LiveSource {
   static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
 
   /// A recording, as fast as it was made. Errors: there is none, or it is damaged from its first line on.
-  static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path);
+  static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path, double speed = 1);
 
   /// The next event, waiting for it until the deadline.
   std::optional<wire::Event> next(wire::Client::Clock::time_point deadline);
