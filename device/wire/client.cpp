@@ -16,6 +16,9 @@ namespace birdseye::wire {
 
 namespace {
 
+constexpr auto kFirstWord = std::chrono::milliseconds(250);
+constexpr auto kSilence = std::chrono::seconds(1);
+
 int remaining_ms(Client::Clock::time_point deadline) {
   const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Client::Clock::now()).count();
   return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
@@ -43,7 +46,11 @@ int try_connect(const addrinfo& address, Client::Clock::time_point deadline) {
 
 }  // namespace
 
-Result<std::unique_ptr<Client>> Client::connect(const std::string& host, int port, Clock::time_point deadline) {
+Client::Client(int fd, std::string name, ForeignSettings foreign)
+    : fd_(fd), name_(std::move(name)), foreign_settings_(std::move(foreign)), connected_(Clock::now()) {}
+
+Result<std::unique_ptr<Client>> Client::connect(const std::string& host, int port, Clock::time_point deadline,
+                                                ForeignSettings foreign) {
   const std::string name = fmt::format("{}:{}", host, port);
   addrinfo hints{};
   hints.ai_family = AF_INET;
@@ -54,7 +61,8 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& host, int por
   }
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owner(found, ::freeaddrinfo);
   for (;;) {
-    if (const int fd = try_connect(*found, deadline); fd >= 0) return std::unique_ptr<Client>(new Client(fd, name));
+    if (const int fd = try_connect(*found, deadline); fd >= 0)
+      return std::unique_ptr<Client>(new Client(fd, name, std::move(foreign)));
     if (Clock::now() >= deadline) {
       return Error{Errc::not_found, fmt::format("{}: no appliance answers; is birdseyed running there?", name)};
     }
@@ -64,6 +72,10 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& host, int por
 
 Client::~Client() {
   ::close(fd_);
+}
+
+Error Client::gone() const {
+  return {Errc::disconnected, fmt::format("{}: the {} has gone", name_, foreign_ ? "server" : "appliance")};
 }
 
 Result<bool> Client::fill(std::size_t size, Clock::time_point deadline) {
@@ -77,7 +89,7 @@ Result<bool> Client::fill(std::size_t size, Clock::time_point deadline) {
     if (got > 0) {
       have_ += static_cast<std::size_t>(got);
     } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
-      return Error{Errc::disconnected, fmt::format("{}: the appliance has gone", name_)};
+      return gone();
     }
   }
   return true;
@@ -92,7 +104,7 @@ Result<void> Client::send(const Packet& packet, Clock::time_point deadline) {
       continue;
     }
     if (errno != EAGAIN && errno != EINTR) {
-      return Error{Errc::disconnected, fmt::format("{}: the appliance has gone", name_)};
+      return gone();
     }
     pollfd entry{fd_, POLLOUT, 0};
     if (::poll(&entry, 1, remaining_ms(deadline)) == 0 && Clock::now() >= deadline) {
@@ -136,11 +148,13 @@ std::optional<ClockChoice> Client::choose() const {
 }
 
 std::string Client::clock_choice() const {
+  if (foreign_) return "by arrivals";
   const auto choice = choose();
   return choice ? choice->reason : "the appliance has not answered yet";
 }
 
 std::optional<RelatedTime<HostTime>> Client::host_from_device(DeviceTime time) const {
+  if (foreign_) return foreign_->host_from_device(time);
   const auto choice = choose();
   if (!choice) return std::nullopt;
   if (choice->way == ClockChoice::Way::exchange) return relation_.host_from_device(time);
@@ -148,20 +162,63 @@ std::optional<RelatedTime<HostTime>> Client::host_from_device(DeviceTime time) c
   return RelatedTime<HostTime>{{time.ns + shift.ns}, choice->sigma};
 }
 
+Result<std::optional<std::span<const std::uint8_t>>> Client::next_message(Clock::time_point deadline) {
+  using Message = std::optional<std::span<const std::uint8_t>>;
+  auto whole = fill(kHeaderBytes, deadline);
+  if (!whole) return whole.error();
+  if (!*whole) return Message();
+  const auto body = body_bytes(std::span(buffer_).first(kHeaderBytes));
+  if (!body) return Error{body.error().code, fmt::format("{}: {}", name_, body.error().what)};
+  const std::size_t size = kHeaderBytes + *body;
+  whole = fill(size, deadline);
+  if (!whole) return whole.error();
+  if (!*whole) return Message();
+  have_ = 0;
+  return Message(std::span(buffer_).first(size));
+}
+
+void Client::judge(const Header& header) {
+  if (appliance_ || foreign_) return;
+  if (is_of_appliance(header)) {
+    appliance_ = true;
+  } else {
+    foreign_.emplace(foreign_settings_, host_now());
+  }
+}
+
+/// An appliance speaks first: who has not is asked for the time after a moment, and for poses, which some send only to
+/// those who ask. Others are not bothered with questions that they do not know.
+void Client::ask() {
+  const auto silent = Clock::now() - connected_;
+  if (appliance_ || (!foreign_ && silent > kFirstWord)) ask_the_time();
+  if (appliance_ || asked_for_poses_ || (!foreign_ && silent < kSilence)) return;
+  asked_for_poses_ = true;
+  (void)send(pack_tracking_request(), Clock::now());
+}
+
 Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
   for (;;) {
-    ask_the_time();
-    auto whole = fill(kHeaderBytes, deadline);
-    if (!whole) return whole.error();
-    if (!*whole) return std::optional<Event>();
-    const auto body = body_bytes(std::span(buffer_).first(kHeaderBytes));
-    if (!body) return Error{body.error().code, fmt::format("{}: {}", name_, body.error().what)};
-    const std::size_t size = kHeaderBytes + *body;
-    whole = fill(size, deadline);
-    if (!whole) return whole.error();
-    if (!*whole) return std::optional<Event>();
-    have_ = 0;
-    auto told = unpacker_.push(std::span(buffer_).first(size));
+    ask();
+    auto until = deadline;
+    if (foreign_) {
+      if (auto event = foreign_->next(host_now())) return event;
+      if (const auto due = foreign_->due())
+        until = std::min(until, Clock::time_point(std::chrono::nanoseconds(due->ns)));
+    }
+    const auto message = next_message(until);
+    if (!message) return message.error();
+    if (!*message) {
+      if (until == deadline) return std::optional<Event>();
+      continue;
+    }
+    const auto header = read_header(**message, kLargestBody);
+    if (!header) return Error{header.error().code, fmt::format("{}: {}", name_, header.error().what)};
+    judge(*header);
+    if (foreign_) {
+      foreign_->push(*header, (*message)->subspan(kHeaderBytes), host_now());
+      continue;
+    }
+    auto told = unpacker_.push(**message);
     if (!told) return Error{told.error().code, fmt::format("{}: {}", name_, told.error().what)};
     if (!*told) continue;
     if (const auto* pong = std::get_if<ClockPong>(&**told)) {

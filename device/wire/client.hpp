@@ -6,17 +6,20 @@
 
 #include "calibration/time/clock_relation.hpp"
 #include "calibration/time/discipline.hpp"
+#include "device/wire/foreign_feed.hpp"
 #include "device/wire/unpacker.hpp"
 
 namespace birdseye::wire {
 
-/// A host's end of the wire.
+/// A host's end of the wire: of an appliance's, or of any OpenIGTLink server's that sends video and poses, which is
+/// told by the first messages that come.
 class Client {
  public:
   using Clock = std::chrono::steady_clock;
 
   /// Tries until the deadline: an appliance that is starting is not an error yet.
-  static Result<std::unique_ptr<Client>> connect(const std::string& host, int port, Clock::time_point deadline);
+  static Result<std::unique_ptr<Client>> connect(const std::string& host, int port, Clock::time_point deadline,
+                                                 ForeignSettings foreign = {});
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
@@ -31,17 +34,25 @@ class Client {
 
   /// The appliance's time on this machine's CLOCK_MONOTONIC, with a sigma: by the narrowest of the questions that
   /// next() asks it from time to time, or by clocks that a network protocol (PTP, NTP) keeps together at both ends,
-  /// whichever is surer. Empty until there was an answer.
+  /// whichever is surer. Empty until there was an answer. Of a server that is no appliance: by arrivals.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
   /// What this machine's kernel says of its clock; without it, only questions count. Monotonic + offset = wall clock.
   void use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic);
   /// Why the way that host_from_device() goes was chosen, in words.
   [[nodiscard]] std::string clock_choice() const;
+  /// What a server that is no appliance of ours is, and what of it is passed over; empty for an appliance.
+  [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
 
  private:
-  Client(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+  Client(int fd, std::string name, ForeignSettings foreign);
   Result<void> send(const Packet& packet, Clock::time_point deadline);
+  [[nodiscard]] Error gone() const;
   Result<bool> fill(std::size_t size, Clock::time_point deadline);
+  /// The next message, header and body; empty at the deadline. It lies in buffer_ until the next call.
+  Result<std::optional<std::span<const std::uint8_t>>> next_message(Clock::time_point deadline);
+  /// Judges by a message what the other side is, where that is not known yet.
+  void judge(const Header& header);
+  void ask();
   void ask_the_time();
   void take(const ClockPong& pong);
   [[nodiscard]] std::optional<ClockChoice> choose() const;
@@ -51,6 +62,11 @@ class Client {
   std::vector<std::uint8_t> buffer_;
   std::size_t have_ = 0;
   Unpacker unpacker_;
+  ForeignSettings foreign_settings_;
+  std::optional<ForeignFeed> foreign_;  ///< the other side is no appliance
+  bool appliance_ = false;              ///< it is one
+  bool asked_for_poses_ = false;
+  Clock::time_point connected_;
   ClockRelation relation_;
   Clock::time_point next_question_{};
   int questions_ = 0;

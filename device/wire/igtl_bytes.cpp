@@ -57,6 +57,17 @@ std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> bo
   return body.size() - std::min(extended, body.size());
 }
 
+std::optional<std::span<const std::uint8_t>> content_of(const Header& header, std::span<const std::uint8_t> body) {
+  if (header.version < 2) return body;
+  constexpr std::size_t kExtended = 12;  // its own size, those of the meta data's index and of the meta data, an id
+  if (body.size() < kExtended) return std::nullopt;
+  const auto before = static_cast<std::size_t>(big_endian(body.first(2)));
+  const auto after = static_cast<std::size_t>(big_endian(body.subspan(2, 2))) +
+                     static_cast<std::size_t>(big_endian(body.subspan(4, 4)));
+  if (before < kExtended || before + after > body.size()) return std::nullopt;
+  return body.subspan(before, body.size() - before - after);
+}
+
 std::optional<std::string> text_of_string(const Header& header, std::span<const std::uint8_t> body) {
   constexpr std::size_t kFixed = 4;  // encoding, length
   const std::size_t content = content_bytes(header, body);

@@ -36,5 +36,7 @@ std::optional<std::string> text_of_string(const Header& header, std::span<const 
 
 /// Bytes of the content: in version 2 after an extended header, whose own size comes first.
 std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body);
+/// The content alone, without the meta data that follows it in version 2; empty where their lengths lie.
+std::optional<std::span<const std::uint8_t>> content_of(const Header& header, std::span<const std::uint8_t> body);
 
 }  // namespace birdseye::wire

@@ -7,7 +7,7 @@
 #include <igtl_tdata.h>
 
 #include <algorithm>
-#include <cstring>
+#include <string_view>
 
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/json.hpp"
@@ -45,8 +45,8 @@ void append_header(std::vector<std::uint8_t>& out, const char* type, const char*
                    std::uint64_t body_bytes, std::uint64_t crc) {
   igtl_header header{};
   header.version = 1;
-  std::strncpy(header.name, type, sizeof header.name);
-  std::strncpy(header.device_name, device, sizeof header.device_name);
+  std::string_view(type).copy(header.name, sizeof header.name);
+  std::string_view(device).copy(header.device_name, sizeof header.device_name);
   header.timestamp = stamp_from(time);
   header.body_size = body_bytes;
   header.crc = crc;
@@ -165,6 +165,14 @@ Packet pack(const Subscription& subscription) {
 
 Packet pack(const CameraLock& lock) {
   return string_packet(kCameraLockDevice, lock, {});
+}
+
+Packet pack_tracking_request() {
+  const std::vector<std::uint8_t> body(IGTL_STT_TDATA_SIZE);  // no least interval, no name of a coordinate system
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "STT_TDATA", "", {}, body.size(), checksum(body));
+  out->insert(out->end(), body.begin(), body.end());
+  return {Packet::Kind::other, std::move(out), nullptr, {}};
 }
 
 Packet pack_tracking_reply(bool done) {

@@ -52,6 +52,8 @@ struct CameraLock {
 };
 Packet pack(const Subscription& subscription);
 Packet pack(const CameraLock& lock);
+/// STT_TDATA: poses are wanted, as often as there are any.
+Packet pack_tracking_request();
 /// The answer to STT_TDATA and STP_TDATA: RTS_TDATA, with the status 0 (done) or 1.
 Packet pack_tracking_reply(bool done);
 

@@ -13,7 +13,8 @@ constexpr auto kPatience = std::chrono::seconds(8);
 
 }  // namespace
 
-Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& address) {
+Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& address,
+                                                        const wire::ForeignSettings& foreign) {
   const std::size_t colon = address.rfind(':');
   int port = kUsualPort;
   if (colon != std::string::npos) {
@@ -25,7 +26,7 @@ Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& addre
   const std::string host = address.substr(0, colon);
   if (host.empty())
     return Error{Errc::bad_value, fmt::format("\"{}\" is no address of an appliance: give HOST:PORT", address)};
-  auto client = wire::Client::connect(host, port, wire::Client::Clock::now() + kPatience);
+  auto client = wire::Client::connect(host, port, wire::Client::Clock::now() + kPatience, foreign);
   if (!client) {
     return Error{
         client.error().code,

@@ -20,9 +20,11 @@ void EventStream::read(const std::stop_token& stop) {
         client_->use_discipline(*clock, wire::wall_minus_monotonic());
     }
     const std::optional<ClockGap> gap = ended || !*event ? std::nullopt : gap_at(**event);
+    std::string words = client_->peer_words();
     {
       const std::lock_guard lock(mutex_);
       if (gap) gap_ = gap;
+      peer_words_ = std::move(words);
       if (ended) {
         ended_ = event.error();
       } else if (*event) {
@@ -45,6 +47,11 @@ std::optional<ClockGap> EventStream::gap_at(const wire::Event& event) const {
 std::optional<ClockGap> EventStream::host_from_device() const {
   const std::lock_guard lock(mutex_);
   return gap_;
+}
+
+std::string EventStream::peer_words() const {
+  const std::lock_guard lock(mutex_);
+  return peer_words_;
 }
 
 void EventStream::keep(wire::Event event) {

@@ -28,6 +28,8 @@ class EventStream : public EventSource {
   Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline) override;
   /// By how much this machine's clock is ahead of the appliance's, by the newest frame; empty until that is known.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
+  /// What a server that is no appliance is, and what of it is passed over; empty for an appliance.
+  [[nodiscard]] std::string peer_words() const;
 
  private:
   void read(const std::stop_token& stop);
@@ -45,6 +47,7 @@ class EventStream : public EventSource {
   std::size_t frames_ = 0;
   std::optional<Error> ended_;
   std::optional<ClockGap> gap_;
+  std::string peer_words_;
   std::jthread thread_;
 };
 

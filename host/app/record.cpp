@@ -9,6 +9,7 @@
 #include "host/app/appliance_link.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/event_stream.hpp"
+#include "host/app/foreign_options.hpp"
 #include "host/app/interrupt.hpp"
 #include "host/app/progress.hpp"
 #include "host/app/recording/recording_writer.hpp"
@@ -29,6 +30,7 @@ constexpr std::uintmax_t kSpareBytes = std::uintmax_t{32} << 20U;
 
 struct Options {
   std::string server, video = "raw";
+  wire::ForeignSettings foreign;
   fs::path out, json;
   double seconds = 0;
   bool pair = false;
@@ -51,8 +53,8 @@ Ending record(EventStream& stream, RecordingWriter& writer, const Options& optio
     if (!event) return {event.error().what};
     if (!*event) {
       if (Clock::now() - heard > kSilence)
-        return {fmt::format("{} sent neither frames nor poses for {} s; is it a birdseyed, and do its instruments run?",
-                            options.server, kSilence / std::chrono::seconds(1))};
+        return {fmt::format("{} sent neither frames nor poses for {} s; do its instruments run?", options.server,
+                            kSilence / std::chrono::seconds(1))};
       continue;
     }
     const bool frame = std::holds_alternative<wire::VideoFrame>(**event);
@@ -96,7 +98,7 @@ Result<ExitCode> run(const Options& options) {
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   ::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is told as a full disk is
-  auto client = connect_appliance(options.server);
+  auto client = connect_appliance(options.server, options.foreign);
   if (!client) return client.error();
   auto writer = RecordingWriter::create({.folder = options.out,
                                          .source = options.server,
@@ -105,13 +107,16 @@ Result<ExitCode> run(const Options& options) {
   if (!writer) return writer.error();
   Progress progress;
   Ending ending;
+  std::string peer;
   {
     EventStream stream(*std::move(client), kMostFramesWaiting);
     ending = record(stream, **writer, options, progress);
+    peer = stream.peer_words();
   }
   progress.keep("completing the files");
   const auto finished = (*writer)->finish(ending.why);
-  const Verdict verdict = judge(**writer, ending, finished.has_value());
+  Verdict verdict = judge(**writer, ending, finished.has_value());
+  if (!peer.empty()) verdict.add(Grade::pass, fmt::format("{} is {}", options.server, peer));
   const RecordingFigures& figures = (*writer)->figures();
   if (auto written = write_file(options.json, text_of(json_of(figures, verdict))); !written) return written.error();
   fmt::print("{}: {:.1f} s, {} frames, {} measurements\n", options.out.string(), figures.seconds(), figures.frames,
@@ -125,7 +130,8 @@ Result<ExitCode> run(const Options& options) {
 void add_record(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<Options>();
   CLI::App& command = *app.add_subcommand("record", "keep video and poses for Slicer, PLUS and birdseye replay");
-  command.add_option("--server", options->server, "the appliance, HOST:PORT")->required();
+  command.add_option("--server", options->server, "the appliance or another OpenIGTLink server, HOST:PORT")->required();
+  add_foreign_options(command, options->foreign);
   command.add_option("--out", options->out, "folder, which is made")->required();
   command.add_option("--seconds", options->seconds, "that it lasts (default: until it is interrupted)")
       ->check(CLI::Range(0.1, 86400.0));

@@ -134,6 +134,31 @@ TEST(LiveSession, ADamagedOperationIsNamed) {
   }
 }
 
+TEST(LiveSession, AServerThatIsNoApplianceIsReadyWhenItSendsVideoAndPoses) {
+  const Scratch scratch;
+  LiveSession session(operation_settings(scratch));
+  session.set_link(true, "connected");
+  EXPECT_FALSE(session.note(LiveStep::connect).done);
+  wire::VideoFrame frame;
+  frame.width_px = frame.height_px = 1;
+  frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(3);
+  session.take(wire::Status{false, "several devices send poses"}, HostTime{0}, std::nullopt);
+  session.take(frame, HostTime{0}, std::nullopt);
+  session.set_link(true, "connected");
+  EXPECT_FALSE(session.note(LiveStep::connect).done);
+  EXPECT_EQ(session.note(LiveStep::connect).line, "several devices send poses");
+  EXPECT_EQ(session.step(), LiveStep::connect);
+  session.take(wire::Status{true, ""}, HostTime{0}, std::nullopt);
+  session.set_link(true, "connected");
+  EXPECT_TRUE(session.note(LiveStep::connect).done);
+  EXPECT_EQ(session.step(), LiveStep::calibrate);
+  // What one server said is not held against the next.
+  session.take(wire::Status{false, "poses and no video"}, HostTime{0}, std::nullopt);
+  session.set_link(false, "gone");
+  session.set_link(true, "connected");
+  EXPECT_TRUE(session.note(LiveStep::connect).done);
+}
+
 TEST(LiveSession, AWrongTouchShowsAndIsTakenBack) {
   const Scratch scratch;
   LiveSession session(operation_settings(scratch));

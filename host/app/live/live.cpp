@@ -7,6 +7,7 @@
 
 #include "host/app/commands.hpp"
 #include "host/app/demo_report.hpp"
+#include "host/app/foreign_options.hpp"
 #include "host/app/live/live_app.hpp"
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string server, board;
+  wire::ForeignSettings foreign;
   bool simulate = false;
   SimulatedCartSettings cart;
   LiveSettings live;
@@ -69,6 +71,7 @@ Result<void> prepare(Options& options) {
   }
   if (std::sscanf(options.video.c_str(), "%dx%d", &options.cart.width_px, &options.cart.height_px) != 2)
     return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
+  options.foreign.scope_bird = options.live.scope;
   window.title = "Birdseye";
   window.layout = layout_file();
   if (!options.board.empty()) {
@@ -159,7 +162,8 @@ Result<ExitCode> run(Options& options) {
     if (!opened) return opened.error();
     source = *std::move(opened);
   } else {
-    source = options.simulate ? LiveSource::of_simulator(options.cart) : LiveSource::of_appliance(options.server);
+    source = options.simulate ? LiveSource::of_simulator(options.cart)
+                              : LiveSource::of_appliance(options.server, options.foreign);
   }
   LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script),
               std::move(log));
@@ -192,7 +196,9 @@ void add_live(CLI::App& app, CommandStatus& status) {
   options->cart.smoothing_ms = 12;  // what is averaged after a frame, the frame has to wait for
   options->cart.wait_ms = 30;
   CLI::App* command = app.add_subcommand("live", "the window at the cart: live video, and the CT over it");
-  command->add_option("--server", options->server, "the appliance")->type_name("HOST:PORT");
+  command->add_option("--server", options->server, "the appliance, or another OpenIGTLink server of tracked video")
+      ->type_name("HOST:PORT");
+  add_foreign_options(*command, options->foreign);
   command->add_option("--recording", options->recording, "what birdseye record wrote, or a PLUS sequence: played again")
       ->type_name("PATH");
   command->add_option("--speed", options->speed, "of the recording: 2 plays it twice as fast (default 1)")

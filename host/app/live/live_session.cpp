@@ -84,11 +84,15 @@ void LiveSession::set_link(bool connected, const std::string& words) {
   connected_ = connected;
   link_words_ = words;
   StepNote& note = at(LiveStep::connect);
-  // What tells nothing of its health, as a recording of another system, is ready when it sends.
-  note.done = connected && (health_ ? health_->state == "ready" : picture_.frame().has_value());
+  if (!connected) {
+    health_.reset();
+    appliance_says_.clear();
+  }
+  // What tells nothing of its health, as another server or its recording, is ready when it sends and nothing is said.
+  note.done = connected && (health_ ? health_->state == "ready" : picture_.frame() && appliance_says_.empty());
   note.line = words;
   if (connected && health_ && !note.done) note.line = fmt::format("the appliance is {}", health_->state);
-  if (!connected) health_.reset();
+  if (connected && !health_ && !appliance_says_.empty()) note.line = appliance_says_;
   if (note.done && step_ == LiveStep::connect) go_to(LiveStep::calibrate);
 }
 

@@ -21,9 +21,9 @@ LiveSource::LiveSource(std::string name, Connect::Work connect)
   if (connect_) connecting_.start(connect_);
 }
 
-std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address) {
-  const auto connect = [address](const std::stop_token&, const Connect::Say&) -> Result<Link> {
-    auto client = connect_appliance(address);
+std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address, const wire::ForeignSettings& foreign) {
+  const auto connect = [address, foreign](const std::stop_token&, const Connect::Say&) -> Result<Link> {
+    auto client = connect_appliance(address, foreign);
     if (!client) return client.error();
     return Link{nullptr, *std::move(client)};
   };
@@ -93,6 +93,11 @@ void LiveSource::link_again() {
   if (events_ || given_up_) return;
   if (!connecting_.running() && Clock::now() >= again_) connecting_.start(connect_);
   if (connecting_.running() && !connecting_.line().empty()) words_ = connecting_.line();
+}
+
+std::string LiveSource::words() const {
+  const std::string peer = stream_ != nullptr ? stream_->peer_words() : "";
+  return peer.empty() ? words_ : words_ + ": " + peer;
 }
 
 std::optional<ClockGap> LiveSource::host_from_device() const {

@@ -11,11 +11,12 @@
 
 namespace birdseye::host {
 
-/// Where events come from: an appliance on the wire, which is connected to again for as long as it takes, or a
-/// simulated cart of our own, which is started once. Never holds the caller up.
+/// Where events come from: an appliance on the wire, or another OpenIGTLink server, which is connected to again for as
+/// long as it takes, or a simulated cart of our own, which is started once. Never holds the caller up.
 class LiveSource {
  public:
-  static std::unique_ptr<LiveSource> of_appliance(const std::string& address);
+  static std::unique_ptr<LiveSource> of_appliance(const std::string& address,
+                                                  const wire::ForeignSettings& foreign = {});
   /// Makes the patient in settings.folder first.
   static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
 
@@ -28,7 +29,7 @@ class LiveSource {
   /// False for a recording, which nobody must take for the present.
   [[nodiscard]] bool live() const { return live_; }
   /// Connected to what, or why not, in words.
-  [[nodiscard]] const std::string& words() const { return words_; }
+  [[nodiscard]] std::string words() const;
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// The simulated cart, once it runs.
   [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "calibration/time/clock_relation.hpp"
+#include "calibration/time/edge_fit.hpp"
+
+namespace birdseye {
+
+/// Relates the host's clock to that of a sender which stamps what it sends and answers no questions, by arrivals
+/// alone. What arrives is late by a delay that is never negative, so the earliest arrivals lie on a line, the lower
+/// edge. What even the earliest were late by shows in no number of arrivals: times are put earlier by
+/// Settings::unseen_delay, so that what is shown is rather taken for older than for newer, and sigma is never less.
+class ArrivalRelation {
+ public:
+  struct Settings {
+    Duration window = Duration::from_ms(30'000);
+    Duration unseen_delay = Duration::from_ms(20);  ///< sending and the network, at their fastest
+    double drift_sigma_ppm = 100;                   ///< what two machines' clocks may differ by in rate
+    Duration step = Duration::from_ms(500);         ///< further off is no delay, but a clock that was moved
+    Duration step_confirms = Duration::from_ms(3000);
+  };
+
+  ArrivalRelation() = default;
+  explicit ArrivalRelation(const Settings& settings) : settings_(settings) {}
+
+  /// Stamps need not be in order. A step of the sender's clock that the arrival shows; what was known is dropped then.
+  std::optional<ClockEvent> push(DeviceTime stamp, HostTime arrived);
+  /// Empty until something arrived.
+  [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
+  [[nodiscard]] std::optional<DeviceTime> device_from_host(HostTime time) const;
+
+ private:
+  /// The earliest arrival of a part of the window.
+  struct Block {
+    std::int64_t id = 0;
+    std::int64_t stamp_ns = 0, offset_ns = 0;  ///< offset: arrival less stamp
+    double count = 0;
+  };
+  [[nodiscard]] double seconds_to(std::int64_t stamp_ns) const;
+  [[nodiscard]] std::int64_t edge_at(std::int64_t stamp_ns) const;
+  void refit();
+
+  Settings settings_;
+  std::deque<Block> blocks_;
+  std::int64_t anchor_stamp_ns_ = 0, anchor_offset_ns_ = 0;  ///< doubles are relative to these
+  EdgeFit fit_;
+  double fit_s_ = 0;
+  std::optional<HostTime> late_since_;
+};
+
+}  // namespace birdseye

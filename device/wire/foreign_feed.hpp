@@ -1,0 +1,83 @@
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+
+#include "calibration/time/arrival_relation.hpp"
+#include "calibration/time/pose_history.hpp"
+#include "device/wire/foreign_messages.hpp"
+
+namespace birdseye::wire {
+
+/// Whom to believe of what a server sends that is no appliance of ours.
+struct ForeignSettings {
+  std::string scope_device{};        ///< whose poses are the scope's; empty: the only one's that sends any
+  std::string video_device{};        ///< whose pictures are the scope's; empty: the only one's that sends any
+  std::string scope_bird = "scope";  ///< the name under which the scope's poses are given on
+};
+
+/// Makes of an OpenIGTLink server's video and poses what an appliance sends: frames with the scope's pose at their
+/// time. Times are the server's; a frame waits a moment for poses from after it. What keeps the overlay from being
+/// drawn is told as an appliance tells it, by Status. Bounded. Times are given, never read.
+class ForeignFeed {
+ public:
+  ForeignFeed(ForeignSettings settings, HostTime began) : settings_(std::move(settings)), began_(began) {}
+
+  /// A message, its last byte having come at `arrived`.
+  void push(const Header& header, std::span<const std::uint8_t> body, HostTime arrived);
+  /// The next of what has become of it by now.
+  std::optional<Event> next(HostTime now);
+  /// When the frame that waits longest for its pose will do without; empty: none waits.
+  [[nodiscard]] std::optional<HostTime> due() const;
+
+  /// Empty until something came. Of a server that stamps nothing, what it sends has the time at which it came.
+  [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
+  /// What kind of server it is, and what of it is passed over, in words.
+  [[nodiscard]] std::string words() const;
+
+ private:
+  struct Tool {
+    PoseHistory poses;
+    std::optional<HostTime> heard;  ///< the last pose that was one
+    bool stamped = true;
+  };
+  struct Waiting {
+    VideoFrame frame;
+    bool stamped = true;
+    HostTime due;
+  };
+  /// The scope's tool, or why there is none.
+  struct Scope {
+    const std::string* name = nullptr;
+    const Tool* tool = nullptr;
+    std::string why;
+  };
+
+  DeviceTime time_of(const Header& header, HostTime arrived);
+  void take(const Header& header, ForeignPicture picture, HostTime arrived);
+  void take(const Header& header, const ForeignPoses& poses, HostTime arrived);
+  void pass_over(const std::string& what);
+  [[nodiscard]] bool is_other_video(const std::string& device);
+  [[nodiscard]] Scope scope() const;
+  [[nodiscard]] PoseAnswer pose_of(const Waiting& waiting, const Scope& scope) const;
+  [[nodiscard]] std::string trouble(HostTime now) const;
+  [[nodiscard]] std::string video_trouble(HostTime now) const;
+
+  ForeignSettings settings_;
+  HostTime began_;
+  ArrivalRelation relation_;
+  std::map<std::string, Tool> tools_;
+  std::set<std::string> videos_, passed_over_;
+  std::deque<Waiting> waiting_;
+  std::deque<Event> events_;
+  std::optional<HostTime> pictured_;
+  bool pictures_stamped_ = true;
+  std::string picture_fault_, damage_, told_;
+  std::uint64_t pictures_ = 0, damaged_ = 0;
+};
+
+}  // namespace birdseye::wire

@@ -1,0 +1,169 @@
+#include "device/wire/foreign_messages.hpp"
+
+#include <fmt/format.h>
+#include <igtl_image.h>
+#include <igtl_qtdata.h>
+#include <igtl_tdata.h>
+#include <igtl_transform.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace birdseye::wire {
+
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+Error damaged(const Header& header, const std::string& how) {
+  return {Errc::bad_format, fmt::format("{} \"{}\" {}", header.type, header.device, how)};
+}
+
+double number_at(Bytes bytes, std::size_t i) {
+  const std::size_t at = 4 * i;
+  const std::uint32_t bits = std::uint32_t{bytes[at]} << 24U | std::uint32_t{bytes[at + 1]} << 16U |
+                             std::uint32_t{bytes[at + 2]} << 8U | bytes[at + 3];
+  return static_cast<double>(std::bit_cast<float>(bits));
+}
+
+/// The same in all elements of lists: name, a byte for the type and one to spare.
+std::string name_at(Bytes element, const std::string& otherwise) {
+  const auto name = element.first(20);
+  const auto end = std::find(name.begin(), name.end(), 0);
+  return end == name.begin() ? otherwise : readable({name.begin(), end});
+}
+
+/// A rotation, or what single precision and a careless sender leave of one.
+constexpr double kOrthonormal = 1e-3;
+
+/// Empty where the matrix is no pose. The identity, which many send for a tool that is out of sight, is none either.
+std::optional<Transform<Tracker, Sensor>> pose_of_matrix(Bytes numbers) {
+  Eigen::Matrix<double, 3, 4> columns;
+  for (std::size_t i = 0; i < 12; ++i) columns.data()[i] = number_at(numbers, i);
+  const Eigen::Matrix3d r = columns.leftCols<3>();
+  if (!columns.allFinite() || !(r * r.transpose()).isIdentity(kOrthonormal) || r.determinant() < 0) return std::nullopt;
+  if (columns.isIdentity(0)) return std::nullopt;
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(columns.col(3)));
+}
+
+/// Position, then the quaternion x y z w; of a quaternion without its w it is the positive one that makes it a unit.
+std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(Bytes numbers) {
+  const Eigen::Vector3d position(number_at(numbers, 0), number_at(numbers, 1), number_at(numbers, 2));
+  const Eigen::Vector3d xyz(number_at(numbers, 3), number_at(numbers, 4), number_at(numbers, 5));
+  const double w = numbers.size() >= 28 ? number_at(numbers, 6) : std::sqrt(std::max(0.0, 1 - xyz.squaredNorm()));
+  const Eigen::Quaterniond rotation(w, xyz.x(), xyz.y(), xyz.z());
+  if (!position.allFinite() || !(std::abs(rotation.norm() - 1) < kOrthonormal)) return std::nullopt;
+  if (position.isZero(0) && xyz.isZero(0)) return std::nullopt;
+  return Transform<Tracker, Sensor>(rotation, position);
+}
+
+void add(ForeignPoses& poses, const std::string& name, const std::optional<Transform<Tracker, Sensor>>& pose) {
+  if (pose) {
+    poses.birds.push_back({name, *pose});
+  } else {
+    poses.no_poses.push_back(name);
+  }
+}
+
+Result<ForeignMessage> read_list(const Header& header, Bytes content, std::size_t element_bytes) {
+  if (content.size() % element_bytes != 0) return damaged(header, "is cut short");
+  const bool quaternions = element_bytes == IGTL_QTDATA_ELEMENT_SIZE;
+  ForeignPoses poses;
+  for (; !content.empty(); content = content.subspan(element_bytes)) {
+    const auto numbers = content.subspan(22, element_bytes - 22);
+    add(poses, name_at(content, header.device), quaternions ? pose_of_quaternion(numbers) : pose_of_matrix(numbers));
+  }
+  return ForeignMessage(std::move(poses));
+}
+
+Result<ForeignMessage> read_position(const Header& header, Bytes content) {
+  constexpr std::size_t kPlace = 12, kShort = 24, kWhole = 28;
+  if (content.size() != kPlace && content.size() != kShort && content.size() != kWhole)
+    return damaged(header, "is cut short");
+  ForeignPoses poses;
+  // A place without a direction is no pose.
+  add(poses, header.device, content.size() == kPlace ? std::nullopt : pose_of_quaternion(content));
+  return ForeignMessage(std::move(poses));
+}
+
+std::string pixels_in_words(const igtl_image_header& image) {
+  static constexpr std::array<const char*, 12> kTypes{
+      "?", "?", "8-bit signed", "8-bit",       "16-bit signed", "16-bit", "32-bit signed", "32-bit",
+      "?", "?", "32-bit float", "64-bit float"};
+  const char* const type = image.scalar_type < kTypes.size() ? kTypes.at(image.scalar_type) : "?";
+  return fmt::format("{} voxels of {} component{}", type, image.num_components, image.num_components == 1 ? "" : "s");
+}
+
+Result<ForeignMessage> read_image(const Header& header, Bytes content) {
+  if (content.size() < IGTL_IMAGE_HEADER_SIZE) return damaged(header, "is cut short");
+  igtl_image_header image{};
+  std::memcpy(&image, content.data(), IGTL_IMAGE_HEADER_SIZE);
+  igtl_image_convert_byte_order(&image);
+  const std::size_t pixels = std::size_t{image.size[0]} * image.size[1], components = image.num_components;
+  if (pixels == 0 || image.size[2] == 0) return damaged(header, "has no pixels");
+  if (image.size[2] > 1) return ForeignMessage(ForeignVolume{});
+  if (image.scalar_type != IGTL_IMAGE_STYPE_TYPE_UINT8 || (components != 1 && components != 3)) {
+    return Error{Errc::unsupported, fmt::format("IMAGE \"{}\" has {}, and 8-bit grey or RGB is read here: have the "
+                                                "server send that",
+                                                header.device, pixels_in_words(image))};
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (image.subvol_size[i] != image.size[i] || image.subvol_offset[i] != 0) {
+      return Error{Errc::unsupported,
+                   fmt::format("IMAGE \"{}\" holds a part of a picture, and whole ones are read here: have the server "
+                               "send them",
+                               header.device)};
+    }
+  }
+  const auto values = content.subspan(IGTL_IMAGE_HEADER_SIZE);
+  if (values.size() < pixels * components) return damaged(header, "is cut short");
+  auto rgb = std::make_shared<std::vector<std::uint8_t>>(3 * pixels);
+  if (components == 3) {
+    std::copy_n(values.begin(), 3 * pixels, rgb->begin());
+  } else {
+    for (std::size_t i = 0; i < pixels; ++i)
+      std::fill_n(rgb->begin() + static_cast<std::ptrdiff_t>(3 * i), 3, values[i]);
+  }
+  return ForeignMessage(ForeignPicture{image.size[0], image.size[1], std::move(rgb)});
+}
+
+}  // namespace
+
+std::string readable(std::string name) {
+  for (char& c : name) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return name;
+}
+
+Result<ForeignMessage> read_foreign(const Header& header, Bytes body) {
+  const std::string& type = header.type;
+  const bool image = type == "IMAGE", transform = type == "TRANSFORM", tdata = type == "TDATA";
+  const bool qtdata = type == "QTDATA", position = type == "POSITION" || type == "QTRANS";
+  if (!image && !transform && !tdata && !qtdata && !position) return ForeignMessage(ForeignOther{});
+  if (checksum(body) != header.crc) return damaged(header, "has a wrong checksum");
+  const auto content = content_of(header, body);
+  if (!content) return damaged(header, "has an extended header that lies");
+  if (image) return read_image(header, *content);
+  if (tdata) return read_list(header, *content, IGTL_TDATA_ELEMENT_SIZE);
+  if (qtdata) return read_list(header, *content, IGTL_QTDATA_ELEMENT_SIZE);
+  if (position) return read_position(header, *content);
+  if (content->size() != IGTL_TRANSFORM_SIZE) return damaged(header, "is cut short");
+  ForeignPoses poses;
+  add(poses, header.device, pose_of_matrix(*content));
+  return ForeignMessage(std::move(poses));
+}
+
+bool is_of_appliance(const Header& header) {
+  static constexpr std::array kStrings{kFrameInfoDevice, kHealthDevice,    kDoubtDevice,          kClockChangeDevice,
+                                       kPedalDevice,     kClockPongDevice, kCameraControlsDevice, kCalibrationDevice};
+  if (header.type == "STATUS") return header.device == kStatusDevice;
+  if (header.type == "TDATA" || header.type == "RTS_TDATA") return header.device == kBirdsDevice;
+  return header.type == "STRING" &&
+         std::any_of(kStrings.begin(), kStrings.end(), [&](const char* name) { return header.device == name; });
+}
+
+}  // namespace birdseye::wire

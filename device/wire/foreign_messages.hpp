@@ -1,0 +1,45 @@
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "device/wire/igtl_bytes.hpp"
+#include "device/wire/messages.hpp"
+
+/// What an OpenIGTLink server that is no appliance of ours (PLUS, 3D Slicer) says of video and tools, by the published
+/// standard alone: header versions 1 to 3, without any meta data.
+namespace birdseye::wire {
+
+/// One picture; grey ones are made RGB. The matrix of an IMAGE says where it lies in a room, which a camera's picture
+/// does not: pixels are taken in their order, the first row at the top.
+struct ForeignPicture {
+  int width_px = 0, height_px = 0;
+  std::shared_ptr<const std::vector<std::uint8_t>> rgb;
+};
+
+/// An IMAGE of more than one slice: no video.
+struct ForeignVolume {};
+
+/// Poses of tools by their names, mm. Of a TRANSFORM or POSITION the name is the device's, of TDATA and QTDATA the
+/// element's.
+struct ForeignPoses {
+  std::vector<Bird> birds;
+  std::vector<std::string> no_poses;  ///< tools whose matrix or quaternion is none, as that of a tool out of sight
+};
+
+/// A message of a type that is not read here.
+struct ForeignOther {};
+
+using ForeignMessage = std::variant<ForeignPicture, ForeignVolume, ForeignPoses, ForeignOther>;
+
+/// A name as it may be shown and written: whatever is no printable ASCII becomes a question mark.
+std::string readable(std::string name);
+
+/// header: its device name is readable. Errc::bad_format: damaged, or its lengths lie. Errc::unsupported: pictures that
+/// are not of 8 bits with one or three components. The error names the message's type and device.
+Result<ForeignMessage> read_foreign(const Header& header, std::span<const std::uint8_t> body);
+
+/// Whether the message is one that only an appliance of ours sends.
+bool is_of_appliance(const Header& header);
+
+}  // namespace birdseye::wire

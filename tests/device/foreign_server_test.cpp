@@ -1,0 +1,88 @@
+// Our client at a server of the protocol's own library.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "device/wire/client.hpp"
+#include "tests/support/foreign_server.hpp"
+
+namespace birdseye::wire {
+namespace {
+
+using Clock = Client::Clock;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::ForeignServer;
+using ::testing::HasSubstr;
+
+/// Frames until there are so many, or there are none for too long.
+std::vector<VideoFrame> frames_from(Client& client, std::size_t count) {
+  std::vector<VideoFrame> frames;
+  const auto deadline = Clock::now() + seconds(20);
+  while (frames.size() < count && Clock::now() < deadline) {
+    const auto event = client.next(deadline);
+    if (!event) break;
+    if (const auto* frame = *event ? std::get_if<VideoFrame>(&**event) : nullptr) frames.push_back(*frame);
+  }
+  return frames;
+}
+
+TEST(ForeignServer, ItsVideoHasThePosesOfItsStamps) {
+  ForeignServer server;
+  const auto client = *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5));
+  const auto frames = frames_from(*client, 30);
+  ASSERT_EQ(frames.size(), 30U);
+  for (const VideoFrame& frame : frames) {
+    EXPECT_EQ(frame.width_px, 64);
+    EXPECT_EQ(frame.height_px, 48);
+    ASSERT_TRUE(frame.info.pose.tracker_from_sensor) << frame.info.pose.reason;
+    EXPECT_EQ(frame.info.pose.kind, PoseKind::exact);
+    const double at_s = static_cast<double>(frame.info.acquired.ns) * 1e-9;
+    const Eigen::Matrix4d error = frame.info.pose.tracker_from_sensor->matrix() - ForeignServer::pose_at(at_s).matrix();
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-3);
+  }
+  // Nothing asks it for the time; it is on this machine, so that the time of day relates its stamps.
+  const auto related = client->host_from_device(frames.back().info.acquired);
+  ASSERT_TRUE(related);
+  const auto wall = std::chrono::system_clock::now().time_since_epoch() - Clock::now().time_since_epoch();
+  const std::int64_t truth_ns = frames.back().info.acquired.ns - std::chrono::nanoseconds(wall).count();
+  const Duration error{related->time.ns - truth_ns};
+  EXPECT_LE(error, Duration::from_ms(0)) << "a frame is never taken for newer than it is";
+  EXPECT_GE(error, Duration::from_ms(-25));
+  EXPECT_GE(related->sigma, Duration::from_ms(20));
+  EXPECT_EQ(client->clock_choice(), "by arrivals");
+  EXPECT_EQ(client->peer_words(), "an OpenIGTLink server that is no appliance of Birdseye; passed over: STRING");
+  EXPECT_TRUE(server.was_asked("STT_TDATA")) << "some send poses by TDATA to those only who ask";
+  EXPECT_FALSE(server.was_asked("STRING")) << "what only an appliance can answer is not asked";
+}
+
+TEST(ForeignServer, TheScopeIsChosenByName) {
+  ForeignServer server(true);
+  const auto client =
+      *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5), {"StylusToTracker", "", "scope"});
+  const auto frames = frames_from(*client, 5);
+  ASSERT_EQ(frames.size(), 5U);
+  const double at_s = static_cast<double>(frames.back().info.acquired.ns) * 1e-9;
+  ASSERT_TRUE(frames.back().info.pose.tracker_from_sensor);
+  const Eigen::Matrix4d error =
+      frames.back().info.pose.tracker_from_sensor->matrix() - ForeignServer::pose_at(at_s).inverse().matrix();
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-3);
+}
+
+TEST(ForeignServer, OneThatEndsInTheMiddleOfAMessageHasGone) {
+  ForeignServer server;
+  const auto client = *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5));
+  ASSERT_EQ(frames_from(*client, 2).size(), 2U);
+  server.cut_off();
+  const auto deadline = Clock::now() + seconds(10);
+  for (;;) {
+    const auto event = client->next(deadline);
+    ASSERT_LT(Clock::now(), deadline);
+    if (event) continue;
+    EXPECT_EQ(event.error().code, Errc::disconnected);
+    EXPECT_THAT(event.error().what, HasSubstr("the server has gone"));
+    break;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::wire
