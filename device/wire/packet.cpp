@@ -5,6 +5,8 @@
 #include <igtl_header.h>
 #include <igtl_image.h>
 #include <igtl_tdata.h>
+#include <igtl_transform.h>
+#include <igtl_util.h>
 
 #include <algorithm>
 #include <string_view>
@@ -124,10 +126,10 @@ Packet pack(const Pedal& pedal) {
   return string_packet(kPedalDevice, pedal, pedal.at);
 }
 
-Packet pack(const Status& status, DeviceTime time) {
+Packet pack(const Status& status, DeviceTime time, const char* device) {
   auto out = std::make_shared<std::vector<std::uint8_t>>();
   const auto message = igtl::StatusMessage::New();
-  message->SetDeviceName(kStatusDevice);
+  message->SetDeviceName(device);
   stamp(*message, time);
   message->SetCode(status.ok ? igtl::StatusMessage::STATUS_OK : igtl::StatusMessage::STATUS_NOT_READY);
   message->SetSubCode(0);
@@ -149,6 +151,45 @@ Packet pack(const Calibration& calibration, DeviceTime time) {
   Packet packet = string_packet(kCalibrationDevice, calibration, time);
   packet.kind = Packet::Kind::calibration;
   return packet;
+}
+
+/// By hand, as the library's is: twelve numbers, column by column, the position last.
+Packet pack(const PublishedTransform& transform) {
+  std::array<igtl_float32, 12> numbers{};
+  const Eigen::Matrix<float, 3, 4> columns = transform.matrix.topRows<3>().cast<float>();
+  std::copy_n(columns.data(), 12, numbers.begin());
+  igtl_transform_convert_byte_order(numbers.data());
+  const std::span body(reinterpret_cast<const std::uint8_t*>(numbers.data()), sizeof numbers);
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "TRANSFORM", transform.name.c_str(), transform.time, body.size(), checksum(body));
+  out->insert(out->end(), body.begin(), body.end());
+  return {Packet::Kind::tracking, std::move(out), nullptr, {}};
+}
+
+Packet pack(const PublishedVolume& volume) {
+  igtl_image_header image{};
+  image.version = IGTL_IMAGE_HEADER_VERSION;
+  image.num_components = 1;
+  image.scalar_type = IGTL_IMAGE_STYPE_TYPE_INT16;
+  image.endian = IGTL_IMAGE_ENDIAN_LITTLE;
+  image.coord = IGTL_IMAGE_COORD_RAS;
+  Eigen::Vector3d middle;
+  for (int i = 0; i < 3; ++i) {
+    const int size = volume.size.at(static_cast<std::size_t>(i));
+    image.size[i] = image.subvol_size[i] = static_cast<std::uint16_t>(size);
+    middle[i] = 0.5 * (size - 1);
+  }
+  // The protocol's image has its place in its middle, not at the first voxel.
+  Eigen::Matrix<float, 3, 4> columns;
+  columns << volume.ras_from_voxel.linear().cast<float>(), (volume.ras_from_voxel * middle).cast<float>();
+  std::copy_n(columns.data(), 12, image.matrix);
+  igtl_image_convert_byte_order(&image);
+  const std::span heads(reinterpret_cast<const std::uint8_t*>(&image), sizeof image);
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "IMAGE", volume.name.c_str(), volume.time, heads.size() + volume.voxels->size(),
+                checksum(*volume.voxels, checksum(heads)));
+  out->insert(out->end(), heads.begin(), heads.end());
+  return {Packet::Kind::volume, std::move(out), volume.voxels, {}};
 }
 
 Packet pack(const ClockPing& ping) {

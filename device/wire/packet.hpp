@@ -1,20 +1,22 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "device/wire/messages.hpp"
 
 namespace birdseye::wire {
 
-/// One or more whole messages, to be sent together or not at all. The pixels of a frame are not copied into it: they
-/// follow the head.
+/// One or more whole messages, to be sent together or not at all. The pixels of a frame or volume are not copied into
+/// it: they follow the head.
 struct Packet {
-  enum class Kind { status, calibration, tracking, frame, other };
+  enum class Kind { status, calibration, tracking, frame, volume, other };
   Kind kind = Kind::other;
   std::shared_ptr<const std::vector<std::uint8_t>> head;
-  std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< null for all but frames
+  std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< null for all but frames and volumes
   DeviceTime arrived;                                       ///< the last byte of what it tells of; 0: of nothing
 
   [[nodiscard]] std::size_t size() const { return head->size() + (pixels ? pixels->size() : 0); }
@@ -28,10 +30,27 @@ Packet pack(const Birds& birds, DeviceTime arrived = {});
 Packet pack(const Doubt& doubt);
 Packet pack(const ClockChange& change);
 Packet pack(const Pedal& pedal);
-Packet pack(const Status& status, DeviceTime time);
+Packet pack(const Status& status, DeviceTime time, const char* device = kStatusDevice);
 Packet pack(const Health& health, DeviceTime time);
 Packet pack(const CameraControls& controls, DeviceTime time);
 Packet pack(const Calibration& calibration, DeviceTime time);
+
+/// A TRANSFORM for other programs: by what they call it, mm.
+struct PublishedTransform {
+  std::string name;
+  Eigen::Matrix4d matrix;
+  DeviceTime time;
+};
+/// An IMAGE of 16-bit voxels for other programs, in their frame, RAS.
+struct PublishedVolume {
+  std::string name;
+  std::array<int, 3> size{};
+  Eigen::Affine3d ras_from_voxel = Eigen::Affine3d::Identity();
+  std::shared_ptr<const std::vector<std::uint8_t>> voxels;  ///< x fastest, two bytes each, the lower first
+  DeviceTime time;
+};
+Packet pack(const PublishedTransform& transform);
+Packet pack(const PublishedVolume& volume);
 
 /// The messages of one client's questions and their answers; times as each side's clock has them, ns.
 struct ClockPing {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <utility>
 
 #include "device/wire/packet.hpp"
@@ -10,7 +11,7 @@
 namespace birdseye::wire {
 
 /// Packets that wait and of which nothing has been sent. Bounded, and what is live wins: where there are too many of a
-/// kind, the oldest of that kind goes. Of STATUS and Calibration only the newest waits, and it never goes.
+/// kind, the oldest of that kind goes. Of STATUS, Calibration and the volume only the newest waits, and it never goes.
 class PacketQueue {
  public:
   static constexpr std::size_t kMostFrames = 3;
@@ -21,6 +22,10 @@ class PacketQueue {
     if (packet.kind == Packet::Kind::frame) {
       frames_.push_back(packet);
       return frames_.size() > kMostFrames ? shed_frame() : 0;
+    }
+    if (packet.kind == Packet::Kind::volume) {
+      volume_ = packet;
+      return 0;
     }
     const auto same = [&](const Packet& other) { return other.kind == packet.kind; };
     if (packet.kind == Packet::Kind::status || packet.kind == Packet::Kind::calibration) {
@@ -43,10 +48,11 @@ class PacketQueue {
   }
   void forget_frames() { frames_.clear(); }
 
-  [[nodiscard]] bool empty() const { return small_.empty() && frames_.empty(); }
-  /// Small ones before frames, otherwise in the order in which they came.
-  [[nodiscard]] const Packet& front() const { return next().front(); }
+  [[nodiscard]] bool empty() const { return small_.empty() && frames_.empty() && !volume_; }
+  /// Small ones before frames and those before the volume, otherwise in the order in which they came.
+  [[nodiscard]] const Packet& front() const { return small_.empty() && frames_.empty() ? *volume_ : next().front(); }
   Packet pop() {
+    if (small_.empty() && frames_.empty()) return *std::exchange(volume_, std::nullopt);
     std::deque<Packet>& from = small_.empty() ? frames_ : small_;
     Packet packet = std::move(from.front());
     from.pop_front();
@@ -58,6 +64,7 @@ class PacketQueue {
   [[nodiscard]] const std::deque<Packet>& next() const { return small_.empty() ? frames_ : small_; }
 
   std::deque<Packet> small_, frames_;
+  std::optional<Packet> volume_;
 };
 
 }  // namespace birdseye::wire

@@ -103,6 +103,7 @@ void Server::accept_one() {
   clients_.emplace_back(fd);
   if (last_status_) offer(clients_.back(), *last_status_);
   if (last_calibration_) offer(clients_.back(), *last_calibration_);
+  if (last_volume_) offer(clients_.back(), *last_volume_);
   ++clients_count_;
 }
 
@@ -117,6 +118,7 @@ bool Server::distribute() {
     const Packet packet = packets.pop();
     if (packet.kind == Packet::Kind::status) last_status_ = packet;
     if (packet.kind == Packet::Kind::calibration) last_calibration_ = packet;
+    if (packet.kind == Packet::Kind::volume) last_volume_ = packet;
     for (ClientLink& client : clients_) offer(client, packet);
   }
   return frames;

@@ -67,7 +67,7 @@ class Server {
   Latencies latencies_;
   std::list<ClientLink> clients_;  ///< of the thread below alone, as is what follows
   // A client that comes is told at once how things are.
-  std::optional<Packet> last_status_, last_calibration_;
+  std::optional<Packet> last_status_, last_calibration_, last_volume_;
   std::jthread thread_;
 };
 

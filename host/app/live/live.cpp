@@ -28,7 +28,7 @@ struct Options {
   LiveWindow::Settings window;
   fs::path tip, script, json, recording;
   double speed = 1;
-  std::string size = "1280x720", video = "512x384";
+  std::string size = "1280x720", video = "512x384", publish;
 };
 
 /// What the simulated patient's CT is shown and checked by: vessels and tumour of its segmentation.
@@ -154,6 +154,12 @@ Result<ExitCode> run(Options& options) {
     if (!opened) return opened.error();
     log = *std::move(opened);
   }
+  std::unique_ptr<Publisher> publisher;
+  if (!options.publish.empty()) {
+    auto listening = Publisher::listen(options.publish);
+    if (!listening) return listening.error();
+    publisher = *std::move(listening);
+  }
   auto window = LiveWindow::open(options.window);
   if (!window) return window.error();
   std::unique_ptr<LiveSource> source;
@@ -165,8 +171,8 @@ Result<ExitCode> run(Options& options) {
     source = options.simulate ? LiveSource::of_simulator(options.cart)
                               : LiveSource::of_appliance(options.server, options.foreign);
   }
-  LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script),
-              std::move(log));
+  LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script), std::move(log),
+              std::move(publisher));
   const auto ran = app.run();
   nlohmann::json json = json_of(app.figures(), app.session());
   Verdict verdict;
@@ -240,6 +246,9 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--out", options->live.out, "a folder for snapshots and the log of frames")->type_name("FOLDER");
   command->add_option("--resume", options->live.resume, "the --out folder of a window that was closed: go on from it")
       ->type_name("FOLDER");
+  command
+      ->add_option("--publish", options->publish, "give 3D Slicer the registered CT over OpenIGTLink (default: do not)")
+      ->type_name("[ADDRESS:]PORT");
   command->add_option("--json", options->json, "figures and verdict")->type_name("FILE");
   command->callback([options, &status] {
     const auto done = run(*options);

@@ -34,13 +34,15 @@ RenderSettings usual_settings() {
 }  // namespace
 
 LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
-                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log)
+                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
+                 std::unique_ptr<Publisher> publisher)
     : window_(std::move(window)),
       source_(std::move(source)),
       session_(std::move(settings)),
       simulated_(std::move(simulated)),
       script_(std::move(script)),
-      log_(std::move(log)) {
+      log_(std::move(log)),
+      publisher_(std::move(publisher)) {
   facts_.ages = &figures_.ages;
   facts_.recorded = !source_->live();
   session_.picture().set_render(usual_settings());
@@ -55,6 +57,10 @@ Result<void> LiveApp::run() {
     session_.set_link(source_->connected(), source_->words());
     session_.tick();
     note_patient();
+    if (publisher_) {
+      const auto& deformation = session_.deformation();
+      publisher_->show(session_.shared_patient(), deformation ? &deformation->field : nullptr, session_.shapes());
+    }
     draw();
     draw_inset();
     if (!window_->fault().empty())
@@ -128,12 +134,16 @@ void LiveApp::draw() {
   window_->swap();
   const HostTime swapped = now();
   to_draw_ = Duration{swapped.ns - began.ns};
+  // Of video that has stopped the age grows: it is said once.
+  if (publisher_ && shown.any)
+    publisher_->tell(shown.overlaid ? "" : shown.stale ? "the video has stopped" : shown.reason);
   if (!shown.any) return grant(wishes);
   const double age_ms = Duration{swapped.ns - picture.exposed().ns}.seconds() * 1e3;
   if (shown.overlaid) figures_.oldest_overlay_ms = std::max(figures_.oldest_overlay_ms, age_ms);
   const std::uint64_t sequence = picture.frame()->info.sequence;
   if (drawn_sequence_ != sequence) {
     drawn_sequence_ = sequence;
+    publish(shown);
     ++figures_.frames;
     figures_.frames_overlaid += shown.overlaid ? 1 : 0;
     figures_.ages.add(age_ms);
@@ -146,6 +156,17 @@ void LiveApp::draw() {
     }
   }
   grant(wishes);
+}
+
+/// What is on the screen, and no more than that: no pose goes out that no overlay was drawn by.
+void LiveApp::publish(const ShownPicture& shown) {
+  if (!publisher_) return;
+  const LivePicture& picture = session_.picture();
+  PublishedFrame frame;
+  frame.exposed = picture.exposed();
+  if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient;
+  if (shown.overlaid) frame.camera_from_patient = picture.camera_from_patient();
+  publisher_->show(frame);
 }
 
 PanelWishes LiveApp::draw_window(const ShownPicture& shown) {

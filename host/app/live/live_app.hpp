@@ -11,6 +11,7 @@
 #include "host/app/live/live_script.hpp"
 #include "host/app/live/live_session.hpp"
 #include "host/app/live/live_source.hpp"
+#include "host/app/live/publisher.hpp"
 #include "host/ui/live_window.hpp"
 
 namespace birdseye::host {
@@ -28,9 +29,10 @@ struct LiveFigures {
 /// script ask for. All on the caller's thread but what the parts do on their own.
 class LiveApp {
  public:
-  /// simulated: the patient that the source makes, to be read once it is there.
+  /// simulated: the patient that the source makes, to be read once it is there. publisher: null, nobody is told.
   LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
-          PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log);
+          PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
+          std::unique_ptr<Publisher> publisher);
 
   /// Until the window is closed, the program is interrupted or the script ends.
   Result<void> run();
@@ -46,6 +48,7 @@ class LiveApp {
   void grant(const PanelWishes& wishes);
   Result<bool> follow_script();
   void draw_inset();
+  void publish(const ShownPicture& shown);
   void note_patient();
   void snapshot(const std::filesystem::path& path, const ShownPicture& shown);
 
@@ -55,6 +58,7 @@ class LiveApp {
   PatientFiles simulated_;
   std::optional<LiveScript> script_;
   std::optional<LiveLog> log_;
+  std::unique_ptr<Publisher> publisher_;
   LiveFigures figures_;
   PanelFacts facts_;
   PanelWishes scripted_;

@@ -45,7 +45,8 @@ void LiveSession::load(const PatientFiles& files) {
 void LiveSession::tick() {
   if (auto loaded = loading_.take()) {
     if (*loaded) {
-      patient_ = **std::move(loaded);
+      patient_ = std::make_shared<const PatientPlan>(**std::move(loaded));
+      ++shapes_;
       fault_.clear();
       make_engine_for(*patient_);
       fit();

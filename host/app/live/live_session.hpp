@@ -126,7 +126,11 @@ class LiveSession {
   [[nodiscard]] DeformProgress deform_progress() const;
   [[nodiscard]] const std::optional<ViewRegistration>& deformation() const { return deformation_; }
   [[nodiscard]] std::optional<CheckReading> check() const;
-  [[nodiscard]] const PatientPlan* patient() const { return patient_ ? &*patient_ : nullptr; }
+  [[nodiscard]] const PatientPlan* patient() const { return patient_.get(); }
+  /// For threads that outlast the patient's stay here.
+  [[nodiscard]] std::shared_ptr<const PatientPlan> shared_patient() const { return patient_; }
+  /// Another number: another CT, or it is deformed in another way.
+  [[nodiscard]] std::uint64_t shapes() const { return shapes_; }
   [[nodiscard]] const std::string& fault() const { return fault_.empty() ? keeping_fault_ : fault_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
   LivePicture& picture() { return picture_; }
@@ -163,7 +167,8 @@ class LiveSession {
   std::optional<wire::Health> health_;
 
   Background<Result<PatientPlan>> loading_;
-  std::optional<PatientPlan> patient_;
+  std::shared_ptr<const PatientPlan> patient_;
+  std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_;
   std::unique_ptr<Engine> engine_;
 

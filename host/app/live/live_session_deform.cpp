@@ -139,6 +139,7 @@ void LiveSession::undo_deform() {
 }
 
 void LiveSession::show_deformation() {
+  ++shapes_;
   if (!engine_) return;
   if (deformation_) {
     engine_->deform(deformation_->field);
