@@ -16,26 +16,40 @@ double ArrivalRelation::seconds_to(std::int64_t stamp_ns) const {
   return static_cast<double>(stamp_ns - anchor_stamp_ns_) * 1e-9;
 }
 
+std::int64_t ArrivalRelation::bound_at(std::int64_t stamp_ns) const {
+  const auto apart_ns = static_cast<double>(std::abs(stamp_ns - earliest_stamp_ns_));
+  return earliest_offset_ns_ + std::llround(settings_.most_drift_ppm * 1e-6 * apart_ns);
+}
+
 std::int64_t ArrivalRelation::edge_at(std::int64_t stamp_ns) const {
-  return anchor_offset_ns_ + std::llround(fit_.value_ns + fit_.slope * (seconds_to(stamp_ns) - fit_s_));
+  const std::int64_t fitted_ns =
+      anchor_offset_ns_ + std::llround(fit_.value_ns + fit_.slope * (seconds_to(stamp_ns) - fit_s_));
+  return std::min(fitted_ns, bound_at(stamp_ns));
 }
 
 std::optional<ClockEvent> ArrivalRelation::push(DeviceTime stamp, HostTime arrived) {
   const std::int64_t offset_ns = arrived.ns - stamp.ns;
   std::optional<ClockEvent> stepped;
   if (!blocks_.empty()) {
-    // Too early cannot be. Too late may be a network that halts, unless it stays so.
     const std::int64_t late_ns = offset_ns - edge_at(stamp.ns);
-    if (late_ns < settings_.step.ns) {
-      late_since_.reset();
-    } else if (!late_since_) {
-      late_since_ = arrived;
-    }
-    if (late_ns < -settings_.step.ns || (late_since_ && arrived - *late_since_ > settings_.step_confirms)) {
+    // Too early cannot be, nor can a network turn the order of stamps: that is a clock that was moved.
+    if (late_ns < -settings_.step.ns || stamp.ns < newest_stamp_ns_ - settings_.step.ns) {
       stepped = ClockEvent{ClockEvent::Kind::step, stamp, late_ns, 0};
       blocks_.clear();
-      late_since_.reset();
     }
+    if (stepped || late_ns < settings_.step.ns) {
+      late_since_.reset();
+      behind_.reset();
+    } else if (!late_since_) {
+      late_since_ = arrived;
+    } else if (arrived - *late_since_ > settings_.behind_confirms) {
+      behind_ = Duration{late_ns};
+    }
+  }
+  newest_stamp_ns_ = blocks_.empty() ? stamp.ns : std::max(newest_stamp_ns_, stamp.ns);
+  if (blocks_.empty() || offset_ns < bound_at(stamp.ns)) {
+    earliest_stamp_ns_ = stamp.ns;
+    earliest_offset_ns_ = offset_ns;
   }
   const std::int64_t id = arrived.ns / kBlockNs;
   if (blocks_.empty() || id > blocks_.back().id) {

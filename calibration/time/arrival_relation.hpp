@@ -12,14 +12,17 @@ namespace birdseye {
 /// alone. What arrives is late by a delay that is never negative, so the earliest arrivals lie on a line, the lower
 /// edge. What even the earliest were late by shows in no number of arrivals: times are put earlier by
 /// Settings::unseen_delay, so that what is shown is rather taken for older than for newer, and sigma is never less.
+/// A network that grows slower is not followed: the edge rises no faster than clocks drift, so that what comes late for
+/// good is taken for as old as it is.
 class ArrivalRelation {
  public:
   struct Settings {
     Duration window = Duration::from_ms(30'000);
     Duration unseen_delay = Duration::from_ms(20);  ///< sending and the network, at their fastest
     double drift_sigma_ppm = 100;                   ///< what two machines' clocks may differ by in rate
-    Duration step = Duration::from_ms(500);         ///< further off is no delay, but a clock that was moved
-    Duration step_confirms = Duration::from_ms(3000);
+    double most_drift_ppm = 100;                    ///< what the edge may rise by, against the earliest arrival
+    Duration step = Duration::from_ms(500);         ///< earlier, or stamped as much earlier: a clock that was moved
+    Duration behind_confirms = Duration::from_ms(3000);
   };
 
   ArrivalRelation() = default;
@@ -30,6 +33,9 @@ class ArrivalRelation {
   /// Empty until something arrived.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
   [[nodiscard]] std::optional<DeviceTime> device_from_host(HostTime time) const;
+  /// What all that comes is late by, against the earliest, where that is more than a step for some seconds: the network
+  /// does not carry what is sent.
+  [[nodiscard]] std::optional<Duration> behind() const { return behind_; }
 
  private:
   /// The earliest arrival of a part of the window.
@@ -40,6 +46,8 @@ class ArrivalRelation {
   };
   [[nodiscard]] double seconds_to(std::int64_t stamp_ns) const;
   [[nodiscard]] std::int64_t edge_at(std::int64_t stamp_ns) const;
+  /// The highest that the edge may be, by the earliest arrival of all.
+  [[nodiscard]] std::int64_t bound_at(std::int64_t stamp_ns) const;
   void refit();
 
   Settings settings_;
@@ -47,7 +55,9 @@ class ArrivalRelation {
   std::int64_t anchor_stamp_ns_ = 0, anchor_offset_ns_ = 0;  ///< doubles are relative to these
   EdgeFit fit_;
   double fit_s_ = 0;
+  std::int64_t earliest_stamp_ns_ = 0, earliest_offset_ns_ = 0, newest_stamp_ns_ = 0;
   std::optional<HostTime> late_since_;
+  std::optional<Duration> behind_;
 };
 
 }  // namespace birdseye

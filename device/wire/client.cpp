@@ -196,12 +196,28 @@ void Client::ask() {
   (void)send(pack_tracking_request(), Clock::now());
 }
 
+Result<void> Client::drain() {
+  constexpr int kMostAtOnce = 16;
+  for (int i = 0; i < kMostAtOnce; ++i) {
+    const auto message = next_message(Clock::now());
+    if (!message) return message.error();
+    if (!*message) return {};
+    const auto header = read_header(**message, kLargestBody);
+    if (!header) return Error{header.error().code, fmt::format("{}: {}", name_, header.error().what)};
+    foreign_->push(*header, (*message)->subspan(kHeaderBytes), host_now());
+  }
+  return {};
+}
+
 Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
   for (;;) {
     ask();
     auto until = deadline;
     if (foreign_) {
+      // What has come already is read first: a pose that lies there is not missed, however late this thread is.
+      if (auto drained = drain(); !drained) return drained.error();
       if (auto event = foreign_->next(host_now())) return event;
+      if (Clock::now() >= deadline) return std::optional<Event>();
       if (const auto due = foreign_->due())
         until = std::min(until, Clock::time_point(std::chrono::nanoseconds(due->ns)));
     }
@@ -220,9 +236,12 @@ Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
     }
     auto told = unpacker_.push(**message);
     if (!told) return Error{told.error().code, fmt::format("{}: {}", name_, told.error().what)};
-    if (!*told) continue;
-    if (const auto* pong = std::get_if<ClockPong>(&**told)) {
-      take(*pong);
+    if (*told && std::holds_alternative<ClockPong>(**told)) {
+      take(std::get<ClockPong>(**told));
+      told->reset();
+    }
+    if (!*told) {
+      if (Clock::now() >= deadline) return std::optional<Event>();
       continue;
     }
     auto& event = std::get<Event>(**told);

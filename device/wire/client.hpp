@@ -51,6 +51,8 @@ class Client {
   /// The next message, header and body; empty at the deadline. It lies in buffer_ until the next call.
   Result<std::optional<std::span<const std::uint8_t>>> next_message(Clock::time_point deadline);
   /// Judges by a message what the other side is, where that is not known yet.
+  /// Gives the foreign feed what has come already.
+  Result<void> drain();
   void judge(const Header& header);
   void ask();
   void ask_the_time();

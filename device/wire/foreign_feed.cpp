@@ -136,10 +136,16 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
 ForeignFeed::Scope ForeignFeed::scope() const {
   std::vector<std::string> names;
   names.reserve(tools_.size());
-  for (const auto& [name, tool] : tools_) names.push_back(name);
-  if (tools_.empty()) return {nullptr, nullptr, "the server sends video and no poses (TRANSFORM or TDATA messages)"};
+  for (const auto& [name, tool] : tools_) {
+    if (name != settings_.not_scope) names.push_back(name);
+  }
+  if (names.empty()) {
+    return {nullptr, nullptr,
+            tools_.empty() ? "the server sends video and no poses (TRANSFORM or TDATA messages)"
+                           : fmt::format("of poses only the pointer's come, \"{}\"", settings_.not_scope)};
+  }
   const std::string& wanted = settings_.scope_device;
-  const auto found = wanted.empty() ? tools_.begin() : tools_.find(wanted);
+  const auto found = tools_.find(wanted.empty() ? names.front() : wanted);
   if (found == tools_.end()) {
     return {nullptr, nullptr,
             fmt::format("no poses of \"{}\" come; there are those of {}: say by --scope-device which are the scope's",
@@ -220,6 +226,12 @@ std::string ForeignFeed::video_trouble(HostTime now) const {
 
 std::string ForeignFeed::trouble(HostTime now) const {
   if (auto video = video_trouble(now); !video.empty()) return video;
+  if (const auto behind = relation_.behind()) {
+    return fmt::format(
+        "what the server sends comes {:.1f} s later than it did: the network does not carry it; send "
+        "smaller pictures, or fewer",
+        behind->seconds());
+  }
   if (tools_.empty() && now - began_ <= kSilence) return {};
   const Scope chosen = scope();
   if (chosen.tool == nullptr) return chosen.why;

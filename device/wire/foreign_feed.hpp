@@ -17,6 +17,7 @@ namespace birdseye::wire {
 struct ForeignSettings {
   std::string scope_device{};        ///< whose poses are the scope's; empty: the only one's that sends any
   std::string video_device{};        ///< whose pictures are the scope's; empty: the only one's that sends any
+  std::string not_scope{};           ///< the pointer's: never the scope's, even where no other sends any
   std::string scope_bird = "scope";  ///< the name under which the scope's poses are given on
 };
 

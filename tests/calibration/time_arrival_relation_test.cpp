@@ -62,6 +62,31 @@ TEST(ArrivalRelation, AHaltOfTheNetworkIsNoStep) {
   EXPECT_NEAR(server.error_ms(relation, 22), 3 - 20, 1.0);
 }
 
+/// Buffers that fill on the way make everything late, for good: it is never taken for new.
+TEST(ArrivalRelation, ANetworkThatGrowsSlowerIsNotFollowed) {
+  for (const double to_ms : {300.0, 900.0}) {
+    Server server;
+    ArrivalRelation relation;
+    for (int i = 0; i < 500; ++i) EXPECT_FALSE(server.send(relation, i * 0.04));
+    EXPECT_FALSE(relation.behind());
+    for (int i = 500; i < 3500; ++i) {
+      server.least_ms = std::min(to_ms, 3 + (i - 500) * 0.5);
+      EXPECT_FALSE(server.send(relation, i * 0.04)) << i;
+    }
+    EXPECT_LT(server.error_ms(relation, 140), 0) << "never for newer than it is";
+    EXPECT_GT(server.error_ms(relation, 140), -25) << "what is never seen, and some drift";
+    EXPECT_EQ(relation.behind().has_value(), to_ms > 500);
+    if (relation.behind()) {
+      EXPECT_NEAR(relation.behind()->seconds(), 0.9, 0.1);
+    }
+    for (int i = 3500; i < 3600; ++i) {
+      server.least_ms = 3;
+      (void)server.send(relation, i * 0.04);
+    }
+    EXPECT_FALSE(relation.behind()) << "it is fast again";
+  }
+}
+
 TEST(ArrivalRelation, AClockThatIsMovedIsToldAndFollowed) {
   for (const double by_s : {-5.0, 5.0}) {
     Server server;

@@ -331,6 +331,28 @@ TEST(ForeignFeed, AnotherDevicesPosesNeverPassForTheScopes) {
   EXPECT_THAT(link.feed.words(), HasSubstr("\"TrackerToProbe\", which by its name is the way back"));
 }
 
+TEST(ForeignFeed, ThePointersPosesAreNeverTheScopes) {
+  Link link({.not_scope = "StylusToTracker"});
+  for (int i = 0; i < 2; ++i) link.transform("StylusToTracker", 10 * i, pose_at(500));
+  link.image(10);
+  bool told = false;
+  for (const Event& event : link.events(2500)) {
+    if (const auto* frame = std::get_if<VideoFrame>(&event)) {
+      EXPECT_EQ(frame->info.pose.kind, PoseKind::refused);
+    }
+    if (const auto* birds = std::get_if<Birds>(&event)) {
+      EXPECT_EQ(birds->birds[0].name, "StylusToTracker");
+    }
+    if (const auto* status = std::get_if<Status>(&event))
+      told = told || status->text == "of poses only the pointer's come, \"StylusToTracker\"";
+  }
+  EXPECT_TRUE(told);
+  // Its scope comes into sight: that is the only other one.
+  for (int i = 0; i < 2; ++i) link.transform("ProbeToTracker", 2600 + 10 * i, pose_at(1));
+  link.image(2610);
+  for (const VideoFrame& frame : link.of<VideoFrame>(2650)) EXPECT_LT(distance_mm(frame.info.pose, pose_at(1)), 1e-3);
+}
+
 TEST(ForeignFeed, OfSeveralVideosTheScopesMustBeNamed) {
   Link link;
   link.image(0);

@@ -29,7 +29,7 @@ TEST(ForeignCommands, RecordKeepsItsVideoAndPoses) {
   EXPECT_THAT(result.output, HasSubstr("no appliance of Birdseye; passed over: STRING"));
   const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "r.json"));
   EXPECT_EQ(json["verdict"], "pass") << json;
-  EXPECT_GT(json["frames"].get<int>(), 10);
+  EXPECT_GT(json["frames"].get<int>(), 0);
   EXPECT_GT(json["poses"]["scope"].get<int>(), 10);
   EXPECT_GT(json["poses"]["StylusToTracker"].get<int>(), 10);
   int posed = 0;

@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "host/app/live/live_script.hpp"
+#include "host/app/live/operation.hpp"
 #include "tests/support/live_operation.hpp"
 
 namespace birdseye::host {
@@ -84,6 +85,11 @@ TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
   calibration.in_force = true;
   calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
   session.take(calibration, HostTime{0}, std::nullopt);
+  EXPECT_FALSE(session.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
+  session.go_on();
+  EXPECT_FALSE(session.picture().setup().has_value()) << "to skip the look is not to have looked";
+  session.go_to(LiveStep::check);
+  session.primary();
   ASSERT_TRUE(session.picture().setup().has_value());
   const auto& found = session.picture().setup()->tracker_from_patient;
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
@@ -92,12 +98,48 @@ TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
 TEST(LiveSession, AnotherPatientsRegistrationIsNotTakenUp) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
-  const LiveSettings wrong = resumed(scratch, scratch.path());
+  LiveSettings wrong = resumed(scratch, scratch.path());
+  wrong.out = scratch.path();
   birdseye::testing::small_ct(scratch, 8);  // in the first one's place
   LiveSession session(wrong);
   load(session);
   EXPECT_NE(session.fault().find("is of another CT"), std::string::npos) << session.fault();
   EXPECT_FALSE(session.note(LiveStep::fiducials).done);
+  // Nor is it lost by what is touched then.
+  const std::string kept = birdseye::testing::contents_of(scratch / "patient_from_tracker.txt");
+  connect_and_calibrate(session);
+  Hand hand(session);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  EXPECT_TRUE(session.note(LiveStep::fiducials).done);
+  EXPECT_EQ(birdseye::testing::contents_of(scratch / "patient_from_tracker.txt"), kept);
+}
+
+/// The scope's calibration in an operation that was kept, and the appliance's record, made before or after it.
+TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
+  const Scratch scratch;
+  for (const bool record_is_newer : {false, true}) {
+    const LiveSettings again = resumed(scratch, scratch.path());
+    LiveSession session(again);
+    Operation kept;
+    kept.ct_checksum = read_patient(again.patient)->checksum;
+    kept.made_utc = "2026-11-22T10:00:00Z";
+    Operation::Calibrated by_board;
+    by_board.camera = {768, 576, 500, 500, 384, 288};
+    by_board.made_utc = record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z";  // the record's is 09:30
+    kept.calibrated = by_board;
+    kept.registered = {kTrackerFromPatient.inverse(), 0.3};
+    ASSERT_TRUE(write_operation(scratch.path(), kept));
+    load(session);
+    ASSERT_EQ(session.fault(), "");
+    wire::Calibration calibration;
+    calibration.in_force = true;
+    calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
+    session.take(calibration, HostTime{0}, std::nullopt);
+    session.primary();
+    ASSERT_TRUE(session.picture().setup().has_value());
+    EXPECT_EQ(session.picture().setup()->camera.fx_px == 500, !record_is_newer);
+  }
 }
 
 TEST(LiveSession, ATouchThatWasTakenBackIsNotTakenUp) {

@@ -9,6 +9,7 @@
 #include "host/app/demo_report.hpp"
 #include "host/app/foreign_options.hpp"
 #include "host/app/live/live_app.hpp"
+#include "host/app/live/operation.hpp"
 #include "host/app/text_files.hpp"
 #include "host/app/write_files.hpp"
 
@@ -72,6 +73,7 @@ Result<void> prepare(Options& options) {
   if (std::sscanf(options.video.c_str(), "%dx%d", &options.cart.width_px, &options.cart.height_px) != 2)
     return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
   options.foreign.scope_bird = options.live.scope;
+  options.foreign.not_scope = options.live.pointer;
   window.title = "Birdseye";
   window.layout = layout_file();
   if (!options.board.empty()) {
@@ -93,6 +95,10 @@ Result<void> prepare(Options& options) {
     std::error_code error;
     fs::create_directories(options.live.out, error);
     if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
+  } else if (!options.live.out.empty() && options.live.resume.empty() && has_operation(options.live.out)) {
+    return Error{Errc::in_use,
+                 fmt::format("{}: holds an operation already; go on from it with --resume {}, or choose another --out",
+                             options.live.out.string(), options.live.out.string())};
   } else if (options.live.patient.ct.empty()) {
     return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
   }

@@ -53,6 +53,7 @@ Result<void> LiveApp::run() {
   const HostTime began = now();
   while (!window_->closed() && !interrupted()) {
     take_events();
+    if (auto said = saving_.take()) facts_.said = *std::move(said);
     note_simulator();
     session_.set_link(source_->connected(), source_->words());
     session_.tick();
@@ -129,7 +130,6 @@ void LiveApp::draw() {
   }
   if (!shot_.empty()) {
     snapshot(shot_, shown);
-    shot_.clear();
   }
   window_->swap();
   const HostTime swapped = now();
@@ -158,14 +158,14 @@ void LiveApp::draw() {
   grant(wishes);
 }
 
-/// What is on the screen, and no more than that: no pose goes out that no overlay was drawn by.
+/// What is on the screen, and no more than that: nothing goes out that no overlay was drawn by.
 void LiveApp::publish(const ShownPicture& shown) {
-  if (!publisher_) return;
+  if (!publisher_ || !shown.overlaid) return;
   const LivePicture& picture = session_.picture();
   PublishedFrame frame;
   frame.exposed = picture.exposed();
   if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient;
-  if (shown.overlaid) frame.camera_from_patient = picture.camera_from_patient();
+  frame.camera_from_patient = picture.camera_from_patient();
   publisher_->show(frame);
 }
 
@@ -218,11 +218,11 @@ void LiveApp::grant(const PanelWishes& asked) {
     session_.set_transfer(*preset);
     editor_.set_points(preset->points());
   }
-  if (wishes.snapshot) shot_ = (log_ ? log_->folder() : ".") / fmt::format("snapshot-{:03}.png", ++shots_);
+  if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
 }
 
 Result<bool> LiveApp::follow_script() {
-  if (!script_) return false;
+  if (!script_ || !shot_.empty() || saving_.running()) return false;
   const auto act = script_->next(session_, now());
   if (!act) return act.error();
   if (!act->key.empty()) add_key(act->key, facts_, scripted_);
@@ -230,29 +230,46 @@ Result<bool> LiveApp::follow_script() {
   return act->end;
 }
 
-/// The window as it is, and in a folder of the same name the picture with all that it was made of.
+/// The window as it is, and in a folder of the same name the picture with all that it was made of. Written on a thread
+/// of its own: the picture on the screen must not stand still meanwhile.
 void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& shown) {
-  const LiveWindow::Shot shot = window_->shot();
-  auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+  if (saving_.running()) return;
+  std::optional<Snapshot> parts;
   const LivePicture& picture = session_.picture();
-  if (written && picture.frame()) {
-    Snapshot parts;
-    parts.frame = &*picture.frame();
-    parts.shown = shown;
-    parts.setup = picture.setup();
-    parts.camera_from_patient = picture.camera_from_patient();
-    parts.render = picture.render();
-    parts.opacity = facts_.opacity;
-    parts.surface_in_front = facts_.surface_in_front;
-    parts.engine = session_.settings().engine;
-    parts.transfer = session_.transfer();
-    parts.patient = session_.settings().patient;
-    parts.deformation = session_.deformation() ? &session_.deformation()->field : nullptr;
-    parts.fre_mm = session_.fre_mm();
-    auto folder = path;
-    written = write_snapshot(folder.replace_extension(), parts);
+  if (picture.frame() && shown.any) {
+    parts.emplace();
+    parts->frame = *picture.frame();
+    parts->picture = *shown.rgb;
+    parts->shown = shown;
+    parts->shown.rgb = nullptr;
+    parts->setup = picture.setup();
+    parts->camera_from_patient = picture.camera_from_patient();
+    parts->render = picture.render();
+    parts->opacity = facts_.opacity;
+    parts->surface_in_front = facts_.surface_in_front;
+    parts->engine = session_.settings().engine;
+    parts->transfer = session_.transfer();
+    parts->patient = session_.settings().patient;
+    if (session_.deformation()) parts->deformation = session_.deformation()->field;
+    parts->fre_mm = session_.fre_mm();
   }
-  facts_.said = written ? "snapshot: " + path.string() : written.error().what;
+  saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {
+    auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+    auto folder = path;
+    if (written && parts) written = write_snapshot(folder.replace_extension(), *parts);
+    return written ? "snapshot: " + path.string() : written.error().what;
+  });
+  shot_.clear();
+}
+
+/// Of snapshots that are there already, none is written over.
+std::filesystem::path LiveApp::next_snapshot() {
+  const std::filesystem::path folder = log_ ? log_->folder() : ".";
+  std::error_code ignored;
+  for (;;) {
+    auto path = folder / fmt::format("snapshot-{:03}.png", ++shots_);
+    if (!std::filesystem::exists(path, ignored)) return path;
+  }
 }
 
 }  // namespace birdseye::host

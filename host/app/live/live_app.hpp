@@ -51,6 +51,7 @@ class LiveApp {
   void publish(const ShownPicture& shown);
   void note_patient();
   void snapshot(const std::filesystem::path& path, const ShownPicture& shown);
+  std::filesystem::path next_snapshot();
 
   std::unique_ptr<LiveWindow> window_;
   std::unique_ptr<LiveSource> source_;
@@ -73,6 +74,7 @@ class LiveApp {
   std::deque<HostTime> swaps_;  ///< of the last second's new frames
   bool sheet_read_ = false;
   int shots_ = 0;
+  Background<std::string> saving_;  ///< a snapshot; what to say of it
 };
 
 }  // namespace birdseye::host

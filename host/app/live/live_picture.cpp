@@ -73,7 +73,7 @@ ShownPicture LivePicture::at(HostTime now) {
   out.age_ms = age.seconds() * 1e3;
   out.stale = age > settings_.stopped;
   if (!setup_) {
-    out.reason = "the patient is not registered yet";
+    out.reason = without_setup_;
   } else if (engine_ == nullptr) {
     out.reason = "the CT is not ready";
   } else if (out.stale) {

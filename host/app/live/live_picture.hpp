@@ -67,6 +67,8 @@ class LivePicture {
   /// Without it, or with a reason why not, nothing is drawn.
   void set_setup(std::optional<Setup> setup, const OverlayGate::Calibration& calibration);
   [[nodiscard]] const std::optional<Setup>& setup() const { return setup_; }
+  /// Why there is none, in words, where there is none.
+  void set_without_setup(const std::string& why) { without_setup_ = why; }
 
   /// A frame that has come; one that came before and was not drawn yet is skipped. exposed: when its exposure was, on
   /// this machine's clock; where that is not known, when it arrived.
@@ -95,6 +97,7 @@ class LivePicture {
   double opacity_ = 1;
   bool surface_in_front_ = false;
   std::optional<Setup> setup_;
+  std::string without_setup_ = "the patient is not registered yet";
   std::optional<wire::VideoFrame> frame_;
   HostTime exposed_;
   OverlayGate::Decision decision_;

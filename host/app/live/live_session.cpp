@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/app/live/operation.hpp"
 #include "host/registration/point_matching.hpp"
 
 namespace birdseye::host {
@@ -14,6 +15,9 @@ namespace {
 
 constexpr Duration kTipWindow = Duration::from_ms(250);
 constexpr std::size_t kFewestFiducials = 3;
+constexpr const char* kUnregistered = "the patient is not registered yet";
+constexpr const char* kUnconfirmed =
+    "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space";
 
 }  // namespace
 
@@ -148,7 +152,10 @@ void LiveSession::take(const wire::Calibration& calibration) {
 
 void LiveSession::adopt(const calibration::CalibrationRecord& record) {
   if (record.tip && !settings_.tip_in_pointer_mm) settings_.tip_in_pointer_mm = record.tip->tip_in_sensor_mm;
-  if (!record.lens || !record.hand_eye || calibrated_here_) return;
+  if (!record.lens || !record.hand_eye) return;
+  if (calibrated_here_ && record.hand_eye->provenance.made_utc <= calibrated_utc_) return;
+  calibrated_here_ = false;
+  calibrated_utc_ = record.hand_eye->provenance.made_utc;
   camera_ = record.lens->camera;
   camera_from_sensor_ = record.hand_eye->camera_from_sensor;
   known_.camera_rms_px = record.lens->rms_px;
@@ -195,6 +202,7 @@ void LiveSession::finish_guide(Result<GuidedCalibration> found) {
   known_.camera_rms_px = found->stations.lens ? found->stations.lens->rms_px : 0;
   known_.tracked_rms_px = hand_eye.tracked_px;
   calibrated_here_ = true;
+  calibrated_utc_ = utc_now();
   note.done = true;
   note.line = fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(found->verdict.grade),
                           found->stations.input.stations.size(), hand_eye.held_out_mm);
@@ -232,7 +240,8 @@ void LiveSession::touch() {
 }
 
 void LiveSession::undo_touch() {
-  if (!touches_.empty()) touches_.pop_back();
+  if (touches_.empty()) return;
+  touches_.pop_back();
   fit();
   keep_operation();
 }
@@ -240,6 +249,7 @@ void LiveSession::undo_touch() {
 void LiveSession::fit() {
   StepNote& note = at(LiveStep::fiducials);
   note.done = false;
+  unconfirmed_ = false;
   fre_mm_.reset();
   registration_fault_.clear();
   tracker_from_patient_.reset();
@@ -266,7 +276,8 @@ void LiveSession::fit() {
 
 void LiveSession::update_setup() {
   std::optional<Setup> setup;
-  if (camera_ && camera_from_sensor_ && tracker_from_patient_)
+  picture_.set_without_setup(unconfirmed_ ? kUnconfirmed : kUnregistered);
+  if (camera_ && camera_from_sensor_ && tracker_from_patient_ && !unconfirmed_)
     setup = Setup{*camera_, *camera_from_sensor_, *tracker_from_patient_};
   picture_.set_setup(std::move(setup), known_);
 }
@@ -321,6 +332,8 @@ void LiveSession::primary() {
       if (note(step_).done) return go_on();
       return deforming() ? cancel_deform() : begin_deform();
     case LiveStep::check:
+      unconfirmed_ = false;
+      update_setup();
       return go_on();
     case LiveStep::run:
       return set_frozen(!frozen_);
@@ -348,7 +361,7 @@ std::string LiveSession::primary_words() const {
       if (note(step_).done) return "go on";
       return deforming() ? "cancel" : "match the CT with the views";
     case LiveStep::check:
-      return "go on";
+      return unconfirmed_ ? "the landmarks fit: go on" : "go on";
     case LiveStep::run:
       return frozen_ ? "let the picture go" : "freeze the picture";
   }

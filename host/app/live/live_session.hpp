@@ -162,7 +162,9 @@ class LiveSession {
   LiveStep step_ = LiveStep::connect;
   std::array<StepNote, kLiveSteps> notes_;
   bool connected_ = false, frozen_ = false;
-  bool calibrated_here_ = false;  ///< by the board: what the appliance has is older
+  bool calibrated_here_ = false;  ///< by the board, at calibrated_utc_: only a newer record of the appliance counts
+  bool unconfirmed_ = false;      ///< the registration is an earlier window's, and nobody has looked whether it holds
+  std::string calibrated_utc_;
   std::string link_words_, appliance_says_, fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
 

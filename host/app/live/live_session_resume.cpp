@@ -1,8 +1,5 @@
 // The part of the session that keeps what was found, and takes it up again in another window.
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-
-#include <ctime>
 
 #include "host/app/live/live_session.hpp"
 #include "host/app/live/operation.hpp"
@@ -12,10 +9,11 @@ namespace birdseye::host {
 void LiveSession::keep_operation() {
   if (settings_.out.empty() || !patient_) return;
   Operation operation;
-  operation.made_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  operation.made_utc = utc_now();
   operation.ct_checksum = patient_->checksum;
   if (calibrated_here_)
-    operation.calibrated = {*camera_, *camera_from_sensor_, known_.camera_rms_px, known_.tracked_rms_px};
+    operation.calibrated = {*camera_, *camera_from_sensor_, known_.camera_rms_px, known_.tracked_rms_px,
+                            calibrated_utc_};
   if (tracker_from_patient_ && fre_mm_) operation.registered = {tracker_from_patient_->inverse(), *fre_mm_};
   if (deformation_) operation.deformation = deformation_->field;
   const auto written = write_operation(settings_.out, operation);
@@ -26,17 +24,22 @@ void LiveSession::resume() {
   const std::filesystem::path folder = std::exchange(settings_.resume, {});
   if (folder.empty()) return;
   auto operation = read_operation(folder);
+  if (operation && operation->ct_checksum != patient_->checksum) {
+    operation = Error{Errc::bad_value,
+                      fmt::format("{}: is of another CT; give that CT, or go on without --resume", folder.string())};
+  }
   if (!operation) {
     fault_ = operation.error().what;
-    return;
-  }
-  if (operation->ct_checksum != patient_->checksum) {
-    fault_ = fmt::format("{}: is of another CT; give that CT, or go on without --resume", folder.string());
+    settings_.out.clear();  // what is there may yet be needed: nothing is written over it
     return;
   }
   const std::string when = "taken up from " + operation->made_utc;
-  if (const auto& found = operation->calibrated) {
+  // A record that the appliance sent meanwhile may be newer.
+  const auto& calibrated = operation->calibrated;
+  if (calibrated && calibrated->made_utc > calibrated_utc_) {
+    const auto& found = calibrated;
     guide_.reset();
+    calibrated_utc_ = found->made_utc;
     camera_ = found->camera;
     camera_from_sensor_ = found->camera_from_sensor;
     known_.camera_rms_px = found->camera_rms_px;
@@ -44,7 +47,9 @@ void LiveSession::resume() {
     calibrated_here_ = true;
     at(LiveStep::calibrate) = {true, when};
   }
-  if (const auto& found = operation->registered) {
+  const bool touched = !touches_.empty();  // anew, while the CT was read
+  if (const auto& found = operation->registered; found && !touched) {
+    unconfirmed_ = true;
     tracker_from_patient_ = found->patient_from_tracker.inverse();
     fre_mm_ = known_.fre_mm = found->fre_mm;
     at(LiveStep::fiducials) = {true, fmt::format("{}, FRE {:.2f} mm", when, found->fre_mm)};
@@ -58,7 +63,7 @@ void LiveSession::resume() {
   update_setup();
   keep_operation();
   // Patient or transmitter may have been moved meanwhile: only a landmark tells.
-  if (operation->registered) go_to(LiveStep::check);
+  if (unconfirmed_) go_to(LiveStep::check);
 }
 
 }  // namespace birdseye::host

@@ -1,7 +1,9 @@
 #include "host/app/live/operation.hpp"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -33,7 +35,8 @@ Result<Operation::Calibrated> read_calibrated(const fs::path& folder, const nloh
   const auto hand_eye = read_pose(folder / kHandEye);
   if (!hand_eye) return hand_eye.error();
   return Operation::Calibrated{*camera, Transform<Camera, Sensor>::from_matrix(*hand_eye),
-                               figures.at("camera_rms_px").get<double>(), figures.at("tracked_rms_px").get<double>()};
+                               figures.at("camera_rms_px").get<double>(), figures.at("tracked_rms_px").get<double>(),
+                               figures.at("made_utc").get<std::string>()};
 }
 
 }  // namespace
@@ -46,12 +49,18 @@ std::string ct_checksum(const Volume& ct) {
   return fmt::format("{:016x}", crc);
 }
 
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
 Result<void> write_operation(const fs::path& folder, const Operation& operation) {
   std::error_code ignored;
   nlohmann::json sheet{{"made_utc", operation.made_utc}, {"ct_checksum", operation.ct_checksum}};
   std::vector<FileText> files;
   if (const auto& found = operation.calibrated) {
-    sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px}, {"tracked_rms_px", found->tracked_rms_px}};
+    sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px},
+                           {"tracked_rms_px", found->tracked_rms_px},
+                           {"made_utc", found->made_utc}};
     files.push_back({folder / kCamera, camera_text(found->camera)});
     files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
   }
@@ -68,6 +77,11 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
   if (!operation.registered) fs::remove(folder / kRegistration, ignored);
   files.push_back({folder / kSheet, text_of(sheet)});
   return write_files(files);
+}
+
+bool has_operation(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / kSheet, ignored);
 }
 
 Result<Operation> read_operation(const fs::path& folder) {

@@ -18,6 +18,7 @@ struct Operation {
     CameraModel camera;
     Transform<Camera, Sensor> camera_from_sensor;
     double camera_rms_px = 0, tracked_rms_px = 0;
+    std::string made_utc;
   };
   /// By touched fiducials.
   struct Registered {
@@ -34,9 +35,13 @@ struct Operation {
 /// Of the voxels and where they lie.
 std::string ct_checksum(const Volume& ct);
 
+/// The time of day: 2026-11-22T09:30:00Z.
+std::string utc_now();
+
 /// operation.json, and beside it camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and field.mha, as far as
 /// there are such.
 Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation);
+bool has_operation(const std::filesystem::path& folder);
 /// Refuses, naming the file, what is missing or damaged.
 Result<Operation> read_operation(const std::filesystem::path& folder);
 

@@ -36,7 +36,7 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   add("--pose", whole(folder / "camera_from_patient.txt"));
   add("--transfer", whole(folder / "transfer.json"));
   add("--over", whole(folder / "video.png"));
-  if (snapshot.deformation != nullptr) add("--deformation", whole(folder / "field.mha"));
+  if (snapshot.deformation) add("--deformation", whole(folder / "field.mha"));
   add("--step-mm", number(snapshot.render.step_mm));
   add("--opacity", number(snapshot.opacity * snapshot.shown.strength));
   add("--engine", snapshot.engine);
@@ -55,11 +55,11 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return Error{Errc::io, folder.string() + ": cannot be made; choose another --out"};
-  const wire::VideoFrame& frame = *snapshot.frame;
+  const wire::VideoFrame& frame = snapshot.frame;
   const ShownPicture& shown = snapshot.shown;
   std::vector<FileText> files{
       {folder / "video.png", png_of(*frame.rgb, frame.width_px, frame.height_px, 3)},
-      {folder / "picture.png", png_of(*shown.rgb, shown.width_px, shown.height_px, 3)},
+      {folder / "picture.png", png_of(snapshot.picture, shown.width_px, shown.height_px, 3)},
   };
   nlohmann::json sheet{{"sequence", frame.info.sequence}, {"acquired_ns", frame.info.acquired.ns},
                        {"age_ms", shown.age_ms},          {"overlaid", shown.overlaid},
@@ -70,7 +70,7 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
     files.push_back({folder / "camera_from_patient.txt", pose_text(snapshot.camera_from_patient->matrix())});
     files.push_back({folder / "transfer.json", transfer_text(*snapshot.transfer)});
     sheet["drawn_again_by"] = render_arguments(folder, snapshot);
-    if (snapshot.deformation != nullptr) {
+    if (snapshot.deformation) {
       if (auto written = write_field(folder / "field.mha", *snapshot.deformation); !written) return written;
     }
   }

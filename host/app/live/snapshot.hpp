@@ -12,8 +12,9 @@ namespace birdseye::host {
 
 /// All that a picture in the window was made of.
 struct Snapshot {
-  const wire::VideoFrame* frame = nullptr;
-  ShownPicture shown;
+  wire::VideoFrame frame;
+  std::vector<std::uint8_t> picture;                              ///< RGB, as it was shown
+  ShownPicture shown;                                             ///< but for its pixels
   std::optional<Setup> setup;                                     ///< empty: nothing was registered
   std::optional<Transform<Camera, Patient>> camera_from_patient;  ///< empty: nothing was drawn
   RenderSettings render;
@@ -22,7 +23,7 @@ struct Snapshot {
   std::string engine;
   std::optional<TransferFunction> transfer;
   PatientFiles patient;
-  const DisplacementField* deformation = nullptr;  ///< of the picture; null: none
+  std::optional<DisplacementField> deformation;  ///< of the picture
   std::optional<double> fre_mm;
 };
 
