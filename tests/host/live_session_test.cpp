@@ -120,7 +120,6 @@ TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
   const Scratch scratch;
   for (const bool record_is_newer : {false, true}) {
     const LiveSettings again = resumed(scratch, scratch.path());
-    LiveSession session(again);
     Operation kept;
     kept.ct_checksum = read_patient(again.patient)->checksum;
     kept.made_utc = "2026-11-22T10:00:00Z";
@@ -130,6 +129,7 @@ TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
     kept.calibrated = by_board;
     kept.registered = {kTrackerFromPatient.inverse(), 0.3};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
+    LiveSession session(again);
     load(session);
     ASSERT_EQ(session.fault(), "");
     wire::Calibration calibration;
