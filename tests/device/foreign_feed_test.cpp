@@ -203,7 +203,8 @@ TEST(ForeignFeed, DamagedMessagesArePassedOverAndCounted) {
   EXPECT_THAT(link.feed.words(), AllOf(HasSubstr("1 damaged"), HasSubstr("\"ProbeToTracker\" has a wrong checksum")));
   // Bodies shorter than what they say of themselves, their checksums right.
   const auto cut = [](const char* type, const Bytes& whole, std::size_t by) {
-    return testing::foreign_message(type, "X", Link::at(0), Bytes(whole.begin() + kHeaderBytes, whole.end() - by));
+    return testing::foreign_message(type, "X", Link::at(0),
+                                    Bytes(whole.begin() + kHeaderBytes, whole.end() - static_cast<std::ptrdiff_t>(by)));
   };
   const Bytes image = image_message("X", Link::at(0), {}), pose = transform_message("X", Link::at(0), pose_at(1));
   link.push(cut("IMAGE", image, 1), 0);
