@@ -213,6 +213,8 @@ Result<std::optional<Event>> Client::next(Clock::time_point deadline) {
   for (;;) {
     ask();
     auto until = deadline;
+    // Who is silent is asked after a while, also where the caller waits for longer.
+    if (!appliance_ && !foreign_) until = std::min(until, Clock::now() + kFirstWord / 2);
     if (foreign_) {
       // What has come already is read first: a pose that lies there is not missed, however late this thread is.
       if (auto drained = drain(); !drained) return drained.error();

@@ -52,6 +52,7 @@ class Cart {
   std::string name_;
   std::unique_ptr<wire::Client> client_;
   bool gone_ = false;  ///< nothing is worth waiting for
+  std::string parted_ = "none has ended";  ///< why the last connection did
 };
 
 }  // namespace birdseye::vm
