@@ -1,6 +1,11 @@
 // Our client at a server of the protocol's own library.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
 
 #include "device/wire/client.hpp"
 #include "tests/support/foreign_server.hpp"
@@ -55,6 +60,32 @@ TEST(ForeignServer, ItsVideoHasThePosesOfItsStamps) {
   EXPECT_EQ(client->peer_words(), "an OpenIGTLink server that is no appliance of Birdseye; passed over: STRING");
   EXPECT_TRUE(server.was_asked("STT_TDATA")) << "some send poses by TDATA to those only who ask";
   EXPECT_FALSE(server.was_asked("STRING")) << "what only an appliance can answer is not asked";
+}
+
+/// One that only listens: it is asked, though the caller waits for it in one piece.
+TEST(ForeignServer, ASilentOneIsAskedWithinOneLongWait) {
+  const int listening = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(listening, reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(::listen(listening, 1), 0);
+  ASSERT_EQ(::getsockname(listening, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  const auto client = *Client::connect("127.0.0.1", ntohs(address.sin_port), Clock::now() + seconds(5));
+  const auto event = client->next(Clock::now() + milliseconds(2500));
+  ASSERT_TRUE(event) << event.error().what;
+  EXPECT_FALSE(*event);
+  const int peer = ::accept(listening, nullptr, nullptr);
+  std::string asked;
+  std::array<char, 4096> bytes{};
+  ssize_t got = 0;
+  while ((got = ::recv(peer, bytes.data(), bytes.size(), MSG_DONTWAIT)) > 0)
+    asked.append(bytes.data(), static_cast<std::size_t>(got));
+  EXPECT_THAT(asked, HasSubstr("STRING")) << "the time";
+  EXPECT_THAT(asked, HasSubstr("STT_TDATA")) << "poses";
+  ::close(peer);
+  ::close(listening);
 }
 
 TEST(ForeignServer, TheScopeIsChosenByName) {
