@@ -8,7 +8,7 @@ modprobe virtio_console
 port=/dev/virtio-ports/birdseye.control
 wait_for $port || exit 1
 modprobe xhci-pci
-start_network
+start_network || exit 1
 exec 3<>$port
 echo ready >&3
 while read -r -u 3 command && [ "$command" != off ]; do

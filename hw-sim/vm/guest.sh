@@ -10,16 +10,19 @@ start_udev() {
   cp -a $from/lib/udev/. /lib/udev/
   cp -a $from/etc/udev/. /etc/udev/
   cp -a $from/usr/lib/x86_64-linux-gnu/systemd/. /usr/lib/x86_64-linux-gnu/systemd/
+  # Or it renames the network interface, where the host's own rules and links say so, while start_network is at it.
+  mkdir -p /etc/udev/rules.d
+  ln -sf /dev/null /etc/udev/rules.d/80-net-setup-link.rules
   /lib/systemd/systemd-udevd --daemon
 }
 
 # The host forwards one TCP port here; nothing in here reaches the host or beyond.
 start_network() {
   modprobe virtio_net
-  wait_for /sys/class/net/eth0
-  busybox ip link set lo up
-  busybox ip link set eth0 up
-  busybox ip addr add 10.0.2.15/24 dev eth0
+  wait_for /sys/class/net/eth0 &&
+    busybox ip link set lo up &&
+    busybox ip link set eth0 up &&
+    busybox ip addr add 10.0.2.15/24 dev eth0
 }
 
 # A webcam at /dev/video0. Its stamps are of the start of the exposure: those of the end that it gives at first lie in the future.

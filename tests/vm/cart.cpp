@@ -42,7 +42,7 @@ std::optional<wire::Event> Cart::any(Clock::time_point deadline) {
 
 void Cart::complain(const std::string& what) {
   const Answer log = machine_.run("tail -5 /run/out/" + name_ + ".log");
-  ADD_FAILURE() << "no " << what << "; " << name_ << " says:\n" << log.output << "the last connection: " << parted_;
+  ADD_FAILURE() << "no " << what << "; " << name_ << " says:\n" << log.output << "\nthe last connection: " << parted_;
   gone_ = log.code != 0 || machine_.run("[ -e /run/started/" + name_ + ".code ]").code == 0;
 }
 
