@@ -75,6 +75,7 @@ PoseAnswer looking_at_the_ball() {
 class LiveWindowPictures : public ::testing::Test {
  protected:
   void open(int width_px, int height_px, double scale) {
+    window_.reset();
     display_ = std::make_unique<birdseye::testing::Display>(std::to_string(width_px) + "x" + std::to_string(height_px));
     ::setenv("DISPLAY", display_->name().c_str(), 1);
     ::unsetenv("WAYLAND_DISPLAY");
@@ -85,6 +86,7 @@ class LiveWindowPictures : public ::testing::Test {
     auto window = LiveWindow::open(settings);
     ASSERT_TRUE(window) << window.error().what;
     window_ = *std::move(window);
+    ages_ = {};
     for (int i = 0; i < 60; ++i) ages_.add(48 + 6 * std::sin(0.7 * i) + (i == 41 ? 30 : 0));
     facts_.ages = &ages_;
     facts_.frames_per_s = 25;
@@ -185,24 +187,16 @@ TEST_F(LiveWindowPictures, FiducialsWithTheirResiduals) {
   expect_looks("fiducials-1280x720", session, HostTime{45'000'000});
 }
 
-TEST_F(LiveWindowPictures, TheOverlayRuns) {
-  ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1));
+TEST_F(LiveWindowPictures, TheOverlayRunsAndOnADenseScreenTheVideoHasStopped) {
   const Scratch scratch;
   LiveSession session(operation_settings(scratch));
   Hand hand(session);
   begin(session, hand, 4);
   const HostTime now = run_overlay(session);
   ASSERT_TRUE(session.picture().at(now).overlaid) << session.picture().at(now).reason;
+  ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1));
   expect_looks("run-1920x1080", session, now);
-}
-
-TEST_F(LiveWindowPictures, OnADenseScreenTheVideoHasStopped) {
   ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1.5));
-  const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  Hand hand(session);
-  begin(session, hand, 4);
-  const HostTime now = run_overlay(session);
   expect_looks("stopped-1920x1080-dense", session, HostTime{now.ns + 2'000'000'000});
 }
 
