@@ -51,7 +51,7 @@ class Cart {
   Machine& machine_;
   std::string name_;
   std::unique_ptr<wire::Client> client_;
-  bool gone_ = false;  ///< nothing is worth waiting for
+  bool gone_ = false;                      ///< nothing is worth waiting for
   std::string parted_ = "none has ended";  ///< why the last connection did
 };
 
