@@ -16,6 +16,8 @@ constexpr Duration kUnstampedSigma = Duration::from_ms(50);
 /// Poses of a picture's time often follow it; a picture that waits longer grows old.
 constexpr Duration kPatience = Duration::from_ms(40);
 constexpr Duration kSilence = Duration::from_ms(2000);
+/// No tracker measures the same to the last digit for so long: what repeats itself is no measurement.
+constexpr Duration kFrozen = Duration::from_ms(1000);
 constexpr Duration kWayBack = Duration::from_ms(1000);
 constexpr std::size_t kMostWaiting = 4, kMostNames = 32;
 
@@ -29,6 +31,10 @@ PoseHistory::Settings history_settings() {
 template <typename Names>
 std::string list_of(const Names& names) {
   return fmt::format("\"{}\"", fmt::join(names, "\", \""));
+}
+
+std::string frozen_words(const std::string& name) {
+  return fmt::format("the pose of \"{}\" stands still to the last digit: does its tracker still measure?", name);
 }
 
 }  // namespace
@@ -108,7 +114,8 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
       return nullptr;
     }
     if (tools_.size() >= kMostNames && !tools_.contains(name)) return nullptr;
-    return &tools_.try_emplace(name, Tool{PoseHistory(history_settings()), std::nullopt, stamped}).first->second;
+    return &tools_.try_emplace(name, Tool{PoseHistory(history_settings()), std::nullopt, std::nullopt, {}, stamped})
+                .first->second;
   };
   for (const std::string& name : poses.no_poses) (void)tool_of(name);
   Birds birds{time, {}};
@@ -116,6 +123,12 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
     Tool* const tool = tool_of(bird.name);
     if (tool == nullptr) continue;
     tool->heard = arrived;
+    const bool repeated = tool->last && time >= tool->still_since &&
+                          tool->last->tracker_from_sensor.matrix() == bird.tracker_from_sensor.matrix();
+    if (!repeated) {
+      tool->still_since = time;
+      tool->last = bird;
+    }
     tool->stamped = stamped;
     const auto newest = tool->poses.newest();
     if (newest && *newest - time > kWayBack) tool->poses = PoseHistory(history_settings());
@@ -171,6 +184,10 @@ PoseAnswer ForeignFeed::pose_of(const Waiting& waiting, const Scope& scope) cons
   }
   if (scope.tool == nullptr) {
     refused.reason = scope.why;
+    return refused;
+  }
+  if (waiting.frame.info.acquired - scope.tool->still_since > kFrozen) {
+    refused.reason = frozen_words(*scope.name);
     return refused;
   }
   return scope.tool->poses.at(waiting.frame.info.acquired);
@@ -237,6 +254,8 @@ std::string ForeignFeed::trouble(HostTime now) const {
   if (chosen.tool == nullptr) return chosen.why;
   if (now - chosen.tool->heard.value_or(began_) > kSilence)
     return fmt::format("\"{}\" sends no poses now; is it in sight of its tracker?", *chosen.name);
+  if (const auto newest = chosen.tool->poses.newest(); newest && *newest - chosen.tool->still_since > kFrozen)
+    return frozen_words(*chosen.name);
   return {};
 }
 

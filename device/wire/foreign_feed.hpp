@@ -44,6 +44,8 @@ class ForeignFeed {
   struct Tool {
     PoseHistory poses;
     std::optional<HostTime> heard;  ///< the last pose that was one
+    std::optional<Bird> last;
+    DeviceTime still_since;  ///< since when its pose is the last one to the bit
     bool stamped = true;
   };
   struct Waiting {

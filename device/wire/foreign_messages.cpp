@@ -60,6 +60,18 @@ std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(Bytes numbers) {
   return Transform<Tracker, Sensor>(rotation, position);
 }
 
+/// What PLUS and Slicer say of a pose: TransformValid ("True"), TransformStatus or Status ("OK") of a message's own,
+/// NAMEStatus of an element of a list. What says nothing is taken for valid, and of what says anything only that.
+bool is_valid(const std::map<std::string, std::string>& meta_data, const std::string& name) {
+  const auto says = [&](const std::string& key, std::initializer_list<const char*> good) {
+    const auto found = meta_data.find(key);
+    return found == meta_data.end() ||
+           std::any_of(good.begin(), good.end(), [&](const char* word) { return found->second == word; });
+  };
+  return says("TransformValid", {"True", "true", "TRUE", "1"}) && says("TransformStatus", {"OK"}) &&
+         says("Status", {"OK"}) && says(name + "Status", {"OK"});
+}
+
 void add(ForeignPoses& poses, const std::string& name, const std::optional<Transform<Tracker, Sensor>>& pose) {
   if (pose) {
     poses.birds.push_back({name, *pose});
@@ -68,7 +80,14 @@ void add(ForeignPoses& poses, const std::string& name, const std::optional<Trans
   }
 }
 
-Result<ForeignMessage> read_list(const Header& header, Bytes content, std::size_t element_bytes) {
+Result<ForeignPoses> read_transform(const Header& header, Bytes content) {
+  if (content.size() != IGTL_TRANSFORM_SIZE) return damaged(header, "is cut short");
+  ForeignPoses poses;
+  add(poses, header.device, pose_of_matrix(content));
+  return poses;
+}
+
+Result<ForeignPoses> read_list(const Header& header, Bytes content, std::size_t element_bytes) {
   if (content.size() % element_bytes != 0) return damaged(header, "is cut short");
   const bool quaternions = element_bytes == IGTL_QTDATA_ELEMENT_SIZE;
   ForeignPoses poses;
@@ -76,17 +95,17 @@ Result<ForeignMessage> read_list(const Header& header, Bytes content, std::size_
     const auto numbers = content.subspan(22, element_bytes - 22);
     add(poses, name_at(content, header.device), quaternions ? pose_of_quaternion(numbers) : pose_of_matrix(numbers));
   }
-  return ForeignMessage(std::move(poses));
+  return poses;
 }
 
-Result<ForeignMessage> read_position(const Header& header, Bytes content) {
+Result<ForeignPoses> read_position(const Header& header, Bytes content) {
   constexpr std::size_t kPlace = 12, kShort = 24, kWhole = 28;
   if (content.size() != kPlace && content.size() != kShort && content.size() != kWhole)
     return damaged(header, "is cut short");
   ForeignPoses poses;
   // A place without a direction is no pose.
   add(poses, header.device, content.size() == kPlace ? std::nullopt : pose_of_quaternion(content));
-  return ForeignMessage(std::move(poses));
+  return poses;
 }
 
 std::string pixels_in_words(const igtl_image_header& image) {
@@ -148,13 +167,19 @@ Result<ForeignMessage> read_foreign(const Header& header, Bytes body) {
   const auto content = content_of(header, body);
   if (!content) return damaged(header, "has an extended header that lies");
   if (image) return read_image(header, *content);
-  if (tdata) return read_list(header, *content, IGTL_TDATA_ELEMENT_SIZE);
-  if (qtdata) return read_list(header, *content, IGTL_QTDATA_ELEMENT_SIZE);
-  if (position) return read_position(header, *content);
-  if (content->size() != IGTL_TRANSFORM_SIZE) return damaged(header, "is cut short");
-  ForeignPoses poses;
-  add(poses, header.device, pose_of_matrix(*content));
-  return ForeignMessage(std::move(poses));
+  const auto meta_data = meta_data_of(header, body);
+  if (!meta_data) return damaged(header, "has meta data that lie");
+  auto poses = tdata      ? read_list(header, *content, IGTL_TDATA_ELEMENT_SIZE)
+               : qtdata   ? read_list(header, *content, IGTL_QTDATA_ELEMENT_SIZE)
+               : position ? read_position(header, *content)
+                          : read_transform(header, *content);
+  if (!poses) return poses.error();
+  std::erase_if(poses->birds, [&](const Bird& bird) {
+    if (is_valid(*meta_data, bird.name)) return false;
+    poses->no_poses.push_back(bird.name);
+    return true;
+  });
+  return ForeignMessage(*std::move(poses));
 }
 
 bool is_of_appliance(const Header& header) {

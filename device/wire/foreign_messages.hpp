@@ -7,7 +7,7 @@
 #include "device/wire/messages.hpp"
 
 /// What an OpenIGTLink server that is no appliance of ours (PLUS, 3D Slicer) says of video and tools, by the published
-/// standard alone: header versions 1 to 3, without any meta data.
+/// standard: header versions 1 to 3, and of the meta data whether a pose is valid.
 namespace birdseye::wire {
 
 /// One picture; grey ones are made RGB. The matrix of an IMAGE says where it lies in a room, which a camera's picture
@@ -24,7 +24,8 @@ struct ForeignVolume {};
 /// element's.
 struct ForeignPoses {
   std::vector<Bird> birds;
-  std::vector<std::string> no_poses;  ///< tools whose matrix or quaternion is none, as that of a tool out of sight
+  /// Tools whose matrix or quaternion is none, or of which the meta data say that it is not valid: out of sight, say.
+  std::vector<std::string> no_poses;
 };
 
 /// A message of a type that is not read here.

@@ -68,6 +68,35 @@ std::optional<std::span<const std::uint8_t>> content_of(const Header& header, st
   return body.subspan(before, body.size() - before - after);
 }
 
+std::optional<std::map<std::string, std::string>> meta_data_of(const Header& header,
+                                                               std::span<const std::uint8_t> body) {
+  std::map<std::string, std::string> found;
+  if (header.version < 2) return found;
+  const auto content = content_of(header, body);
+  if (!content) return std::nullopt;
+  // Index: how many there are; of each the key's length, the encoding and the value's length. Then all keys and values.
+  constexpr std::size_t kCount = 2, kEntry = 8;
+  const auto index = body.subspan(static_cast<std::size_t>(content->data() - body.data()) + content->size());
+  if (index.size() < kCount) return index.empty() ? std::optional(found) : std::nullopt;
+  const auto count = static_cast<std::size_t>(big_endian(index.first(kCount)));
+  if (index.size() < kCount + kEntry * count) return std::nullopt;
+  auto texts = index.subspan(kCount + kEntry * count);
+  const auto text = [&](std::size_t size) {
+    std::string out(texts.begin(), texts.begin() + static_cast<std::ptrdiff_t>(size));
+    texts = texts.subspan(size);
+    return out;
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto entry = index.subspan(kCount + kEntry * i, kEntry);
+    const auto key = static_cast<std::size_t>(big_endian(entry.first(2)));
+    const auto value = static_cast<std::size_t>(big_endian(entry.subspan(4, 4)));
+    if (key + value > texts.size()) return std::nullopt;
+    std::string name = text(key);
+    found.insert_or_assign(std::move(name), text(value));
+  }
+  return found;
+}
+
 std::optional<std::string> text_of_string(const Header& header, std::span<const std::uint8_t> body) {
   constexpr std::size_t kFixed = 4;  // encoding, length
   const std::size_t content = content_bytes(header, body);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -38,5 +39,8 @@ std::optional<std::string> text_of_string(const Header& header, std::span<const 
 std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body);
 /// The content alone, without the meta data that follows it in version 2; empty where their lengths lie.
 std::optional<std::span<const std::uint8_t>> content_of(const Header& header, std::span<const std::uint8_t> body);
+/// The meta data by their keys; none in version 1. Empty where their lengths lie.
+std::optional<std::map<std::string, std::string>> meta_data_of(const Header& header,
+                                                               std::span<const std::uint8_t> body);
 
 }  // namespace birdseye::wire

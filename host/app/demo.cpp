@@ -29,8 +29,8 @@ Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan
   if (!truth) return truth.error();
   std::map<std::uint64_t, std::pair<Eigen::Vector2d, Eigen::Vector2d>> places;
   for (const OverlaidFrame& frame : session.overlaid) {
-    const auto found = target_error(*truth, frame.sequence, session.setup->camera, frame.camera_from_patient,
-                                    plan.tumour_centre_in_patient_mm);
+    const auto found = overlay_error(*truth, frame.sequence, session.setup->camera, frame.camera_from_patient,
+                                     plan.tumour_centre_in_patient_mm);
     if (!found) {
       return Error{Errc::bad_format, fmt::format("{}: lacks frame {}, which was overlaid; run the demo again",
                                                  (out / "truth").string(), frame.sequence)};

@@ -116,6 +116,8 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
                                    folder.string(),
                                    "--seed",
                                    std::to_string(settings.seed),
+                                   "--deformation-mm",
+                                   fmt::format("{}", settings.deformation_mm),
                                    "--position-noise-mm",
                                    fmt::format("{}", settings.position_noise_mm),
                                    "--angle-noise-deg",

@@ -10,16 +10,17 @@
 
 namespace birdseye::host {
 
-std::optional<TargetError> target_error(const SimulatedTruth& truth, std::uint64_t sequence, const CameraModel& camera,
-                                        const Transform<Camera, Patient>& camera_from_patient,
-                                        const Eigen::Vector3d& tumour_in_patient_mm) {
+std::optional<OverlayError> overlay_error(const SimulatedTruth& truth, std::uint64_t sequence,
+                                          const CameraModel& camera,
+                                          const Transform<Camera, Patient>& camera_from_patient,
+                                          const Eigen::Vector3d& tumour_in_patient_mm) {
   const auto found = truth.camera_from_patient.find(sequence);
   if (found == truth.camera_from_patient.end()) return std::nullopt;
   const Eigen::Vector3d true_mm = found->second * truth.tumour_centre_in_patient_mm;
   const Eigen::Vector3d overlaid_mm = camera_from_patient * tumour_in_patient_mm;
   const auto true_px = project(truth.camera, true_mm);
   const auto overlaid_px = project(camera, overlaid_mm);
-  TargetError error;
+  OverlayError error;
   error.target_mm = (overlaid_mm - true_mm).norm();
   if (true_px && overlaid_px) {
     error.overlay_px = (*overlaid_px - *true_px).norm();
@@ -39,7 +40,7 @@ Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder)
   try {
     std::ifstream in(folder / "truth.json");
     const nlohmann::json json = nlohmann::json::parse(in);
-    const auto centre = json.at("tumour_centre_in_patient_mm").get<std::array<double, 3>>();
+    const auto centre = json.at("tumour_centre_moved_to_mm").get<std::array<double, 3>>();
     truth.tumour_centre_in_patient_mm = {centre[0], centre[1], centre[2]};
     const nlohmann::json& c = json.at("camera");
     CameraModel& camera = truth.camera;

@@ -16,21 +16,22 @@ namespace birdseye::host {
 /// What the simulator knows and only the report reads.
 struct SimulatedTruth {
   CameraModel camera;
-  Eigen::Vector3d tumour_centre_in_patient_mm;
+  Eigen::Vector3d tumour_centre_in_patient_mm;  ///< in the operation: deformed, where the liver is
   std::map<std::uint64_t, Transform<Camera, Patient>> camera_from_patient;  ///< by the frame's sequence
 };
 
 /// How far an overlay puts the tumour's centre from where it truly is.
-struct TargetError {
+struct OverlayError {
   double target_mm = 0, overlay_px = 0;
   /// In the picture; both or none.
   std::optional<std::pair<Eigen::Vector2d, Eigen::Vector2d>> true_and_overlaid_px;
 };
-/// Of one frame, overlaid with this lens from this pose; tumour_in_patient_mm: as the CT shows it. Empty where the
-/// truth knows no such frame.
-std::optional<TargetError> target_error(const SimulatedTruth& truth, std::uint64_t sequence, const CameraModel& camera,
-                                        const Transform<Camera, Patient>& camera_from_patient,
-                                        const Eigen::Vector3d& tumour_in_patient_mm);
+/// Of one frame, overlaid with this lens from this pose; tumour_in_patient_mm: as the CT that is drawn shows it. Empty
+/// where the truth knows no such frame.
+std::optional<OverlayError> overlay_error(const SimulatedTruth& truth, std::uint64_t sequence,
+                                          const CameraModel& camera,
+                                          const Transform<Camera, Patient>& camera_from_patient,
+                                          const Eigen::Vector3d& tumour_in_patient_mm);
 
 /// folder: the simulator's truth/.
 Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder);

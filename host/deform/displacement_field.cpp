@@ -39,6 +39,18 @@ Eigen::Vector3d DisplacementField::displacement(const Eigen::Vector3d& point_in_
   return sum;
 }
 
+Eigen::Vector3d DisplacementField::deformed_of(const Eigen::Vector3d& rest_in_patient_mm) const {
+  constexpr int kSteps = 200;
+  constexpr double kCloseMm = 1e-4, kDamping = 0.7;
+  Eigen::Vector3d x = rest_in_patient_mm;
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::Vector3d change = kDamping * (rest_in_patient_mm - displacement(x) - x);
+    x += change;
+    if (change.norm() < kCloseMm) break;
+  }
+  return x;
+}
+
 Eigen::Matrix3d DisplacementField::gradient(const Eigen::Vector3d& point_in_patient_mm) const {
   std::array<int, 3> base{};
   Eigen::Vector3d t;

@@ -24,6 +24,9 @@ struct DisplacementField {
     return displacement_mm[grid_index(size, i, j, k)];
   }
   [[nodiscard]] Eigen::Vector3d displacement(const Eigen::Vector3d& point_in_patient_mm) const;
+  /// Where what the undeformed volume has at a point is seen: the p with p + u(p) = rest, to 1e-4 mm, by damped
+  /// fixed-point steps.
+  [[nodiscard]] Eigen::Vector3d deformed_of(const Eigen::Vector3d& rest_in_patient_mm) const;
   /// du/dp within the lattice cell of the point; zero outside the box.
   [[nodiscard]] Eigen::Matrix3d gradient(const Eigen::Vector3d& point_in_patient_mm) const;
 };

@@ -14,6 +14,9 @@ std::string OverlayGate::doubt(const PoseAnswer& pose) const {
   if (!(c.tracked_rms_px <= settings_.most_tracked_rms_px))
     return fmt::format("hand-eye is off by {:.1f} px", c.tracked_rms_px);
   if (!(c.fre_mm <= settings_.most_fre_mm)) return fmt::format("the fiducials fit to {:.1f} mm only", c.fre_mm);
+  if (!(c.target_mm <= settings_.most_target_mm))
+    return fmt::format("fiducials as these leave the target open by {:.0f} mm: touch others, round about it",
+                       c.target_mm);
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
     return fmt::format("the pose is predicted {:.0f} ms ahead", pose.age.seconds() * 1e3);
   }

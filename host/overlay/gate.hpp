@@ -15,11 +15,13 @@ class OverlayGate {
     Duration most_predicted = Duration::from_ms(40);  ///< how far ahead of its newest sample a pose may be
     double most_sigma_mm = 1.5;                       ///< of the pose's position
     Duration fade = Duration::from_ms(200);
-    double most_camera_rms_px = 1.5, most_tracked_rms_px = 12, most_fre_mm = 5;
+    double most_camera_rms_px = 1.5, most_tracked_rms_px = 12, most_fre_mm = 5, most_target_mm = 8;
   };
   /// How well camera, hand-eye and patient are known. Zeros are perfect; what is not known must not be drawn with.
   struct Calibration {
     double camera_rms_px = 0, tracked_rms_px = 0, fre_mm = 0;
+    double target_mm = 0;    ///< what the fiducials' error comes to at the target
+    double hand_eye_mm = 0;  ///< the error of hand-eye, held out, at the working distance
   };
   struct Decision {
     double strength = 0;  ///< of the overlay, 0 to 1

@@ -40,6 +40,9 @@ int main(int argc, char** argv) {
   run.add_option("--seed", cart.seed, "everything random follows from it");
   run.add_option("--position-noise-mm", cart.noise.position_mm, "per axis and record")->check(CLI::Range(0.0, 50.0));
   run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
+  run.add_option("--deformation-mm", cart.deformation_mm,
+                 "how far the liver has moved since the CT, where it has moved most")
+      ->check(CLI::Range(0.0, 30.0));
   run.add_option("--distortion-mm", cart.distortion_mm, "largest displacement by metal in the room")
       ->check(CLI::Range(0.0, 500.0));
   run.add_option("--sway-s", cart.pace.sway_s, "how long the scope is first turned to and fro over the board")

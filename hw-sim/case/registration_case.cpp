@@ -61,15 +61,6 @@ Result<void> check(const CaseSettings& settings) {
   return {};
 }
 
-Mesh deformed(const Mesh& rest, const TissueMap& map) {
-  Mesh out = rest;
-  tbb::parallel_for(std::size_t{0}, out.vertices.size(), [&](std::size_t i) {
-    out.vertices[i] = map.deformed_of(rest.vertices[i].cast<double>()).cast<float>();
-  });
-  compute_normals(out);
-  return out;
-}
-
 Result<Case> make_case(const CaseSettings& settings) {
   auto subject = subject_of(settings);
   if (!subject) return subject.error();

@@ -16,16 +16,6 @@ using Eigen::Vector3d;
 constexpr double kMarginMm = 25;  // about the organ, so that it is free to move within the CT's box
 constexpr double kSurfaceMm = 1.5;
 
-std::pair<Vector3d, Vector3d> bounds(const Mesh& mesh) {
-  Eigen::Vector3f low = mesh.vertices.front();
-  Eigen::Vector3f high = low;
-  for (const Eigen::Vector3f& v : mesh.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  return {low.cast<double>(), high.cast<double>()};
-}
-
 /// A scan of the box about a surface. Its origin is of whole mm, which every file format holds exactly.
 Grid scan_about(const Mesh& surface) {
   const auto [low, high] = bounds(surface);

@@ -167,4 +167,13 @@ double TissueMap::least_determinant() const {
   return *std::min_element(least.begin(), least.end());
 }
 
+Mesh deformed(const Mesh& rest, const TissueMap& map) {
+  Mesh out = rest;
+  tbb::parallel_for(std::size_t{0}, out.vertices.size(), [&](std::size_t i) {
+    out.vertices[i] = map.deformed_of(rest.vertices[i].cast<double>()).cast<float>();
+  });
+  compute_normals(out);
+  return out;
+}
+
 }  // namespace birdseye::hw_sim

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "hw-sim/phantom/mesh.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -48,5 +49,7 @@ class TissueMap {
   std::array<int, 3> inner_;
   std::vector<Eigen::Vector3d> control_mm_;
 };
+
+Mesh deformed(const Mesh& rest, const TissueMap& map);
 
 }  // namespace birdseye::hw_sim

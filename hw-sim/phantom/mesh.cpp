@@ -51,6 +51,16 @@ void compute_normals(Mesh& mesh) {
   for (Eigen::Vector3f& n : mesh.normals) n.normalize();
 }
 
+std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Mesh& mesh) {
+  Eigen::Vector3f low = mesh.vertices.front();
+  Eigen::Vector3f high = low;
+  for (const Eigen::Vector3f& v : mesh.vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  return {low.cast<double>(), high.cast<double>()};
+}
+
 Mesh surface_of(const ScalarGrid& field) {
   const Grid& grid = field.grid;
   Mesh mesh;

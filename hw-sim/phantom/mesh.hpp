@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -26,6 +27,8 @@ Mesh closed_surface(const Field& field, const Eigen::Vector3d& low_mm, const Eig
                     double spacing_mm);
 /// The normals that follow from where the vertices are now.
 void compute_normals(Mesh& mesh);
+/// The least and the largest coordinates of its vertices.
+std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Mesh& mesh);
 
 /// Binary little-endian PLY, the form that every mesh program reads.
 Result<void> write_ply(const std::filesystem::path& path, const Mesh& mesh);

@@ -10,6 +10,7 @@
 
 #include "drivers/io/monotonic.hpp"
 #include "hw-sim/base/announce.hpp"
+#include "hw-sim/case/tissue_map.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/phantom/json_file.hpp"
@@ -31,9 +32,19 @@ nlohmann::json sheet_of(const World& world) {
   return sheet;
 }
 
-nlohmann::json truth_of(const World& world, const CameraModel& lens) {
+/// The liver since the CT: one control point in the middle of a box about it, whose surface holds still.
+Result<TissueMap> moved_liver(const Mesh& liver, double deformation_mm, std::uint64_t seed) {
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(25);
+  const auto [low_mm, high_mm] = bounds(liver);
+  const TissueMap still(low_mm - margin, high_mm + margin, {1, 1, 1});
+  if (deformation_mm <= 0) return still;
+  return TissueMap::random(still, deformation_mm, liver.vertices, seed);
+}
+
+nlohmann::json truth_of(const World& world, const TissueMap& moved, const CameraModel& lens) {
   nlohmann::json truth;
   truth["tumour_centre_in_patient_mm"] = json_of(world.truth().tumour_centre_mm);
+  truth["tumour_centre_moved_to_mm"] = json_of(moved.deformed_of(world.truth().tumour_centre_mm));
   for (const Eigen::Vector3d& f : world.truth().fiducials_mm) truth["fiducials_in_patient_mm"].push_back(json_of(f));
   truth["tracker_from_patient"] = json_of(world.tracker_from_patient().matrix());
   truth["tracker_from_marker"] = json_of(world.tracker_from_marker().matrix());
@@ -109,13 +120,20 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   if (!world) return world.error();
   const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
   if (!laparoscope) return laparoscope.error();
-  (*laparoscope)->set_cavity({.organ = *liver, .wall_centre_mm = truth->liver_centre_mm});
+  const auto moved = moved_liver(*liver, settings.deformation_mm, settings.seed);
+  if (!moved) return moved.error();
+  Cavity cavity{.organ = *liver, .wall_centre_mm = truth->liver_centre_mm};
+  if (settings.deformation_mm > 0) {
+    cavity.organ = deformed(*liver, *moved);
+    cavity.rest_mm = liver->vertices;
+  }
+  (*laparoscope)->set_cavity(cavity);
   (*laparoscope)->set_bench(world->board());
 
   std::error_code error;
   std::filesystem::create_directories(settings.folder / "truth", error);
   for (const Result<void>& written :
-       {write_json(settings.folder / "truth" / "truth.json", truth_of(*world, lens)),
+       {write_json(settings.folder / "truth" / "truth.json", truth_of(*world, *moved, lens)),
         write_text(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
         write_json(settings.folder / "cart.json", sheet_of(*world))}) {
     if (!written) return written.error();

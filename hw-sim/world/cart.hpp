@@ -22,6 +22,7 @@ struct CartSettings {
   Pace pace;
   double camera_delay_ms = 0;    ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
   bool drop_late = false;        ///< frames that are not traced in time
+  double deformation_mm = 0;     ///< how far the liver's surface has moved since the CT, where it has moved most
   double distortion_mm = 0;      ///< of the tracker's field, where it is largest
   std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
 };

@@ -229,6 +229,84 @@ TEST(ForeignFeed, DamagedMessagesArePassedOverAndCounted) {
   EXPECT_EQ(frames[0].info.pose.kind, PoseKind::exact);
 }
 
+TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
+  using MetaData = std::vector<std::pair<std::string, std::string>>;
+  // As PLUS sends them (TransformValid, TransformStatus), and Slicer (Status).
+  const std::vector<std::pair<MetaData, bool>> cases{
+      {{}, true},
+      {{{"TransformValid", "True"}, {"TransformStatus", "OK"}}, true},
+      {{{"Author", "someone"}}, true},
+      {{{"TransformValid", "False"}}, false},
+      {{{"TransformValid", "True"}, {"TransformStatus", "OUT_OF_VIEW"}}, false},
+      {{{"Status", "MISSING"}}, false},
+      {{{"ProbeToTrackerStatus", "INVALID"}}, false},
+      {{{"StylusToTrackerStatus", "INVALID"}}, true},
+  };
+  for (const auto& [meta_data, valid] : cases) {
+    Link link;
+    for (int i = 0; i < 5; ++i) {
+      Envelope envelope = Link::at(20 * i, 2);
+      envelope.meta_data = meta_data;
+      link.push(transform_message("ProbeToTracker", envelope, pose_at(i)), 20 * i);
+    }
+    link.image(70);
+    const auto frames = link.of<VideoFrame>(200);
+    ASSERT_EQ(frames.size(), 1U);
+    EXPECT_EQ(frames[0].info.pose.tracker_from_sensor.has_value(), valid) << ::testing::PrintToString(meta_data);
+  }
+  // Of a list each element is judged by itself.
+  Link link(ForeignSettings{.scope_device = "Probe"});
+  for (int i = 0; i < 5; ++i) {
+    Bytes list;
+    for (const char* name : {"Probe", "Stylus"}) {
+      put_text(list, name, 20);
+      put_text(list, "", 2);
+      put_matrix(list, pose_at(i));
+    }
+    Envelope envelope = Link::at(20 * i, 2);
+    envelope.meta_data = {{"ProbeStatus", "MISSING"}, {"StylusStatus", "OK"}};
+    link.push(testing::foreign_message("TDATA", "Tracker", envelope, list), 20 * i);
+  }
+  for (const Birds& birds : link.of<Birds>(100)) {
+    ASSERT_EQ(birds.birds.size(), 1U);
+    EXPECT_EQ(birds.birds[0].name, "Stylus");
+  }
+}
+
+TEST(ForeignFeed, MetaDataThatLieAreDamage) {
+  const Bytes whole = transform_message("ProbeToTracker", Link::at(0, 2), pose_at(1));
+  const Bytes body(whole.begin() + kHeaderBytes, whole.end());
+  // The index: how many, and of the one entry the lengths of key and value.
+  for (const auto& [byte, value] : {std::pair{60, 2}, {61, 2}, {62, 1}, {63, 9}, {66, 1}, {69, 3}}) {
+    Bytes lies = body;
+    lies[static_cast<std::size_t>(byte)] = static_cast<std::uint8_t>(value);
+    Bytes message = testing::foreign_message("TRANSFORM", "ProbeToTracker", {kServerNs, 1}, lies);
+    message[1] = 2;
+    Link link;
+    link.push(message, 0);
+    EXPECT_THAT(link.feed.words(), HasSubstr("1 damaged")) << byte;
+  }
+}
+
+TEST(ForeignFeed, APoseThatRepeatsItselfForASecondIsNoMeasurement) {
+  Link link;
+  std::vector<VideoFrame> frames;
+  for (int ms = 0; ms <= 2600; ms += 20) {
+    // It moves, stands for 1.4 s, moves again.
+    const int moved = ms < 600 ? ms : ms < 2000 ? 600 : ms;
+    link.transform("ProbeToTracker", ms, pose_at(moved * 1e-3));
+    if (ms % 100 == 0) link.image(ms);
+    for (VideoFrame& frame : link.of<VideoFrame>(ms + 5)) frames.push_back(std::move(frame));
+  }
+  ASSERT_GT(frames.size(), 20U);
+  for (const VideoFrame& frame : frames) {
+    const auto ms = Link::ms_of(frame.info.acquired);
+    EXPECT_EQ(frame.info.pose.tracker_from_sensor.has_value(), ms <= 1600 || ms >= 2000) << ms;
+    if (ms <= 1600 || ms >= 2000) continue;
+    EXPECT_THAT(frame.info.pose.reason, HasSubstr("\"ProbeToTracker\" stands still to the last digit"));
+  }
+}
+
 TEST(ForeignFeed, DamageAnywhereCrashesNothing) {
   std::mt19937 rng(11);
   const std::vector<Bytes> whole{image_message("Endo", Link::at(0, 2), {}),

@@ -3,6 +3,7 @@
 
 #include <thread>
 
+#include "calibration/solve/point_error.hpp"
 #include "host/app/live/live_script.hpp"
 #include "host/app/live/operation.hpp"
 #include "tests/support/live_operation.hpp"
@@ -51,6 +52,101 @@ TEST(LiveSession, GoesFromTheLinkToARegisteredPatient) {
   EXPECT_NEAR(reading->distance_mm, 2, 0.1);
   session.go_on();
   EXPECT_EQ(session.step(), LiveStep::run);
+}
+
+/// The scope at its place, looking at the patient's point from so far.
+wire::VideoFrame looking_at(const LiveSession& session, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
+                            double sigma_mm) {
+  const Setup& setup = *session.picture().setup();
+  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
+                                                       Eigen::Vector3d(0, 0, from_mm) - point_in_patient_mm);
+  wire::VideoFrame frame;
+  frame.width_px = setup.camera.width_px;
+  frame.height_px = setup.camera.height_px;
+  frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
+  frame.info.acquired = DeviceTime{40 * kMs};
+  frame.info.pose.kind = PoseKind::exact;
+  frame.info.pose.position_sigma_mm = sigma_mm;
+  frame.info.pose.tracker_from_sensor =
+      setup.tracker_from_patient * camera_from_patient.inverse() * setup.camera_from_sensor;
+  return frame;
+}
+
+TEST(LiveSession, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
+  const Scratch scratch;
+  LiveSession session(operation_settings(scratch));
+  load(session);
+  connect_and_calibrate(session);
+  Hand hand(session);
+  for (std::size_t i = 0; i < 4; ++i) hand.rest_at(kFiducials[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 1 : -1), 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(session.picture().setup().has_value());
+  EXPECT_FALSE(session.target_mark().has_value()) << "of no frame";
+  const Eigen::Vector3d tumour_mm(30, 30, 20);
+  session.take(looking_at(session, tumour_mm, 100, 0.2), HostTime{0}, ClockGap{});
+  session.picture().draw();
+  const auto mark = session.target_mark();
+  ASSERT_TRUE(mark.has_value());
+  const CameraModel& camera = session.picture().setup()->camera;
+  EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
+  EXPECT_FALSE(mark->motion_counted);
+  // By hand: the fiducials, hand-eye's 0.5 mm of the record, the pose's 0.2 mm an axis.
+  const auto localisation = calibration::localisation_error_of(*session.fre_mm(), 4);
+  const double fiducials_mm = calibration::TargetError(kFiducials, localisation.upper95_mm).rms_mm(tumour_mm);
+  const double rms_mm = std::sqrt(fiducials_mm * fiducials_mm + 0.25 + 3 * 0.04);
+  EXPECT_NEAR(mark->radius_mm, rms_mm * std::sqrt(5.99 / 3), 1e-3);
+  EXPECT_NEAR(mark->radius_px, mark->radius_mm * camera.fx_px / 100, 0.1);
+}
+
+TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
+  const Scratch scratch;
+  LiveSettings again = operation_settings(scratch);
+  again.resume = scratch.path();
+  Operation kept;
+  kept.ct_checksum = read_patient(again.patient)->checksum;
+  kept.made_utc = "2026-11-22T10:00:00Z";
+  kept.registered = {kTrackerFromPatient.inverse(), 0.3, 1.2};
+  // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
+  DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  kept.deformation = {field, 0.7};
+  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  LiveSession session(again);
+  load(session);
+  ASSERT_EQ(session.fault(), "");
+  wire::Calibration calibration;
+  calibration.in_force = true;
+  calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
+  session.take(calibration, HostTime{0}, std::nullopt);
+  session.primary();
+  ASSERT_TRUE(session.picture().setup().has_value());
+  session.take(looking_at(session, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
+  session.picture().draw();
+  const auto mark = session.target_mark();
+  ASSERT_TRUE(mark.has_value());
+  const CameraModel& camera = session.picture().setup()->camera;
+  EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
+  EXPECT_TRUE(mark->motion_counted);
+  EXPECT_NEAR(mark->radius_mm, std::sqrt((1.2 * 1.2 + 0.25 + 0.7 * 0.7) * 5.99 / 3), 1e-3);
+  Hand hand(session);
+  hand.rest_at({34, 30, 21}, 30);
+  const auto reading = session.check();
+  ASSERT_TRUE(reading.has_value());
+  EXPECT_EQ(reading->nearest, "tumour");
+  EXPECT_NEAR(reading->distance_mm, 1, 0.1);
+}
+
+TEST(LiveSession, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {
+  OverlayGate gate;
+  gate.set_calibration({.fre_mm = 0.5, .target_mm = 9});
+  PoseAnswer pose;
+  pose.kind = PoseKind::exact;
+  pose.tracker_from_sensor.emplace();
+  const auto decision = gate.decide({0}, pose);
+  EXPECT_EQ(decision.strength, 0);
+  EXPECT_NE(decision.reason.find("leave the target open by 9 mm"), std::string::npos) << decision.reason;
 }
 
 /// Four fiducials, and what was found of them is in out.
@@ -127,7 +223,7 @@ TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
     by_board.camera = {768, 576, 500, 500, 384, 288};
     by_board.made_utc = record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z";  // the record's is 09:30
     kept.calibrated = by_board;
-    kept.registered = {kTrackerFromPatient.inverse(), 0.3};
+    kept.registered = {kTrackerFromPatient.inverse(), 0.3, 0.5};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
     LiveSession session(again);
     load(session);

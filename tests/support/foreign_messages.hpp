@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 /// Messages of a server that nobody of ours wrote, byte by byte as the OpenIGTLink standard has them; their checksum is
@@ -29,24 +30,29 @@ inline void put_text(Bytes& out, std::string_view text, std::size_t bytes) {
 struct Envelope {
   std::int64_t stamp_ns = 0;
   unsigned version = 1;
+  std::vector<std::pair<std::string, std::string>> meta_data = {{"Status", "OK"}};  ///< from version 2 on
 };
 
 inline Bytes foreign_message(std::string_view type, std::string_view device, const Envelope& envelope,
                              const Bytes& content) {
   Bytes body;
   if (envelope.version >= 2) {
-    put(body, 12, 2);  // this extended header
-    put(body, 10, 2);  // an index of one entry: count, length of the key, its encoding, length of the value
-    put(body, 8, 4);
+    std::size_t texts = 0;
+    for (const auto& [key, value] : envelope.meta_data) texts += key.size() + value.size();
+    put(body, 12, 2);                                 // this extended header
+    put(body, 2 + 8 * envelope.meta_data.size(), 2);  // an index
+    put(body, texts, 4);
     put(body, 7, 4);  // an id
   }
   body.insert(body.end(), content.begin(), content.end());
   if (envelope.version >= 2) {
-    put(body, 1, 2);
-    put(body, 6, 2);
-    put(body, 3, 2);
-    put(body, 2, 4);
-    put_text(body, "StatusOK", 8);
+    put(body, envelope.meta_data.size(), 2);
+    for (const auto& [key, value] : envelope.meta_data) {
+      put(body, key.size(), 2);
+      put(body, 3, 2);  // of the value: US-ASCII
+      put(body, value.size(), 4);
+    }
+    for (const auto& [key, value] : envelope.meta_data) put_text(body, key + value, key.size() + value.size());
   }
   Bytes out;
   put(out, envelope.version, 2);

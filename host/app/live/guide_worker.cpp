@@ -107,6 +107,11 @@ void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {
     const std::lock_guard lock(mutex_);
     state_ = guide.state();
   }
+  {
+    const std::lock_guard lock(mutex_);
+    state_.collecting = false;
+    state_.next = "that is enough, and is being worked out; fiducials may be touched meanwhile";
+  }
   auto result = fault ? Result<GuidedCalibration>(*fault) : solve(guide.finish(), plan);
   const std::lock_guard lock(mutex_);
   result_ = std::move(result);

@@ -149,7 +149,7 @@ void LiveApp::draw() {
     while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
     facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
     if (log_) {
-      log_->add(sequence, age_ms, shown.strength,
+      log_->add(sequence, age_ms, shown.strength, session_.shapes(),
                 shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
     }
   }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <sstream>
-#include <vector>
 
 #include "host/app/simulated_truth.hpp"
 
@@ -18,13 +17,13 @@ Result<LiveLog> LiveLog::open(const std::filesystem::path& folder) {
   log.file_.open(folder / "frames.csv", std::ios::trunc);
   if (error || !log.file_)
     return Error{Errc::unreadable, folder.string() + ": cannot be written; choose another --out"};
-  log.file_ << "sequence,age_ms,strength,camera_from_patient (16 numbers, row by row; none: no overlay)\n";
+  log.file_ << "sequence,age_ms,strength,shape,camera_from_patient (16 numbers, row by row; none: no overlay)\n";
   return log;
 }
 
-void LiveLog::add(std::uint64_t sequence, double age_ms, double strength,
+void LiveLog::add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape,
                   const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
-  file_ << fmt::format("{},{:.2f},{:.3f}", sequence, age_ms, strength);
+  file_ << fmt::format("{},{:.2f},{:.3f},{}", sequence, age_ms, strength, shape);
   if (camera_from_patient) {
     const Eigen::Matrix4d m = camera_from_patient->matrix();
     for (int i = 0; i < 16; ++i) file_ << fmt::format(",{:.9g}", m(i / 4, i % 4));
@@ -38,29 +37,28 @@ Result<void> LiveLog::close() {
   return Error{Errc::io, (folder_ / "frames.csv").string() + ": not all of it could be written; is the disk full?"};
 }
 
-Result<std::vector<double>> logged_target_errors_mm(const std::filesystem::path& log_folder,
-                                                    const std::filesystem::path& truth_folder,
-                                                    const CameraModel& camera,
-                                                    const Eigen::Vector3d& tumour_in_patient_mm) {
+Result<std::map<std::uint64_t, std::vector<double>>> logged_target_errors_mm(
+    const std::filesystem::path& log_folder, const std::filesystem::path& truth_folder, const CameraModel& camera,
+    const std::function<Eigen::Vector3d(std::uint64_t shape)>& tumour_in_patient_mm) {
   const auto truth = read_simulated_truth(truth_folder);
   if (!truth) return truth.error();
   std::ifstream in(log_folder / "frames.csv");
   std::string line;
   std::getline(in, line);
-  std::vector<double> errors_mm;
+  std::map<std::uint64_t, std::vector<double>> errors_mm;
   while (std::getline(in, line)) {
     std::replace(line.begin(), line.end(), ',', ' ');
     std::istringstream numbers(line);
-    std::uint64_t sequence = 0;
+    std::uint64_t sequence = 0, shape = 0;
     double age_ms = 0, strength = 0;
     Eigen::Matrix4d m;
-    numbers >> sequence >> age_ms >> strength;
+    numbers >> sequence >> age_ms >> strength >> shape;
     for (int i = 0; i < 16; ++i) numbers >> m(i / 4, i % 4);
     if (!numbers) continue;  // without an overlay
-    const auto error =
-        target_error(*truth, sequence, camera, Transform<Camera, Patient>::from_matrix(m), tumour_in_patient_mm);
+    const auto error = overlay_error(*truth, sequence, camera, Transform<Camera, Patient>::from_matrix(m),
+                                     tumour_in_patient_mm(shape));
     if (!error) return Error{Errc::bad_format, fmt::format("the truth lacks frame {}, which was overlaid", sequence)};
-    errors_mm.push_back(error->target_mm);
+    errors_mm[shape].push_back(error->target_mm);
   }
   return errors_mm;
 }

@@ -3,8 +3,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
@@ -12,13 +15,14 @@
 
 namespace birdseye::host {
 
-/// A line for each frame that was shown, in FOLDER/frames.csv: its number, age at the screen, and where its overlay was
-/// drawn from. It is written as it comes: an hour of it takes no memory.
+/// A line for each frame that was shown, in FOLDER/frames.csv: its number, age at the screen, which CT its overlay is
+/// of, and where that was drawn from. It is written as it comes: an hour of it takes no memory.
 class LiveLog {
  public:
   /// folder: made if need be.
   static Result<LiveLog> open(const std::filesystem::path& folder);
-  void add(std::uint64_t sequence, double age_ms, double strength,
+  /// shape: LiveSession::shapes().
+  void add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape,
            const std::optional<Transform<Camera, Patient>>& camera_from_patient);
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// All written; an error where the disk was full.
@@ -29,11 +33,11 @@ class LiveLog {
   std::ofstream file_;
 };
 
-/// What a simulated operation's overlay was off by, against the truth in folder/truth: of each overlaid frame of the
-/// log, the distance of the tumour's centre, mm. camera: the lens it was drawn with.
-Result<std::vector<double>> logged_target_errors_mm(const std::filesystem::path& log_folder,
-                                                    const std::filesystem::path& truth_folder,
-                                                    const CameraModel& camera,
-                                                    const Eigen::Vector3d& tumour_in_patient_mm);
+/// What a simulated operation's overlay was off by, against the truth in truth_folder: of each overlaid frame of the
+/// log, by the shape of the CT that was drawn, the distance of the tumour's centre, mm. camera: the lens it was drawn
+/// with; tumour_in_patient_mm: where the CT of a shape has it.
+Result<std::map<std::uint64_t, std::vector<double>>> logged_target_errors_mm(
+    const std::filesystem::path& log_folder, const std::filesystem::path& truth_folder, const CameraModel& camera,
+    const std::function<Eigen::Vector3d(std::uint64_t shape)>& tumour_in_patient_mm);
 
 }  // namespace birdseye::host

@@ -260,6 +260,24 @@ void draw_banner(const ShownPicture& shown, const LiveSession& session, bool rec
   list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ImGui::GetColorU32(colour), text.c_str());
 }
 
+/// Where the target is drawn, and how far from there it may be.
+void draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) {
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const ImVec2 middle(corner.x + fit * static_cast<float>(mark.at_px.x() + 0.5),
+                      corner.y + fit * static_cast<float>(mark.at_px.y() + 0.5));
+  const float radius = fit * static_cast<float>(mark.radius_px);
+  const ImU32 colour = ImGui::GetColorU32(mark.motion_counted ? kGood : kWarn);
+  list->AddCircle(middle, radius, IM_COL32(0, 0, 0, 160), 0, 3.5F * scale);
+  list->AddCircle(middle, radius, colour, 0, 1.5F * scale);
+  const std::string text =
+      fmt::format("+-{:.1f} mm{}", mark.radius_mm, mark.motion_counted ? "" : ", if it has not moved since the CT");
+  const ImVec2 wide = ImGui::CalcTextSize(text.c_str());
+  const ImVec2 from(middle.x + radius + 6 * scale, middle.y - wide.y / 2);
+  list->AddRectFilled(ImVec2(from.x - 3 * scale, from.y - 2 * scale),
+                      ImVec2(from.x + wide.x + 3 * scale, from.y + wide.y + 2 * scale), IM_COL32(0, 0, 0, 150));
+  list->AddText(from, colour, text.c_str());
+}
+
 void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
                 bool recorded) {
   const ImVec2 size(at.wide - at.side, at.high - at.strip);
@@ -272,7 +290,9 @@ void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& s
         std::min(size.x / static_cast<float>(shown.width_px), size.y / static_cast<float>(shown.height_px));
     const ImVec2 shape(fit * static_cast<float>(shown.width_px), fit * static_cast<float>(shown.height_px));
     ImGui::SetCursorPos(ImVec2((size.x - shape.x) / 2, (size.y - shape.y) / 2));
+    const ImVec2 corner = ImGui::GetCursorScreenPos();
     ImGui::Image(texture(window.picture(LiveWindow::Slot::video)), shape);
+    if (const auto mark = session.target_mark(); mark && shown.overlaid) draw_target(*mark, corner, fit, at.scale);
   }
   draw_banner(shown, session, recorded, ImVec2(at.side, 0), size.x, at.scale);
   if (const std::uintptr_t inset = window.picture(LiveWindow::Slot::inset); inset != 0) {

@@ -137,7 +137,9 @@ void LiveSession::take(const wire::Birds& birds) {
     tips_.emplace_back(birds.acquired, tip);
     while (birds.acquired - tips_.front().first > kTipWindow) tips_.pop_front();
     const auto rested = touch_detector_.push(birds.acquired, tip);
-    if (rested && step_ == LiveStep::fiducials) add_touch(*rested);
+    // The hand need not wait for the arithmetic.
+    const bool being_worked_out = guide_ && !guide_->state().collecting;
+    if (rested && (step_ == LiveStep::fiducials || being_worked_out)) add_touch(*rested);
   }
 }
 
@@ -160,6 +162,7 @@ void LiveSession::adopt(const calibration::CalibrationRecord& record) {
   camera_from_sensor_ = record.hand_eye->camera_from_sensor;
   known_.camera_rms_px = record.lens->rms_px;
   known_.tracked_rms_px = record.hand_eye->rms_px;
+  known_.hand_eye_mm = record.hand_eye->held_out_mm;
   StepNote& note = at(LiveStep::calibrate);
   note.done = true;
   note.line = fmt::format("by the scope's record of {}", record.hand_eye->provenance.made_utc);
@@ -201,6 +204,7 @@ void LiveSession::finish_guide(Result<GuidedCalibration> found) {
   camera_from_sensor_ = hand_eye.camera_from_sensor;
   known_.camera_rms_px = found->stations.lens ? found->stations.lens->rms_px : 0;
   known_.tracked_rms_px = hand_eye.tracked_px;
+  known_.hand_eye_mm = hand_eye.held_out_mm;
   calibrated_here_ = true;
   calibrated_utc_ = utc_now();
   note.done = true;
@@ -208,7 +212,9 @@ void LiveSession::finish_guide(Result<GuidedCalibration> found) {
                           found->stations.input.stations.size(), hand_eye.held_out_mm);
   update_setup();
   keep_operation();
-  if (step_ == LiveStep::calibrate) go_to(LiveStep::fiducials);
+  if (step_ != LiveStep::calibrate) return;
+  const bool all_touched = settings_.fiducials != 0 && at(LiveStep::fiducials).done;
+  go_to(all_touched ? LiveStep::views : LiveStep::fiducials);
 }
 
 std::optional<GuideState> LiveSession::guide() const {
@@ -264,9 +270,14 @@ void LiveSession::fit() {
     registration_fault_ = found.error().what;
     return update_setup();
   }
-  for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->fit.residuals_mm[i];
+  std::vector<Eigen::Vector3d> touched_in_patient_mm;
+  for (std::size_t i = 0; i < touches_.size(); ++i) {
+    touches_[i].residual_mm = found->fit.residuals_mm[i];
+    touched_in_patient_mm.push_back(patient_->markers_in_patient_mm[found->ct_of_touch[i]]);
+  }
   fre_mm_ = found->fit.fre_rms_mm;
   known_.fre_mm = *fre_mm_;
+  expect_registration_error(touched_in_patient_mm, *fre_mm_);
   tracker_from_patient_ = found->fit.to_from.inverse();
   note.line = fmt::format("{} touched, FRE {:.2f} mm", touches_.size(), *fre_mm_);
   note.done = touches_.size() >= std::max(kFewestFiducials + 1, settings_.fiducials);
@@ -284,22 +295,6 @@ void LiveSession::update_setup() {
 
 std::optional<double> LiveSession::fre_mm() const {
   return fre_mm_;
-}
-
-std::optional<CheckReading> LiveSession::check() const {
-  if (!tracker_from_patient_ || tips_.empty() || !patient_) return std::nullopt;
-  CheckReading reading;
-  reading.tip_in_patient_mm = tracker_from_patient_->inverse() * tips_.back().second;
-  const auto consider = [&](const std::string& name, const Eigen::Vector3d& place_mm) {
-    const double distance_mm = (place_mm - reading.tip_in_patient_mm).norm();
-    if (!reading.nearest.empty() && distance_mm >= reading.distance_mm) return;
-    reading.nearest = name;
-    reading.distance_mm = distance_mm;
-  };
-  for (const NamedPoint& landmark : patient_->landmarks) consider(landmark.name, landmark.place_mm);
-  for (std::size_t i = 0; i < patient_->markers_in_patient_mm.size(); ++i)
-    consider(fmt::format("fiducial {}", i + 1), patient_->markers_in_patient_mm[i]);
-  return reading;
 }
 
 void LiveSession::go_to(LiveStep step) {

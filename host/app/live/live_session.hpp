@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -62,11 +63,18 @@ struct DeformProgress {
   std::string line;
 };
 
-/// What the pointer's tip is near to, in the CT.
+/// What the pointer's tip is near to, in the CT as it is shown.
 struct CheckReading {
   Eigen::Vector3d tip_in_patient_mm;
   std::string nearest;  ///< landmark or fiducial; empty: there is none
   double distance_mm = 0;
+};
+
+/// Where the overlay has the target, and how far from there it may be.
+struct TargetMark {
+  Eigen::Vector2d at_px;
+  double radius_px = 0, radius_mm = 0;  ///< in the picture, it is within with a probability of 95 %, as far as counted
+  bool motion_counted = false;          ///< whether that counts how the organ has moved since the CT
 };
 
 /// The state of the operation, from the first connection to the running overlay; knows nothing of windows. Fed with the
@@ -126,6 +134,9 @@ class LiveSession {
   [[nodiscard]] DeformProgress deform_progress() const;
   [[nodiscard]] const std::optional<ViewRegistration>& deformation() const { return deformation_; }
   [[nodiscard]] std::optional<CheckReading> check() const;
+  /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the pose,
+  /// and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
+  [[nodiscard]] std::optional<TargetMark> target_mark() const;
   [[nodiscard]] const PatientPlan* patient() const { return patient_.get(); }
   /// For threads that outlast the patient's stay here.
   [[nodiscard]] std::shared_ptr<const PatientPlan> shared_patient() const { return patient_; }
@@ -154,7 +165,9 @@ class LiveSession {
   void show_deformation();
   void keep_operation();
   void resume();
-  [[nodiscard]] Eigen::Vector3d middle_mm() const;
+  void expect_registration_error(std::span<const Eigen::Vector3d> touched_in_patient_mm, double fre_mm);
+  [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
+  [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
   void make_engine_for(const PatientPlan& plan);
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
 

@@ -28,12 +28,6 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
 
 }  // namespace
 
-Eigen::Vector3d LiveSession::middle_mm() const {
-  if (!patient_->landmarks.empty()) return patient_->landmarks.front().place_mm;
-  const Volume& ct = patient_->ct;
-  return ct.patient_from_voxel * Eigen::Vector3d(0.5 * Eigen::Vector3d(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1));
-}
-
 void LiveSession::keep_view() {
   StepNote& note = at(LiveStep::views);
   const auto& frame = picture_.frame();
@@ -59,7 +53,7 @@ std::optional<ViewAdvice> LiveSession::view_advice() const {
   std::vector<Transform<Camera, Patient>> kept;
   kept.reserve(views_.size());
   for (const KeptView& view : views_) kept.push_back(view.camera_from_patient);
-  return advise_view(kept, *now, middle_mm());
+  return advise_view(kept, *now, target_in_patient_mm());
 }
 
 void LiveSession::begin_deform() {

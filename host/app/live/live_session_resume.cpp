@@ -12,10 +12,11 @@ void LiveSession::keep_operation() {
   operation.made_utc = utc_now();
   operation.ct_checksum = patient_->checksum;
   if (calibrated_here_)
-    operation.calibrated = {*camera_, *camera_from_sensor_, known_.camera_rms_px, known_.tracked_rms_px,
-                            calibrated_utc_};
-  if (tracker_from_patient_ && fre_mm_) operation.registered = {tracker_from_patient_->inverse(), *fre_mm_};
-  if (deformation_) operation.deformation = deformation_->field;
+    operation.calibrated = {*camera_,           *camera_from_sensor_, known_.camera_rms_px, known_.tracked_rms_px,
+                            known_.hand_eye_mm, calibrated_utc_};
+  if (tracker_from_patient_ && fre_mm_)
+    operation.registered = {tracker_from_patient_->inverse(), *fre_mm_, known_.target_mm};
+  if (deformation_) operation.deformation = {deformation_->field, deformation_->uncertainty_mm};
   const auto written = write_operation(settings_.out, operation);
   keeping_fault_ = written ? "" : "not kept: " + written.error().what;
 }
@@ -44,6 +45,7 @@ void LiveSession::resume() {
     camera_from_sensor_ = found->camera_from_sensor;
     known_.camera_rms_px = found->camera_rms_px;
     known_.tracked_rms_px = found->tracked_rms_px;
+    known_.hand_eye_mm = found->hand_eye_mm;
     calibrated_here_ = true;
     at(LiveStep::calibrate) = {true, when};
   }
@@ -52,11 +54,13 @@ void LiveSession::resume() {
     unconfirmed_ = true;
     tracker_from_patient_ = found->patient_from_tracker.inverse();
     fre_mm_ = known_.fre_mm = found->fre_mm;
+    known_.target_mm = found->target_mm;
     at(LiveStep::fiducials) = {true, fmt::format("{}, FRE {:.2f} mm", when, found->fre_mm)};
   }
   if (operation->deformation) {
     deformation_.emplace();
-    deformation_->field = *std::move(operation->deformation);
+    deformation_->field = operation->deformation->field;
+    deformation_->uncertainty_mm = operation->deformation->uncertainty_mm;
     at(LiveStep::deform) = {true, when};
     show_deformation();
   }

@@ -34,8 +34,11 @@ Result<Operation::Calibrated> read_calibrated(const fs::path& folder, const nloh
   if (!camera) return camera.error();
   const auto hand_eye = read_pose(folder / kHandEye);
   if (!hand_eye) return hand_eye.error();
-  return Operation::Calibrated{*camera, Transform<Camera, Sensor>::from_matrix(*hand_eye),
-                               figures.at("camera_rms_px").get<double>(), figures.at("tracked_rms_px").get<double>(),
+  return Operation::Calibrated{*camera,
+                               Transform<Camera, Sensor>::from_matrix(*hand_eye),
+                               figures.at("camera_rms_px").get<double>(),
+                               figures.at("tracked_rms_px").get<double>(),
+                               figures.at("hand_eye_mm").get<double>(),
                                figures.at("made_utc").get<std::string>()};
 }
 
@@ -60,17 +63,19 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
   if (const auto& found = operation.calibrated) {
     sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px},
                            {"tracked_rms_px", found->tracked_rms_px},
+                           {"hand_eye_mm", found->hand_eye_mm},
                            {"made_utc", found->made_utc}};
     files.push_back({folder / kCamera, camera_text(found->camera)});
     files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
   }
   if (const auto& found = operation.registered) {
-    sheet["registered"] = {{"fre_mm", found->fre_mm}};
+    sheet["registered"] = {{"fre_mm", found->fre_mm}, {"target_mm", found->target_mm}};
     files.push_back({folder / kRegistration, pose_text(found->patient_from_tracker.matrix())});
   }
   sheet["deformed"] = operation.deformation.has_value();
-  if (operation.deformation) {
-    if (auto written = write_field(folder / kField, *operation.deformation); !written) return written;
+  if (const auto& found = operation.deformation) {
+    if (found->uncertainty_mm) sheet["uncertainty_mm"] = *found->uncertainty_mm;
+    if (auto written = write_field(folder / kField, found->field); !written) return written;
   } else {
     fs::remove(folder / kField, ignored);  // export would take an old one for the present
   }
@@ -105,12 +110,15 @@ Result<Operation> read_operation(const fs::path& folder) {
       const auto matrix = read_pose(folder / kRegistration);
       if (!matrix) return matrix.error();
       out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix),
-                        sheet.at("registered").at("fre_mm").get<double>()};
+                        sheet.at("registered").at("fre_mm").get<double>(),
+                        sheet.at("registered").at("target_mm").get<double>()};
     }
     if (sheet.at("deformed").get<bool>()) {
       auto field = read_field(folder / kField);
       if (!field) return field.error();
-      out.deformation = *std::move(field);
+      out.deformation.emplace();
+      out.deformation->field = *std::move(field);
+      if (sheet.contains("uncertainty_mm")) out.deformation->uncertainty_mm = sheet.at("uncertainty_mm").get<double>();
     }
     return out;
   } catch (const nlohmann::json::exception& wrong) {

@@ -17,19 +17,24 @@ struct Operation {
   struct Calibrated {
     CameraModel camera;
     Transform<Camera, Sensor> camera_from_sensor;
-    double camera_rms_px = 0, tracked_rms_px = 0;
+    double camera_rms_px = 0, tracked_rms_px = 0, hand_eye_mm = 0;
     std::string made_utc;
   };
   /// By touched fiducials.
   struct Registered {
     Transform<Patient, Tracker> patient_from_tracker;
-    double fre_mm = 0;
+    double fre_mm = 0, target_mm = 0;
+  };
+  /// By views.
+  struct Deformed {
+    DisplacementField field;  ///< patient LPS, mm
+    std::optional<double> uncertainty_mm;
   };
   std::string ct_checksum;  ///< which CT it was of: another's registration is refused
   std::string made_utc;     ///< 2026-11-22T09:30:00Z
   std::optional<Calibrated> calibrated;
   std::optional<Registered> registered;
-  std::optional<DisplacementField> deformation;  ///< patient LPS, mm
+  std::optional<Deformed> deformation;
 };
 
 /// Of the voxels and where they lie.
