@@ -1,5 +1,9 @@
 #include "hw-sim/world/frame_camera.hpp"
 
+#include <sys/resource.h>
+#include <tbb/task_scheduler_observer.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -14,6 +18,18 @@ namespace {
 constexpr std::size_t kQueueFrames = 160;
 constexpr std::size_t kReadyFrames = 60;
 constexpr std::int64_t kListenNs = 20'000'000;
+
+/// Has those who trace a frame wait for whoever is to show it. The tracker's thread is not one of them.
+class PatientTracers : public tbb::task_scheduler_observer {
+ public:
+  ~PatientTracers() override { observe(false); }
+  void on_scheduler_entry(bool /*is_worker*/) override {
+    (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNice);
+  }
+
+ private:
+  static constexpr int kNice = 10;
+};
 
 }  // namespace
 
@@ -53,6 +69,9 @@ void FrameCamera::start(std::int64_t world_zero_ns) {
 }
 
 void FrameCamera::render(const std::stop_token& stop) {
+  PatientTracers patient;
+  if (settings_.drop_late) patient.observe(true);
+  std::int64_t tracing_ns = 0;
   const Transform<Marker, Tracker> marker_from_tracker = world_.tracker_from_marker().inverse();
   const Transform<Patient, Tracker> patient_from_tracker = world_.tracker_from_patient().inverse();
   for (std::uint64_t sequence = 0; sequence < frames_; ++sequence) {
@@ -61,12 +80,14 @@ void FrameCamera::render(const std::stop_token& stop) {
       changed_.wait(lock, stop, [&] { return queue_.size() < kQueueFrames; });
     }
     if (stop.stop_requested()) return;
-    if (settings_.drop_late && sequence + 1 < frames_ && is_past(sequence)) continue;
+    if (settings_.drop_late && sequence + 1 < frames_ && too_late_for(sequence, tracing_ns)) continue;
+    const std::int64_t began_ns = drivers::now().ns;
     const double world_s = static_cast<double>(sequence) / settings_.rate_hz;
     const Transform<Tracker, Camera> pose = world_.tracker_from_camera(world_s);
     Rendered rendered{sequence, world_.at_bench(world_s)
                                     ? laparoscope_.look_at_bench((marker_from_tracker * pose).inverse(), sequence)
                                     : laparoscope_.look_into_cavity((patient_from_tracker * pose).inverse(), sequence)};
+    tracing_ns = drivers::now().ns - began_ns;
     {
       const std::lock_guard lock(mutex_);
       queue_.push_back(std::move(rendered));
@@ -75,9 +96,9 @@ void FrameCamera::render(const std::stop_token& stop) {
   }
 }
 
-bool FrameCamera::is_past(std::uint64_t sequence) const {
+bool FrameCamera::too_late_for(std::uint64_t sequence, std::int64_t tracing_ns) const {
   const auto after_zero_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(sequence) / settings_.rate_hz);
-  return zero_ns_ != 0 && drivers::now().ns > zero_ns_ + after_zero_ns;
+  return zero_ns_ != 0 && drivers::now().ns + tracing_ns > zero_ns_ + after_zero_ns;
 }
 
 bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {

@@ -26,8 +26,10 @@ class FrameCamera {
     CameraModel lens;
     double rate_hz = 25;
     std::uint64_t seed = 1;
-    double delay_ms = 0;     ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
-    bool drop_late = false;  ///< frames that are not traced in time are left out, as by a camera; else they come late
+    double delay_ms = 0;  ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
+    /// Frames that cannot be traced before their exposure are left out, and whoever is to show them has the processor
+    /// first; else they come late.
+    bool drop_late = false;
     std::vector<Fault> faults;  ///< from the world's time 0 on
   };
 
@@ -56,8 +58,8 @@ class FrameCamera {
   void serve(const std::stop_token& stop);
   void serve_world(CameraScript& script, const std::stop_token& stop);
   void follow(CameraScript& script, std::int64_t until_ns);
-  /// Whether a frame that is not traced yet should have been exposed by now.
-  [[nodiscard]] bool is_past(std::uint64_t sequence) const;
+  /// Whether a frame is exposed before it could be traced, which takes so long.
+  [[nodiscard]] bool too_late_for(std::uint64_t sequence, std::int64_t tracing_ns) const;
   [[nodiscard]] bool take(Rendered& rendered, const std::stop_token& stop);
   [[nodiscard]] Picture picture_of(const Rendered& rendered, bool half_size);
 

@@ -133,27 +133,28 @@ Result<void> judge(const Options& options, LiveApp& app, nlohmann::json& json, V
     const bool deformed = shape == session.shapes() && session.deformation();
     return deformed ? session.deformation()->field.deformed_of(tumour_mm) : tumour_mm;
   };
-  const auto by_shape_mm =
-      logged_target_errors_mm(options.live.out, options.live.out / "truth", setup->camera, tumour_as_shown_mm);
-  if (!by_shape_mm) return by_shape_mm.error();
+  const auto by_shape =
+      logged_target_errors(options.live.out, options.live.out / "truth", setup->camera, tumour_as_shown_mm);
+  if (!by_shape) return by_shape.error();
   // What is on the screen at the end is judged.
-  const auto errors_mm = by_shape_mm->find(session.shapes());
-  if (errors_mm == by_shape_mm->end()) {
+  const auto last = by_shape->find(session.shapes());
+  if (last == by_shape->end()) {
     verdict.add(Grade::fail, "no frame bore an overlay");
     return {};
   }
+  const LoggedErrors& errors = last->second;
   constexpr double kPassMm = 3, kMarginalMm = 5;
-  const double p95_mm = percentile(errors_mm->second, 0.95);
-  json["target_error_mm_p50"] = percentile(errors_mm->second, 0.5);
+  const double p95_mm = percentile(errors.mm, 0.95);
+  json["target_error_mm_p50"] = percentile(errors.mm, 0.5);
   json["target_error_mm_p95"] = p95_mm;
-  json["target_error_mm_max"] = *std::max_element(errors_mm->second.begin(), errors_mm->second.end());
-  if (session.deformation() && errors_mm != by_shape_mm->begin())
-    json["target_error_before_deforming_mm_p50"] = percentile(std::prev(errors_mm)->second, 0.5);
-  verdict.add(
-      p95_mm <= kPassMm       ? Grade::pass
-      : p95_mm <= kMarginalMm ? Grade::marginal
-                              : Grade::fail,
-      fmt::format("the tumour's centre is within {:.2f} mm in 95 % of {} frames", p95_mm, errors_mm->second.size()));
+  json["target_error_mm_max"] = *std::max_element(errors.mm.begin(), errors.mm.end());
+  json["expected_error_mm_p50"] = percentile(errors.expected_mm, 0.5);
+  if (session.deformation() && last != by_shape->begin())
+    json["target_error_before_deforming_mm_p50"] = percentile(std::prev(last)->second.mm, 0.5);
+  verdict.add(p95_mm <= kPassMm       ? Grade::pass
+              : p95_mm <= kMarginalMm ? Grade::marginal
+                                      : Grade::fail,
+              fmt::format("the tumour's centre is within {:.2f} mm in 95 % of {} frames", p95_mm, errors.mm.size()));
   return {};
 }
 

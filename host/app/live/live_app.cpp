@@ -149,7 +149,8 @@ void LiveApp::draw() {
     while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
     facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
     if (log_) {
-      log_->add(sequence, age_ms, shown.strength, session_.shapes(),
+      const auto mark = session_.target_mark();
+      log_->add(sequence, age_ms, shown.strength, session_.shapes(), mark ? mark->rms_mm : 0,
                 shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
     }
   }

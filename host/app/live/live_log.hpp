@@ -21,8 +21,8 @@ class LiveLog {
  public:
   /// folder: made if need be.
   static Result<LiveLog> open(const std::filesystem::path& folder);
-  /// shape: LiveSession::shapes().
-  void add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape,
+  /// shape: LiveSession::shapes(); expected_mm: of the target, TargetMark::rms_mm.
+  void add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape, double expected_mm,
            const std::optional<Transform<Camera, Patient>>& camera_from_patient);
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// All written; an error where the disk was full.
@@ -33,10 +33,15 @@ class LiveLog {
   std::ofstream file_;
 };
 
+/// Of frames, one after the other.
+struct LoggedErrors {
+  std::vector<double> mm, expected_mm;
+};
+
 /// What a simulated operation's overlay was off by, against the truth in truth_folder: of each overlaid frame of the
-/// log, by the shape of the CT that was drawn, the distance of the tumour's centre, mm. camera: the lens it was drawn
-/// with; tumour_in_patient_mm: where the CT of a shape has it.
-Result<std::map<std::uint64_t, std::vector<double>>> logged_target_errors_mm(
+/// log, by the shape of the CT that was drawn, the distance of the tumour's centre, and what was expected of it, mm.
+/// camera: the lens it was drawn with; tumour_in_patient_mm: where the CT of a shape has it.
+Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
     const std::filesystem::path& log_folder, const std::filesystem::path& truth_folder, const CameraModel& camera,
     const std::function<Eigen::Vector3d(std::uint64_t shape)>& tumour_in_patient_mm);
 

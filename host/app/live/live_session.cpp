@@ -130,9 +130,12 @@ void LiveSession::take(const wire::VideoFrame& frame, HostTime exposed) {
 }
 
 void LiveSession::take(const wire::Birds& birds) {
-  if (!settings_.tip_in_pointer_mm) return;
+  const auto& setup = picture_.setup();
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name != settings_.pointer) continue;
+    if (bird.name == settings_.scope && setup && patient_) {
+      jitter_.push(birds.acquired, setup->camera_from_patient(bird.tracker_from_sensor) * target_in_patient_mm());
+    }
+    if (bird.name != settings_.pointer || !settings_.tip_in_pointer_mm) continue;
     const Eigen::Vector3d tip = bird.tracker_from_sensor * *settings_.tip_in_pointer_mm;
     tips_.emplace_back(birds.acquired, tip);
     while (birds.acquired - tips_.front().first > kTipWindow) tips_.pop_front();

@@ -16,6 +16,7 @@
 #include "host/app/live/guide_worker.hpp"
 #include "host/app/live/live_picture.hpp"
 #include "host/app/live/patient.hpp"
+#include "host/overlay/target_jitter.hpp"
 #include "host/registration/touch_detector.hpp"
 #include "host/registration/view_advice.hpp"
 #include "host/registration/view_registration.hpp"
@@ -73,6 +74,7 @@ struct CheckReading {
 /// Where the overlay has the target, and how far from there it may be.
 struct TargetMark {
   Eigen::Vector2d at_px;
+  double rms_mm = 0;                    ///< the error that is to be expected, as a length in space
   double radius_px = 0, radius_mm = 0;  ///< in the picture, it is within with a probability of 95 %, as far as counted
   bool motion_counted = false;          ///< whether that counts how the organ has moved since the CT
 };
@@ -134,8 +136,8 @@ class LiveSession {
   [[nodiscard]] DeformProgress deform_progress() const;
   [[nodiscard]] const std::optional<ViewRegistration>& deformation() const { return deformation_; }
   [[nodiscard]] std::optional<CheckReading> check() const;
-  /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the pose,
-  /// and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
+  /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the
+  /// tracker's noise, and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
   [[nodiscard]] std::optional<TargetMark> target_mark() const;
   [[nodiscard]] const PatientPlan* patient() const { return patient_.get(); }
   /// For threads that outlast the patient's stay here.
@@ -199,6 +201,7 @@ class LiveSession {
   std::vector<TouchedFiducial> touches_;
   std::optional<double> fre_mm_;
   LivePicture picture_;
+  TargetJitter jitter_;
 
   std::vector<KeptView> views_;
   std::optional<ViewRegistration> deformation_;

@@ -1,6 +1,7 @@
 // The part of the session that tells how far the overlay may be trusted.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "calibration/solve/point_error.hpp"
@@ -32,12 +33,15 @@ std::optional<TargetMark> LiveSession::target_mark() const {
   const Eigen::Vector3d target_mm = *camera_from_patient * as_shown_mm(target_in_patient_mm());
   const auto at_px = project(setup->camera, target_mm);
   if (!at_px) return std::nullopt;
-  const double pose_mm = std::sqrt(3.0) * picture_.frame()->info.pose.position_sigma_mm;  // it is given an axis
+  // A pose's own sigma is an axis's, and counts what the hand may have done since; the jitter counts the angles.
+  const double pose_mm =
+      std::max(std::sqrt(3.0) * picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm().value_or(0));
   const double deformation_mm = deformation_ ? deformation_->uncertainty_mm.value_or(0) : 0;
-  const double rms_mm = std::hypot(std::hypot(known_.target_mm, known_.hand_eye_mm), std::hypot(pose_mm, deformation_mm));
+  const double rms_mm =
+      std::hypot(std::hypot(known_.target_mm, known_.hand_eye_mm), std::hypot(pose_mm, deformation_mm));
   // Two of three axes show in the picture; 5.99 is the 95 % quantile of chi-square with two degrees of freedom.
   const double radius_mm = rms_mm * std::sqrt(5.99 / 3);
-  return TargetMark{*at_px, radius_mm * setup->camera.fx_px / target_mm.z(), radius_mm,
+  return TargetMark{*at_px, rms_mm, radius_mm * setup->camera.fx_px / target_mm.z(), radius_mm,
                     deformation_ && deformation_->uncertainty_mm};
 }
 
