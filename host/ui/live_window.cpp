@@ -35,7 +35,6 @@ void use_style(float scale) {
   style.WindowRounding = 0;
   style.FrameRounding = 3;
   style.WindowBorderSize = 0;
-  style.Colors[ImGuiCol_WindowBg] = ImVec4(0.09F, 0.10F, 0.11F, 1);
   style.ScaleAllSizes(scale);
 }
 
@@ -88,7 +87,7 @@ void LiveWindow::end_frame() {
   int wide = 0, high = 0;
   glfwGetFramebufferSize(window_, &wide, &high);
   glViewport(0, 0, wide, high);
-  glClearColor(0, 0, 0, 1);
+  glClearColor(0.09F, 0.10F, 0.11F, 1);
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glFinish();

@@ -200,5 +200,19 @@ TEST_F(LiveWindowPictures, TheOverlayRunsAndOnADenseScreenTheVideoHasStopped) {
   expect_looks("stopped-1920x1080-dense", session, HostTime{now.ns + 2'000'000'000});
 }
 
+TEST_F(LiveWindowPictures, AnEngineOnTheCardLeavesTheWindowItsOwnContext) {
+  const Scratch scratch;
+  ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1));
+  LiveSettings settings = operation_settings(scratch);
+  settings.engine = "gl";
+  LiveSession session(settings);
+  Hand hand(session);
+  begin(session, hand, 4);
+  ASSERT_EQ(session.engine_name().substr(0, 2), "gl") << session.fault();
+  const HostTime now = run_overlay(session);
+  ASSERT_TRUE(session.picture().at(now).overlaid) << session.picture().at(now).reason;
+  expect_looks("run-1920x1080", session, now);
+}
+
 }  // namespace
 }  // namespace birdseye::host

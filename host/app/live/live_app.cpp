@@ -192,6 +192,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (scripted_.clip) wishes.clip = scripted_.clip;
   if (scripted_.surface_in_front) wishes.surface_in_front = scripted_.surface_in_front;
   scripted_ = {};
+  key_waits_ = false;
   if (wishes.primary) session_.primary();
   if (wishes.next) session_.go_on();
   if (wishes.undo) session_.undo();
@@ -221,10 +222,14 @@ void LiveApp::grant(const PanelWishes& asked) {
 }
 
 Result<bool> LiveApp::follow_script() {
-  if (!script_ || !shot_.empty() || saving_.running()) return false;
+  // One after the other, as a hand would.
+  if (!script_ || key_waits_ || !shot_.empty() || saving_.running()) return false;
   const auto act = script_->next(session_, now());
   if (!act) return act.error();
-  if (!act->key.empty()) add_key(act->key, facts_, scripted_);
+  if (!act->key.empty()) {
+    add_key(act->key, facts_, scripted_);
+    key_waits_ = true;
+  }
   if (!act->shot.empty()) shot_ = act->shot;
   return act->end;
 }

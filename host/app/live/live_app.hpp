@@ -63,6 +63,7 @@ class LiveApp {
   LiveFigures figures_;
   PanelFacts facts_;
   PanelWishes scripted_;
+  bool key_waits_ = false;  ///< scripted_ has not been granted yet
   TransferEditor editor_;
   std::optional<HuHistogram> histogram_;
   std::optional<InsetView> inset_;

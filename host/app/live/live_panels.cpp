@@ -15,8 +15,10 @@ namespace {
 constexpr float kSidePx = 330, kStripPx = 118;
 const ImVec4 kGood(0.45F, 0.80F, 0.45F, 1), kWarn(0.96F, 0.74F, 0.30F, 1), kBad(0.96F, 0.38F, 0.34F, 1);
 const ImVec4 kQuiet(0.62F, 0.66F, 0.70F, 1), kText(0.92F, 0.93F, 0.94F, 1);
+// Without a background of its own: the window's is drawn at once, which a driver in software is glad of.
 constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
-                                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus;
+                                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
+                                    ImGuiWindowFlags_NoBackground;
 
 struct Layout {
   float wide, high, side, strip, scale;

@@ -8,6 +8,7 @@
 
 #include "host/app/live/operation.hpp"
 #include "host/registration/point_matching.hpp"
+#include "host/render/engine_thread.hpp"
 
 namespace birdseye::host {
 
@@ -18,6 +19,13 @@ constexpr std::size_t kFewestFiducials = 3;
 constexpr const char* kUnregistered = "the patient is not registered yet";
 constexpr const char* kUnconfirmed =
     "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space";
+
+/// On a thread of its own: the window's OpenGL stays the window's.
+Result<std::unique_ptr<Engine>> engine_of(const std::string& name, const PatientPlan& patient,
+                                          const std::optional<TransferFunction>& transfer) {
+  if (!transfer) return Error{Errc::bad_value, "there is no transfer function to draw the CT by"};
+  return make_on_own_thread([&] { return make_engine(name, patient.shown, *transfer); });
+}
 
 }  // namespace
 
@@ -40,19 +48,25 @@ LiveSession::LiveSession(LiveSettings settings) : settings_(std::move(settings))
 void LiveSession::load(const PatientFiles& files) {
   if (deforming()) return;  // it reads the patient that there is
   settings_.patient = files;
-  loading_.start([files](const std::stop_token&, const auto& say) {
+  loading_.start([files, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto& say) {
     say("reading the CT");
-    return read_patient(files);
+    auto read = read_patient(files);
+    if (!read) return Result<Loaded>(read.error());
+    auto patient = std::make_shared<const PatientPlan>(*std::move(read));
+    auto engine = engine_of(name, *patient, transfer);
+    return Result<Loaded>(Loaded{std::move(patient), std::move(engine)});
   });
 }
 
 void LiveSession::tick() {
   if (auto loaded = loading_.take()) {
     if (*loaded) {
-      patient_ = std::make_shared<const PatientPlan>(**std::move(loaded));
+      picture_.set_engine(nullptr);
+      engine_.reset();
+      patient_ = std::move((*loaded)->patient);
       ++shapes_;
-      fault_.clear();
-      make_engine_for(*patient_);
+      if (transfer_) fault_.clear();
+      use(std::move((*loaded)->engine));
       fit();
       resume();
     } else {
@@ -65,11 +79,10 @@ void LiveSession::tick() {
   }
 }
 
-void LiveSession::make_engine_for(const PatientPlan& plan) {
+void LiveSession::use(Result<std::unique_ptr<Engine>> engine) {
   picture_.set_engine(nullptr);
   engine_.reset();
-  if (!transfer_) return;
-  auto engine = make_engine(settings_.engine, plan.shown, *transfer_);
+  if (!transfer_) return;  // which is said already
   if (!engine) {
     fault_ = engine.error().what;
     return;
@@ -81,7 +94,7 @@ void LiveSession::make_engine_for(const PatientPlan& plan) {
 
 void LiveSession::set_transfer(const TransferFunction& transfer) {
   transfer_ = transfer;
-  if (patient_) make_engine_for(*patient_);
+  if (patient_) use(engine_of(settings_.engine, *patient_, transfer_));
   picture_.redraw();
 }
 

@@ -170,7 +170,7 @@ class LiveSession {
   void expect_registration_error(std::span<const Eigen::Vector3d> touched_in_patient_mm, double fre_mm);
   [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
   [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
-  void make_engine_for(const PatientPlan& plan);
+  void use(Result<std::unique_ptr<Engine>> engine);
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
 
   LiveSettings settings_;
@@ -183,7 +183,11 @@ class LiveSession {
   std::string link_words_, appliance_says_, fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
 
-  Background<Result<PatientPlan>> loading_;
+  struct Loaded {
+    std::shared_ptr<const PatientPlan> patient;
+    Result<std::unique_ptr<Engine>> engine;  ///< of what is shown
+  };
+  Background<Result<Loaded>> loading_;
   std::shared_ptr<const PatientPlan> patient_;
   std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_;

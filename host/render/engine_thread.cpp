@@ -1,0 +1,92 @@
+#include "host/render/engine_thread.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace birdseye::host {
+
+namespace {
+
+/// Does one thing after the other, each while its asker waits.
+class Worker {
+ public:
+  Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+  void run(const std::function<void()>& what) {
+    const std::lock_guard one_asker(asking_);
+    std::unique_lock lock(mutex_);
+    todo_ = &what;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return todo_ == nullptr; });
+  }
+
+ private:
+  void work(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (changed_.wait(lock, stop, [this] { return todo_ != nullptr; })) {
+      (*todo_)();
+      todo_ = nullptr;
+      changed_.notify_all();
+    }
+  }
+
+  std::mutex asking_, mutex_;
+  std::condition_variable_any changed_;
+  const std::function<void()>* todo_ = nullptr;
+  std::jthread thread_;
+};
+
+class EngineThread final : public Engine {
+ public:
+  Result<void> make(const std::function<Result<std::unique_ptr<Engine>>()>& make) {
+    std::optional<Error> fault;
+    worker_.run([&] {
+      auto made = make();
+      if (made) {
+        engine_ = *std::move(made);
+      } else {
+        fault = made.error();
+      }
+    });
+    return fault ? Result<void>(*fault) : Result<void>();
+  }
+  ~EngineThread() override {
+    worker_.run([this] { engine_.reset(); });
+  }
+  EngineThread() = default;
+  EngineThread(const EngineThread&) = delete;
+  EngineThread& operator=(const EngineThread&) = delete;
+
+  void deform(const DisplacementField& field) override {
+    worker_.run([&] { engine_->deform(field); });
+  }
+  void undeform() override {
+    worker_.run([this] { engine_->undeform(); });
+  }
+  ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
+                   const RenderSettings& settings) override {
+    ImageRgba out;
+    worker_.run([&] { out = engine_->render(camera, camera_from_patient, settings); });
+    return out;
+  }
+  [[nodiscard]] std::string name() const override { return engine_->name(); }
+  [[nodiscard]] std::string fault() const override { return engine_->fault(); }
+  [[nodiscard]] std::size_t bytes() const override { return engine_->bytes(); }
+
+ private:
+  std::unique_ptr<Engine> engine_;
+  Worker worker_;  // last: it ends before what it works on
+};
+
+}  // namespace
+
+Result<std::unique_ptr<Engine>> make_on_own_thread(std::function<Result<std::unique_ptr<Engine>>()> make) {
+  auto made = std::make_unique<EngineThread>();
+  if (auto fault = made->make(make); !fault) return fault.error();
+  return std::unique_ptr<Engine>(std::move(made));
+}
+
+}  // namespace birdseye::host
