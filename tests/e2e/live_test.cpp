@@ -19,23 +19,30 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
   const Scratch scratch;
   const testing::Display display("1280x720");
   const std::string out = (scratch / "live").string();
-  // On a machine that is too slow at one moment there is rightly no overlay then.
+  // On a machine that is too slow at one moment there is rightly no overlay then: no view is kept, no snapshot bears
+  // one.
   std::string several;
   for (int i = 0; i < 6; ++i) several += "key s\nsleep 0.7\n";
-  const std::string script = scratch.file(
-      "script.txt", "wait connect 90\nwait calibrate 120\nshot " + out + "/calibrated.png\nwait fiducials 60\nshot " +
-                        out + "/registered.png\nkey enter\nkey enter\nkey space\nwait run 2\nsleep 6\n" + several +
-                        "end\n");
+  const std::string script =
+      scratch.file("script.txt", "wait connect 90\nwait calibrate 120\nshot " + out + "/calibrated.png\n" +
+                                     "wait fiducials 60\nshot " + out + "/registered.png\n" +
+                                     "press space 1.4 views 60\nkey enter\nkey space\nwait deform 180\nshot " + out +
+                                     "/deformed.png\nkey enter\nkey space\nwait run 2\nsleep 6\n" + several + "end\n");
   const auto result = run("birdseye",
-                          "live --simulate --look-s 60 --out " + out + " --script " + script + " --json " +
+                          "live --simulate --look-s 240 --out " + out + " --script " + script + " --json " +
                               (scratch / "live.json").string(),
                           display.env());
   ASSERT_EQ(result.code, 0) << result.output;
   const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "live.json"));
-  EXPECT_EQ(json["verdict"], "pass") << json;
-  EXPECT_LE(json["target_error_mm_p95"].get<double>(), 3.0);
+  EXPECT_NE(json["verdict"], "fail") << json;
+  // The liver has moved by 8 mm since the CT; five views of one side of it bring the tumour most of the way back.
+  const auto before_mm = json["target_error_before_deforming_mm_p50"].get<double>();
+  EXPECT_NEAR(before_mm, 7.5, 1.5);
+  EXPECT_LE(json["target_error_mm_p50"].get<double>(), 0.5 * before_mm) << json;
+  EXPECT_LE(json["target_error_mm_p95"].get<double>(), 5.0) << json;
+  EXPECT_LE(json["target_error_mm_p50"].get<double>(), 1.6 * json["expected_error_mm_p50"].get<double>()) << json;
   EXPECT_GT(json["frames_overlaid"].get<int>(), 0);
-  for (const char* name : {"calibrated.png", "registered.png", "snapshot-001.png"}) {
+  for (const char* name : {"calibrated.png", "registered.png", "deformed.png", "snapshot-001.png"}) {
     const cv::Mat picture = cv::imread(out + "/" + name);
     EXPECT_EQ(picture.cols, 1280) << name;
     EXPECT_EQ(picture.rows, 720) << name;

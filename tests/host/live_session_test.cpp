@@ -359,9 +359,30 @@ TEST(LiveScript, IsFollowedLineByLine) {
   EXPECT_NE(late.error().what.find("s.txt:5: connect was not done within 2 s"), std::string::npos) << late.error().what;
 }
 
+TEST(LiveScript, PressesAKeyUntilAStepIsDone) {
+  const Scratch scratch;
+  auto script = LiveScript::read(scratch.file("s.txt", "press space 0.5 connect 2\nend\n"));
+  ASSERT_TRUE(script) << script.error().what;
+  LiveSession session{LiveSettings{}};
+  const auto key_at = [&](std::int64_t ms) { return script->next(session, HostTime{ms * kMs})->key; };
+  EXPECT_EQ(key_at(0), "space");
+  EXPECT_EQ(key_at(400), "");
+  EXPECT_EQ(key_at(500), "space");
+  EXPECT_EQ(key_at(1000), "space");
+  auto late = *script;
+  EXPECT_FALSE(late.next(session, HostTime{2000 * kMs}));
+  wire::Health health;
+  health.state = "ready";
+  session.take(health, HostTime{0}, std::nullopt);
+  session.set_link(true, "connected");
+  EXPECT_EQ(key_at(1600), "");
+  EXPECT_TRUE(script->next(session, HostTime{1601 * kMs})->end);
+}
+
 TEST(LiveScript, NamesALineThatIsNone) {
   const Scratch scratch;
-  for (const char* text : {"wait connect\n", "wait nothing 3\n", "jump 3\n", "key\n", "sleep -1\n"}) {
+  for (const char* text :
+       {"wait connect\n", "wait nothing 3\n", "jump 3\n", "key\n", "sleep -1\n", "press space 1 views\n"}) {
     const auto script = LiveScript::read(scratch.file("s.txt", std::string("end\n") + text));
     ASSERT_FALSE(script) << text;
     EXPECT_NE(script.error().what.find("s.txt:2: "), std::string::npos) << script.error().what;

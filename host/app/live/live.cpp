@@ -213,6 +213,7 @@ Result<ExitCode> run(Options& options) {
 
 void add_live(CLI::App& app, CommandStatus& status) {
   auto options = std::make_shared<Options>();
+  options->cart.deformation_mm = 8;
   options->cart.dwell_s = 0.7;
   options->cart.pause_s = 8;
   options->cart.look_s = 3600;
@@ -231,7 +232,7 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--seed", options->cart.seed, "with --simulate: another patient and other noise");
   command
       ->add_option("--deformation-mm", options->cart.deformation_mm,
-                   "with --simulate: how far the liver has moved since the CT, where it has moved most (default 0)")
+                   "with --simulate: how far the liver has moved since the CT, where it has moved most (default 8)")
       ->check(CLI::Range(0.0, 30.0));
   command->add_option("--faults", options->cart.faults, "with --simulate: a script of faults")->type_name("FILE");
   command

@@ -29,15 +29,18 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
     Line line;
     line.number = number;
     if (!(words >> line.verb)) continue;
-    const bool timed = line.verb == "wait" || line.verb == "sleep";
-    bool sound = timed || line.verb == "key" || line.verb == "shot" || line.verb == "end";
-    if (line.verb != "sleep" && line.verb != "end") sound = sound && static_cast<bool>(words >> line.what);
-    if (timed) sound = sound && static_cast<bool>(words >> line.seconds) && line.seconds >= 0;
-    if (line.verb == "wait") sound = sound && step_of(line.what).has_value();
+    bool sound = false;
+    if (line.verb == "wait") sound = static_cast<bool>(words >> line.step >> line.seconds);
+    if (line.verb == "press")
+      sound = static_cast<bool>(words >> line.what >> line.every_s >> line.step >> line.seconds);
+    if (line.verb == "sleep") sound = static_cast<bool>(words >> line.seconds);
+    if (line.verb == "key" || line.verb == "shot") sound = static_cast<bool>(words >> line.what);
+    if (line.verb == "end") sound = true;
+    sound = sound && line.seconds >= 0 && line.every_s >= 0 && (line.step.empty() || step_of(line.step));
     if (!sound) {
       return Error{Errc::bad_format,
-                   fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"sleep SECONDS\", \"key NAME\", \"shot FILE\" or "
-                               "\"end\"",
+                   fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"press NAME SECONDS STEP SECONDS\", \"sleep "
+                               "SECONDS\", \"key NAME\", \"shot FILE\" or \"end\"",
                                path.string(), number)};
     }
     script.lines_.push_back(std::move(line));
@@ -50,10 +53,18 @@ Result<LiveScript::Act> LiveScript::next(const LiveSession& session, HostTime no
   if (!since_) since_ = now;
   const Line& line = lines_.front();
   const double waited_s = Duration{now.ns - since_->ns}.seconds();
-  if (line.verb == "wait" && !session.note(*step_of(line.what)).done) {
-    if (waited_s < line.seconds) return Act{};
-    return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.what,
-                                            line.seconds, session.note(*step_of(line.what)).line)};
+  if (!line.step.empty()) {
+    const StepNote& note = session.note(*step_of(line.step));
+    if (!note.done && waited_s >= line.seconds) {
+      return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.step,
+                                              line.seconds, note.line)};
+    }
+    const bool due = line.verb == "press" && (!pressed_ || Duration{now.ns - pressed_->ns}.seconds() >= line.every_s);
+    if (!note.done && due) {
+      pressed_ = now;
+      return Act{line.what, {}, false};
+    }
+    if (!note.done) return Act{};
   }
   if (line.verb == "sleep" && waited_s < line.seconds) return Act{};
   Act act;
@@ -62,6 +73,7 @@ Result<LiveScript::Act> LiveScript::next(const LiveSession& session, HostTime no
   act.end = line.verb == "end";
   lines_.pop_front();
   since_.reset();
+  pressed_.reset();
   return act;
 }
 

@@ -12,10 +12,11 @@
 namespace birdseye::host {
 
 /// Keys pressed and pictures taken without a hand: a line each of
-///   wait STEP SECONDS   until that step is done; fails after so long
+///   wait STEP SECONDS                 until that step is done; fails after so long
+///   press NAME SECONDS STEP SECONDS   that key every so often until that step is done; fails after so long
 ///   sleep SECONDS
-///   key NAME            as draw_panels' keys: space, enter, backspace, a letter
-///   shot FILE           the window as a PNG
+///   key NAME                          as draw_panels' keys: space, enter, backspace, a letter
+///   shot FILE                         the window as a PNG
 ///   end
 /// and remarks after #.
 class LiveScript {
@@ -35,11 +36,13 @@ class LiveScript {
   struct Line {
     int number = 0;
     std::string verb, what;
-    double seconds = 0;
+    std::string step;  ///< that is waited for
+    double seconds = 0, every_s = 0;
   };
   std::string name_;
   std::deque<Line> lines_;
-  std::optional<HostTime> since_;  ///< when the first line's turn came
+  std::optional<HostTime> since_;    ///< when the first line's turn came
+  std::optional<HostTime> pressed_;  ///< when its key was last pressed
 };
 
 }  // namespace birdseye::host
