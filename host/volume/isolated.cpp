@@ -66,9 +66,10 @@ Result<IsolatedOutcome> run_isolated(
     run_copy(fds[1], work);
   }
   ::close(fds[1]);
+  std::vector<std::uint8_t> chunk(1U << 20U);
+  (void)::fcntl(fds[0], F_SETPIPE_SZ, static_cast<int>(chunk.size()));  // a volume is hundreds of megabytes
   IsolatedOutcome outcome;
   const auto deadline = Clock::now() + std::chrono::nanoseconds(within.ns);
-  std::vector<std::uint8_t> chunk(1U << 20U);
   bool in_time = true;
   for (;;) {
     const auto left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();

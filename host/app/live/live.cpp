@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -116,6 +117,8 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
                       {"engine", session.engine_name()}};
   if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
+  if (figures.window_s) json["window_s"] = *figures.window_s;
+  if (figures.ct_s) json["ct_s"] = *figures.ct_s;
   return json;
 }
 
@@ -159,6 +162,9 @@ Result<void> judge(const Options& options, LiveApp& app, nlohmann::json& json, V
 }
 
 Result<ExitCode> run(Options& options) {
+  const HostTime asked{
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+          .count()};
   if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<LiveScript> script;
   if (!options.script.empty()) {
@@ -191,7 +197,7 @@ Result<ExitCode> run(Options& options) {
   }
   LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script), std::move(log),
               std::move(publisher));
-  const auto ran = app.run();
+  const auto ran = app.run(asked);
   nlohmann::json json = json_of(app.figures(), app.session());
   Verdict verdict;
   if (!ran) verdict.add(Grade::fail, ran.error().what);

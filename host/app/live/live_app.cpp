@@ -48,9 +48,10 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
   session_.picture().set_render(usual_settings());
 }
 
-Result<void> LiveApp::run() {
+Result<void> LiveApp::run(HostTime asked) {
   note_interrupts();
   const HostTime began = now();
+  asked_ = asked;
   while (!window_->closed() && !interrupted()) {
     take_events();
     if (auto said = saving_.take()) facts_.said = *std::move(said);
@@ -101,6 +102,7 @@ void LiveApp::note_patient() {
   facts_.histogram = &*histogram_;
   inset_.emplace(session_.patient()->shown);
   if (session_.transfer()) editor_.set_points(session_.transfer()->points());
+  figures_.ct_s = Duration{now().ns - asked_.ns}.seconds();
 }
 
 /// Some times a second, between frames: it is no part of what must be live.
@@ -131,6 +133,7 @@ void LiveApp::draw() {
   }
   window_->swap();
   const HostTime swapped = now();
+  if (!figures_.window_s) figures_.window_s = Duration{swapped.ns - asked_.ns}.seconds();
   to_draw_ = Duration{swapped.ns - began.ns};
   // Of video that has stopped the age grows: it is said once.
   if (publisher_ && shown.any)

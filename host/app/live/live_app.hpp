@@ -18,6 +18,8 @@ namespace birdseye::host {
 
 /// What a run of the window came to.
 struct LiveFigures {
+  /// From when the window was asked for: until it showed something, and until the CT could be drawn.
+  std::optional<double> window_s, ct_s;
   std::uint64_t frames = 0, frames_skipped = 0, frames_overlaid = 0;
   double seconds = 0;
   AgeStrip ages;
@@ -35,7 +37,8 @@ class LiveApp {
           std::unique_ptr<Publisher> publisher);
 
   /// Until the window is closed, the program is interrupted or the script ends.
-  Result<void> run();
+  /// asked: when the program was started.
+  Result<void> run(HostTime asked);
   [[nodiscard]] const LiveFigures& figures() const { return figures_; }
   [[nodiscard]] LiveSession& session() { return session_; }
   [[nodiscard]] std::optional<LiveLog>& log() { return log_; }
@@ -62,6 +65,7 @@ class LiveApp {
   std::unique_ptr<Publisher> publisher_;
   LiveFigures figures_;
   PanelFacts facts_;
+  HostTime asked_;
   PanelWishes scripted_;
   bool key_waits_ = false;  ///< scripted_ has not been granted yet
   TransferEditor editor_;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <future>
 
 #include "host/app/live/operation.hpp"
 #include "host/registration/point_matching.hpp"
@@ -52,8 +53,12 @@ void LiveSession::load(const PatientFiles& files) {
     say("reading the CT");
     auto read = read_patient(files);
     if (!read) return Result<Loaded>(read.error());
-    auto patient = std::make_shared<const PatientPlan>(*std::move(read));
+    const auto patient = std::make_shared<PatientPlan>(*std::move(read));
+    std::future<std::vector<Eigen::Vector3d>> found;
+    if (files.fiducials.empty())
+      found = std::async(std::launch::async, [&patient] { return find_fiducials(patient->ct); });
     auto engine = engine_of(name, *patient, transfer);
+    if (found.valid()) patient->markers_in_patient_mm = found.get();
     return Result<Loaded>(Loaded{std::move(patient), std::move(engine)});
   });
 }

@@ -49,9 +49,6 @@ Result<PatientPlan> read_patient(const PatientFiles& files) {
     auto points = read_points(files.fiducials);
     if (!points) return points.error();
     plan.markers_in_patient_mm = *std::move(points);
-  } else {
-    for (const MarkerFit& marker : find_markers(plan.ct).markers)
-      plan.markers_in_patient_mm.push_back(marker.centre_in_patient_mm);
   }
   if (!files.landmarks.empty()) {
     const auto places = read_places(files.landmarks);
@@ -59,6 +56,12 @@ Result<PatientPlan> read_patient(const PatientFiles& files) {
     for (const auto& [name, place] : *places) plan.landmarks.push_back({name, place});
   }
   return plan;
+}
+
+std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct) {
+  std::vector<Eigen::Vector3d> places_mm;
+  for (const MarkerFit& marker : find_markers(ct).markers) places_mm.push_back(marker.centre_in_patient_mm);
+  return places_mm;
 }
 
 }  // namespace birdseye::host

@@ -35,7 +35,9 @@ struct PatientPlan {
   std::vector<NamedPoint> landmarks;
 };
 
-/// An error names the file.
+/// An error names the file. Where no fiducials are given, markers_in_patient_mm is left to find_fiducials.
 Result<PatientPlan> read_patient(const PatientFiles& files);
+/// The markers that the CT shows, the brightest first.
+std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct);
 
 }  // namespace birdseye::host
