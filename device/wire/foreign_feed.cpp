@@ -186,7 +186,7 @@ PoseAnswer ForeignFeed::pose_of(const Waiting& waiting, const Scope& scope) cons
     refused.reason = scope.why;
     return refused;
   }
-  if (waiting.frame.info.acquired - scope.tool->still_since > kFrozen) {
+  if (scope.tool->last && waiting.frame.info.acquired - scope.tool->still_since > kFrozen) {
     refused.reason = frozen_words(*scope.name);
     return refused;
   }

@@ -7,7 +7,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr Duration kGap = Duration::from_ms(60);
+constexpr Duration kGap = Duration::from_ms(130);
 constexpr std::size_t kFewest = 10, kMost = 64;
 
 }  // namespace

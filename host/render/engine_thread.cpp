@@ -1,6 +1,7 @@
 #include "host/render/engine_thread.hpp"
 
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -10,7 +11,7 @@ namespace birdseye::host {
 
 namespace {
 
-/// Does one thing after the other, each while its asker waits.
+/// Does one thing after the other, each while its asker waits, who gets what it throws.
 class Worker {
  public:
   Worker() : thread_([this](const std::stop_token& stop) { work(stop); }) {}
@@ -21,13 +22,18 @@ class Worker {
     todo_ = &what;
     changed_.notify_all();
     changed_.wait(lock, [this] { return todo_ == nullptr; });
+    if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   }
 
  private:
   void work(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (changed_.wait(lock, stop, [this] { return todo_ != nullptr; })) {
-      (*todo_)();
+      try {
+        (*todo_)();
+      } catch (...) {
+        thrown_ = std::current_exception();
+      }
       todo_ = nullptr;
       changed_.notify_all();
     }
@@ -36,6 +42,7 @@ class Worker {
   std::mutex asking_, mutex_;
   std::condition_variable_any changed_;
   const std::function<void()>* todo_ = nullptr;
+  std::exception_ptr thrown_;
   std::jthread thread_;
 };
 

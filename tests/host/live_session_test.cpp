@@ -90,10 +90,10 @@ TEST(LiveSession, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
   const CameraModel& camera = session.picture().setup()->camera;
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_FALSE(mark->motion_counted);
-  // By hand: the fiducials, hand-eye's 0.5 mm of the record, the pose's 0.2 mm an axis.
+  // By hand: the fiducials, hand-eye's 0.5 mm of the record, across the line of sight, the pose's 0.2 mm an axis.
   const auto localisation = calibration::localisation_error_of(*session.fre_mm(), 4);
   const double fiducials_mm = calibration::TargetError(kFiducials, localisation.upper95_mm).rms_mm(tumour_mm);
-  const double rms_mm = std::sqrt(fiducials_mm * fiducials_mm + 0.25 + 3 * 0.04);
+  const double rms_mm = std::sqrt(fiducials_mm * fiducials_mm + 1.5 * 0.25 + 3 * 0.04);
   EXPECT_NEAR(mark->radius_mm, rms_mm * std::sqrt(5.99 / 3), 1e-3);
   EXPECT_NEAR(mark->radius_px, mark->radius_mm * camera.fx_px / 100, 0.1);
 }
@@ -105,7 +105,7 @@ TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   Operation kept;
   kept.ct_checksum = read_patient(again.patient)->checksum;
   kept.made_utc = "2026-11-22T10:00:00Z";
-  kept.registered = {kTrackerFromPatient.inverse(), 0.3, 1.2};
+  kept.registered = {kTrackerFromPatient.inverse(), 0.3, kFiducials};
   // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
   DisplacementField field;
   field.size = {2, 2, 2};
@@ -129,13 +129,22 @@ TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const CameraModel& camera = session.picture().setup()->camera;
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_TRUE(mark->motion_counted);
-  EXPECT_NEAR(mark->radius_mm, std::sqrt((1.2 * 1.2 + 0.25 + 0.7 * 0.7) * 5.99 / 3), 1e-3);
+  const double fiducials_mm =
+      calibration::TargetError(kFiducials, calibration::localisation_error_of(0.3, 4).upper95_mm).rms_mm({30, 30, 20});
+  EXPECT_NEAR(mark->radius_mm, std::sqrt((fiducials_mm * fiducials_mm + 1.5 * 0.25 + 0.7 * 0.7) * 5.99 / 3), 1e-3);
   Hand hand(session);
   hand.rest_at({34, 30, 21}, 30);
   const auto reading = session.check();
   ASSERT_TRUE(reading.has_value());
   EXPECT_EQ(reading->nearest, "tumour");
   EXPECT_NEAR(reading->distance_mm, 1, 0.1);
+  // By another registration the deformation means nothing.
+  session.go_to(LiveStep::fiducials);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(session.picture().setup().has_value()) << session.registration_fault();
+  EXPECT_FALSE(session.deformation().has_value());
+  EXPECT_FALSE(session.note(LiveStep::deform).done);
 }
 
 TEST(LiveSession, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {
@@ -223,7 +232,7 @@ TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
     by_board.camera = {768, 576, 500, 500, 384, 288};
     by_board.made_utc = record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z";  // the record's is 09:30
     kept.calibrated = by_board;
-    kept.registered = {kTrackerFromPatient.inverse(), 0.3, 0.5};
+    kept.registered = {kTrackerFromPatient.inverse(), 0.3, kFiducials};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
     LiveSession session(again);
     load(session);

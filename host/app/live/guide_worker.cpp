@@ -107,7 +107,7 @@ void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {
     const std::lock_guard lock(mutex_);
     state_ = guide.state();
   }
-  {
+  if (!fault) {
     const std::lock_guard lock(mutex_);
     state_.collecting = false;
     state_.next = "that is enough, and is being worked out; fiducials may be touched meanwhile";

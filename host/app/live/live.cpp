@@ -151,7 +151,7 @@ Result<void> judge(const Options& options, LiveApp& app, nlohmann::json& json, V
   json["target_error_mm_p50"] = percentile(errors.mm, 0.5);
   json["target_error_mm_p95"] = p95_mm;
   json["target_error_mm_max"] = *std::max_element(errors.mm.begin(), errors.mm.end());
-  json["expected_error_mm_p50"] = percentile(errors.expected_mm, 0.5);
+  if (!errors.expected_mm.empty()) json["expected_error_mm_p50"] = percentile(errors.expected_mm, 0.5);
   if (session.deformation() && last != by_shape->begin())
     json["target_error_before_deforming_mm_p50"] = percentile(std::prev(last)->second.mm, 0.5);
   verdict.add(p95_mm <= kPassMm       ? Grade::pass

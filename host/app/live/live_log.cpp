@@ -60,7 +60,7 @@ Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
                                      tumour_in_patient_mm(shape));
     if (!error) return Error{Errc::bad_format, fmt::format("the truth lacks frame {}, which was overlaid", sequence)};
     errors[shape].mm.push_back(error->target_mm);
-    errors[shape].expected_mm.push_back(expected_mm);
+    if (expected_mm > 0) errors[shape].expected_mm.push_back(expected_mm);
   }
   return errors;
 }

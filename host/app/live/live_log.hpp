@@ -21,7 +21,7 @@ class LiveLog {
  public:
   /// folder: made if need be.
   static Result<LiveLog> open(const std::filesystem::path& folder);
-  /// shape: LiveSession::shapes(); expected_mm: of the target, TargetMark::rms_mm.
+  /// shape: LiveSession::shapes(); expected_mm: of the target, TargetMark::rms_mm; 0 where it is out of view.
   void add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape, double expected_mm,
            const std::optional<Transform<Camera, Patient>>& camera_from_patient);
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
@@ -35,7 +35,7 @@ class LiveLog {
 
 /// Of frames, one after the other.
 struct LoggedErrors {
-  std::vector<double> mm, expected_mm;
+  std::vector<double> mm, expected_mm;  ///< what was expected only of those that had the target in view
 };
 
 /// What a simulated operation's overlay was off by, against the truth in truth_folder: of each overlaid frame of the

@@ -49,6 +49,7 @@ LiveSession::LiveSession(LiveSettings settings) : settings_(std::move(settings))
 void LiveSession::load(const PatientFiles& files) {
   if (deforming()) return;  // it reads the patient that there is
   settings_.patient = files;
+  transfer_is_newer_ = false;
   loading_.start([files, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto& say) {
     say("reading the CT");
     auto read = read_patient(files);
@@ -71,7 +72,7 @@ void LiveSession::tick() {
       patient_ = std::move((*loaded)->patient);
       ++shapes_;
       if (transfer_) fault_.clear();
-      use(std::move((*loaded)->engine));
+      use(transfer_is_newer_ ? engine_of(settings_.engine, *patient_, transfer_) : std::move((*loaded)->engine));
       fit();
       resume();
     } else {
@@ -99,6 +100,9 @@ void LiveSession::use(Result<std::unique_ptr<Engine>> engine) {
 
 void LiveSession::set_transfer(const TransferFunction& transfer) {
   transfer_ = transfer;
+  transfer_is_newer_ = true;
+  picture_.set_engine(nullptr);
+  engine_.reset();  // before there is another: they may be large
   if (patient_) use(engine_of(settings_.engine, *patient_, transfer_));
   picture_.redraw();
 }
@@ -159,7 +163,8 @@ void LiveSession::take(const wire::Birds& birds) {
     while (birds.acquired - tips_.front().first > kTipWindow) tips_.pop_front();
     const auto rested = touch_detector_.push(birds.acquired, tip);
     // The hand need not wait for the arithmetic.
-    const bool being_worked_out = guide_ && !guide_->state().collecting;
+    const bool being_worked_out =
+        step_ == LiveStep::calibrate && !unconfirmed_ && guide_ && !guide_->state().collecting;
     if (rested && (step_ == LiveStep::fiducials || being_worked_out)) add_touch(*rested);
   }
 }
@@ -178,6 +183,8 @@ void LiveSession::adopt(const calibration::CalibrationRecord& record) {
   if (!record.lens || !record.hand_eye) return;
   if (calibrated_here_ && record.hand_eye->provenance.made_utc <= calibrated_utc_) return;
   calibrated_here_ = false;
+  if (camera_ && record.hand_eye->provenance.made_utc != calibrated_utc_)
+    forget_deformation("the scope was calibrated anew: keep views again");
   calibrated_utc_ = record.hand_eye->provenance.made_utc;
   camera_ = record.lens->camera;
   camera_from_sensor_ = record.hand_eye->camera_from_sensor;
@@ -220,6 +227,7 @@ void LiveSession::finish_guide(Result<GuidedCalibration> found) {
     note.line = "the verdict is fail; " + (found->verdict.reasons.empty() ? "" : found->verdict.reasons.front());
     return;
   }
+  forget_deformation("the scope was calibrated anew: keep views again");
   const calibration::HandEyeResult& hand_eye = found->hand_eye;
   camera_ = *found->stations.input.camera;
   camera_from_sensor_ = hand_eye.camera_from_sensor;
@@ -282,6 +290,7 @@ void LiveSession::fit() {
   tracker_from_patient_.reset();
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
   note.line = fmt::format("{} touched", touches_.size());
+  forget_deformation("the fiducials were touched anew: keep views again");
   if (!patient_ || touches_.size() < kFewestFiducials) return update_setup();
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());
@@ -291,14 +300,14 @@ void LiveSession::fit() {
     registration_fault_ = found.error().what;
     return update_setup();
   }
-  std::vector<Eigen::Vector3d> touched_in_patient_mm;
+  fitted_in_patient_mm_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
     touches_[i].residual_mm = found->fit.residuals_mm[i];
-    touched_in_patient_mm.push_back(patient_->markers_in_patient_mm[found->ct_of_touch[i]]);
+    fitted_in_patient_mm_.push_back(patient_->markers_in_patient_mm[found->ct_of_touch[i]]);
   }
   fre_mm_ = found->fit.fre_rms_mm;
   known_.fre_mm = *fre_mm_;
-  expect_registration_error(touched_in_patient_mm, *fre_mm_);
+  expect_registration_error();
   tracker_from_patient_ = found->fit.to_from.inverse();
   note.line = fmt::format("{} touched, FRE {:.2f} mm", touches_.size(), *fre_mm_);
   note.done = touches_.size() >= std::max(kFewestFiducials + 1, settings_.fiducials);
@@ -307,6 +316,7 @@ void LiveSession::fit() {
 }
 
 void LiveSession::update_setup() {
+  jitter_ = {};
   std::optional<Setup> setup;
   picture_.set_without_setup(unconfirmed_ ? kUnconfirmed : kUnregistered);
   if (camera_ && camera_from_sensor_ && tracker_from_patient_ && !unconfirmed_)

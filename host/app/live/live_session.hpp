@@ -167,7 +167,8 @@ class LiveSession {
   void show_deformation();
   void keep_operation();
   void resume();
-  void expect_registration_error(std::span<const Eigen::Vector3d> touched_in_patient_mm, double fre_mm);
+  void expect_registration_error();
+  void forget_deformation(const std::string& why);
   [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
   [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
   void use(Result<std::unique_ptr<Engine>> engine);
@@ -191,6 +192,7 @@ class LiveSession {
   std::shared_ptr<const PatientPlan> patient_;
   std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_;
+  bool transfer_is_newer_ = false;  ///< than what the CT that is being read is to be drawn by
   std::unique_ptr<Engine> engine_;
 
   std::unique_ptr<GuideWorker> guide_;
@@ -204,11 +206,13 @@ class LiveSession {
   std::deque<std::pair<DeviceTime, Eigen::Vector3d>> tips_;  ///< of the last quarter of a second
   std::vector<TouchedFiducial> touches_;
   std::optional<double> fre_mm_;
+  std::vector<Eigen::Vector3d> fitted_in_patient_mm_;  ///< the fiducials that the registration is by
   LivePicture picture_;
   TargetJitter jitter_;
 
   std::vector<KeptView> views_;
   std::optional<ViewRegistration> deformation_;
+  bool forget_running_ = false;  ///< the deformation that is being found is by a setup that is no more
   mutable std::mutex steps_mutex_;
   std::vector<float> steps_;
   Background<Result<ViewRegistration>> deforming_;  // the last: its thread uses what is above

@@ -105,7 +105,23 @@ DeformProgress LiveSession::deform_progress() const {
   return {steps_, deforming_.line()};
 }
 
+/// Views are of the poses that they were kept with, and a deformation takes in what the registration was off by:
+/// another setup's is no better than none.
+void LiveSession::forget_deformation(const std::string& why) {
+  if (deforming()) {
+    forget_running_ = true;
+    cancel_deform();
+  }
+  if (views_.empty() && !deformation_) return;
+  views_.clear();
+  at(LiveStep::views) = {false, why};
+  at(LiveStep::deform) = {};
+  if (!std::exchange(deformation_, std::nullopt)) return;
+  show_deformation();
+}
+
 void LiveSession::finish_deform(Result<ViewRegistration> found) {
+  if (std::exchange(forget_running_, false)) return;
   StepNote& note = at(LiveStep::deform);
   if (!found) {
     note = {false, found.error().what};

@@ -15,7 +15,7 @@ void LiveSession::keep_operation() {
     operation.calibrated = {*camera_,           *camera_from_sensor_, known_.camera_rms_px, known_.tracked_rms_px,
                             known_.hand_eye_mm, calibrated_utc_};
   if (tracker_from_patient_ && fre_mm_)
-    operation.registered = {tracker_from_patient_->inverse(), *fre_mm_, known_.target_mm};
+    operation.registered = {tracker_from_patient_->inverse(), *fre_mm_, fitted_in_patient_mm_};
   if (deformation_) operation.deformation = {deformation_->field, deformation_->uncertainty_mm};
   const auto written = write_operation(settings_.out, operation);
   keeping_fault_ = written ? "" : "not kept: " + written.error().what;
@@ -54,7 +54,8 @@ void LiveSession::resume() {
     unconfirmed_ = true;
     tracker_from_patient_ = found->patient_from_tracker.inverse();
     fre_mm_ = known_.fre_mm = found->fre_mm;
-    known_.target_mm = found->target_mm;
+    fitted_in_patient_mm_ = found->fiducials_in_patient_mm;
+    expect_registration_error();
     at(LiveStep::fiducials) = {true, fmt::format("{}, FRE {:.2f} mm", when, found->fre_mm)};
   }
   if (operation->deformation) {

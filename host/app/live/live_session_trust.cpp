@@ -9,11 +9,11 @@
 
 namespace birdseye::host {
 
-void LiveSession::expect_registration_error(std::span<const Eigen::Vector3d> touched_in_patient_mm, double fre_mm) {
+void LiveSession::expect_registration_error() {
   // Few residuals may be small by chance: the bound under which the localisation error lies, not its estimate.
-  const auto localisation = calibration::localisation_error_of(fre_mm, touched_in_patient_mm.size());
+  const auto localisation = calibration::localisation_error_of(*fre_mm_, fitted_in_patient_mm_.size());
   known_.target_mm =
-      calibration::TargetError(touched_in_patient_mm, localisation.upper95_mm).rms_mm(target_in_patient_mm());
+      calibration::TargetError(fitted_in_patient_mm_, localisation.upper95_mm).rms_mm(target_in_patient_mm());
 }
 
 Eigen::Vector3d LiveSession::target_in_patient_mm() const {
@@ -32,13 +32,18 @@ std::optional<TargetMark> LiveSession::target_mark() const {
   if (!setup || !camera_from_patient || !patient_) return std::nullopt;
   const Eigen::Vector3d target_mm = *camera_from_patient * as_shown_mm(target_in_patient_mm());
   const auto at_px = project(setup->camera, target_mm);
-  if (!at_px) return std::nullopt;
+  if (!at_px || at_px->minCoeff() < 0 || at_px->x() >= setup->camera.width_px || at_px->y() >= setup->camera.height_px)
+    return std::nullopt;
+  // Far off the axis a lens model folds back into the picture.
+  const auto ray = unproject(setup->camera, *at_px);
+  constexpr double kSameRay = 1e-3;
+  if (!ray || (ray->head<2>() - target_mm.head<2>() / target_mm.z()).norm() > kSameRay) return std::nullopt;
   // A pose's own sigma is an axis's, and counts what the hand may have done since; the jitter counts the angles.
   const double pose_mm =
       std::max(std::sqrt(3.0) * picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm().value_or(0));
+  const double hand_eye_mm = std::sqrt(1.5) * known_.hand_eye_mm;  // it is given across the line of sight, of two axes
   const double deformation_mm = deformation_ ? deformation_->uncertainty_mm.value_or(0) : 0;
-  const double rms_mm =
-      std::hypot(std::hypot(known_.target_mm, known_.hand_eye_mm), std::hypot(pose_mm, deformation_mm));
+  const double rms_mm = std::hypot(std::hypot(known_.target_mm, hand_eye_mm), std::hypot(pose_mm, deformation_mm));
   // Two of three axes show in the picture; 5.99 is the 95 % quantile of chi-square with two degrees of freedom.
   const double radius_mm = rms_mm * std::sqrt(5.99 / 3);
   return TargetMark{*at_px, rms_mm, radius_mm * setup->camera.fx_px / target_mm.z(), radius_mm,

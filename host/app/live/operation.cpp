@@ -69,7 +69,9 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
     files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
   }
   if (const auto& found = operation.registered) {
-    sheet["registered"] = {{"fre_mm", found->fre_mm}, {"target_mm", found->target_mm}};
+    sheet["registered"] = {{"fre_mm", found->fre_mm}, {"fiducials_in_patient_mm", nlohmann::json::array()}};
+    for (const Eigen::Vector3d& place : found->fiducials_in_patient_mm)
+      sheet["registered"]["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
     files.push_back({folder / kRegistration, pose_text(found->patient_from_tracker.matrix())});
   }
   sheet["deformed"] = operation.deformation.has_value();
@@ -109,9 +111,14 @@ Result<Operation> read_operation(const fs::path& folder) {
     if (sheet.contains("registered")) {
       const auto matrix = read_pose(folder / kRegistration);
       if (!matrix) return matrix.error();
-      out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix),
-                        sheet.at("registered").at("fre_mm").get<double>(),
-                        sheet.at("registered").at("target_mm").get<double>()};
+      out.registered = {
+          Transform<Patient, Tracker>::from_matrix(*matrix), sheet.at("registered").at("fre_mm").get<double>(), {}};
+      for (const auto& place : sheet.at("registered").at("fiducials_in_patient_mm"))
+        out.registered->fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
+                                                             place.at(2).get<double>());
+      if (out.registered->fiducials_in_patient_mm.size() < 3)
+        return Error{Errc::bad_format,
+                     fmt::format("{}: names fewer than three fiducials; register anew", path.string())};
     }
     if (sheet.at("deformed").get<bool>()) {
       auto field = read_field(folder / kField);
@@ -122,7 +129,8 @@ Result<Operation> read_operation(const fs::path& folder) {
     }
     return out;
   } catch (const nlohmann::json::exception& wrong) {
-    return Error{Errc::bad_format, fmt::format("{}: is damaged ({}); register anew", path.string(), wrong.what())};
+    return Error{Errc::bad_format, fmt::format("{}: is damaged, or of an earlier version ({}); register anew",
+                                               path.string(), wrong.what())};
   }
 }
 

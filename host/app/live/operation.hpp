@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "host/app/frame_overlay.hpp"
 #include "host/deform/displacement_field.hpp"
@@ -23,7 +24,8 @@ struct Operation {
   /// By touched fiducials.
   struct Registered {
     Transform<Patient, Tracker> patient_from_tracker;
-    double fre_mm = 0, target_mm = 0;
+    double fre_mm = 0;
+    std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched
   };
   /// By views.
   struct Deformed {
