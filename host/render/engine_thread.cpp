@@ -90,7 +90,7 @@ class EngineThread final : public Engine {
 
 }  // namespace
 
-Result<std::unique_ptr<Engine>> make_on_own_thread(std::function<Result<std::unique_ptr<Engine>>()> make) {
+Result<std::unique_ptr<Engine>> make_on_own_thread(const std::function<Result<std::unique_ptr<Engine>>()>& make) {
   auto made = std::make_unique<EngineThread>();
   if (auto fault = made->make(make); !fault) return fault.error();
   return std::unique_ptr<Engine>(std::move(made));

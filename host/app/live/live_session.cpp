@@ -54,7 +54,7 @@ void LiveSession::load(const PatientFiles& files) {
     say("reading the CT");
     auto read = read_patient(files);
     if (!read) return Result<Loaded>(read.error());
-    const auto patient = std::make_shared<PatientPlan>(*std::move(read));
+    auto patient = std::make_shared<PatientPlan>(*std::move(read));
     std::future<std::vector<Eigen::Vector3d>> found;
     if (files.fiducials.empty())
       found = std::async(std::launch::async, [&patient] { return find_fiducials(patient->ct); });
