@@ -12,6 +12,7 @@ namespace birdseye::host {
 namespace {
 
 using birdseye::testing::connect_and_calibrate;
+using birdseye::testing::give_record;
 using birdseye::testing::Hand;
 using birdseye::testing::kFiducials;
 using birdseye::testing::kMs;
@@ -98,14 +99,25 @@ TEST(LiveSession, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
   EXPECT_NEAR(mark->radius_px, mark->radius_mm * camera.fx_px / 100, 0.1);
 }
 
-TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
-  const Scratch scratch;
-  LiveSettings again = operation_settings(scratch);
-  again.resume = scratch.path();
+/// By all fiducials, of this CT.
+Operation registered_operation(const LiveSettings& settings) {
   Operation kept;
-  kept.ct_checksum = read_patient(again.patient)->checksum;
+  kept.ct_checksum = read_patient(settings.patient)->checksum;
   kept.made_utc = "2026-11-22T10:00:00Z";
   kept.registered = {kTrackerFromPatient.inverse(), 0.3, kFiducials};
+  return kept;
+}
+
+LiveSettings resumed(const Scratch& scratch, const std::filesystem::path& from) {
+  LiveSettings out = operation_settings(scratch);
+  out.resume = from;
+  return out;
+}
+
+TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
+  const Scratch scratch;
+  const LiveSettings again = resumed(scratch, scratch.path());
+  Operation kept = registered_operation(again);
   // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
   DisplacementField field;
   field.size = {2, 2, 2};
@@ -116,10 +128,7 @@ TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   LiveSession session(again);
   load(session);
   ASSERT_EQ(session.fault(), "");
-  wire::Calibration calibration;
-  calibration.in_force = true;
-  calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
-  session.take(calibration, HostTime{0}, std::nullopt);
+  give_record(session);
   session.primary();
   ASSERT_TRUE(session.picture().setup().has_value());
   session.take(looking_at(session, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
@@ -171,12 +180,6 @@ void register_into(const std::filesystem::path& out, const Scratch& scratch) {
   ASSERT_TRUE(session.note(LiveStep::fiducials).done);
 }
 
-LiveSettings resumed(const Scratch& scratch, const std::filesystem::path& from) {
-  LiveSettings out = operation_settings(scratch);
-  out.resume = from;
-  return out;
-}
-
 TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
@@ -186,10 +189,7 @@ TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
   EXPECT_TRUE(session.note(LiveStep::fiducials).done);
   EXPECT_EQ(session.step(), LiveStep::check);  // not the run: the patient may have been moved
   EXPECT_FALSE(session.picture().setup().has_value()) << "without the scope's record there is no overlay";
-  wire::Calibration calibration;
-  calibration.in_force = true;
-  calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
-  session.take(calibration, HostTime{0}, std::nullopt);
+  give_record(session);
   EXPECT_FALSE(session.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
   session.go_on();
   EXPECT_FALSE(session.picture().setup().has_value()) << "to skip the look is not to have looked";
@@ -225,22 +225,16 @@ TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
   const Scratch scratch;
   for (const bool record_is_newer : {false, true}) {
     const LiveSettings again = resumed(scratch, scratch.path());
-    Operation kept;
-    kept.ct_checksum = read_patient(again.patient)->checksum;
-    kept.made_utc = "2026-11-22T10:00:00Z";
+    Operation kept = registered_operation(again);
     Operation::Calibrated by_board;
     by_board.camera = {768, 576, 500, 500, 384, 288};
     by_board.made_utc = record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z";  // the record's is 09:30
     kept.calibrated = by_board;
-    kept.registered = {kTrackerFromPatient.inverse(), 0.3, kFiducials};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
     LiveSession session(again);
     load(session);
     ASSERT_EQ(session.fault(), "");
-    wire::Calibration calibration;
-    calibration.in_force = true;
-    calibration.record = calibration::record_text(birdseye::testing::example_record(768, 576, {}, {}));
-    session.take(calibration, HostTime{0}, std::nullopt);
+    give_record(session);
     session.primary();
     ASSERT_TRUE(session.picture().setup().has_value());
     EXPECT_EQ(session.picture().setup()->camera.fx_px == 500, !record_is_newer);

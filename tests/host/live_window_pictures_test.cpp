@@ -148,10 +148,7 @@ class LiveWindowPictures : public ::testing::Test {
 void begin(LiveSession& session, Hand& hand, std::size_t touched) {
   birdseye::testing::load(session);
   connect_and_calibrate(session);
-  wire::Calibration calibration;
-  calibration.in_force = true;
-  calibration.record = calibration::record_text(record());
-  session.take(calibration, HostTime{0}, std::nullopt);
+  birdseye::testing::give_record(session, record());
   const Eigen::Vector3d slip_mm(0.3, -0.2, 0.1);
   for (std::size_t i = 0; i < touched; ++i) hand.rest_at(kFiducials[i] + static_cast<double>(i) * slip_mm, 80);
   hand.rest_at({0, 0, 200}, 1);

@@ -72,16 +72,22 @@ class Hand {
   std::int64_t time_ms_ = 1000;
 };
 
+/// The appliance sends the scope's calibration record.
+inline void give_record(LiveSession& session,
+                        const calibration::CalibrationRecord& record = example_record(768, 576, {}, {})) {
+  wire::Calibration calibration;
+  calibration.in_force = true;
+  calibration.record = calibration::record_text(record);
+  session.take(calibration, HostTime{0}, std::nullopt);
+}
+
 inline void connect_and_calibrate(LiveSession& session) {
   wire::Health health;
   health.state = "ready";
   session.take(health, HostTime{0}, std::nullopt);
   session.set_link(true, "connected");
   EXPECT_EQ(session.step(), LiveStep::calibrate);
-  wire::Calibration calibration;
-  calibration.in_force = true;
-  calibration.record = calibration::record_text(example_record(768, 576, {}, {}));
-  session.take(calibration, HostTime{0}, std::nullopt);
+  give_record(session);
   EXPECT_TRUE(session.note(LiveStep::calibrate).done);
   session.primary();
   EXPECT_EQ(session.step(), LiveStep::fiducials);
