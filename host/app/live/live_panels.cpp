@@ -274,7 +274,9 @@ void draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) 
   const std::string text =
       fmt::format("+-{:.1f} mm{}", mark.radius_mm, mark.motion_counted ? "" : ", if it has not moved since the CT");
   const ImVec2 wide = ImGui::CalcTextSize(text.c_str());
-  const ImVec2 from(middle.x + radius + 6 * scale, middle.y - wide.y / 2);
+  const float beside = radius + 6 * scale, right = ImGui::GetWindowPos().x + ImGui::GetWindowSize().x;
+  const bool fits = middle.x + beside + wide.x < right;
+  const ImVec2 from(fits ? middle.x + beside : middle.x - beside - wide.x, middle.y - wide.y / 2);
   list->AddRectFilled(ImVec2(from.x - 3 * scale, from.y - 2 * scale),
                       ImVec2(from.x + wide.x + 3 * scale, from.y + wide.y + 2 * scale), IM_COL32(0, 0, 0, 150));
   list->AddText(from, colour, text.c_str());
