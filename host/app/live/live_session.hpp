@@ -152,6 +152,7 @@ class LiveSession {
   [[nodiscard]] Engine* engine() const { return engine_.get(); }
   [[nodiscard]] const std::optional<TransferFunction>& transfer() const { return transfer_; }
   [[nodiscard]] std::string engine_name() const { return engine_ ? engine_->name() : ""; }
+  /// The picture has these colours once an engine is made that draws by them.
   void set_transfer(const TransferFunction& transfer);
 
  private:
@@ -171,7 +172,9 @@ class LiveSession {
   void forget_deformation(const std::string& why);
   [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
   [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
+  void take_loaded();
   void use(Result<std::unique_ptr<Engine>> engine);
+  void recolour();
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
 
   LiveSettings settings_;
@@ -192,8 +195,9 @@ class LiveSession {
   std::shared_ptr<const PatientPlan> patient_;
   std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_;
-  bool transfer_is_newer_ = false;  ///< than what the CT that is being read is to be drawn by
+  bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::unique_ptr<Engine> engine_;
+  Background<Result<Loaded>> recolouring_;
 
   std::unique_ptr<GuideWorker> guide_;
   std::optional<Verdict> calibration_verdict_;
