@@ -12,6 +12,9 @@
 
 #include "host/ui/glfw_window.hpp"
 
+// GLFW's header of it would want those of Xlib and Xrandr, and a GLFW without X11 does not have it.
+extern "C" __attribute__((weak)) unsigned long glfwGetX11Window(GLFWwindow* window);
+
 namespace birdseye::host {
 
 namespace {
@@ -63,6 +66,7 @@ Result<std::unique_ptr<LiveWindow>> LiveWindow::open(const Settings& settings) {
 }
 
 LiveWindow::~LiveWindow() {
+  cover_.reset();  // before the window that it lies on
   if (imgui_ != nullptr) {
     ImGui_ImplOpenGL3_Shutdown();
     ImGui_ImplGlfw_Shutdown();
@@ -93,8 +97,16 @@ void LiveWindow::end_frame() {
   glFinish();
 }
 
-void LiveWindow::swap() {
+void LiveWindow::swap(Believed believe_until) {
+  if (cover_) cover_->lift();
   glfwSwapBuffers(window_);
+  if (cover_) cover_->believe_until(believe_until);
+}
+
+void LiveWindow::cover_when_still(int left_px, std::span<const std::uint8_t> rgb, int width_px, int height_px) {
+  if (glfwGetX11Window == nullptr) return;
+  const auto window = static_cast<std::uint32_t>(glfwGetX11Window(window_));
+  cover_ = StallCover::over(window, left_px, rgb, width_px, height_px);
 }
 
 bool LiveWindow::closed() const {

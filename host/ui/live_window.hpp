@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "calibration/base/result.hpp"
 #include "host/render/gl/gl_context.hpp"
 #include "host/render/scene.hpp"
+#include "host/ui/stall_cover.hpp"
 
 struct GLFWwindow;
 struct ImGuiContext;
@@ -37,7 +39,14 @@ class LiveWindow final : public GlContext {
   void begin_frame();
   /// Draws all panels into the back of the window, and waits until that is done; swap() shows it.
   void end_frame();
-  void swap();
+  /// Of what is shown; empty: for ever.
+  using Believed = std::optional<StallCover::Clock::time_point>;
+  /// What is still on the screen then is covered, as cover_when_still() says.
+  void swap(Believed believe_until = std::nullopt);
+  /// rgb: what covers the window right of left_px then. Without an X server nothing ever does.
+  void cover_when_still(int left_px, std::span<const std::uint8_t> rgb, int width_px, int height_px);
+  /// How often it stood still.
+  [[nodiscard]] int stood_still() const { return cover_ ? cover_->covered() : 0; }
   [[nodiscard]] bool closed() const;
   /// Keys that were pressed before begin_frame(), unless into a field of text: "space", "enter", "backspace", "+", "-",
   /// small letters and digits.
@@ -63,6 +72,7 @@ class LiveWindow final : public GlContext {
   GLFWwindow* window_ = nullptr;
   ImGuiContext* imgui_ = nullptr;
   std::string layout_;
+  std::unique_ptr<StallCover> cover_;
   struct Texture {
     std::uint32_t name = 0;
     int width_px = 0, height_px = 0;

@@ -98,9 +98,10 @@ void FaultRig::start_tracker() {
 
 void FaultRig::start_camera() {
   write("camera.toml", settings_.camera_faults);
-  camera_ = std::make_unique<Child>(
-      simulator(fmt::format("camera --socket {0}/camera --size {1} --rate {2} --faults {0}/camera.toml",
-                            settings_.folder.string(), settings_.size, kFrameRateHz)));
+  camera_ = std::make_unique<Child>(simulator(
+      fmt::format("camera --socket {0}/camera --size {1} --rate {2} --format {3} --faults {0}/camera.toml --truth "
+                  "{0}/camera.json",
+                  settings_.folder.string(), settings_.size, kFrameRateHz, settings_.format)));
   if (!camera_->says({"ready"}, Clock::now() + kStartsWithin)) fail("the camera's simulator: " + camera_->output());
 }
 
@@ -139,7 +140,15 @@ std::string FaultRig::log() {
 }
 
 std::int64_t FaultRig::circle_zero_ns() const {
-  const auto truth = nlohmann::json::parse(contents_of(settings_.folder / "truth.json"), nullptr, false);
+  return zero_of("truth.json");
+}
+
+std::int64_t FaultRig::first_frame_ns() const {
+  return zero_of("camera.json");
+}
+
+std::int64_t FaultRig::zero_of(const std::string& name) const {
+  const auto truth = nlohmann::json::parse(contents_of(settings_.folder / name), nullptr, false);
   return truth.is_object() ? truth.value("zero_monotonic_ns", std::int64_t{0}) : 0;
 }
 

@@ -36,7 +36,7 @@ class FaultRig {
     std::string tracker_faults = {}, camera_faults = {};  ///< TOML
     bool tracker = true, camera = true;                   ///< false: absent at the start
     std::string tracker_device = {};                      ///< in place of the simulator's
-    std::string size = "160x120";
+    std::string size = "160x120", format = "RGB3";
     std::string more = {};                 ///< of the configuration
     std::vector<std::string> within = {};  ///< what birdseyed is started by
   };
@@ -60,11 +60,14 @@ class FaultRig {
   [[nodiscard]] std::string device() const { return (settings_.folder / "tty").string(); }
   /// CLOCK_MONOTONIC at the second 0 of the tracker's circle.
   [[nodiscard]] std::int64_t circle_zero_ns() const;
+  /// CLOCK_MONOTONIC at the middle of the exposure of the frame with the number 0.
+  [[nodiscard]] std::int64_t first_frame_ns() const;
 
  private:
   void connect();
   void fail(const std::string& what);
   void write(const std::string& name, const std::string& text) const;
+  [[nodiscard]] std::int64_t zero_of(const std::string& name) const;
 
   Settings settings_;
   std::unique_ptr<Child> tracker_, camera_, birdseyed_;

@@ -7,6 +7,7 @@
 #include "host/app/live/live_panels.hpp"
 #include "host/app/live/live_picture.hpp"
 #include "tests/support/display.hpp"
+#include "tests/support/screen.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -157,6 +158,12 @@ TEST(LivePicture, NoStaleOverlayStaysLongerThan150MsUnderAnyFault) {
       if (ms > one.last_good_ms + 150) {
         EXPECT_EQ(magenta_in(*shown.rgb), 0) << "at " << ms - kFaultMs << " ms";
       }
+      // Nor does one that the program does not come to take away; and a picture without one says when it has stopped.
+      const double seen_ms = static_cast<double>(ms) - shown.age_ms;
+      EXPECT_EQ(shown.believe_until.has_value(), shown.any && !shown.stale);
+      if (shown.believe_until) {
+        EXPECT_LE(static_cast<double>(shown.believe_until->ns) * 1e-6, seen_ms + (shown.overlaid ? 150 : 350));
+      }
       if (ms == kFaultMs + 500) words = shown.reason;
     });
     EXPECT_NE(words.find(one.words), std::string::npos) << words;
@@ -265,6 +272,42 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
       }
     });
     EXPECT_GT(seen, 10);
+  }
+}
+
+TEST_F(LiveWindowTest, WhatStaysOnTheScreenTooLongIsCovered) {
+  constexpr int kSide = 200;
+  LiveWindow::Settings settings;
+  settings.width_px = 640;
+  settings.height_px = 480;
+  auto opened = LiveWindow::open(settings);
+  ASSERT_TRUE(opened) << opened.error().what;
+  LiveWindow& window = **opened;
+  window.cover_when_still(kSide, std::vector<std::uint8_t>{200, 10, 20}, 1, 1);
+  birdseye::testing::Screen screen(display_->name());
+  const auto draw = [&](LiveWindow::Believed until) {
+    window.begin_frame();
+    window.end_frame();
+    window.swap(until);
+  };
+  const auto red_at = [&](int x, int y) { return static_cast<int>(screen.grab(x, y, 1, 1).at(0)); };
+  const auto look = [&](int video, int side) {
+    EXPECT_NEAR(red_at(kSide + 1, 1), video, 2);
+    EXPECT_NEAR(red_at(639, 479), video, 2);
+    EXPECT_NEAR(red_at(kSide - 1, 10), side, 2);
+  };
+  draw(std::nullopt);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  look(23, 23);  // what is not to be believed at all is not covered: it says so itself
+  EXPECT_EQ(window.stood_still(), 0);
+  for (int times = 1; times <= 3; ++times) {
+    draw(std::chrono::steady_clock::now() + std::chrono::milliseconds(100));
+    // This thread stands still, and a screen shows for ever what was drawn last.
+    std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    EXPECT_EQ(window.stood_still(), times);
+    look(200, 23);
+    draw(std::nullopt);
+    look(23, 23);
   }
 }
 

@@ -115,6 +115,7 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
                       {"age_ms_p95", figures.ages.percentile_ms(0.95)},
                       {"age_ms_max", figures.ages.most_ms()},
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
+                      {"stood_still", figures.stood_still},
                       {"engine", session.engine_name()}};
   if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
   if (figures.window_s) json["window_s"] = *figures.window_s;

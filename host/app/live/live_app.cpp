@@ -7,6 +7,7 @@
 #include "calibration/solve/pattern.hpp"
 #include "host/app/interrupt.hpp"
 #include "host/app/live/snapshot.hpp"
+#include "host/app/live/stall_picture.hpp"
 #include "host/app/picture.hpp"
 #include "host/app/write_files.hpp"
 #include "host/render/transfer_function.hpp"
@@ -52,6 +53,8 @@ Result<void> LiveApp::run(HostTime asked) {
   note_interrupts();
   const HostTime began = now();
   asked_ = asked;
+  const Picture cover = stall_picture(window_->scale());
+  window_->cover_when_still(side_px(window_->scale()), cover.rgb, cover.width_px, cover.height_px);
   while (!window_->closed() && !interrupted()) {
     take_events();
     if (auto said = saving_.take()) facts_.said = *std::move(said);
@@ -70,6 +73,7 @@ Result<void> LiveApp::run(HostTime asked) {
     const auto ended = follow_script();
     if (!ended) return ended.error();
     figures_.seconds = Duration{now().ns - began.ns}.seconds();
+    figures_.stood_still = window_->stood_still();
     if (*ended) break;
   }
   figures_.frames_skipped = session_.picture().frames_skipped();
@@ -131,7 +135,9 @@ void LiveApp::draw() {
     shown = picture.at(now());
     draw_window(shown);
   }
-  window_->swap();
+  LiveWindow::Believed until;  // what is frozen or has stopped says so itself
+  if (shown.believe_until && !session_.frozen()) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
+  window_->swap(until);
   const HostTime swapped = now();
   if (!figures_.window_s) figures_.window_s = Duration{swapped.ns - asked_.ns}.seconds();
   to_draw_ = Duration{swapped.ns - began.ns};

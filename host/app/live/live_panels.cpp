@@ -333,6 +333,10 @@ void draw_strip(const Layout& at, const LiveSession& session, const PanelFacts& 
 
 }  // namespace
 
+int side_px(float scale) {
+  return static_cast<int>(kSidePx * scale);
+}
+
 void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes) {
   constexpr double kNotch = 0.1;
   if (key == "space") wishes.primary = true;

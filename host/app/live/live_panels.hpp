@@ -33,6 +33,8 @@ struct PanelFacts {
   std::string said;       ///< a remark of the window's own: where a snapshot went
 };
 
+/// How wide the workflow beside the video is.
+int side_px(float scale);
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
 PanelWishes draw_panels(const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
                         const PanelFacts& facts, TransferEditor& editor);

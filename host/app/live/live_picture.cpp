@@ -95,6 +95,8 @@ ShownPicture LivePicture::at(HostTime now) {
   if (kind != kind_) ++changes_;
   kind_ = kind;
   out.changes = changes_;
+  const Duration most_age = settings_.most_age - std::max(predicted, Duration{});
+  if (!out.stale) out.believe_until = exposed_ + (out.overlaid ? most_age : settings_.stopped) + settings_.late;
   out.rgb = out.overlaid ? &overlaid_ : out.stale ? &stopped_ : frame_->rgb.get();
   return out;
 }

@@ -24,6 +24,8 @@ struct ShownPicture {
   const std::vector<std::uint8_t>* rgb = nullptr;  ///< the picture to show
   int width_px = 0, height_px = 0;
   std::uint64_t changes = 0;  ///< another number: other pixels
+  /// From then on it must no longer be on the screen; empty: it says itself that it is not live.
+  std::optional<HostTime> believe_until;
 };
 
 /// The picture and its safety (design, section 7): each frame is overlaid with the pose that came with it, if the gate
@@ -42,6 +44,9 @@ class LivePicture {
     Duration most_age = Duration::from_ms(120);
     /// A frame older than this is said to be stopped video.
     Duration stopped = Duration::from_ms(300);
+    /// Whoever shows it is late where it is still on the screen so long after it grew too old: something else has to
+    /// take it away.
+    Duration late = Duration::from_ms(18);
     OverlayGate::Settings gate = quick_to_fade();
   };
 
