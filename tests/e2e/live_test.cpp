@@ -75,6 +75,9 @@ TEST(Live, SaysWhatIsMissing) {
   testing::expect_refused("birdseye", "live --simulate --script " + (scratch / "none").string(), {"none"});
   testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(), {"there is no display"}, "",
                           "env -u DISPLAY -u WAYLAND_DISPLAY");
+  const testing::Display display;
+  testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(),
+                          {"OpenGL 4.5", "libgl1-mesa-dri"}, "", display.env() + " MESA_GL_VERSION_OVERRIDE=3.3");
 }
 
 }  // namespace

@@ -116,7 +116,10 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
                       {"age_ms_max", figures.ages.most_ms()},
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
                       {"stood_still", figures.stood_still},
-                      {"engine", session.engine_name()}};
+                      {"engine", session.engine_name()},
+                      {"link_says", session.link_words()},
+                      {"appliance_says", session.appliance_says()},
+                      {"picture_says", figures.picture_says}};
   if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
   if (figures.window_s) json["window_s"] = *figures.window_s;
   if (figures.ct_s) json["ct_s"] = *figures.ct_s;

@@ -129,6 +129,7 @@ void LiveApp::draw() {
   if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
   drawn_ = began;
   const PanelWishes wishes = draw_window(shown);
+  figures_.picture_says = shown.reason;
   if (!shot_.empty()) snapshot(shot_, shown);
   if (shown.overlaid && !picture.at(now()).overlaid) {
     // It took longer than it was thought to: what has grown stale on the way is not shown.

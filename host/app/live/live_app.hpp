@@ -25,7 +25,8 @@ struct LiveFigures {
   AgeStrip ages;
   /// The oldest picture that bore an overlay when it was handed to the screen.
   double oldest_overlay_ms = 0;
-  int stood_still = 0;  ///< how often it was covered, for it showed nothing newer in time
+  std::string picture_says;  ///< at the end: why there was no overlay; empty: there was
+  int stood_still = 0;       ///< how often it was covered, for it showed nothing newer in time
 };
 
 /// The window at the cart: takes events from the source to the session, draws, and does what keys, buttons and the

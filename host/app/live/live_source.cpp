@@ -66,6 +66,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesyst
   auto reader = RecordingReader::open(path, settings);
   if (!reader) return reader.error();
   std::unique_ptr<LiveSource> source(new LiveSource(path.string(), {}));
+  source->recording_ = reader->get();
   source->events_ = *std::move(reader);
   source->live_ = false;
   source->words_ = "playing " + path.string();
@@ -80,9 +81,10 @@ std::optional<wire::Event> LiveSource::next(Clock::time_point deadline) {
   }
   auto event = events_->next(deadline);
   if (event) return *std::move(event);
-  words_ = event.error().what;
+  words_ = event.error().what + notes();
   events_.reset();
   stream_ = nullptr;
+  recording_ = nullptr;
   again_ = Clock::now() + kConnectAgain;
   given_up_ = cart_ != nullptr || !live_;
   return std::nullopt;
@@ -97,7 +99,15 @@ void LiveSource::link_again() {
 
 std::string LiveSource::words() const {
   const std::string peer = stream_ != nullptr ? stream_->peer_words() : "";
-  return peer.empty() ? words_ : words_ + ": " + peer;
+  return (peer.empty() ? words_ : words_ + ": " + peer) + notes();
+}
+
+/// What is amiss with the recording, as far as it was read.
+std::string LiveSource::notes() const {
+  std::string out;
+  for (const std::string& note : recording_ != nullptr ? recording_->notes() : std::vector<std::string>())
+    out += "; " + note;
+  return out;
 }
 
 std::optional<ClockGap> LiveSource::host_from_device() const {

@@ -11,6 +11,8 @@
 
 namespace birdseye::host {
 
+class RecordingReader;
+
 /// Where events come from: an appliance on the wire, or another OpenIGTLink server, which is connected to again for as
 /// long as it takes, or a simulated cart of our own, which is started once. Never holds the caller up.
 class LiveSource {
@@ -44,6 +46,7 @@ class LiveSource {
   LiveSource(std::string name, Connect::Work connect);
   void take_link(Result<Link> link);
   void link_again();
+  [[nodiscard]] std::string notes() const;
 
   std::string name_, words_;
   Connect::Work connect_;
@@ -52,7 +55,8 @@ class LiveSource {
   bool given_up_ = false;
   std::unique_ptr<SimulatedCart> cart_;
   std::unique_ptr<EventSource> events_;
-  EventStream* stream_ = nullptr;  ///< events_, where they come over the wire
+  EventStream* stream_ = nullptr;               ///< events_, where they come over the wire
+  const RecordingReader* recording_ = nullptr;  ///< events_, where they are recorded
   bool live_ = true;
 };
 
