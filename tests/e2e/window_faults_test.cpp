@@ -183,6 +183,10 @@ TEST(WindowFaults, NoStaleOrWrongOverlayIsOnTheScreen) {
           seeing(rig, said, spans[i].end_ns, spans[i].end_ns + calm_ns));
   }
 
+  // What is registered went to 3D Slicer all the while: the CT, and where it is with each frame that bore it.
+  EXPECT_EQ(rig.sent("IMAGE"), 1);
+  EXPECT_GT(rig.sent("TRANSFORM"), 1000);
+
   // The appliance goes, and the window stays.
   const std::int64_t gone_ns = monotonic_ns();
   rig.appliance().birdseyed().signal(SIGKILL);

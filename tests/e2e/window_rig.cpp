@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <sstream>
 
@@ -116,16 +117,15 @@ struct WindowRig::Hearing {
     while (!stop.stop_requested()) {
       if (!slicer.receive() && !slicer.connected()) return;
       const std::lock_guard lock(mutex);
-      const std::string words = slicer.status_ok ? "" : slicer.status;
-      if (slicer.counts["STATUS"] == heard) continue;
-      heard = slicer.counts["STATUS"];
-      said.push_back({monotonic_ns(), words});
+      if (slicer.counts["STATUS"] != heard["STATUS"])
+        said.push_back({monotonic_ns(), slicer.status_ok ? "" : slicer.status});
+      heard = slicer.counts;
     }
   }
   Slicer slicer;
   std::mutex mutex;
   std::vector<Said> said;
-  int heard = 0;
+  std::map<std::string, int> heard;
   std::jthread thread;
 };
 
@@ -231,6 +231,11 @@ bool WindowRig::shows_overlay_within(double seconds) {
 std::vector<Said> WindowRig::said() {
   const std::lock_guard lock(hearing_->mutex);
   return hearing_->said;
+}
+
+int WindowRig::sent(const std::string& type) {
+  const std::lock_guard lock(hearing_->mutex);
+  return hearing_->heard[type];
 }
 
 std::int64_t WindowRig::exposed_ns(std::uint32_t number) const {

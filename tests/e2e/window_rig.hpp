@@ -46,6 +46,8 @@ class WindowRig {
 
   [[nodiscard]] const std::vector<Glance>& glances() const { return glances_; }
   [[nodiscard]] std::vector<Said> said();
+  /// How many messages of a type it has sent to its client.
+  [[nodiscard]] int sent(const std::string& type);
   [[nodiscard]] FaultRig& appliance() { return *appliance_; }
   /// When a frame was exposed, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t exposed_ns(std::uint32_t number) const;

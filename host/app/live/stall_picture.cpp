@@ -11,13 +11,12 @@ Picture stall_picture(float scale) {
   out.rgb.resize(std::size_t{3} * static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px));
   cv::Mat rgb(out.height_px, out.width_px, CV_8UC3, out.rgb.data());
   rgb = cv::Scalar(44, 12, 12);
-  const auto say = [&](const char* text, double height, double y) {
+  const auto say = [&](const char* text, double height, int thick, double y) {
     cv::putText(rgb, text, cv::Point(static_cast<int>(30 * scale), static_cast<int>(y * scale)),
-                cv::FONT_HERSHEY_SIMPLEX, height * scale, cv::Scalar(245, 97, 87), static_cast<int>(2 * scale),
-                cv::LINE_AA);
+                cv::FONT_HERSHEY_DUPLEX, height * scale, cv::Scalar(245, 97, 87), thick, cv::LINE_AA);
   };
-  say("NOT LIVE", 1.4, 90);
-  say("the window stands still: look at the scope's own screen", 0.55, 130);
+  say("NOT LIVE", 1.6, 3, 90);
+  say("the window stands still: look at the scope's own screen", 0.55, 1, 135);
   return out;
 }
 
