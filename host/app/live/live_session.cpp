@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <future>
 
 #include "host/app/live/operation.hpp"
 #include "host/registration/point_matching.hpp"
-#include "host/render/engine_thread.hpp"
 
 namespace birdseye::host {
 
@@ -20,13 +18,6 @@ constexpr std::size_t kFewestFiducials = 3;
 constexpr const char* kUnregistered = "the patient is not registered yet";
 constexpr const char* kUnconfirmed =
     "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space";
-
-/// On a thread of its own: the window's OpenGL stays the window's.
-Result<std::unique_ptr<Engine>> engine_of(const std::string& name, const PatientPlan& patient,
-                                          const std::optional<TransferFunction>& transfer) {
-  if (!transfer) return Error{Errc::bad_value, "there is no transfer function to draw the CT by"};
-  return make_on_own_thread([&] { return make_engine(name, patient.shown, *transfer); });
-}
 
 }  // namespace
 
@@ -46,65 +37,17 @@ LiveSession::LiveSession(LiveSettings settings) : settings_(std::move(settings))
   if (!settings_.patient.ct.empty()) load(settings_.patient);
 }
 
-void LiveSession::load(const PatientFiles& files) {
-  if (deforming()) return;  // it reads the patient that there is
-  settings_.patient = files;
-  transfer_is_newer_ = false;
-  loading_.start([files, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto& say) {
-    say("reading the CT");
-    auto read = read_patient(files);
-    if (!read) return Result<Loaded>(read.error());
-    auto patient = std::make_shared<PatientPlan>(*std::move(read));
-    std::future<std::vector<Eigen::Vector3d>> found;
-    if (files.fiducials.empty())
-      found = std::async(std::launch::async, [&patient] { return find_fiducials(patient->ct); });
-    auto engine = engine_of(name, *patient, transfer);
-    if (found.valid()) patient->markers_in_patient_mm = found.get();
-    return Result<Loaded>(Loaded{std::move(patient), std::move(engine)});
-  });
-}
-
 void LiveSession::tick() {
-  if (auto loaded = loading_.take()) {
-    if (*loaded) {
-      picture_.set_engine(nullptr);
-      engine_.reset();
-      patient_ = std::move((*loaded)->patient);
-      ++shapes_;
-      if (transfer_) fault_.clear();
-      use(transfer_is_newer_ ? engine_of(settings_.engine, *patient_, transfer_) : std::move((*loaded)->engine));
-      fit();
-      resume();
-    } else {
-      fault_ = loaded->error().what;
-    }
+  if (auto loaded = loading_.take()) finish_loading(*std::move(loaded));
+  if (auto found = finding_.take(); found && !markers_in_patient_mm_) {
+    markers_in_patient_mm_ = *std::move(found);
+    if (!touches_.empty()) fit();
+    resume();
   }
   if (auto found = deforming_.take()) finish_deform(*std::move(found));
   if (guide_) {
     if (auto found = guide_->take()) finish_guide(*std::move(found));
   }
-}
-
-void LiveSession::use(Result<std::unique_ptr<Engine>> engine) {
-  picture_.set_engine(nullptr);
-  engine_.reset();
-  if (!transfer_) return;  // which is said already
-  if (!engine) {
-    fault_ = engine.error().what;
-    return;
-  }
-  engine_ = *std::move(engine);
-  if (deformation_) engine_->deform(deformation_->field);
-  picture_.set_engine(engine_.get());
-}
-
-void LiveSession::set_transfer(const TransferFunction& transfer) {
-  transfer_ = transfer;
-  transfer_is_newer_ = true;
-  picture_.set_engine(nullptr);
-  engine_.reset();  // before there is another: they may be large
-  if (patient_) use(engine_of(settings_.engine, *patient_, transfer_));
-  picture_.redraw();
 }
 
 void LiveSession::set_link(bool connected, const std::string& words) {
@@ -291,11 +234,11 @@ void LiveSession::fit() {
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
   note.line = fmt::format("{} touched", touches_.size());
   forget_deformation("the fiducials were touched anew: keep views again");
-  if (!patient_ || touches_.size() < kFewestFiducials) return update_setup();
+  if (!markers_in_patient_mm_ || touches_.size() < kFewestFiducials) return update_setup();
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());
   for (const TouchedFiducial& touch : touches_) places.push_back(touch.tip_in_tracker_mm);
-  const auto found = match_and_fit(patient_->markers_in_patient_mm, places);
+  const auto found = match_and_fit(*markers_in_patient_mm_, places);
   if (!found) {
     registration_fault_ = found.error().what;
     return update_setup();
@@ -303,7 +246,7 @@ void LiveSession::fit() {
   fitted_in_patient_mm_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
     touches_[i].residual_mm = found->fit.residuals_mm[i];
-    fitted_in_patient_mm_.push_back(patient_->markers_in_patient_mm[found->ct_of_touch[i]]);
+    fitted_in_patient_mm_.push_back((*markers_in_patient_mm_)[found->ct_of_touch[i]]);
   }
   fre_mm_ = found->fit.fre_rms_mm;
   known_.fre_mm = *fre_mm_;
