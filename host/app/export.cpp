@@ -90,7 +90,7 @@ Result<RestMap> map_of(const Options& options, const Registered& registered) {
 ImageFile image_of(const Volume& volume, const Eigen::Affine3d& seen_from_voxel) {
   ImageFile image;
   image.size = volume.size;
-  image.values.assign(volume.hu.begin(), volume.hu.end());
+  image.hu = volume.hu;
   image.origin_mm = seen_from_voxel.translation();
   image.spacing_mm = seen_from_voxel.linear().colwise().norm();
   image.axes = seen_from_voxel.linear().colwise().normalized();

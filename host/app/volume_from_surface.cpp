@@ -29,8 +29,8 @@ Result<void> volume_from_surface(const Options& options) {
   image.spacing_mm = volume->spacing_mm;
   image.origin_mm = volume->patient_from_voxel.translation();
   image.axes.setIdentity();
-  image.values.assign(volume->hu.begin(), volume->hu.end());
-  if (auto written = write_image(options.out, image, StoredAs::float32); !written) return written;
+  image.hu = volume->hu;
+  if (auto written = write_image(options.out, image, StoredAs::int16); !written) return written;
   fmt::print("{}: {} x {} x {} voxels of {:g} mm\n", options.out.string(), volume->size[0], volume->size[1],
              volume->size[2], settings.spacing_mm);
   return {};

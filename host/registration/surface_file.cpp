@@ -73,16 +73,10 @@ Surface decode_others(const fs::path& path) {
 }
 
 template <typename T>
-std::vector<T> taken(const std::uint8_t*& at, const std::uint8_t* end) {
+std::vector<T> taken(const Receive& receive) {
   std::uint64_t count = 0;
-  if (end - at < static_cast<std::ptrdiff_t>(sizeof count)) return {};
-  std::memcpy(&count, at, sizeof count);
-  at += sizeof count;
-  if (count > static_cast<std::size_t>(end - at) / sizeof(T)) return {};
-  std::vector<T> values(count);
-  if (count > 0) std::memcpy(static_cast<void*>(values.data()), at, count * sizeof(T));
-  at += count * sizeof(T);
-  return values;
+  if (!receive(&count, sizeof count)) return {};
+  return receive_values<T>(receive, count).value_or(std::vector<T>());
 }
 
 }  // namespace
@@ -94,24 +88,24 @@ Result<Surface> read_surface(const fs::path& path) {
   if (!std::ifstream(path))
     return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   constexpr Duration kLongest = Duration::from_ms(60'000);
-  const auto outcome = run_isolated(
-      [&path](const std::function<void(const void* data, std::size_t size)>& send) {
-        const Surface surface = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path);
+  Surface surface;
+  const auto ran = run_isolated(
+      [&path](const Send& send) {
+        const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path);
         const auto put = [&send](const auto& values) {
           const std::uint64_t count = values.size();
           send(&count, sizeof count);
           send(values.data(), count * sizeof values[0]);
         };
-        put(surface.vertices_mm);
-        put(surface.triangles);
+        put(decoded.vertices_mm);
+        put(decoded.triangles);
+      },
+      [&surface](const Receive& receive) {
+        surface.vertices_mm = taken<Eigen::Vector3f>(receive);
+        surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
       },
       kLongest);
-  if (!outcome) return outcome.error();
-  const std::uint8_t* at = outcome->bytes.data();
-  const std::uint8_t* end = at + outcome->bytes.size();
-  Surface surface;
-  surface.vertices_mm = taken<Eigen::Vector3f>(at, end);
-  surface.triangles = taken<std::array<std::uint32_t, 3>>(at, end);
+  if (!ran) return ran.error();
   const bool sound = !surface.triangles.empty() &&
                      std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),
                                  [](const Eigen::Vector3f& p) { return p.allFinite(); }) &&

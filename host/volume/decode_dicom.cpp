@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 #include <itkGDCMImageIO.h>
-#include <itkImage.h>
-#include <itkImageFileReader.h>
 #include <itkMetaDataObject.h>
 
 #include <algorithm>
@@ -11,20 +9,19 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <new>
 #include <numbers>
 #include <sstream>
 
 #include "host/volume/decode.hpp"
+#include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
 namespace fs = std::filesystem;
-using Image = itk::Image<double, 3>;
 
 /// One DICOM slice's header.
 struct Slice {
@@ -47,8 +44,9 @@ std::string text_of(const itk::GDCMImageIO& io, const char* tag) {
 /// (DICOM PS3.5, 7.1 and A.4), the last of its tag since an icon may come before, and whether the file holds all of it.
 /// Of what it does not find (deflated or big-endian files) it says nothing either.
 bool is_cut(const fs::path& path, std::size_t pixel_bytes) {
-  std::ifstream in(path, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  std::error_code error;
+  std::string bytes(fs::file_size(path, error), '\0');
+  std::ifstream(path, std::ios::binary).read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   using namespace std::string_literals;
   const std::size_t element = bytes.rfind("\xE0\x7F\x10\x00"s);
   if (element == std::string::npos) return false;
@@ -240,26 +238,26 @@ Result<ImageFile> stack(const fs::path& named, std::vector<Slice> slices, const 
   image.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), *step};
   image.origin_mm = first.position_mm;
   image.axes << first.row, first.column, first.row.cross(first.column).normalized();
-  image.values.reserve(first.size[0] * first.size[1] * slices.size());
+  image.hu.reserve(first.size[0] * first.size[1] * slices.size());
   for (const Slice& slice : slices) {
     announce(slice.path);
     try {
-      const auto reader = itk::ImageFileReader<Image>::New();
-      reader->SetImageIO(itk::GDCMImageIO::New());
-      reader->SetFileName(slice.path.string());
-      reader->Update();
-      const auto region = reader->GetOutput()->GetLargestPossibleRegion().GetSize();
-      if (region[0] != first.size[0] || region[1] != first.size[1] || region[2] != 1) {
-        return refused(Errc::unsupported, slice.path, "holds several frames; give a series of one slice a file");
-      }
-      const double* const pixels = reader->GetOutput()->GetBufferPointer();
-      image.values.insert(image.values.end(), pixels, pixels + region[0] * region[1]);
+      const auto io = itk::GDCMImageIO::New();
+      io->SetFileName(slice.path.string());
+      io->ReadImageInformation();
+      std::vector<char> pixels(static_cast<std::size_t>(io->GetImageSizeInBytes()));
+      io->Read(pixels.data());
+      Result<void> read;
+      with_type(io->GetComponentType(), [&](auto type) { read = append_hu<decltype(type)>(named, pixels, image.hu); });
+      if (!read) return read.error();
     } catch (const std::bad_alloc&) {
       throw;
     } catch (const std::exception&) {
       return refused(Errc::unreadable, slice.path, "its pixels cannot be decoded; export it again, uncompressed");
     }
   }
+  if (image.hu.size() != first.size[0] * first.size[1] * slices.size())
+    return refused(Errc::bad_format, named, "changed while it was read; read it again");
   return image;
 }
 

@@ -12,11 +12,13 @@
 #include <cstring>
 #include <new>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "host/volume/decode.hpp"
+#include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
 
@@ -131,32 +133,6 @@ itk::ImageIOBase::Pointer image_io(const fs::path& path, bool writing) {
   return nullptr;
 }
 
-template <typename T>
-void convert(const std::vector<char>& bytes, std::vector<float>& values) {
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    T value;
-    std::memcpy(&value, bytes.data() + i * sizeof(T), sizeof(T));
-    values[i] = static_cast<float>(value);
-  }
-}
-
-/// False for types that hold no numbers.
-bool convert(itk::IOComponentEnum type, const std::vector<char>& bytes, std::vector<float>& values) {
-  using Type = itk::IOComponentEnum;
-  constexpr std::pair<Type, void (*)(const std::vector<char>&, std::vector<float>&)> kTypes[] = {
-      {Type::UCHAR, convert<unsigned char>},   {Type::CHAR, convert<signed char>},
-      {Type::USHORT, convert<unsigned short>}, {Type::SHORT, convert<short>},
-      {Type::UINT, convert<unsigned>},         {Type::INT, convert<int>},
-      {Type::ULONG, convert<unsigned long>},   {Type::LONG, convert<long>},
-      {Type::FLOAT, convert<float>},           {Type::DOUBLE, convert<double>}};
-  for (const auto& [known, converter] : kTypes) {
-    if (known != type) continue;
-    converter(bytes, values);
-    return true;
-  }
-  return false;
-}
-
 /// All of the image is to be read, or written.
 void take_whole(itk::ImageIOBase& io) {
   itk::ImageIORegion whole(io.GetNumberOfDimensions());
@@ -164,16 +140,76 @@ void take_whole(itk::ImageIOBase& io) {
   io.SetIORegion(whole);
 }
 
-/// The voxels as the file has them. The readers leave what a damaged or missing file does not give as it was, and some
-/// say nothing: what differs after two readings over two fillings was never read.
-std::optional<std::vector<char>> read_voxels(itk::ImageIOBase& io) {
+constexpr char kFilling = '\xA5';  // as 16 bits no Hounsfield unit of a patient, so that it shows
+
+/// Whether there is a value that is all filling, or one that ends in it at the end, where a file may be cut.
+template <typename Bits>
+bool shows_filling(std::span<const char> bytes) {
+  Bits filling;
+  std::memset(&filling, kFilling, sizeof filling);
+  std::size_t left = 0;
+  for (std::size_t at = 0; at + sizeof(Bits) <= bytes.size(); at += sizeof(Bits)) {
+    Bits value;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    left += value == filling ? 1 : 0;  // counted to the end: that is many times faster than stopping
+  }
+  return left > 0 || bytes.back() == kFilling;
+}
+
+bool shows_filling(std::span<const char> bytes, std::size_t value_bytes) {
+  switch (value_bytes) {
+    case 2:
+      return shows_filling<std::uint16_t>(bytes);
+    case 4:
+      return shows_filling<std::uint32_t>(bytes);
+    case 8:
+      return shows_filling<std::uint64_t>(bytes);
+    default:
+      return shows_filling<std::uint8_t>(bytes);
+  }
+}
+
+/// The voxels as the file has them, over kFilling. The readers leave what a damaged or missing file does not give as it
+/// was, and some say nothing: where the filling shows, a second reading over another one tells what was never read.
+bool read_voxels(itk::ImageIOBase& io, std::span<char> filled) {
   take_whole(io);
-  std::vector<char> first(static_cast<std::size_t>(io.GetImageSizeInBytes()), '\x55');
-  io.Read(first.data());
-  std::vector<char> second(first.size(), '\xAA');
+  io.Read(filled.data());
+  if (!shows_filling(filled, io.GetComponentSize())) return true;
+  std::vector<char> second(filled.size(), '\x5A');
   io.Read(second.data());
-  if (first != second) return std::nullopt;
-  return first;
+  return std::equal(filled.begin(), filled.end(), second.begin());
+}
+
+/// Where one value a voxel is what is due. cut: why to refuse a file that does not give all voxels.
+Result<void> read_hu(const fs::path& path, itk::ImageIOBase& io, const Error& cut, std::vector<std::int16_t>& hu) {
+  const auto bytes = static_cast<std::size_t>(io.GetImageSizeInBytes());
+  if (io.GetComponentType() == itk::IOComponentEnum::SHORT) {
+    std::int16_t filling = 0;
+    std::memset(&filling, kFilling, sizeof filling);
+    hu.assign(bytes / sizeof filling, filling);
+    if (!read_voxels(io, {reinterpret_cast<char*>(hu.data()), bytes})) return cut;
+    return {};
+  }
+  std::vector<char> values(bytes, kFilling);
+  if (!read_voxels(io, values)) return cut;
+  Result<void> read;
+  const bool numbers =
+      with_type(io.GetComponentType(), [&](auto type) { read = append_hu<decltype(type)>(path, values, hu); });
+  if (!numbers) return refused(Errc::unsupported, path, "holds no plain numbers; export it as 16-bit integers");
+  return read;
+}
+
+Result<void> read_values(const fs::path& path, itk::ImageIOBase& io, const Error& cut, std::vector<float>& values) {
+  std::vector<char> bytes(static_cast<std::size_t>(io.GetImageSizeInBytes()), kFilling);
+  if (!read_voxels(io, bytes)) return cut;
+  const bool numbers = with_type(io.GetComponentType(), [&](auto value) {
+    for (std::size_t at = 0; at + sizeof value <= bytes.size(); at += sizeof value) {
+      std::memcpy(&value, bytes.data() + at, sizeof value);
+      values.push_back(static_cast<float>(value));
+    }
+  });
+  if (!numbers) return refused(Errc::unsupported, path, "holds no plain numbers; export it as 16-bit integers");
+  return {};
 }
 
 }  // namespace
@@ -183,7 +219,7 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
   if (io == nullptr) {
     return refused(Errc::bad_format, path, "is no image that can be read; give DICOM, NIfTI, NRRD, MHA or MHD");
   }
-  const std::string cut = "is cut short or damaged; export it again";
+  const std::string why_cut = "is cut short or damaged; export it again";
   try {
     const auto nifti = std::string(io->GetNameOfClass()) == "NiftiImageIO" ? NiftiFile::open(path) : std::nullopt;
     if (nifti && !nifti->header_is_finite()) {
@@ -214,23 +250,20 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
       image.origin_mm[axis] = io->GetOrigin(axis);
       for (unsigned row = 0; row < 3; ++row) image.axes(row, axis) = io->GetDirection(axis)[row];
     }
-    const auto bytes_expected = static_cast<std::size_t>(io->GetImageSizeInBytes());
     if (nifti) {
       // By the file's own type: a slope makes the reader give floats where the file holds integers.
       const std::string fault = nifti->fault(nifti->bytes_of(count));
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);
     }
-    const auto bytes = read_voxels(*io);
-    if (!bytes || bytes->size() != bytes_expected) return refused(Errc::bad_format, path, cut);
-    image.values.resize(count);
-    if (!convert(io->GetComponentType(), *bytes, image.values)) {
-      return refused(Errc::unsupported, path, "holds no plain numbers; export it as 16-bit integers");
-    }
+    const Error cut = refused(Errc::bad_format, path, why_cut);
+    auto read = components == 1 ? read_hu(path, *io, cut, image.hu) : read_values(path, *io, cut, image.values);
+    if (!read) return read.error();
+    if (image.hu.size() + image.values.size() != count) return cut;
     return image;
   } catch (const std::bad_alloc&) {
     return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   } catch (const std::exception&) {
-    return refused(Errc::unreadable, path, cut);
+    return refused(Errc::unreadable, path, why_cut);
   }
 }
 
@@ -256,11 +289,10 @@ Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs 
       io->Write(image.values.data());
     } else if (stored == StoredAs::int16) {
       io->SetComponentType(itk::IOComponentEnum::SHORT);
-      const std::vector<std::int16_t> whole(image.values.begin(), image.values.end());
-      io->Write(whole.data());
+      io->Write(image.hu.data());
     } else {
       io->SetComponentType(itk::IOComponentEnum::UCHAR);
-      const std::vector<std::uint8_t> bytes(image.values.begin(), image.values.end());
+      const std::vector<std::uint8_t> bytes(image.hu.begin(), image.hu.end());
       io->Write(bytes.data());
     }
     return {};

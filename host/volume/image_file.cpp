@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <new>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "host/volume/decode.hpp"
@@ -22,8 +20,6 @@ namespace fs = std::filesystem;
 /// What the copy of this process sends of itself: the file it is about to read, how it failed, or the image.
 enum class Record : std::uint8_t { reading = 'r', error = 'e', image = 'i' };
 
-using Send = std::function<void(const void* data, std::size_t size)>;
-
 void send_text(const Send& send, Record kind, std::int32_t code, const std::string& text) {
   const auto length = static_cast<std::uint32_t>(text.size());
   send(&kind, sizeof kind);
@@ -36,11 +32,11 @@ void send_image(const Send& send, const ImageFile& image) {
   const Record kind = Record::image;
   send(&kind, sizeof kind);
   send(image.size.data(), sizeof image.size);
-  send(&image.components, sizeof image.components);
   send(image.spacing_mm.data(), 3 * sizeof(double));
   send(image.origin_mm.data(), 3 * sizeof(double));
   send(image.axes.data(), 9 * sizeof(double));
-  send(image.values.data(), image.values.size() * sizeof(float));
+  send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
+  send(image.values.data(), image.values.size() * sizeof image.values[0]);
 }
 
 Result<ImageFile> decode(const fs::path& path, int components, const Announce& announce) {
@@ -50,45 +46,40 @@ Result<ImageFile> decode(const fs::path& path, int components, const Announce& a
   return is_dicom(path) ? decode_dicom_file(path, announce) : decode_image_file(path, components);
 }
 
-/// Takes the records apart. Bytes that end early are the end of a copy that died.
-class Records {
- public:
-  explicit Records(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+std::optional<Error> receive_text(const Receive& receive) {
+  constexpr std::uint32_t kLongest = 1 << 16;
+  std::int32_t code = 0;
+  std::uint32_t length = 0;
+  if (!receive(&code, sizeof code) || !receive(&length, sizeof length) || length > kLongest) return std::nullopt;
+  Error told{static_cast<Errc>(code), std::string(length, ' ')};
+  if (!receive(told.what.data(), length)) return std::nullopt;
+  return told;
+}
 
-  bool take(void* to, std::size_t size) {
-    if (bytes_.size() < size) return false;
-    std::memcpy(to, bytes_.data(), size);
-    bytes_ = bytes_.subspan(size);
-    return true;
+std::optional<ImageFile> receive_image(const Receive& receive, int components) {
+  ImageFile image;
+  image.components = components;
+  if (!receive(image.size.data(), sizeof image.size) || !receive(image.spacing_mm.data(), 3 * sizeof(double)) ||
+      !receive(image.origin_mm.data(), 3 * sizeof(double)) || !receive(image.axes.data(), 9 * sizeof(double))) {
+    return std::nullopt;
   }
-
-  std::optional<Error> take_text() {
-    std::int32_t code = 0;
-    std::uint32_t length = 0;
-    if (!take(&code, sizeof code) || !take(&length, sizeof length) || bytes_.size() < length) return std::nullopt;
-    Error told{static_cast<Errc>(code), std::string(length, ' ')};
-    take(told.what.data(), length);
-    return told;
+  constexpr int kMost = 65535;
+  std::size_t count = static_cast<std::size_t>(components);
+  for (const int n : image.size) {
+    if (n < 0 || n > kMost) return std::nullopt;
+    count *= static_cast<std::size_t>(n);
   }
-
-  std::optional<ImageFile> take_image() {
-    ImageFile image;
-    if (!take(image.size.data(), sizeof image.size) || !take(&image.components, sizeof image.components) ||
-        !take(image.spacing_mm.data(), 3 * sizeof(double)) || !take(image.origin_mm.data(), 3 * sizeof(double)) ||
-        !take(image.axes.data(), 9 * sizeof(double))) {
-      return std::nullopt;
-    }
-    std::size_t count = static_cast<std::size_t>(image.components);
-    for (const int n : image.size) count *= static_cast<std::size_t>(n);
-    if (bytes_.size() != count * sizeof(float)) return std::nullopt;
-    image.values.resize(count);
-    take(image.values.data(), bytes_.size());
-    return image;
+  if (components == 1) {
+    auto hu = receive_values<std::int16_t>(receive, count);
+    if (!hu) return std::nullopt;
+    image.hu = *std::move(hu);
+  } else {
+    auto values = receive_values<float>(receive, count);
+    if (!values) return std::nullopt;
+    image.values = *std::move(values);
   }
-
- private:
-  std::span<const std::uint8_t> bytes_;
-};
+  return image;
+}
 
 /// Whether the image lies somewhere that a patient can.
 Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
@@ -128,31 +119,40 @@ Result<ImageFile> read_image(const fs::path& path, int components) {
   const auto work = [&](const Send& send) {
     const auto image =
         decode(path, components, [&send](const fs::path& file) { send_text(send, Record::reading, 0, file.string()); });
-    if (image) {
+    if (image && image->components != components) {
+      const Error other = refused(Errc::unsupported, path, "is a CT; give a displacement field");
+      send_text(send, Record::error, static_cast<std::int32_t>(other.code), other.what);
+    } else if (image) {
       send_image(send, *image);
     } else {
       send_text(send, Record::error, static_cast<std::int32_t>(image.error().code), image.error().what);
     }
   };
-  try {
-    const auto outcome = run_isolated(work, kLongest);
-    if (!outcome) return outcome.error();
-    Records records(outcome->bytes);
-    fs::path reading = path;
+  fs::path reading = path;
+  std::optional<Result<ImageFile>> read;
+  const auto take = [&](const Receive& receive) {
     Record kind{};
-    while (records.take(&kind, sizeof kind)) {
+    while (!read && receive(&kind, sizeof kind)) {
       if (kind == Record::image) {
-        auto image = records.take_image();
-        if (!image) break;
-        if (auto sound = check_geometry(path, *image); !sound) return sound.error();
-        return *std::move(image);
+        if (auto image = receive_image(receive, components)) read = *std::move(image);
+        return;
       }
-      auto told = records.take_text();
-      if (!told) break;
-      if (kind == Record::error) return *std::move(told);
-      reading = told->what;
+      auto told = receive_text(receive);
+      if (!told) return;
+      if (kind == Record::error) {
+        read = *std::move(told);
+      } else {
+        reading = told->what;
+      }
     }
-    return refused(Errc::bad_format, reading, "is cut short, damaged, or too large to decode; copy it again");
+  };
+  try {
+    if (auto ran = run_isolated(work, take, kLongest); !ran) return ran.error();
+    if (!read)
+      return refused(Errc::bad_format, reading, "is cut short, damaged, or too large to decode; copy it again");
+    if (!*read) return read->error();
+    if (auto sound = check_geometry(path, **read); !sound) return sound.error();
+    return *std::move(*read);
   } catch (const std::bad_alloc&) {
     return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   }

@@ -20,8 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// The copy's part: never returns.
-[[noreturn]] void run_copy(
-    int fd, const std::function<void(const std::function<void(const void* data, std::size_t size)>& send)>& work) {
+[[noreturn]] void run_copy(int fd, const std::function<void(const Send&)>& work) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
@@ -47,13 +46,51 @@ using Clock = std::chrono::steady_clock;
   ::_exit(0);
 }
 
+/// The other end of the pipe. Ends the copy with itself.
+class Copy {
+ public:
+  Copy(pid_t process, int fd, Duration within)
+      : process_(process), fd_(fd), deadline_(Clock::now() + std::chrono::nanoseconds(within.ns)) {}
+  ~Copy() {
+    ::close(fd_);
+    ::kill(process_, SIGKILL);
+    int status = 0;
+    while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
+    }
+  }
+  Copy(const Copy&) = delete;
+  Copy& operator=(const Copy&) = delete;
+
+  bool receive(void* to, std::size_t size) const {
+    auto* bytes = static_cast<char*>(to);
+    while (size > 0) {
+      const auto left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - Clock::now()).count();
+      if (left_ms <= 0) return false;
+      pollfd entry{fd_, POLLIN, 0};
+      if (::poll(&entry, 1, static_cast<int>(std::min<std::int64_t>(left_ms, 1000))) <= 0) continue;
+      const ssize_t got = ::read(fd_, bytes, size);
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) return false;
+      bytes += got;
+      size -= static_cast<std::size_t>(got);
+    }
+    return true;
+  }
+
+ private:
+  pid_t process_;
+  int fd_;
+  Clock::time_point deadline_;
+};
+
 }  // namespace
 
-Result<IsolatedOutcome> run_isolated(
-    const std::function<void(const std::function<void(const void* data, std::size_t size)>& send)>& work,
-    Duration within) {
+Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
+                          Duration within) {
   std::array<int, 2> fds{-1, -1};
   if (::pipe2(fds.data(), O_CLOEXEC) != 0) return Error{Errc::io, "no pipe is free for a decoder", errno};
+  constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
+  (void)::fcntl(fds[0], F_SETPIPE_SZ, kPipeBytes);
   const pid_t child = ::fork();
   if (child < 0) {
     const int failed = errno;
@@ -66,32 +103,9 @@ Result<IsolatedOutcome> run_isolated(
     run_copy(fds[1], work);
   }
   ::close(fds[1]);
-  std::vector<std::uint8_t> chunk(1U << 20U);
-  (void)::fcntl(fds[0], F_SETPIPE_SZ, static_cast<int>(chunk.size()));  // a volume is hundreds of megabytes
-  IsolatedOutcome outcome;
-  const auto deadline = Clock::now() + std::chrono::nanoseconds(within.ns);
-  bool in_time = true;
-  for (;;) {
-    const auto left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
-    pollfd entry{fds[0], POLLIN, 0};
-    const int ready = ::poll(&entry, 1, static_cast<int>(std::clamp<std::int64_t>(left_ms, 0, 1000)));
-    if (ready == 0 && left_ms <= 0) {
-      in_time = false;
-      break;
-    }
-    if (ready <= 0) continue;
-    const ssize_t got = ::read(fds[0], chunk.data(), chunk.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) break;
-    outcome.bytes.insert(outcome.bytes.end(), chunk.begin(), chunk.begin() + got);
-  }
-  ::close(fds[0]);
-  if (!in_time) ::kill(child, SIGKILL);
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  outcome.ended_well = in_time && WIFEXITED(status) && WEXITSTATUS(status) == 0;
-  return outcome;
+  const Copy copy(child, fds[0], within);
+  take([&copy](void* to, std::size_t size) { return copy.receive(to, size); });
+  return {};
 }
 
 }  // namespace birdseye::host

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -9,18 +11,32 @@
 
 namespace birdseye::host {
 
-/// What work in a process of its own came to.
-struct IsolatedOutcome {
-  std::vector<std::uint8_t> bytes;  ///< all that it sent
-  bool ended_well = false;          ///< false: it was killed by a signal, or by the deadline
-};
+/// Sends bytes to the process that asked for the work.
+using Send = std::function<void(const void* data, std::size_t size)>;
+/// Takes the next bytes that the work sends. False where they do not come: it has ended, by a signal perhaps, or is
+/// late.
+using Receive = std::function<bool(void* to, std::size_t size)>;
 
-/// Runs work in a copy of this process, whose output goes nowhere and whose death is not ours. For decoders of files
-/// from elsewhere: Debian's GDCM meets damage with an assertion, which no catch can hold
-/// (docs/decisions/0012-isolated-import.md). work is given send(data, size). It must not use threads of ours; it is
-/// killed at the deadline.
-Result<IsolatedOutcome> run_isolated(
-    const std::function<void(const std::function<void(const void* data, std::size_t size)>& send)>& work,
-    Duration within);
+/// Runs work in a copy of this process, whose output goes nowhere and whose death is not ours, and take in this one,
+/// at the same time. For decoders of files from elsewhere: Debian's GDCM meets damage with an assertion, which no catch
+/// can hold (docs/decisions/0012-isolated-import.md). What take receives is not to be trusted. work must not use
+/// threads of ours; it is killed at the deadline, or when take returns.
+Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
+                          Duration within);
+
+/// So many values, as far as they come: the count is only what the other process says, so that no memory is touched
+/// before there is something to put there. Empty where they do not all come.
+template <typename T>
+std::optional<std::vector<T>> receive_values(const Receive& receive, std::size_t count) {
+  constexpr std::size_t kStep = (1U << 18U) / sizeof(T), kReserved = (1U << 30U) / sizeof(T);
+  std::vector<T> values;
+  values.reserve(std::min(count, kReserved));
+  while (values.size() < count) {
+    const std::size_t had = values.size(), more = std::min(count - had, kStep);
+    values.resize(had + more);
+    if (!receive(values.data() + had, more * sizeof(T))) return std::nullopt;
+  }
+  return values;
+}
 
 }  // namespace birdseye::host

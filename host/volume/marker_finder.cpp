@@ -1,7 +1,8 @@
 #include "host/volume/marker_finder.hpp"
 
-#include <itkConnectedComponentImageFilter.h>
+#include <itkBinaryImageToLabelMapFilter.h>
 #include <itkImage.h>
+#include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -13,7 +14,6 @@ namespace {
 
 using Eigen::Vector3d;
 using Mask = itk::Image<unsigned char, 3>;
-using Components = itk::Image<unsigned int, 3>;
 
 constexpr double kExplained = 0.9;         // a marker; bones in real CTs of the abdomen come to 0.86
 constexpr double kExplainedInDoubt = 0.8;  // a marker that another one, or the border, disturbs
@@ -28,6 +28,18 @@ struct Component {
   [[nodiscard]] Vector3d centre_voxel() const { return sum / static_cast<double>(voxels); }
 };
 
+void add_run(Component& c, const Mask::IndexType& first, int length) {
+  for (int n = 0; n < length; ++n) {
+    const Eigen::Array3i here(static_cast<int>(first[0]) + n, static_cast<int>(first[1]), static_cast<int>(first[2]));
+    const Vector3d p = here.cast<double>();
+    c.low = c.low.min(here);
+    c.high = c.high.max(here);
+    c.sum += p;
+    c.squares += p * p.transpose();
+  }
+  c.voxels += static_cast<std::size_t>(length);
+}
+
 std::vector<Component> bright_components(const Volume& ct, std::int16_t threshold) {
   const auto mask = Mask::New();
   Mask::SizeType size;
@@ -36,27 +48,18 @@ std::vector<Component> bright_components(const Volume& ct, std::int16_t threshol
   mask->Allocate();
   std::transform(ct.hu.begin(), ct.hu.end(), mask->GetBufferPointer(),
                  [threshold](std::int16_t hu) { return static_cast<unsigned char>(hu >= threshold ? 1 : 0); });
-  const auto label = itk::ConnectedComponentImageFilter<Mask, Components>::New();
+  // As runs along x: an image of labels would take four times the mask, and as long to go through.
+  const auto label = itk::BinaryImageToLabelMapFilter<Mask>::New();
   label->SetInput(mask);
+  label->SetInputForegroundValue(1);
   label->FullyConnectedOn();
   label->Update();
-  std::vector<Component> components(label->GetObjectCount());
-  const unsigned* labels = label->GetOutput()->GetBufferPointer();
-  for (int k = 0; k < ct.size[2]; ++k) {
-    for (int j = 0; j < ct.size[1]; ++j) {
-      for (int i = 0; i < ct.size[0]; ++i) {
-        const unsigned id = labels[ct.index(i, j, k)];
-        if (id == 0) continue;
-        Component& c = components[id - 1];
-        const Eigen::Array3i here(i, j, k);
-        const Vector3d p(i, j, k);
-        c.low = c.low.min(here);
-        c.high = c.high.max(here);
-        c.sum += p;
-        c.squares += p * p.transpose();
-        ++c.voxels;
-      }
-    }
+  const auto* const map = label->GetOutput();
+  std::vector<Component> components(map->GetNumberOfLabelObjects());
+  for (std::size_t n = 0; n < components.size(); ++n) {
+    const auto* const object = map->GetNthLabelObject(n);
+    for (std::size_t line = 0; line < object->GetNumberOfLines(); ++line)
+      add_run(components[n], object->GetLine(line).GetIndex(), static_cast<int>(object->GetLine(line).GetLength()));
   }
   return components;
 }
@@ -97,19 +100,21 @@ class Finder {
  public:
   Finder(const Volume& ct, const MarkerShape& shape) : ct_(ct), shape_(shape) {}
 
-  void look(const Component& c) {
-    const Size size = size_of(ct_, c, shape_);
-    if (size == Size::other) return;
-    const Vector3d centre = ct_.patient_from_voxel * c.centre_voxel();
-    if (size == Size::two) return look_at_two(c, centre);
-    if (known(centre)) return;
-    const auto fit = fit_marker(ct_, shape_, centre, directions_of(ct_, c));
-    if (!fit || !is_one(*fit, at_border(ct_, c) ? kExplainedInDoubt : kExplained)) {
-      others_.push_back(centre);
-    } else if (at_border(ct_, c) || cut(*fit)) {
-      doubt(fit->centre_in_patient_mm, "is cut by the border of the CT: scan more of the patient");
-    } else if (!known(fit->centre_in_patient_mm)) {
-      out_.markers.push_back(*fit);
+  void look(const std::vector<Component>& components) {
+    std::vector<Candidate> candidates;
+    for (const Component& c : components) {
+      const Size size = size_of(ct_, c, shape_);
+      const Vector3d centre = ct_.patient_from_voxel * c.centre_voxel();
+      if (size == Size::two || (size == Size::one && !known(centre))) candidates.push_back({&c, size, centre, {}});
+    }
+    // What is a marker depends on what was found before, so that only the fits are made side by side.
+    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t n) { fit(candidates[n]); });
+    for (const Candidate& candidate : candidates) {
+      if (candidate.size == Size::two) {
+        judge_two(candidate);
+      } else {
+        judge_one(candidate);
+      }
     }
   }
 
@@ -127,6 +132,37 @@ class Finder {
   }
 
  private:
+  struct Candidate {
+    const Component* component;
+    Size size;
+    Vector3d centre;
+    std::vector<std::optional<MarkerFit>> fits;  // one for each marker that it may be
+  };
+
+  void fit(Candidate& candidate) const {
+    const Eigen::Matrix3d directions = directions_of(ct_, *candidate.component);
+    if (candidate.size == Size::one) {
+      candidate.fits = {fit_marker(ct_, shape_, candidate.centre, directions)};
+      return;
+    }
+    for (const double side : {-0.5, 0.5}) {
+      const Vector3d centre = candidate.centre + side * shape_.diameter_mm * directions.col(2);
+      candidate.fits.push_back(fit_marker(ct_, shape_, centre, directions));
+    }
+  }
+  void judge_one(const Candidate& candidate) {
+    if (known(candidate.centre)) return;
+    const auto& fit = candidate.fits.front();
+    const bool border = at_border(ct_, *candidate.component);
+    if (!fit || !is_one(*fit, border ? kExplainedInDoubt : kExplained)) {
+      others_.push_back(candidate.centre);
+    } else if (border || cut(*fit)) {
+      doubt(fit->centre_in_patient_mm, "is cut by the border of the CT: scan more of the patient");
+    } else if (!known(fit->centre_in_patient_mm)) {
+      out_.markers.push_back(*fit);
+    }
+  }
+
   [[nodiscard]] bool same(const Vector3d& a, const Vector3d& b) const {
     return (a - b).norm() < shape_.widest_mm() / 2;
   }
@@ -159,16 +195,13 @@ class Finder {
                      [&](const DoubtfulMarker& d) { return same(d.centre_in_patient_mm, centre); }))
       out_.doubtful.push_back({centre, reason});
   }
-  void look_at_two(const Component& c, const Vector3d& centre) {
-    const Eigen::Matrix3d directions = directions_of(ct_, c);
-    std::vector<MarkerFit> fits;
-    for (const double side : {-0.5, 0.5}) {
-      const auto fit = fit_marker(ct_, shape_, centre + side * shape_.diameter_mm * directions.col(2), directions);
-      if (fit && is_one(*fit, kExplainedInDoubt)) fits.push_back(*fit);
-    }
-    if (fits.size() < 2 || same(fits[0].centre_in_patient_mm, fits[1].centre_in_patient_mm)) return;
-    for (const MarkerFit& fit : fits)
-      doubt(fit.centre_in_patient_mm, "touches another marker, which pulls its centre: place them apart");
+  void judge_two(const Candidate& candidate) {
+    const auto& a = candidate.fits[0];
+    const auto& b = candidate.fits[1];
+    if (!a || !b || !is_one(*a, kExplainedInDoubt) || !is_one(*b, kExplainedInDoubt)) return;
+    if (same(a->centre_in_patient_mm, b->centre_in_patient_mm)) return;
+    for (const auto& fit : candidate.fits)
+      doubt(fit->centre_in_patient_mm, "touches another marker, which pulls its centre: place them apart");
   }
 
   const Volume& ct_;
@@ -183,9 +216,7 @@ FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search) {
   Finder finder(ct, search.shape);
   std::vector<std::int16_t> thresholds{300, 700, 1500};
   if (search.threshold_hu) thresholds = {*search.threshold_hu};
-  for (const std::int16_t threshold : thresholds) {
-    for (const Component& component : bright_components(ct, threshold)) finder.look(component);
-  }
+  for (const std::int16_t threshold : thresholds) finder.look(bright_components(ct, threshold));
   return finder.finish();
 }
 

@@ -112,7 +112,7 @@ Result<void> write_labels(const std::filesystem::path& path, const Volume& label
   image.spacing_mm = labels.spacing_mm;
   image.origin_mm = labels.patient_from_voxel.translation();
   image.axes = labels.patient_from_voxel.linear().colwise().normalized();
-  image.values.assign(labels.hu.begin(), labels.hu.end());
+  image.hu = labels.hu;
   return write_image(path, image, StoredAs::uint8);
 }
 

@@ -55,6 +55,51 @@ TEST(LiveSession, GoesFromTheLinkToARegisteredPatient) {
   EXPECT_EQ(session.step(), LiveStep::run);
 }
 
+/// As kFiducials, in soft tissue.
+std::string ct_with_markers(const Scratch& scratch) {
+  hw_sim::Grid grid;
+  grid.size = {68, 75, 61};
+  grid.spacing_mm = {1.5, 1.5, 1.5};
+  grid.origin_mm = {-20, -20, -20};
+  std::vector<std::int16_t> hu;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        double outside_mm = 100;
+        for (const Eigen::Vector3d& f : kFiducials)
+          outside_mm = std::min(outside_mm, (grid.point(i, j, k) - f).norm() - 4);
+        hu.push_back(static_cast<std::int16_t>(40 + 1500 * std::clamp(0.5 - outside_mm / 1.5, 0.0, 1.0)));
+      }
+    }
+  }
+  EXPECT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid, hu, 1));
+  return (scratch / "ct").string();
+}
+
+TEST(LiveSession, WhatIsTouchedBeforeTheMarkersAreFoundCounts) {
+  const Scratch scratch;
+  LiveSettings settings = operation_settings(scratch);
+  settings.patient.fiducials.clear();
+  settings.patient.ct = ct_with_markers(scratch);
+  LiveSession session(settings);
+  connect_and_calibrate(session);
+  Hand hand(session);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(session.touches().size(), kFiducials.size());
+  EXPECT_FALSE(session.fre_mm().has_value());
+  load(session);
+  for (int i = 0; i < 1000 && !session.markers_in_patient_mm(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    session.tick();
+  }
+  ASSERT_TRUE(session.markers_in_patient_mm().has_value());
+  EXPECT_EQ(session.markers_in_patient_mm()->size(), kFiducials.size());
+  ASSERT_TRUE(session.fre_mm().has_value()) << session.registration_fault();
+  EXPECT_LT(*session.fre_mm(), 0.3);
+  EXPECT_EQ(session.step(), LiveStep::views);
+}
+
 /// The scope at its place, looking at the patient's point from so far.
 wire::VideoFrame looking_at(const LiveSession& session, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
                             double sigma_mm) {

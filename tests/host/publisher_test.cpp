@@ -11,10 +11,10 @@ namespace birdseye::host {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using birdseye::testing::Slicer;
 using std::chrono::milliseconds;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using birdseye::testing::Slicer;
 
 const Transform<Tracker, Patient> kTrackerFromPatient(
     Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix(), {300, 20, -40});

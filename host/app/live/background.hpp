@@ -23,6 +23,7 @@ class Background {
   /// Not while it runs.
   void start(Work work) {
     thread_ = {};
+    (void)take();  // what came of the work before is not of this
     running_ = true;
     say("");
     thread_ = std::jthread([this, work = std::move(work)](const std::stop_token& stop) {

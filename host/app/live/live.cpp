@@ -123,6 +123,7 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
   if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
   if (figures.window_s) json["window_s"] = *figures.window_s;
   if (figures.ct_s) json["ct_s"] = *figures.ct_s;
+  if (figures.fiducials_s) json["fiducials_s"] = *figures.fiducials_s;
   return json;
 }
 

@@ -101,6 +101,8 @@ void LiveApp::note_simulator() {
 }
 
 void LiveApp::note_patient() {
+  if (session_.markers_in_patient_mm() && !figures_.fiducials_s)
+    figures_.fiducials_s = Duration{now().ns - asked_.ns}.seconds();
   if (session_.patient() == nullptr || histogram_) return;
   histogram_.emplace(session_.patient()->shown);
   facts_.histogram = &*histogram_;

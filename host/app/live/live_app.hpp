@@ -18,8 +18,9 @@ namespace birdseye::host {
 
 /// What a run of the window came to.
 struct LiveFigures {
-  /// From when the window was asked for: until it showed something, and until the CT could be drawn.
-  std::optional<double> window_s, ct_s;
+  /// From when the window was asked for: until it showed something, until the CT could be drawn, and until its
+  /// fiducials were known.
+  std::optional<double> window_s, ct_s, fiducials_s;
   std::uint64_t frames = 0, frames_skipped = 0, frames_overlaid = 0;
   double seconds = 0;
   AgeStrip ages;

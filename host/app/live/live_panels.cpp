@@ -109,10 +109,12 @@ void draw_calibrate(const LiveSession& session, float scale) {
 
 void draw_fiducials(const LiveSession& session) {
   say(kText, "touch each fiducial with the pointer, and rest there for half a second");
-  if (const PatientPlan* patient = session.patient()) {
+  if (const auto& markers = session.markers_in_patient_mm()) {
     say(kQuiet,
-        fmt::format("the CT shows {}{}", patient->markers_in_patient_mm.size(),
+        fmt::format("the CT shows {}{}", markers->size(),
                     session.fiducials_wanted() != 0 ? fmt::format("; {} are wanted", session.fiducials_wanted()) : ""));
+  } else if (session.patient() != nullptr) {
+    say(kQuiet, "markers are looked for in the CT");
   }
   for (std::size_t i = 0; i < session.touches().size(); ++i) {
     const TouchedFiducial& touch = session.touches()[i];

@@ -38,7 +38,13 @@ LiveSession::LiveSession(LiveSettings settings) : settings_(std::move(settings))
 }
 
 void LiveSession::tick() {
-  take_loaded();
+  if (auto loaded = loading_.take()) finish_loading(*std::move(loaded));
+  if (auto found = finding_.take(); found && !markers_in_patient_mm_) {
+    markers_in_patient_mm_ = *std::move(found);
+    if (!touches_.empty()) fit();
+    resume();
+  }
+  finish_recolouring();
   if (auto found = deforming_.take()) finish_deform(*std::move(found));
   if (guide_) {
     if (auto found = guide_->take()) finish_guide(*std::move(found));
@@ -229,11 +235,11 @@ void LiveSession::fit() {
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
   note.line = fmt::format("{} touched", touches_.size());
   forget_deformation("the fiducials were touched anew: keep views again");
-  if (!patient_ || touches_.size() < kFewestFiducials) return update_setup();
+  if (!markers_in_patient_mm_ || touches_.size() < kFewestFiducials) return update_setup();
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());
   for (const TouchedFiducial& touch : touches_) places.push_back(touch.tip_in_tracker_mm);
-  const auto found = match_and_fit(patient_->markers_in_patient_mm, places);
+  const auto found = match_and_fit(*markers_in_patient_mm_, places);
   if (!found) {
     registration_fault_ = found.error().what;
     return update_setup();
@@ -241,7 +247,7 @@ void LiveSession::fit() {
   fitted_in_patient_mm_.clear();
   for (std::size_t i = 0; i < touches_.size(); ++i) {
     touches_[i].residual_mm = found->fit.residuals_mm[i];
-    fitted_in_patient_mm_.push_back(patient_->markers_in_patient_mm[found->ct_of_touch[i]]);
+    fitted_in_patient_mm_.push_back((*markers_in_patient_mm_)[found->ct_of_touch[i]]);
   }
   fre_mm_ = found->fit.fre_rms_mm;
   known_.fre_mm = *fre_mm_;

@@ -140,6 +140,10 @@ class LiveSession {
   /// tracker's noise, and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
   [[nodiscard]] std::optional<TargetMark> target_mark() const;
   [[nodiscard]] const PatientPlan* patient() const { return patient_.get(); }
+  /// The fiducials in the CT; empty as long as they are looked for.
+  [[nodiscard]] const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm() const {
+    return markers_in_patient_mm_;
+  }
   /// For threads that outlast the patient's stay here.
   [[nodiscard]] std::shared_ptr<const PatientPlan> shared_patient() const { return patient_; }
   /// Another number: another CT, or it is deformed in another way.
@@ -156,6 +160,13 @@ class LiveSession {
   void set_transfer(const TransferFunction& transfer);
 
  private:
+  struct Loaded {
+    std::shared_ptr<const PatientPlan> patient;
+    Result<std::unique_ptr<Engine>> engine;  ///< of what is shown
+  };
+
+  void finish_loading(Result<Loaded> loaded);
+  void finish_recolouring();
   void take(const wire::VideoFrame& frame, HostTime exposed);
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
@@ -172,9 +183,7 @@ class LiveSession {
   void forget_deformation(const std::string& why);
   [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
   [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
-  void take_loaded();
   void use(Result<std::unique_ptr<Engine>> engine);
-  void recolour();
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
 
   LiveSettings settings_;
@@ -187,17 +196,15 @@ class LiveSession {
   std::string link_words_, appliance_says_, fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
 
-  struct Loaded {
-    std::shared_ptr<const PatientPlan> patient;
-    Result<std::unique_ptr<Engine>> engine;  ///< of what is shown
-  };
   Background<Result<Loaded>> loading_;
   std::shared_ptr<const PatientPlan> patient_;
+  Background<std::vector<Eigen::Vector3d>> finding_;
+  std::optional<std::vector<Eigen::Vector3d>> markers_in_patient_mm_;
   std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_;
   bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::unique_ptr<Engine> engine_;
-  Background<Result<Loaded>> recolouring_;
+  Background<Loaded> recolouring_;
 
   std::unique_ptr<GuideWorker> guide_;
   std::optional<Verdict> calibration_verdict_;

@@ -61,8 +61,8 @@ std::optional<CheckReading> LiveSession::check() const {
     reading.distance_mm = distance_mm;
   };
   for (const NamedPoint& landmark : patient_->landmarks) consider(landmark.name, landmark.place_mm);
-  for (std::size_t i = 0; i < patient_->markers_in_patient_mm.size(); ++i)
-    consider(fmt::format("fiducial {}", i + 1), patient_->markers_in_patient_mm[i]);
+  for (std::size_t i = 0; markers_in_patient_mm_ && i < markers_in_patient_mm_->size(); ++i)
+    consider(fmt::format("fiducial {}", i + 1), (*markers_in_patient_mm_)[i]);
   return reading;
 }
 

@@ -48,7 +48,7 @@ Result<PatientPlan> read_patient(const PatientFiles& files) {
   if (!files.fiducials.empty()) {
     auto points = read_points(files.fiducials);
     if (!points) return points.error();
-    plan.markers_in_patient_mm = *std::move(points);
+    plan.fiducials_in_patient_mm = *std::move(points);
   }
   if (!files.landmarks.empty()) {
     const auto places = read_places(files.landmarks);

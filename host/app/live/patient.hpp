@@ -30,12 +30,12 @@ struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
   std::optional<Volume> labels;
-  std::vector<int> organ;                              ///< labels of what the views show: it is matched with them
-  std::vector<Eigen::Vector3d> markers_in_patient_mm;  ///< the brightest first, where they were found
+  std::vector<int> organ;  ///< labels of what the views show: it is matched with them
+  std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given
   std::vector<NamedPoint> landmarks;
 };
 
-/// An error names the file. Where no fiducials are given, markers_in_patient_mm is left to find_fiducials.
+/// An error names the file. Where no fiducials are given, they are left to find_fiducials.
 Result<PatientPlan> read_patient(const PatientFiles& files);
 /// The markers that the CT shows, the brightest first.
 std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct);

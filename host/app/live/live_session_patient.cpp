@@ -1,6 +1,4 @@
-// The part of the session that reads the patient and makes what draws it, both beside the window.
-#include <future>
-
+// The part of the session that reads the patient, and makes the engine that draws the CT.
 #include "host/app/live/live_session.hpp"
 #include "host/render/engine_thread.hpp"
 
@@ -25,33 +23,30 @@ void LiveSession::load(const PatientFiles& files) {
     say("reading the CT");
     auto read = read_patient(files);
     if (!read) return Result<Loaded>(read.error());
-    auto patient = std::make_shared<PatientPlan>(*std::move(read));
-    std::future<std::vector<Eigen::Vector3d>> found;
-    if (files.fiducials.empty())
-      found = std::async(std::launch::async, [&patient] { return find_fiducials(patient->ct); });
+    auto patient = std::make_shared<const PatientPlan>(*std::move(read));
     auto engine = engine_of(name, *patient, transfer);
-    if (found.valid()) patient->markers_in_patient_mm = found.get();
     return Result<Loaded>(Loaded{std::move(patient), std::move(engine)});
   });
 }
 
-void LiveSession::take_loaded() {
-  if (auto loaded = loading_.take()) {
-    if (*loaded) {
-      picture_.set_engine(nullptr);
-      engine_.reset();  // it draws the patient that goes
-      patient_ = std::move((*loaded)->patient);
-      ++shapes_;
-      if (transfer_) fault_.clear();
-      use(std::move((*loaded)->engine));
-      fit();
-      resume();
-    } else {
-      fault_ = loaded->error().what;
-    }
+void LiveSession::finish_loading(Result<Loaded> loaded) {
+  if (!loaded) {
+    fault_ = loaded.error().what;
+    return;
   }
-  if (auto made = recolouring_.take(); made && *made && (**made).patient == patient_) use(std::move((**made).engine));
-  if (transfer_is_newer_ && patient_ && !recolouring_.running()) recolour();
+  picture_.set_engine(nullptr);
+  engine_.reset();
+  patient_ = std::move(loaded->patient);
+  ++shapes_;
+  if (transfer_) fault_.clear();
+  use(std::move(loaded->engine));
+  // The search may take seconds, and the CT can be shown meanwhile.
+  markers_in_patient_mm_ = patient_->fiducials_in_patient_mm;
+  if (!markers_in_patient_mm_)
+    finding_.start([patient = patient_](const std::stop_token&, const auto&) { return find_fiducials(patient->ct); });
+  fit();
+  // What was touched meanwhile counts more than what is resumed, and is fitted first.
+  if (markers_in_patient_mm_ || touches_.empty()) resume();
 }
 
 void LiveSession::use(Result<std::unique_ptr<Engine>> engine) {
@@ -73,13 +68,15 @@ void LiveSession::set_transfer(const TransferFunction& transfer) {
   transfer_is_newer_ = true;
 }
 
-/// The picture keeps its old colours meanwhile: it must not stand still.
-void LiveSession::recolour() {
+/// The picture keeps its old colours until there are new ones: it must not stand still.
+void LiveSession::finish_recolouring() {
+  if (auto made = recolouring_.take(); made && made->patient == patient_) use(std::move(made->engine));
+  if (!transfer_is_newer_ || !patient_ || recolouring_.running()) return;
   transfer_is_newer_ = false;
   recolouring_.start(
-      [patient = patient_, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto& /*say*/) {
+      [patient = patient_, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto&) {
         auto engine = engine_of(name, *patient, transfer);
-        return Result<Loaded>(Loaded{patient, std::move(engine)});
+        return Loaded{patient, std::move(engine)};
       });
 }
 
