@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "host/volume/decode.hpp"
+#include "host/volume/isolated.hpp"
 #include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
@@ -268,6 +269,7 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
 }
 
 Result<void> write_image(const fs::path& path, const ImageFile& image, StoredAs stored) {
+  const CopiesHeldOff held;
   const itk::ImageIOBase::Pointer io = image_io(path, true);
   if (io == nullptr) return refused(Errc::bad_value, path, "name it .nii.gz, .nrrd or .mha");
   try {

@@ -12,12 +12,18 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <mutex>
 
 namespace birdseye::host {
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+std::shared_mutex& copying() {
+  static std::shared_mutex mutex;
+  return mutex;
+}
 
 /// The copy's part: never returns.
 [[noreturn]] void run_copy(int fd, const std::function<void(const Send&)>& work) {
@@ -85,13 +91,18 @@ class Copy {
 
 }  // namespace
 
+CopiesHeldOff::CopiesHeldOff() : held_(copying()) {}
+
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
                           Duration within) {
   std::array<int, 2> fds{-1, -1};
   if (::pipe2(fds.data(), O_CLOEXEC) != 0) return Error{Errc::io, "no pipe is free for a decoder", errno};
   constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
   (void)::fcntl(fds[0], F_SETPIPE_SZ, kPipeBytes);
-  const pid_t child = ::fork();
+  const pid_t child = [] {
+    const std::unique_lock alone(copying());
+    return ::fork();
+  }();
   if (child < 0) {
     const int failed = errno;
     ::close(fds[0]);

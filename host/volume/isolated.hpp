@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <shared_mutex>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -16,6 +17,16 @@ using Send = std::function<void(const void* data, std::size_t size)>;
 /// Takes the next bytes that the work sends. False where they do not come: it has ended, by a signal perhaps, or is
 /// late.
 using Receive = std::function<bool(void* to, std::size_t size)>;
+
+/// While one lives, no copy of this process is made. For work on a thread with a library that decoders use too: a copy
+/// would inherit its locks as they are, and nobody who lets go of them.
+class CopiesHeldOff {
+ public:
+  CopiesHeldOff();
+
+ private:
+  std::shared_lock<std::shared_mutex> held_;
+};
 
 /// Runs work in a copy of this process, whose output goes nowhere and whose death is not ours, and take in this one,
 /// at the same time. For decoders of files from elsewhere: Debian's GDCM meets damage with an assertion, which no catch

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/volume/isolated.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -41,6 +43,7 @@ void add_run(Component& c, const Mask::IndexType& first, int length) {
 }
 
 std::vector<Component> bright_components(const Volume& ct, std::int16_t threshold) {
+  const CopiesHeldOff held;  // it runs while other files are read
   const auto mask = Mask::New();
   Mask::SizeType size;
   for (unsigned axis = 0; axis < 3; ++axis) size[axis] = static_cast<itk::SizeValueType>(ct.size[axis]);

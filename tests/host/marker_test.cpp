@@ -2,12 +2,17 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <random>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "host/volume/import.hpp"
 #include "host/volume/marker_finder.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/small_ct.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -108,7 +113,7 @@ const Vector3d kSpacings[] = {{0.7, 0.7, 0.7}, {0.7, 0.7, 2.5}, {1.5, 1.5, 2.0}}
 TEST(Markers, CentresAreFoundToAFifthOfAVoxel) {
   for (const Kind& kind : kKinds) {
     for (const Vector3d& spacing : kSpacings) {
-      SCOPED_TRACE(testing::Message() << kind.name << " in voxels of " << spacing.transpose());
+      SCOPED_TRACE(::testing::Message() << kind.name << " in voxels of " << spacing.transpose());
       Scene scene(spacing, true);
       std::mt19937 rng(11);
       std::uniform_real_distribution<double> uniform(-1, 1);
@@ -178,7 +183,7 @@ TEST(Markers, ClutterIsNotReported) {
 
 TEST(Markers, WhatTheBorderCutsOrAnotherTouchesIsNamed) {
   for (const Vector3d& spacing : kSpacings) {
-    SCOPED_TRACE(testing::Message() << spacing.transpose());
+    SCOPED_TRACE(::testing::Message() << spacing.transpose());
     Scene scene(spacing);
     const Vector3d up = Vector3d::UnitZ();
     const MarkerShape ball{MarkerKind::ball, 8, 0, 0};
@@ -200,6 +205,19 @@ TEST(Markers, WhatTheBorderCutsOrAnotherTouchesIsNamed) {
     EXPECT_EQ(cut, 2);
     EXPECT_EQ(touching, 2);
   }
+}
+
+TEST(Markers, FilesAreReadWhileTheyAreLookedFor) {
+  const birdseye::testing::Scratch scratch;
+  const std::string file = birdseye::testing::small_ct(scratch);
+  const Scene scene(Vector3d(0.5, 0.5, 0.5));
+  std::atomic<bool> done = false;
+  std::jthread looking([&] {
+    while (!done) (void)find_markers(scene.ct, {});
+  });
+  // A copy of the process inherits what the thread held at that moment, and would wait for it for ever.
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(import_volume(file));
+  done = true;
 }
 
 TEST(Markers, SizesThatNoMarkerHasAreRefused) {
