@@ -98,7 +98,11 @@ void LiveWindow::end_frame() {
 }
 
 void LiveWindow::swap(Believed believe_until) {
-  if (cover_) cover_->lift();
+  if (cover_) {
+    cover_->lift();
+    // A driver may show it and come back much later. What must not be covered yet is what was there before.
+    if (believe_until) cover_->believe_until(believe_until);
+  }
   glfwSwapBuffers(window_);
   if (cover_) cover_->believe_until(believe_until);
 }

@@ -116,6 +116,8 @@ void StallCover::watch(const std::stop_token& stop) {
     } else if (Clock::now() < *until) {
       earlier_.wait_until(lock, stop, *until, [&] { return until_ && *until_ < *until; });
     } else {
+      // What the server sends to everybody would gather for ever.
+      while (xcb_generic_event_t* const event = xcb_poll_for_event(server_)) std::free(event);
       xcb_map_window(server_, cover_);
       xcb_flush(server_);
       covering_ = true;

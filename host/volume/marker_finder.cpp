@@ -101,7 +101,8 @@ Eigen::Matrix3d directions_of(const Volume& ct, const Component& c) {
 
 class Finder {
  public:
-  Finder(const Volume& ct, const MarkerShape& shape) : ct_(ct), shape_(shape) {}
+  Finder(const Volume& ct, const MarkerShape& shape, std::stop_token stop)
+      : ct_(ct), shape_(shape), stop_(std::move(stop)) {}
 
   void look(const std::vector<Component>& components) {
     std::vector<Candidate> candidates;
@@ -111,7 +112,10 @@ class Finder {
       if (size == Size::two || (size == Size::one && !known(centre))) candidates.push_back({&c, size, centre, {}});
     }
     // What is a marker depends on what was found before, so that only the fits are made side by side.
-    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t n) { fit(candidates[n]); });
+    tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t n) {
+      if (!stop_.stop_requested()) fit(candidates[n]);
+    });
+    if (stop_.stop_requested()) return;
     for (const Candidate& candidate : candidates) {
       if (candidate.size == Size::two) {
         judge_two(candidate);
@@ -209,17 +213,20 @@ class Finder {
 
   const Volume& ct_;
   const MarkerShape& shape_;
+  const std::stop_token stop_;
   FoundMarkers out_;
   std::vector<Vector3d> others_;
 };
 
 }  // namespace
 
-FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search) {
-  Finder finder(ct, search.shape);
+FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop) {
+  Finder finder(ct, search.shape, stop);
   std::vector<std::int16_t> thresholds{300, 700, 1500};
   if (search.threshold_hu) thresholds = {*search.threshold_hu};
-  for (const std::int16_t threshold : thresholds) finder.look(bright_components(ct, threshold));
+  for (const std::int16_t threshold : thresholds) {
+    if (!stop.stop_requested()) finder.look(bright_components(ct, threshold));
+  }
   return finder.finish();
 }
 

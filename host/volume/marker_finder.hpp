@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct FoundMarkers {
 
 /// Finds markers of one shape in a CT. What is connected and brighter than the threshold, and of about the size, is
 /// fitted (fit_marker), and taken for a marker where the shape explains the voxels.
-FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search = {});
+/// stop: what was found until then is given.
+FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search = {}, const std::stop_token& stop = {});
 
 }  // namespace birdseye::host

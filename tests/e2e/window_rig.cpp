@@ -84,6 +84,21 @@ int free_port() {
   return ntohs(address.sin_port);
 }
 
+bool listens(int port, Child::Clock::time_point deadline) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  for (bool there = false; Child::Clock::now() < deadline;) {
+    const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+    there = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+    ::close(fd);
+    if (there) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return false;
+}
+
 /// The frame's number, and whether the picture is dimmed; what is at the places of a block's middle decides.
 struct Number {
   std::optional<std::uint32_t> value;
@@ -99,7 +114,9 @@ Number number_in(const std::vector<std::uint8_t>& rgb, int width_px) {
   for (int i = 0; i < 32; ++i) {
     const int x = static_cast<int>(kLeftPx + (i + 0.5) * block * zoom) - kFromPx;
     const int level = rgb[3 * static_cast<std::size_t>(kRow * kWidePx + x)];
-    const bool black = level<40, white = level> 230, dimmed_white = level > 110 && level < 145;
+    const bool black = level < 40;
+    const bool white = level > 230;
+    const bool dimmed_white = level > 110 && level < 145;
     if (!black && !white && !dimmed_white) return {};
     value = 2 * value + (black ? 0U : 1U);
     out.white = std::max(out.white, level);
@@ -157,7 +174,7 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
   for (std::string word; in >> word;) words.push_back(word);
   first_frame_ns_ = appliance_->first_frame_ns();
   window_ = std::make_unique<Child>(words);
-  std::this_thread::sleep_for(std::chrono::seconds(2));  // it listens before it opens its window
+  EXPECT_TRUE(listens(port, Child::Clock::now() + std::chrono::seconds(20))) << failure();
   hearing_ = std::make_unique<Hearing>(port);
 }
 
@@ -212,6 +229,8 @@ Glance WindowRig::look() {
 
 void WindowRig::watch(double seconds) {
   circle_zero_ns_ = appliance_->circle_zero_ns();
+  EXPECT_GT(first_frame_ns_, 0);
+  EXPECT_GT(circle_zero_ns_, 0);
   const std::int64_t end_ns = monotonic_ns() + static_cast<std::int64_t>(seconds * 1e9);
   while (monotonic_ns() < end_ns) {
     glances_.push_back(look());

@@ -213,8 +213,9 @@ TEST(LiveSession, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {
 }
 
 /// Four fiducials, and what was found of them is in out.
-void register_into(const std::filesystem::path& out, const Scratch& scratch) {
+void register_into(const std::filesystem::path& out, const Scratch& scratch, bool with_markers = false) {
   LiveSettings kept = operation_settings(scratch);
+  if (with_markers) kept.patient.ct = ct_with_markers(scratch);
   kept.out = out;
   LiveSession session(kept);
   load(session);
@@ -243,6 +244,34 @@ TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
   ASSERT_TRUE(session.picture().setup().has_value());
   const auto& found = session.picture().setup()->tracker_from_patient;
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
+}
+
+TEST(LiveSession, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch, true);
+  const std::string kept = birdseye::testing::contents_of(scratch / "operation.json");
+  LiveSettings settings = resumed(scratch, scratch.path());
+  settings.out = scratch.path();
+  settings.patient.ct = ct_with_markers(scratch);
+  settings.patient.fiducials.clear();  // looked for, which takes its time
+  LiveSession session(settings);
+  connect_and_calibrate(session);
+  Hand hand(session);
+  hand.rest_at({0, 0, 40}, 80);  // by mistake
+  hand.rest_at({0, 0, 200}, 1);
+  load(session);
+  hand.rest_at({0, 0, 80}, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(session.touches().size(), 2U);
+  EXPECT_EQ(birdseye::testing::contents_of(scratch / "operation.json"), kept);
+  for (int i = 0; i < 1000 && !session.markers_in_patient_mm(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    session.tick();
+  }
+  EXPECT_EQ(session.fault(), "");
+  EXPECT_TRUE(session.note(LiveStep::fiducials).done) << session.note(LiveStep::fiducials).line;
+  EXPECT_EQ(session.step(), LiveStep::check);
+  EXPECT_TRUE(session.touches().empty());
 }
 
 TEST(LiveSession, AnotherPatientsRegistrationIsNotTakenUp) {

@@ -264,7 +264,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->opacity = facts_.opacity;
     parts->surface_in_front = facts_.surface_in_front;
     parts->engine = session_.settings().engine;
-    parts->transfer = session_.transfer();
+    parts->transfer = session_.drawn_by();
     parts->patient = session_.settings().patient;
     if (session_.deformation()) parts->deformation = session_.deformation()->field;
     parts->fre_mm = session_.fre_mm();

@@ -148,13 +148,17 @@ class LiveSession {
   [[nodiscard]] std::shared_ptr<const PatientPlan> shared_patient() const { return patient_; }
   /// Another number: another CT, or it is deformed in another way.
   [[nodiscard]] std::uint64_t shapes() const { return shapes_; }
-  [[nodiscard]] const std::string& fault() const { return fault_.empty() ? keeping_fault_ : fault_; }
+  [[nodiscard]] const std::string& fault() const {
+    return !fault_.empty() ? fault_ : !engine_fault_.empty() ? engine_fault_ : keeping_fault_;
+  }
   [[nodiscard]] bool frozen() const { return frozen_; }
   LivePicture& picture() { return picture_; }
   [[nodiscard]] const LivePicture& picture() const { return picture_; }
   [[nodiscard]] const LiveSettings& settings() const { return settings_; }
   [[nodiscard]] Engine* engine() const { return engine_.get(); }
   [[nodiscard]] const std::optional<TransferFunction>& transfer() const { return transfer_; }
+  /// By which the engine draws: that before, as long as an engine for another is being made.
+  [[nodiscard]] const std::optional<TransferFunction>& drawn_by() const { return drawn_by_; }
   [[nodiscard]] std::string engine_name() const { return engine_ ? engine_->name() : ""; }
   /// The picture has these colours once an engine is made that draws by them.
   void set_transfer(const TransferFunction& transfer);
@@ -162,7 +166,8 @@ class LiveSession {
  private:
   struct Loaded {
     std::shared_ptr<const PatientPlan> patient;
-    Result<std::unique_ptr<Engine>> engine;  ///< of what is shown
+    Result<std::unique_ptr<Engine>> engine;    ///< of what is shown
+    std::optional<TransferFunction> transfer;  ///< that the engine draws by
   };
 
   void finish_loading(Result<Loaded> loaded);
@@ -183,7 +188,7 @@ class LiveSession {
   void forget_deformation(const std::string& why);
   [[nodiscard]] Eigen::Vector3d target_in_patient_mm() const;
   [[nodiscard]] Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm) const;
-  void use(Result<std::unique_ptr<Engine>> engine);
+  void use(Loaded& loaded);
   StepNote& at(LiveStep step) { return notes_[static_cast<std::size_t>(step)]; }
 
   LiveSettings settings_;
@@ -193,7 +198,7 @@ class LiveSession {
   bool calibrated_here_ = false;  ///< by the board, at calibrated_utc_: only a newer record of the appliance counts
   bool unconfirmed_ = false;      ///< the registration is an earlier window's, and nobody has looked whether it holds
   std::string calibrated_utc_;
-  std::string link_words_, appliance_says_, fault_, registration_fault_, keeping_fault_;
+  std::string link_words_, appliance_says_, fault_, engine_fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
 
   Background<Result<Loaded>> loading_;
@@ -201,7 +206,7 @@ class LiveSession {
   Background<std::vector<Eigen::Vector3d>> finding_;
   std::optional<std::vector<Eigen::Vector3d>> markers_in_patient_mm_;
   std::uint64_t shapes_ = 0;
-  std::optional<TransferFunction> transfer_;
+  std::optional<TransferFunction> transfer_, drawn_by_;
   bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::unique_ptr<Engine> engine_;
   Background<Loaded> recolouring_;

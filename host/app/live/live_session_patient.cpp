@@ -25,7 +25,7 @@ void LiveSession::load(const PatientFiles& files) {
     if (!read) return Result<Loaded>(read.error());
     auto patient = std::make_shared<const PatientPlan>(*std::move(read));
     auto engine = engine_of(name, *patient, transfer);
-    return Result<Loaded>(Loaded{std::move(patient), std::move(engine)});
+    return Result<Loaded>(Loaded{std::move(patient), std::move(engine), transfer});
   });
 }
 
@@ -39,25 +39,26 @@ void LiveSession::finish_loading(Result<Loaded> loaded) {
   patient_ = std::move(loaded->patient);
   ++shapes_;
   if (transfer_) fault_.clear();
-  use(std::move(loaded->engine));
-  // The search may take seconds, and the CT can be shown meanwhile.
+  use(*loaded);
   markers_in_patient_mm_ = patient_->fiducials_in_patient_mm;
-  if (!markers_in_patient_mm_)
-    finding_.start([patient = patient_](const std::stop_token&, const auto&) { return find_fiducials(patient->ct); });
   fit();
   // What was touched meanwhile counts more than what is resumed, and is fitted first.
   if (markers_in_patient_mm_ || touches_.empty()) resume();
+  // The search may take seconds, and the CT can be shown meanwhile.
+  if (!markers_in_patient_mm_) {
+    finding_.start([patient = patient_](const std::stop_token& stop, const auto& /*say*/) {
+      return find_fiducials(patient->ct, stop);
+    });
+  }
 }
 
-void LiveSession::use(Result<std::unique_ptr<Engine>> engine) {
-  picture_.set_engine(nullptr);
-  engine_.reset();
+void LiveSession::use(Loaded& loaded) {
   if (!transfer_) return;  // which is said already
-  if (!engine) {
-    fault_ = engine.error().what;
-    return;
-  }
-  engine_ = *std::move(engine);
+  engine_fault_ = loaded.engine ? "" : loaded.engine.error().what;
+  if (!loaded.engine) return;
+  picture_.set_engine(nullptr);
+  engine_ = *std::move(loaded.engine);
+  drawn_by_ = loaded.transfer;
   if (deformation_) engine_->deform(deformation_->field);
   picture_.set_engine(engine_.get());
   picture_.redraw();
@@ -70,13 +71,13 @@ void LiveSession::set_transfer(const TransferFunction& transfer) {
 
 /// The picture keeps its old colours until there are new ones: it must not stand still.
 void LiveSession::finish_recolouring() {
-  if (auto made = recolouring_.take(); made && made->patient == patient_) use(std::move(made->engine));
+  if (auto made = recolouring_.take(); made && made->patient == patient_) use(*made);
   if (!transfer_is_newer_ || !patient_ || recolouring_.running()) return;
   transfer_is_newer_ = false;
   recolouring_.start(
       [patient = patient_, name = settings_.engine, transfer = transfer_](const std::stop_token&, const auto&) {
         auto engine = engine_of(name, *patient, transfer);
-        return Loaded{patient, std::move(engine)};
+        return Loaded{patient, std::move(engine), transfer};
       });
 }
 

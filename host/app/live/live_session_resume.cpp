@@ -8,6 +8,7 @@ namespace birdseye::host {
 
 void LiveSession::keep_operation() {
   if (settings_.out.empty() || !patient_) return;
+  if (!settings_.resume.empty()) return;  // what is there has not been read yet
   Operation operation;
   operation.made_utc = utc_now();
   operation.ct_checksum = patient_->checksum;
@@ -49,7 +50,8 @@ void LiveSession::resume() {
     calibrated_here_ = true;
     at(LiveStep::calibrate) = {true, when};
   }
-  const bool touched = !touches_.empty();  // anew, while the CT was read
+  const bool touched = fre_mm_.has_value();  // anew, while the CT was read; fewer than a registration count for nothing
+  if (!touched) touches_.clear();
   if (const auto& found = operation->registered; found && !touched) {
     unconfirmed_ = true;
     tracker_from_patient_ = found->patient_from_tracker.inverse();
@@ -58,7 +60,7 @@ void LiveSession::resume() {
     expect_registration_error();
     at(LiveStep::fiducials) = {true, fmt::format("{}, FRE {:.2f} mm", when, found->fre_mm)};
   }
-  if (operation->deformation) {
+  if (operation->deformation && !touched) {
     deformation_.emplace();
     deformation_->field = operation->deformation->field;
     deformation_->uncertainty_mm = operation->deformation->uncertainty_mm;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "host/app/appliance_link.hpp"
 #include "host/app/recording/recording_reader.hpp"
 
@@ -104,9 +106,12 @@ std::string LiveSource::words() const {
 
 /// What is amiss with the recording, as far as it was read.
 std::string LiveSource::notes() const {
+  constexpr std::size_t kMost = 3;
   std::string out;
-  for (const std::string& note : recording_ != nullptr ? recording_->notes() : std::vector<std::string>())
-    out += "; " + note;
+  if (recording_ == nullptr) return out;
+  const std::vector<std::string>& notes = recording_->notes();
+  for (std::size_t i = 0; i < std::min(notes.size(), kMost); ++i) out += "; " + notes[i];
+  if (notes.size() > kMost) out += fmt::format("; and {} more", notes.size() - kMost);
   return out;
 }
 

@@ -58,9 +58,9 @@ Result<PatientPlan> read_patient(const PatientFiles& files) {
   return plan;
 }
 
-std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct) {
+std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop) {
   std::vector<Eigen::Vector3d> places_mm;
-  for (const MarkerFit& marker : find_markers(ct).markers) places_mm.push_back(marker.centre_in_patient_mm);
+  for (const MarkerFit& marker : find_markers(ct, {}, stop).markers) places_mm.push_back(marker.centre_in_patient_mm);
   return places_mm;
 }
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,6 @@ struct PatientPlan {
 /// An error names the file. Where no fiducials are given, they are left to find_fiducials.
 Result<PatientPlan> read_patient(const PatientFiles& files);
 /// The markers that the CT shows, the brightest first.
-std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct);
+std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop);
 
 }  // namespace birdseye::host
