@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+"""How the live window keeps up: 768x576 at 25 frames a second from birdseyed, a deformed CT over it, no graphics card.
+
+usage: window_bench.py BIN [--seconds 60] [--size 768x576] [--rate 25]
+
+A simulated operation gives the patient, the registration and the deformation. Then the simulated tracker goes round the
+liver once in two seconds, and the simulated camera sends pictures that cost it nothing, so that the machine is the
+window's and the appliance's as it is at a cart. The last line is JSON.
+"""
+import argparse
+import csv
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+KEYS = """wait connect 90
+wait calibrate 150
+wait fiducials 60
+press space 1.4 views 60
+key enter
+key space
+wait deform 180
+end
+"""
+CAMERA = """%YAML:1.0
+---
+image_width: {0}
+image_height: {1}
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ {2}, 0., {3}, 0., {2}, {4}, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ -0.30, 0.10, 0.001, -0.0006, 0. ]
+"""
+
+
+def window(options, arguments, script, folder):
+    (folder / "script.txt").write_text(script)
+    number_from, number_to = os.pipe()
+    with subprocess.Popen(["Xvfb", "-displayfd", str(number_to), "-screen", "0", "1280x720x24", "-nolisten", "tcp"],
+                          pass_fds=[number_to], stderr=subprocess.DEVNULL) as server:
+        display = ":" + os.read(number_from, 16).decode().strip()
+        try:
+            subprocess.run([options.bin / "birdseye", "live", *arguments, "--script", folder / "script.txt", "--json",
+                            folder / "live.json"], check=True, stdout=subprocess.DEVNULL,
+                           env={**os.environ, "DISPLAY": display})
+        finally:
+            server.terminate()
+    return json.loads((folder / "live.json").read_text())
+
+
+def operation(options, folder):
+    """A registered, deformed patient, as `--resume` takes it, round the middle of the tracker's circle."""
+    made, kept = folder / "made", folder / "operation"
+    window(options, ["--simulate", "--out", made, "--look-s", "600"], KEYS, folder)
+    kept.mkdir()
+    for name in ("operation.json", "field.mha"):
+        shutil.copy(made / name, kept)
+    x, y, z = json.loads((made / "phantom" / "truth.json").read_text())["liver_centre_mm"]
+    (kept / "patient_from_tracker.txt").write_text(f"1 0 0 {x - 400}\n0 1 0 {y}\n0 0 1 {z}\n0 0 0 1\n")
+    # 130 mm before it, looking at it.
+    (kept / "camera_from_sensor.txt").write_text("0 1 0 0\n0 0 -1 0\n-1 0 0 -70\n0 0 0 1\n")
+    width, height = (int(part) for part in options.size.split("x"))
+    (kept / "camera.yaml").write_text(CAMERA.format(width, height, 0.78 * width, width / 2, height / 2))
+    return made / "phantom"
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("bin", type=lambda text: pathlib.Path(text).resolve())
+    parser.add_argument("--seconds", type=float, default=60)
+    parser.add_argument("--size", default="768x576")
+    parser.add_argument("--rate", type=float, default=25)
+    options = parser.parse_args()
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="birdseye-window-"))
+    phantom = operation(options, folder)
+    width, height = options.size.split("x")
+    (folder / "cart.toml").write_text(f"""[tracker]
+device = "{folder}/tty"
+[camera]
+source = "socket:{folder}/camera"
+width = {width}
+height = {height}
+rate_hz = {options.rate}
+[wire]
+port = 18977
+""")
+    simulator = options.bin / "birdseye-sim"
+    running = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for command in (
+        [simulator, "minibird", "--tty", folder / "tty", "--boot-ms", "100", "--position-noise-mm", "0.1",
+         "--angle-noise-deg", "0.05"],
+        [simulator, "camera", "--socket", folder / "camera", "--size", options.size, "--rate", str(options.rate)],
+        [options.bin / "birdseyed", "--config", folder / "cart.toml"])]
+    try:
+        figures = window(options, [
+            "--server", "127.0.0.1:18977", "--ct", phantom / "ct", "--labels", phantom / "segmentation.nii.gz", "--show",
+            "2,3,4", "--organ", "1,2,3,4", "--targets", "4", "--resume", folder / "operation", "--out", folder / "out"],
+            f"wait connect 30\nsleep 5\nkey 6\nkey space\nwait run 5\nsleep {options.seconds + 4}\nend\n", folder)
+    finally:
+        for program in running:
+            program.terminate()
+            program.wait()
+    with open(folder / "out" / "frames.csv", newline="") as file:
+        frames = [(int(row[0]), float(row[1]), float(row[2])) for row in list(csv.reader(file))[1:]]
+    overlaid = [frame for frame in frames if frame[2] > 0]
+    began = overlaid[int(4 * options.rate)][0]  # the overlay has just appeared, and everything was made for it
+    judged = [frame for frame in frames if began <= frame[0] <= overlaid[-1][0]]
+    ages = sorted(age for _, age, _ in judged)
+    print(json.dumps({
+        "size": options.size, "rate_hz": options.rate, "frames_sent": judged[-1][0] - began + 1, "frames_shown": len(judged),
+        "frames_overlaid": sum(strength > 0 for _, _, strength in judged),
+        "exposure_to_swap_ms_p50": ages[len(ages) // 2], "exposure_to_swap_ms_p95": ages[int(0.95 * len(ages))],
+        "exposure_to_swap_ms_max": ages[-1], "oldest_overlay_ms": figures["oldest_overlay_ms"],
+        "stood_still": figures["stood_still"], "engine": figures["engine"]}))
+    shutil.rmtree(folder)
+
+
+if __name__ == "__main__":
+    main()
