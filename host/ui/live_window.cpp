@@ -7,6 +7,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -60,6 +61,11 @@ Result<std::unique_ptr<LiveWindow>> LiveWindow::open(const Settings& settings) {
   io.IniFilename = made->layout_.empty() ? nullptr : made->layout_.c_str();
   use_font(made->scale_);
   use_style(made->scale_);
+  // ImGui's own state of keys misses those that are let go before it looks, as a pedal may. It calls this one too.
+  glfwSetWindowUserPointer(made->window_, made.get());
+  glfwSetKeyCallback(made->window_, [](GLFWwindow* at, int key, int /*scancode*/, int action, int /*mods*/) {
+    if (action == GLFW_PRESS) static_cast<LiveWindow*>(glfwGetWindowUserPointer(at))->pressed_.push_back(key);
+  });
   ImGui_ImplGlfw_InitForOpenGL(made->window_, true);
   ImGui_ImplOpenGL3_Init("#version 450");
   return made;
@@ -79,8 +85,9 @@ LiveWindow::~LiveWindow() {
   glfwTerminate();
 }
 
-void LiveWindow::begin_frame() {
-  glfwPollEvents();
+void LiveWindow::begin_frame(bool again) {
+  pressed_.clear();
+  if (!again) glfwPollEvents();
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
@@ -120,21 +127,20 @@ bool LiveWindow::closed() const {
 std::vector<std::string> LiveWindow::keys() const {
   std::vector<std::string> pressed;
   if (ImGui::GetIO().WantTextInput) return pressed;
-  for (const auto& [code, name] : {std::pair{GLFW_KEY_SPACE, "space"},
-                                   {GLFW_KEY_ENTER, "enter"},
-                                   {GLFW_KEY_KP_ENTER, "enter"},
-                                   {GLFW_KEY_BACKSPACE, "backspace"},
-                                   {GLFW_KEY_EQUAL, "+"},
-                                   {GLFW_KEY_KP_ADD, "+"},
-                                   {GLFW_KEY_MINUS, "-"},
-                                   {GLFW_KEY_KP_SUBTRACT, "-"}}) {
-    if (ImGui::IsKeyPressed(code, false)) pressed.emplace_back(name);
-  }
-  for (int code = GLFW_KEY_0; code <= GLFW_KEY_9; ++code) {
-    if (ImGui::IsKeyPressed(code, false)) pressed.emplace_back(1, static_cast<char>(code));
-  }
-  for (int code = GLFW_KEY_A; code <= GLFW_KEY_Z; ++code) {
-    if (ImGui::IsKeyPressed(code, false)) pressed.emplace_back(1, static_cast<char>(code - GLFW_KEY_A + 'a'));
+  constexpr std::array<std::pair<int, const char*>, 8> kNamed{{{GLFW_KEY_SPACE, "space"},
+                                                               {GLFW_KEY_ENTER, "enter"},
+                                                               {GLFW_KEY_KP_ENTER, "enter"},
+                                                               {GLFW_KEY_BACKSPACE, "backspace"},
+                                                               {GLFW_KEY_EQUAL, "+"},
+                                                               {GLFW_KEY_KP_ADD, "+"},
+                                                               {GLFW_KEY_MINUS, "-"},
+                                                               {GLFW_KEY_KP_SUBTRACT, "-"}}};
+  for (const int code : pressed_) {
+    for (const auto& [named, name] : kNamed) {
+      if (code == named) pressed.emplace_back(name);
+    }
+    if (code >= GLFW_KEY_0 && code <= GLFW_KEY_9) pressed.emplace_back(1, static_cast<char>(code));
+    if (code >= GLFW_KEY_A && code <= GLFW_KEY_Z) pressed.emplace_back(1, static_cast<char>(code - GLFW_KEY_A + 'a'));
   }
   return pressed;
 }

@@ -36,7 +36,8 @@ class LiveWindow final : public GlContext {
   LiveWindow& operator=(const LiveWindow&) = delete;
 
   /// Takes what the user did, waiting for nothing.
-  void begin_frame();
+  /// again: of the frame that was just drawn, for it is drawn another time: what has come since waits for the next.
+  void begin_frame(bool again = false);
   /// Draws all panels into the back of the window, and waits until that is done; swap() shows it.
   void end_frame();
   /// Of what is shown; empty: for ever.
@@ -72,6 +73,7 @@ class LiveWindow final : public GlContext {
   GLFWwindow* window_ = nullptr;
   ImGuiContext* imgui_ = nullptr;
   std::string layout_;
+  std::vector<int> pressed_;  ///< keys by GLFW's numbers, since the frame before
   std::unique_ptr<StallCover> cover_;
   struct Texture {
     std::uint32_t name = 0;

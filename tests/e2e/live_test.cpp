@@ -71,6 +71,10 @@ TEST(Live, SaysWhatIsMissing) {
   const Scratch scratch;
   testing::expect_refused("birdseye", "live", {"--server HOST:PORT, --recording PATH and --simulate"});
   testing::expect_refused("birdseye", "live --server 127.0.0.1:1", {"--ct is missing"});
+  testing::expect_refused("birdseye", "live --server 127.0.0.1:1 --ct /no/such/ct", {"--ct /no/such/ct: no such file"});
+  (void)scratch.file("operation.json", "{}");
+  testing::expect_refused("birdseye", "live --simulate --out " + scratch.path().string(),
+                          {"holds an operation already", "--resume"});
   testing::expect_refused("birdseye", "live --simulate --size 3x4", {"--size: \"3x4\""});
   testing::expect_refused("birdseye", "live --simulate --script " + (scratch / "none").string(), {"none"});
   testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(), {"there is no display"}, "",

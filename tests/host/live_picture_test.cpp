@@ -275,6 +275,28 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
   }
 }
 
+TEST_F(LiveWindowTest, AKeyThatIsLetGoAtOnceCounts) {
+  LiveWindow::Settings settings;
+  settings.width_px = 640;
+  settings.height_px = 480;
+  auto window = LiveWindow::open(settings);
+  ASSERT_TRUE(window) << window.error().what;
+  birdseye::testing::Screen screen(display_->name());
+  const auto keys = [&](bool again) {
+    (*window)->begin_frame(again);
+    const auto pressed = (*window)->keys();
+    (*window)->end_frame();
+    (*window)->swap();
+    return pressed;
+  };
+  EXPECT_TRUE(keys(false).empty());
+  constexpr std::uint8_t kSpace = 65;
+  screen.tap(kSpace);
+  EXPECT_TRUE(keys(true).empty()) << "of the frame before, which is drawn again";
+  EXPECT_EQ(keys(false), std::vector<std::string>{"space"});
+  EXPECT_TRUE(keys(false).empty());
+}
+
 TEST_F(LiveWindowTest, WhatStaysOnTheScreenTooLongIsCovered) {
   constexpr int kSide = 200;
   LiveWindow::Settings settings;

@@ -62,6 +62,20 @@ fs::path layout_file() {
   return error ? fs::path() : folder / "birdseye" / "live.ini";
 }
 
+/// out/live; where that holds an operation, the next that does not.
+fs::path free_folder() {
+  fs::path folder = "out/live";
+  for (int n = 2; has_operation(folder); ++n) folder = fmt::format("out/live-{}", n);
+  return folder;
+}
+
+Result<void> refuse_operation_in(const LiveSettings& live) {
+  if (live.out.empty() || !live.resume.empty() || !has_operation(live.out)) return {};
+  return Error{Errc::in_use,
+               fmt::format("{0}: holds an operation already; go on from it with --resume {0}, or choose another --out",
+                           live.out.string())};
+}
+
 Result<void> prepare(Options& options) {
   const int sources = static_cast<int>(options.simulate) + static_cast<int>(!options.server.empty()) +
                       static_cast<int>(!options.recording.empty());
@@ -89,19 +103,19 @@ Result<void> prepare(Options& options) {
       return Error{Errc::bad_value, options.tip.string() + ": holds no single point; give what calibrate tip wrote"};
     options.live.tip_in_pointer_mm = points->front();
   }
+  if (auto kept = refuse_operation_in(options.live); !kept) return kept;
   if (options.simulate) {
-    if (options.live.out.empty()) options.live.out = "out/live";
+    if (options.live.out.empty()) options.live.out = options.live.resume;
+    if (options.live.out.empty()) options.live.out = free_folder();
     options.cart.folder = options.live.out;
     options.simulated = simulated_patient(options.live.out);
     std::error_code error;
     fs::create_directories(options.live.out, error);
     if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
-  } else if (!options.live.out.empty() && options.live.resume.empty() && has_operation(options.live.out)) {
-    return Error{Errc::in_use,
-                 fmt::format("{}: holds an operation already; go on from it with --resume {}, or choose another --out",
-                             options.live.out.string(), options.live.out.string())};
   } else if (options.live.patient.ct.empty()) {
     return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
+  } else if (std::error_code ignored; !fs::exists(options.live.patient.ct, ignored)) {
+    return Error{Errc::not_found, fmt::format("--ct {}: no such file or folder", options.live.patient.ct.string())};
   }
   return {};
 }

@@ -93,7 +93,7 @@ void LiveApp::take_events() {
 void LiveApp::note_simulator() {
   SimulatedCart* const cart = source_->cart();
   if (cart == nullptr || sheet_read_) return;
-  sheet_read_ = true;
+  sheet_read_ = facts_.simulated = true;
   const CartSheet& sheet = cart->sheet();
   if (const auto pattern = calibration::parse_pattern(sheet.board))
     session_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
@@ -136,7 +136,7 @@ void LiveApp::draw() {
   if (shown.overlaid && !picture.at(now()).overlaid) {
     // It took longer than it was thought to: what has grown stale on the way is not shown.
     shown = picture.at(now());
-    draw_window(shown);
+    draw_window(shown, true);
   }
   LiveWindow::Believed until;  // what is frozen or has stopped says so itself
   if (shown.believe_until && !session_.frozen()) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
@@ -180,12 +180,12 @@ void LiveApp::publish(const ShownPicture& shown) {
   publisher_->show(frame);
 }
 
-PanelWishes LiveApp::draw_window(const ShownPicture& shown) {
+PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
   if (shown.any && shown.changes != drawn_changes_) {
     window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
     drawn_changes_ = shown.changes;
   }
-  window_->begin_frame();
+  window_->begin_frame(again);
   facts_.frames_skipped = session_.picture().frames_skipped();
   PanelWishes wishes = draw_panels(*window_, session_, shown, facts_, editor_);
   window_->end_frame();
@@ -258,6 +258,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->picture = *shown.rgb;
     parts->shown = shown;
     parts->shown.rgb = nullptr;
+    if (session_.frozen()) parts->shown.reason = "frozen";
     parts->setup = picture.setup();
     parts->camera_from_patient = picture.camera_from_patient();
     parts->render = picture.render();

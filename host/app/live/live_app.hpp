@@ -50,7 +50,7 @@ class LiveApp {
   void take_events();
   void note_simulator();
   void draw();
-  PanelWishes draw_window(const ShownPicture& shown);
+  PanelWishes draw_window(const ShownPicture& shown, bool again = false);
   void grant(const PanelWishes& wishes);
   Result<bool> follow_script();
   void draw_inset();

@@ -107,8 +107,9 @@ void draw_calibrate(const LiveSession& session, float scale) {
     say(kWarn, "no board is named: start with --board, or give the appliance the scope's record");
 }
 
-void draw_fiducials(const LiveSession& session) {
-  say(kText, "touch each fiducial with the pointer, and rest there for half a second");
+void draw_fiducials(const LiveSession& session, bool simulated) {
+  say(kText, simulated ? "the simulated operator touches each fiducial with the pointer: wait"
+                       : "touch each fiducial with the pointer, and rest there for half a second");
   if (const auto& markers = session.markers_in_patient_mm()) {
     say(kQuiet,
         fmt::format("the CT shows {}{}", markers->size(),
@@ -156,8 +157,9 @@ void draw_deform(const LiveSession& session, float scale) {
   if (session.deformation()) say(kQuiet, "Backspace undoes it");
 }
 
-void draw_check(const LiveSession& session) {
-  say(kText, "point at a landmark: the distance should be that of the pointer from it");
+void draw_check(const LiveSession& session, bool simulated) {
+  say(kText, simulated ? "nobody points at anything over the simulated cart: go on"
+                       : "point at a landmark, and hold the pointer's tip to it: the distance below should be near 0");
   const auto reading = session.check();
   if (!reading) return say(kWarn, "no pointer is seen, or the patient is not registered");
   const Eigen::Vector3d& tip = reading->tip_in_patient_mm;
@@ -217,7 +219,7 @@ void draw_side(const Layout& at, const LiveSession& session, const PanelFacts& f
       draw_calibrate(session, at.scale);
       break;
     case LiveStep::fiducials:
-      draw_fiducials(session);
+      draw_fiducials(session, facts.simulated);
       break;
     case LiveStep::views:
       draw_views(session);
@@ -226,7 +228,7 @@ void draw_side(const Layout& at, const LiveSession& session, const PanelFacts& f
       draw_deform(session, at.scale);
       break;
     case LiveStep::check:
-      draw_check(session);
+      draw_check(session, facts.simulated);
       break;
     case LiveStep::run:
       draw_run(session, facts, editor, at.scale, wishes);

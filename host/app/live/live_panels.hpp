@@ -29,8 +29,9 @@ struct PanelFacts {
   bool clip = false, surface_in_front = false;
   CuttingPlane plane;
   const HuHistogram* histogram = nullptr;
-  bool recorded = false;  ///< the source is a recording
-  std::string said;       ///< a remark of the window's own: where a snapshot went
+  bool recorded = false;   ///< the source is a recording
+  bool simulated = false;  ///< it is the simulated cart, whose operator touches the fiducials and nothing else
+  std::string said;        ///< a remark of the window's own: where a snapshot went
 };
 
 /// How wide the workflow beside the video is.

@@ -195,8 +195,10 @@ class LiveSession {
   LiveStep step_ = LiveStep::connect;
   std::array<StepNote, kLiveSteps> notes_;
   bool connected_ = false, frozen_ = false;
-  bool calibrated_here_ = false;  ///< by the board, at calibrated_utc_: only a newer record of the appliance counts
-  bool unconfirmed_ = false;      ///< the registration is an earlier window's, and nobody has looked whether it holds
+  bool calibrated_here_ = false;    ///< by the board, at calibrated_utc_: only a newer record of the appliance counts
+  bool unconfirmed_ = false;        ///< the registration is an earlier window's, and nobody has looked whether it holds
+  bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
+  bool forget_running_ = false;     ///< the deformation that is being found is by a setup that is no more
   std::string calibrated_utc_;
   std::string link_words_, appliance_says_, fault_, engine_fault_, registration_fault_, keeping_fault_;
   std::optional<wire::Health> health_;
@@ -207,7 +209,6 @@ class LiveSession {
   std::optional<std::vector<Eigen::Vector3d>> markers_in_patient_mm_;
   std::uint64_t shapes_ = 0;
   std::optional<TransferFunction> transfer_, drawn_by_;
-  bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::unique_ptr<Engine> engine_;
   Background<Loaded> recolouring_;
 
@@ -228,7 +229,6 @@ class LiveSession {
 
   std::vector<KeptView> views_;
   std::optional<ViewRegistration> deformation_;
-  bool forget_running_ = false;  ///< the deformation that is being found is by a setup that is no more
   mutable std::mutex steps_mutex_;
   std::vector<float> steps_;
   Background<Result<ViewRegistration>> deforming_;  // the last: its thread uses what is above
