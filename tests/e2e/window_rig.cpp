@@ -2,6 +2,8 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -13,7 +15,6 @@
 #include "host/app/live/operation.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
-#include "tests/support/screen.hpp"
 #include "tests/support/slicer.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -146,8 +147,38 @@ struct WindowRig::Hearing {
   std::jthread thread;
 };
 
+CoreWatch::CoreWatch() {
+  for (int core = 0; core < static_cast<int>(std::thread::hardware_concurrency()); ++core)
+    threads_.emplace_back([this, core](const std::stop_token& stop) { watch(core, stop); });
+}
+
+void CoreWatch::watch(int core, const std::stop_token& stop) {
+  constexpr std::int64_t kNapNs = 5'000'000, kLateNs = 40'000'000;
+  cpu_set_t only;
+  CPU_ZERO(&only);
+  CPU_SET(static_cast<std::size_t>(core), &only);
+  ::pthread_setaffinity_np(::pthread_self(), sizeof only, &only);
+  while (!stop.stop_requested()) {
+    const std::int64_t before_ns = monotonic_ns();
+    std::this_thread::sleep_for(std::chrono::nanoseconds(kNapNs));
+    const std::int64_t now_ns = monotonic_ns();
+    if (now_ns - before_ns < kLateNs) continue;
+    const std::lock_guard lock(mutex_);
+    late_ns_.push_back(now_ns);
+  }
+}
+
+bool CoreWatch::stood_still(std::int64_t from_ns, std::int64_t until_ns) const {
+  constexpr std::int64_t kBesideNs = 300'000'000;
+  const std::lock_guard lock(mutex_);
+  return std::any_of(late_ns_.begin(), late_ns_.end(), [&](std::int64_t late_ns) {
+    return late_ns > from_ns - kBesideNs && late_ns < until_ns + kBesideNs;
+  });
+}
+
 WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, const std::string& camera_faults)
     : display_(fmt::format("{}x{}", kWindowWidth, kWindowHeight)) {
+  screen_ = std::make_unique<Screen>(display_.name());
   const std::string ct = small_ct(scratch);
   write_registered(scratch / "operation", ct);
   FaultRig::Settings settings{.folder = scratch / "cart"};
@@ -180,20 +211,13 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
 
 WindowRig::~WindowRig() {
   listening_.request_stop();
-  hearing_->thread.request_stop();
+  if (hearing_) hearing_->thread.request_stop();
 }
 
 Glance WindowRig::look() {
-  // One connection for all, opened late: the display is there by now.
-  thread_local std::unique_ptr<Screen> screen;
-  thread_local std::string of;
-  if (of != display_.name()) {
-    screen = std::make_unique<Screen>(display_.name());
-    of = display_.name();
-  }
   Glance out;
   out.at_ns = monotonic_ns();
-  const std::vector<std::uint8_t> rgb = screen->grab(kFromPx, kTopPx, kWidePx, kHighPx);
+  const std::vector<std::uint8_t> rgb = screen_->grab(kFromPx, kTopPx, kWidePx, kHighPx);
   if (rgb.empty()) return out;
   for (const int width_px : {kVideoWidth, kVideoWidth / 2}) {
     const Number number = number_in(rgb, width_px);

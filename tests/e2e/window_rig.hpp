@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -11,6 +12,7 @@
 #include "tests/e2e/fault_rig.hpp"
 #include "tests/support/display.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/screen.hpp"
 
 namespace birdseye::testing {
 
@@ -27,6 +29,19 @@ struct Glance {
 struct Said {
   std::int64_t at_ns = 0;
   std::string words;  ///< why no overlay is drawn; empty: it is
+};
+
+/// Notes when a core of the machine lets nobody run.
+class CoreWatch {
+ public:
+  CoreWatch();
+  [[nodiscard]] bool stood_still(std::int64_t from_ns, std::int64_t until_ns) const;
+
+ private:
+  void watch(int core, const std::stop_token& stop);
+  mutable std::mutex mutex_;
+  std::vector<std::int64_t> late_ns_;
+  std::vector<std::jthread> threads_;
 };
 
 /// The real `birdseye live` on a display of its own, registered by what an earlier window kept, over the real birdseyed
@@ -48,6 +63,7 @@ class WindowRig {
   [[nodiscard]] std::vector<Said> said();
   /// How many messages of a type it has sent to its client.
   [[nodiscard]] int sent(const std::string& type);
+  [[nodiscard]] const CoreWatch& cores() const { return cores_; }
   [[nodiscard]] FaultRig& appliance() { return *appliance_; }
   /// When a frame was exposed, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t exposed_ns(std::uint32_t number) const;
@@ -59,7 +75,9 @@ class WindowRig {
   struct Hearing;
   Glance look();
 
+  CoreWatch cores_;
   Display display_;
+  std::unique_ptr<Screen> screen_;
   std::unique_ptr<FaultRig> appliance_;
   std::unique_ptr<Child> window_;
   std::unique_ptr<Hearing> hearing_;
