@@ -49,9 +49,11 @@ def window(options, arguments, script, folder):
                           pass_fds=[number_to], stderr=subprocess.DEVNULL) as server:
         display = ":" + os.read(number_from, 16).decode().strip()
         try:
-            subprocess.run([options.bin / "birdseye", "live", *arguments, "--script", folder / "script.txt", "--json",
-                            folder / "live.json"], check=True, stdout=subprocess.DEVNULL,
+            ended = subprocess.run([options.bin / "birdseye", "live", *arguments, "--script", folder / "script.txt", "--json",
+                            folder / "live.json"], check=False, stdout=subprocess.DEVNULL,
                            env={**os.environ, "DISPLAY": display})
+            if ended.returncode not in (0, 3):  # 3: the error against the truth, which is not judged here
+                raise SystemExit(f"birdseye live: exit code {ended.returncode}")
         finally:
             server.terminate()
     return json.loads((folder / "live.json").read_text())
