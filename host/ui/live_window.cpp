@@ -107,8 +107,8 @@ void LiveWindow::end_frame() {
 void LiveWindow::swap(Believed believe_until) {
   if (cover_) {
     cover_->lift();
-    // A driver may show it and come back much later. What must not be covered yet is what was there before.
-    if (believe_until) cover_->believe_until(believe_until);
+    // A driver may show it at once or much later, and come back later still: until then the earlier time holds.
+    if (believe_until) cover_->believe_no_longer_than(*believe_until);
   }
   glfwSwapBuffers(window_);
   if (cover_) cover_->believe_until(believe_until);

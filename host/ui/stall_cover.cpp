@@ -81,11 +81,16 @@ StallCover::~StallCover() {
 }
 
 void StallCover::believe_until(std::optional<Clock::time_point> until) {
+  if (until) believe_no_longer_than(*until);
   const std::lock_guard lock(mutex_);
-  // What is later needs no waking: the thread looks again when the earlier has passed.
-  const bool earlier = until && (!until_ || *until < *until_);
+  until_ = until;  // what is later needs no waking: the thread looks again when the earlier has passed
+}
+
+void StallCover::believe_no_longer_than(Clock::time_point until) {
+  const std::lock_guard lock(mutex_);
+  if (until_ && *until_ <= until) return;
   until_ = until;
-  if (earlier) earlier_.notify_one();
+  earlier_.notify_one();
 }
 
 void StallCover::lift() {

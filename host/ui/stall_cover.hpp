@@ -30,6 +30,8 @@ class StallCover {
 
   /// What is on the screen is to be believed until then; empty: for ever.
   void believe_until(std::optional<Clock::time_point> until);
+  /// Leaves the time that holds where it is the earlier.
+  void believe_no_longer_than(Clock::time_point until);
   /// Before something new is shown: takes it away, and returns once it is gone. What it showed stays on the screen
   /// until then.
   void lift();
