@@ -2,7 +2,7 @@
 set(allowed_calibration calibration)
 set(allowed_drivers calibration drivers)
 set(allowed_device calibration drivers device)
-set(allowed_host calibration device/wire host)
+set(allowed_host calibration drivers/system device/wire host)
 set(allowed_hw-sim calibration drivers device hw-sim)
 
 set(violations "")

@@ -9,7 +9,7 @@
 #include "device/birdseyed/gpio_thread.hpp"
 #include "device/birdseyed/tracker_thread.hpp"
 #include "device/wire/clock_discipline.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

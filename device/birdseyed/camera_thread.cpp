@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

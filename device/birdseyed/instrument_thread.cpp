@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

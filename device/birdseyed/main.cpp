@@ -10,14 +10,14 @@
 #include <stop_token>
 #include <thread>
 
-#include "calibration/base/program.hpp"
 #include "device/birdseyed/appliance.hpp"
 #include "device/birdseyed/patient_stderr.hpp"
 #include "device/birdseyed/probe.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/program.hpp"
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include "device/birdseyed/tracker_thread.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

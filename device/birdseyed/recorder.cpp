@@ -16,8 +16,8 @@
 #include <system_error>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::device {
 

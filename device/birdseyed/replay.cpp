@@ -3,7 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include "device/birdseyed/instrument_thread.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

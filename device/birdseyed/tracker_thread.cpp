@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "drivers/io/monotonic.hpp"
 #include "drivers/io/open_line.hpp"
 #include "drivers/minibird/record_parser.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::device {
 

@@ -13,7 +13,7 @@
 
 #include "drivers/gpio/debouncer.hpp"
 #include "drivers/gpio/kernel_stamps.hpp"
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

@@ -10,7 +10,7 @@
 #include <mutex>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

@@ -8,9 +8,9 @@
 
 #include "drivers/io/ftdi_port.hpp"
 #include "drivers/io/libusb_port.hpp"
-#include "drivers/io/monotonic.hpp"
 #include "drivers/io/serial_port.hpp"
 #include "drivers/io/socket_line.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

@@ -15,8 +15,8 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
 #include "drivers/io/serial_latency.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

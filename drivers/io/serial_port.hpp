@@ -7,7 +7,7 @@
 
 #include "drivers/io/byte_stream.hpp"
 #include "drivers/io/serial_marks.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::drivers {
 

@@ -16,7 +16,7 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers {
 

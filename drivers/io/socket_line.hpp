@@ -6,7 +6,7 @@
 #include <string>
 
 #include "drivers/io/byte_stream.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::drivers {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers::minibird {
 

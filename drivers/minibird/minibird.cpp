@@ -7,8 +7,8 @@
 #include <array>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
 #include "drivers/minibird/configuration.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::drivers::minibird {
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "drivers/video/frame_source.hpp"
 #include "drivers/video/pixel_format.hpp"
 #include "drivers/video/pixel_pool.hpp"

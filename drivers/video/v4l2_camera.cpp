@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 #include "drivers/video/jpeg_decoder.hpp"
 
 namespace birdseye::drivers {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "drivers/video/camera_controls.hpp"
 #include "drivers/video/camera_offers.hpp"
 

@@ -12,12 +12,12 @@
 #include <set>
 
 #include "calibration/base/median.hpp"
-#include "host/app/bench_device_rig.hpp"
-#include "host/app/bench_machine.hpp"
-#include "host/app/bench_wakes.hpp"
+#include "drivers/system/interrupt.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/interrupt.hpp"
-#include "host/app/write_files.hpp"
+#include "host/bench/bench_device_rig.hpp"
+#include "host/bench/bench_machine.hpp"
+#include "host/bench/bench_wakes.hpp"
+#include "host/files/write_files.hpp"
 
 namespace birdseye::host {
 

@@ -1,4 +1,4 @@
-#include "host/app/bench_register.hpp"
+#include "host/bench/bench_register.hpp"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "host/app/bench_machine.hpp"
+#include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/progress.hpp"
-#include "host/app/write_files.hpp"
+#include "host/bench/bench_machine.hpp"
+#include "host/files/write_files.hpp"
 
 namespace birdseye::host {
 

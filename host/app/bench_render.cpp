@@ -12,11 +12,11 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/median.hpp"
-#include "host/app/bench_machine.hpp"
-#include "host/app/bench_phantom.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/picture.hpp"
-#include "host/app/write_files.hpp"
+#include "host/bench/bench_machine.hpp"
+#include "host/bench/bench_phantom.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/write_files.hpp"
 #include "host/render/engine.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 

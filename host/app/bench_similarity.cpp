@@ -10,11 +10,11 @@
 #include <random>
 
 #include "calibration/base/median.hpp"
-#include "host/app/bench_machine.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/write_files.hpp"
-#include "host/registration/parzen_mutual_information.hpp"
-#include "host/registration/similarity.hpp"
+#include "host/bench/bench_machine.hpp"
+#include "host/files/write_files.hpp"
+#include "host/registration/similarity/parzen_mutual_information.hpp"
+#include "host/registration/similarity/similarity.hpp"
 
 namespace birdseye::host {
 

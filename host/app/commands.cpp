@@ -1,6 +1,6 @@
 #include "host/app/commands.hpp"
 
-#include "calibration/base/program.hpp"
+#include "drivers/system/program.hpp"
 
 namespace birdseye::host {
 

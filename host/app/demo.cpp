@@ -6,12 +6,12 @@
 #include <map>
 #include <memory>
 
+#include "drivers/system/interrupt.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/demo_session.hpp"
-#include "host/app/interrupt.hpp"
-#include "host/app/simulated_truth.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
+#include "host/demo/demo_session.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/simulated/simulated_truth.hpp"
 #include "host/volume/import.hpp"
 
 namespace birdseye::host {

@@ -7,10 +7,10 @@
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 

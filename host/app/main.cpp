@@ -1,4 +1,4 @@
-#include "calibration/base/program.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 
 int main(int argc, char** argv) {

@@ -6,14 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/verdict.hpp"
-#include "host/app/appliance_link.hpp"
+#include "drivers/system/interrupt.hpp"
+#include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/event_stream.hpp"
 #include "host/app/foreign_options.hpp"
-#include "host/app/interrupt.hpp"
-#include "host/app/progress.hpp"
-#include "host/app/recording/recording_writer.hpp"
-#include "host/app/write_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/link/appliance_link.hpp"
+#include "host/link/event_stream.hpp"
+#include "host/recording/recording_writer.hpp"
 
 namespace birdseye::host {
 

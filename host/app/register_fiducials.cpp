@@ -7,15 +7,15 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/base/verdict.hpp"
-#include "calibration/solve/odd_points.hpp"
-#include "calibration/solve/point_error.hpp"
-#include "calibration/solve/point_fit.hpp"
+#include "calibration/points/odd_points.hpp"
+#include "calibration/points/point_error.hpp"
+#include "calibration/points/point_fit.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/target_error_map.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
-#include "host/registration/point_matching.hpp"
-#include "host/registration/surface_refinement.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/registration/rigid/point_matching.hpp"
+#include "host/registration/rigid/surface_refinement.hpp"
+#include "host/report/target_error_map.hpp"
 #include "host/volume/import.hpp"
 
 namespace birdseye::host {

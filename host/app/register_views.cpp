@@ -9,15 +9,15 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/picture.hpp"
-#include "host/app/progress.hpp"
-#include "host/app/registration_case.hpp"
-#include "host/app/registration_error.hpp"
-#include "host/app/registration_report.hpp"
-#include "host/app/run_registration.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
+#include "host/case/registration_case.hpp"
+#include "host/case/registration_error.hpp"
+#include "host/case/registration_report.hpp"
+#include "host/case/run_registration.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
 #include "host/overlay/compositor.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/labels.hpp"

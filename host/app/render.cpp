@@ -9,15 +9,15 @@
 #include <nlohmann/json.hpp>
 
 #include "host/app/commands.hpp"
-#include "host/app/picture.hpp"
-#include "host/app/render_scene.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
 #include "host/overlay/compositor.hpp"
+#include "host/overlay/render_scene.hpp"
 #include "host/overlay/surface_cues.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
-#include "host/ui/window.hpp"
+#include "host/window/window.hpp"
 
 namespace birdseye::host {
 

@@ -9,16 +9,16 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/verdict.hpp"
+#include "drivers/system/interrupt.hpp"
+#include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
-#include "host/app/film.hpp"
-#include "host/app/interrupt.hpp"
-#include "host/app/picture.hpp"
-#include "host/app/progress.hpp"
-#include "host/app/recording/recording_reader.hpp"
-#include "host/app/render_scene.hpp"
-#include "host/app/replay_setup.hpp"
-#include "host/app/text_files.hpp"
-#include "host/app/write_files.hpp"
+#include "host/files/film.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/operation/replay_setup.hpp"
+#include "host/overlay/render_scene.hpp"
+#include "host/recording/recording_reader.hpp"
 
 namespace birdseye::host {
 

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "host/app/commands.hpp"
-#include "host/app/write_files.hpp"
+#include "host/files/write_files.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/segmentation.hpp"
 

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "host/app/commands.hpp"
-#include "host/registration/surface_slab.hpp"
+#include "host/registration/rigid/surface_slab.hpp"
 #include "host/volume/image_file.hpp"
 
 namespace birdseye::host {

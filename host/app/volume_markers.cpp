@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host/app/commands.hpp"
-#include "host/app/slice_picture.hpp"
-#include "host/app/write_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/report/slice_picture.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/marker_finder.hpp"
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "host/render/scene.hpp"
+#include "host/render/scene/scene.hpp"
 
 namespace birdseye::host {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibration/geometry/camera_model.hpp"
-#include "host/render/scene.hpp"
+#include "host/render/scene/scene.hpp"
 
 namespace birdseye::host {
 

@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "calibration/base/program.hpp"
+#include "drivers/system/program.hpp"
 #include "hw-sim/app/instruments.hpp"
 #include "hw-sim/app/stop_signal.hpp"
 #include "hw-sim/case/registration_case.hpp"

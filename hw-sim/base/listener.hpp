@@ -4,7 +4,7 @@
 #include <string>
 
 #include "calibration/base/result.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::hw_sim {
 

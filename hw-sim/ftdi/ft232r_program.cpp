@@ -9,9 +9,9 @@
 #include <array>
 #include <cerrno>
 
-#include "drivers/io/monotonic.hpp"
-#include "drivers/io/unique_fd.hpp"
-#include "hw-sim/base/announce.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/unique_fd.hpp"
+#include "hw-sim/faults/announce.hpp"
 #include "hw-sim/ftdi/usb_redir.hpp"
 #include "hw-sim/minibird/motion.hpp"
 

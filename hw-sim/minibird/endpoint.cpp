@@ -13,8 +13,8 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "hw-sim/base/listener.hpp"
 #include "hw-sim/base/wait_for_fd.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "drivers/io/monotonic.hpp"
-#include "hw-sim/base/announce.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "hw-sim/faults/announce.hpp"
 #include "hw-sim/minibird/motion.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 

@@ -7,8 +7,8 @@
 #include <deque>
 #include <vector>
 
-#include "drivers/io/monotonic.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/base/listener.hpp"
 #include "hw-sim/base/wait_for_fd.hpp"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "drivers/io/monotonic.hpp"
-#include "hw-sim/base/announce.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "hw-sim/faults/announce.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 #include "hw-sim/video/strobe.hpp"
 

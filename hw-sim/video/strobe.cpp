@@ -8,7 +8,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "drivers/io/monotonic.hpp"
+#include "drivers/system/monotonic.hpp"
 
 namespace birdseye::hw_sim {
 

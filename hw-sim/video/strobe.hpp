@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "calibration/base/result.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "hw-sim/video/camera_script.hpp"
 
 namespace birdseye::hw_sim {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/io/monotonic.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 

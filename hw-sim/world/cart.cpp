@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/io/monotonic.hpp"
-#include "hw-sim/base/announce.hpp"
+#include "drivers/system/monotonic.hpp"
 #include "hw-sim/case/tissue_map.hpp"
+#include "hw-sim/faults/announce.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/phantom/json_file.hpp"

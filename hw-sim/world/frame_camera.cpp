@@ -8,8 +8,8 @@
 #include <cmath>
 #include <utility>
 
-#include "drivers/io/monotonic.hpp"
-#include "hw-sim/base/announce.hpp"
+#include "drivers/system/monotonic.hpp"
+#include "hw-sim/faults/announce.hpp"
 
 namespace birdseye::hw_sim {
 

@@ -2,7 +2,7 @@
 
 #include <opencv2/calib3d.hpp>
 
-#include "calibration/solve/camera_calibration.hpp"
+#include "calibration/camera/camera_calibration.hpp"
 #include "tests/support/board_views.hpp"
 #include "tests/support/hand_eye_bench.hpp"
 

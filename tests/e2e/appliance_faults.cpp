@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "device/wire/json.hpp"
-#include "drivers/io/unique_fd.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 
 namespace birdseye::testing {

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/calibration/latency_streams.hpp"
+#include "tests/calibration/latency/latency_streams.hpp"
 #include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "host/app/recording/recording_writer.hpp"
+#include "host/recording/recording_writer.hpp"
 #include "tests/e2e/fault_rig.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/display.hpp"

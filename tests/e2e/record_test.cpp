@@ -4,8 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host/app/calibrate/pose_files.hpp"
-#include "host/app/recording/recording_reader.hpp"
+#include "host/files/pose_files.hpp"
+#include "host/recording/recording_reader.hpp"
 #include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/scratch.hpp"

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <sstream>
 
-#include "host/app/live/operation.hpp"
+#include "host/operation/operation.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
 #include "tests/support/slicer.hpp"

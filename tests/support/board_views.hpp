@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "calibration/detect/pattern_view.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
-#include "calibration/solve/pattern_view.hpp"
 
 namespace birdseye::testing {
 

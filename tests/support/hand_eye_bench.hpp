@@ -5,7 +5,7 @@
 #include <string>
 
 #include "calibration/base/units.hpp"
-#include "calibration/solve/hand_eye_calibration.hpp"
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "tests/support/lens.hpp"
 
 namespace birdseye::testing {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/app/live/live_session.hpp"
+#include "host/operation/live_session.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"

@@ -6,8 +6,8 @@
 
 #include "host/deform/displacement_field.hpp"
 #include "host/render/reference/reference_renderer.hpp"
-#include "host/render/scene.hpp"
-#include "host/render/transfer_function.hpp"
+#include "host/render/scene/scene.hpp"
+#include "host/render/scene/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 #include "tests/support/lens.hpp"
 

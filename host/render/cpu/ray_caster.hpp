@@ -9,8 +9,8 @@
 #include "host/deform/displacement_field.hpp"
 #include "host/render/cpu/seen_ranges.hpp"
 #include "host/render/cpu/voxel_grid.hpp"
-#include "host/render/scene.hpp"
-#include "host/render/transfer_function.hpp"
+#include "host/render/scene/scene.hpp"
+#include "host/render/scene/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {

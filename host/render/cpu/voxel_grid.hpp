@@ -8,9 +8,9 @@
 
 #include "host/deform/displacement_field.hpp"
 #include "host/render/cpu/kernels.hpp"
-#include "host/render/scene.hpp"
-#include "host/render/seen_bricks.hpp"
-#include "host/render/transfer_function.hpp"
+#include "host/render/scene/scene.hpp"
+#include "host/render/scene/seen_bricks.hpp"
+#include "host/render/scene/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host::cpu {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "calibration/base/result.hpp"
-#include "host/render/scene.hpp"
+#include "host/render/scene/scene.hpp"
 
 namespace birdseye::host {
 

@@ -7,8 +7,8 @@
 #include "host/deform/displacement_field.hpp"
 #include "host/render/gl/gl_context.hpp"
 #include "host/render/gl/gl_objects.hpp"
-#include "host/render/scene.hpp"
-#include "host/render/transfer_function.hpp"
+#include "host/render/scene/scene.hpp"
+#include "host/render/scene/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {

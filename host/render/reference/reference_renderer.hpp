@@ -5,8 +5,8 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/deform/displacement_field.hpp"
-#include "host/render/scene.hpp"
-#include "host/render/transfer_function.hpp"
+#include "host/render/scene/scene.hpp"
+#include "host/render/scene/transfer_function.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {

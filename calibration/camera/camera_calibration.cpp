@@ -1,0 +1,227 @@
+#include "calibration/camera/camera_calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "calibration/base/units.hpp"
+#include "calibration/camera/camera_bundle.hpp"
+#include "calibration/camera/camera_figures.hpp"
+#include "calibration/camera/camera_outliers.hpp"
+#include "calibration/camera/camera_views.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+/// One lens model fitted to all views, and what it is worth on views it has not seen.
+struct ModelFit {
+  LensModel model = LensModel::pinhole;
+  CameraModel camera;
+  std::vector<BundleView> views;
+  std::vector<double> convergence_px;
+  double rms_px = 0;
+  std::vector<double> held_out_squares_px2;  ///< per view, summed over its points
+  double held_out_px = 0, held_out_angle_rad = 0;
+  CameraVector sigma_between_views = CameraVector::Zero();
+  bool usable = true;  ///< a lens was found, and it does not fold inside the picture
+  bool folds = false;
+};
+
+std::size_t used_points(std::span<const BundleView> views) {
+  std::size_t count = 0;
+  for (const BundleView& view : views)
+    count += static_cast<std::size_t>(std::count(view.weights.begin(), view.weights.end(), 1.0));
+  return count;
+}
+
+double squares_of(const CameraModel& camera, const BundleView& view) {
+  const auto residuals = residuals_px(camera, view);
+  double sum = 0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) sum += view.weights[i] * residuals[i].squaredNorm();
+  return sum;
+}
+
+/// The same as an angle, which times a distance is an error in space.
+double angle_squares_of(const CameraModel& camera, const BundleView& view) {
+  const auto residuals = residuals_px(camera, view);
+  const Eigen::Array2d focal(camera.fx_px, camera.fy_px);
+  double sum = 0;
+  for (std::size_t i = 0; i < residuals.size(); ++i)
+    sum += view.weights[i] * (residuals[i].array() / focal).matrix().squaredNorm();
+  return sum;
+}
+
+/// Fits the lens without each group of views in turn, and that group's views with it.
+void hold_out(ModelFit& fit, int folds) {
+  const std::size_t groups = std::min(fit.views.size(), static_cast<std::size_t>(std::max(2, folds)));
+  std::vector<CameraVector> lenses;
+  double squares = 0, angle_squares = 0;
+  fit.held_out_squares_px2.assign(fit.views.size(), 0);
+  for (std::size_t group = 0; group < groups; ++group) {
+    std::vector<BundleView> others;
+    for (std::size_t v = 0; v < fit.views.size(); ++v) {
+      if (v % groups != group) others.push_back(fit.views[v]);
+    }
+    CameraModel camera = fit.camera;
+    refine_bundle(camera, others, solved_by(fit.model), {.most_steps = 12, .tolerance = 1e-9});
+    lenses.push_back(parameters_of(camera));
+    for (std::size_t v = group; v < fit.views.size(); v += groups) {
+      BundleView view = fit.views[v];
+      view.camera_from_marker = fit_pose(camera, view);
+      fit.held_out_squares_px2[v] = squares_of(camera, view);
+      squares += fit.held_out_squares_px2[v];
+      angle_squares += angle_squares_of(camera, view);
+    }
+  }
+  const auto points = static_cast<double>(used_points(fit.views));
+  fit.held_out_px = std::sqrt(squares / points);
+  fit.held_out_angle_rad = std::sqrt(angle_squares / points);
+  const auto n = static_cast<double>(groups);
+  CameraVector mean = CameraVector::Zero(), variance = CameraVector::Zero();
+  for (const CameraVector& lens : lenses) mean += lens / n;
+  // Grouped jackknife (B. Efron and C. Stein, 1981).
+  for (const CameraVector& lens : lenses) variance += (n - 1) / n * (lens - mean).cwiseAbs2();
+  fit.sigma_between_views = variance.cwiseSqrt();
+}
+
+std::vector<ModelFit> fit_models(const CameraModel& start, const SoundViews& sound, int folds) {
+  std::vector<ModelFit> fits;
+  CameraModel camera = start;
+  camera.k1 = camera.k2 = camera.p1 = camera.p2 = camera.k3 = 0;
+  std::vector<BundleView> views;
+  for (const SoundView& view : sound.views) views.push_back(view.bundle);
+  for (const LensModel model : kLensModels) {
+    // Each model starts where the one before it, which it contains, has ended.
+    BundleSummary summary = refine_bundle(camera, views, solved_by(model), {.most_steps = 100});
+    ModelFit& fit = fits.emplace_back();
+    fit.model = model;
+    fit.camera = camera;
+    fit.views = views;
+    fit.convergence_px = std::move(summary.rms_px);
+    double squares = 0;
+    for (const BundleView& view : views) squares += squares_of(camera, view);
+    fit.rms_px = std::sqrt(squares / static_cast<double>(used_points(views)));
+    fit.usable = static_cast<bool>(check(camera));
+    if (!fit.usable) {
+      fit.held_out_px = fit.held_out_angle_rad = std::numeric_limits<double>::quiet_NaN();
+      fit.held_out_squares_px2.assign(views.size(), fit.held_out_px);
+      continue;
+    }
+    fit.folds = folds_inside(camera);
+    hold_out(fit, folds);
+    fit.usable = !fit.folds && std::isfinite(fit.held_out_px);
+  }
+  return fits;
+}
+
+/// Whether what the other model gains on this one, view by view, is no more than its own standard error, or too little
+/// to matter.
+bool as_good(const ModelFit& fit, const ModelFit& best) {
+  constexpr double kTooLittle = 1.01;  // a held-out error 1 % larger hides a bend of a seventh of the noise
+  if (fit.held_out_px <= kTooLittle * best.held_out_px) return true;
+  const auto n = static_cast<double>(fit.views.size());
+  double mean = 0, squares = 0;
+  for (std::size_t v = 0; v < fit.views.size(); ++v) {
+    const double gain = fit.held_out_squares_px2[v] - best.held_out_squares_px2[v];
+    mean += gain / n;
+    squares += gain * gain / n;
+  }
+  return mean <= std::sqrt(std::max(0.0, squares - mean * mean) / (n - 1));
+}
+
+const ModelFit& choose(const std::vector<ModelFit>& fits, std::optional<LensModel> asked) {
+  const ModelFit *best = nullptr, *best_folding = nullptr;
+  for (const ModelFit& fit : fits) {
+    if (asked && fit.model == *asked) return fit;
+    const ModelFit*& rival = fit.usable ? best : best_folding;
+    if (std::isfinite(fit.held_out_px) && (rival == nullptr || fit.held_out_px < rival->held_out_px)) rival = &fit;
+  }
+  // A lens that fits far better and folds is what the views say; one that does not fold and does not fit helps nobody.
+  constexpr double kFarBetter = 0.5;
+  if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kFarBetter * best->held_out_px))
+    return best_folding != nullptr ? *best_folding : fits.front();
+  return *std::find_if(fits.begin(), fits.end(),
+                       [&](const ModelFit& fit) { return fit.usable && as_good(fit, *best); });
+}
+
+void add_covariance(const ModelFit& fit, CameraCalibration& out) {
+  std::vector<int> solved;
+  for (int i = 0; i < CameraModel::kParameters; ++i) {
+    if (solved_by(fit.model)[static_cast<std::size_t>(i)]) solved.push_back(i);
+  }
+  const auto points = static_cast<double>(used_points(fit.views));
+  const double freedom = 2 * points - static_cast<double>(solved.size() + 6 * fit.views.size());
+  out.noise_sigma_px = fit.rms_px * std::sqrt(points / std::max(freedom, 1.0));
+  const Eigen::MatrixXd information = lens_information(fit.camera, fit.views)(solved, solved);
+  // In units in which each parameter alone is known equally well, so that the eigenvalues can be compared.
+  const Eigen::VectorXd unit = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * information * unit.asDiagonal());
+  constexpr double kOpen = 1e-11;
+  if (!(eigen.eigenvalues()[0] > kOpen)) {
+    Eigen::Index worst = 0;
+    eigen.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
+    out.undetermined = kCameraParameterNames[static_cast<std::size_t>(solved[static_cast<std::size_t>(worst)])];
+  }
+  const Eigen::VectorXd inverse = eigen.eigenvalues().cwiseMax(kOpen).cwiseInverse();
+  const Eigen::MatrixXd root = unit.asDiagonal() * eigen.eigenvectors();
+  out.covariance(solved, solved) =
+      out.noise_sigma_px * out.noise_sigma_px * (root * inverse.asDiagonal() * root.transpose());
+}
+
+CameraCalibration put_together(const ModelFit& fit, const SoundViews& sound,
+                               const CameraCalibrationSettings& settings) {
+  CameraCalibration out;
+  out.camera = fit.camera;
+  out.model = fit.model;
+  out.folds = fit.folds;
+  out.sigma_between_views = fit.sigma_between_views;
+  out.rms_px = fit.rms_px;
+  out.held_out_px = fit.held_out_px;
+  out.convergence_px = fit.convergence_px;
+  out.rejected = sound.rejected;
+  std::sort(out.rejected.begin(), out.rejected.end(),
+            [](const RejectedView& a, const RejectedView& b) { return a.index < b.index; });
+  std::vector<std::size_t> order(sound.views.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return sound.views[a].index < sound.views[b].index; });
+  for (const std::size_t v : order)
+    add_view(sound.views[v], fit.camera, fit.views[v], fit.held_out_squares_px2[v], out);
+  add_covariance(fit, out);
+  add_geometry(out);
+  add_regions(settings.columns, settings.rows, out);
+  out.held_out_mm = fit.held_out_angle_rad * out.mean_distance_mm;
+  return out;
+}
+
+}  // namespace
+
+Result<CameraCalibration> calibrate_camera(std::span<const PatternView> views, int width_px, int height_px,
+                                           const CameraCalibrationSettings& settings) {
+  auto sound = sort_out(views, width_px, height_px);
+  if (!sound) return sound.error();
+  if (sound->views.size() < kLeastViews) return too_few_views(sound->views.size(), sound->rejected);
+  auto start = start_camera(*sound, width_px, height_px, settings.robust);
+  if (!start) return start.error();
+  if (settings.robust) {
+    if (const auto left_out = leave_out_outliers(*start, *sound); !left_out) return left_out.error();
+  }
+  const std::vector<ModelFit> fits = fit_models(*start, *sound, settings.folds);
+  const ModelFit& chosen = choose(fits, settings.model);
+  if (const auto checked = check(chosen.camera); !checked)
+    return Error{Errc::degenerate,
+                 "the views do not determine a camera: take more, with the board tilted to all sides"};
+  CameraCalibration out = put_together(chosen, *sound, settings);
+  for (const ModelFit& fit : fits) {
+    out.models.push_back(
+        {fit.model, fit.camera, fit.rms_px, fit.held_out_px, fit.held_out_angle_rad * out.mean_distance_mm, fit.folds});
+  }
+  return out;
+}
+
+}  // namespace birdseye::calibration

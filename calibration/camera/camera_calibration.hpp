@@ -1,0 +1,157 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/detect/pattern_view.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+
+namespace birdseye::calibration {
+
+/// How many of CameraModel's distortion terms are solved for, simplest first; the rest stay 0.
+enum class LensModel { pinhole, radial1, radial2, radial2_tangential2, radial3_tangential2 };
+inline constexpr std::array kLensModels{LensModel::pinhole, LensModel::radial1, LensModel::radial2,
+                                        LensModel::radial2_tangential2, LensModel::radial3_tangential2};
+
+const char* name_of(LensModel model);
+std::optional<LensModel> lens_model_of(std::string_view name);
+/// Which of CameraModel's nine parameters the model solves for.
+std::array<bool, CameraModel::kParameters> solved_by(LensModel model);
+
+using CameraVector = Eigen::Matrix<double, CameraModel::kParameters, 1>;
+using CameraMatrix = Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters>;
+/// The names of the nine, in CameraModel's order, with their units: "fx_px" .. "k3".
+inline constexpr std::array kCameraParameterNames{"fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
+
+struct CameraCalibrationSettings {
+  std::optional<LensModel> model;  ///< empty: chosen by held-out error
+  /// Points and views that do not fit are found and left out. Without it: least squares of all that is given, as
+  /// OpenCV's calibrateCamera.
+  bool robust = true;
+  int folds = 10;             ///< the views are held out in at most so many groups; one by one where there are fewer
+  int columns = 8, rows = 6;  ///< cells of the picture, for coverage and regions
+};
+
+struct RejectedView {
+  std::size_t index = 0;  ///< among the views given
+  std::string name, reason;
+};
+
+/// A point of a view that was used, and what the fit leaves there: seen minus predicted.
+struct FittedPoint {
+  std::size_t view = 0;  ///< in CameraCalibration::views
+  int id = 0;
+  Eigen::Vector2d pixel_px, residual_px;
+  bool outlier = false;  ///< left out of the fit
+};
+
+struct FittedView {
+  std::size_t index = 0;  ///< among the views given
+  std::string name;
+  std::size_t points = 0, outliers = 0;
+  double rms_px = 0;       ///< of the points without outliers, as all figures here
+  double held_out_px = 0;  ///< rms with the lens of the views of the other groups
+  double tilt_deg = 0;     ///< between the board's normal and the optical axis
+  double distance_mm = 0;  ///< of the middle of its points, along the optical axis
+};
+
+struct LensModelFit {
+  LensModel model = LensModel::pinhole;
+  CameraModel camera;
+  double rms_px = 0, held_out_px = 0, held_out_mm = 0;
+  bool folds = false;  ///< some pixel of the picture has no ray
+};
+
+/// A cell of the picture.
+struct RegionResidual {
+  int column = 0, row = 0;
+  std::size_t count = 0;
+  double rms_px = 0;
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< what is left of a lens model that does not fit there
+};
+
+struct CameraCalibration {
+  CameraModel camera;
+  LensModel model = LensModel::pinhole;
+  bool folds = false;  ///< the lens of the chosen model folds inside the picture
+  /// Of the nine parameters, rows and columns of those not solved for 0: the residuals' variance times the inverse of
+  /// the normal matrix from which the boards' poses are eliminated. Holds where residuals are independent.
+  CameraMatrix covariance = CameraMatrix::Zero();
+  /// One standard deviation from how far the lens moves when groups of views are left out (grouped jackknife). Larger
+  /// than the covariance's where the points of a view err together: a board that is not flat, a view that is blurred.
+  CameraVector sigma_between_views = CameraVector::Zero();
+  std::string undetermined;  ///< what the views leave open, in words; empty where they determine all
+  std::vector<Transform<Camera, Marker>> camera_from_marker;  ///< one per used view
+  std::vector<FittedView> views;                              ///< used, in the order given
+  std::vector<RejectedView> rejected;
+  std::vector<FittedPoint> points;  ///< of all used views, outliers too
+  std::size_t outliers = 0;
+  double noise_sigma_px = 0;  ///< per axis, from the residuals and their degrees of freedom
+  double rms_px = 0;          ///< root mean square distance, over the used points
+  double held_out_px = 0;     ///< the same with each view's lens from the other groups: only its pose is its own
+  double held_out_mm = 0;     ///< at the board's mean distance
+  std::vector<LensModelFit> models;
+  int columns = 0, rows = 0;
+  std::vector<RegionResidual> regions;  ///< row by row
+  double coverage = 0;                  ///< share of cells that hold points
+  double tilt_spread_deg = 0;           ///< the largest angle between the normals of two boards
+  double least_distance_mm = 0, mean_distance_mm = 0, largest_distance_mm = 0;
+  std::vector<double> convergence_px;  ///< rms after each step of the last refinement
+
+  [[nodiscard]] CameraVector sigma() const { return covariance.diagonal().cwiseMax(0).cwiseSqrt(); }
+  /// The larger of the two sigmas, for each parameter.
+  [[nodiscard]] CameraVector careful_sigma() const { return sigma().cwiseMax(sigma_between_views); }
+};
+
+/// Lens and boards' poses from views of a flat pattern (z = 0).
+///
+/// Z. Zhang's closed form (2000, through OpenCV) starts a least-squares fit over all corners (Ceres, analytic
+/// derivatives). Residuals are first weighed by Cauchy's function at a scale from their median; what lies further out
+/// than chance puts one of that many points with 1 % is an outlier, views most of whose points do not fit are rejected,
+/// and the rest is fitted plainly. Each lens model is fitted and held out; the simplest one is taken whose held-out
+/// error is within one standard error of the best's.
+///
+/// Views that cannot be used are named in `rejected`: numbers that are not finite, points outside the picture, the same
+/// number twice, fewer than six points, the same pose as another view's. The order of views and of points in them
+/// changes nothing.
+/// Errors: Errc::bad_value for a size that is not positive and views whose vectors do not go together;
+/// Errc::degenerate, naming why, where fewer than three views are left or they do not determine a camera.
+Result<CameraCalibration> calibrate_camera(std::span<const PatternView> views, int width_px, int height_px,
+                                           const CameraCalibrationSettings& settings = {});
+
+/// The limits against which a calibration is judged. Those in pixels are for a picture 1920 wide and go with the width.
+namespace camera_limits {
+inline constexpr double kWidth_px = 1920;
+// A pixel is 0.07 mm at 10 cm before a 70 degree lens: under what a tracker adds. Five are 0.35 mm, and show.
+inline constexpr double kHeldOutPass_px = 1, kHeldOutMarginal_px = 5;
+// Ten views let one in ten be held out; with fewer than five one bad view decides.
+inline constexpr std::size_t kViewsPass = 10, kViewsMarginal = 5;
+// Where no board was, distortion is extrapolated. A round picture in a wide frame covers no more than 0.5 of it.
+inline constexpr double kCoveragePass = 0.5, kCoverageMarginal = 0.25;
+// A focal length that is off by 0.5 % moves the far end of a scene from 100 to 150 mm by 0.25 mm in depth.
+inline constexpr double kFocalSigmaPass = 0.005, kFocalSigmaMarginal = 0.02;
+inline constexpr double kCentreSigmaPass = 0.005, kCentreSigmaMarginal = 0.02;  ///< of the width
+// Focal length and distance are told apart by foreshortening alone, which goes with the sine of the tilt.
+inline constexpr double kTiltSpreadPass_deg = 25, kTiltSpreadMarginal_deg = 10;
+inline constexpr double kAspectPass = 0.12, kAspectMarginal = 0.2;  ///< PAL's pixels are 1.07 times as wide as high
+inline constexpr double kOutliersPass = 0.05, kOutliersMarginal = 0.2;
+// No laparoscope focuses nearer or farther: the board's size was given in another unit.
+inline constexpr double kNearest_mm = 5, kFarthest_mm = 5000;
+}  // namespace camera_limits
+
+Verdict judge_camera(const CameraCalibration& calibration);
+/// The same for views that determine no camera: fail, with the error's words and what to do.
+Verdict judge_no_camera(const Error& error);
+
+/// Whether some pixel of the picture, corners included, has no ray: the lens folds inside it.
+bool folds_inside(const CameraModel& camera);
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,173 @@
+#include "calibration/field/field_fit_parts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/base/median.hpp"
+
+namespace birdseye::calibration {
+
+namespace detail {
+
+Result<FieldFunctions> box_of(std::span<const Eigen::Vector3d> places_mm) {
+  FieldFunctions box;
+  box.low_mm.setConstant(1e300);
+  box.high_mm.setConstant(-1e300);
+  for (const Eigen::Vector3d& p : places_mm) {
+    if (!p.allFinite()) return Error{Errc::bad_value, "a position is not finite; take out the row it is in"};
+    box.low_mm = box.low_mm.cwiseMin(p);
+    box.high_mm = box.high_mm.cwiseMax(p);
+  }
+  const Eigen::Vector3d size_mm = box.high_mm - box.low_mm;
+  if (!(size_mm.minCoeff() >= kThinnestBoxMm)) {
+    return Error{Errc::degenerate,
+                 fmt::format("the samples fill {:.0f} x {:.0f} x {:.0f} mm; a map needs {:.0f} mm along each axis, so "
+                             "lift the board, or put it at more heights",
+                             size_mm.x(), size_mm.y(), size_mm.z(), kThinnestBoxMm)};
+  }
+  return box;
+}
+
+std::vector<FieldFunctions> families(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm,
+                                     const std::optional<FieldBasis>& only, std::size_t most_functions) {
+  std::vector<FieldFunctions> out;
+  const auto offer = [&](FieldBasis basis, int order) {
+    FieldFunctions functions = box;
+    functions.basis = basis;
+    functions.order = order;
+    if (basis == FieldBasis::rbf) functions.centres_mm = spread_out(places_mm, static_cast<std::size_t>(order));
+    const bool wanted = !only || *only == basis;
+    if (wanted && functions.fault().empty() && functions.count() <= most_functions) out.push_back(std::move(functions));
+  };
+  for (int order = 1; order <= 4; ++order) offer(FieldBasis::polynomial, order);
+  for (int order = 2; order <= 5; ++order) offer(FieldBasis::bernstein, order);
+  for (const int centres : {20, 50, 100, 180}) offer(FieldBasis::rbf, centres);
+  return out;
+}
+
+std::size_t best_of(std::span<const FieldCandidate> candidates, std::span<const FieldFunctions> functions) {
+  constexpr double kAsGood = 1.02;
+  const auto least = std::min_element(candidates.begin(), candidates.end(),
+                                      [](const auto& a, const auto& b) { return a.held_out_mm < b.held_out_mm; });
+  auto best = static_cast<std::size_t>(least - candidates.begin());
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (candidates[i].held_out_mm <= kAsGood * least->held_out_mm && functions[i].count() < functions[best].count())
+      best = i;
+  }
+  return best;
+}
+
+std::vector<bool> far_off(std::span<const Eigen::Vector3d> errors_mm, const std::vector<bool>& used, double least_mm) {
+  constexpr double kMedianSigmas = 1.538;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < errors_mm.size(); ++i) {
+    if (used[i]) sizes.push_back(errors_mm[i].norm());
+  }
+  const double limit_mm = std::max(least_mm, kOutlierSigmas * median_of(std::move(sizes)) / kMedianSigmas);
+  std::vector<bool> far(errors_mm.size());
+  for (std::size_t i = 0; i < errors_mm.size(); ++i) far[i] = !(errors_mm[i].norm() <= limit_mm);
+  return far;
+}
+
+double rms(std::span<const Eigen::Vector3d> errors, const std::vector<bool>& used) {
+  double squares = 0, count = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!used[i]) continue;
+    squares += errors[i].squaredNorm();
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
+void sum_up(FieldFit& fit) {
+  double before = 0, after = 0, count = 0;
+  fit.before_worst_mm = fit.held_out_worst_mm = 0;
+  for (const FieldResidual& r : fit.residuals) {
+    if (r.outlier) continue;
+    ++count;
+    before += r.before_mm.squaredNorm();
+    after += r.held_out_mm.squaredNorm();
+    fit.before_worst_mm = std::max(fit.before_worst_mm, r.before_mm.norm());
+    if (r.held_out_mm.norm() >= fit.held_out_worst_mm) {
+      fit.held_out_worst_mm = r.held_out_mm.norm();
+      fit.worst = r.name;
+    }
+  }
+  fit.before_mm = std::sqrt(before / std::max(1.0, count));
+  fit.held_out_mm = std::sqrt(after / std::max(1.0, count));
+}
+
+double mapped_part(const std::vector<double>& sigmas_mm) {
+  const auto mapped = std::count_if(sigmas_mm.begin(), sigmas_mm.end(), [](double s) { return s >= 0; });
+  return static_cast<double>(mapped) / static_cast<double>(sigmas_mm.size());
+}
+
+}  // namespace detail
+
+namespace {
+
+// The error of the best published corrections of such trackers, and what an overlay may still be off by at all.
+constexpr double kPassMm = 1.0, kMarginalMm = 2.5;
+// Pairs carry the noise of two sensors that move, and of their orientations.
+constexpr double kPairPassMm = 2.0, kPairMarginalMm = 4.0;
+constexpr double kWorstFactor = 5;   // of the RMS; beyond it one region is not described by the map
+constexpr double kLittleGain = 0.9;  // of the error before: the map takes away next to nothing
+constexpr double kFewOutliers = 0.1, kManyOutliers = 0.25;
+constexpr double kMostlyMapped = 0.6;           // of the box
+constexpr double kLeastDirectionSpread = 0.02;  // a body that is turned by 30 deg about two axes has 0.06
+
+void judge_pairs(const FieldFit& fit, Verdict& verdict) {
+  if (fit.direction_spread < kLeastDirectionSpread) {
+    verdict.add(Grade::fail,
+                fmt::format("the line between the sensors hardly turned (spread {:.3f}, at least {:.2f}): stretching "
+                            "cannot be told from a longer body",
+                            fit.direction_spread, kLeastDirectionSpread),
+                "turn the body about all axes while it is moved through the volume");
+  }
+  if (!fit.distance_known) {
+    verdict.add(Grade::marginal, "the distance between the sensors is not given: the scale is left as it was measured",
+                "measure the distance between the sensors' centres with a calliper and give it with --distance");
+  }
+}
+
+}  // namespace
+
+Verdict verdict_of(const FieldFit& fit) {
+  Verdict verdict;
+  verdict.judge(
+      fit.from_pairs ? "held-out change of the body's length and direction" : "held-out error after correction",
+      fit.held_out_mm, "mm", fit.from_pairs ? kPairPassMm : kPassMm, fit.from_pairs ? kPairMarginalMm : kMarginalMm,
+      "average each place for longer, measure more places where the report's arrows are long, and move what "
+      "metal can be moved away from the transmitter");
+  if (fit.held_out_worst_mm > kWorstFactor * fit.held_out_mm) {
+    verdict.add(Grade::marginal,
+                fmt::format("{} is off by {:.1f} mm, more than {:.0f} times the rest", fit.worst, fit.held_out_worst_mm,
+                            kWorstFactor),
+                "measure again around the place that is named, in smaller steps");
+  }
+  if (fit.held_out_mm > kLittleGain * fit.before_mm) {
+    verdict.add(Grade::marginal,
+                fmt::format("the map takes next to nothing away: {:.2f} mm before, {:.2f} mm after", fit.before_mm,
+                            fit.held_out_mm),
+                "if the error before is small enough, work without a map");
+  }
+  const auto outliers = static_cast<double>(
+      std::count_if(fit.residuals.begin(), fit.residuals.end(), [](const auto& r) { return r.outlier; }));
+  const double part = outliers / static_cast<double>(fit.residuals.size());
+  if (part > kFewOutliers) {
+    verdict.add(part > kManyOutliers ? Grade::fail : Grade::marginal,
+                fmt::format("{:.0f} of {} measurements do not fit the rest", outliers, fit.residuals.size()),
+                "look whether the sensor was seated at the places that are named, and measure those again");
+  }
+  if (fit.mapped_part < kMostlyMapped) {
+    verdict.add(Grade::marginal,
+                fmt::format("only {:.0f} % of the box around the samples is mapped", 100 * fit.mapped_part),
+                "measure where the report shows gaps: poses there will be doubted");
+  }
+  if (fit.from_pairs) judge_pairs(fit, verdict);
+  return verdict;
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/detect/pattern_view.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "calibration/hand_eye/board_symmetry.hpp"
+#include "calibration/hand_eye/tracked_chain.hpp"
+#include "calibration/hand_eye/view_pose.hpp"
+
+namespace birdseye::calibration {
+
+/// One moment at which the scope was looked through and tracked.
+struct HandEyeStation {
+  std::string name;  ///< for messages, as of its picture
+  PatternView view;
+  std::optional<PatternView> right_view;                        ///< of the second lens of a stereo scope
+  std::optional<Transform<Camera, Marker>> camera_from_marker;  ///< instead of views: what another program found
+  Transform<Tracker, Sensor> tracker_from_sensor;
+  std::optional<Transform<Tracker, TrackedBody>> tracker_from_body;  ///< of a board that moves and is tracked
+  Motion sensor_motion, body_motion;                                 ///< needed for the time offset only
+};
+
+struct HandEyeInput {
+  std::vector<HandEyeStation> stations;
+  std::optional<CameraModel> camera;  ///< none is needed where stations hold camera_from_marker
+  std::optional<StereoLens> right;
+  std::optional<TrackerNoise> tracker_noise;  ///< none: estimated from the residuals
+  TrackerNoise view_noise;                    ///< of camera_from_marker, where that is given instead of corners
+  std::optional<double> corner_sigma_px;      ///< per axis; none: estimated from the residuals
+  std::optional<BoardSymmetry> symmetry;      ///< of a board whose pictures do not tell which way round it lies
+  bool estimate_time_offset = false;          ///< the stations then hold their motions
+};
+
+/// Something that the person who holds the scope should know.
+struct Finding {
+  Grade grade = Grade::pass;
+  std::string reason, next_step;
+};
+
+/// What the stations can tell, found before anything is solved.
+struct HandEyeObservability {
+  std::size_t stations = 0;  ///< that are used
+  /// Principal axes of the turns between stations, the most turned about first, in the sensor's frame and the camera's
+  /// (columns), and the root mean square turn about each.
+  Eigen::Matrix3d axes_in_sensor = Eigen::Matrix3d::Identity(), axes_in_camera = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d turns_deg = Eigen::Vector3d::Zero();
+  double greatest_turn_deg = 0;
+  /// By how much the tracker and the pictures disagree about the angles of the same turns: median over all pairs.
+  double angle_mismatch_deg = 0;
+  /// True size of the board over its stated size, by the tracker's distances against the camera's; 0 if not determined.
+  double board_scale = 0, board_scale_sigma = 0;
+  bool solvable = false;
+  std::vector<Finding> findings;
+};
+
+/// A closed form's answer.
+struct HandEyeStart {
+  std::string method;
+  std::string failed;  ///< why it has none; empty if it has
+  Transform<Camera, Sensor> camera_from_sensor;
+  double score = std::numeric_limits<double>::infinity();  ///< tracked reprojection, px; without pictures, mm
+};
+
+/// How one station fits.
+struct HandEyeStationFit {
+  std::string name;
+  bool used = false;
+  std::string why_not;                        ///< "outlier: ..", "rejected: .."; empty if used
+  std::size_t corners_left_out = 0;           ///< that do not fit the board, of its first lens and its second
+  double view_rms_px = 0;                     ///< of its other corners, with the board's pose that they fit best
+  double tracked_px = 0;                      ///< of its corners, with the board where the tracker says that it is
+  double held_out_px = 0;                     ///< the same with the hand-eye of all the other stations
+  double held_out_mm = 0;                     ///< the same across the line of sight, at the board
+  double turn_off_deg = 0, shift_off_mm = 0;  ///< tracked pose against the one through the picture, with all stations
+  double distance_squared = 0;  ///< Mahalanobis distance of its held-out residual, squared: six on average
+  Transform<Camera, Marker> camera_from_marker;
+  std::vector<Eigen::Vector2d> seen_px, tracked_corner_px;  ///< held out
+};
+
+struct HandEyeResult {
+  bool solved = false;  ///< otherwise only observability, and of the stations what was rejected, are filled
+  Transform<Camera, Sensor> camera_from_sensor;
+  /// Of (rotation, rad; translation, mm): the true one is exp(rotation) R, t + translation, in the camera's frame.
+  Matrix6d covariance = Matrix6d::Zero();
+  /// The 95 % region: errors e with e^T covariance^-1 e up to this.
+  double region_limit = 0;
+  Transform<TrackedBody, Marker> body_from_marker;  ///< tracker_from_marker for a board at rest
+  std::optional<double> time_offset_s;
+  double time_offset_sigma_s = 0;
+
+  double corner_sigma_px = 0;
+  TrackerNoise tracker_noise;  ///< stated, or as estimated
+  bool noise_estimated = false;
+  double variance_factor = 1;  ///< of residuals against the stated noise, in which the covariance is multiplied if > 1
+  double rms_px = 0;           ///< corners against the fit, in which the tracked poses may err
+  double tracked_px = 0, held_out_px = 0, held_out_mm = 0;  ///< over the stations used, as above
+  double held_out_median_px = 0;                            ///< over the stations, which one bad pose does not move
+  double working_distance_mm = 0;                           ///< median, camera to board
+
+  HandEyeObservability observability;
+  std::vector<HandEyeStart> starts;
+  std::string start;                        ///< the one that was refined
+  std::vector<HandEyeStationFit> stations;  ///< in the order of the input
+  std::vector<std::string> outliers;
+  std::vector<double> cost_trace;  ///< of the last refinement, per iteration
+
+  [[nodiscard]] Eigen::Vector3d rotation_sigma_deg() const;
+  [[nodiscard]] Eigen::Vector3d translation_sigma_mm() const;
+  /// By how much a point straight ahead at the working distance is off: one sigma, root mean square over directions
+  /// across the line of sight.
+  [[nodiscard]] double sigma_at_board_mm() const;
+};
+
+/// Where the camera sits on its sensor, from stations at which scope and board were seen together. All closed forms
+/// start; the best by reprojection is refined to the most likely solution over all corners and tracked poses
+/// (hand_eye_refinement.hpp). Does not depend on the order of the stations.
+/// What cannot be used is an error: no stations, stations unlike each other (some with a tracked board, some without),
+/// no camera for corners, a camera that fails its check. Stations that do not determine hand-eye are a result that is
+/// not solved, whose observability says why. May be called again and again while stations come in.
+Result<HandEyeResult> calibrate_hand_eye(const HandEyeInput& input);
+
+/// The verdict on a result; the limits are constants in hand_eye_verdict.cpp.
+Verdict judge(const HandEyeResult& result);
+
+}  // namespace birdseye::calibration

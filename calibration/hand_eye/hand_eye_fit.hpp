@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibration/hand_eye/tracked_chain.hpp"
+
+namespace birdseye::calibration {
+
+/// A station with its picture summed up: the board's pose by its corners and the covariance of that.
+struct SummedStation {
+  TrackedChain chain;
+  Transform<Camera, Marker> camera_from_marker;
+  Matrix6d view_covariance = Matrix6d::Zero();
+};
+
+/// Parameters beyond hand-eye and body_from_marker.
+struct ChainFreedom {
+  bool time_offset = false;
+  bool board_scale = false;
+  [[nodiscard]] int parameters() const { return 12 + (time_offset ? 1 : 0) + (board_scale ? 1 : 0); }
+};
+
+struct ChainFit {
+  ChainState state;
+  Eigen::MatrixXd covariance;  ///< of hand-eye (6), body_from_marker (6), time offset, board scale, as far as free
+  std::vector<Vector6d> residuals;
+  std::vector<double> cost_trace;
+  bool converged = false;
+};
+
+/// Degrees of freedom of the t distribution that stands in for the normal one where stations may be outliers.
+inline constexpr double kRobustFreedom = 4;
+
+/// The normal equations of all stations at a state: each station's residual weighed by the inverse of its covariance,
+/// in which the view's own is folded (the pose of the board at each station is eliminated: the Schur complement).
+struct ChainNormal {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd gradient;
+  double cost = 0;
+};
+ChainNormal chain_normal(std::span<const SummedStation> stations, const ChainState& state, const TrackerNoise& noise,
+                         const ChainFreedom& freedom, bool robust);
+
+/// Gauss-Newton with Levenberg's damping, from a start. robust: residuals of a t distribution (kRobustFreedom).
+ChainFit fit_chain(std::span<const SummedStation> stations, const ChainState& start, const TrackerNoise& noise,
+                   const ChainFreedom& freedom, bool robust);
+
+/// Restricted maximum likelihood of the tracker's two variances (H. Patterson and R. Thompson, 1971), the fit being
+/// repeated as they change. Variances do not go below kLeastNoise.
+TrackerNoise estimate_noise(std::span<const SummedStation> stations, ChainFit& fit, TrackerNoise start,
+                            const ChainFreedom& freedom);
+inline constexpr TrackerNoise kLeastNoise{0.003, 1e-5};  ///< no tracker is better; exact data would make it zero
+
+/// The two variances are told apart by few residuals where there are few stations: as if so many more of each had
+/// been seen that agree with one noise for both, the position's sigma being a tracker's usual multiple of the angle's.
+inline constexpr double kNoisePriorFreedom = 6;
+
+/// The noise that medians of the residuals tell: a start that a few outliers do not move.
+TrackerNoise median_noise(std::span<const Vector6d> residuals, const ChainFreedom& freedom);
+
+/// Fit without one station, by Gauss-Newton from the fit with all, robust or not as that was. Empty if the others do
+/// not determine it.
+struct HeldOut {
+  ChainState state;
+  double distance_squared = 0;  ///< of the station's residual, against its own covariance and the fit's
+};
+std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::size_t which, const ChainFit& fit,
+                                const TrackerNoise& noise, const ChainFreedom& freedom, bool robust);
+
+/// The value that an F distribution of (6, freedom) exceeds with that probability, times six: the limit of a
+/// Mahalanobis distance squared in six dimensions whose covariance rests on so many residuals.
+double distance_limit(double exceeded_with, double freedom);
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "calibration/base/units.hpp"
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+/// Three stations determine hand-eye; with ten, one that is off shows, and leaving one out tells something.
+constexpr std::size_t kEnoughStations = 10;
+constexpr std::size_t kFewStations = 5;
+/// One sigma of what the calibration adds to where a point at the board is drawn: it is to stay below what a tracker of
+/// the miniBIRD's kind adds at every frame (its 1.8 mm, and half a degree over the length of the scope).
+constexpr double kNearestMm = 5, kFarthestMm = 5000;  // no scope focuses nearer or farther
+constexpr double kFineSigmaMm = 1;
+constexpr double kUsableSigmaMm = 2.5;
+constexpr double kFineSigmaDeg = 0.25;
+constexpr double kUsableSigmaDeg = 0.75;
+/// Tracked overlay on a station that was not used: hand-eye and one pose of the tracker together.
+constexpr double kFineHeldOutMm = 5;
+constexpr double kUsableHeldOutMm = 10;
+/// One station in five that does not fit is no accident.
+constexpr double kManyOutliers = 0.2;
+/// Residuals against the stated noise, as a ratio of sigmas.
+constexpr double kNoisier = 1.5;
+constexpr double kMuchNoisier = 4;
+/// Corners against the board where they fit it best.
+constexpr double kFineRmsPx = 1.5;
+constexpr double kUsableRmsPx = 4;
+
+std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 8;
+  std::string out;
+  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i) out += (i > 0 ? ", " : "") + names[i];
+  return names.size() > kMost ? fmt::format("{} and {} more", out, names.size() - kMost) : out;
+}
+
+void judge_rejected(const HandEyeResult& r, Verdict& verdict) {
+  std::vector<std::string> named;
+  for (const HandEyeStationFit& s : r.stations) {
+    constexpr std::string_view kRejected = "rejected: ";
+    if (s.why_not.starts_with(kRejected)) named.push_back(s.name + " (" + s.why_not.substr(kRejected.size()) + ")");
+  }
+  if (named.empty()) return;
+  verdict.add(2 * named.size() > r.stations.size() ? Grade::marginal : Grade::pass,
+              fmt::format("{} of {} stations cannot be used: {}", named.size(), r.stations.size(), joined(named)));
+}
+
+void judge_stations(const HandEyeResult& r, Verdict& verdict) {
+  const std::size_t used = r.observability.stations - r.outliers.size();
+  const std::string count = fmt::format("{} stations used", used);
+  if (used >= kEnoughStations) {
+    verdict.add(Grade::pass, count);
+  } else {
+    verdict.add(used >= kFewStations ? Grade::marginal : Grade::fail,
+                fmt::format("{}, of {}", count, used >= kFewStations ? kEnoughStations : kFewStations),
+                fmt::format("take {} more, each turned another way", kEnoughStations - used));
+  }
+  if (r.outliers.empty()) return;
+  const double part = static_cast<double>(r.outliers.size()) / static_cast<double>(r.observability.stations);
+  verdict.add(
+      part > 2 * kManyOutliers ? Grade::fail
+      : part > kManyOutliers   ? Grade::marginal
+                               : Grade::pass,
+      fmt::format("{} do not fit the others and are left out: {}", r.outliers.size(), joined(r.outliers)),
+      part > kManyOutliers ? "hold the scope still at each station, away from metal, and take those again" : "");
+}
+
+void judge_noise(const HandEyeResult& r, Verdict& verdict) {
+  if (r.noise_estimated) {
+    verdict.add(Grade::pass,
+                fmt::format("the tracker's noise, by the residuals: {:.2f} mm and {:.2f} deg per axis",
+                            r.tracker_noise.position_sigma_mm, r.tracker_noise.angle_sigma_rad * kDegPerRad));
+    return;
+  }
+  const double ratio = std::sqrt(r.variance_factor);
+  if (ratio > kNoisier) {
+    verdict.add(ratio > kMuchNoisier ? Grade::fail : Grade::marginal,
+                fmt::format("residuals are {:.1f} times what the stated noise of the tracker allows", ratio),
+                "hold the scope still at each station and keep metal away, or state the tracker's noise as it is");
+  }
+}
+
+/// Several findings may give the same advice.
+void keep_once(std::vector<std::string>& steps) {
+  std::vector<std::string> out;
+  for (std::string& step : steps) {
+    if (std::find(out.begin(), out.end(), step) == out.end()) out.push_back(std::move(step));
+  }
+  steps = std::move(out);
+}
+
+}  // namespace
+
+Verdict judge(const HandEyeResult& r) {
+  Verdict verdict;
+  for (const Finding& f : r.observability.findings) verdict.add(f.grade, f.reason, f.next_step);
+  judge_rejected(r, verdict);
+  if (!r.solved) {
+    if (verdict.grade != Grade::fail) verdict.add(Grade::fail, "hand-eye is not determined", "take more stations");
+    return verdict;
+  }
+  if (!(r.working_distance_mm >= kNearestMm && r.working_distance_mm <= kFarthestMm)) {
+    verdict.add(Grade::fail,
+                fmt::format("the board is {:.3g} mm from the camera: lengths in metres, taken for millimetres?",
+                            r.working_distance_mm),
+                "give --unit m for poses in metres, and the board's squares in mm");
+  }
+  judge_stations(r, verdict);
+  judge_noise(r, verdict);
+  const std::string more = "take more stations, and turn the scope more between them";
+  verdict.judge("hand-eye's part of the error at the board (one sigma)", r.sigma_at_board_mm(), "mm", kFineSigmaMm,
+                kUsableSigmaMm, more);
+  verdict.judge("sigma of the rotation", r.rotation_sigma_deg().maxCoeff(), "deg", kFineSigmaDeg, kUsableSigmaDeg,
+                more);
+  verdict.judge("held-out error", r.held_out_mm, "mm", kFineHeldOutMm, kUsableHeldOutMm,
+                "hold the scope still at each station, and keep metal away from the tracker");
+  if (r.rms_px > 0) {
+    verdict.judge("error of the corners", r.rms_px, "px", kFineRmsPx, kUsableRmsPx,
+                  "calibrate the lens anew, and see that the board is flat and the right one");
+  }
+  keep_once(verdict.next_steps);
+  return verdict;
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,197 @@
+#include "calibration/latency/latency.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/base/units.hpp"
+#include "calibration/latency/latency_limits.hpp"
+#include "calibration/latency/latency_models.hpp"
+#include "calibration/latency/latency_scan.hpp"
+#include "calibration/latency/motion_stream.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+constexpr double kRateWindowS = 0.08;  // half of it: the band of the spline, so that the scan's peak is not blunted
+constexpr double kMarginS = 0.08;      // about a sample, so that refining never leaves what a covers
+
+void shift_times(MotionSamples& samples, double by_s) {
+  for (MotionSpline::Sample& sample : samples) sample.time_s += by_s;
+}
+void shift_times(std::vector<ImageMotion>& samples, double by_s) {
+  for (ImageMotion& sample : samples) {
+    sample.from_s += by_s;
+    sample.to_s += by_s;
+  }
+}
+double first_time(const MotionSamples& samples) {
+  return samples.front().time_s;
+}
+double first_time(const std::vector<ImageMotion>& samples) {
+  return samples.front().from_s;
+}
+double last_time(const MotionSamples& samples) {
+  return samples.back().time_s;
+}
+double last_time(const std::vector<ImageMotion>& samples) {
+  return samples.back().to_s;
+}
+bool is_covered(const MotionSpline& a, const MotionSpline::Sample& b, double offset_s) {
+  return a.covers(b.time_s - offset_s, kMarginS);
+}
+bool is_covered(const MotionSpline& a, const ImageMotion& b, double offset_s) {
+  return a.covers(b.from_s - offset_s, kMarginS) && a.covers(b.to_s - offset_s, kMarginS);
+}
+
+/// Moves both to a time of which 0 is the middle of what they have in common.
+template <typename SamplesB>
+Result<void> overlap(MotionSamples& a, SamplesB& b, Latency& latency) {
+  const double begin_s = std::max(first_time(a), first_time(b)), end_s = std::min(last_time(a), last_time(b));
+  if (!(end_s > begin_s)) {
+    return Error{Errc::bad_value,
+                 fmt::format("the streams do not overlap: a lasts from {:.3f} to {:.3f} s, b from {:.3f} to {:.3f} s; "
+                             "record both at once, with stamps of one clock",
+                             first_time(a), last_time(a), first_time(b), last_time(b))};
+  }
+  latency.overlap_s = end_s - begin_s;
+  latency.at_s = 0.5 * (begin_s + end_s);
+  shift_times(a, -latency.at_s);
+  shift_times(b, -latency.at_s);
+  return {};
+}
+
+void take_scan(const LagScan& scan, Latency& latency) {
+  latency.correlation = scan.best;
+  latency.lag_s = scan.best_s;
+  latency.at_edge = scan.at_edge;
+  latency.rival_lag_s = scan.rival_s;
+  latency.rival_correlation = scan.rival;
+  latency.curves.lag_s = scan.lags_s;
+  latency.curves.correlation = scan.correlation;
+}
+
+/// The samples of b that a covers at the best lag, and at the rival's where it needs them too.
+template <typename Sample>
+std::vector<Sample> covered(const MotionSpline& a, const std::vector<Sample>& b, const LagScan& scan) {
+  std::vector<Sample> kept;
+  for (const Sample& sample : b) {
+    if (is_covered(a, sample, scan.best_s) && (!scan.has_rival || is_covered(a, sample, scan.rival_s)))
+      kept.push_back(sample);
+  }
+  return kept;
+}
+
+void take_fit(const TimingFit& fit, Latency& latency) {
+  latency.determined = std::isfinite(fit.offset_sigma_s) && std::isfinite(fit.offset_s);
+  latency.offset_ms = 1e3 * fit.offset_s;
+  latency.drift_ppm = 1e6 * fit.drift;
+  const double half_ms = 1e3 * fit.student95 * fit.offset_sigma_s, half_ppm = 1e6 * fit.student95 * fit.drift_sigma;
+  latency.offset_ci95_ms = {latency.offset_ms - half_ms, latency.offset_ms + half_ms};
+  latency.drift_ci95_ppm = {latency.drift_ppm - half_ppm, latency.drift_ppm + half_ppm};
+  latency.outlier_share = fit.outlier_share;
+  for (std::size_t i = 0; i < fit.part_s.size(); ++i) {
+    latency.curves.part_s.push_back(fit.part_s[i]);
+    latency.curves.part_offset_ms.push_back(1e3 * (fit.offset_s + fit.drift * fit.part_s[i] + fit.part_offset_s[i]));
+    latency.curves.part_sigma_ms.push_back(1e3 * fit.part_sigma_s[i]);
+  }
+}
+
+void take_speeds(const RateGrid& a, const RateSignal& b, LatencyCurves& curves) {
+  for (Eigen::Index i = 0; i < a.rates.rows(); ++i) {
+    if (!a.valid[static_cast<std::size_t>(i)]) continue;
+    curves.a_s.push_back(a.begin_s + static_cast<double>(i) * a.spacing_s);
+    curves.a_speed.push_back(a.rates.row(i).norm());
+  }
+  curves.b_s = b.times_s;
+  for (Eigen::Index i = 0; i < b.rates.rows(); ++i) curves.b_speed.push_back(b.rates.row(i).norm());
+}
+
+/// Moving enough, and long enough, for a fit to be worth the while.
+bool is_worth_a_fit(const Latency& latency) {
+  return is_moving(latency.a) && is_moving(latency.b) && latency.overlap_s >= kShortestS &&
+         latency.correlation >= kLeastCorrelation;
+}
+
+bool too_few(const std::size_t samples, Latency& latency) {
+  constexpr std::size_t kFewest = 40;
+  latency.determined = false;
+  return samples < kFewest;
+}
+
+}  // namespace
+
+Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const TimedRotation> b,
+                             const LatencySettings& settings) {
+  Latency latency;
+  const auto as_poses = [](std::span<const TimedRotation> rows) {
+    std::vector<TimedMotionPose> poses;
+    for (const TimedRotation& row : rows) poses.push_back({row.time_s, row.base_from_body, Eigen::Vector3d::Zero()});
+    return poses;
+  };
+  auto of_a = clean(std::span<const TimedMotionPose>(as_poses(a)), "a", latency.a);
+  if (!of_a) return std::move(of_a).error();
+  auto of_b = clean(std::span<const TimedMotionPose>(as_poses(b)), "b", latency.b);
+  if (!of_b) return std::move(of_b).error();
+  if (auto common = overlap(*of_a, *of_b, latency); !common) return common.error();
+  measure(*of_a, latency.a);
+  measure(*of_b, latency.b);
+
+  const MotionSpline spline(*of_a);
+  const RateGrid grid = rate_grid(spline, first_time(*of_a), last_time(*of_a), false);
+  const RateSignal rates = turn_rates(*of_b, std::max(kRateWindowS, 1.2 / latency.b.rate_hz));
+  const LagScan scan = scan_lags(grid, rates, RateMap::rotation, settings.most_offset_s);
+  take_scan(scan, latency);
+  take_speeds(grid, rates, latency.curves);
+  const MotionSamples used = covered(spline, *of_b, scan);
+  if (too_few(used.size(), latency) || !is_worth_a_fit(latency)) return latency;
+
+  RotationTiming model(spline, used, scan.turn, scan.best_s);
+  const TimingFit fit = fit_timing(model, scan.best_s, settings.find_drift);
+  take_fit(fit, latency);
+  latency.residual = kDegPerRad * fit.rms;
+  latency.b_from_a = model.b_from_a();
+  if (scan.has_rival) {
+    RotationTiming other(spline, used, scan.rival_turn, scan.rival_s);
+    latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
+  }
+  return latency;
+}
+
+Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const ImageMotion> b,
+                             const LatencySettings& settings) {
+  Latency latency;
+  auto of_a = clean(a, "a", latency.a);
+  if (!of_a) return std::move(of_a).error();
+  auto of_b = clean(b, "b", latency.b);
+  if (!of_b) return std::move(of_b).error();
+  if (auto common = overlap(*of_a, *of_b, latency); !common) return common.error();
+  measure(*of_a, latency.a);
+  measure(*of_b, latency.b);
+
+  const MotionSpline spline(*of_a);
+  const RateGrid grid = rate_grid(spline, first_time(*of_a), last_time(*of_a), true);
+  const RateSignal rates = image_rates(*of_b);
+  const LagScan scan = scan_lags(grid, rates, RateMap::linear, settings.most_offset_s);
+  take_scan(scan, latency);
+  take_speeds(grid, rates, latency.curves);
+  const std::vector<ImageMotion> used = covered(spline, *of_b, scan);
+  if (too_few(used.size(), latency) || !is_worth_a_fit(latency)) return latency;
+
+  ImageTiming model(spline, used, scan.best_s);
+  const TimingFit fit = fit_timing(model, scan.best_s, settings.find_drift);
+  take_fit(fit, latency);
+  latency.residual = fit.rms;
+  latency.curves.a_s.clear();
+  for (const double t : model.times_s()) latency.curves.a_s.push_back(t - fit.offset_s - fit.drift * t);
+  latency.curves.a_speed = model.modelled_speeds(fit.offset_s, fit.drift);
+  if (scan.has_rival) {
+    ImageTiming other(spline, used, scan.rival_s);
+    latency.rival_sigmas = sigmas_worse(fit, fit_timing(other, scan.rival_s, settings.find_drift), model.times_s());
+  }
+  return latency;
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "calibration/latency/latency.hpp"
+
+namespace birdseye::calibration {
+
+// Slower than this, what a tracker's noise pretends (1.7 deg/s over 0.3 s, for half a degree) and what a hand does
+// without meaning to are no longer small beside it.
+inline constexpr double kLeastTurnDegS = 5, kLeastShiftMmS = 20, kLeastImagePxS = 15;
+inline constexpr double kShortestS = 8;  ///< fewer parts than this many seconds give no interval to rely on
+inline constexpr double kGoodS = 15;
+// Where less than this is common to the two, chance reaches as high within a second to either side.
+inline constexpr double kLeastCorrelation = 0.5, kGoodCorrelation = 0.8;
+// A rival must explain the recording worse by this many standard errors: chance in a scan of 200 lags reaches 3.
+inline constexpr double kRivalSigmas = 4;
+// Half of the interval. A scope that is led with care turns by 30 deg/s: 2 ms are 0.06 deg, 0.1 mm at 100 mm.
+inline constexpr double kGoodHalfMs = 2, kMostHalfMs = 5;
+// A quartz is within 50 ppm of another; beyond, a clock is wrong or samples are lost.
+inline constexpr double kMostDriftPpm = 100;
+inline constexpr double kMostOutliers = 0.1, kTooManyOutliers = 0.35;
+inline constexpr double kLongGapS = 0.5;
+
+inline bool is_moving(const StreamMotion& m) {
+  return m.turn_speed_deg_s >= kLeastTurnDegS || m.shift_speed_mm_s >= kLeastShiftMmS ||
+         m.image_speed_px_s >= kLeastImagePxS;
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,149 @@
+#include "calibration/latency/latency_scan.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace birdseye::calibration {
+
+namespace {
+
+constexpr double kLagStepS = 0.01;
+constexpr Eigen::Index kMostRows = 6000;  // of b: more make no peak clearer
+constexpr double kLeastShare = 0.5;       // of b's rows that must meet rows of a for a lag to count
+// Between two peaks the correlation must dip by so much for them to be two.
+constexpr double kDip = 0.02;
+
+/// Rows longer than one and a half times what 95 % of rows stay under are cut to that: a jump of a tracker is not to
+/// outweigh the recording.
+void clip(Eigen::MatrixXd& rates) {
+  if (rates.rows() == 0) return;
+  const Eigen::VectorXd norms = rates.rowwise().norm();
+  std::vector<double> sorted(norms.data(), norms.data() + norms.size());
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), at, sorted.end());
+  const double limit = 1.5 * *at;
+  for (Eigen::Index i = 0; i < rates.rows(); ++i) {
+    if (norms[i] > limit && norms[i] > 0) rates.row(i) *= limit / norms[i];
+  }
+}
+
+std::optional<Eigen::VectorXd> look_up(const RateGrid& grid, double time_s) {
+  const double at = (time_s - grid.begin_s) / grid.spacing_s;
+  if (!(at >= 0) || at >= static_cast<double>(grid.rates.rows() - 1)) return std::nullopt;
+  const auto low = static_cast<std::size_t>(at);
+  if (!grid.valid[low] || !grid.valid[low + 1]) return std::nullopt;
+  const double part = at - static_cast<double>(low);
+  const auto row = static_cast<Eigen::Index>(low);
+  return Eigen::VectorXd((1 - part) * grid.rates.row(row) + part * grid.rates.row(row + 1));
+}
+
+/// The rows of both streams that meet at one lag, means removed.
+struct Meeting {
+  Eigen::MatrixXd a, b;
+};
+
+std::optional<Meeting> meet(const RateGrid& a, const RateSignal& b, double lag_s) {
+  const Eigen::Index every = std::max<Eigen::Index>(1, b.rates.rows() / kMostRows);
+  std::vector<Eigen::VectorXd> of_a;
+  std::vector<Eigen::Index> rows;
+  Eigen::Index asked = 0;
+  for (Eigen::Index i = 0; i < b.rates.rows(); i += every, ++asked) {
+    if (auto found = look_up(a, b.times_s[static_cast<std::size_t>(i)] - lag_s)) {
+      of_a.push_back(*std::move(found));
+      rows.push_back(i);
+    }
+  }
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  if (static_cast<double>(count) < kLeastShare * static_cast<double>(asked) || count < 10) return std::nullopt;
+  Meeting meeting{Eigen::MatrixXd(count, a.rates.cols()), Eigen::MatrixXd(count, b.rates.cols())};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    meeting.a.row(i) = of_a[static_cast<std::size_t>(i)];
+    meeting.b.row(i) = b.rates.row(rows[static_cast<std::size_t>(i)]);
+  }
+  meeting.a.rowwise() -= Eigen::RowVectorXd(meeting.a.colwise().mean());
+  meeting.b.rowwise() -= Eigen::RowVectorXd(meeting.b.colwise().mean());
+  return meeting;
+}
+
+/// Kabsch: the rotation that brings a's rates nearest to b's, and how much of them it explains.
+double rotation_correlation(const Meeting& meeting, Eigen::Matrix3d* turn) {
+  const Eigen::Matrix3d cross = meeting.b.transpose() * meeting.a;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  if (turn != nullptr) *turn = svd.matrixU() * Eigen::Vector3d(1, 1, handed).asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Vector3d& s = svd.singularValues();
+  const double size = meeting.a.norm() * meeting.b.norm();
+  return size > 0 ? std::max(0.0, (s[0] + s[1] + handed * s[2]) / size) : 0;
+}
+
+double linear_correlation(const Meeting& meeting) {
+  Eigen::MatrixXd a = meeting.a;
+  for (Eigen::Index k = 0; k < a.cols(); ++k) {
+    const double size = a.col(k).norm();
+    if (size > 0) a.col(k) /= size;
+  }
+  constexpr double kRidge = 1e-6;  // a body that turns about one axis only leaves others open
+  const Eigen::MatrixXd normal = a.transpose() * a + kRidge * Eigen::MatrixXd::Identity(a.cols(), a.cols());
+  const Eigen::MatrixXd left = meeting.b - a * normal.ldlt().solve(a.transpose() * meeting.b);
+  const double all = meeting.b.squaredNorm();
+  if (!(all > 0)) return 0;
+  // What so many free numbers explain of anything is taken off, as the adjusted coefficient of determination does.
+  const auto rows = static_cast<double>(a.rows());
+  const double share =
+      1 - left.squaredNorm() / all * (rows - 1) / std::max(1.0, rows - 1 - static_cast<double>(a.cols()));
+  return std::sqrt(std::clamp(share, 0.0, 1.0));
+}
+
+bool is_peak(const std::vector<double>& c, std::size_t i) {
+  return (i == 0 || c[i] >= c[i - 1]) && (i + 1 == c.size() || c[i] > c[i + 1]);
+}
+
+void find_rival(LagScan& scan, std::size_t best) {
+  const std::vector<double>& c = scan.correlation;
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    if (i == best || !is_peak(c, i) || (scan.has_rival && c[i] <= scan.rival)) continue;
+    const auto from = c.begin() + static_cast<std::ptrdiff_t>(std::min(i, best));
+    const auto to = c.begin() + static_cast<std::ptrdiff_t>(std::max(i, best));
+    if (*std::min_element(from, to) > c[i] - kDip) continue;
+    scan.has_rival = true;
+    scan.rival = c[i];
+    scan.rival_s = scan.lags_s[i];
+  }
+}
+
+}  // namespace
+
+LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s) {
+  RateGrid clipped_a = a;
+  RateSignal clipped_b = b;
+  clip(clipped_a.rates);
+  clip(clipped_b.rates);
+  LagScan scan;
+  const int steps = static_cast<int>(std::lround(most_lag_s / kLagStepS));
+  for (int n = -steps; n <= steps; ++n) {
+    const double lag_s = n * kLagStepS;
+    const auto meeting = meet(clipped_a, clipped_b, lag_s);
+    const double c = !meeting                   ? 0
+                     : map == RateMap::rotation ? rotation_correlation(*meeting, nullptr)
+                                                : linear_correlation(*meeting);
+    scan.lags_s.push_back(lag_s);
+    scan.correlation.push_back(c);
+  }
+  const auto top = std::max_element(scan.correlation.begin(), scan.correlation.end());
+  const auto best = static_cast<std::size_t>(top - scan.correlation.begin());
+  scan.best_s = scan.lags_s[best];
+  scan.best = *top;
+  scan.at_edge = best == 0 || best + 1 == scan.lags_s.size();
+  find_rival(scan, best);
+  if (map == RateMap::rotation) {
+    if (const auto meeting = meet(clipped_a, clipped_b, scan.best_s)) rotation_correlation(*meeting, &scan.turn);
+    if (const auto meeting = meet(clipped_a, clipped_b, scan.rival_s)) rotation_correlation(*meeting, &scan.rival_turn);
+  }
+  return scan;
+}
+
+}  // namespace birdseye::calibration

@@ -1,0 +1,387 @@
+#include "calibration/points/pivot.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+using Poses = std::vector<PivotPose>;
+using Indices = std::vector<std::size_t>;
+
+constexpr std::size_t kLeastPoses = 4;
+constexpr int kSamples = 500;  // where half of all poses are wrong, one of 16 samples of four has none of them
+/// 2.5 deviations of a normal distribution in one dimension; in three the same share lies within 3.33.
+constexpr double kOutlier = 3.33;
+/// The share of a normal distribution's variance in three dimensions that lies within: P(chi2_5 < k^2)/P(chi2_3 < k^2).
+constexpr double kVarianceWithin = 0.961;
+/// A direction that swings less than this, squared, is rounding: the tip along it is left alone.
+constexpr double kOpen = 1e-10;
+constexpr int kSides = 8;
+constexpr std::size_t kLeastGroups = 5;  // fewer say too little about how groups differ
+
+/// Mean pose of each divot, of those used.
+struct Means {
+  std::vector<Eigen::Matrix3d> rotation;
+  std::vector<Eigen::Vector3d> translation;
+  std::vector<double> count;
+};
+
+Means means_of(const Poses& poses, const Indices& used, std::size_t divots) {
+  Means m{std::vector<Eigen::Matrix3d>(divots, Eigen::Matrix3d::Zero()),
+          std::vector<Eigen::Vector3d>(divots, Eigen::Vector3d::Zero()), std::vector<double>(divots, 0)};
+  for (const std::size_t i : used) {
+    m.rotation[poses[i].divot] += poses[i].tracker_from_sensor.rotation();
+    m.translation[poses[i].divot] += poses[i].tracker_from_sensor.translation();
+    m.count[poses[i].divot] += 1;
+  }
+  for (std::size_t k = 0; k < divots; ++k) {
+    if (m.count[k] == 0) continue;
+    m.rotation[k] /= m.count[k];
+    m.translation[k] /= m.count[k];
+  }
+  return m;
+}
+
+/// The tip's normal equations once each pivot is replaced by the mean of R t + q, and their solution of least length.
+struct Linear {
+  Means means;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d tip = Eigen::Vector3d::Zero();
+  [[nodiscard]] Eigen::Vector3d pivot(std::size_t divot) const {
+    return means.rotation[divot] * tip + means.translation[divot];
+  }
+};
+
+Linear solve(const Poses& poses, const Indices& used, std::size_t divots) {
+  Linear out;
+  out.means = means_of(poses, used, divots);
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const std::size_t i : used) {
+    const auto& pose = poses[i].tracker_from_sensor;
+    const Eigen::Matrix3d swing = pose.rotation() - out.means.rotation[poses[i].divot];
+    out.normal += swing.transpose() * swing;
+    right -= swing.transpose() * (pose.translation() - out.means.translation[poses[i].divot]);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(out.normal);
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d direction = eigen.eigenvectors().col(k);
+    if (eigen.eigenvalues()[k] > kOpen * static_cast<double>(used.size()))
+      out.inverse += direction * direction.transpose() / eigen.eigenvalues()[k];
+  }
+  out.tip = out.inverse * right;
+  return out;
+}
+
+/// From sensor to tip; poses that tell no tip may show any direction.
+Eigen::Vector3d shaft_of(const Eigen::Vector3d& tip_mm) {
+  constexpr double kNone_mm = 1e-6;
+  return tip_mm.norm() > kNone_mm ? Eigen::Vector3d(tip_mm.normalized()) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+}
+
+Eigen::Vector3d median_point(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d out;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    values.reserve(points.size());
+    for (const Eigen::Vector3d& point : points) values.push_back(point[axis]);
+    out[axis] = median_of(std::move(values));
+  }
+  return out;
+}
+
+/// Where each divot is by the median of the tip's places, which half of the poses may miss.
+std::vector<Eigen::Vector3d> median_pivots(const Poses& poses, const Eigen::Vector3d& tip, std::size_t divots) {
+  std::vector<std::vector<Eigen::Vector3d>> places(divots);
+  for (const PivotPose& pose : poses) places[pose.divot].push_back(pose.tracker_from_sensor * tip);
+  std::vector<Eigen::Vector3d> pivots;
+  pivots.reserve(places.size());
+  for (const auto& of_divot : places) pivots.push_back(median_point(of_divot));
+  return pivots;
+}
+
+std::vector<double> residuals_of(const Poses& poses, const Eigen::Vector3d& tip,
+                                 const std::vector<Eigen::Vector3d>& pivots) {
+  std::vector<double> out;
+  for (const PivotPose& pose : poses) out.push_back((pose.tracker_from_sensor * tip - pivots[pose.divot]).norm());
+  return out;
+}
+
+PivotFit fit_of(const Poses& poses, const Indices& used, const Linear& linear) {
+  PivotFit fit;
+  fit.tip_in_sensor_mm = linear.tip;
+  fit.pivots_in_tracker_mm = median_pivots(poses, linear.tip, linear.means.count.size());
+  for (std::size_t k = 0; k < linear.means.count.size(); ++k) {
+    if (linear.means.count[k] > 0) fit.pivots_in_tracker_mm[k] = linear.pivot(k);
+  }
+  const auto residuals = residuals_of(poses, linear.tip, fit.pivots_in_tracker_mm);
+  double squares = 0;
+  for (const std::size_t i : used) squares += residuals[i] * residuals[i];
+  const auto count = static_cast<double>(used.size());
+  fit.rms_mm = std::sqrt(squares / count);
+  fit.component_rms_mm = std::sqrt(squares / (3 * count));
+  return fit;
+}
+
+Indices inliers_of(const std::vector<double>& residuals, std::size_t unknowns) {
+  // A length's median is 1.54 deviations of a coordinate; with few poses a fit is too good (P. Rousseeuw, 1984).
+  const auto count = static_cast<double>(residuals.size());
+  const double deviation =
+      median_of(residuals) / 1.54 * (1 + 5 / std::max(1.0, count - static_cast<double>(unknowns) / 3));
+  // What agrees to rounding has no outliers.
+  constexpr double kRounding_mm = 1e-9;
+  Indices inliers;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (residuals[i] <= kOutlier * deviation + kRounding_mm) inliers.push_back(i);
+  }
+  return inliers;
+}
+
+/// Moves count of the poses in from, drawn at random, to its front, and adds them to sample.
+void draw(Indices& from, std::size_t count, std::mt19937& random, Indices& sample) {
+  for (std::size_t k = 0; k < count; ++k) {
+    std::swap(from[k], from[k + random() % (from.size() - k)]);
+    sample.push_back(from[k]);
+  }
+}
+
+/// Residuals of the best of many tips, each from four poses in one divot, or three in each of two: what one divot
+/// leaves open another may tell.
+std::vector<double> sample_residuals(const Poses& poses, std::size_t divots, const Linear& all) {
+  std::vector<Indices> members(divots);
+  for (std::size_t i = 0; i < poses.size(); ++i) members[poses[i].divot].push_back(i);
+  std::erase_if(members, [](const Indices& of_divot) { return of_divot.size() < kLeastPoses; });
+  std::vector<double> best = residuals_of(poses, all.tip, median_pivots(poses, all.tip, divots));
+  double least = median_of(best);
+  std::mt19937 random(1);  // a calibration repeated is the same calibration
+  for (int n = 0; n < kSamples && !members.empty(); ++n) {
+    const std::size_t one = random() % members.size(), other = random() % members.size();
+    Indices sample;
+    draw(members[one], one == other ? kLeastPoses : kLeastPoses - 1, random, sample);
+    if (one != other) draw(members[other], kLeastPoses - 1, random, sample);
+    const Linear linear = solve(poses, sample, divots);
+    auto found = residuals_of(poses, linear.tip, median_pivots(poses, linear.tip, divots));
+    if (const double median = median_of(found); median < least) {
+      least = median;
+      best = std::move(found);
+    }
+  }
+  return best;
+}
+
+/// The poses that agree; all of them where fewer than a third of the poses do.
+Indices agreeing(const Poses& poses, std::size_t divots, const Linear& all) {
+  auto residuals = sample_residuals(poses, divots, all);
+  const std::size_t unknowns = 3 + 3 * divots;
+  Indices used;
+  for (int round = 0; round < 30; ++round) {
+    Indices inliers = inliers_of(residuals, unknowns);
+    if (inliers == used) break;
+    used = std::move(inliers);
+    if (used.size() < std::max(kLeastPoses, poses.size() / 3)) {
+      used.resize(poses.size());
+      std::iota(used.begin(), used.end(), std::size_t{0});
+      break;
+    }
+    const PivotFit fit = fit_of(poses, used, solve(poses, used, divots));
+    residuals = residuals_of(poses, fit.tip_in_sensor_mm, fit.pivots_in_tracker_mm);
+  }
+  return used;
+}
+
+/// To which of kSides sides each pose leans, from the mean of its divot.
+std::vector<int> sides_of(const Poses& poses, const Linear& linear) {
+  std::vector<int> sides;
+  for (const PivotPose& pose : poses) {
+    const Eigen::Vector3d mean = (linear.means.rotation[pose.divot] * shaft_of(linear.tip)).normalized();
+    const Eigen::Vector3d shaft = pose.tracker_from_sensor.rotation() * shaft_of(linear.tip);
+    const Eigen::Vector3d x = mean.unitOrthogonal();
+    const double turn = std::atan2(shaft.dot(mean.cross(x)), shaft.dot(x)) / (360 * kRadPerDeg) + 0.5;
+    // A pointer that did not lean at all, or has no length, leans to no side: any will do.
+    sides.push_back(turn >= 0 && turn < 1 ? static_cast<int>(turn * kSides) : 0);
+  }
+  return sides;
+}
+
+/// White's covariance of the tip, each residual as it would be had the fit not seen its pose (J. MacKinnon and H.
+/// White, 1985): with few poses it is too small otherwise.
+Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, const Linear& linear) {
+  Eigen::Matrix3d scores = Eigen::Matrix3d::Zero();
+  for (const std::size_t i : used) {
+    const auto& pose = poses[i].tracker_from_sensor;
+    const std::size_t divot = poses[i].divot;
+    const Eigen::Matrix3d swing = pose.rotation() - linear.means.rotation[divot];
+    const Eigen::Matrix3d unseen =
+        (1 - 1 / linear.means.count[divot]) * Eigen::Matrix3d::Identity() - swing * linear.inverse * swing.transpose();
+    const Eigen::Vector3d residual = pose * linear.tip - linear.pivot(divot);
+    // A pose that alone tells some part of the tip has no residual there.
+    const Eigen::Vector3d score = swing.transpose() * unseen.completeOrthogonalDecomposition().solve(residual);
+    scores += score * score.transpose();
+  }
+  return linear.inverse * scores * linear.inverse / kVarianceWithin;
+}
+
+/// The same where the errors of all poses of a group may be one: those of a divot, where there are divots enough, or
+/// those that lean to one side. A field that metal bends errs alike there, however many poses there are.
+Eigen::Matrix3d grouped_covariance(const Poses& poses, const Indices& used, const Linear& linear) {
+  const bool by_divot = linear.means.count.size() >= kLeastGroups;
+  const auto sides = sides_of(poses, linear);
+  std::vector<Eigen::Vector3d> sums(by_divot ? linear.means.count.size() : kSides, Eigen::Vector3d::Zero());
+  for (const std::size_t i : used) {
+    const auto& pose = poses[i].tracker_from_sensor;
+    const Eigen::Matrix3d swing = pose.rotation() - linear.means.rotation[poses[i].divot];
+    const std::size_t group = by_divot ? poses[i].divot : static_cast<std::size_t>(sides[i]);
+    sums[group] += swing.transpose() * (pose * linear.tip - linear.pivot(poses[i].divot));
+  }
+  Eigen::Matrix3d scores = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& sum : sums) scores += sum * sum.transpose();
+  const auto groups = static_cast<double>(sums.size());
+  return groups / (groups - 1) * linear.inverse * scores * linear.inverse;
+}
+
+/// The first, as much larger as the second says that it is too small.
+Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const Linear& linear) {
+  const Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
+  const double grouped_mm2 = grouped_covariance(poses, used, linear).trace();
+  return independent * (grouped_mm2 > independent.trace() ? grouped_mm2 / independent.trace() : 1.0);
+}
+
+PivotTilt tilt_of(const Poses& poses, const Indices& used, const Linear& linear) {
+  PivotTilt tilt;
+  std::vector<Eigen::Vector3d> shafts;
+  for (const PivotPose& pose : poses) shafts.emplace_back(pose.tracker_from_sensor.rotation() * shaft_of(linear.tip));
+  double least_cosine = 1;
+  for (const std::size_t a : used) {
+    for (const std::size_t b : used) {
+      if (b >= a) break;
+      if (poses[a].divot == poses[b].divot) least_cosine = std::min(least_cosine, shafts[a].dot(shafts[b]));
+    }
+  }
+  tilt.widest_deg = std::acos(std::clamp(least_cosine, -1.0, 1.0)) * kDegPerRad;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(linear.normal);
+  tilt.weakest_in_sensor = eigen.eigenvectors().col(0);
+  Eigen::Index largest = 0;
+  tilt.weakest_in_sensor.cwiseAbs().maxCoeff(&largest);
+  if (tilt.weakest_in_sensor[largest] < 0) tilt.weakest_in_sensor = -tilt.weakest_in_sensor;
+  const double swing = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]) / static_cast<double>(used.size()));
+  tilt.weakest_swing_deg = std::asin(std::min(1.0, swing)) * kDegPerRad;
+  return tilt;
+}
+
+double held_out_of(const Poses& poses, const Indices& used, const Linear& linear) {
+  const auto sides = sides_of(poses, linear);
+  double squares = 0, count = 0;
+  for (int side = 0; side < kSides; ++side) {
+    Indices rest;
+    for (const std::size_t i : used) {
+      if (sides[i] != side) rest.push_back(i);
+    }
+    if (rest.size() < kLeastPoses) continue;
+    const Linear without = solve(poses, rest, linear.means.count.size());
+    for (const std::size_t i : used) {
+      if (sides[i] != side || without.means.count[poses[i].divot] == 0) continue;
+      squares += (poses[i].tracker_from_sensor * without.tip - without.pivot(poses[i].divot)).squaredNorm();
+      count += 1;
+    }
+  }
+  return count > 0 ? std::sqrt(squares / count) : std::nan("");
+}
+
+void find_slide(const Poses& poses, const std::vector<Eigen::Vector3d>& offsets, std::size_t divots, Pivot& out) {
+  constexpr std::size_t kLeastThird = 4;
+  for (std::size_t k = 0; k < divots; ++k) {
+    Indices members;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      if (poses[i].divot == k) members.push_back(i);
+    }
+    const std::size_t third = members.size() / 3;
+    if (third < kLeastThird) continue;
+    std::stable_sort(members.begin(), members.end(),
+                     [&](std::size_t a, std::size_t b) { return poses[a].time_s < poses[b].time_s; });
+    std::vector<Eigen::Vector3d> first, last;
+    std::vector<double> scatter;
+    for (std::size_t n = 0; n < third; ++n) {
+      first.push_back(offsets[members[n]]);
+      last.push_back(offsets[members[members.size() - 1 - n]]);
+    }
+    const Eigen::Vector3d from = median_point(first), to = median_point(last);
+    for (std::size_t n = 0; n < third; ++n) {
+      scatter.push_back((first[n] - from).norm());
+      scatter.push_back((last[n] - to).norm());
+    }
+    const double slid_mm = (to - from).norm();
+    if (slid_mm < out.slid_mm) continue;
+    out.slid_mm = slid_mm;
+    out.slid_divot = k;
+    // A median's variance is 1.57 of a mean's.
+    out.slid_sigma_mm = median_of(scatter) / 1.54 * std::sqrt(2 * 1.57 / static_cast<double>(third));
+  }
+}
+
+bool less(const PivotPose& a, const PivotPose& b) {
+  if (a.divot != b.divot) return a.divot < b.divot;
+  const Eigen::Matrix4d x = a.tracker_from_sensor.matrix(), y = b.tracker_from_sensor.matrix();
+  return std::lexicographical_compare(x.data(), x.data() + 16, y.data(), y.data() + 16);
+}
+
+}  // namespace
+
+Result<Pivot> solve_pivot(std::span<const PivotPose> given) {
+  if (given.size() < kLeastPoses) {
+    return Error{Errc::degenerate, fmt::format("{} poses: a pivot needs at least {}, tilted to several sides",
+                                               given.size(), kLeastPoses)};
+  }
+  std::size_t divots = 0;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (!given[i].tracker_from_sensor.matrix().allFinite())
+      return Error{Errc::bad_value, fmt::format("pose {} has a number that is not finite", i + 1)};
+    divots = std::max(divots, given[i].divot + 1);
+  }
+  // Sums and samples in an order that the poses themselves give.
+  Indices order(given.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return less(given[a], given[b]); });
+  Poses poses;
+  for (const std::size_t i : order) poses.push_back(given[i]);
+  Pivot out;
+  for (std::size_t i = 0; i < poses.size(); ++i) out.distinct_poses += i == 0 || less(poses[i - 1], poses[i]) ? 1 : 0;
+
+  Indices all(poses.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const Linear algebraic = solve(poses, all, divots);
+  out.algebraic = fit_of(poses, all, algebraic);
+  const Indices used = agreeing(poses, divots, algebraic);
+  const Linear linear = solve(poses, used, divots);
+  out.robust = fit_of(poses, used, linear);
+  out.tip_covariance_mm2 = covariance_of(poses, used, linear);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(out.tip_covariance_mm2, Eigen::EigenvaluesOnly);
+  out.tip_sigma_mm = std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+  out.tilt = tilt_of(poses, used, linear);
+  out.held_out_mm = held_out_of(poses, used, linear);
+  std::vector<Eigen::Vector3d> offsets;
+  for (const PivotPose& pose : poses)
+    offsets.emplace_back(pose.tracker_from_sensor * linear.tip - out.robust.pivots_in_tracker_mm[pose.divot]);
+  find_slide(poses, offsets, divots, out);
+  // Back to the order in which the poses were given.
+  out.offsets_mm.resize(given.size());
+  out.residuals_mm.resize(given.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    out.offsets_mm[order[i]] = offsets[i];
+    out.residuals_mm[order[i]] = offsets[i].norm();
+    if (!std::binary_search(used.begin(), used.end(), i)) out.outliers.push_back(order[i]);
+  }
+  std::sort(out.outliers.begin(), out.outliers.end());
+  return out;
+}
+
+}  // namespace birdseye::calibration

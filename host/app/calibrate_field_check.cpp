@@ -1,0 +1,138 @@
+#include "host/app/calibrate_field_check.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "calibration/record/field_map_file.hpp"
+#include "host/app/results.hpp"
+#include "host/calibrate/field_pictures.hpp"
+#include "host/files/field_files.hpp"
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using calibration::CheckedPlace;
+using calibration::FieldCheck;
+
+struct Options {
+  std::filesystem::path plate, measured, history, field;
+  std::string when;
+  ResultPaths results;
+};
+
+Result<std::vector<CheckedPlace>> places_of(const Options& options) {
+  const auto plate = read_places(options.plate);
+  if (!plate) return plate.error();
+  auto measured = read_places(options.measured);
+  if (!measured) return measured.error();
+  std::optional<calibration::FieldMap> map;
+  if (!options.field.empty()) {
+    auto read = read_field_map(options.field);
+    if (!read) return read.error();
+    map = std::move(read->map);
+  }
+  std::vector<CheckedPlace> out;
+  for (const auto& [name, place] : *measured) {
+    const auto known =
+        std::find_if(plate->begin(), plate->end(), [&name = name](const auto& one) { return one.first == name; });
+    if (known == plate->end())
+      return Error{Errc::bad_value, fmt::format("{}: \"{}\" is no place of {}; give both the same names",
+                                                options.measured.string(), name, options.plate.string())};
+    CheckedPlace one{name, known->second, place};
+    if (map) {
+      const auto correction = map->correction_mm(place);
+      if (!correction)
+        return Error{Errc::bad_value, fmt::format("{}: {}: {}; put the plate where the field was mapped",
+                                                  options.measured.string(), name, map->why_not(place))};
+      one.measured_mm += *correction;
+    }
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+nlohmann::json json_of(const FieldCheck& check, const std::vector<CheckedPlace>& places,
+                       const std::vector<FieldCheck>& history) {
+  nlohmann::json json{{"when", check.when},
+                      {"rms_mm", check.rms_mm},
+                      {"worst_mm", check.worst_mm},
+                      {"worst", check.worst_place},
+                      {"scale_percent", check.scale_percent},
+                      {"days", history.size()},
+                      {"places", nlohmann::json::array()}};
+  for (std::size_t i = 0; i < places.size(); ++i)
+    json["places"].push_back({{"name", places[i].name}, {"off_mm", check.off_mm[i]}});
+  if (const auto chart = calibration::control_chart(history)) {
+    const auto limits = [](const calibration::ControlLimits& l) {
+      return nlohmann::json{
+          {"mean", l.mean}, {"sigma", l.sigma}, {"low", l.mean - 3 * l.sigma}, {"high", l.mean + 3 * l.sigma}};
+    };
+    json["limits"] = {{"rms_mm", limits(chart->rms_mm)}, {"scale_percent", limits(chart->scale_percent)}};
+  }
+  return json;
+}
+
+HtmlPage page_of(const FieldCheck& check, const std::vector<CheckedPlace>& places,
+                 const std::vector<FieldCheck>& history) {
+  HtmlPage page("The tracker's field, checked");
+  page.paragraph(fmt::format("{}: {} places, {:.2f} mm RMS, the largest {:.2f} mm at {}; distances {:+.2f} %.",
+                             check.when, places.size(), check.rms_mm, check.worst_mm, check.worst_place,
+                             check.scale_percent));
+  page.heading("Day by day");
+  page.svg(field_chart_svg(history),
+           "Red: more than 3 sigma from the mean of the first eight days, those to the left of the dashed line.");
+  page.heading("Today's places");
+  std::vector<std::vector<std::string>> rows{{"place", "off"}};
+  for (std::size_t i = 0; i < places.size(); ++i)
+    rows.push_back({places[i].name, fmt::format("{:.2f} mm", check.off_mm[i])});
+  page.table(rows);
+  return page;
+}
+
+void run(const Options& options, CommandStatus& status) {
+  auto history = read_history(options.history);
+  if (!history) return status.refuse(history.error());
+  const auto places = places_of(options);
+  if (!places) return status.refuse(places.error());
+  const std::string when =
+      options.when.empty() ? fmt::format("{:%Y-%m-%dT%H:%M}", fmt::localtime(std::time(nullptr))) : options.when;
+  const auto check = calibration::check_field(when, *places);
+  if (!check) return status.refuse({check.error().code, options.measured.string() + ": " + check.error().what});
+  history->push_back(*check);
+  // A bad day belongs into the history like any other; the file is replaced as a whole.
+  if (const auto written = write_file(options.history, history_text(*history)); !written)
+    return status.refuse(written.error());
+  finish_calibration(options.results, "", json_of(*check, *places, *history), page_of(*check, *places, *history),
+                     calibration::verdict_of(*history), status);
+}
+
+}  // namespace
+
+CLI::App* add_calibrate_field_check(CLI::App& field, CommandStatus& status) {
+  auto options = std::make_shared<Options>();
+  CLI::App* check = field.add_subcommand("check", "a plate's places, touched each day, against those of other days");
+  check->add_option("--plate", options->plate, "the places as they are: name,x,y,z, mm (CSV)")
+      ->required()
+      ->type_name("FILE");
+  check->add_option("--measured", options->measured, "the pointer's tip in them today, in the tracker's frame")
+      ->required()
+      ->type_name("FILE");
+  check->add_option("--history", options->history, "one line a day; today's is added (CSV)")
+      ->required()
+      ->type_name("FILE");
+  check->add_option("--field", options->field, "the map that the appliance uses, where --measured was taken without it")
+      ->type_name("FILE");
+  check->add_option("--when", options->when, "what the day is called; now, if left out");
+  check->add_option("--json", options->results.json, "figures, verdict and reasons")->type_name("FILE");
+  check->add_option("--report", options->results.report, "a page with the chart (HTML)")->type_name("FILE");
+  check->callback([options, &status] { run(*options, status); });
+  return check;
+}
+
+}  // namespace birdseye::host

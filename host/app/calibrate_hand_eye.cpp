@@ -1,0 +1,273 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "calibration/base/units.hpp"
+#include "host/app/calibrate_commands.hpp"
+#include "host/app/results.hpp"
+#include "host/calibrate/hand_eye_files.hpp"
+#include "host/calibrate/hand_eye_report.hpp"
+#include "host/calibrate/hand_eye_rod.hpp"
+#include "host/files/text_files.hpp"
+#include "host/guide/live_hand_eye.hpp"
+#include "host/link/appliance_hardware.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+struct Options {
+  HandEyeFiles files;
+  std::filesystem::path rod_angles;
+  bool live = false;
+  LivePlan plan;
+  std::string unit = "mm";
+  double position_sigma_mm = 0, angle_sigma_deg = 0;
+  ResultPaths results;
+};
+
+Result<void> check_right(const HandEyeFiles& files) {
+  if (files.right_camera.empty() != files.right_from_left.empty())
+    return Error{Errc::bad_value, "give --right-camera and --right-from-left together"};
+  if (files.right_images.empty()) {
+    if (files.right_camera.empty()) return {};
+    return Error{Errc::bad_value, "--right-images is missing: which pictures are the right camera's?"};
+  }
+  if (files.images.empty()) return Error{Errc::bad_value, "--right-images goes with --images, the left camera's"};
+  if (files.camera.empty() == files.right_camera.empty()) return {};
+  return Error{Errc::bad_value,
+               "with --right-images give --camera, --right-camera and --right-from-left, or none of them: both lenses "
+               "are then calibrated from the pictures"};
+}
+
+Result<void> check(const Options& options) {
+  const HandEyeFiles& files = options.files;
+  const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.eye_poses.empty() ? 0 : 1);
+  if (sources != 1) return Error{Errc::bad_value, "give one of --images (with --board), --eye-poses and --live"};
+  if (files.eye_poses.empty() && files.board.empty())
+    return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
+  if (!options.live && files.poses.empty())
+    return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
+  if (const auto sound = check_right(files); !sound) return sound.error();
+  if (!options.rod_angles.empty() && files.images.empty())
+    return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
+  if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
+    return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
+  return {};
+}
+
+/// A hand-eye goes into a record beside the lens it was made with, and no other.
+Result<void> check_record(const Options& options) {
+  const auto& path = options.results.record;
+  std::error_code ignored;
+  const bool there = std::filesystem::exists(path, ignored);
+  if (path.empty() || (!there && options.files.camera.empty())) return {};
+  std::optional<CameraModel> recorded;
+  if (there) {
+    const auto record = read_record(path);
+    if (!record) return record.error();
+    if (record->lens) recorded = record->lens->camera;
+  }
+  if (options.files.camera.empty()) return {};
+  const auto camera = read_camera(options.files.camera);
+  if (!camera) return camera.error();
+  if (recorded == *camera) return {};
+  return Error{Errc::bad_value,
+               fmt::format("{}: its lens is not that of {}: enter that first (birdseye calibrate camera --record), or "
+                           "leave out --camera",
+                           path.string(), options.files.camera.string())};
+}
+
+Result<HandEyeRecording> record_live(const Options& options) {
+  LivePlan plan = options.plan;
+  auto pattern = calibration::parse_pattern(options.files.board);
+  if (!pattern) return pattern.error();
+  plan.guide.pattern = *std::move(pattern);
+  if (!options.files.camera.empty()) {
+    auto camera = read_camera(options.files.camera);
+    if (!camera) return camera.error();
+    plan.guide.camera = *camera;
+  }
+  Progress progress;
+  auto session = guide_hand_eye(plan, progress);
+  if (!session) return session.error();
+  HandEyeRecording out;
+  out.input = std::move(session->input);
+  out.notes.push_back("ended: " + session->ended);
+  if (!plan.guide.camera) {
+    if (session->lens) {
+      out.camera_verdict = calibration::judge_camera(*session->lens);
+    } else {
+      out.camera_verdict.add(Grade::fail, "no lens was found: " + session->lens_fault,
+                             "hold the scope still at more stations, tilted another way at each");
+    }
+    out.lens = std::move(session->lens);
+  }
+  return out;
+}
+
+/// What is found from a recording, and what to think of it.
+struct Found {
+  calibration::HandEyeResult result;
+  std::optional<RodCalibration> rod;
+  Verdict verdict;
+};
+
+/// With a rod, recording keeps the stations of its reference angle, of which the result is.
+Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Found& out) {
+  auto rod = calibrate_rod(recording, angles);
+  if (!rod) return rod.error();
+  recording.input.stations = rod->at_reference().stations;
+  out.result = rod->at_reference().result;
+  out.verdict = rod->at_reference().verdict;
+  judge_rod(*rod, out.verdict);
+  recording.notes.push_back(
+      fmt::format("camera_from_sensor holds with the rod at {:g} degrees", rod->at_reference().angle_deg));
+  out.rod = *std::move(rod);
+  return {};
+}
+
+Result<Found> solve(const Options& options, const RodAngles& angles, HandEyeRecording& recording) {
+  Found out;
+  if (recording.input.stations.empty() || (options.files.eye_poses.empty() && !recording.input.camera)) {
+    out.verdict = recording.camera_verdict;
+    if (out.verdict.grade != Grade::fail)
+      out.verdict.add(Grade::fail, "no picture shows the board together with a pose",
+                      "see that --board names the pattern in the pictures");
+    return out;
+  }
+  if (!angles.empty()) {
+    if (const auto solved = solve_rod(angles, recording, out); !solved) return solved.error();
+  } else {
+    auto solved = calibration::calibrate_hand_eye(recording.input);
+    if (!solved) return solved.error();
+    out.result = *std::move(solved);
+    out.verdict = calibration::judge(out.result);
+  }
+  if (const Grade lens = recording.camera_verdict.grade; lens != Grade::pass) {
+    out.verdict.add(lens, fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens)),
+                    "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
+  }
+  return out;
+}
+
+/// Hand-eye, and the lens it was found with where that is new.
+RecordEntry entry_of(const Options& options, const HandEyeRecording& recording, const Found& found) {
+  const std::string what =
+      options.files.board.empty() ? options.files.eye_poses.filename().string() : options.files.board;
+  return {fmt::format("{}, {} stations", what, recording.input.stations.size()),
+          [&](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
+            if (const auto& lens = recording.lens) {
+              record.hand_eye.reset();  // the new one is entered below
+              enter_lens(record, {provenance, lens->camera, name_of(lens->model), lens->covariance, lens->rms_px,
+                                  lens->held_out_px, std::nullopt});
+            }
+            const calibration::HandEyeResult& r = found.result;
+            record.hand_eye = calibration::HandEyeEntry{provenance,    r.camera_from_sensor, r.covariance, r.rms_px,
+                                                        r.held_out_px, r.held_out_mm,        std::nullopt};
+            if (found.rod && found.rod->scope) {
+              const RodScope& rod = *found.rod->scope;
+              record.hand_eye->rod = calibration::RodEntry{found.rod->at_reference().angle_deg, rod.axis_in_sensor,
+                                                           rod.axis_point_in_sensor_mm, rod.picture_turn};
+            }
+          }};
+}
+
+void finish(const Options& options, const HandEyeRecording& recording, const Found& found, CommandStatus& status) {
+  const calibration::HandEyeResult& result = found.result;
+  for (const std::string& note : recording.notes) fmt::print("{}\n", note);
+  if (recording.stream_correlation > 0 && result.solved) {
+    const double late_ms = -1000 * (recording.stream_offset_s + result.time_offset_s.value_or(0));
+    fmt::print("the times of the pictures are {:.1f} +- {:.1f} ms too {} against those of the poses\n",
+               std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
+  }
+  nlohmann::json json = hand_eye_json(result, recording);
+  HtmlPage page = hand_eye_page(result, recording);
+  if (found.rod) {
+    json["rod"] = rod_json(*found.rod);
+    add_rod_to(page, *found.rod);
+  }
+  finish_calibration(options.results, result.solved ? pose_text(result.camera_from_sensor.matrix()) : "",
+                     std::move(json), std::move(page), found.verdict, status, entry_of(options, recording, found));
+}
+
+void run(Options& options, CommandStatus& status) {
+  HandEyeFiles& files = options.files;
+  files.mm_per_unit = options.unit == "m" ? 1000 : 1;
+  if (const auto sound = check(options); !sound) return status.refuse(sound.error());
+  if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
+  if (options.live) {
+    const auto fits = check_bound_record(options.results.record, options.plan.server, {"tracker", "camera"});
+    if (!fits) return status.refuse(fits.error());
+  }
+  RodAngles angles;
+  if (!options.rod_angles.empty()) {
+    auto read = read_rod_angles(options.rod_angles);
+    if (!read) return status.refuse(read.error());
+    angles = *std::move(read);
+  }
+  auto recording = options.live ? record_live(options) : read_hand_eye_stations(files);
+  if (!recording) return status.refuse(recording.error());
+  if (options.position_sigma_mm > 0)
+    recording->input.tracker_noise =
+        calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
+  const auto found = solve(options, angles, *recording);
+  if (!found) return status.refuse(found.error());
+  finish(options, *recording, *found, status);
+}
+
+}  // namespace
+
+void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
+  auto options = std::make_shared<Options>();
+  HandEyeFiles& files = options->files;
+  CLI::App* command = calibrate.add_subcommand("hand-eye", "where the camera sits on its sensor");
+  command->add_option("--board", files.board, "pattern in the pictures, as chessboard:14x10:3mm")->type_name("SPEC");
+  command->add_option("--images", files.images, "pictures of the board, or folders of them")->type_name("PATH");
+  command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
+  command->add_option("--transform", files.transform, "which of a sequence's transforms that is");
+  command->add_option("--board-poses", files.board_poses, "tracked poses of what carries the board, if it moves")
+      ->type_name("PATH");
+  command->add_option("--board-transform", files.board_transform, "which of a sequence's transforms that is");
+  command->add_option("--camera", files.camera, "lens (OpenCV YAML); without it, calibrated from the pictures")
+      ->type_name("FILE");
+  command->add_option("--right-images", files.right_images, "the right camera's, which pair with --images by name")
+      ->type_name("PATH");
+  command->add_option("--right-camera", files.right_camera, "the right lens, as --camera")->type_name("FILE");
+  command
+      ->add_option("--right-from-left", files.right_from_left,
+                   "4x4 matrix, left to right camera, mm: with --right-camera")
+      ->type_name("FILE");
+  command
+      ->add_option("--eye-poses", files.eye_poses,
+                   "instead of pictures, poses of the camera in the board's frame; by time if both have times")
+      ->type_name("PATH");
+  command->add_option("--unit", options->unit, "of lengths in files of poses")->check(CLI::IsMember({"mm", "m"}));
+  command->add_option("--position-sigma", options->position_sigma_mm, "the tracker's noise per axis, mm")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--angle-sigma", options->angle_sigma_deg, "the tracker's noise per axis, degrees")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--rod-angles", options->rod_angles,
+                   "of an oblique scope: at what its rod stood, as lines of picture,degrees")
+      ->type_name("FILE");
+  command->add_flag("--live", options->live, "be guided, with an appliance that runs, in place of files");
+  LivePlan& plan = options->plan;
+  command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")
+      ->type_name("HOST:PORT");
+  command->add_option("--bird", plan.guide.bird, "with --live: the scope's bird, by its name (default: scope)");
+  command->add_option("--keep", plan.guide.keep, "with --live: a folder for the stations' pictures and poses")
+      ->type_name("FOLDER");
+  command->add_option("--stations", plan.guide.fewest_stations, "with --live: the fewest (default 12)")
+      ->check(CLI::Range(6, 100));
+  command->add_option("--most-stations", plan.guide.most_stations, "with --live: then it ends in any case (default 40)")
+      ->check(CLI::Range(6, 200));
+  command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
+      ->check(CLI::Range(5.0, 7200.0));
+  add_result_options(*command, options->results, "camera_from_sensor, a 4x4 matrix, mm");
+  command->callback([options, &status] { run(*options, status); });
+}
+
+}  // namespace birdseye::host

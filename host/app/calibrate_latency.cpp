@@ -1,0 +1,210 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "calibration/latency/latency.hpp"
+#include "host/app/calibrate_commands.hpp"
+#include "host/app/results.hpp"
+#include "host/calibrate/latency_report.hpp"
+#include "host/calibrate/latency_streams.hpp"
+#include "host/files/pose_files.hpp"
+#include "host/link/appliance_hardware.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+using calibration::Latency;
+
+struct Options {
+  fs::path recording, poses, eye_poses;
+  std::string server, transform, eye_transform, unit = "mm";
+  std::optional<double> delay_ms;
+  LatencySource source;
+  calibration::LatencySettings settings;
+  bool no_drift = false;
+  ResultPaths paths;
+};
+
+struct Found {
+  Latency latency;
+  StreamNames names;
+  std::string advice;
+  nlohmann::json more = nlohmann::json::object();
+};
+
+/// What to do about it, for an appliance. The times of frames follow from [camera] delay_ms, those of poses from
+/// [tracker] delay_ms: raising the first makes frames earlier.
+std::string advice_of(const Latency& latency, const std::optional<double>& delay_ms) {
+  const double late_ms = latency.offset_ms;
+  if (latency.offset_ci95_ms[0] < 0 && latency.offset_ci95_ms[1] > 0)
+    return fmt::format(
+        "the frames' times agree with the tracker's: {:.1f} ms is within the interval of 0; leave "
+        "delay_ms as it is",
+        late_ms);
+  const bool late = late_ms > 0;
+  std::string text = fmt::format("the frames' times are {:.1f} ms too {} against the tracker's: ", std::abs(late_ms),
+                                 late ? "late" : "early");
+  if (delay_ms && *delay_ms + late_ms >= 0) {
+    text += fmt::format("set [camera] delay_ms to {:.1f}", *delay_ms + late_ms);
+  } else {
+    text += fmt::format("{} [camera] delay_ms by {:.1f}", late ? "raise" : "lower", std::abs(late_ms));
+  }
+  return text + fmt::format("; or, where the camera stamps its frames itself, {} [tracker] delay_ms by as much",
+                            late ? "lower" : "raise");
+}
+
+Result<Found> of_appliance(const Options& options, Progress& progress) {
+  Result<LatencyStreams> streams = Error{};
+  if (!options.recording.empty()) {
+    LatencySource all = options.source;
+    all.seconds = 0;
+    streams = replay_streams(options.recording, all, progress);
+  } else {
+    streams = record_streams(options.server, options.source, progress);
+  }
+  if (!streams) return std::move(streams).error();
+  progress.keep(fmt::format("{} poses, {} frames", streams->tracker.size(), streams->frames));
+  if (streams->video.empty()) {
+    return Error{Errc::bad_value, fmt::format("no motion can be seen in any of {} frames: {}; look at something with a "
+                                              "texture, such as the board, in focus and in the light",
+                                              streams->frames, streams->usual_reason)};
+  }
+  auto latency = calibration::find_latency(std::span<const calibration::TimedMotionPose>(streams->tracker),
+                                           std::span<const calibration::ImageMotion>(streams->video), options.settings);
+  if (!latency) return Error{latency.error().code, latency.error().what + " (a: the tracker, b: the video)"};
+  Found found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}};
+  found.advice = advice_of(found.latency, options.delay_ms);
+  found.more = {{"method", "picture motion"},
+                {"bird", streams->bird},
+                {"frames", streams->frames},
+                {"frames_without_motion", streams->frames_without_motion}};
+  if (options.delay_ms) found.more["camera_delay_ms"] = *options.delay_ms + found.latency.offset_ms;
+  return found;
+}
+
+Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& path, const std::string& transform,
+                                                               double mm_per_unit, Verdict& odd) {
+  const auto set = read_pose_set(path, transform, mm_per_unit);
+  if (!set) return set.error();
+  if (!set->timed)
+    return Error{Errc::bad_value,
+                 fmt::format("{}: its poses bear no times, only an order; give a CSV with times", path.string())};
+  std::vector<calibration::TimedRotation> rows;
+  for (const TimedPose& pose : set->poses) rows.push_back({pose.time_s, pose.tracker_from_sensor.quaternion()});
+  if (!set->rejected.empty()) {
+    odd.add(Grade::pass, fmt::format("{}: {} rows rejected, the first: {}", path.filename().string(),
+                                     set->rejected.size(), set->rejected.front()));
+  }
+  for (const std::string& note : set->notes) odd.add(Grade::pass, path.filename().string() + ": " + note);
+  return rows;
+}
+
+Result<Found> of_files(const Options& options, Verdict& odd) {
+  const double mm_per_unit = options.unit == "m" ? 1000 : 1;
+  const auto a = read_rotations(options.poses, options.transform, mm_per_unit, odd);
+  if (!a) return a.error();
+  const auto b = read_rotations(options.eye_poses, options.eye_transform, mm_per_unit, odd);
+  if (!b) return b.error();
+  auto latency = calibration::find_latency(*a, *b, options.settings);
+  if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
+  Found found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}};
+  found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",
+                             options.eye_poses.filename().string(), std::abs(found.latency.offset_ms),
+                             found.latency.offset_ms > 0 ? "late" : "early", options.poses.filename().string(),
+                             found.latency.offset_ms > 0 ? "subtract" : "add");
+  return found;
+}
+
+std::string out_text(const Latency& latency) {
+  return fmt::format(
+      "# How late frames are against the tracker, ms and ppm\noffset_ms = {:.3f}\noffset_ci95_ms = [{:.3f}, {:.3f}]\n"
+      "drift_ppm = {:.2f}\ndrift_ci95_ppm = [{:.2f}, {:.2f}]\n",
+      latency.offset_ms, latency.offset_ci95_ms[0], latency.offset_ci95_ms[1], latency.drift_ppm,
+      latency.drift_ci95_ppm[0], latency.drift_ci95_ppm[1]);
+}
+
+std::string made_from(const Options& options) {
+  if (!options.recording.empty()) return options.recording.filename().string();
+  if (!options.server.empty()) return options.server;
+  return fmt::format("{} and {}", options.poses.filename().string(), options.eye_poses.filename().string());
+}
+
+void run(const Options& options, CommandStatus& status) {
+  Progress progress;
+  Verdict odd;
+  const bool files = !options.poses.empty();
+  if (static_cast<int>(files) + static_cast<int>(!options.recording.empty()) +
+          static_cast<int>(!options.server.empty()) !=
+      1) {
+    return status.refuse(
+        {Errc::bad_value, "calibrate latency: give one of --server, --recording, or --poses with --eye-poses"});
+  }
+  if (!options.server.empty()) {
+    const auto fits = check_bound_record(options.paths.record, options.server, {"tracker", "camera"});
+    if (!fits) return status.refuse(fits.error());
+  }
+  const auto found = files ? of_files(options, odd) : of_appliance(options, progress);
+  if (!found) return status.refuse(found.error());
+  Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
+  for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
+  if (verdict.grade != Grade::fail) {
+    const Latency& l = found->latency;
+    fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",
+               l.offset_ms, l.offset_ci95_ms[0], l.offset_ci95_ms[1], l.drift_ppm, l.drift_ci95_ppm[0],
+               l.drift_ci95_ppm[1], found->advice);
+  }
+  nlohmann::json json = latency_json(found->latency, verdict);
+  json.update(found->more);
+  if (verdict.grade == Grade::fail) {
+    json.erase("camera_delay_ms");
+  } else {
+    json["advice"] = found->advice;
+  }
+  finish_calibration(options.paths, out_text(found->latency), std::move(json),
+                     latency_page(found->latency, verdict, found->names, found->advice), verdict, status,
+                     {made_from(options), [&found](auto& record, const auto& provenance) {
+                        const Latency& l = found->latency;
+                        record.latency = calibration::LatencyEntry{provenance, l.offset_ms, l.offset_ci95_ms[0],
+                                                                   l.offset_ci95_ms[1], l.drift_ppm};
+                      }});
+}
+
+}  // namespace
+
+void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
+  auto options = std::make_shared<Options>();
+  CLI::App& command = *calibrate.add_subcommand(
+      "latency", "how late the video's times are against the tracker's, from motion that both see");
+  command.add_option("--server", options->server, "an appliance that runs: record from it now")->type_name("HOST:PORT");
+  command.add_option("--seconds", options->source.seconds, "how long to record from it (default 20)")
+      ->check(CLI::Range(8.0, 600.0));
+  command.add_option("--recording", options->recording, "a recording of an appliance (.berec), played again")
+      ->type_name("FILE");
+  command.add_option("--bird", options->source.bird, "the bird on the scope, by its name (default scope)");
+  command.add_option("--delay-ms", options->delay_ms, "what [camera] delay_ms is now, to be told what to set")
+      ->check(CLI::Range(0.0, 1000.0));
+  CLI::Option* const poses =
+      command.add_option("--poses", options->poses, "poses with times, in place of an appliance: of the tracker")
+          ->type_name("FILE");
+  command.add_option("--eye-poses", options->eye_poses, "of the camera, against what it looks at")
+      ->type_name("FILE")
+      ->needs(poses);
+  command.add_option("--transform", options->transform, "which transform of --poses, of a PLUS sequence")->needs(poses);
+  command.add_option("--eye-transform", options->eye_transform, "the same of --eye-poses")->needs(poses);
+  command.add_option("--unit", options->unit, "of lengths in both files")
+      ->check(CLI::IsMember({"mm", "m"}))
+      ->needs(poses);
+  command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
+  add_result_options(command, options->paths, "offset and drift (TOML)");
+  command.callback([options, &status] {
+    options->settings.find_drift = !options->no_drift;
+    run(*options, status);
+  });
+}
+
+}  // namespace birdseye::host

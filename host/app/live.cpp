@@ -1,0 +1,307 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "host/app/commands.hpp"
+#include "host/app/foreign_options.hpp"
+#include "host/demo/demo_report.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+#include "host/operation/operation.hpp"
+#include "host/window/live_app.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string server, board;
+  wire::ForeignSettings foreign;
+  bool simulate = false;
+  SimulatedCartSettings cart;
+  LiveSettings live;
+  PatientFiles simulated;  ///< once it is made
+  LiveWindow::Settings window;
+  fs::path tip, script, json, recording;
+  double speed = 1;
+  std::string size = "1280x720", video = "512x384", publish;
+};
+
+/// What the simulated patient's CT is shown and checked by: vessels and tumour of its segmentation.
+PatientFiles simulated_patient(const fs::path& folder) {
+  constexpr int kLiver = 1, kPortal = 2, kHepatic = 3, kTumour = 4;
+  PatientFiles files;
+  files.ct = folder / "phantom" / "ct";
+  files.labels = folder / "phantom" / "segmentation.nii.gz";
+  files.shown = {kPortal, kHepatic, kTumour};
+  files.targets = {kTumour};
+  files.organ = {kLiver, kPortal, kHepatic, kTumour};
+  return files;
+}
+
+/// Where windows remember their layout between runs, by the XDG base directory specification.
+fs::path layout_file() {
+  const char* const config = std::getenv("XDG_CONFIG_HOME");
+  const char* const home = std::getenv("HOME");
+  fs::path folder;
+  if (config != nullptr && *config != 0) {
+    folder = config;
+  } else if (home != nullptr) {
+    folder = fs::path(home) / ".config";
+  } else {
+    return {};
+  }
+  std::error_code error;
+  fs::create_directories(folder / "birdseye", error);
+  return error ? fs::path() : folder / "birdseye" / "live.ini";
+}
+
+/// out/live; where that holds an operation, the next that does not.
+fs::path free_folder() {
+  fs::path folder = "out/live";
+  for (int n = 2; has_operation(folder); ++n) folder = fmt::format("out/live-{}", n);
+  return folder;
+}
+
+Result<void> refuse_operation_in(const LiveSettings& live) {
+  if (live.out.empty() || !live.resume.empty() || !has_operation(live.out)) return {};
+  return Error{Errc::in_use,
+               fmt::format("{0}: holds an operation already; go on from it with --resume {0}, or choose another --out",
+                           live.out.string())};
+}
+
+Result<void> prepare(Options& options) {
+  const int sources = static_cast<int>(options.simulate) + static_cast<int>(!options.server.empty()) +
+                      static_cast<int>(!options.recording.empty());
+  if (sources != 1) return Error{Errc::bad_value, "give one of --server HOST:PORT, --recording PATH and --simulate"};
+  LiveWindow::Settings& window = options.window;
+  if (std::sscanf(options.size.c_str(), "%dx%d", &window.width_px, &window.height_px) != 2 || window.width_px < 640 ||
+      window.height_px < 480) {
+    return Error{Errc::bad_value, fmt::format("--size: \"{}\" is no size of at least 640x480", options.size)};
+  }
+  if (std::sscanf(options.video.c_str(), "%dx%d", &options.cart.width_px, &options.cart.height_px) != 2)
+    return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
+  options.foreign.scope_bird = options.live.scope;
+  options.foreign.not_scope = options.live.pointer;
+  window.title = "Birdseye";
+  window.layout = layout_file();
+  if (!options.board.empty()) {
+    auto pattern = calibration::parse_pattern(options.board);
+    if (!pattern) return pattern.error();
+    options.live.pattern = *std::move(pattern);
+  }
+  if (!options.tip.empty()) {
+    const auto points = read_points(options.tip);
+    if (!points) return points.error();
+    if (points->size() != 1)
+      return Error{Errc::bad_value, options.tip.string() + ": holds no single point; give what calibrate tip wrote"};
+    options.live.tip_in_pointer_mm = points->front();
+  }
+  if (auto kept = refuse_operation_in(options.live); !kept) return kept;
+  if (options.simulate) {
+    if (options.live.out.empty()) options.live.out = options.live.resume;
+    if (options.live.out.empty()) options.live.out = free_folder();
+    options.cart.folder = options.live.out;
+    options.simulated = simulated_patient(options.live.out);
+    std::error_code error;
+    fs::create_directories(options.live.out, error);
+    if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
+  } else if (options.live.patient.ct.empty()) {
+    return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
+  } else if (std::error_code ignored; !fs::exists(options.live.patient.ct, ignored)) {
+    return Error{Errc::not_found, fmt::format("--ct {}: no such file or folder", options.live.patient.ct.string())};
+  }
+  return {};
+}
+
+nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
+  nlohmann::json json{{"frames", figures.frames},
+                      {"frames_skipped", figures.frames_skipped},
+                      {"frames_overlaid", figures.frames_overlaid},
+                      {"seconds", figures.seconds},
+                      {"age_ms_p50", figures.ages.percentile_ms(0.5)},
+                      {"age_ms_p95", figures.ages.percentile_ms(0.95)},
+                      {"age_ms_max", figures.ages.most_ms()},
+                      {"oldest_overlay_ms", figures.oldest_overlay_ms},
+                      {"stood_still", figures.stood_still},
+                      {"engine", session.engine_name()},
+                      {"link_says", session.link_words()},
+                      {"appliance_says", session.appliance_says()},
+                      {"picture_says", figures.picture_says}};
+  if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
+  if (figures.window_s) json["window_s"] = *figures.window_s;
+  if (figures.ct_s) json["ct_s"] = *figures.ct_s;
+  if (figures.fiducials_s) json["fiducials_s"] = *figures.fiducials_s;
+  return json;
+}
+
+/// Against the truth of a simulated cart, as far as an overlay was drawn.
+Result<void> judge(const Options& options, LiveApp& app, nlohmann::json& json, Verdict& verdict) {
+  const auto& setup = app.session().picture().setup();
+  const PatientPlan* const patient = app.session().patient();
+  if (!setup || patient == nullptr || patient->landmarks.empty()) {
+    verdict.add(Grade::fail, "no overlay was reached");
+    return {};
+  }
+  const LiveSession& session = app.session();
+  const Eigen::Vector3d tumour_mm = patient->landmarks.front().place_mm;
+  const auto tumour_as_shown_mm = [&](std::uint64_t shape) -> Eigen::Vector3d {
+    const bool deformed = shape == session.shapes() && session.deformation();
+    return deformed ? session.deformation()->field.deformed_of(tumour_mm) : tumour_mm;
+  };
+  const auto by_shape =
+      logged_target_errors(options.live.out, options.live.out / "truth", setup->camera, tumour_as_shown_mm);
+  if (!by_shape) return by_shape.error();
+  // What is on the screen at the end is judged.
+  const auto last = by_shape->find(session.shapes());
+  if (last == by_shape->end()) {
+    verdict.add(Grade::fail, "no frame bore an overlay");
+    return {};
+  }
+  const LoggedErrors& errors = last->second;
+  constexpr double kPassMm = 3, kMarginalMm = 5;
+  const double p95_mm = percentile(errors.mm, 0.95);
+  json["target_error_mm_p50"] = percentile(errors.mm, 0.5);
+  json["target_error_mm_p95"] = p95_mm;
+  json["target_error_mm_max"] = *std::max_element(errors.mm.begin(), errors.mm.end());
+  if (!errors.expected_mm.empty()) json["expected_error_mm_p50"] = percentile(errors.expected_mm, 0.5);
+  if (session.deformation() && last != by_shape->begin())
+    json["target_error_before_deforming_mm_p50"] = percentile(std::prev(last)->second.mm, 0.5);
+  verdict.add(p95_mm <= kPassMm       ? Grade::pass
+              : p95_mm <= kMarginalMm ? Grade::marginal
+                                      : Grade::fail,
+              fmt::format("the tumour's centre is within {:.2f} mm in 95 % of {} frames", p95_mm, errors.mm.size()));
+  return {};
+}
+
+Result<ExitCode> run(Options& options) {
+  const HostTime asked{
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+          .count()};
+  if (auto prepared = prepare(options); !prepared) return prepared.error();
+  std::optional<LiveScript> script;
+  if (!options.script.empty()) {
+    auto read = LiveScript::read(options.script);
+    if (!read) return read.error();
+    script = *std::move(read);
+  }
+  std::optional<LiveLog> log;
+  if (!options.live.out.empty()) {
+    auto opened = LiveLog::open(options.live.out);
+    if (!opened) return opened.error();
+    log = *std::move(opened);
+  }
+  std::unique_ptr<Publisher> publisher;
+  if (!options.publish.empty()) {
+    auto listening = Publisher::listen(options.publish);
+    if (!listening) return listening.error();
+    publisher = *std::move(listening);
+  }
+  auto window = LiveWindow::open(options.window);
+  if (!window) return window.error();
+  std::unique_ptr<LiveSource> source;
+  if (!options.recording.empty()) {
+    auto opened = LiveSource::of_recording(options.recording, options.speed);
+    if (!opened) return opened.error();
+    source = *std::move(opened);
+  } else {
+    source = options.simulate ? LiveSource::of_simulator(options.cart)
+                              : LiveSource::of_appliance(options.server, options.foreign);
+  }
+  LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script), std::move(log),
+              std::move(publisher));
+  const auto ran = app.run(asked);
+  nlohmann::json json = json_of(app.figures(), app.session());
+  Verdict verdict;
+  if (!ran) verdict.add(Grade::fail, ran.error().what);
+  if (app.log()) {
+    if (auto closed = app.log()->close(); !closed) return closed.error();
+    if (options.simulate) {
+      if (auto judged = judge(options, app, json, verdict); !judged) return judged.error();
+    }
+  }
+  json["verdict"] = name_of(verdict.grade);
+  json["reasons"] = verdict.reasons;
+  if (auto written = write_file(options.json, text_of(json)); !written) return written.error();
+  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  if (!ran) return ran.error();
+  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
+}
+
+}  // namespace
+
+void add_live(CLI::App& app, CommandStatus& status) {
+  auto options = std::make_shared<Options>();
+  options->cart.deformation_mm = 8;
+  options->cart.dwell_s = 0.7;
+  options->cart.pause_s = 8;
+  options->cart.look_s = 3600;
+  options->cart.drop_late = true;
+  options->cart.smoothing_ms = 12;  // what is averaged after a frame, the frame has to wait for
+  options->cart.wait_ms = 30;
+  CLI::App* command = app.add_subcommand("live", "the window at the cart: live video, and the CT over it");
+  command->add_option("--server", options->server, "the appliance, or another OpenIGTLink server of tracked video")
+      ->type_name("HOST:PORT");
+  add_foreign_options(*command, options->foreign);
+  command->add_option("--recording", options->recording, "what birdseye record wrote, or a PLUS sequence: played again")
+      ->type_name("PATH");
+  command->add_option("--speed", options->speed, "of the recording: 2 plays it twice as fast (default 1)")
+      ->check(CLI::Range(0.05, 20.0));
+  command->add_flag("--simulate", options->simulate, "a simulated cart and patient of its own, in --out");
+  command->add_option("--seed", options->cart.seed, "with --simulate: another patient and other noise");
+  command
+      ->add_option("--deformation-mm", options->cart.deformation_mm,
+                   "with --simulate: how far the liver has moved since the CT, where it has moved most (default 8)")
+      ->check(CLI::Range(0.0, 30.0));
+  command->add_option("--faults", options->cart.faults, "with --simulate: a script of faults")->type_name("FILE");
+  command
+      ->add_option("--video", options->video,
+                   "with --simulate: the size of its video (default 512x384, which two "
+                   "cores trace and overlay in time)")
+      ->type_name("WxH");
+  command->add_option("--look-s", options->cart.look_s, "with --simulate: how long the operation lasts")
+      ->check(CLI::Range(1.0, 86400.0));
+  PatientFiles& patient = options->live.patient;
+  command->add_option("--ct", patient.ct, "the patient's CT")->type_name("PATH");
+  command->add_option("--labels", patient.labels, "its segmentation")->type_name("FILE");
+  command->add_option("--show", patient.shown, "labels to show; without them, all of the CT")->delimiter(',');
+  command->add_option("--organ", patient.organ, "labels of the organ that the video shows, to match it with")
+      ->delimiter(',');
+  command->add_option("--targets", patient.targets, "labels whose middles are landmarks to check by")->delimiter(',');
+  command->add_option("--fiducials", patient.fiducials, "the fiducials' places in the CT; without it, they are found")
+      ->type_name("FILE");
+  command->add_option("--fiducial-count", options->live.fiducials, "how many of them are to be touched");
+  command->add_option("--landmarks", patient.landmarks, "a table name, x, y, z of places to check by")
+      ->type_name("FILE");
+  command->add_option("--board", options->board, "the board to calibrate with")->type_name("SPEC");
+  command->add_option("--tip", options->tip, "the pointer's tip, by calibrate tip; else by the scope's record")
+      ->type_name("FILE");
+  command->add_option("--scope", options->live.scope, "the scope's bird (default scope)");
+  command->add_option("--pointer", options->live.pointer, "the pointer's bird (default pointer)");
+  command->add_option("--transfer", options->live.transfer, "transfer function: a preset, or a file");
+  command->add_option("--engine", options->live.engine, "cpu, gl, slices or auto (default cpu)")
+      ->check(CLI::IsMember({"cpu", "gl", "slices", "auto"}));
+  command->add_option("--size", options->size, "of the window (default 1280x720)")->type_name("WxH");
+  command->add_option("--scale", options->window.scale, "of text and panels; without it, as the screen asks for")
+      ->check(CLI::Range(0.5, 4.0));
+  command->add_option("--script", options->script, "keys to press and pictures to take")->type_name("FILE");
+  command->add_option("--out", options->live.out, "a folder for snapshots and the log of frames")->type_name("FOLDER");
+  command->add_option("--resume", options->live.resume, "the --out folder of a window that was closed: go on from it")
+      ->type_name("FOLDER");
+  command
+      ->add_option("--publish", options->publish, "give 3D Slicer the registered CT over OpenIGTLink (default: do not)")
+      ->type_name("[ADDRESS:]PORT");
+  command->add_option("--json", options->json, "figures and verdict")->type_name("FILE");
+  command->callback([options, &status] {
+    const auto done = run(*options);
+    done ? void(status.code = *done) : status.refuse(done.error());
+  });
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,66 @@
+#include "host/app/results.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+/// Before the work rather than after it.
+std::string folder_is_there(const std::string& file) {
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  std::error_code ignored;
+  if (std::filesystem::is_directory(folder, ignored)) return "";
+  return fmt::format("{}: there is no folder {}; make it first", file, folder.string());
+}
+
+}  // namespace
+
+void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record) {
+  command.add_option("--out", paths.out, out_help)->type_name("FILE")->check(folder_is_there);
+  command.add_option("--json", paths.json, "figures, verdict and reasons")->type_name("FILE")->check(folder_is_there);
+  if (record)
+    command.add_option("--record", paths.record, "the scope's calibration record, which gets this as an entry")
+        ->type_name("FILE")
+        ->check(folder_is_there);
+  command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
+      ->type_name("FILE")
+      ->check(folder_is_there);
+}
+
+void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
+                        const Verdict& verdict, CommandStatus& status, const RecordEntry& entry) {
+  json["verdict"] = name_of(verdict.grade);
+  json["reasons"] = verdict.reasons;
+  json["next_steps"] = verdict.next_steps;
+  page.set_verdict(verdict);
+  std::vector<FileText> files{{paths.json, text_of(json)}, {paths.report, page.html()}};
+  if (verdict.grade != Grade::fail) {
+    files.push_back({paths.out, out_text});
+    if (!paths.record.empty()) {
+      const auto record = record_with(paths.record, entry, verdict.grade);
+      if (!record) {  // what was found is not lost for it
+        (void)write_files({{paths.json, text_of(json)}, {paths.report, page.html()}, {paths.out, out_text}});
+        return status.refuse(record.error());
+      }
+      files.push_back({paths.record, *record});
+    }
+  }
+  if (const auto written = write_files(files); !written) return status.refuse(written.error());
+  fmt::print("verdict: {}\n", name_of(verdict.grade));
+  for (const std::string& reason : verdict.reasons) fmt::print("  {}\n", reason);
+  for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
+  if (verdict.grade == Grade::fail) {
+    status.code = ExitCode::verdict_fail;
+    for (const auto& path : {paths.out, paths.record}) {
+      if (!path.empty()) fmt::print(stderr, "birdseye: {} is not written: the verdict is fail\n", path.string());
+    }
+  }
+}
+
+}  // namespace birdseye::host

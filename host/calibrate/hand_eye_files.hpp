@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/camera/camera_calibration.hpp"
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "host/files/pose_files.hpp"
+
+namespace birdseye::host {
+
+/// Where the stations of a hand-eye calibration lie.
+struct HandEyeFiles {
+  std::string board;                                    ///< SPEC
+  std::vector<std::filesystem::path> images;            ///< none: eye_poses
+  std::filesystem::path camera;                         ///< empty: calibrated from the images
+  std::vector<std::filesystem::path> right_images;      ///< of a stereo scope's second camera
+  std::filesystem::path right_camera, right_from_left;  ///< both, or neither: calibrated from the images
+  std::filesystem::path poses, board_poses, eye_poses;
+  std::string transform, board_transform;
+  double mm_per_unit = 1;
+};
+
+/// The solver's input, and what there is to tell of how it came about.
+struct HandEyeRecording {
+  calibration::HandEyeInput input;
+  std::vector<std::string> notes;
+  std::vector<std::string> pictures;                   ///< names of all that were read, used or not
+  std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images; of a stereo scope, the left
+  Verdict camera_verdict;                              ///< on that
+  double stream_offset_s = 0;     ///< of two streams' clocks, found from their motion; the solver's adds to it
+  double stream_correlation = 0;  ///< 0 if there are no two streams
+};
+
+/// Reads and pairs pictures and poses: by their order, that of their names with numbers in them by value. As many
+/// pictures as poses are wanted, those that cannot be used counted. Right pictures pair with left ones by name, one
+/// with each. eye_poses are poses of the camera in the board's frame (marker_from_camera); where both they and poses
+/// have times they pair by time.
+Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files);
+
+}  // namespace birdseye::host

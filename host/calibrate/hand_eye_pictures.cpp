@@ -1,0 +1,122 @@
+#include "host/calibrate/hand_eye_pictures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "calibration/camera/camera_calibration.hpp"
+#include "calibration/camera/stereo_calibration.hpp"
+#include "calibration/detect/pattern.hpp"
+#include "host/calibrate/hand_eye_stereo.hpp"
+#include "host/calibrate/picture_views.hpp"
+#include "host/files/name_order.hpp"
+#include "host/files/text_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using calibration::HandEyeStation;
+using calibration::Pattern;
+using calibration::PatternView;
+
+std::optional<calibration::BoardSymmetry> symmetry_of(const Pattern& pattern) {
+  if (!pattern.half_turn_ambiguous && !pattern.quarter_turn_ambiguous) return std::nullopt;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e300), high = -low;
+  for (const Eigen::Vector3d& p : calibration::pattern_points_mm(pattern)) {
+    low = low.cwiseMin(p.head<2>());
+    high = high.cwiseMax(p.head<2>());
+  }
+  return calibration::BoardSymmetry{0.5 * (low + high), pattern.quarter_turn_ambiguous ? 4 : 2};
+}
+
+Result<CameraModel> read_lens(const HandEyeFiles& files, const PictureViews& pictures) {
+  auto camera = read_camera(files.camera);
+  if (camera && (camera->width_px != pictures.width_px || camera->height_px != pictures.height_px))
+    return Error{Errc::bad_value,
+                 fmt::format("{}: a camera of {}x{} for pictures of {}x{}", files.camera.string(), camera->width_px,
+                             camera->height_px, pictures.width_px, pictures.height_px)};
+  return camera;
+}
+
+/// From the pictures themselves.
+Result<void> calibrate_lens(const PictureViews& pictures, HandEyeRecording& out) {
+  auto solved = calibration::calibrate_camera(pictures.used, pictures.width_px, pictures.height_px);
+  if (!solved) return solved.error();
+  out.camera_verdict = calibration::judge_camera(*solved);
+  out.notes.push_back(fmt::format("the lens is calibrated from the same pictures: {:.2f} px, focal length {:.1f} px",
+                                  solved->rms_px, solved->camera.fx_px));
+  out.lens = *std::move(solved);
+  out.input.camera = out.lens->camera;
+  return {};
+}
+
+Result<void> calibrate_lenses(const PictureViews& left_pictures, const std::vector<PatternView>& left,
+                              const RightPictures& right, HandEyeRecording& out) {
+  auto solved = calibration::calibrate_stereo(left, right.views, {left_pictures.width_px, left_pictures.height_px},
+                                              {right.width_px, right.height_px});
+  if (!solved) return solved.error();
+  out.camera_verdict = calibration::judge_stereo(*solved);
+  out.notes.push_back(fmt::format("both lenses are calibrated from the same pictures: {:.2f} px, {:.2f} mm apart",
+                                  solved->rms_px, solved->baseline_mm));
+  out.input.camera = solved->left.camera;
+  out.input.right = calibration::StereoLens{solved->right.camera, solved->right_from_left};
+  out.lens = std::move(solved->left);
+  return {};
+}
+
+/// The left pictures' views in the order of their names, with those in which nothing was found.
+std::vector<PatternView> every_view(const PictureViews& pictures) {
+  std::vector<PatternView> views = pictures.used;
+  for (const auto& rejected : pictures.rejected) views.emplace_back().name = rejected.name;
+  std::stable_sort(views.begin(), views.end(),
+                   [](const auto& a, const auto& b) { return before_by_number(a.name, b.name); });
+  return views;
+}
+
+Result<void> find_lens(const HandEyeFiles& files, const PictureViews& pictures, const std::vector<PatternView>& left,
+                       const std::optional<RightPictures>& right, HandEyeRecording& out) {
+  if (files.camera.empty())
+    return right ? calibrate_lenses(pictures, left, *right, out) : calibrate_lens(pictures, out);
+  const auto camera = read_lens(files, pictures);
+  if (!camera) return camera.error();
+  out.input.camera = *camera;
+  if (!right || !right->lens) return {};
+  out.input.right = right->lens;
+  return check_relation(files, out.input);
+}
+
+}  // namespace
+
+Result<void> read_hand_eye_pictures(const HandEyeFiles& files, HandEyeRecording& out) {
+  const auto pattern = calibration::parse_pattern(files.board);
+  if (!pattern) return pattern.error();
+  const auto pictures = read_picture_views(*pattern, files.images);
+  if (!pictures) return pictures.error();
+  for (const auto& rejected : pictures->rejected) out.notes.push_back(rejected.name + ": " + rejected.reason);
+  const std::vector<PatternView> left = every_view(*pictures);
+  std::optional<RightPictures> right;
+  if (!files.right_images.empty()) {
+    auto read = read_right_pictures(files, *pattern, left, out.notes);
+    if (!read) return read.error();
+    right = *std::move(read);
+  }
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    HandEyeStation& s = out.input.stations.emplace_back();
+    s.name = left[i].name;
+    s.view = left[i];
+    out.pictures.push_back(s.name);
+    if (right && !right->views[i].points_px.empty()) s.right_view = right->views[i];
+  }
+  if (pictures->used.empty()) return {};  // the solver says that too few are left
+  const auto found = find_lens(files, *pictures, left, right, out);
+  if (!found && files.camera.empty() && found.error().code == Errc::degenerate) {
+    out.camera_verdict = calibration::judge_no_camera(found.error());
+    return {};
+  }
+  if (!found) return found.error();
+  out.input.symmetry = symmetry_of(*pattern);
+  return {};
+}
+
+}  // namespace birdseye::host

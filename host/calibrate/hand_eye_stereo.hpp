@@ -1,0 +1,24 @@
+#pragma once
+
+#include "host/calibrate/hand_eye_files.hpp"
+#include "host/calibrate/picture_views.hpp"
+
+namespace birdseye::host {
+
+/// The second camera's pictures, and its lens where that is given: files.right_images and what goes with them.
+struct RightPictures {
+  std::vector<calibration::PatternView> views;  ///< [i] shows the moment of left[i]; without points: not found
+  int width_px = 0, height_px = 0;
+  std::optional<calibration::StereoLens> lens;  ///< none: to be calibrated from the same pictures
+};
+
+/// Pictures pair with the left ones by name. Those in which the board is not found are told in notes.
+Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const calibration::Pattern& pattern,
+                                          const std::vector<calibration::PatternView>& left,
+                                          std::vector<std::string>& notes);
+
+/// Refuses a relation of the cameras that puts the boards of the left pictures elsewhere in the right ones than they
+/// are seen there.
+Result<void> check_relation(const HandEyeFiles& files, const calibration::HandEyeInput& input);
+
+}  // namespace birdseye::host

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calibration/points/pivot.hpp"
+
+namespace birdseye::host {
+
+// Pictures of a tip's calibration, as SVG.
+
+/// A bar for each pose, in the order given, those of outliers marked; lines between divots.
+std::string tip_residuals_svg(const std::vector<calibration::PivotPose>& poses, const calibration::Pivot& pivot);
+
+/// Where the tip was at each pose, about its pivot, from three sides.
+std::string tip_cloud_svg(const calibration::Pivot& pivot);
+
+/// To which side and how far the pointer leaned at each pose, seen along its mean direction in each divot; sides to
+/// which it did not lean are shaded.
+std::string tilt_coverage_svg(const std::vector<calibration::PivotPose>& poses, const calibration::Pivot& pivot);
+
+}  // namespace birdseye::host

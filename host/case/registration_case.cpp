@@ -1,0 +1,341 @@
+#include "host/case/registration_case.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <sstream>
+#include <toml.hpp>
+
+#include "host/files/text_files.hpp"
+#include "host/registration/similarity/overlap_mask.hpp"
+#include "host/registration/similarity/similarity.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A table of the case, with its name and file for messages.
+class Table {
+ public:
+  Table(const fs::path& file, std::string name, const toml::value& table)
+      : file_(file), name_(std::move(name)), table_(table) {}
+  [[nodiscard]] bool has(const char* key) const { return table_.contains(key); }
+  template <typename T>
+  [[nodiscard]] Result<T> get(const char* key) const {
+    if (!has(key)) return wrong(key, "is missing");
+    try {
+      if constexpr (std::is_same_v<T, double>) {
+        if (table_.at(key).is_integer()) return static_cast<double>(table_.at(key).as_integer());
+      }
+      return toml::find<T>(table_, key);
+    } catch (const std::exception&) {
+      return wrong(key, "is of another type");
+    }
+  }
+  template <typename T>
+  [[nodiscard]] Result<T> get(const char* key, const T& otherwise) const {
+    if (!has(key)) return otherwise;
+    return get<T>(key);
+  }
+  /// A path of the case, relative to its file.
+  [[nodiscard]] Result<fs::path> path(const char* key) const {
+    const auto text = get<std::string>(key);
+    if (!text) return text.error();
+    const fs::path path = file_.parent_path() / *text;
+    std::error_code error;
+    if (text->empty() || !fs::exists(path, error)) return wrong(key, fmt::format("{} does not exist", path.string()));
+    return path;
+  }
+  [[nodiscard]] Error wrong(const char* key, const std::string& why) const {
+    return Error{Errc::bad_value, fmt::format("{}: [{}] {}: {}", file_.string(), name_, key, why)};
+  }
+  [[nodiscard]] const toml::value& value() const { return table_; }
+
+ private:
+  const fs::path& file_;
+  std::string name_;
+  const toml::value& table_;
+};
+
+/// A key that is not known is a slip of the pen, and would be taken for its default.
+Result<void> only_known_keys(const fs::path& file, const toml::value& all) {
+  static const std::map<std::string, std::set<std::string>> kKnown = {
+      {"volume", {"path", "label", "label_values", "transfer"}},
+      {"model",
+       {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
+        "most_evaluations"}},
+      {"view", {"image", "camera", "camera_from_patient", "mask"}},
+      {"truth", {"landmarks", "control_points", "pose"}}};
+  for (const auto& [name, content] : all.as_table()) {
+    const auto table = kKnown.find(name);
+    if (table == kKnown.end())
+      return Error{Errc::bad_value,
+                   fmt::format("{}: [{}] is not known; there are volume, model, view, truth", file.string(), name)};
+    const auto check = [&, &name = name](const toml::value& one) -> Result<void> {
+      if (!one.is_table()) return {};
+      for (const auto& [key, unused] : one.as_table()) {
+        if (table->second.count(key) == 0) {
+          return Error{Errc::bad_value, fmt::format("{}: [{}] {}: is not known; there are {}", file.string(), name, key,
+                                                    fmt::join(table->second, ", "))};
+        }
+      }
+      return {};
+    };
+    if (content.is_array()) {
+      for (const toml::value& one : content.as_array()) {
+        if (auto known = check(one); !known) return known.error();
+      }
+    } else if (auto known = check(content); !known) {
+      return known.error();
+    }
+  }
+  return {};
+}
+
+Result<void> read_volume(const Table& table, RegistrationCase& out) {
+  const auto path = table.path("path");
+  if (!path) return path.error();
+  auto ct = import_volume(*path);
+  if (!ct) return ct.error();
+  out.ct = *std::move(ct);
+  const auto transfer = table.get<std::string>("transfer", "liver");
+  if (!transfer) return transfer.error();
+  out.transfer = *transfer;
+  if (!table.has("label")) return {};
+  const auto label = table.path("label");
+  if (!label) return label.error();
+  auto labels = import_labels(*label, out.ct);
+  if (!labels) return labels.error();
+  out.labels = *std::move(labels);
+  const auto values = table.get<std::vector<int>>("label_values");
+  if (!values) return values.error();
+  out.label_values = *values;
+  if (values->empty()) return table.wrong("label_values", "is empty; name the labels to keep");
+  return {};
+}
+
+/// What only the optimisers that go by the value alone have a choice of.
+Result<void> read_direct_search(const Table& table, RegistrationCase& out) {
+  const bool direct = out.optimiser != "gradient";
+  for (const char* key : {"unknowns", "similarity", "most_evaluations"}) {
+    if (table.has(key) && !direct) return table.wrong(key, "needs optimiser = \"simplex\" or \"powell\"");
+  }
+  const auto unknowns = table.get<std::string>("unknowns", "control_points");
+  if (!unknowns) return unknowns.error();
+  if (*unknowns != "control_points" && *unknowns != "vertices")
+    return table.wrong("unknowns", "is control_points or vertices");
+  out.vertices = *unknowns == "vertices";
+  constexpr int kDeepest = 3;  // 1029 unknowns
+  if (out.vertices && out.level > kDeepest)
+    return table.wrong("level", fmt::format("is 1 to {} where unknowns = \"vertices\"", kDeepest));
+  if (direct && !out.vertices && !out.control_points) {
+    return table.wrong("control_points", fmt::format("give three whole numbers: \"auto\" needs optimiser = "
+                                                     "\"gradient\", not \"{}\"",
+                                                     out.optimiser));
+  }
+  const auto similarity = table.get<std::string>("similarity", out.similarity);
+  if (!similarity) return similarity.error();
+  out.similarity = *similarity;
+  const auto& names = similarity_names();
+  if (std::find(names.begin(), names.end(), out.similarity) == names.end())
+    return table.wrong("similarity", fmt::format("is none of {}", fmt::join(names, ", ")));
+  const auto most = table.get<int>("most_evaluations", out.most_evaluations);
+  if (!most) return most.error();
+  if (*most < 1) return table.wrong("most_evaluations", "is 1 or more");
+  out.most_evaluations = *most;
+  return {};
+}
+
+Result<void> read_model(const Table& table, RegistrationCase& out) {
+  const auto& model = table.value();
+  if (table.has("control_points") && model.at("control_points").is_string()) {
+    if (model.at("control_points").as_string().str != "auto")
+      return table.wrong("control_points", "is three whole numbers or \"auto\"");
+  } else if (table.has("control_points")) {
+    const auto points = table.get<std::vector<int>>("control_points");
+    if (!points) return points.error();
+    constexpr int kMost = 15;
+    if (points->size() != 3 || *std::min_element(points->begin(), points->end()) < 1 ||
+        *std::max_element(points->begin(), points->end()) > kMost) {
+      return table.wrong("control_points", fmt::format("is three whole numbers of 1 to {}, or \"auto\"", kMost));
+    }
+    out.control_points = {(*points)[0], (*points)[1], (*points)[2]};
+  }
+  const auto level = table.get<int>("level", out.level);
+  if (!level) return level.error();
+  if (*level < 1 || *level > PatchOctree::kDeepest) return table.wrong("level", "is 1 to 5");
+  out.level = *level;
+  const auto optimiser = table.get<std::string>("optimiser", out.optimiser);
+  if (!optimiser) return optimiser.error();
+  if (*optimiser != "gradient" && *optimiser != "simplex" && *optimiser != "powell")
+    return table.wrong("optimiser", "is gradient, simplex or powell");
+  out.optimiser = *optimiser;
+  if (auto done = read_direct_search(table, out); !done) return done.error();
+  const auto refine_pose = table.get<bool>("refine_pose", out.refine_pose);
+  if (!refine_pose) return refine_pose.error();
+  if (*refine_pose && out.optimiser != "gradient") return table.wrong("refine_pose", "needs optimiser = \"gradient\"");
+  out.refine_pose = *refine_pose;
+  if (table.has("pose_prior")) {
+    const auto prior = table.get<double>("pose_prior");
+    if (!prior) return prior.error();
+    constexpr double kMost = 100;
+    if (!(*prior >= 0 && *prior <= kMost)) return table.wrong("pose_prior", "is 0 to 100, as 0.01");
+    out.pose_prior = *prior;
+  }
+  if (!table.has("initial")) return {};
+  const auto initial = table.path("initial");
+  if (!initial) return initial.error();
+  auto field = read_field(*initial);
+  if (!field) return field.error();
+  out.initial = *std::move(field);
+  return {};
+}
+
+Result<void> read_view(const Table& table, const fs::path& folder, RegistrationCase& out) {
+  VideoView view;
+  const auto image = table.path("image");
+  if (!image) return image.error();
+  view.name = fs::relative(*image, folder.empty() ? "." : folder).string();
+  const cv::Mat bgr = cv::imread(image->string(), cv::IMREAD_COLOR);
+  if (bgr.empty()) return table.wrong("image", image->string() + " is no picture that can be read");
+  const auto camera = table.path("camera");
+  if (!camera) return camera.error();
+  const auto model = read_camera(*camera);
+  if (!model) return model.error();
+  view.camera = *model;
+  if (bgr.cols != model->width_px || bgr.rows != model->height_px) {
+    return table.wrong("camera", fmt::format("is for pictures of {}x{} and {} is of {}x{}; calibrate at this size",
+                                             model->width_px, model->height_px, image->string(), bgr.cols, bgr.rows));
+  }
+  const auto pose = table.path("camera_from_patient");
+  if (!pose) return pose.error();
+  const auto matrix = read_pose(*pose);
+  if (!matrix) return matrix.error();
+  view.camera_from_patient = Transform<Camera, Patient>::from_matrix(*matrix);
+  cv::Mat rgb, grey;
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  view.grey.assign(grey.begin<std::uint8_t>(), grey.end<std::uint8_t>());
+  std::vector<std::uint8_t> left_out(view.grey.size(), 0);
+  if (table.has("mask")) {
+    const auto mask_path = table.path("mask");
+    if (!mask_path) return mask_path.error();
+    const cv::Mat mask = cv::imread(mask_path->string(), cv::IMREAD_GRAYSCALE);
+    if (mask.size() != grey.size())
+      return table.wrong("mask", mask_path->string() + " is no picture of the image's size");
+    constexpr int kCounts = 128;
+    std::transform(mask.begin<std::uint8_t>(), mask.end<std::uint8_t>(), left_out.begin(),
+                   [](std::uint8_t m) { return static_cast<std::uint8_t>(m < kCounts ? 1 : 0); });
+  }
+  Picture picture{bgr.cols, bgr.rows, {}};
+  picture.rgb.assign(rgb.datastart, rgb.dataend);
+  auto overlap = overlap_mask(picture.rgb, bgr.cols, bgr.rows, left_out);
+  if (!overlap) return Error{overlap.error().code, fmt::format("{}: {}", image->string(), overlap.error().what)};
+  view.mask = *std::move(overlap);
+  constexpr double kLeast_percent = 1;
+  const auto counts = view.mask.size() - static_cast<std::size_t>(std::count(view.mask.begin(), view.mask.end(), 0));
+  if (100.0 * static_cast<double>(counts) < kLeast_percent * static_cast<double>(view.mask.size())) {
+    return table.wrong(
+        "image", fmt::format("only {} of {}'s pixels count, under {} %: too much is masked, black or glare", counts,
+                             view.name, kLeast_percent));
+  }
+  for (const VideoView& other : out.views) {
+    if (other.grey == view.grey)
+      return table.wrong("image", fmt::format("is the same picture as {}; name each view once", other.name));
+  }
+  out.pictures.push_back(std::move(picture));
+  out.views.push_back(std::move(view));
+  return {};
+}
+
+Result<std::vector<Landmark>> read_landmarks(const fs::path& path) {
+  std::vector<Landmark> landmarks;
+  std::ifstream in(path);
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    if (number == 1 && line.rfind("name", 0) == 0) continue;
+    if (line.empty()) continue;
+    Landmark landmark;
+    std::istringstream fields(line);
+    std::getline(fields, landmark.name, ',');
+    std::string rest;
+    std::getline(fields, rest);
+    std::replace(rest.begin(), rest.end(), ',', ' ');
+    std::istringstream numbers(rest);
+    for (int i = 0; i < 3; ++i) numbers >> landmark.rest_mm[i];
+    for (int i = 0; i < 3; ++i) numbers >> landmark.deformed_mm[i];
+    if (!numbers || !landmark.rest_mm.allFinite() || !landmark.deformed_mm.allFinite()) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}: line {}: a name and six numbers are needed", path.string(), number)};
+    }
+    landmarks.push_back(std::move(landmark));
+  }
+  return landmarks;
+}
+
+}  // namespace
+
+Result<RegistrationCase> read_case(const fs::path& path) {
+  std::error_code no_file;
+  if (!fs::is_regular_file(path, no_file)) {
+    return Error{
+        Errc::unreadable,
+        fmt::format("{}: is no file; name the case's TOML file, as birdseye-sim case writes it", path.string())};
+  }
+  toml::value all;
+  try {
+    all = toml::parse(path.string());
+  } catch (const std::exception& problem) {
+    std::string what = problem.what();
+    return Error{Errc::bad_format, fmt::format("{}: is no case: {}", path.string(), what.substr(0, what.find('\n')))};
+  }
+  if (auto known = only_known_keys(path, all); !known) return known.error();
+  RegistrationCase out;
+  const toml::value none = toml::table{};
+  const auto table = [&](const char* name) { return Table(path, name, all.contains(name) ? all.at(name) : none); };
+  if (auto done = read_volume(table("volume"), out); !done) return done.error();
+  if (auto done = read_model(table("model"), out); !done) return done.error();
+  if (!all.contains("view") || !all.at("view").is_array() || all.at("view").as_array().empty())
+    return Error{Errc::bad_value, fmt::format("{}: has no [[view]]; name one or more", path.string())};
+  int number = 0;
+  for (const toml::value& view : all.at("view").as_array()) {
+    const Table one(path, fmt::format("view {}", number++), view);
+    if (auto done = read_view(one, path.parent_path(), out); !done) return done.error();
+  }
+  const Table truth = table("truth");
+  if (truth.has("landmarks")) {
+    const auto landmarks_path = truth.path("landmarks");
+    if (!landmarks_path) return landmarks_path.error();
+    auto landmarks = read_landmarks(*landmarks_path);
+    if (!landmarks) return landmarks.error();
+    out.landmarks = *std::move(landmarks);
+  }
+  if (truth.has("control_points")) {
+    const auto points_path = truth.path("control_points");
+    if (!points_path) return points_path.error();
+    auto deformation = read_true_deformation(*points_path);
+    if (!deformation) return deformation.error();
+    out.truth = *std::move(deformation);
+  }
+  if (truth.has("pose")) {
+    const auto pose_path = truth.path("pose");
+    if (!pose_path) return pose_path.error();
+    const auto pose = read_pose(*pose_path);
+    if (!pose) return pose.error();
+    out.true_pose = Transform<Patient, Patient>::from_matrix(*pose);
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

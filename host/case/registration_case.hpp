@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/case/true_deformation.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/files/picture.hpp"
+#include "host/registration/views/multi_view.hpp"
+#include "host/registration/views/synthetic_view.hpp"
+#include "host/render/scene/transfer_function.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// A point of the organ, patient frame, mm: where it was when the CT was taken, and where it is in the views.
+struct Landmark {
+  std::string name;
+  Eigen::Vector3d rest_mm, deformed_mm;
+};
+
+/// What `birdseye register views` is given: docs/manual/registration.md describes the file.
+struct RegistrationCase {
+  Volume ct;
+  std::optional<Volume> labels;
+  std::vector<int> label_values;
+  std::string transfer;
+  /// Inner control points along each axis; empty for "auto".
+  std::optional<std::array<int, 3>> control_points;
+  int level = 5;
+  std::string optimiser = "gradient";  ///< or simplex, powell; only these use the three below
+  bool vertices = false;               ///< the unknowns are the free vertices of `level`
+  std::string similarity = "mi";
+  int most_evaluations = 400;
+  bool refine_pose = false;  ///< only with gradient
+  double pose_prior = Prior{}.pose;
+  std::optional<DisplacementField> initial;
+  std::vector<VideoView> views;
+  std::vector<Picture> pictures;  ///< of the views, in colour
+  std::vector<Landmark> landmarks;
+  std::optional<TrueDeformation> truth;
+  /// What a refined pose should be: patient_from_model.
+  std::optional<Transform<Patient, Patient>> true_pose;
+};
+
+/// Refuses, naming file and key: what is missing or of another size than it says, and two views that are the same.
+Result<RegistrationCase> read_case(const std::filesystem::path& path);
+
+}  // namespace birdseye::host

@@ -1,0 +1,94 @@
+#include "host/case/registration_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "host/report/html_page.hpp"
+#include "host/report/line_plot.hpp"
+
+namespace birdseye::host {
+
+std::string trace_svg(const std::vector<TracePoint>& trace) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  Panel panel{
+      "Similarity at each evaluation, and degrees of freedom", "evaluations", "similarity", {{"similarity", {}}}};
+  panel.from_zero = false;
+  // A line for each stage: values of different resolutions or numbers of unknowns cannot be compared.
+  for (std::size_t i = 0; i < trace.size(); ++i) {
+    const auto x = static_cast<double>(i);
+    const bool begins =
+        i == 0 || trace[i].reduction != trace[i - 1].reduction || trace[i].parameters != trace[i - 1].parameters;
+    if (begins) {
+      panel.curves[0].points.emplace_back(kNone, kNone);
+      panel.marks.push_back({x, std::to_string(trace[i].parameters)});
+    }
+    panel.curves[0].points.emplace_back(x, trace[i].similarity);
+  }
+  return plot_svg({panel}, 1, {920, 300});
+}
+
+std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageRgba& overlay) {
+  const std::size_t pixels = view.grey.size();
+  std::vector<double> synthetic(pixels);
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    synthetic[i] = 0.299 * overlay.rgba[4 * i] + 0.587 * overlay.rgba[4 * i + 1] + 0.114 * overlay.rgba[4 * i + 2];
+    if (view.mask[i] == 0) continue;
+    const double v = view.grey[i];
+    n += 1;
+    sx += synthetic[i];
+    sy += v;
+    sxx += synthetic[i] * synthetic[i];
+    sxy += synthetic[i] * v;
+  }
+  const double spread = n * sxx - sx * sx;
+  const double gain = spread > 0 ? (n * sxy - sx * sy) / spread : 0;
+  const double offset = n > 0 ? (sy - gain * sx) / n : 0;
+  std::vector<std::uint8_t> rgb(3 * pixels, 255);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (view.mask[i] == 0) {
+      std::fill_n(rgb.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, std::uint8_t{128});
+      continue;
+    }
+    constexpr double kContrast = 2;
+    const double d = std::clamp(kContrast * (view.grey[i] - gain * synthetic[i] - offset), -255.0, 255.0);
+    const auto rest = static_cast<std::uint8_t>(255 - std::abs(d));
+    rgb[3 * i] = d > 0 ? 255 : rest;
+    rgb[3 * i + 1] = rest;
+    rgb[3 * i + 2] = d > 0 ? rest : 255;
+  }
+  return rgb;
+}
+
+std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
+                                const nlohmann::json& json) {
+  HtmlPage page(fmt::format("Registration to {} views", c.views.size()));
+  page.set_verdict(verdict);
+  std::vector<std::vector<std::string>> rows{{"figure", ""}};
+  for (const auto& [key, value] : json.items()) {
+    if (key == "verdict") continue;
+    if (value.is_number()) rows.push_back({key, fmt::format("{:.6g}", value.get<double>())});
+    if (value.is_string()) rows.push_back({key, value.get<std::string>()});
+  }
+  page.table(rows);
+  page.heading("Similarity on the way");
+  page.svg(trace_svg(found.trace), "Each line is one stage; lines of different stages cannot be compared.");
+  page.heading("Views");
+  for (std::size_t n = 0; n < c.views.size(); ++n) {
+    std::vector<std::string> files;
+    for (const char* kind : {"before", "after", "difference_before", "difference_after"})
+      files.push_back(fmt::format("view{}_{}.png", n, kind));
+    page.picture_files(files,
+                       fmt::format("{}: similarity {:.4f} before, {:.4f} after. Left: before; right: after. Above: "
+                                   "the overlay; below: difference of grey (red: the video is brighter; blue: "
+                                   "darker; grey: not compared).",
+                                   c.views[n].name, found.per_view_before[n], found.per_view_after[n]));
+  }
+  return page.html();
+}
+
+}  // namespace birdseye::host

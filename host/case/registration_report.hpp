@@ -1,0 +1,25 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "calibration/base/verdict.hpp"
+#include "host/case/registration_case.hpp"
+#include "host/registration/views/view_registration.hpp"
+#include "host/render/scene/scene.hpp"
+
+namespace birdseye::host {
+
+/// Similarity over the optimiser's evaluations.
+std::string trace_svg(const std::vector<TracePoint>& trace);
+
+/// How far the view's grey is from the overlay's, once that is scaled to it: red where the video is brighter, blue
+/// where it is darker; RGB.
+std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageRgba& overlay);
+
+/// A page that shows the pictures beside it.
+std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
+                                const nlohmann::json& json);
+
+}  // namespace birdseye::host

@@ -1,0 +1,34 @@
+#include "host/case/run_registration.hpp"
+
+#include "host/registration/views/rendered_registration.hpp"
+
+namespace birdseye::host {
+
+Result<ViewRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
+                                          bool estimate_uncertainty,
+                                          const std::function<void(const std::string&)>& tell) {
+  const Volume* const labels = c.labels ? &*c.labels : nullptr;
+  if (c.optimiser == "gradient") {
+    ViewRegistrationSettings settings;
+    settings.control_points = c.control_points;
+    settings.level = c.level;
+    settings.initial = c.initial;
+    settings.refine_pose = c.refine_pose;
+    settings.prior.pose = c.pose_prior;
+    settings.estimate_uncertainty = estimate_uncertainty;
+    settings.progress = tell;
+    return register_views(c.views, c.ct, labels, c.label_values, transfer, settings);
+  }
+  RenderedRegistrationSettings settings;
+  settings.optimiser = c.optimiser == "powell" ? DirectOptimiser::powell : DirectOptimiser::simplex;
+  settings.similarity = c.similarity;
+  settings.vertices = c.vertices;
+  settings.control_points = c.control_points.value_or(settings.control_points);
+  settings.level = c.level;
+  settings.initial = c.initial;
+  settings.most_evaluations = c.most_evaluations;
+  settings.progress = tell;
+  return register_rendered(c.views, c.ct, labels, c.label_values, transfer, settings);
+}
+
+}  // namespace birdseye::host

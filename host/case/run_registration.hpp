@@ -1,0 +1,16 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "host/case/registration_case.hpp"
+#include "host/registration/views/view_registration.hpp"
+
+namespace birdseye::host {
+
+/// Registers a case by the optimiser that it names. tell is called with a line for a person now and then.
+Result<ViewRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
+                                          bool estimate_uncertainty,
+                                          const std::function<void(const std::string&)>& tell);
+
+}  // namespace birdseye::host

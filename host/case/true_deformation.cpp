@@ -1,0 +1,56 @@
+#include "host/case/true_deformation.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace birdseye::host {
+
+Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path) {
+  const auto wrong = [&](const std::string& why) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: {}; name the control_points.json of birdseye-sim case", path.string(), why)};
+  };
+  try {
+    std::ifstream in(path);
+    const nlohmann::json json = nlohmann::json::parse(in);
+    const auto low = json.at("box_low_mm").get<std::array<double, 3>>();
+    const auto high = json.at("box_high_mm").get<std::array<double, 3>>();
+    auto patch = BezierPatch::create(json.at("degree").get<std::array<int, 3>>());
+    if (!patch) return wrong(patch.error().what);
+    TrueDeformation out{Eigen::Vector3d(low.data()), Eigen::Vector3d(high.data()) - Eigen::Vector3d(low.data()),
+                        *std::move(patch)};
+    if (!(out.box_mm.minCoeff() > 0)) return wrong("has a box of no size");
+    std::vector<Eigen::Vector3d> moves;
+    for (const auto& point : json.at("displacement_mm")) {
+      const auto move_mm = point.get<std::array<double, 3>>();
+      moves.emplace_back(Eigen::Vector3d(move_mm.data()).cwiseQuotient(out.box_mm));
+    }
+    if (moves.size() != out.patch.free_points()) {
+      return wrong(
+          fmt::format("has {} displacements for {} inner control points", moves.size(), out.patch.free_points()));
+    }
+    out.patch.set_displacements(moves);
+    return out;
+  } catch (const nlohmann::json::exception& problem) {
+    return wrong(problem.what());
+  }
+}
+
+double epsilon(const TrueDeformation& truth, const DisplacementField* field) {
+  constexpr int kLevel = 3;
+  const PatchOctree tree = *PatchOctree::uniform(kLevel);
+  double sum = 0;
+  for (std::size_t i = 0; i < tree.free_vertices(); ++i) {
+    const Eigen::Vector3d x = tree.vertex(i);
+    Eigen::Vector3d rest = truth.patch.displacement(x);
+    if (field != nullptr)
+      rest -= field->displacement(truth.low_mm + x.cwiseProduct(truth.box_mm)).cwiseQuotient(truth.box_mm);
+    sum += rest.squaredNorm();
+  }
+  return sum;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,196 @@
+#include "host/demo/demo_session.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "calibration/base/median.hpp"
+#include "calibration/camera/camera_calibration.hpp"
+#include "drivers/system/interrupt.hpp"
+#include "host/registration/rigid/point_matching.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+#include "host/volume/marker_finder.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The labels of the simulator's segmentation that the overlay shows.
+constexpr int kPortal = 2, kHepatic = 3, kTumour = 4;
+constexpr int kKeepEvery = 20;  // of the overlaid frames, for the pictures of the report
+
+}  // namespace
+
+Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials) {
+  const auto ct = import_volume(patient / "ct");
+  if (!ct) return ct.error();
+  const auto labels = import_labels(patient / "segmentation.nii.gz", *ct);
+  if (!labels) return labels.error();
+  Plan plan;
+  const int shown[] = {kPortal, kHepatic, kTumour};
+  auto kept = keep_labels(*ct, *labels, shown);
+  if (!kept) return kept.error();
+  plan.shown = *std::move(kept);
+  const auto centre = label_centroid_mm(*labels, kTumour);
+  if (!centre) return centre.error();
+  plan.tumour_centre_in_patient_mm = *centre;
+  for (const MarkerFit& marker : find_markers(*ct).markers)
+    plan.markers_in_patient_mm.push_back(marker.centre_in_patient_mm);
+  if (static_cast<int>(plan.markers_in_patient_mm.size()) < fiducials) {
+    return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", (patient / "ct").string(),
+                                              plan.markers_in_patient_mm.size(), fiducials)};
+  }
+  plan.markers_in_patient_mm.resize(static_cast<std::size_t>(fiducials));  // the brightest
+  return plan;
+}
+
+std::string DemoSession::stage_at(DeviceTime time) const {
+  std::string name;
+  for (const CartStage& stage : cart_.stages()) {
+    if (stage.begins <= time) name = stage.name;
+  }
+  return name;
+}
+
+Result<void> DemoSession::finish() {
+  // Of the middle one: measurements that a busy machine had no time for do not make the tracker a slower one.
+  if (!tracker_periods_s_.empty()) figures.tracker_rate_hz = 1 / median_of(std::move(tracker_periods_s_));
+  return film_.finish();
+}
+
+Result<void> DemoSession::take(const wire::Birds& birds) {
+  if (last_measured_) tracker_periods_s_.push_back((birds.acquired - *last_measured_).seconds());
+  last_measured_ = birds.acquired;
+  const std::string stage = stage_at(birds.acquired);
+  if (stage == "calibrate") {
+    stations_.push(birds);
+    take_stations();
+  }
+  for (const wire::Bird& bird : birds.birds) {
+    if (bird.name == "pointer" && (stage == "touch" || stage == "look")) {
+      const Eigen::Vector3d tip = bird.tracker_from_sensor * cart_.sheet().tip_in_pointer_mm;
+      if (const auto touch = touch_detector_.push(birds.acquired, tip); touch && stage == "touch") {
+        touches_in_tracker_mm_.push_back(touch->tip_in_tracker_mm);
+        progress_(fmt::format("touched fiducial {} of {}", touches_in_tracker_mm_.size(), cart_.sheet().fiducials));
+      }
+    }
+  }
+  return {};
+}
+
+void DemoSession::take_stations() {
+  while (auto taken = stations_.take_station()) {
+    calibration::HandEyeStation station;
+    station.name = taken->view.name;
+    station.view = std::move(taken->view);
+    station.tracker_from_sensor = taken->tracker_from_sensor;
+    seen_.stations.push_back(std::move(station));
+  }
+}
+
+Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
+  stations_.finish();
+  take_stations();
+  std::vector<calibration::PatternView> views;
+  views.reserve(seen_.stations.size());
+  for (const calibration::HandEyeStation& station : seen_.stations) views.push_back(station.view);
+  const auto lens = calibration::calibrate_camera(views, size.width_px, size.height_px);
+  if (!lens) return Error{lens.error().code, "camera calibration: " + lens.error().what};
+  seen_.camera = lens->camera;
+  const auto hand_eye = calibration::calibrate_hand_eye(seen_);
+  if (!hand_eye) return Error{hand_eye.error().code, "hand-eye calibration: " + hand_eye.error().what};
+  if (const Verdict verdict = calibration::judge(*hand_eye); verdict.grade == Grade::fail)
+    return Error{Errc::degenerate, fmt::format("hand-eye calibration: {}", fmt::join(verdict.reasons, "; "))};
+  const auto fit = match_and_fit(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
+  if (!fit) return Error{fit.error().code, "registration: " + fit.error().what};
+  figures.camera_rms_px = lens->rms_px;
+  figures.hand_eye_rms_px = hand_eye->tracked_px;
+  figures.board_views = static_cast<int>(seen_.stations.size());
+  figures.fre_mm = fit->fit.fre_rms_mm;
+  figures.fiducial_residuals_mm = fit->fit.residuals_mm;
+  setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
+  const auto transfer = load_transfer_function("tumour-and-vessels");
+  if (!transfer) return transfer.error();
+  auto engine = make_engine("cpu", plan_.shown, *transfer);
+  if (!engine) return engine.error();
+  engine_ = *std::move(engine);
+  RenderSettings settings;
+  settings.step_mm = 1.2;
+  drawing_.emplace(*setup, OverlayGate::Calibration{lens->rms_px, hand_eye->tracked_px, fit->fit.fre_rms_mm}, *engine_,
+                   settings);
+  progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
+                             figures.board_views, hand_eye->tracked_px, fit->fit.fre_rms_mm));
+  return {};
+}
+
+Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
+  const FrameOverlay::Drawn drawn = drawing_->draw(frame);
+  if (drawn.camera_from_patient) {
+    if (overlaid.size() % kKeepEvery == 0) {
+      kept.push_back({frame.info.sequence,
+                      {frame.width_px, frame.height_px, *frame.rgb},
+                      {frame.width_px, frame.height_px, drawn.rgb}});
+    }
+    overlaid.push_back({frame.info.sequence, frame.info.acquired, *drawn.camera_from_patient});
+    if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
+  } else {
+    ++figures.frames_without_overlay;
+  }
+  return film_.add(drawn.rgb);
+}
+
+Result<void> DemoSession::take(const wire::VideoFrame& frame) {
+  ++figures.frames;
+  // By the camera's own count, whoever lost them.
+  if (!first_sequence_) first_sequence_ = frame.info.sequence;
+  figures.frames_dropped = static_cast<int>(frame.info.sequence - *first_sequence_ + 1) - figures.frames;
+  const std::string stage = stage_at(frame.info.acquired);
+  if (stage == "calibrate") {
+    stations_.push(frame);
+    progress_(fmt::format("calibrating: {} views of the board", seen_.stations.size()));
+  }
+  if (stage != "look" && stage != "end") return {};
+  if (!setup) {
+    CameraModel size;
+    size.width_px = frame.width_px;
+    size.height_px = frame.height_px;
+    if (auto done = calibrate_and_register(size); !done) return done;
+  }
+  return overlay(frame);
+}
+
+Result<void> DemoSession::run(EventStream& stream) {
+  constexpr auto kPatience = std::chrono::seconds(15);
+  auto heard = Clock::now();
+  for (;;) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
+    if (const std::string failure = cart_.failure(); !failure.empty()) return Error{Errc::disconnected, failure};
+    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    if (!event) return event.error();
+    if (!*event) {
+      const auto stages = cart_.stages();
+      // Nothing waits, the script has ended, and the last frames have had time to come.
+      if (!stages.empty() && stages.back().name == "end" && Clock::now() - heard > std::chrono::milliseconds(500))
+        return {};
+      if (Clock::now() - heard > kPatience)
+        return Error{Errc::timeout, "the appliance has sent nothing for 15 s; see birdseyed.log"};
+      continue;
+    }
+    Result<void> taken;
+    if (const auto* frame = std::get_if<wire::VideoFrame>(&**event)) {
+      taken = take(*frame);
+      heard = Clock::now();
+    } else if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
+      taken = take(*birds);
+      // After the script's end the tracker goes on a little; the last frames may still be on their way.
+      const auto stages = cart_.stages();
+      const bool ended = !stages.empty() && stages.back().name == "end" && stages.back().begins < birds->acquired;
+      if (ended && Clock::now() - heard > std::chrono::milliseconds(400)) return {};
+    }
+    if (!taken) return taken;
+  }
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "device/wire/messages.hpp"
+#include "drivers/system/progress.hpp"
+#include "host/demo/demo_report.hpp"
+#include "host/files/film.hpp"
+#include "host/files/picture.hpp"
+#include "host/guide/live_stations.hpp"
+#include "host/link/event_stream.hpp"
+#include "host/overlay/frame_overlay.hpp"
+#include "host/registration/rigid/touch_detector.hpp"
+#include "host/render/engine.hpp"
+#include "host/simulated/simulated_cart.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// What is read of the CT before the operation: all that the appliance does not send.
+struct Plan {
+  Volume shown;
+  Eigen::Vector3d tumour_centre_in_patient_mm;
+  std::vector<Eigen::Vector3d> markers_in_patient_mm;
+};
+/// patient: a folder that the simulator made; its CT must show at least this many fiducials.
+Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials);
+
+struct OverlaidFrame {
+  std::uint64_t sequence;
+  DeviceTime acquired;
+  Transform<Camera, Patient> camera_from_patient;
+};
+
+struct KeptFrame {
+  std::uint64_t sequence;
+  Picture video, overlay;
+};
+
+/// One run of the demo: takes the appliance's events in order and does what the stage asks for.
+class DemoSession {
+ public:
+  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, const Plan& plan, Film film, Progress& progress)
+      : cart_(cart), plan_(plan), film_(std::move(film)), progress_(progress), stations_(board, "scope") {}
+
+  /// Until the operation has ended and its last frame has come.
+  Result<void> run(EventStream& stream);
+  Result<void> finish();
+
+  DemoFigures figures;
+  std::vector<OverlaidFrame> overlaid;
+  std::vector<KeptFrame> kept;
+  std::optional<Setup> setup;
+
+ private:
+  [[nodiscard]] std::string stage_at(DeviceTime time) const;
+  Result<void> take(const wire::Birds& birds);
+  Result<void> take(const wire::VideoFrame& frame);
+  void take_stations();
+  Result<void> calibrate_and_register(const CameraModel& size);
+  Result<void> overlay(const wire::VideoFrame& frame);
+
+  SimulatedCart& cart_;
+  const Plan& plan_;
+  Film film_;
+  Progress& progress_;
+  LiveStations stations_;
+  calibration::HandEyeInput seen_;
+  TouchDetector touch_detector_;
+  std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
+  std::unique_ptr<Engine> engine_;
+  std::optional<FrameOverlay> drawing_;
+  std::optional<std::uint64_t> first_sequence_;
+  std::optional<DeviceTime> last_measured_;
+  std::vector<double> tracker_periods_s_;
+};
+
+}  // namespace birdseye::host

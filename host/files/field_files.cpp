@@ -1,0 +1,256 @@
+#include "host/files/field_files.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "host/files/pose_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Row = std::vector<std::string>;
+
+struct Table {
+  Row columns;
+  std::vector<std::pair<int, Row>> rows;  ///< with their lines
+};
+
+Row split(const std::string& line) {
+  Row fields(1);
+  for (const char c : line) {
+    if (c == ',' || c == ';' || c == '\t') {
+      fields.emplace_back();
+    } else if (c != ' ' && c != '\r' && c != '"') {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+Result<Table> read_table(const fs::path& path, const Row& needed) {
+  std::error_code ignored;
+  std::ifstream in(path);
+  if (!in || fs::is_directory(path, ignored))
+    return Error{Errc::not_found, path.string() + ": no such file, or not to be read"};
+  Table table;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
+    if (table.columns.empty()) {
+      table.columns = split(line);
+    } else {
+      table.rows.emplace_back(number, split(line));
+    }
+  }
+  for (const std::string& name : needed) {
+    if (std::find(table.columns.begin(), table.columns.end(), name) == table.columns.end())
+      return Error{Errc::bad_format, fmt::format("{}: has no column {}; the first line names the columns: {}",
+                                                 path.string(), name, fmt::join(needed, ","))};
+  }
+  if (table.rows.empty()) return Error{Errc::bad_format, path.string() + ": has no rows under its first line"};
+  return table;
+}
+
+/// A cell's text; empty where there is none.
+std::string cell(const Table& table, const Row& row, const std::string& column) {
+  const auto found = std::find(table.columns.begin(), table.columns.end(), column);
+  const auto at = static_cast<std::size_t>(found - table.columns.begin());
+  return at < row.size() ? row[at] : "";
+}
+
+constexpr double kLargest = 1e6;  // mm: beyond it stands what some trackers write for "missing", as -3.697314E28
+
+std::optional<double> number(const std::string& text) {
+  double value = 0;
+  const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (failed != std::errc() || end != text.data() + text.size() || !(std::abs(value) < kLargest)) return std::nullopt;
+  return value;
+}
+
+template <std::size_t N>
+std::optional<std::array<double, N>> numbers(const Table& table, const Row& row,
+                                             const std::array<const char*, N>& columns) {
+  std::array<double, N> out{};
+  for (std::size_t i = 0; i < N; ++i) {
+    const auto value = number(cell(table, row, columns[i]));
+    if (!value) return std::nullopt;
+    out[i] = *value;
+  }
+  return out;
+}
+
+Result<void> all_used(const fs::path& path, std::size_t used) {
+  if (used > 0) return {};
+  return Error{Errc::bad_format, path.string() + ": holds no row that can be used"};
+}
+
+}  // namespace
+
+Result<FieldSamples> read_field_grid(const fs::path& path, bool held_alike) {
+  Row needed{"true_x", "true_y", "true_z", "x", "y", "z"};
+  if (held_alike) needed.insert(needed.end(), {"qx", "qy", "qz", "qw"});
+  const auto table = read_table(path, needed);
+  if (!table) return table.error();
+  FieldSamples out;
+  for (const auto& [line, row] : table->rows) {
+    std::string name = cell(*table, row, "name");
+    if (name.empty()) name = fmt::format("line {}", line);
+    const auto p = numbers<6>(*table, row, {"true_x", "true_y", "true_z", "x", "y", "z"});
+    std::optional<std::array<double, 4>> q{{0, 0, 0, 1}};
+    if (held_alike) q = numbers<4>(*table, row, {"qx", "qy", "qz", "qw"});
+    if (!p || !q) {
+      out.rejected.push_back(fmt::format("line {}: a number is missing, or is none that can be", line));
+      continue;
+    }
+    const Eigen::Quaterniond turn((*q)[3], (*q)[0], (*q)[1], (*q)[2]);
+    if (std::abs(turn.norm() - 1) > 1e-2) {
+      out.rejected.push_back(fmt::format("line {}: qx,qy,qz,qw is no rotation", line));
+      continue;
+    }
+    calibration::FieldSample sample{name, {(*p)[0], (*p)[1], (*p)[2]}, {}, {turn, {(*p)[3], (*p)[4], (*p)[5]}}};
+    if (held_alike) sample.true_rotation = Eigen::Matrix3d::Identity();
+    out.samples.push_back(std::move(sample));
+  }
+  if (const auto any = all_used(path, out.samples.size()); !any) return any.error();
+  return out;
+}
+
+Result<GridSpec> parse_grid_spec(const std::string& text) {
+  GridSpec spec;
+  int taken = 0;
+  auto* const c = spec.counts;
+  auto* const s = spec.steps_mm;
+  bool sound =
+      std::sscanf(text.c_str(), "%dx%dx%d:%lfx%lfx%lfmm%n", &c[0], &c[1], &c[2], &s[0], &s[1], &s[2], &taken) == 6 &&
+      taken == static_cast<int>(text.size());
+  if (!sound) {
+    taken = 0;
+    sound = std::sscanf(text.c_str(), "%dx%dx%d:%lfmm%n", &c[0], &c[1], &c[2], &s[0], &taken) == 4 &&
+            taken == static_cast<int>(text.size());
+    s[1] = s[2] = s[0];
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    sound = sound && c[axis] >= 2 && c[axis] <= 100 && s[axis] > 0 && s[axis] <= 1000;
+  if (sound) return spec;
+  return Error{Errc::bad_value,
+               fmt::format("--grid-spec {}: give counts and steps, as 6x6x5:100mm or 6x6x5:100x96x100mm", text)};
+}
+
+Result<FieldSamples> read_field_poses(const fs::path& path, const GridSpec& spec, bool held_alike) {
+  auto poses = read_pose_set(path);
+  if (!poses) return poses.error();
+  const auto& n = spec.counts;
+  const std::size_t nodes = static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1] * n[2]);
+  if (poses->poses.size() + poses->rejected.size() != nodes)
+    return Error{Errc::bad_value,
+                 fmt::format("{}: {} poses for {} nodes; give a pose for each node, in their order, and an INVALID or "
+                             "NaN one for a node that was left out",
+                             path.string(), poses->poses.size() + poses->rejected.size(), nodes)};
+  FieldSamples out{{}, std::move(poses->rejected)};
+  for (const TimedPose& pose : poses->poses) {
+    const auto at = static_cast<int>(pose.index);
+    const int i = at % n[0], j = at / n[0] % n[1], k = at / n[0] / n[1];
+    const Eigen::Vector3d place(i * spec.steps_mm[0], j * spec.steps_mm[1], k * spec.steps_mm[2]);
+    calibration::FieldSample sample{
+        fmt::format("node {},{},{} ({})", i + 1, j + 1, k + 1, pose.name), place, {}, pose.tracker_from_sensor};
+    if (held_alike) sample.true_rotation = Eigen::Matrix3d::Identity();
+    out.samples.push_back(std::move(sample));
+  }
+  return out;
+}
+
+Result<FieldPairs> read_field_pairs(const fs::path& a, const fs::path& b) {
+  constexpr double kSameMomentS = 0.005;
+  auto of_a = read_pose_set(a), of_b = read_pose_set(b);
+  if (!of_a) return of_a.error();
+  if (!of_b) return of_b.error();
+  FieldPairs out;
+  for (const auto& [path, set] : {std::pair{&a, &*of_a}, std::pair{&b, &*of_b}}) {
+    for (const std::string& why : set->rejected) out.rejected.push_back(path->filename().string() + ": " + why);
+  }
+  const bool timed = of_a->timed && of_b->timed;
+  std::size_t k = 0;
+  for (const TimedPose& pose : of_a->poses) {
+    const auto before = [&](const TimedPose& other) {
+      return timed ? other.time_s < pose.time_s - kSameMomentS : other.index < pose.index;
+    };
+    while (k < of_b->poses.size() && before(of_b->poses[k])) ++k;
+    if (k == of_b->poses.size()) break;
+    const TimedPose& other = of_b->poses[k];
+    if (timed ? other.time_s > pose.time_s + kSameMomentS : other.index != pose.index) continue;
+    out.pairs.push_back({pose.name, pose.tracker_from_sensor, other.tracker_from_sensor});
+    ++k;
+  }
+  if (out.pairs.empty())
+    return Error{Errc::bad_value, fmt::format("{} and {}: no two poses are of the same moment (to 5 ms); were they "
+                                              "recorded together, on one clock?",
+                                              a.string(), b.string())};
+  return out;
+}
+
+Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file.is_open() || file.bad())
+    return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
+  auto map = calibration::parse_field_map(text.str());
+  if (!map) return Error{map.error().code, path.string() + ": " + map.error().what};
+  return map;
+}
+
+Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const fs::path& path) {
+  const auto table = read_table(path, {"name", "x", "y", "z"});
+  if (!table) return table.error();
+  std::vector<std::pair<std::string, Eigen::Vector3d>> out;
+  for (const auto& [line, row] : table->rows) {
+    const auto p = numbers<3>(*table, row, {"x", "y", "z"});
+    if (!p)
+      return Error{Errc::bad_format,
+                   fmt::format("{}:{}: needs a name and three numbers, mm; measure it again, or take it out",
+                               path.string(), line)};
+    out.emplace_back(cell(*table, row, "name"), Eigen::Vector3d((*p)[0], (*p)[1], (*p)[2]));
+  }
+  return out;
+}
+
+Result<std::vector<calibration::FieldCheck>> read_history(const fs::path& path) {
+  std::vector<calibration::FieldCheck> out;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return out;
+  const auto table = read_table(path, {"when", "rms_mm", "scale_percent", "worst_mm", "worst_place"});
+  if (!table) return table.error();
+  for (const auto& [line, row] : table->rows) {
+    const auto v = numbers<3>(*table, row, {"rms_mm", "scale_percent", "worst_mm"});
+    if (!v)
+      return Error{Errc::bad_format,
+                   fmt::format("{}:{}: is no day of a history; take the line out", path.string(), line)};
+    out.push_back({cell(*table, row, "when"), (*v)[0], (*v)[1], (*v)[2], cell(*table, row, "worst_place"), {}});
+  }
+  return out;
+}
+
+std::string history_text(const std::vector<calibration::FieldCheck>& history) {
+  std::string out = "when,rms_mm,scale_percent,worst_mm,worst_place\n";
+  for (const auto& day : history) {
+    std::string when = day.when;  // a name of its own making must not become columns
+    std::replace_if(
+        when.begin(), when.end(), [](char c) { return std::string_view(",;\t\n\r\" ").find(c) < 7; }, '-');
+    out +=
+        fmt::format("{},{:.4f},{:.4f},{:.4f},{}\n", when, day.rms_mm, day.scale_percent, day.worst_mm, day.worst_place);
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/field/field_check.hpp"
+#include "calibration/field/field_fit.hpp"
+#include "calibration/record/field_map_file.hpp"
+
+namespace birdseye::host {
+
+/// What was read, and what was passed over and why: "line 8: not finite".
+struct FieldSamples {
+  std::vector<calibration::FieldSample> samples;
+  std::vector<std::string> rejected;
+};
+
+/// A table with the columns true_x, true_y, true_z, x, y, z (mm) and, if orientation was measured, qx, qy, qz, qw
+/// (Hamilton); a column name is taken for names. held_alike: the sensor was turned the same way at each place.
+Result<FieldSamples> read_field_grid(const std::filesystem::path& path, bool held_alike);
+
+/// Nodes of a regular grid: counts along each axis, x fastest, and steps between them.
+struct GridSpec {
+  int counts[3] = {0, 0, 0};
+  double steps_mm[3] = {0, 0, 0};
+};
+/// "6x6x5:100mm", or "6x6x5:100x96x100mm" where the steps differ.
+Result<GridSpec> parse_grid_spec(const std::string& text);
+/// Poses in the order of the grid's nodes; those that were rejected count as nodes that were left out.
+Result<FieldSamples> read_field_poses(const std::filesystem::path& path, const GridSpec& spec, bool held_alike);
+
+struct FieldPairs {
+  std::vector<calibration::FieldPair> pairs;
+  std::vector<std::string> rejected;
+};
+/// Two files of poses, paired by their times (to 5 ms), or by their order where they have none.
+Result<FieldPairs> read_field_pairs(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// A map as birdseye calibrate field wrote it; an error names the file.
+Result<calibration::FieldMapFile> read_field_map(const std::filesystem::path& path);
+
+/// A table name, x, y, z: a plate's places as they are, or as they were touched.
+Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const std::filesystem::path& path);
+
+/// The days so far; empty where there is no such file yet.
+Result<std::vector<calibration::FieldCheck>> read_history(const std::filesystem::path& path);
+std::string history_text(const std::vector<calibration::FieldCheck>& history);
+
+}  // namespace birdseye::host

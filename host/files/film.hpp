@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "drivers/system/child_process.hpp"
+
+namespace birdseye::host {
+
+/// An H.264 film in an MP4 file, encoded by the ffmpeg program. The file appears under its name when the film is whole.
+class Film {
+ public:
+  static Result<Film> open(const std::filesystem::path& path, int width_px, int height_px, double rate_hz);
+
+  /// rgb: width * height * 3 bytes, rows from the top.
+  Result<void> add(std::span<const std::uint8_t> rgb);
+  Result<void> finish();
+
+ private:
+  Film(ChildProcess encoder, std::filesystem::path path, std::filesystem::path temporary, std::size_t frame_bytes)
+      : encoder_(std::move(encoder)),
+        path_(std::move(path)),
+        temporary_(std::move(temporary)),
+        frame_bytes_(frame_bytes) {}
+
+  ChildProcess encoder_;
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  std::size_t frame_bytes_;
+};
+
+/// The frames of such a film, decoded by the ffmpeg program, in order.
+class FilmReader {
+ public:
+  static Result<FilmReader> open(const std::filesystem::path& path, int width_px, int height_px);
+
+  /// RGB, rows from the top; what comes before it is passed over. An error at the film's end, or where the index has
+  /// been read already.
+  Result<std::vector<std::uint8_t>> read(std::size_t index);
+
+ private:
+  FilmReader(ChildProcess decoder, std::filesystem::path path, std::size_t frame_bytes)
+      : decoder_(std::move(decoder)), path_(std::move(path)), frame_bytes_(frame_bytes) {}
+
+  ChildProcess decoder_;
+  std::filesystem::path path_;
+  std::size_t frame_bytes_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,83 @@
+#include "host/files/picture.hpp"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace birdseye::host {
+
+namespace {
+
+const cv::Scalar kMark(255, 255, 255), kRim(0, 0, 0);
+
+/// The picture's own pixels, for OpenCV to draw on.
+cv::Mat view_of(Picture& picture) {
+  return {picture.height_px, picture.width_px, CV_8UC3, picture.rgb.data()};
+}
+
+cv::Point point_of(const Eigen::Vector2d& p) {
+  return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
+}
+
+}  // namespace
+
+Result<Picture> read_picture(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return Error{Errc::not_found, path.string() + ": no such file"};
+  const cv::Mat read = cv::imread(path.string(), cv::IMREAD_COLOR);
+  if (read.empty()) return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};
+  Picture picture{read.cols, read.rows, {}};
+  picture.rgb.resize(3 * read.total());
+  cv::Mat rgb = view_of(picture);
+  cv::cvtColor(read, rgb, cv::COLOR_BGR2RGB);
+  return picture;
+}
+
+std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels) {
+  const cv::Mat image(height_px, width_px, channels == 4 ? CV_8UC4 : CV_8UC3, const_cast<std::uint8_t*>(pixels.data()));
+  cv::Mat swapped;
+  cv::cvtColor(image, swapped, channels == 4 ? cv::COLOR_RGBA2BGRA : cv::COLOR_RGB2BGR);
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", swapped, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+Picture tile(std::span<const Picture> pictures, int columns, double scale) {
+  Picture out;
+  if (pictures.empty()) return out;
+  const int width = static_cast<int>(pictures[0].width_px * scale);
+  const int height = static_cast<int>(pictures[0].height_px * scale);
+  const int count = static_cast<int>(pictures.size());
+  out.width_px = width * std::min(columns, count);
+  out.height_px = height * ((count + columns - 1) / columns);
+  out.rgb.resize(static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px) * 3);
+  cv::Mat canvas = view_of(out);
+  for (int i = 0; i < count; ++i) {
+    const Picture& p = pictures[static_cast<std::size_t>(i)];
+    const cv::Mat source(p.height_px, p.width_px, CV_8UC3, const_cast<std::uint8_t*>(p.rgb.data()));
+    cv::Mat cell = canvas(cv::Rect(i % columns * width, i / columns * height, width, height));
+    cv::resize(source, cell, cell.size(), 0, 0, cv::INTER_AREA);
+  }
+  return out;
+}
+
+void draw_cross(Picture& picture, const Eigen::Vector2d& centre_px) {
+  cv::Mat image = view_of(picture);
+  cv::drawMarker(image, point_of(centre_px), kRim, cv::MARKER_CROSS, 18, 4, cv::LINE_AA);
+  cv::drawMarker(image, point_of(centre_px), kMark, cv::MARKER_CROSS, 18, 2, cv::LINE_AA);
+}
+
+void draw_circle(Picture& picture, const Eigen::Vector2d& centre_px) {
+  cv::Mat image = view_of(picture);
+  cv::circle(image, point_of(centre_px), 14, kRim, 3, cv::LINE_AA);
+  cv::circle(image, point_of(centre_px), 14, kMark, 1, cv::LINE_AA);
+}
+
+std::vector<std::uint8_t> grey_of(std::span<const std::uint8_t> rgb, int width_px, int height_px) {
+  const cv::Mat image(height_px, width_px, CV_8UC3, const_cast<std::uint8_t*>(rgb.data()));
+  std::vector<std::uint8_t> grey(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
+  cv::Mat out(height_px, width_px, CV_8UC1, grey.data());
+  cv::cvtColor(image, out, cv::COLOR_RGB2GRAY);
+  return grey;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,171 @@
+#include "host/files/pose_collector.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+namespace birdseye::host {
+
+namespace {
+
+/// How far a recorded rotation may be from one: files with three decimals pass, and at 400 mm from the sensor that is
+/// 0.4 mm.
+constexpr double kRotationTolerance = 1e-3;
+/// No tracker sees so far; what is beyond stands for "not seen", as NDI's -3.697314E28 does.
+constexpr double kFarthest_mm = 1e5;
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const auto first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+/// What is wrong with a position, if anything.
+std::string problem_of(const Eigen::Vector3d& position_mm) {
+  if (!position_mm.allFinite()) return "not finite";
+  const double farthest_mm = position_mm.cwiseAbs().maxCoeff();
+  if (farthest_mm <= kFarthest_mm) return {};
+  Eigen::Index which = 0;
+  position_mm.cwiseAbs().maxCoeff(&which);
+  return fmt::format("{:.6g} mm is no position (a stand-in for a missing one)", position_mm[which]);
+}
+
+}  // namespace
+
+ReadNumber read_number(std::string_view text) {
+  text = trimmed(text);
+  std::string lower(text);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  for (const std::string_view word : {"", "missing", "invalid", "na", "n/a", "none", "null"}) {
+    if (lower == word) return {0, lower == "invalid" ? "INVALID" : "missing"};
+  }
+  if (text.size() > 1 && text[0] == '+') text.remove_prefix(1);
+  ReadNumber out;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out.value);
+  const bool beyond = error == std::errc::result_out_of_range;
+  if (!beyond && (error != std::errc() || end != text.data() + text.size())) {
+    out.problem = fmt::format("\"{}\" is no number", text.substr(0, 40));
+  } else if (beyond || !std::isfinite(out.value)) {
+    out.problem = "not finite";
+  }
+  return out;
+}
+
+ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit) {
+  ReadPose out;
+  if (!matrix.allFinite()) {
+    out.problem = "not finite";
+    return out;
+  }
+  const Eigen::Matrix3d r = matrix.topLeftCorner<3, 3>();
+  const Eigen::Vector3d position_mm = mm_per_unit * matrix.topRightCorner<3, 1>();
+  out.problem = problem_of(position_mm);
+  if (!out.problem.empty()) return out;
+  const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(off <= 2 * kRotationTolerance)) {
+    out.problem = "no rotation";
+  } else if (r.determinant() < 0) {
+    out.problem = "no rotation but a mirror";
+  } else if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9) {
+    out.problem = "its last row is not 0 0 0 1";
+  }
+  out.tracker_from_sensor = Transform<Tracker, Sensor>(r, position_mm);
+  return out;
+}
+
+ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3d& position, double mm_per_unit) {
+  ReadPose out;
+  const Eigen::Vector3d position_mm = mm_per_unit * position;
+  out.problem = quaternion.coeffs().allFinite() ? problem_of(position_mm) : "not finite";
+  if (!out.problem.empty()) return out;
+  if (std::abs(quaternion.norm() - 1) > kRotationTolerance) {
+    out.problem = fmt::format("its quaternion has length {:.4g} where a rotation has 1", quaternion.norm());
+    return out;
+  }
+  out.tracker_from_sensor = Transform<Tracker, Sensor>(quaternion, position_mm);
+  return out;
+}
+
+ReadPose read_matrix(std::string_view text, double mm_per_unit) {
+  std::array<double, 16> numbers{};
+  std::size_t count = 0;
+  ReadPose out;
+  for (text = trimmed(text); !text.empty(); text = trimmed(text)) {
+    const std::string_view word = text.substr(0, text.find_first_of(" \t\r\n,;"));
+    const ReadNumber number = read_number(word);
+    if (!number.problem.empty()) {
+      out.problem = number.problem;
+      return out;
+    }
+    if (count < numbers.size()) numbers[count] = number.value;
+    ++count;
+    text.remove_prefix(std::min(text.size(), word.size() + 1));
+  }
+  if (count != numbers.size()) {
+    out.problem = count == 0 ? "missing" : fmt::format("{} numbers where a 4x4 matrix has 16", count);
+    return out;
+  }
+  return checked_pose(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), mm_per_unit);
+}
+
+void PoseCollector::add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose) {
+  if (!pose.problem.empty()) return reject(name, pose.problem);
+  if (!std::isfinite(time_s) || !std::isfinite(unfiltered_time_s)) return reject(name, "has no time");
+  set_.poses.push_back({name, next_index_++, time_s, unfiltered_time_s, pose.tracker_from_sensor});
+}
+
+void PoseCollector::reject(const std::string& name, const std::string& why) {
+  set_.rejected.push_back(name + ": " + why);
+  ++next_index_;
+}
+
+void PoseCollector::sort_by_time() {
+  auto& poses = set_.poses;
+  const auto earlier = [](const TimedPose& a, const TimedPose& b) { return a.time_s < b.time_s; };
+  const auto back = std::adjacent_find(poses.begin(), poses.end(), [&](auto& a, auto& b) { return earlier(b, a); });
+  if (back != poses.end()) {
+    set_.notes.push_back(fmt::format("times go back after {}: put in the order of their times", back->name));
+    std::stable_sort(poses.begin(), poses.end(), earlier);
+  }
+  // One time cannot have two poses, and which of them is right cannot be known: the first one recorded stays.
+  std::vector<TimedPose> kept;
+  for (TimedPose& pose : poses) {
+    if (!kept.empty() && kept.back().time_s == pose.time_s) {
+      set_.rejected.push_back(fmt::format("{}: has the time of {}", pose.name, kept.back().name));
+    } else {
+      kept.push_back(std::move(pose));
+    }
+  }
+  poses = std::move(kept);
+}
+
+void PoseCollector::note_repeated_poses() {
+  std::size_t repeats = 0;
+  std::string first;
+  for (std::size_t i = 1; i < set_.poses.size(); ++i) {
+    if (set_.poses[i].tracker_from_sensor.matrix() != set_.poses[i - 1].tracker_from_sensor.matrix()) continue;
+    if (repeats++ == 0) first = set_.poses[i].name;
+  }
+  if (repeats > 0) {
+    set_.notes.push_back(
+        fmt::format("{} of {} poses repeat the one before to the last digit, first {}: one reading recorded twice",
+                    repeats, set_.poses.size(), first));
+  }
+}
+
+Result<PoseSet> PoseCollector::finish(const std::filesystem::path& path) && {
+  if (set_.timed) sort_by_time();
+  note_repeated_poses();
+  if (!set_.poses.empty()) return std::move(set_);
+  if (set_.rejected.empty()) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path.string())};
+  return Error{Errc::bad_value, fmt::format("{}: none of {} poses can be used; {}", path.string(), set_.rejected.size(),
+                                            set_.rejected.front())};
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,127 @@
+#include "host/files/pose_sequence.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <fstream>
+#include <string_view>
+
+#include "host/files/pose_collector.hpp"
+#include "host/files/sequence_header.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<SequenceHeader> read_header(const fs::path& path) {
+  auto header = read_sequence_header(path);
+  if (header && header->transforms.empty()) {
+    return Error{Errc::bad_format, fmt::format("{}: holds no transforms of frames (Seq_Frame0000_..Transform) in its "
+                                               "header; record it with the tracker's transforms",
+                                               path.string())};
+  }
+  return header;
+}
+
+/// The name as the sequence has it, whether or not it was given with "Transform" at its end.
+Result<std::string> find_transform(const SequenceHeader& sequence, const fs::path& path, std::string name,
+                                   const std::string& reference) {
+  const std::string held = fmt::format("it holds {}", fmt::join(sequence.transforms, ", "));
+  if (name.ends_with(kTransformField)) name.resize(name.size() - kTransformField.size());
+  if (sequence.transforms.contains(name)) return name;
+  if (!name.empty())
+    return Error{Errc::bad_value, fmt::format("{}: has no transform {}; {}", path.string(), name, held)};
+  auto others = sequence.transforms;
+  others.erase(reference);
+  if (others.size() == 1) return *others.begin();
+  return Error{Errc::bad_value,
+               fmt::format("{}: say by name which transform is the sensor's (--transform); {}", path.string(), held)};
+}
+
+ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transform, double mm_per_unit) {
+  const std::string key = transform + std::string(kTransformField);
+  const std::string_view status = value_of(frame, transform + std::string(kTransformStatusField));
+  // A sequence without states has only what was seen.
+  if (!status.empty() && status != kStatusOk) return {{}, std::string(status)};
+  if (!frame.contains(key)) return {{}, "missing"};
+  return read_matrix(value_of(frame, key), mm_per_unit);
+}
+
+/// reference_from_sensor, or which of both is not there.
+ReadPose relative_pose_of(const SequenceHeader::Fields& frame, const std::string& transform,
+                          const std::string& reference, double mm_per_unit) {
+  ReadPose sensor = pose_of(frame, transform, mm_per_unit);
+  if (!sensor.problem.empty()) return {{}, transform + " " + sensor.problem};
+  const ReadPose base = pose_of(frame, reference, mm_per_unit);
+  if (!base.problem.empty()) return {{}, reference + " " + base.problem};
+  const auto tracker_from_reference = Transform<Tracker, Marker>::from_matrix(base.tracker_from_sensor.matrix());
+  const Transform<Marker, Sensor> relative = tracker_from_reference.inverse() * sensor.tracker_from_sensor;
+  sensor.tracker_from_sensor = Transform<Tracker, Sensor>(relative.rotation(), relative.translation());
+  return sensor;
+}
+
+}  // namespace
+
+bool is_sequence(const fs::path& path) {
+  const std::string extension = path.extension().string();
+  if (extension == ".mha" || extension == ".mhd" || extension == ".nrrd" || extension == ".nhdr") return true;
+  std::ifstream in(path, std::ios::binary);
+  std::string first(10, '\0');
+  in.read(first.data(), static_cast<std::streamsize>(first.size()));
+  return first.starts_with("ObjectType") || first.starts_with("NRRD000");
+}
+
+Result<PoseSet> read_sequence(const fs::path& path, std::string transform, std::string reference, double mm_per_unit) {
+  const auto sequence = read_header(path);
+  if (!sequence) return sequence.error();
+  const bool relative = !reference.empty();
+  if (relative) {
+    auto found = find_transform(*sequence, path, reference, {});
+    if (!found) return found.error();
+    reference = *found;
+  }
+  auto found = find_transform(*sequence, path, transform, reference);
+  if (!found) return found.error();
+  transform = *found;
+  if (relative && transform == reference) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: {} against itself stands still; name two transforms", path.string(), transform)};
+  }
+  const bool timed = std::any_of(sequence->frames.begin(), sequence->frames.end(),
+                                 [](const auto& item) { return item.second.contains(kTimestampField); });
+  PoseCollector collector(timed);
+  for (const auto& [number, frame] : sequence->frames) {
+    const std::string name = fmt::format("frame {}", number);
+    const ReadPose pose =
+        relative ? relative_pose_of(frame, transform, reference, mm_per_unit) : pose_of(frame, transform, mm_per_unit);
+    ReadNumber time =
+        timed ? read_number(value_of(frame, kTimestampField)) : ReadNumber{static_cast<double>(number), {}};
+    ReadNumber unfiltered =
+        frame.contains(kUnfilteredTimestampField) ? read_number(value_of(frame, kUnfilteredTimestampField)) : time;
+    collector.set_next_index(number);
+    if (pose.problem.empty() && !(time.problem + unfiltered.problem).empty()) {
+      collector.reject(name, "has no time");
+    } else {
+      collector.add(name, time.value, unfiltered.value, pose);
+    }
+  }
+  return std::move(collector).finish(path);
+}
+
+Result<PoseSet> read_relative_pose_set(const fs::path& path, const std::string& transform, const std::string& reference,
+                                       double mm_per_unit) {
+  if (reference.empty())
+    return Error{Errc::bad_value, fmt::format("{}: name the reference's transform (--reference)", path.string())};
+  return read_sequence(path, transform, reference, mm_per_unit);
+}
+
+Result<std::vector<std::string>> sequence_transforms(const fs::path& path) {
+  const auto sequence = read_header(path);
+  if (!sequence) return sequence.error();
+  return std::vector<std::string>(sequence->transforms.begin(), sequence->transforms.end());
+}
+
+}  // namespace birdseye::host

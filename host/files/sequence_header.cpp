@@ -1,0 +1,77 @@
+#include "host/files/sequence_header.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <fstream>
+#include <optional>
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kFrame = "Seq_Frame";
+/// A header's lines are short; one that is longer is pixels.
+constexpr std::size_t kLongestLine = 1 << 16;
+
+/// A line of a MetaImage's header, "key = value", or of an NRRD's, "key:=value".
+std::optional<std::pair<std::string_view, std::string_view>> field_of(std::string_view line) {
+  const auto equals = line.find('=');
+  if (equals == std::string_view::npos || equals == 0) return std::nullopt;
+  const auto bare = [](std::string_view text) {
+    const auto first = text.find_first_not_of(" \t\r");
+    if (first == std::string_view::npos) return std::string_view();
+    return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+  };
+  return std::pair{bare(line.substr(0, line[equals - 1] == ':' ? equals - 1 : equals)), bare(line.substr(equals + 1))};
+}
+
+void take_line(std::string_view line, SequenceHeader& header) {
+  const auto field = field_of(line);
+  if (!field) return;
+  std::string_view key = field->first;
+  if (!key.starts_with(kFrame)) {
+    header.fields.insert_or_assign(std::string(key), std::string(field->second));
+    return;
+  }
+  key.remove_prefix(kFrame.size());
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), number);
+  if (error != std::errc() || end == key.data() + key.size() || *end != '_') return;
+  key.remove_prefix(static_cast<std::size_t>(end - key.data()) + 1);
+  if (key.ends_with(kTransformField)) header.transforms.emplace(key.substr(0, key.size() - kTransformField.size()));
+  header.frames[number].insert_or_assign(std::string(key), std::string(field->second));
+}
+
+}  // namespace
+
+Result<SequenceHeader> read_sequence_header(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored))
+    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
+  SequenceHeader header;
+  std::string line;
+  for (bool nrrd = false, first = true; std::getline(in, line) && line.size() < kLongestLine; first = false) {
+    if (first) nrrd = line.starts_with("NRRD");
+    take_line(line, header);
+    // Here the header ends and the pixels begin.
+    if (line.starts_with("ElementDataFile") || (nrrd && (line.empty() || line == "\r"))) {
+      header.whole = true;
+      header.data_offset = in.eof() ? static_cast<std::uint64_t>(fs::file_size(path, ignored))
+                                    : static_cast<std::uint64_t>(std::streamoff(in.tellg()));
+      break;
+    }
+  }
+  return header;
+}
+
+std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key) {
+  const auto found = fields.find(key);
+  return found == fields.end() ? std::string_view() : std::string_view(found->second);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,195 @@
+#include "host/guide/hand_eye_guide.hpp"
+
+#include <fmt/format.h>
+
+#include "calibration/base/units.hpp"
+#include "calibration/hand_eye/view_pose.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using calibration::HandEyeStation;
+
+constexpr auto kLookEvery = std::chrono::milliseconds(1500);
+constexpr std::size_t kFirstSolved = 6;
+// Nearer than this to a station, another tells nothing new: a tracker repeats its error there.
+constexpr double kSamePlaceMm = 4, kSameTurnRad = 2.5 * kRadPerDeg;
+constexpr double kCornerSigmaPx = 0.3;
+
+}  // namespace
+
+Result<void> HandEyeGuide::check(const GuidePlan& plan) {
+  if (plan.pattern.half_turn_ambiguous || plan.pattern.quarter_turn_ambiguous) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: looks the same turned upside down, so that a view does not tell which end is which; "
+                             "use a board with one odd and one even count, or a ChArUco board",
+                             plan.pattern.spec)};
+  }
+  if (plan.keep.empty()) return {};
+  std::error_code error;
+  for (const char* folder : {"pictures", "poses"}) std::filesystem::create_directories(plan.keep / folder, error);
+  if (error) return Error{Errc::unreadable, plan.keep.string() + ": cannot be made: " + error.message()};
+  return {};
+}
+
+HandEyeGuide::HandEyeGuide(GuidePlan plan, Teller tell)
+    : plan_(std::move(plan)), tell_(std::move(tell)), stations_(plan_.pattern, plan_.bird) {
+  session_.input.camera = plan_.camera;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero(), last = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : calibration::pattern_points_mm(plan_.pattern)) {
+    first = first.cwiseMin(point);
+    last = last.cwiseMax(point);
+  }
+  extent_mm_ = last - first;
+  tell_.lasting(state_.next);
+}
+
+Result<void> HandEyeGuide::take(const wire::Event& event) {
+  if (ended()) return {};
+  if (const auto* birds = std::get_if<wire::Birds>(&event)) stations_.push(*birds);
+  if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
+    if (auto taken = take_frame(*frame); !taken) return taken;
+  }
+  while (auto station = stations_.take_station()) {
+    if (auto added = add(*std::move(station)); !added) return added;
+  }
+  if (const std::string remark = stations_.take_remark(); !remark.empty()) tell_.lasting(remark);
+  if (Clock::now() > next_look_) look();
+  return {};
+}
+
+Result<void> HandEyeGuide::take_frame(const wire::VideoFrame& frame) {
+  if (session_.width_px != 0 && (frame.width_px != session_.width_px || frame.height_px != session_.height_px)) {
+    return Error{Errc::bad_value, fmt::format("frames changed from {} x {} to {} x {}: calibrate at one size",
+                                              session_.width_px, session_.height_px, frame.width_px, frame.height_px)};
+  }
+  session_.width_px = frame.width_px;
+  session_.height_px = frame.height_px;
+  stations_.push(frame);
+  return {};
+}
+
+void HandEyeGuide::end(const std::string& why) {
+  if (!ended()) session_.ended = why;
+}
+
+GuidedStations HandEyeGuide::finish() {
+  tell_.lasting(session_.ended + "; the last solution is being worked out");
+  solve(true);
+  return std::move(session_);
+}
+
+Result<void> HandEyeGuide::add(LiveStation taken) {
+  for (const HandEyeStation& other : session_.input.stations) {
+    const auto& a = other.tracker_from_sensor;
+    const auto& b = taken.tracker_from_sensor;
+    if ((a.translation() - b.translation()).norm() < kSamePlaceMm &&
+        rotation_angle_between(a.rotation(), b.rotation()) < kSameTurnRad) {
+      tell_.lasting(fmt::format("not taken: the same pose as {}; move on", other.name));
+      return {};
+    }
+  }
+  const std::size_t number = session_.input.stations.size() + 1;
+  taken.view.name = fmt::format("station {}", number);
+  if (auto kept = keep(taken, number); !kept) return kept;
+  state_.stations = number;
+  tell_.lasting(fmt::format("station {}: {} points", number, taken.view.points_px.size()));
+  HandEyeStation station;
+  station.name = taken.view.name;
+  station.tracker_from_sensor = taken.tracker_from_sensor;
+  station.view = std::move(taken.view);
+  session_.input.stations.push_back(std::move(station));
+  if (number >= kFirstSolved) solve(false);
+  if (session_.ended.empty() && number >= plan_.most_stations)
+    session_.ended = fmt::format("{} stations, the most that were asked for", number);
+  next_look_ = {};
+  return {};
+}
+
+Result<void> HandEyeGuide::keep(const LiveStation& taken, std::size_t number) {
+  if (plan_.keep.empty()) return {};
+  const std::string name = fmt::format("station{:03}", number);
+  const wire::VideoFrame& frame = taken.frame;
+  return write_files(
+      {{plan_.keep / "pictures" / (name + ".png"), png_of(*frame.rgb, frame.width_px, frame.height_px, 3)},
+       {plan_.keep / "poses" / (name + ".txt"), pose_text(taken.tracker_from_sensor.matrix())}});
+}
+
+/// The lens that is given, or that the views so far tell of.
+std::optional<CameraModel> HandEyeGuide::lens(bool last) {
+  if (plan_.camera) return plan_.camera;
+  std::vector<calibration::PatternView> views;
+  views.reserve(session_.input.stations.size());
+  for (const HandEyeStation& station : session_.input.stations) views.push_back(station.view);
+  calibration::CameraCalibrationSettings settings;
+  if (!last) {  // quick: which model is best is asked at the end
+    settings.model = calibration::LensModel::radial2_tangential2;
+    settings.folds = 2;
+  }
+  auto found = calibration::calibrate_camera(views, session_.width_px, session_.height_px, settings);
+  if (!found) {
+    session_.lens_fault = found.error().what;
+    return std::nullopt;
+  }
+  session_.lens_fault.clear();
+  lens_grade_ = calibration::judge_camera(*found).grade;
+  session_.lens = *std::move(found);
+  return session_.lens->camera;
+}
+
+void HandEyeGuide::solve(bool last) {
+  session_.input.camera = lens(last);
+  if (!session_.input.camera) {
+    tell_.lasting("lens: not found yet: " + session_.lens_fault);
+    return;
+  }
+  const auto result = calibration::calibrate_hand_eye(session_.input);
+  if (last || !result) return;
+  Verdict verdict = calibration::judge(*result);
+  if (!plan_.camera) verdict.add(lens_grade_, lens_grade_ == Grade::pass ? "" : "the lens wants more views");
+  state_.grade = verdict.grade;
+  if (result->solved) state_.held_out_mm = result->held_out_mm;
+  if (result->solved)
+    tell_.lasting(
+        fmt::format("hand-eye so far: held-out {:.2f} mm, verdict {}", result->held_out_mm, name_of(verdict.grade)));
+  if (verdict.grade == Grade::pass && session_.input.stations.size() >= plan_.fewest_stations)
+    session_.ended = fmt::format("the verdict is pass with {} stations", session_.input.stations.size());
+}
+
+std::optional<Transform<Camera, Marker>> HandEyeGuide::pose_of(const calibration::PatternView& view) const {
+  if (!session_.input.camera) return std::nullopt;
+  const auto pose = calibration::find_view_pose({{&*session_.input.camera, {}, &view}}, kCornerSigmaPx);
+  if (!pose) return std::nullopt;
+  return pose->camera_from_marker;
+}
+
+/// What is covered, and the next best pose from where the scope is.
+void HandEyeGuide::look() {
+  next_look_ = Clock::now() + kLookEvery;
+  if (stations_.deciding() || session_.width_px == 0) return;
+  if (!session_.input.camera) {
+    state_.next =
+        "tilt the scope by 20 to 40 degrees, each time another way, and turn it about its length between them";
+    tell_.now(fmt::format("{} stations; {}", session_.input.stations.size(), state_.next));
+    return;
+  }
+  std::vector<calibration::Station> stations;
+  for (const HandEyeStation& station : session_.input.stations) {
+    if (const auto pose = pose_of(station.view))
+      stations.push_back({station.tracker_from_sensor, *pose, station.view.points_px});
+  }
+  const auto seen = stations_.look();
+  state_.pattern_seen = seen.has_value();
+  state_.next =
+      calibration::next_best_pose(stations, *session_.input.camera, extent_mm_, seen ? pose_of(*seen) : std::nullopt)
+          .words;
+  state_.coverage = calibration::coverage_of(stations, session_.width_px, session_.height_px);
+  tell_.now(fmt::format("{} stations; {}; {}next: {}", stations.size(), coverage_line(state_.coverage),
+                        seen ? "" : "the pattern is not seen now; ", state_.next));
+}
+
+}  // namespace birdseye::host

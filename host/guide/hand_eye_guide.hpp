@@ -1,0 +1,93 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "calibration/camera/camera_calibration.hpp"
+#include "calibration/detect/pattern.hpp"
+#include "calibration/guide/guidance.hpp"
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "device/wire/messages.hpp"
+#include "host/guide/live_stations.hpp"
+
+namespace birdseye::host {
+
+/// What a guided hand-eye calibration is told.
+struct GuidePlan {
+  std::string bird = "scope";  ///< the scope's, as the appliance names it
+  calibration::Pattern pattern;
+  std::optional<CameraModel> camera;  ///< a lens that is known; empty: found from the same views
+  std::filesystem::path keep;         ///< a folder for the stations' pictures and poses; empty: none are kept
+  std::size_t fewest_stations = 12, most_stations = 40;
+};
+
+/// What it came to.
+struct GuidedStations {
+  calibration::HandEyeInput input;
+  int width_px = 0, height_px = 0;
+  std::optional<calibration::CameraCalibration> lens;  ///< where it was found here
+  std::string lens_fault;                              ///< why none was, in words
+  std::string ended;                                   ///< why, in words
+};
+
+/// Where it stands, for whoever holds the scope.
+struct GuideState {
+  std::string next = "hold the scope over the pattern, all of it in the picture, and still for a second";
+  calibration::Coverage coverage;  ///< of the stations, once a lens is known
+  std::size_t stations = 0;
+  bool collecting = true;  ///< false: enough has been taken, and the last solution is being worked out
+  bool pattern_seen = false;
+  std::optional<double> held_out_mm;  ///< of the solution so far
+  Grade grade = Grade::fail;
+};
+
+/// Leads a person through the stations of a hand-eye calibration: fed with the appliance's events in order, it takes a
+/// station whenever the scope is held still over the pattern, solves after each, says what is covered and where to go
+/// next, and ends when the verdict is pass or at the most stations. Solving holds the caller up for some tenths of a
+/// second.
+class HandEyeGuide {
+ public:
+  /// now: a line that the next replaces; lasting: one that stays.
+  struct Teller {
+    std::function<void(const std::string&)> now, lasting;
+  };
+
+  /// Refuses a pattern that looks the same upside down, and a folder that cannot be made.
+  static Result<void> check(const GuidePlan& plan);
+  HandEyeGuide(GuidePlan plan, Teller tell);
+
+  /// Errors: frames of another size than before, a picture that cannot be kept.
+  Result<void> take(const wire::Event& event);
+  /// Ends it with the stations that it has; why in words.
+  void end(const std::string& why);
+  [[nodiscard]] bool ended() const { return !session_.ended.empty(); }
+  /// Works out the last solution and gives all that was taken. Once, at the end.
+  GuidedStations finish();
+
+  [[nodiscard]] const GuideState& state() const { return state_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  Result<void> take_frame(const wire::VideoFrame& frame);
+  Result<void> add(LiveStation taken);
+  Result<void> keep(const LiveStation& taken, std::size_t number);
+  std::optional<CameraModel> lens(bool last);
+  void solve(bool last);
+  [[nodiscard]] std::optional<Transform<Camera, Marker>> pose_of(const calibration::PatternView& view) const;
+  void look();
+
+  GuidePlan plan_;
+  Teller tell_;
+  LiveStations stations_;
+  Clock::time_point next_look_{};
+  Eigen::Vector3d extent_mm_;
+  GuidedStations session_;
+  GuideState state_;
+  Grade lens_grade_ = Grade::pass;
+};
+
+}  // namespace birdseye::host

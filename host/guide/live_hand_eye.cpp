@@ -1,0 +1,95 @@
+#include "host/guide/live_hand_eye.hpp"
+
+#include <fmt/format.h>
+
+#include "drivers/system/interrupt.hpp"
+#include "host/link/appliance_link.hpp"
+#include "host/link/event_stream.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Clock = wire::Client::Clock;
+
+constexpr auto kSilence = std::chrono::seconds(6);
+
+/// Whether frames and the scope's poses come, and what the appliance says of it if not.
+class Silence {
+ public:
+  explicit Silence(const LivePlan& plan) : plan_(plan) {}
+
+  void hear(const wire::Event& event) {
+    if (std::holds_alternative<wire::VideoFrame>(event)) heard_ = Clock::now();
+    if (const auto* status = std::get_if<wire::Status>(&event)) status_ = status->text;
+    const auto* birds = std::get_if<wire::Birds>(&event);
+    if (birds == nullptr) return;
+    for (const wire::Bird& bird : birds->birds) {
+      if (bird.name == plan_.guide.bird) {
+        posed_ = Clock::now();
+      } else if (others_.find(bird.name) == std::string::npos) {
+        others_ += (others_.empty() ? "" : ", ") + bird.name;
+      }
+    }
+  }
+
+  [[nodiscard]] Result<void> check() const {
+    const auto seconds = kSilence / std::chrono::seconds(1);
+    if (Clock::now() - heard_ > kSilence) {
+      return Error{Errc::timeout, fmt::format("{}: no frame has come for {} s{}{}", plan_.server, seconds,
+                                              status_.empty() ? "" : ": ", status_)};
+    }
+    if (Clock::now() - posed_ > kSilence) {
+      return Error{Errc::timeout, fmt::format("{}: no pose of \"{}\" has come for {} s{}{}", plan_.server,
+                                              plan_.guide.bird, seconds, others_.empty() ? "" : "; there is " + others_,
+                                              status_.empty() ? "" : "; it says: " + status_)};
+    }
+    return {};
+  }
+
+ private:
+  const LivePlan& plan_;
+  Clock::time_point heard_ = Clock::now(), posed_ = heard_;
+  std::string status_, others_;
+};
+
+Result<GuidedStations> lead(const LivePlan& plan, EventStream& stream, Progress& progress) {
+  HandEyeGuide guide(plan.guide, {[&](const std::string& line) { progress(line); },
+                                  [&](const std::string& line) { progress.keep(line); }});
+  Silence silence(plan);
+  const auto ends =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(plan.seconds));
+  std::string said;
+  while (!guide.ended()) {
+    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    if (!event) return event.error();
+    if (*event) {
+      silence.hear(**event);
+      if (const auto* status = std::get_if<wire::Status>(&**event)) {
+        if (!status->ok && status->text != said) progress.keep("the appliance says: " + status->text);
+        said = status->text;
+      }
+      if (auto taken = guide.take(**event); !taken) return taken.error();
+    }
+    if (const auto heard = silence.check(); !heard) return heard.error();
+    if (interrupted()) guide.end("interrupted");
+    if (Clock::now() > ends) guide.end(fmt::format("{:g} s are over", plan.seconds));
+  }
+  return guide.finish();
+}
+
+}  // namespace
+
+Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) {
+  if (const auto sound = HandEyeGuide::check(plan.guide); !sound) return sound.error();
+  auto client = connect_appliance(plan.server);
+  if (!client) return client.error();
+  // Focus or exposure that changes from view to view would be another lens.
+  if (const auto locked = (*client)->lock_camera(true, Clock::now() + std::chrono::seconds(2)); !locked)
+    return locked.error();
+  note_interrupts();
+  EventStream stream(*std::move(client), 60);
+  return lead(plan, stream, progress);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,122 @@
+#include "host/operation/live_source.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host/link/appliance_link.hpp"
+#include "host/recording/recording_reader.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Clock = wire::Client::Clock;
+
+constexpr std::size_t kMostFramesWaiting = 12;  // half a second: older frames are of no use to a picture that is live
+constexpr auto kConnectAgain = std::chrono::seconds(1);
+
+}  // namespace
+
+LiveSource::LiveSource(std::string name, Connect::Work connect)
+    : name_(std::move(name)), words_("connecting to " + name_), connect_(std::move(connect)) {
+  if (connect_) connecting_.start(connect_);
+}
+
+std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address, const wire::ForeignSettings& foreign) {
+  const auto connect = [address, foreign](const std::stop_token&, const Connect::Say&) -> Result<Link> {
+    auto client = connect_appliance(address, foreign);
+    if (!client) return client.error();
+    return Link{nullptr, *std::move(client)};
+  };
+  return std::unique_ptr<LiveSource>(new LiveSource(address, connect));
+}
+
+std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings settings) {
+  const auto connect = [settings = std::move(settings)](const std::stop_token& stop,
+                                                        const Connect::Say& say) -> Result<Link> {
+    say("making the patient");
+    if (auto made = SimulatedCart::make_patient(settings); !made) return made.error();
+    if (stop.stop_requested()) return Error{Errc::disconnected, "cancelled"};
+    say("starting tracker, camera and appliance");
+    auto cart = SimulatedCart::start(settings);
+    if (!cart) return cart.error();
+    auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Clock::now() + std::chrono::seconds(20));
+    if (!client) return client.error();
+    return Link{*std::move(cart), *std::move(client)};
+  };
+  return std::unique_ptr<LiveSource>(new LiveSource("the simulated cart", connect));
+}
+
+void LiveSource::take_link(Result<Link> link) {
+  if (!link) {
+    words_ = link.error().what;
+    again_ = Clock::now() + kConnectAgain;
+    given_up_ = name_ == "the simulated cart";  // what could not be started once is not tried for ever
+    return;
+  }
+  if (link->cart) cart_ = std::move(link->cart);
+  auto stream = std::make_unique<EventStream>(std::move(link->client), kMostFramesWaiting);
+  stream_ = stream.get();
+  events_ = std::move(stream);
+  words_ = "connected to " + name_;
+}
+
+Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed) {
+  RecordingReader::Settings settings;
+  settings.speed = speed;
+  auto reader = RecordingReader::open(path, settings);
+  if (!reader) return reader.error();
+  std::unique_ptr<LiveSource> source(new LiveSource(path.string(), {}));
+  source->recording_ = reader->get();
+  source->events_ = *std::move(reader);
+  source->live_ = false;
+  source->words_ = "playing " + path.string();
+  return source;
+}
+
+std::optional<wire::Event> LiveSource::next(Clock::time_point deadline) {
+  if (!events_) link_again();
+  if (!events_) {
+    std::this_thread::sleep_until(deadline);
+    return std::nullopt;
+  }
+  auto event = events_->next(deadline);
+  if (event) return *std::move(event);
+  words_ = event.error().what + notes();
+  events_.reset();
+  stream_ = nullptr;
+  recording_ = nullptr;
+  again_ = Clock::now() + kConnectAgain;
+  given_up_ = cart_ != nullptr || !live_;
+  return std::nullopt;
+}
+
+void LiveSource::link_again() {
+  if (auto link = connecting_.take()) take_link(*std::move(link));
+  if (events_ || given_up_) return;
+  if (!connecting_.running() && Clock::now() >= again_) connecting_.start(connect_);
+  if (connecting_.running() && !connecting_.line().empty()) words_ = connecting_.line();
+}
+
+std::string LiveSource::words() const {
+  const std::string peer = stream_ != nullptr ? stream_->peer_words() : "";
+  return (peer.empty() ? words_ : words_ + ": " + peer) + notes();
+}
+
+/// What is amiss with the recording, as far as it was read.
+std::string LiveSource::notes() const {
+  constexpr std::size_t kMost = 3;
+  std::string out;
+  if (recording_ == nullptr) return out;
+  const std::vector<std::string>& notes = recording_->notes();
+  for (std::size_t i = 0; i < std::min(notes.size(), kMost); ++i) out += "; " + notes[i];
+  if (notes.size() > kMost) out += fmt::format("; and {} more", notes.size() - kMost);
+  return out;
+}
+
+std::optional<ClockGap> LiveSource::host_from_device() const {
+  return stream_ != nullptr ? stream_->host_from_device() : std::nullopt;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/system/background.hpp"
+#include "host/link/event_stream.hpp"
+#include "host/simulated/simulated_cart.hpp"
+
+namespace birdseye::host {
+
+class RecordingReader;
+
+/// Where events come from: an appliance on the wire, or another OpenIGTLink server, which is connected to again for as
+/// long as it takes, or a simulated cart of our own, which is started once. Never holds the caller up.
+class LiveSource {
+ public:
+  static std::unique_ptr<LiveSource> of_appliance(const std::string& address,
+                                                  const wire::ForeignSettings& foreign = {});
+  /// Makes the patient in settings.folder first.
+  static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
+
+  /// A recording, as fast as it was made. Errors: there is none, or it is damaged from its first line on.
+  static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path, double speed = 1);
+
+  /// The next event, waiting for it until the deadline.
+  std::optional<wire::Event> next(wire::Client::Clock::time_point deadline);
+  [[nodiscard]] bool connected() const { return events_ != nullptr; }
+  /// False for a recording, which nobody must take for the present.
+  [[nodiscard]] bool live() const { return live_; }
+  /// Connected to what, or why not, in words.
+  [[nodiscard]] std::string words() const;
+  [[nodiscard]] std::optional<ClockGap> host_from_device() const;
+  /// The simulated cart, once it runs.
+  [[nodiscard]] SimulatedCart* cart() const { return cart_.get(); }
+
+ private:
+  /// What connecting gives: the cart where there is one to start.
+  struct Link {
+    std::unique_ptr<SimulatedCart> cart;
+    std::unique_ptr<wire::Client> client;
+  };
+  using Connect = Background<Result<Link>>;
+  LiveSource(std::string name, Connect::Work connect);
+  void take_link(Result<Link> link);
+  void link_again();
+  [[nodiscard]] std::string notes() const;
+
+  std::string name_, words_;
+  Connect::Work connect_;
+  Connect connecting_;
+  wire::Client::Clock::time_point again_{};
+  bool given_up_ = false;
+  std::unique_ptr<SimulatedCart> cart_;
+  std::unique_ptr<EventSource> events_;
+  EventStream* stream_ = nullptr;               ///< events_, where they come over the wire
+  const RecordingReader* recording_ = nullptr;  ///< events_, where they are recorded
+  bool live_ = true;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,137 @@
+#include "host/operation/operation.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "device/wire/igtl_bytes.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSheet = "operation.json";
+constexpr const char* kCamera = "camera.yaml";
+constexpr const char* kHandEye = "camera_from_sensor.txt";
+constexpr const char* kRegistration = "patient_from_tracker.txt";
+constexpr const char* kField = "field.mha";
+
+template <typename T>
+std::span<const std::uint8_t> bytes_of(const T* data, std::size_t count) {
+  return {reinterpret_cast<const std::uint8_t*>(data), count * sizeof(T)};
+}
+
+Result<Operation::Calibrated> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
+  auto camera = read_camera(folder / kCamera);
+  if (!camera) return camera.error();
+  const auto hand_eye = read_pose(folder / kHandEye);
+  if (!hand_eye) return hand_eye.error();
+  return Operation::Calibrated{*camera,
+                               Transform<Camera, Sensor>::from_matrix(*hand_eye),
+                               figures.at("camera_rms_px").get<double>(),
+                               figures.at("tracked_rms_px").get<double>(),
+                               figures.at("hand_eye_mm").get<double>(),
+                               figures.at("made_utc").get<std::string>()};
+}
+
+}  // namespace
+
+std::string ct_checksum(const Volume& ct) {
+  std::uint64_t crc = wire::checksum(bytes_of(ct.hu.data(), ct.hu.size()));
+  crc = wire::checksum(bytes_of(ct.size.data(), ct.size.size()), crc);
+  const Eigen::Matrix4d place = ct.patient_from_voxel.matrix();
+  crc = wire::checksum(bytes_of(place.data(), 16), crc);
+  return fmt::format("{:016x}", crc);
+}
+
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+Result<void> write_operation(const fs::path& folder, const Operation& operation) {
+  std::error_code ignored;
+  nlohmann::json sheet{{"made_utc", operation.made_utc}, {"ct_checksum", operation.ct_checksum}};
+  std::vector<FileText> files;
+  if (const auto& found = operation.calibrated) {
+    sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px},
+                           {"tracked_rms_px", found->tracked_rms_px},
+                           {"hand_eye_mm", found->hand_eye_mm},
+                           {"made_utc", found->made_utc}};
+    files.push_back({folder / kCamera, camera_text(found->camera)});
+    files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
+  }
+  if (const auto& found = operation.registered) {
+    sheet["registered"] = {{"fre_mm", found->fre_mm}, {"fiducials_in_patient_mm", nlohmann::json::array()}};
+    for (const Eigen::Vector3d& place : found->fiducials_in_patient_mm)
+      sheet["registered"]["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
+    files.push_back({folder / kRegistration, pose_text(found->patient_from_tracker.matrix())});
+  }
+  sheet["deformed"] = operation.deformation.has_value();
+  if (const auto& found = operation.deformation) {
+    if (found->uncertainty_mm) sheet["uncertainty_mm"] = *found->uncertainty_mm;
+    if (auto written = write_field(folder / kField, found->field); !written) return written;
+  } else {
+    fs::remove(folder / kField, ignored);  // export would take an old one for the present
+  }
+  if (!operation.registered) fs::remove(folder / kRegistration, ignored);
+  files.push_back({folder / kSheet, text_of(sheet)});
+  return write_files(files);
+}
+
+bool has_operation(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::exists(folder / kSheet, ignored);
+}
+
+Result<Operation> read_operation(const fs::path& folder) {
+  const fs::path path = folder / kSheet;
+  std::ifstream in(path);
+  if (!in) {
+    return Error{Errc::not_found,
+                 fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
+  }
+  try {
+    const nlohmann::json sheet = nlohmann::json::parse(in);
+    Operation out;
+    sheet.at("made_utc").get_to(out.made_utc);
+    sheet.at("ct_checksum").get_to(out.ct_checksum);
+    if (sheet.contains("calibrated")) {
+      auto found = read_calibrated(folder, sheet.at("calibrated"));
+      if (!found) return found.error();
+      out.calibrated = *std::move(found);
+    }
+    if (sheet.contains("registered")) {
+      const auto matrix = read_pose(folder / kRegistration);
+      if (!matrix) return matrix.error();
+      out.registered = {
+          Transform<Patient, Tracker>::from_matrix(*matrix), sheet.at("registered").at("fre_mm").get<double>(), {}};
+      for (const auto& place : sheet.at("registered").at("fiducials_in_patient_mm"))
+        out.registered->fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
+                                                             place.at(2).get<double>());
+      if (out.registered->fiducials_in_patient_mm.size() < 3)
+        return Error{Errc::bad_format,
+                     fmt::format("{}: names fewer than three fiducials; register anew", path.string())};
+    }
+    if (sheet.at("deformed").get<bool>()) {
+      auto field = read_field(folder / kField);
+      if (!field) return field.error();
+      out.deformation.emplace();
+      out.deformation->field = *std::move(field);
+      if (sheet.contains("uncertainty_mm")) out.deformation->uncertainty_mm = sheet.at("uncertainty_mm").get<double>();
+    }
+    return out;
+  } catch (const nlohmann::json::exception& wrong) {
+    return Error{Errc::bad_format, fmt::format("{}: is damaged, or of an earlier version ({}); register anew",
+                                               path.string(), wrong.what())};
+  }
+}
+
+}  // namespace birdseye::host

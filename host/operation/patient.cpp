@@ -1,0 +1,67 @@
+#include "host/operation/patient.hpp"
+
+#include <fmt/format.h>
+
+#include "host/files/field_files.hpp"
+#include "host/files/text_files.hpp"
+#include "host/operation/operation.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+#include "host/volume/marker_finder.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+Result<void> read_labels(const PatientFiles& files, PatientPlan& plan) {
+  const auto labels = import_labels(files.labels, plan.ct);
+  if (!labels) return labels.error();
+  if (!files.shown.empty()) {
+    auto kept = keep_labels(plan.ct, *labels, files.shown);
+    if (!kept) return kept.error();
+    plan.shown = *std::move(kept);
+  }
+  for (const int target : files.targets) {
+    const auto centre = label_centroid_mm(*labels, target);
+    if (!centre) return centre.error();
+    plan.landmarks.push_back({fmt::format("middle of label {}", target), *centre});
+  }
+  plan.labels = *labels;
+  plan.organ = files.organ;
+  return {};
+}
+
+}  // namespace
+
+Result<PatientPlan> read_patient(const PatientFiles& files) {
+  PatientPlan plan;
+  auto ct = import_volume(files.ct);
+  if (!ct) return ct.error();
+  plan.ct = *std::move(ct);
+  plan.checksum = ct_checksum(plan.ct);
+  if (files.labels.empty() && !(files.shown.empty() && files.targets.empty()))
+    return Error{Errc::bad_value, "labels are named and no file of labels is given: give --labels"};
+  if (!files.labels.empty()) {
+    if (auto read = read_labels(files, plan); !read) return read.error();
+  }
+  if (plan.shown.hu.empty()) plan.shown = plan.ct;
+  if (!files.fiducials.empty()) {
+    auto points = read_points(files.fiducials);
+    if (!points) return points.error();
+    plan.fiducials_in_patient_mm = *std::move(points);
+  }
+  if (!files.landmarks.empty()) {
+    const auto places = read_places(files.landmarks);
+    if (!places) return places.error();
+    for (const auto& [name, place] : *places) plan.landmarks.push_back({name, place});
+  }
+  return plan;
+}
+
+std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop) {
+  std::vector<Eigen::Vector3d> places_mm;
+  for (const MarkerFit& marker : find_markers(ct, {}, stop).markers) places_mm.push_back(marker.centre_in_patient_mm);
+  return places_mm;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,81 @@
+#include "host/operation/snapshot.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host/files/picture.hpp"
+#include "host/files/text_files.hpp"
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string number(double value) {
+  return fmt::format("{:.17g}", value);
+}
+
+/// Paths of folder's own files are given as they are from wherever folder is.
+std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot& snapshot) {
+  std::error_code ignored;
+  const auto whole = [&ignored](const fs::path& path) { return fs::absolute(path, ignored).string(); };
+  std::vector<std::string> out{"render", "--volume", whole(snapshot.patient.ct)};
+  const auto add = [&out](const char* option, const std::string& value) {
+    out.emplace_back(option);
+    out.push_back(value);
+  };
+  if (!snapshot.patient.shown.empty()) {
+    add("--labels", whole(snapshot.patient.labels));
+    add("--keep", fmt::format("{}", fmt::join(snapshot.patient.shown, ",")));
+  }
+  add("--camera", whole(folder / "camera.yaml"));
+  add("--pose", whole(folder / "camera_from_patient.txt"));
+  add("--transfer", whole(folder / "transfer.json"));
+  add("--over", whole(folder / "video.png"));
+  if (snapshot.deformation) add("--deformation", whole(folder / "field.mha"));
+  add("--step-mm", number(snapshot.render.step_mm));
+  add("--opacity", number(snapshot.opacity * snapshot.shown.strength));
+  add("--engine", snapshot.engine);
+  if (snapshot.surface_in_front) out.emplace_back("--surface-in-front");
+  if (const auto& clip = snapshot.render.clip) {
+    out.emplace_back("--clip-plane");
+    for (const double value : {clip->normal.x(), clip->normal.y(), clip->normal.z(), clip->offset_mm})
+      out.push_back(number(value));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return Error{Errc::io, folder.string() + ": cannot be made; choose another --out"};
+  const wire::VideoFrame& frame = snapshot.frame;
+  const ShownPicture& shown = snapshot.shown;
+  std::vector<FileText> files{
+      {folder / "video.png", png_of(*frame.rgb, frame.width_px, frame.height_px, 3)},
+      {folder / "picture.png", png_of(snapshot.picture, shown.width_px, shown.height_px, 3)},
+  };
+  nlohmann::json sheet{{"sequence", frame.info.sequence}, {"acquired_ns", frame.info.acquired.ns},
+                       {"age_ms", shown.age_ms},          {"overlaid", shown.overlaid},
+                       {"strength", shown.strength},      {"reason", shown.reason}};
+  if (snapshot.fre_mm) sheet["fre_mm"] = *snapshot.fre_mm;
+  if (shown.overlaid && snapshot.setup && snapshot.camera_from_patient && snapshot.transfer) {
+    files.push_back({folder / "camera.yaml", camera_text(snapshot.setup->camera)});
+    files.push_back({folder / "camera_from_patient.txt", pose_text(snapshot.camera_from_patient->matrix())});
+    files.push_back({folder / "transfer.json", transfer_text(*snapshot.transfer)});
+    sheet["drawn_again_by"] = render_arguments(folder, snapshot);
+    if (snapshot.deformation) {
+      if (auto written = write_field(folder / "field.mha", *snapshot.deformation); !written) return written;
+    }
+  }
+  files.push_back({folder / "snapshot.json", text_of(sheet)});
+  return write_files(files);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+
+#include "device/wire/messages.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/operation/patient.hpp"
+#include "host/overlay/live_picture.hpp"
+#include "host/render/scene/transfer_function.hpp"
+
+namespace birdseye::host {
+
+/// All that a picture in the window was made of.
+struct Snapshot {
+  wire::VideoFrame frame;
+  std::vector<std::uint8_t> picture;                              ///< RGB, as it was shown
+  ShownPicture shown;                                             ///< but for its pixels
+  std::optional<Setup> setup;                                     ///< empty: nothing was registered
+  std::optional<Transform<Camera, Patient>> camera_from_patient;  ///< empty: nothing was drawn
+  RenderSettings render;
+  double opacity = 1;
+  bool surface_in_front = false;
+  std::string engine;
+  std::optional<TransferFunction> transfer;
+  PatientFiles patient;
+  std::optional<DisplacementField> deformation;  ///< of the picture
+  std::optional<double> fre_mm;
+};
+
+/// In folder, which it makes: video.png as it came, picture.png as it was shown, and, where the CT was drawn, what it
+/// was drawn by, with snapshot.json holding the figures and the arguments by which `birdseye render` draws it again.
+Result<void> write_snapshot(const std::filesystem::path& folder, const Snapshot& snapshot);
+
+}  // namespace birdseye::host

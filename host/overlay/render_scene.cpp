@@ -1,0 +1,92 @@
+#include "host/overlay/render_scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "host/overlay/compositor.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+/// The corners of the volume's box in the patient frame.
+std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9);
+  Eigen::Vector3d high = -low;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d voxel((corner & 1) * (volume.size[0] - 1), (corner >> 1 & 1) * (volume.size[1] - 1),
+                                (corner >> 2) * (volume.size[2] - 1));
+    const Eigen::Vector3d p = volume.patient_from_voxel * voxel;
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return {low, high};
+}
+
+}  // namespace
+
+Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
+                          const std::vector<int>& keep) {
+  auto ct = import_volume(volume);
+  if (!ct || labels.empty()) return ct;
+  const auto label_of = import_labels(labels, *ct);
+  if (!label_of) return label_of.error();
+  auto kept = keep_labels(*ct, *label_of, keep);
+  if (!kept) return Error{kept.error().code, fmt::format("{}: {}", labels.string(), kept.error().what)};
+  return kept;
+}
+
+Eigen::Vector3d middle_of(const Volume& volume) {
+  const auto [low, high] = bounds(volume);
+  return 0.5 * (low + high);
+}
+
+Result<void> look_from_the_front(RenderScene& scene, const std::string& size, double clip) {
+  CameraModel& c = scene.camera;
+  int read = 0;
+  if (std::sscanf(size.c_str(), "%dx%d%n", &c.width_px, &c.height_px, &read) != 2 ||
+      static_cast<std::size_t>(read) != size.size() || c.width_px < 16 || c.height_px < 16 || c.width_px > 8192 ||
+      c.height_px > 8192) {
+    return Error{Errc::bad_value, fmt::format("--size {}: give WIDTHxHEIGHT of 16 to 8192 pixels", size)};
+  }
+  const auto [low, high] = bounds(scene.volume);
+  const Eigen::Vector3d extent = high - low;
+  const bool thin = 2 * extent.z() < std::min(extent.x(), extent.y());
+  const Eigen::Vector3d right = Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d down =
+      thin ? Eigen::Vector3d(Eigen::Vector3d::UnitY()) : Eigen::Vector3d(-Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d forward = right.cross(down);
+  const double wide = extent.x();
+  const double tall = extent.dot(down.cwiseAbs());
+  const double deep = extent.dot(forward);
+  const double distance = 2.5 * std::max(wide, tall);
+  const Eigen::Vector3d middle = 0.5 * (low + high);
+  const Eigen::Vector3d eye = middle - (0.5 * deep + distance) * forward;
+  c.fx_px = c.fy_px = 0.96 * (distance + clip * deep) * std::min(c.width_px / wide, c.height_px / tall);
+  c.cx_px = 0.5 * (c.width_px - 1);
+  c.cy_px = 0.5 * (c.height_px - 1);
+  Eigen::Matrix3d patient_from_camera;
+  patient_from_camera << right, down, forward;
+  scene.camera_from_patient = Transform<Patient, Camera>(patient_from_camera, eye).inverse();
+  if (clip > 0) scene.settings.clip = ClipPlane{forward, low.dot(forward) + clip * deep};
+  return {};
+}
+
+ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                     const RenderSettings& settings) {
+  ImageRgba image = engine.render(scene.camera, camera_from_patient, settings);
+  if (scene.straighten) scene.straighten->hide_unseen(image);
+  return image;
+}
+
+Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+             const RenderSettings& settings) {
+  const ImageRgba image = overlay_of(engine, scene, camera_from_patient, settings);
+  return {image.width_px, image.height_px, composite(scene.behind.rgb, image, 1)};
+}
+
+}  // namespace birdseye::host

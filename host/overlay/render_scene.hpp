@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/files/picture.hpp"
+#include "host/overlay/undistortion.hpp"
+#include "host/render/engine.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+class Window;
+
+/// What `birdseye render` draws, once all is read.
+struct RenderScene {
+  Volume volume;
+  std::optional<DisplacementField> deformation;
+  CameraModel camera;
+  Transform<Camera, Patient> camera_from_patient;
+  RenderSettings settings;
+  std::vector<Transform<Camera, Patient>> path;  ///< that a film goes along; may be none
+  double film_s = 4;
+  Picture behind;                              ///< of the camera's size: a frame of video, or black
+  std::optional<FrameUndistorter> straighten;  ///< where the camera is a straight one in place of that of the video
+};
+
+/// A CT; with labels, a label volume on its grid, of it what has one of those to keep.
+Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
+                          const std::vector<int>& keep);
+
+/// Without lens and pose: from in front of the patient, head up; of a scan thinner than half its height or width, from
+/// the feet as radiologists look at a slice. The volume fills the picture; what lies before share `clip` of its depth
+/// is cut away. size: WIDTHxHEIGHT.
+Result<void> look_from_the_front(RenderScene& scene, const std::string& size, double clip);
+
+/// The middle of the volume's box, patient frame.
+Eigen::Vector3d middle_of(const Volume& volume);
+
+/// The scene from here, with settings of its own, where the lens of the video sees anything.
+ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                     const RenderSettings& settings);
+
+/// That over what is behind it.
+Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+             const RenderSettings& settings);
+
+/// With a path the camera goes along it, from the first pose in the first frame to the last in the last. Without, and
+/// with a deformation: it grows from nothing and goes back. Without both the camera swings about the volume's middle.
+Result<void> film_scene(const std::filesystem::path& path, const RenderScene& scene, Engine& engine);
+
+/// Shows the scene in a window until the user closes it, or after so many pictures where that is not 0. The mouse turns
+/// the volume about its middle and the wheel comes nearer; keys: R back to the start, C the cut, D the deformation,
+/// Esc. What the window showed last.
+Result<Picture> show_scene(Window& window, const RenderScene& scene, Engine& engine, int most_pictures);
+
+}  // namespace birdseye::host

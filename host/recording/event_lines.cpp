@@ -1,0 +1,97 @@
+#include "host/recording/event_lines.hpp"
+
+#include <fmt/format.h>
+
+#include "device/wire/json.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using nlohmann::json;
+
+json json_of(const wire::Birds& birds) {
+  json list = json::array();
+  for (const wire::Bird& bird : birds.birds) {
+    const Eigen::Matrix4d m = bird.tracker_from_sensor.matrix();
+    json rows = json::array();
+    for (int i = 0; i < 16; ++i) rows.push_back(m(i / 4, i % 4));
+    list.push_back({{"name", bird.name}, {"tracker_from_sensor", rows}});
+  }
+  return {{"acquired_ns", birds.acquired.ns}, {"birds", list}};
+}
+
+/// Throws json::exception, or std::invalid_argument for a matrix that is no pose.
+wire::Birds birds_of(const json& in) {
+  wire::Birds birds;
+  in.at("acquired_ns").get_to(birds.acquired.ns);
+  for (const json& bird : in.at("birds")) {
+    const json& rows = bird.at("tracker_from_sensor");
+    if (rows.size() != 16) throw std::invalid_argument("a pose has 16 numbers");
+    Eigen::Matrix4d m;
+    for (int i = 0; i < 16; ++i) m(i / 4, i % 4) = rows[static_cast<std::size_t>(i)].get<double>();
+    const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+    if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-6) || r.determinant() < 0)
+      throw std::invalid_argument("a pose that is no pose");
+    birds.birds.push_back({bird.at("name").get<std::string>(), Transform<Tracker, Sensor>::from_matrix(m)});
+  }
+  return birds;
+}
+
+json json_of(const wire::VideoFrame& frame, const FramePlace& place) {
+  return {{"info", frame.info},
+          {"width_px", frame.width_px},
+          {"height_px", frame.height_px},
+          {"file", place.file},
+          {"index", place.index}};
+}
+
+EventOfLine event_of(const std::string& kind, const json& in) {
+  if (kind == "VideoFrame") {
+    wire::VideoFrame frame;
+    in.at("info").get_to(frame.info);
+    in.at("width_px").get_to(frame.width_px);
+    in.at("height_px").get_to(frame.height_px);
+    return {frame, {in.at("file").get<std::string>(), in.at("index").get<std::size_t>()}};
+  }
+  if (kind == "Birds") return {birds_of(in), {}};
+  if (kind == "Doubt") return {in.get<wire::Doubt>(), {}};
+  if (kind == "ClockChange") return {in.get<wire::ClockChange>(), {}};
+  if (kind == "Pedal") return {in.get<wire::Pedal>(), {}};
+  if (kind == "Status") return {wire::Status{in.at("ok").get<bool>(), in.at("text").get<std::string>()}, {}};
+  if (kind == "Health") return {in.get<wire::Health>(), {}};
+  if (kind == "CameraControls") return {in.get<wire::CameraControls>(), {}};
+  if (kind == "Calibration") return {in.get<wire::Calibration>(), {}};
+  throw std::invalid_argument(fmt::format("an event of kind \"{}\", which is not known", kind));
+}
+
+}  // namespace
+
+std::string event_line(const wire::Event& event, const FramePlace& place) {
+  struct Visitor {
+    const FramePlace& place;
+    json operator()(const wire::VideoFrame& e) const { return {{"VideoFrame", json_of(e, place)}}; }
+    json operator()(const wire::Birds& e) const { return {{"Birds", json_of(e)}}; }
+    json operator()(const wire::Doubt& e) const { return {{"Doubt", e}}; }
+    json operator()(const wire::ClockChange& e) const { return {{"ClockChange", e}}; }
+    json operator()(const wire::Pedal& e) const { return {{"Pedal", e}}; }
+    json operator()(const wire::Status& e) const { return {{"Status", {{"ok", e.ok}, {"text", e.text}}}}; }
+    json operator()(const wire::Health& e) const { return {{"Health", e}}; }
+    json operator()(const wire::CameraControls& e) const { return {{"CameraControls", e}}; }
+    json operator()(const wire::Calibration& e) const { return {{"Calibration", e}}; }
+  };
+  // Names that an instrument tells need not be UTF-8.
+  return std::visit(Visitor{place}, event).dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+Result<EventOfLine> parse_event_line(const std::string& line) {
+  try {
+    const json in = json::parse(line);
+    if (!in.is_object() || in.size() != 1) return Error{Errc::bad_format, "is no event"};
+    return event_of(in.begin().key(), in.begin().value());
+  } catch (const std::exception& fault) {
+    return Error{Errc::bad_format, fmt::format("is no event: {}", fault.what())};
+  }
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,255 @@
+#include "host/recording/recording_reader.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "host/files/pose_collector.hpp"
+#include "host/recording/recording_writer.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// "StylusToTracker" -> "stylus".
+std::string bird_name(std::string transform) {
+  constexpr std::string_view kTo = "ToTracker";
+  if (transform.ends_with(kTo) && transform.size() > kTo.size()) transform.resize(transform.size() - kTo.size());
+  transform[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(transform[0])));
+  return transform;
+}
+
+std::optional<DeviceTime> time_of(const wire::Event& event) {
+  if (const auto* frame = std::get_if<wire::VideoFrame>(&event))
+    return std::max(frame->info.acquired, frame->info.arrived);
+  if (const auto* birds = std::get_if<wire::Birds>(&event)) return birds->acquired;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const fs::path& path, const Settings& settings) {
+  std::unique_ptr<RecordingReader> reader(new RecordingReader(path, settings));
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return Error{Errc::not_found, fmt::format("{}: no such recording", path.string())};
+  if (auto opened = fs::is_directory(path, ignored) ? reader->open_folder() : reader->open_sequence(); !opened)
+    return opened.error();
+  return reader;
+}
+
+Result<void> RecordingReader::open_folder() {
+  lines_.open(path_ / kRecordingEvents);
+  if (!lines_) {
+    return Error{Errc::not_found,
+                 fmt::format("{}: holds no recording ({}); give a folder that birdseye record made, or "
+                             "a .igs.mha",
+                             path_.string(), kRecordingEvents)};
+  }
+  std::ifstream file(path_ / kRecordingSheet);
+  const auto sheet = nlohmann::json::parse(file, nullptr, false);
+  if (!sheet.is_object()) {
+    notes_.push_back(fmt::format("{} is missing or damaged; the rest is read without it", kRecordingSheet));
+    return {};
+  }
+  const auto version = sheet.find("birdseye_recording");
+  if (version == sheet.end() || !version->is_number_integer() || *version != kRecordingVersion) {
+    return Error{Errc::unsupported, fmt::format("{}: is of another version than {}", (path_ / kRecordingSheet).string(),
+                                                kRecordingVersion)};
+  }
+  if (const auto ended = sheet.find("ended"); ended != sheet.end() && *ended == false)
+    notes_.emplace_back("it was cut short while it was recorded");
+  return {};
+}
+
+Result<void> RecordingReader::open_sequence() {
+  auto opened = SequenceReader::open(path_);
+  if (!opened) return opened.error();
+  sequence_ = *std::move(opened);
+  const auto& transforms = sequence_->header().transforms;
+  scope_ = settings_.transform;
+  if (scope_.ends_with(kTransformField)) scope_.resize(scope_.size() - kTransformField.size());
+  if (scope_.empty()) scope_ = transforms.size() == 1 ? *transforms.begin() : transform_name("scope");
+  if (!transforms.contains(scope_)) {
+    return Error{
+        Errc::bad_value,
+        fmt::format("{}: say by name which transform is the scope's (--transform); it holds {}", path_.string(),
+                    transforms.empty() ? "none" : fmt::format("{}", fmt::join(transforms, ", ")))};
+  }
+  const bool timed = std::any_of(sequence_->header().frames.begin(), sequence_->header().frames.end(),
+                                 [](const auto& frame) { return frame.second.contains(kTimestampField); });
+  if (!timed) return Error{Errc::bad_format, fmt::format("{}: its frames have no Timestamp", path_.string())};
+  return {};
+}
+
+Result<std::optional<EventOfLine>> RecordingReader::take_line() {
+  std::string line;
+  if (!std::getline(lines_, line)) return std::optional<EventOfLine>();
+  ++line_;
+  // What was cut lacks its end.
+  const bool cut = lines_.eof();
+  auto event = parse_event_line(line);
+  if (event && !cut) return std::optional(*std::move(event));
+  if (cut) {
+    notes_.push_back(fmt::format("{} is cut short in line {}", kRecordingEvents, line_));
+    return std::optional<EventOfLine>();
+  }
+  return Error{event.error().code,
+               fmt::format("{}: line {} {}", (path_ / kRecordingEvents).string(), line_, event.error().what)};
+}
+
+Result<void> RecordingReader::make_events(std::size_t number, const SequenceHeader::Fields& fields) {
+  const ReadNumber time = read_number(value_of(fields, kTimestampField));
+  if (!time.problem.empty()) {
+    notes_.push_back(fmt::format("frame {} has no time and is passed over", number));
+    return {};
+  }
+  const DeviceTime acquired{std::llround(time.value * 1e9)};
+  wire::Birds birds{acquired, {}};
+  wire::VideoFrame frame;
+  frame.info.pose.reason = scope_ + " missing";
+  for (const std::string& transform : sequence_->header().transforms) {
+    const std::string_view status = value_of(fields, transform + std::string(kTransformStatusField));
+    const auto text = fields.find(transform + std::string(kTransformField));
+    if (text == fields.end()) continue;
+    ReadPose pose =
+        status.empty() || status == kStatusOk ? read_matrix(text->second, 1) : ReadPose{{}, std::string(status)};
+    if (pose.problem.empty()) birds.birds.push_back({bird_name(transform), pose.tracker_from_sensor});
+    if (transform != scope_) continue;
+    frame.info.pose.reason = pose.problem.empty() ? "" : scope_ + " " + pose.problem;
+    if (!pose.problem.empty()) continue;
+    // PLUS interpolates the tracker's poses at the times of its frames.
+    frame.info.pose.kind = PoseKind::interpolated;
+    frame.info.pose.tracker_from_sensor = pose.tracker_from_sensor;
+  }
+  made_.push_back({birds, {}});
+  const std::string_view status = value_of(fields, kImageStatusField);
+  if (sequence_->width_px() == 0 || (!status.empty() && status != kStatusOk)) return {};
+  const ReadNumber counted = read_number(value_of(fields, kFrameNumberField));
+  frame.info.sequence =
+      counted.problem.empty() && counted.value >= 0 ? static_cast<std::uint64_t>(counted.value) : number;
+  frame.info.acquired = frame.info.arrived = acquired;
+  frame.width_px = sequence_->width_px();
+  frame.height_px = sequence_->height_px();
+  made_.push_back({frame, {"", number}});
+  return {};
+}
+
+Result<std::optional<EventOfLine>> RecordingReader::take_of_sequence() {
+  const auto& frames = sequence_->header().frames;
+  while (made_.empty()) {
+    const auto found = frames.lower_bound(next_frame_);
+    if (found == frames.end()) return std::optional<EventOfLine>();
+    next_frame_ = found->first + 1;
+    if (auto made = make_events(found->first, found->second); !made) return made.error();
+  }
+  std::optional<EventOfLine> event = std::move(made_.front());
+  made_.pop_front();
+  return event;
+}
+
+Result<void> RecordingReader::open_video(const std::string& name, const wire::VideoFrame& frame) {
+  sequence_.reset();
+  film_.reset();
+  video_ = name;
+  std::error_code ignored;
+  for (const char* extension : {".igs.mha", ".igs.mhd"}) {
+    const fs::path file = path_ / (name + extension);
+    if (!fs::exists(file, ignored)) continue;
+    auto opened = SequenceReader::open(file);
+    if (!opened) return opened.error();
+    sequence_ = *std::move(opened);
+    return {};
+  }
+  auto film = FilmReader::open(path_ / (name + ".mp4"), frame.width_px / 2 * 2, frame.height_px / 2 * 2);
+  if (!film) {
+    return Error{Errc::not_found,
+                 fmt::format("{}: lacks the video, {}.igs.mha, .igs.mhd or .mp4", path_.string(), name)};
+  }
+  film_ = *std::move(film);
+  return {};
+}
+
+/// False: the frame is not there, or not whole.
+Result<bool> RecordingReader::fetch_pixels(wire::VideoFrame& frame, const FramePlace& place) {
+  if (place.file != video_ || (!sequence_ && !film_)) {
+    if (fs::path(place.file).has_parent_path())
+      return Error{Errc::bad_value, fmt::format("{}: names a file elsewhere, {}", path_.string(), place.file)};
+    if (auto opened = open_video(place.file, frame); !opened) return opened.error();
+  }
+  if (sequence_ && place.index >= sequence_->frames()) return false;
+  auto rgb = sequence_ ? sequence_->read(place.index) : film_->read(place.index);
+  if (!rgb && film_ && rgb.error().code == Errc::bad_format) return false;
+  if (!rgb) return rgb.error();
+  if (sequence_ && (frame.width_px != sequence_->width_px() || frame.height_px != sequence_->height_px())) {
+    return Error{Errc::bad_format, fmt::format("{}: frame {} is said to be {}x{}, and the file of its pixels is {}x{}",
+                                               path_.string(), place.index, frame.width_px, frame.height_px,
+                                               sequence_->width_px(), sequence_->height_px())};
+  }
+  if (film_) {  // whose sizes are even
+    frame.width_px = frame.width_px / 2 * 2;
+    frame.height_px = frame.height_px / 2 * 2;
+  }
+  frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(*std::move(rgb));
+  return true;
+}
+
+Error RecordingReader::end() const {
+  const std::string lost =
+      frames_lost_ == 0 ? "" : fmt::format(" are whole, {} more are cut short or missing", frames_lost_);
+  return {Errc::disconnected, fmt::format("{}: ends here; {} frames{}", path_.string(), frames_, lost)};
+}
+
+/// The next event into waiting_; false at the end.
+Result<bool> RecordingReader::fetch_next() {
+  for (;;) {
+    auto taken = lines_.is_open() ? take_line() : take_of_sequence();
+    if (!taken) return taken.error();
+    if (!*taken) return false;
+    if (auto* frame = std::get_if<wire::VideoFrame>(&(*taken)->event)) {
+      const auto whole = settings_.pictures ? fetch_pixels(*frame, (*taken)->place) : Result<bool>(true);
+      if (!whole) return whole.error();
+      ++(*whole ? frames_ : frames_lost_);
+      if (!*whole) continue;
+    }
+    waiting_ = std::move((*taken)->event);
+    return true;
+  }
+}
+
+Clock::time_point RecordingReader::due(const wire::Event& event) {
+  const auto time = time_of(event);
+  if (!first_ && time) {
+    first_ = last_ = time;
+    began_ = Clock::now();
+    return Clock::time_point::min();
+  }
+  if (time) last_ = std::max(*last_, *time);
+  if (!last_ || settings_.speed <= 0) return Clock::time_point::min();
+  const double since_s = (*last_ - *first_).seconds() / settings_.speed;
+  return began_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(since_s));
+}
+
+Result<std::optional<wire::Event>> RecordingReader::next(Clock::time_point deadline) {
+  if (ended_) return *ended_;
+  if (!waiting_) {
+    const auto fetched = fetch_next();
+    if (!fetched || !*fetched) {
+      ended_ = fetched ? end() : fetched.error();
+      return *ended_;
+    }
+  }
+  const auto when = due(*waiting_);
+  std::this_thread::sleep_until(std::min(when, deadline));
+  if (when > deadline) return std::optional<wire::Event>();
+  return std::exchange(waiting_, std::nullopt);
+}
+
+}  // namespace birdseye::host

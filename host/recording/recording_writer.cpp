@@ -1,0 +1,264 @@
+#include "host/recording/recording_writer.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <nlohmann/json.hpp>
+
+#include "host/files/sequence_header.hpp"
+#include "host/files/write_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kUsualRateHz = 25;
+/// More than any tracker has: names are what somebody sends.
+constexpr std::size_t kMostBirds = 64;
+
+}  // namespace
+
+Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const RecordingSettings& settings) {
+  std::error_code error;
+  if (fs::exists(settings.folder / kRecordingSheet, error) || fs::exists(settings.folder / kRecordingEvents, error)) {
+    return Error{Errc::in_use,
+                 fmt::format("{}: holds a recording already; choose another --out", settings.folder.string())};
+  }
+  fs::create_directories(settings.folder, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", settings.folder.string())};
+  auto events = OutputFile::create(settings.folder / kRecordingEvents);
+  if (!events) return events.error();
+  auto tracker = SequenceWriter::create(settings.folder, kRecordingTracker, 0, 0);
+  if (!tracker) return tracker.error();
+  std::unique_ptr<RecordingWriter> writer(new RecordingWriter(settings, *std::move(events), *std::move(tracker)));
+  if (auto written = writer->write_sheet("it is being recorded, or was cut short", false); !written)
+    return written.error();
+  return writer;
+}
+
+Result<void> RecordingWriter::add_line(const wire::Event& event, const FramePlace& place) {
+  const std::string line = event_line(event, place) + "\n";
+  if (auto put = events_.put(events_at_, line); !put) {
+    events_.cut(events_at_);
+    return put;
+  }
+  events_at_ += line.size();
+  ++figures_.events;
+  return {};
+}
+
+void RecordingWriter::note_time(DeviceTime time) {
+  if (!figures_.first) figures_.first = figures_.last = time;
+  figures_.last = std::max(*figures_.last, time);
+}
+
+Result<void> RecordingWriter::add(const wire::Event& event) {
+  if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) return add_frame(*frame);
+  if (const auto* birds = std::get_if<wire::Birds>(&event)) {
+    if (auto added = add_birds(*birds); !added) return added;
+  }
+  if (const auto* health = std::get_if<wire::Health>(&event)) health_ = *health;
+  return add_line(event, {});
+}
+
+Result<void> RecordingWriter::add_birds(const wire::Birds& birds) {
+  note_time(birds.acquired);
+  SequenceWriter::Fields fields = {{std::string(kTimestampField), seconds_text(birds.acquired.ns)}};
+  for (const wire::Bird& bird : birds.birds) {
+    if (transform_of_.size() >= kMostBirds && !transform_of_.contains(bird.name)) continue;
+    transform_of_.try_emplace(bird.name, transform_name(bird.name));
+    histories_[bird.name].push(birds.acquired, {}, bird.tracker_from_sensor);
+    ++figures_.poses[bird.name];
+  }
+  // Every bird that ever told of itself is in each of the frames.
+  for (const auto& [name, transform] : transform_of_) {
+    const auto found = std::find_if(birds.birds.begin(), birds.birds.end(),
+                                    [&name = name](const wire::Bird& bird) { return bird.name == name; });
+    const bool seen = found != birds.birds.end();
+    const Eigen::Matrix4d m = seen ? found->tracker_from_sensor.matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity());
+    fields.emplace_back(transform + std::string(kTransformField), transform_text(m));
+    fields.emplace_back(transform + std::string(kTransformStatusField), seen ? kStatusOk : kStatusInvalid);
+  }
+  if (auto added = tracker_.add(fields, {}); !added) return added;
+  ++figures_.measurements;
+  return {};
+}
+
+SequenceWriter::Fields RecordingWriter::fields_of(const wire::VideoFrame& frame) const {
+  const wire::FrameInfo& info = frame.info;
+  SequenceWriter::Fields fields = {{std::string(kFrameNumberField), std::to_string(info.sequence)},
+                                   {std::string(kTimestampField), seconds_text(info.acquired.ns)},
+                                   {std::string(kUnfilteredTimestampField), seconds_text(info.arrived.ns)},
+                                   {"TimestampSigma", seconds_text(info.acquired_sigma.ns)},
+                                   {"PoseKind", to_string(info.pose.kind)},
+                                   {"PoseSigmaMm", fmt::format("{}", info.pose.position_sigma_mm)}};
+  const auto add = [&](const std::string& transform, const PoseAnswer& pose) {
+    const auto& m = pose.tracker_from_sensor;
+    fields.emplace_back(transform + std::string(kTransformField),
+                        transform_text(m ? m->matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity())));
+    fields.emplace_back(transform + std::string(kTransformStatusField), m ? kStatusOk : kStatusInvalid);
+  };
+  const std::string scope = transform_name("scope");
+  add(scope, info.pose);
+  for (const auto& [bird, transform] : transform_of_) {
+    if (transform != scope) add(transform, histories_.at(bird).at(info.acquired));
+  }
+  return fields;
+}
+
+std::string RecordingWriter::next_video() const {
+  const std::size_t number = figures_.videos.size() + 1;
+  return number == 1 ? kRecordingVideo : fmt::format("{}-{}", kRecordingVideo, number);
+}
+
+Result<void> RecordingWriter::begin_video(const wire::VideoFrame& frame, double rate_hz) {
+  RecordedVideo video;
+  video.name = next_video();
+  video.width_px = frame.width_px;
+  video.height_px = frame.height_px;
+  video.rate_hz = rate_hz;
+  if (settings_.compressed) {
+    video.file = video.name + ".mp4";
+    auto film = Film::open(settings_.folder / video.file, frame.width_px, frame.height_px, rate_hz);
+    if (!film) return film.error();
+    film_ = *std::move(film);
+  } else {
+    auto sequence = SequenceWriter::create(settings_.folder, video.name, frame.width_px, frame.height_px);
+    if (!sequence) return sequence.error();
+    video.file = sequence->path().filename().string();
+    sequence_.push_back(*std::move(sequence));
+  }
+  figures_.videos.push_back(video);
+  return write_sheet("it is being recorded, or was cut short", false);
+}
+
+Result<void> RecordingWriter::write_frame(const wire::VideoFrame& frame) {
+  RecordedVideo& video = figures_.videos.back();
+  if (auto added = film_ ? film_->add(*frame.rgb) : sequence_[0].add(fields_of(frame), *frame.rgb); !added)
+    return added;
+  if (auto added = add_line(frame, {video.name, video.frames}); !added) return added;
+  ++video.frames;
+  ++figures_.frames;
+  return {};
+}
+
+Result<void> RecordingWriter::add_frame(const wire::VideoFrame& frame) {
+  note_time(frame.info.acquired);
+  if (last_sequence_ && frame.info.sequence > *last_sequence_ + 1)
+    figures_.frames_missing += frame.info.sequence - *last_sequence_ - 1;
+  last_sequence_ = frame.info.sequence;
+  const bool open = film_ || !sequence_.empty();
+  if (open &&
+      (figures_.videos.back().width_px != frame.width_px || figures_.videos.back().height_px != frame.height_px)) {
+    notes_.push_back(fmt::format("the frames changed from {}x{} to {}x{} px: another file begins there",
+                                 figures_.videos.back().width_px, figures_.videos.back().height_px, frame.width_px,
+                                 frame.height_px));
+    if (auto ended = end_video(); !ended) return ended;
+  }
+  if (film_ || !sequence_.empty()) return write_frame(frame);
+  if (!settings_.compressed) {
+    if (auto begun = begin_video(frame, 0); !begun) return begun;
+    return write_frame(frame);
+  }
+  if (waiting_ && (waiting_->width_px != frame.width_px || waiting_->height_px != frame.height_px)) {
+    if (auto ended = end_video(); !ended) return ended;
+  }
+  if (!waiting_) {
+    // Its line at once, in its turn.
+    waiting_ = frame;
+    ++figures_.frames;
+    return add_line(frame, {next_video(), 0});
+  }
+  const double between_s = (frame.info.acquired - waiting_->info.acquired).seconds();
+  const auto steps = static_cast<double>(frame.info.sequence - waiting_->info.sequence);
+  const double told_hz = steps / between_s;
+  const bool sound = told_hz >= 1 && told_hz <= 1000;
+  if (auto begun = begin_film(sound ? std::round(10 * told_hz) / 10 : kUsualRateHz); !begun) return begun;
+  return write_frame(frame);
+}
+
+Result<void> RecordingWriter::begin_film(double rate_hz) {
+  const wire::VideoFrame first = *std::exchange(waiting_, std::nullopt);
+  if (auto begun = begin_video(first, rate_hz); !begun) return begun;
+  ++figures_.videos.back().frames;
+  return film_->add(*first.rgb);
+}
+
+Result<void> RecordingWriter::end_video() {
+  if (waiting_) {
+    if (auto begun = begin_film(kUsualRateHz); !begun) return begun;
+  }
+  if (film_) {
+    auto finished = film_->finish();
+    film_.reset();
+    return finished;
+  }
+  if (sequence_.empty()) return {};
+  if (!settings_.pair) {
+    // Two files are as good to read: not worth losing the recording for.
+    if (auto joined = sequence_[0].join(); !joined) notes_.push_back(joined.error().what);
+    figures_.videos.back().file = sequence_[0].path().filename().string();
+  }
+  sequence_.clear();
+  return {};
+}
+
+Result<void> RecordingWriter::finish(const std::string& why) {
+  Result<void> ended = end_video();
+  if (!ended) notes_.push_back(ended.error().what);
+  if (auto synced = events_.sync(); !synced) notes_.push_back(synced.error().what);
+  if (auto written = write_sheet(why, true); !written) return written;
+  return ended;
+}
+
+Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
+  using nlohmann::json;
+  json videos = json::array(), instruments = json::array();
+  for (const RecordedVideo& video : figures_.videos) {
+    videos.push_back({{"file", video.file}, {"width_px", video.width_px}, {"height_px", video.height_px}});
+    if (ended) videos.back()["frames"] = video.frames;
+    if (video.rate_hz > 0) videos.back()["film_rate_hz"] = video.rate_hz;
+  }
+  json sheet = {{"birdseye_recording", kRecordingVersion},
+                {"ended", ended},
+                {"why", why},
+                {"source", settings_.source},
+                {"events", {{"file", kRecordingEvents}}},
+                {"tracker", {{"file", std::string(kRecordingTracker) + ".igs.mha"}}},
+                {"video", videos},
+                {"clock", {{"stamps", "the appliance's CLOCK_MONOTONIC, ns; in the sequences s"}}},
+                {"notes", notes_}};
+  if (ended) {
+    sheet["made_utc"] = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+    sheet["seconds"] = figures_.seconds();
+    sheet["frames"] = figures_.frames;
+    sheet["frames_missing"] = figures_.frames_missing;
+    sheet["events"]["count"] = figures_.events;
+    sheet["tracker"]["measurements"] = figures_.measurements;
+    sheet["tracker"]["poses"] = figures_.poses;
+  }
+  if (figures_.first) {
+    sheet["clock"]["first_ns"] = figures_.first->ns;
+    sheet["clock"]["last_ns"] = figures_.last->ns;
+  }
+  if (health_) {
+    for (const wire::InstrumentHealth& one : health_->instruments)
+      instruments.push_back({{"name", one.name}, {"text", one.text}, {"identity", one.identity}});
+    sheet["instruments"] = instruments;
+    sheet["clock"]["source"] = health_->clock.source;
+    sheet["clock"]["synchronised"] = health_->clock.synchronised;
+    sheet["clock"]["wall_minus_monotonic_ns"] = health_->clock.wall_minus_monotonic_ns;
+    sheet["appliance_frames_dropped"] = health_->frames_dropped;
+    sheet["appliance_messages_shed"] = health_->messages_shed;
+  }
+  return write_file(settings_.folder / kRecordingSheet,
+                    sheet.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace birdseye::host

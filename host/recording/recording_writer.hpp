@@ -1,0 +1,97 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/time/pose_history.hpp"
+#include "device/wire/messages.hpp"
+#include "host/files/film.hpp"
+#include "host/recording/event_lines.hpp"
+#include "host/recording/sequence_writer.hpp"
+
+namespace birdseye::host {
+
+// The files of a recording.
+inline constexpr const char* kRecordingSheet = "recording.json";
+inline constexpr const char* kRecordingEvents = "events.jsonl";
+inline constexpr const char* kRecordingTracker = "tracker";  ///< .igs.mha
+inline constexpr const char* kRecordingVideo = "video";      ///< .igs.mha, or .igs.mhd and .raw, or .mp4; video-2 ...
+inline constexpr int kRecordingVersion = 1;
+
+struct RecordingSettings {
+  std::filesystem::path folder = {};
+  std::string source = {};  ///< whom it was recorded from, as HOST:PORT
+  bool compressed = false;  ///< films by ffmpeg, which lose something
+  bool pair = false;        ///< leaves header and pixels two files
+};
+
+/// One file of frames of one size.
+struct RecordedVideo {
+  std::string name;
+  std::string file;  ///< what to open
+  int width_px = 0, height_px = 0;
+  std::size_t frames = 0;
+  double rate_hz = 0;
+};
+
+/// What is in a recording so far.
+struct RecordingFigures {
+  std::vector<RecordedVideo> videos;
+  std::size_t frames = 0, measurements = 0, events = 0;
+  std::uint64_t frames_missing = 0;  ///< holes in the camera's count
+  std::optional<DeviceTime> first, last;
+  std::map<std::string, std::size_t> poses;  ///< by bird
+  [[nodiscard]] double seconds() const { return first ? (*last - *first).seconds() : 0; }
+};
+
+/// Writes what an appliance tells into a folder: events.jsonl, all of it, to play again; tracker.igs.mha and the
+/// video's sequence, for Slicer and PLUS; recording.json, what is in it. What was added stays good whatever ends the
+/// program.
+class RecordingWriter {
+ public:
+  /// Makes the folder, which must hold no recording yet.
+  static Result<std::unique_ptr<RecordingWriter>> create(const RecordingSettings& settings);
+
+  /// An error ends the recording: what came before it is kept, and finish() is to follow.
+  Result<void> add(const wire::Event& event);
+  /// Completes the files. why: it ended, in words.
+  Result<void> finish(const std::string& why);
+  [[nodiscard]] const RecordingFigures& figures() const { return figures_; }
+  /// What is not as it was asked for, in words.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+
+ private:
+  RecordingWriter(RecordingSettings settings, OutputFile events, SequenceWriter tracker)
+      : settings_(std::move(settings)), events_(std::move(events)), tracker_(std::move(tracker)) {}
+  Result<void> add_line(const wire::Event& event, const FramePlace& place);
+  Result<void> add_frame(const wire::VideoFrame& frame);
+  Result<void> add_birds(const wire::Birds& birds);
+  Result<void> begin_video(const wire::VideoFrame& frame, double rate_hz);
+  Result<void> begin_film(double rate_hz);
+  Result<void> write_frame(const wire::VideoFrame& frame);
+  Result<void> end_video();
+  Result<void> write_sheet(const std::string& why, bool ended);
+  void note_time(DeviceTime time);
+  [[nodiscard]] std::string next_video() const;
+  [[nodiscard]] SequenceWriter::Fields fields_of(const wire::VideoFrame& frame) const;
+
+  RecordingSettings settings_;
+  OutputFile events_;
+  SequenceWriter tracker_;
+  std::uint64_t events_at_ = 0;
+  std::vector<SequenceWriter> sequence_;  ///< one while frames come and are not compressed
+  std::optional<Film> film_;
+  std::optional<wire::VideoFrame> waiting_;  ///< the first frame of a film, until the second tells the rate
+  std::map<std::string, PoseHistory> histories_;
+  std::map<std::string, std::string> transform_of_;  ///< by bird
+  std::optional<std::uint64_t> last_sequence_;
+  std::optional<wire::Health> health_;
+  RecordingFigures figures_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/files/sequence_header.hpp"
+
+namespace birdseye::host {
+
+/// The pictures of a PLUS sequence (.igs.mha, or .igs.mhd with its pixels beside it), grey or RGB, 8 bits, plain or
+/// compressed by zlib, of our making or of PLUS's.
+class SequenceReader {
+ public:
+  /// Refuses, naming the file: what is no such sequence, of other pixels or in an orientation that is not a picture's.
+  static Result<SequenceReader> open(const std::filesystem::path& path);
+  SequenceReader(SequenceReader&&) noexcept;
+  SequenceReader& operator=(SequenceReader&&) noexcept;
+  ~SequenceReader();
+
+  [[nodiscard]] const SequenceHeader& header() const { return header_; }
+  [[nodiscard]] int width_px() const { return width_px_; }
+  [[nodiscard]] int height_px() const { return height_px_; }
+  /// That are there, whole.
+  [[nodiscard]] std::size_t frames() const { return whole_; }
+  /// That the header tells of: more, where the file was cut.
+  [[nodiscard]] std::size_t frames_told() const { return told_; }
+
+  /// RGB, rows from the top. Of a compressed file those that come before it are decompressed too, unless they are read
+  /// in order.
+  Result<std::vector<std::uint8_t>> read(std::size_t index);
+
+ private:
+  struct Pixels;
+  SequenceReader(std::filesystem::path path, SequenceHeader header);
+  Result<void> take_layout();
+  Result<void> find_pixels();
+
+  std::filesystem::path path_;
+  SequenceHeader header_;
+  int width_px_ = 0, height_px_ = 0, channels_ = 1;
+  bool mirrored_ = false, from_below_ = false;
+  std::size_t told_ = 0, whole_ = 0;
+  std::unique_ptr<Pixels> pixels_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,157 @@
+#include "host/registration/rigid/point_matching.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace birdseye::host {
+
+namespace {
+
+using Points = std::span<const Eigen::Vector3d>;
+
+// Another assignment must fit worse by this factor, and by this much.
+constexpr double kClearlyBetter = 3, kClearlyWorse_mm = 2;
+constexpr double kWorstFre_mm = 15;
+constexpr std::size_t kMostLooks = 30'000'000;  // a second or so
+
+Eigen::MatrixXd distances(Points points) {
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Eigen::MatrixXd out(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j)
+      out(i, j) = (points[static_cast<std::size_t>(i)] - points[static_cast<std::size_t>(j)]).norm();
+  }
+  return out;
+}
+
+/// Depth first over assignments, touched point by touched point, cutting what cannot matter any more.
+class Search {
+ public:
+  Search(Points ct_mm, Points touched_mm)
+      : ct_mm_(ct_mm),
+        touched_mm_(touched_mm),
+        ct_distances_(distances(ct_mm)),
+        touched_distances_(distances(touched_mm)) {}
+
+  void run() {
+    order_.clear();
+    taken_.assign(ct_mm_.size(), false);
+    descend();
+  }
+  [[nodiscard]] bool gave_up() const { return looks_ > kMostLooks; }
+  [[nodiscard]] bool found() const { return !best_order_.empty(); }
+  [[nodiscard]] bool ambiguous() const { return second_mm_ < not_clearly_worse_mm(); }
+  [[nodiscard]] double best_mm() const { return best_mm_; }
+  [[nodiscard]] double second_mm() const { return second_mm_; }
+  [[nodiscard]] const std::vector<std::size_t>& best_order() const { return best_order_; }
+  [[nodiscard]] std::vector<Eigen::Vector3d> ct_in_order(const std::vector<std::size_t>& order) const {
+    std::vector<Eigen::Vector3d> ct;
+    ct.reserve(order.size());
+    for (const std::size_t i : order) ct.push_back(ct_mm_[i]);
+    return ct;
+  }
+
+ private:
+  [[nodiscard]] double not_clearly_worse_mm() const {
+    return std::max(kClearlyBetter * best_mm_, best_mm_ + kClearlyWorse_mm);
+  }
+  /// The FRE from which on an assignment is neither the best nor a rival of it.
+  [[nodiscard]] double limit_mm() const {
+    return std::min({second_mm_, kWorstFre_mm, found() ? not_clearly_worse_mm() : kWorstFre_mm});
+  }
+
+  [[nodiscard]] bool fits_so_far(std::size_t ct) const {
+    const double most_mm = limit_mm() * std::sqrt(2 * static_cast<double>(touched_mm_.size()));
+    const auto here = static_cast<Eigen::Index>(order_.size());
+    for (Eigen::Index i = 0; i < here; ++i) {
+      const auto other = static_cast<Eigen::Index>(order_[static_cast<std::size_t>(i)]);
+      if (std::abs(touched_distances_(here, i) - ct_distances_(static_cast<Eigen::Index>(ct), other)) >= most_mm)
+        return false;
+    }
+    return true;
+  }
+
+  void weigh() {
+    const auto fit = calibration::detail::fit_rigid(ct_in_order(order_), touched_mm_);
+    if (!fit) return;
+    double squares = 0;
+    for (std::size_t i = 0; i < order_.size(); ++i)
+      squares += (ct_mm_[order_[i]] - fit->rotation * touched_mm_[i] - fit->translation_mm).squaredNorm();
+    const double fre_mm = std::sqrt(squares / static_cast<double>(order_.size()));
+    if (fre_mm >= kWorstFre_mm) return;
+    if (fre_mm < best_mm_) {
+      second_mm_ = std::exchange(best_mm_, fre_mm);
+      best_order_ = order_;
+    } else {
+      second_mm_ = std::min(second_mm_, fre_mm);
+    }
+  }
+
+  void descend() {
+    if (order_.size() == touched_mm_.size()) return weigh();
+    for (std::size_t ct = 0; ct < ct_mm_.size() && !gave_up(); ++ct) {
+      if (taken_[ct]) continue;
+      ++looks_;
+      if (!fits_so_far(ct)) continue;
+      taken_[ct] = true;
+      order_.push_back(ct);
+      descend();
+      order_.pop_back();
+      taken_[ct] = false;
+    }
+  }
+
+  Points ct_mm_, touched_mm_;
+  Eigen::MatrixXd ct_distances_, touched_distances_;
+  std::vector<std::size_t> order_, best_order_;
+  std::vector<bool> taken_;
+  double best_mm_ = std::numeric_limits<double>::infinity(), second_mm_ = best_mm_;
+  std::size_t looks_ = 0;
+};
+
+}  // namespace
+
+Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+  const std::size_t touched = touched_in_tracker_mm.size();
+  if (touched > ct_in_patient_mm.size()) {
+    return Error{Errc::bad_value,
+                 fmt::format("{} markers found in the CT, {} touched on the patient: leave out touches that are on no "
+                             "marker, or find the missing markers",
+                             ct_in_patient_mm.size(), touched)};
+  }
+  // What no order makes good: too few points, points on a line, no numbers.
+  if (auto fit = calibration::detail::fit_rigid(touched_in_tracker_mm, touched_in_tracker_mm); !fit) return fit.error();
+  for (const Eigen::Vector3d& p : ct_in_patient_mm) {
+    if (!p.allFinite()) return Error{Errc::bad_value, "a CT point has a coordinate that is not a finite number"};
+  }
+  Search search(ct_in_patient_mm, touched_in_tracker_mm);
+  search.run();
+  if (search.gave_up()) {
+    return Error{Errc::degenerate,
+                 fmt::format("{} touched and {} CT points can be matched in too many ways: give the files the same "
+                             "order, or remove CT points that are no markers",
+                             touched, ct_in_patient_mm.size())};
+  }
+  if (!search.found()) {
+    return Error{
+        Errc::degenerate,
+        fmt::format("no choice of markers in the CT fits the touched points to {} mm: were they all touched on "
+                    "markers, and are both files in mm?",
+                    kWorstFre_mm)};
+  }
+  if (search.ambiguous()) {
+    return Error{Errc::degenerate,
+                 fmt::format("the markers cannot be told apart by their distances (FRE {:.1f} mm, and {:.1f} mm in "
+                             "another order): place them less evenly, or touch more",
+                             search.best_mm(), search.second_mm())};
+  }
+  auto fit = calibration::fit_points<Patient, Tracker>(search.ct_in_order(search.best_order()), touched_in_tracker_mm);
+  if (!fit) return fit.error();
+  return MatchedFit{*std::move(fit), search.best_order()};
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,123 @@
+#include <fmt/format.h>
+#include <itkVTKPolyDataMeshIO.h>
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+#include "host/registration/rigid/surface.hpp"
+#include "host/volume/isolated.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Surface decode_vtk(const fs::path& path) {
+  const auto io = itk::VTKPolyDataMeshIO::New();
+  io->SetFileName(path.string());
+  io->ReadMeshInformation();
+  // A number takes two bytes at least: what promises more than the file holds is not waited for.
+  const std::uintmax_t most = fs::file_size(path) / 2;
+  if (io->GetPointDimension() != 3 || 3 * io->GetNumberOfPoints() > most || io->GetCellBufferSize() > 2 * most)
+    return {};
+  Surface surface;
+  const std::size_t points = io->GetNumberOfPoints();
+  surface.vertices_mm.resize(points);
+  std::vector<double> doubles;
+  if (io->GetPointComponentType() == itk::IOComponentEnum::FLOAT) {
+    io->ReadPoints(surface.vertices_mm.data()->data());
+  } else if (io->GetPointComponentType() == itk::IOComponentEnum::DOUBLE) {
+    doubles.resize(3 * points);
+    io->ReadPoints(doubles.data());
+    for (std::size_t i = 0; i < points; ++i)
+      surface.vertices_mm[i] = Eigen::Map<const Eigen::Vector3d>(doubles.data() + 3 * i).cast<float>();
+  } else {
+    return {};
+  }
+  // Each cell: its kind, how many corners, which.
+  std::vector<std::uint32_t> cells(io->GetCellBufferSize());
+  io->ReadCells(cells.data());
+  for (std::size_t i = 0; i + 1 < cells.size();) {
+    const std::size_t corners = cells[i + 1];
+    if (corners > cells.size() - i - 2) return {};
+    for (std::size_t c = 2; c < corners; ++c)
+      surface.triangles.push_back({cells[i + 2], cells[i + 1 + c], cells[i + 2 + c]});
+    i += 2 + corners;
+  }
+  return surface;
+}
+
+Surface decode_others(const fs::path& path) {
+  Assimp::Importer importer;
+  const aiScene* scene =
+      importer.ReadFile(path.string(), aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType);
+  Surface surface;
+  for (unsigned m = 0; scene != nullptr && m < scene->mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene->mMeshes[m];
+    const auto first = static_cast<std::uint32_t>(surface.vertices_mm.size());
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i)
+      surface.vertices_mm.emplace_back(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
+    for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+      const aiFace& face = mesh.mFaces[i];
+      if (face.mNumIndices != 3) continue;  // points and edges
+      surface.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+    }
+  }
+  return surface;
+}
+
+template <typename T>
+std::vector<T> taken(const Receive& receive) {
+  std::uint64_t count = 0;
+  if (!receive(&count, sizeof count)) return {};
+  return receive_values<T>(receive, count).value_or(std::vector<T>());
+}
+
+}  // namespace
+
+Result<Surface> read_surface(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored))
+    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
+  if (!std::ifstream(path))
+    return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
+  constexpr Duration kLongest = Duration::from_ms(60'000);
+  Surface surface;
+  const auto ran = run_isolated(
+      [&path](const Send& send) {
+        const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path);
+        const auto put = [&send](const auto& values) {
+          const std::uint64_t count = values.size();
+          send(&count, sizeof count);
+          send(values.data(), count * sizeof values[0]);
+        };
+        put(decoded.vertices_mm);
+        put(decoded.triangles);
+      },
+      [&surface](const Receive& receive) {
+        surface.vertices_mm = taken<Eigen::Vector3f>(receive);
+        surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
+      },
+      kLongest);
+  if (!ran) return ran.error();
+  const bool sound = !surface.triangles.empty() &&
+                     std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),
+                                 [](const Eigen::Vector3f& p) { return p.allFinite(); }) &&
+                     std::all_of(surface.triangles.begin(), surface.triangles.end(), [&](const auto& t) {
+                       return *std::max_element(t.begin(), t.end()) < surface.vertices_mm.size();
+                     });
+  if (!sound) {
+    return Error{Errc::bad_format, fmt::format("{}: holds no triangles that can be read; export it as PLY, STL, OBJ or "
+                                               "VTK polygons",
+                                               path.string())};
+  }
+  return surface;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,82 @@
+#include "host/registration/views/rigid_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace birdseye::host {
+
+namespace {
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& w) {
+  Eigen::Matrix3d m;
+  m << 0, -w.z(), w.y(),  //
+      w.z(), 0, -w.x(),   //
+      -w.y(), w.x(), 0;
+  return m;
+}
+
+/// exp(w + d) = exp(w) exp(right_jacobian(w) d) to first order.
+Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& w) {
+  const double angle2 = w.squaredNorm(), angle = std::sqrt(angle2);
+  // By series near zero, where the quotients lose their digits.
+  constexpr double kSmall = 1e-3;
+  const double a = angle < kSmall ? 0.5 - angle2 / 24 : (1 - std::cos(angle)) / angle2;
+  const double b = angle < kSmall ? 1.0 / 6 - angle2 / 120 : (angle - std::sin(angle)) / (angle2 * angle);
+  const Eigen::Matrix3d cross = cross_matrix(w);
+  return Eigen::Matrix3d::Identity() - a * cross + b * cross * cross;
+}
+
+}  // namespace
+
+RigidMotion::RigidMotion(const Tissue& tissue) : patient_from_grid_(tissue.patient_from_grid) {
+  double mass = 0, second = 0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  for (int z = 0; z < tissue.points[2]; ++z) {
+    for (int y = 0; y < tissue.points[1]; ++y) {
+      for (int x = 0; x < tissue.points[0]; ++x) {
+        const auto share = static_cast<double>(tissue.occupancy[grid_index(tissue.points, x, y, z)]);
+        const Eigen::Vector3d p = Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm);
+        mass += share;
+        first += share * p;
+        second += share * p.squaredNorm();
+      }
+    }
+  }
+  const Eigen::Vector3d centre_on_grid_mm = first / mass;
+  centre_mm_ = patient_from_grid_ * centre_on_grid_mm;
+  gyration_mm_ = std::max(1.0, std::sqrt(std::max(0.0, second / mass - centre_on_grid_mm.squaredNorm())));
+}
+
+Transform<Patient, Patient> RigidMotion::patient_from_model(const PoseUnknowns& x) const {
+  const Eigen::Matrix3d r = rotation_exp(Eigen::Vector3d(x[3], x[4], x[5]) / gyration_mm_);
+  return {r, centre_mm_ - r * centre_mm_ + Eigen::Vector3d(x[0], x[1], x[2])};
+}
+
+PoseUnknowns RigidMotion::gradient(const PoseUnknowns& x, const Wrench& on_rays) const {
+  // A place q of a ray, which stays in the given frame, is seen at the model's p = exp(-w) (q - c - t) + c. So
+  // dp/dt = -exp(-w), and a change dw turns p about c by -right_jacobian(w) dw.
+  const Eigen::Vector3d w = Eigen::Vector3d(x[3], x[4], x[5]) / gyration_mm_;
+  const Eigen::Vector3d centre_on_grid_mm = patient_from_grid_.inverse(Eigen::Isometry) * centre_mm_;
+  const Eigen::Vector3d about_centre = on_rays.moment - centre_on_grid_mm.cross(on_rays.force);
+  const Eigen::Matrix3d patient_from_grid = patient_from_grid_.linear();
+  const Eigen::Vector3d by_shift = -(rotation_exp(w) * (patient_from_grid * on_rays.force));
+  const Eigen::Vector3d by_turn = -(right_jacobian(w).transpose() * (patient_from_grid * about_centre)) / gyration_mm_;
+  return {by_shift.x(), by_shift.y(), by_shift.z(), by_turn.x(), by_turn.y(), by_turn.z()};
+}
+
+void RigidMotion::add_to(const Tissue& tissue, const PoseUnknowns& unknowns, std::vector<float>& moves) const {
+  const Transform<Patient, Patient> model_from_patient = patient_from_model(unknowns).inverse();
+  const Eigen::Affine3d grid_from_patient = patient_from_grid_.inverse(Eigen::Isometry);
+  for (int z = 0; z < tissue.points[2]; ++z) {
+    for (int y = 0; y < tissue.points[1]; ++y) {
+      for (int x = 0; x < tissue.points[0]; ++x) {
+        const Eigen::Vector3d p = Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm);
+        const Eigen::Vector3d move = grid_from_patient * (model_from_patient * (patient_from_grid_ * p)) - p;
+        float* const to = &moves[3 * grid_index(tissue.points, x, y, z)];
+        for (int axis = 0; axis < 3; ++axis) to[axis] += static_cast<float>(move[axis]);
+      }
+    }
+  }
+}
+
+}  // namespace birdseye::host

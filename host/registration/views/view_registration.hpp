@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/registration/views/control_grid.hpp"
+#include "host/registration/views/multi_view.hpp"
+#include "host/registration/views/tissue.hpp"
+
+namespace birdseye::host {
+
+/// One evaluation of the optimiser.
+struct TracePoint {
+  int reduction = 0;  ///< every so many pixels
+  std::size_t parameters = 0;
+  double similarity = 0;
+};
+
+/// Whoever waits for a registration: sees each step, and may call it off. Called on the registration's thread.
+struct RegistrationWatch {
+  std::function<void(const TracePoint&)> step = [](const TracePoint&) {};
+  std::function<bool()> cancelled = [] { return false; };
+};
+
+struct ViewRegistrationSettings {
+  /// Inner control points along each axis; none: as many as the views support.
+  std::optional<std::array<int, 3>> control_points;
+  /// Patches of the octree that carries the result: 2^level along each axis.
+  int level = 5;
+  /// Where to start; must not fold.
+  std::optional<DisplacementField> initial;
+  /// The lamp, where it is known; none: estimated from the views.
+  std::optional<Headlight> light;
+  bool estimate_uncertainty = true;
+  /// Whether a rigid motion common to all views is found together with the deformation.
+  bool refine_pose = false;
+  Prior prior;
+  /// Called with a line for a person now and then.
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+  RegistrationWatch watch;
+};
+
+struct ViewRegistration {
+  std::array<int, 3> control_points{};
+  std::vector<double> parameters;  ///< mm, see ControlGrid
+  DisplacementField field;         ///< rest = deformed + u(deformed)
+  /// Of the given poses, where it is refined: camera_from_patient * patient_from_model is where the pictures were taken
+  /// from. The field is in the model's frame.
+  std::optional<PoseUnknowns> pose;
+  Transform<Patient, Patient> patient_from_model;
+  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< of the organ, about which it turns; model's frame
+  Headlight light;
+  double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
+  std::vector<double> per_view_before, per_view_after;
+  int evaluations = 0, gradient_evaluations = 0;
+  std::vector<TracePoint> trace;
+  double min_jacobian = 1;
+  /// The error of the organ's surface that is to be expected, root mean square (confidence.hpp). None where it was not
+  /// asked for or nothing better than the start was found.
+  std::optional<double> uncertainty_mm;
+  std::string why_so_many_points;  ///< in words
+  bool worse_than_start = false;   ///< the start is what is returned then: the initial field itself, or none
+  bool folded = false;             ///< and that is why: every deformation that was found folds
+  bool lamp_at_limit = false;      ///< the lamp is at the end of where it was searched
+};
+
+/// Deforms the tissue until synthetic views look like the video: L-BFGS with the analytic gradient, coarse to fine.
+/// Refuses, naming the view: one that sees nothing of the organ, a picture of a single grey; and a start that folds,
+/// also as the control points give it again. Errc::disconnected where the watch calls it off.
+Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
+                                        std::span<const int> label_values, const TransferFunction& transfer,
+                                        const ViewRegistrationSettings& settings);
+
+}  // namespace birdseye::host

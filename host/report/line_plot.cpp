@@ -1,0 +1,112 @@
+#include "host/report/line_plot.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/report/axes.hpp"
+#include "host/report/svg.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr const char* kColours[] = {kBlue, kOrange, kGreen, "#8d4aa8", "#7a6a1e", "#555555"};
+
+Range range_of(const Panel& panel, bool of_x) {
+  Range range;
+  for (const Curve& curve : panel.curves) {
+    for (const auto& [x, y] : curve.points) range.include(of_x ? x : y);
+  }
+  if (of_x || range.high < range.low) return range;
+  if (panel.from_zero) range.include(0);
+  constexpr double kAbove = 0.05;
+  range.high += kAbove * range.size();
+  if (range.low != 0) range.low -= kAbove * range.size();
+  return range;
+}
+
+/// Curves are told apart by the order in which their names first appear.
+const char* colour_of(const std::string& name, const std::vector<Panel>& panels) {
+  std::vector<std::string> seen;
+  for (const Panel& panel : panels) {
+    for (const Curve& curve : panel.curves) {
+      if (std::find(seen.begin(), seen.end(), curve.name) == seen.end()) seen.push_back(curve.name);
+    }
+  }
+  const auto at = static_cast<std::size_t>(std::find(seen.begin(), seen.end(), name) - seen.begin());
+  return kColours[at % std::size(kColours)];
+}
+
+/// The curves' names above the plot, where there are several; below: where its lines end.
+std::string legend_svg(const Panel& panel, const std::vector<Panel>& all, double width, double& below) {
+  constexpr double kLetter = 7.3, kBetween = 14, kLine = 16;
+  if (panel.curves.size() < 2) return {};
+  std::string out;
+  double x = Axes::kLeft;
+  below += kLine;
+  for (const Curve& curve : panel.curves) {
+    const double needed = kLetter * static_cast<double>(curve.name.size());
+    if (x > Axes::kLeft && x + needed > width) {
+      x = Axes::kLeft;
+      below += kLine;
+    }
+    out += svg_text(x, below, curve.name, Anchor::start, colour_of(curve.name, all));
+    x += needed + kBetween;
+  }
+  return out;
+}
+
+std::string curve_svg(const Curve& curve, const Axes& axes, const char* colour) {
+  constexpr std::size_t kFew = 8;
+  std::string out, line;
+  const auto end_line = [&] {
+    if (!line.empty())
+      out += fmt::format("<polyline points='{}' fill='none' stroke='{}' stroke-width='1.8'/>", line, colour);
+    line.clear();
+  };
+  for (const auto& [x, y] : curve.points) {
+    if (!std::isfinite(x) || !std::isfinite(y)) {
+      end_line();
+      continue;
+    }
+    line += fmt::format("{:.1f},{:.1f} ", axes.x_of(x), axes.y_of(y));
+    if (curve.points.size() <= kFew) out += svg_dot(axes.x_of(x), axes.y_of(y), 2.6, colour);
+  }
+  end_line();
+  return out;
+}
+
+std::string panel_svg(const Panel& panel, const std::vector<Panel>& all, const PanelSize& size) {
+  constexpr double kRight = 16;
+  double head = 18;
+  std::string svg = fmt::format("<g font-weight='bold'>{}</g>", svg_text(Axes::kLeft, head, panel.title));
+  svg += legend_svg(panel, all, size.width, head);
+  if (!panel.marks.empty()) head += 16;
+  const double top = head + 10;
+  const Axes axes({Axes::kLeft, top, size.width - Axes::kLeft - kRight, size.height - top - Axes::kBelow - 4},
+                  {range_of(panel, true), panel.x_label, 5}, {range_of(panel, false), panel.y_label});
+  svg += axes.svg();
+  for (const Mark& mark : panel.marks) {
+    svg += svg_line(axes.x_of(mark.x), top, axes.x_of(mark.x), top + axes.area().height, kGrey, kDashed) +
+           svg_text(axes.x_of(mark.x), top - 4, mark.text, Anchor::start, kGrey);
+  }
+  for (const Curve& curve : panel.curves) svg += curve_svg(curve, axes, colour_of(curve.name, all));
+  return svg;
+}
+
+}  // namespace
+
+std::string plot_svg(const std::vector<Panel>& panels, int columns, const PanelSize& size) {
+  const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
+  std::string svg;
+  for (std::size_t n = 0; n < panels.size(); ++n) {
+    const int column = static_cast<int>(n) % columns, row = static_cast<int>(n) / columns;
+    svg += fmt::format("<g transform='translate({} {})'>{}</g>\n", column * size.width, row * size.height,
+                       panel_svg(panels[n], panels, size));
+  }
+  return svg_picture(columns * size.width, rows * size.height, svg);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,81 @@
+#include "host/simulated/simulated_truth.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace birdseye::host {
+
+std::optional<OverlayError> overlay_error(const SimulatedTruth& truth, std::uint64_t sequence,
+                                          const CameraModel& camera,
+                                          const Transform<Camera, Patient>& camera_from_patient,
+                                          const Eigen::Vector3d& tumour_in_patient_mm) {
+  const auto found = truth.camera_from_patient.find(sequence);
+  if (found == truth.camera_from_patient.end()) return std::nullopt;
+  const Eigen::Vector3d true_mm = found->second * truth.tumour_centre_in_patient_mm;
+  const Eigen::Vector3d overlaid_mm = camera_from_patient * tumour_in_patient_mm;
+  const auto true_px = project(truth.camera, true_mm);
+  const auto overlaid_px = project(camera, overlaid_mm);
+  OverlayError error;
+  error.target_mm = (overlaid_mm - true_mm).norm();
+  if (true_px && overlaid_px) {
+    error.overlay_px = (*overlaid_px - *true_px).norm();
+    error.true_and_overlaid_px = {*true_px, *overlaid_px};
+  } else if (true_px || overlaid_px) {
+    // One of the two lies behind the camera: as wrong as a picture can be.
+    error.overlay_px = std::hypot(truth.camera.width_px, truth.camera.height_px);
+  }
+  return error;
+}
+
+Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder) {
+  const auto wrong = [&](const char* name, const std::string& why) {
+    return Error{Errc::bad_format, fmt::format("{}: {}", (folder / name).string(), why)};
+  };
+  SimulatedTruth truth;
+  try {
+    std::ifstream in(folder / "truth.json");
+    const nlohmann::json json = nlohmann::json::parse(in);
+    const auto centre = json.at("tumour_centre_moved_to_mm").get<std::array<double, 3>>();
+    truth.tumour_centre_in_patient_mm = {centre[0], centre[1], centre[2]};
+    const nlohmann::json& c = json.at("camera");
+    CameraModel& camera = truth.camera;
+    c.at("width_px").get_to(camera.width_px);
+    c.at("height_px").get_to(camera.height_px);
+    for (const auto& [name, value] : {std::pair{"fx_px", &camera.fx_px},
+                                      {"fy_px", &camera.fy_px},
+                                      {"cx_px", &camera.cx_px},
+                                      {"cy_px", &camera.cy_px},
+                                      {"k1", &camera.k1},
+                                      {"k2", &camera.k2},
+                                      {"p1", &camera.p1},
+                                      {"p2", &camera.p2},
+                                      {"k3", &camera.k3}}) {
+      c.at(name).get_to(*value);
+    }
+  } catch (const nlohmann::json::exception& problem) {
+    return wrong("truth.json", problem.what());
+  }
+  std::ifstream in(folder / "frames.csv");
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream numbers(line);
+    std::uint64_t sequence = 0;
+    double world_s = 0;
+    Eigen::Matrix4d m;
+    numbers >> sequence >> world_s;
+    for (int i = 0; i < 16; ++i) numbers >> m(i / 4, i % 4);
+    if (!numbers) return wrong("frames.csv", "a row that is cut short");
+    truth.camera_from_patient.emplace(sequence, Transform<Camera, Patient>::from_matrix(m));
+  }
+  if (truth.camera_from_patient.empty()) return wrong("frames.csv", "holds no frames");
+  return truth;
+}
+
+}  // namespace birdseye::host

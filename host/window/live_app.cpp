@@ -1,0 +1,292 @@
+#include "host/window/live_app.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "calibration/detect/pattern.hpp"
+#include "drivers/system/interrupt.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/write_files.hpp"
+#include "host/operation/snapshot.hpp"
+#include "host/render/scene/transfer_function.hpp"
+#include "host/window/stall_picture.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Clock = wire::Client::Clock;
+
+// Between pictures it is looked as often as this whether one has grown stale.
+constexpr auto kTick = std::chrono::milliseconds(12);
+constexpr Duration kRedraw = Duration::from_ms(50);  // for hands and figures, where there is no new frame
+
+HostTime now() {
+  return HostTime{std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count()};
+}
+
+RenderSettings usual_settings() {
+  RenderSettings settings;
+  settings.step_mm = 1.2;  // what two cores draw in time
+  return settings;
+}
+
+}  // namespace
+
+LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
+                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
+                 std::unique_ptr<Publisher> publisher)
+    : window_(std::move(window)),
+      source_(std::move(source)),
+      session_(std::move(settings)),
+      simulated_(std::move(simulated)),
+      script_(std::move(script)),
+      log_(std::move(log)),
+      publisher_(std::move(publisher)) {
+  facts_.ages = &figures_.ages;
+  facts_.recorded = !source_->live();
+  session_.picture().set_render(usual_settings());
+}
+
+Result<void> LiveApp::run(HostTime asked) {
+  note_interrupts();
+  const HostTime began = now();
+  asked_ = asked;
+  const Picture cover = stall_picture(window_->scale());
+  window_->cover_when_still(side_px(window_->scale()), cover.rgb, cover.width_px, cover.height_px);
+  while (!window_->closed() && !interrupted()) {
+    take_events();
+    if (auto said = saving_.take()) facts_.said = *std::move(said);
+    note_simulator();
+    session_.set_link(source_->connected(), source_->words());
+    session_.tick();
+    note_patient();
+    if (publisher_) {
+      const auto& deformation = session_.deformation();
+      publisher_->show(session_.shared_patient(), deformation ? &deformation->field : nullptr, session_.shapes());
+    }
+    draw();
+    draw_inset();
+    if (!window_->fault().empty())
+      return Error{Errc::io, "window: " + window_->fault() + "; the driver of the graphics card is at fault"};
+    const auto ended = follow_script();
+    if (!ended) return ended.error();
+    figures_.seconds = Duration{now().ns - began.ns}.seconds();
+    figures_.stood_still = window_->stood_still();
+    if (*ended) break;
+  }
+  figures_.frames_skipped = session_.picture().frames_skipped();
+  return {};
+}
+
+void LiveApp::take_events() {
+  const auto deadline = Clock::now() + kTick;
+  bool frame = false;
+  // Waits for a frame, then takes what has come besides: the newest frame is what is drawn.
+  while (auto event = source_->next(frame ? Clock::now() : deadline)) {
+    frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
+    session_.take(*event, now(), source_->host_from_device());
+  }
+}
+
+void LiveApp::note_simulator() {
+  SimulatedCart* const cart = source_->cart();
+  if (cart == nullptr || sheet_read_) return;
+  sheet_read_ = facts_.simulated = true;
+  const CartSheet& sheet = cart->sheet();
+  if (const auto pattern = calibration::parse_pattern(sheet.board))
+    session_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
+  session_.load(simulated_);
+}
+
+void LiveApp::note_patient() {
+  if (session_.markers_in_patient_mm() && !figures_.fiducials_s)
+    figures_.fiducials_s = Duration{now().ns - asked_.ns}.seconds();
+  if (session_.patient() == nullptr || histogram_) return;
+  histogram_.emplace(session_.patient()->shown);
+  facts_.histogram = &*histogram_;
+  inset_.emplace(session_.patient()->shown);
+  if (session_.transfer()) editor_.set_points(session_.transfer()->points());
+  figures_.ct_s = Duration{now().ns - asked_.ns}.seconds();
+}
+
+/// Some times a second, between frames: it is no part of what must be live.
+void LiveApp::draw_inset() {
+  constexpr Duration kEvery = Duration::from_ms(250);
+  Engine* const engine = session_.engine();
+  if (!inset_ || engine == nullptr || Duration{now().ns - inset_drawn_.ns} < kEvery) return;
+  inset_drawn_ = now();
+  const Picture picture = inset_->draw(*engine, session_.picture().camera_from_patient());
+  window_->set_picture(LiveWindow::Slot::inset, picture.rgb, picture.width_px, picture.height_px);
+}
+
+void LiveApp::draw() {
+  LivePicture& picture = session_.picture();
+  picture.draw();
+  const HostTime began = now();
+  // Judged as of when it will be seen: drawing the window takes its time too.
+  ShownPicture shown = picture.at(HostTime{began.ns + to_draw_.ns});
+  const bool news = shown.changes != drawn_changes_ || !shot_.empty();
+  if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
+  drawn_ = began;
+  const PanelWishes wishes = draw_window(shown);
+  figures_.picture_says = shown.reason;
+  if (!shot_.empty()) snapshot(shot_, shown);
+  if (shown.overlaid && !picture.at(now()).overlaid) {
+    // It took longer than it was thought to: what has grown stale on the way is not shown.
+    shown = picture.at(now());
+    draw_window(shown, true);
+  }
+  LiveWindow::Believed until;  // what is frozen or has stopped says so itself
+  if (shown.believe_until && !session_.frozen()) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
+  window_->swap(until);
+  const HostTime swapped = now();
+  if (!figures_.window_s) figures_.window_s = Duration{swapped.ns - asked_.ns}.seconds();
+  to_draw_ = Duration{swapped.ns - began.ns};
+  // Of video that has stopped the age grows: it is said once.
+  if (publisher_ && shown.any)
+    publisher_->tell(shown.overlaid ? "" : shown.stale ? "the video has stopped" : shown.reason);
+  if (!shown.any) return grant(wishes);
+  const double age_ms = Duration{swapped.ns - picture.exposed().ns}.seconds() * 1e3;
+  if (shown.overlaid) figures_.oldest_overlay_ms = std::max(figures_.oldest_overlay_ms, age_ms);
+  const std::uint64_t sequence = picture.frame()->info.sequence;
+  if (drawn_sequence_ != sequence) {
+    drawn_sequence_ = sequence;
+    publish(shown);
+    ++figures_.frames;
+    figures_.frames_overlaid += shown.overlaid ? 1 : 0;
+    figures_.ages.add(age_ms);
+    swaps_.push_back(swapped);
+    while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
+    facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
+    if (log_) {
+      const auto mark = session_.target_mark();
+      log_->add(sequence, age_ms, shown.strength, session_.shapes(), mark ? mark->rms_mm : 0,
+                shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
+    }
+  }
+  grant(wishes);
+}
+
+/// What is on the screen, and no more than that: nothing goes out that no overlay was drawn by.
+void LiveApp::publish(const ShownPicture& shown) {
+  if (!publisher_ || !shown.overlaid) return;
+  const LivePicture& picture = session_.picture();
+  PublishedFrame frame;
+  frame.exposed = picture.exposed();
+  if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient;
+  frame.camera_from_patient = picture.camera_from_patient();
+  publisher_->show(frame);
+}
+
+PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
+  if (shown.any && shown.changes != drawn_changes_) {
+    window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
+    drawn_changes_ = shown.changes;
+  }
+  window_->begin_frame(again);
+  facts_.frames_skipped = session_.picture().frames_skipped();
+  PanelWishes wishes = draw_panels(*window_, session_, shown, facts_, editor_);
+  window_->end_frame();
+  return wishes;
+}
+
+void LiveApp::grant(const PanelWishes& asked) {
+  PanelWishes wishes = asked;
+  if (scripted_.primary) wishes.primary = true;
+  if (scripted_.next) wishes.next = true;
+  if (scripted_.undo) wishes.undo = true;
+  if (scripted_.freeze) wishes.freeze = true;
+  if (scripted_.snapshot) wishes.snapshot = true;
+  if (scripted_.step) wishes.step = scripted_.step;
+  if (scripted_.opacity) wishes.opacity = scripted_.opacity;
+  if (scripted_.clip) wishes.clip = scripted_.clip;
+  if (scripted_.surface_in_front) wishes.surface_in_front = scripted_.surface_in_front;
+  scripted_ = {};
+  key_waits_ = false;
+  if (wishes.primary) session_.primary();
+  if (wishes.next) session_.go_on();
+  if (wishes.undo) session_.undo();
+  if (wishes.freeze) session_.set_frozen(!session_.frozen());
+  if (wishes.step) session_.go_to(*wishes.step);
+  if (wishes.opacity) {
+    facts_.opacity = *wishes.opacity;
+    session_.picture().set_opacity(facts_.opacity);
+  }
+  if (wishes.clip) facts_.clip = *wishes.clip;
+  if (wishes.surface_in_front) {
+    facts_.surface_in_front = *wishes.surface_in_front;
+    session_.picture().set_surface_in_front(facts_.surface_in_front);
+  }
+  if (wishes.plane) facts_.plane = *wishes.plane;
+  if ((wishes.clip || wishes.plane) && session_.patient() != nullptr) {
+    RenderSettings render = usual_settings();
+    if (facts_.clip) render.clip = clip_plane(facts_.plane, session_.patient()->shown);
+    session_.picture().set_render(render);
+  }
+  if (wishes.transfer) session_.set_transfer(TransferFunction(*wishes.transfer));
+  if (const auto preset = load_transfer_function(wishes.preset); !wishes.preset.empty() && preset) {
+    session_.set_transfer(*preset);
+    editor_.set_points(preset->points());
+  }
+  if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
+}
+
+Result<bool> LiveApp::follow_script() {
+  // One after the other, as a hand would.
+  if (!script_ || key_waits_ || !shot_.empty() || saving_.running()) return false;
+  const auto act = script_->next(session_, now());
+  if (!act) return act.error();
+  if (!act->key.empty()) {
+    add_key(act->key, facts_, scripted_);
+    key_waits_ = true;
+  }
+  if (!act->shot.empty()) shot_ = act->shot;
+  return act->end;
+}
+
+/// The window as it is, and in a folder of the same name the picture with all that it was made of. Written on a thread
+/// of its own: the picture on the screen must not stand still meanwhile.
+void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& shown) {
+  if (saving_.running()) return;
+  std::optional<Snapshot> parts;
+  const LivePicture& picture = session_.picture();
+  if (picture.frame() && shown.any) {
+    parts.emplace();
+    parts->frame = *picture.frame();
+    parts->picture = *shown.rgb;
+    parts->shown = shown;
+    parts->shown.rgb = nullptr;
+    if (session_.frozen()) parts->shown.reason = "frozen";
+    parts->setup = picture.setup();
+    parts->camera_from_patient = picture.camera_from_patient();
+    parts->render = picture.render();
+    parts->opacity = facts_.opacity;
+    parts->surface_in_front = facts_.surface_in_front;
+    parts->engine = session_.settings().engine;
+    parts->transfer = session_.drawn_by();
+    parts->patient = session_.settings().patient;
+    if (session_.deformation()) parts->deformation = session_.deformation()->field;
+    parts->fre_mm = session_.fre_mm();
+  }
+  saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {
+    auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+    auto folder = path;
+    if (written && parts) written = write_snapshot(folder.replace_extension(), *parts);
+    return written ? "snapshot: " + path.string() : written.error().what;
+  });
+  shot_.clear();
+}
+
+/// Of snapshots that are there already, none is written over.
+std::filesystem::path LiveApp::next_snapshot() {
+  const std::filesystem::path folder = log_ ? log_->folder() : ".";
+  std::error_code ignored;
+  for (;;) {
+    auto path = folder / fmt::format("snapshot-{:03}.png", ++shots_);
+    if (!std::filesystem::exists(path, ignored)) return path;
+  }
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,80 @@
+#include "host/window/live_script.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace birdseye::host {
+
+namespace {
+
+std::optional<LiveStep> step_of(const std::string& name) {
+  for (std::size_t i = 0; i < kLiveSteps; ++i) {
+    if (name == name_of(static_cast<LiveStep>(i))) return static_cast<LiveStep>(i);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file) return Error{Errc::unreadable, path.string() + ": cannot be read"};
+  LiveScript script;
+  script.name_ = path.string();
+  std::string text;
+  for (int number = 1; std::getline(file, text); ++number) {
+    std::istringstream words(text.substr(0, text.find('#')));
+    Line line;
+    line.number = number;
+    if (!(words >> line.verb)) continue;
+    bool sound = false;
+    if (line.verb == "wait") sound = static_cast<bool>(words >> line.step >> line.seconds);
+    if (line.verb == "press")
+      sound = static_cast<bool>(words >> line.what >> line.every_s >> line.step >> line.seconds);
+    if (line.verb == "sleep") sound = static_cast<bool>(words >> line.seconds);
+    if (line.verb == "key" || line.verb == "shot") sound = static_cast<bool>(words >> line.what);
+    if (line.verb == "end") sound = true;
+    sound = sound && line.seconds >= 0 && line.every_s >= 0 && (line.step.empty() || step_of(line.step));
+    if (!sound) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"press NAME SECONDS STEP SECONDS\", \"sleep "
+                               "SECONDS\", \"key NAME\", \"shot FILE\" or \"end\"",
+                               path.string(), number)};
+    }
+    script.lines_.push_back(std::move(line));
+  }
+  return script;
+}
+
+Result<LiveScript::Act> LiveScript::next(const LiveSession& session, HostTime now) {
+  if (lines_.empty()) return Act{};
+  if (!since_) since_ = now;
+  const Line& line = lines_.front();
+  const double waited_s = Duration{now.ns - since_->ns}.seconds();
+  if (!line.step.empty()) {
+    const StepNote& note = session.note(*step_of(line.step));
+    if (!note.done && waited_s >= line.seconds) {
+      return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.step,
+                                              line.seconds, note.line)};
+    }
+    const bool due = line.verb == "press" && (!pressed_ || Duration{now.ns - pressed_->ns}.seconds() >= line.every_s);
+    if (!note.done && due) {
+      pressed_ = now;
+      return Act{line.what, {}, false};
+    }
+    if (!note.done) return Act{};
+  }
+  if (line.verb == "sleep" && waited_s < line.seconds) return Act{};
+  Act act;
+  if (line.verb == "key") act.key = line.what;
+  if (line.verb == "shot") act.shot = line.what;
+  act.end = line.verb == "end";
+  lines_.pop_front();
+  since_.reset();
+  pressed_.reset();
+  return act;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/clock.hpp"
+#include "host/operation/live_session.hpp"
+
+namespace birdseye::host {
+
+/// Keys pressed and pictures taken without a hand: a line each of
+///   wait STEP SECONDS                 until that step is done; fails after so long
+///   press NAME SECONDS STEP SECONDS   that key every so often until that step is done; fails after so long
+///   sleep SECONDS
+///   key NAME                          as draw_panels' keys: space, enter, backspace, a letter
+///   shot FILE                         the window as a PNG
+///   end
+/// and remarks after #.
+class LiveScript {
+ public:
+  /// An error names file and line.
+  static Result<LiveScript> read(const std::filesystem::path& path);
+
+  struct Act {
+    std::string key;
+    std::filesystem::path shot;
+    bool end = false;
+  };
+  /// What is to be done now; at most one act a call. An error where something was waited for in vain.
+  Result<Act> next(const LiveSession& session, HostTime now);
+
+ private:
+  struct Line {
+    int number = 0;
+    std::string verb, what;
+    std::string step;  ///< that is waited for
+    double seconds = 0, every_s = 0;
+  };
+  std::string name_;
+  std::deque<Line> lines_;
+  std::optional<HostTime> since_;    ///< when the first line's turn came
+  std::optional<HostTime> pressed_;  ///< when its key was last pressed
+};
+
+}  // namespace birdseye::host

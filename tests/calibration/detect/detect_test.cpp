@@ -1,0 +1,94 @@
+#include "calibration/detect/detect.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "tests/support/data.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+GreyView view_of(const cv::Mat& grey) {
+  return {grey.data, grey.cols, grey.rows, grey.step};
+}
+
+TEST(Pattern, ReadsItsSpecsAndRefusesNonsense) {
+  EXPECT_TRUE(parse_pattern("chessboard:14x10:0.3cm")->half_turn_ambiguous);
+  EXPECT_FALSE(parse_pattern("chessboard:11x8:6mm")->half_turn_ambiguous);
+  EXPECT_FALSE(parse_pattern("dots:4x11:5mm:asymmetric")->half_turn_ambiguous);
+  EXPECT_TRUE(parse_pattern("dots:25x18:3mm:markers=133,141,308,316")->half_turn_ambiguous);
+  EXPECT_FALSE(parse_pattern("dots:25x18:3mm:markers=133,141,308,317")->half_turn_ambiguous);
+  for (const char* wrong :
+       {"chessboard", "chessboard:14x10:3", "chessboard:2x5:3mm", "chessboard:14x10:nanmm", "charuco:5x7:5mm:4mm",
+        "charuco:5x7:5mm:5mm:DICT_4X4_50", "charuco:50x70:5mm:4mm:DICT_4X4_50", "dots:5x5:3mm:markers=1,2,99"})
+    EXPECT_FALSE(parse_pattern(wrong)) << wrong;
+}
+
+TEST(Detect, StorzPlateFitsOneLens) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto pattern = parse_pattern("charuco:19x26:5mm:4mm:DICT_4X4_250:legacy");
+  ASSERT_TRUE(pattern);
+  std::vector<std::vector<cv::Point3f>> points_mm;
+  std::vector<std::vector<cv::Point2f>> points_px;
+  for (const char* name : {"0", "1", "2", "3", "4", "7"}) {
+    const auto file = *data / "laparoscope_charuco_handeye" / (std::string("calib.left.images.") + name + ".png");
+    const cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+    const Detection seen = detect(*pattern, view_of(grey), name);
+    ASSERT_TRUE(seen.view) << seen.rejected;
+    EXPECT_GE(seen.points_seen, 180);
+    auto& mm = points_mm.emplace_back();
+    auto& px = points_px.emplace_back();
+    for (const auto& p : seen.view->points_in_marker_mm) mm.emplace_back(float(p.x()), float(p.y()), 0.F);
+    for (const auto& p : seen.view->points_px) px.emplace_back(float(p.x()), float(p.y()));
+  }
+  cv::Mat camera, distortion;
+  std::vector<cv::Mat> turns, moves;
+  EXPECT_LT(cv::calibrateCamera(points_mm, points_px, {1920, 1080}, camera, distortion, turns, moves), 0.9);
+  for (std::size_t v = 0; v < points_mm.size(); ++v) {
+    std::vector<cv::Point2f> fitted;
+    cv::projectPoints(points_mm[v], turns[v], moves[v], camera, distortion, fitted);
+    for (std::size_t i = 0; i < fitted.size(); ++i) EXPECT_LT(cv::norm(fitted[i] - points_px[v][i]), 5);
+  }
+}
+
+TEST(Detect, WebcamCornersLieAtThePublishedOnesAndFaultsAreNamed) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto pattern = parse_pattern("chessboard:14x10:6mm");
+  ASSERT_TRUE(pattern);
+  cv::Mat grey;
+  for (int i = 0; i < 12; ++i) {
+    const auto stem = *data / "camera_chessboard_webcam" / "calib.";
+    grey = cv::imread(stem.string() + "images." + std::to_string(i) + ".png", cv::IMREAD_GRAYSCALE);
+    const Detection seen = detect(*pattern, view_of(grey), std::to_string(i));
+    ASSERT_TRUE(seen.view) << i << ": " << seen.rejected;
+    std::ifstream in(stem.string() + "image_points." + std::to_string(i) + ".txt");
+    std::vector<Eigen::Vector2d> published;
+    Eigen::Vector2d p;
+    while (in >> p.x() >> p.y()) published.push_back(p);
+    std::vector<double> apart;
+    for (const auto& px : seen.view->points_px) {
+      double nearest = 1e9;
+      for (const auto& q : published) nearest = std::min(nearest, (px - q).norm());
+      apart.push_back(nearest);
+    }
+    std::nth_element(apart.begin(), apart.begin() + 70, apart.end());
+    EXPECT_LT(apart[70], 0.5) << i;
+    RecordProperty("width_px_" + std::to_string(i), std::to_string(seen.sharpness_px));
+  }
+  cv::Mat bad = grey / 12;
+  EXPECT_NE(detect(*pattern, view_of(bad), "").rejected.find("too dark"), std::string::npos);
+  bad = grey * 10;
+  EXPECT_NE(detect(*pattern, view_of(bad), "").rejected.find("overexposed"), std::string::npos);
+  cv::GaussianBlur(grey, bad, {0, 0}, 12);
+  EXPECT_FALSE(detect(*pattern, view_of(bad), "").view);
+}
+
+}  // namespace
+}  // namespace birdseye::calibration

@@ -1,0 +1,248 @@
+#include "calibration/field/field_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calibration/base/units.hpp"
+#include "calibration/points/point_fit.hpp"
+#include "tests/calibration/field/simulated_field.hpp"
+
+namespace birdseye::testing {
+
+Truth against_truth(const calibration::FieldMap& map, const hw_sim::FieldDistortion& field, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> part(0, 1);
+  std::vector<Eigen::Vector3d> truth, bent, corrected;
+  std::vector<Eigen::Matrix3d> turns_before, turns_after;
+  Truth out;
+  constexpr int kPlaces = 800;
+  const Eigen::Matrix3d held = rotation_exp({0.2, 0.5, -0.1});
+  for (int i = 0; i < kPlaces; ++i) {
+    const Eigen::Vector3d place =
+        kVolumeLowMm + Eigen::Vector3d(part(rng), part(rng), part(rng)).cwiseProduct(kVolumeHighMm - kVolumeLowMm);
+    const auto seen = measured(field, {held, place}, 0, 0, rng);
+    const auto answer = map.correct(seen);
+    if (!answer) continue;
+    truth.push_back(place);
+    bent.push_back(seen.translation());
+    corrected.push_back(answer->tracker_from_sensor.translation());
+    turns_before.emplace_back(seen.rotation() * held.transpose());
+    turns_after.emplace_back(answer->tracker_from_sensor.rotation() * held.transpose());
+  }
+  out.mapped = static_cast<double>(truth.size()) / kPlaces;
+  const auto before = calibration::fit_points<Tracker, Marker>(bent, truth);
+  const auto after = calibration::fit_points<Tracker, Marker>(corrected, truth);
+  if (!before || !after) return out;
+  out.before_mm = before->fre_rms_mm;
+  out.after_mm = after->fre_rms_mm;
+  for (const double r : after->residuals_mm) out.worst_mm = std::max(out.worst_mm, r);
+  const auto spread_deg = [](const std::vector<Eigen::Matrix3d>& turns) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const auto& t : turns) mean += rotation_log(t) / static_cast<double>(turns.size());
+    double squares = 0;
+    for (const auto& t : turns) squares += (rotation_log(t) - mean).squaredNorm() / static_cast<double>(turns.size());
+    return kDegPerRad * std::sqrt(squares);
+  };
+  out.before_deg = spread_deg(turns_before);
+  out.after_deg = spread_deg(turns_after);
+  return out;
+}
+
+}  // namespace birdseye::testing
+
+namespace birdseye::calibration {
+namespace {
+
+using testing::against_truth;
+using testing::grid_samples;
+using testing::GridSpec;
+
+std::size_t outliers(const FieldFit& fit) {
+  return static_cast<std::size_t>(
+      std::count_if(fit.residuals.begin(), fit.residuals.end(), [](const auto& r) { return r.outlier; }));
+}
+
+TEST(FieldFit, TenMillimetresComeDownToLessThanEightTenths) {
+  for (const double noise_mm : {0.3, 1.0, 1.8}) {
+    double squares = 0;
+    constexpr unsigned kFields = 5;
+    for (unsigned seed = 1; seed <= kFields; ++seed) {
+      const hw_sim::FieldDistortion field(10, seed);
+      GridSpec spec;
+      spec.noise_mm = noise_mm;
+      const auto fit = fit_field(grid_samples(field, spec, seed));
+      ASSERT_TRUE(fit) << fit.error().what;
+      const auto truth = against_truth(fit->map, field, seed + 50);
+      EXPECT_GT(truth.before_mm, 1.5);
+      EXPECT_LT(truth.after_mm, 0.8) << noise_mm << " mm of noise, field " << seed;
+      EXPECT_LT(truth.after_deg, truth.before_deg / 2) << seed;
+      EXPECT_GT(truth.mapped, 0.95);
+      squares += truth.after_mm * truth.after_mm / kFields;
+      EXPECT_LE(outliers(*fit), 1U);
+      // What was held out carries the noise of the measurement; the truth does not.
+      EXPECT_NEAR(fit->held_out_mm, std::hypot(truth.after_mm, noise_mm), 0.3 * fit->held_out_mm) << seed;
+      EXPECT_EQ(verdict_of(*fit).grade, noise_mm < 0.9 ? Grade::pass : Grade::marginal) << verdict_of(*fit).reasons[0];
+    }
+    EXPECT_LT(std::sqrt(squares), noise_mm < 0.5 ? 0.3 : 0.65) << noise_mm;
+  }
+}
+
+TEST(FieldFit, EveryFamilyTakesMostOfItAway) {
+  const hw_sim::FieldDistortion field(10, 3);
+  const auto samples = grid_samples(field, {}, 3);
+  double best_mm = 1e9;
+  for (const FieldBasis basis : {FieldBasis::polynomial, FieldBasis::bernstein, FieldBasis::rbf}) {
+    const auto fit = fit_field(samples, {basis});
+    ASSERT_TRUE(fit);
+    EXPECT_EQ(fit->map.data().functions.basis, basis);
+    EXPECT_LT(against_truth(fit->map, field, 3).after_mm, 0.8) << name_of(basis);
+    best_mm = std::min(best_mm, fit->held_out_mm);
+  }
+  const auto free = fit_field(samples);
+  EXPECT_LT(free->held_out_mm, 1.05 * best_mm);  // within 2 % the simpler one is taken
+}
+
+TEST(FieldFit, ItsSigmaIsWhatMeasurementsAreOffBy) {
+  double squares = 0, predicted = 0, count = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const hw_sim::FieldDistortion field(10, seed);
+    GridSpec spec;
+    spec.noise_mm = 0.6;
+    const auto fit = fit_field(grid_samples(field, spec, seed));
+    ASSERT_TRUE(fit);
+    // Other nodes: the same volume in other steps, with the board where it was.
+    GridSpec other = spec;
+    other.nx = 8;
+    other.nz = 7;
+    for (const FieldSample& s : grid_samples(field, other, seed + 90)) {
+      const auto corrected = fit->map.correct(s.measured);
+      if (!corrected) continue;
+      const Eigen::Vector3d truth = *fit->tracker_from_board * s.true_mm;
+      squares += (corrected->tracker_from_sensor.translation() - truth).squaredNorm();
+      predicted += corrected->sigma_mm * corrected->sigma_mm;
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 1500);
+  EXPECT_NEAR(std::sqrt(squares / predicted), 1, 0.25);
+}
+
+TEST(FieldFit, NeitherOrderNorTheBoardsPlaceMatters) {
+  const hw_sim::FieldDistortion field(10, 5);
+  auto samples = grid_samples(field, {5, 5, 4, 0.3, 0.1}, 5);
+  const auto fit = fit_field(samples, {FieldBasis::polynomial});
+  const Transform<Marker, Marker> moved(rotation_exp({1, -2, 0.4}), Eigen::Vector3d(900, -5, 17));
+  for (FieldSample& s : samples) {
+    s.true_mm = moved * s.true_mm;
+    s.true_rotation = moved.rotation() * *s.true_rotation;
+  }
+  std::reverse(samples.begin(), samples.end());
+  const auto again = fit_field(samples, {FieldBasis::polynomial});
+  ASSERT_TRUE(fit && again);
+  const Eigen::Vector3d place(300, 50, -40);
+  EXPECT_LT((*fit->map.correction_mm(place) - *again->map.correction_mm(place)).norm(), 1e-7);
+  EXPECT_NEAR(fit->held_out_mm, again->held_out_mm, 1e-7);
+  EXPECT_NEAR(*fit->held_out_deg, *again->held_out_deg, 1e-7);
+}
+
+TEST(FieldFit, BlundersAreNamedAndDoNotBendTheMap) {
+  const hw_sim::FieldDistortion field(10, 6);
+  auto samples = grid_samples(field, {}, 6);
+  const std::size_t wrong[] = {0, 17, 90, 91, 150};  // a corner, and two beside each other
+  for (const std::size_t i : wrong)
+    samples[i].measured =
+        Transform<Tracker, Sensor>(samples[i].measured.rotation(),
+                                   Eigen::Vector3d(samples[i].measured.translation() + Eigen::Vector3d(20, -15, 9)));
+  samples[40].true_mm *= 2;  // the wrong node's name
+  const auto fit = fit_field(samples);
+  ASSERT_TRUE(fit);
+  for (const std::size_t i : wrong) EXPECT_TRUE(fit->residuals[i].outlier) << i;
+  EXPECT_TRUE(fit->residuals[40].outlier);
+  EXPECT_LE(outliers(*fit), 7U);
+  EXPECT_LT(against_truth(fit->map, field, 6).after_mm, 0.4);
+}
+
+TEST(FieldFit, AHoleInTheSamplesIsNotMapped) {
+  const hw_sim::FieldDistortion field(10, 7);
+  auto samples = grid_samples(field, {9, 9, 8, 0.3, 0.1}, 7);
+  std::erase_if(samples, [](const FieldSample& s) {
+    return s.measured.translation().x() > 370 && s.measured.translation().y() > 0;
+  });
+  // One far corner keeps the box whole.
+  const auto all = grid_samples(field, {9, 9, 8, 0.3, 0.1}, 7);
+  samples.push_back(all.back());
+  const auto fit = fit_field(samples);
+  ASSERT_TRUE(fit);
+  EXPECT_FALSE(fit->map.sigma_mm({540, 150, 0}));
+  EXPECT_NE(fit->map.why_not({540, 150, 0}).find("not mapped near"), std::string::npos);
+  EXPECT_TRUE(fit->map.sigma_mm({200, 150, 0}));
+  EXPECT_LT(fit->mapped_part, 0.95);
+}
+
+TEST(FieldFit, OrientationIsLeftAloneWhereItIsNotKnown) {
+  const hw_sim::FieldDistortion field(10, 8);
+  auto samples = grid_samples(field, {5, 5, 4, 0.3, 0.1}, 8);
+  samples[3].true_rotation.reset();
+  const auto fit = fit_field(samples);
+  ASSERT_TRUE(fit);
+  EXPECT_FALSE(fit->map.maps_orientation());
+  EXPECT_FALSE(fit->held_out_deg);
+  const auto corrected = fit->map.correct(samples[50].measured);
+  ASSERT_TRUE(corrected);
+  EXPECT_EQ(corrected->tracker_from_sensor.rotation(), samples[50].measured.rotation());
+}
+
+TEST(FieldFit, EachReasonIsReached) {
+  const auto reason = [](const FieldFit& fit) {
+    std::string all;
+    for (const std::string& r : verdict_of(fit).reasons) all += r + "\n";
+    return all;
+  };
+  const hw_sim::FieldDistortion straight(0.01, 1);
+  GridSpec noisy;
+  noisy.noise_mm = 1;
+  const auto no_need = fit_field(grid_samples(straight, noisy, 1));
+  ASSERT_TRUE(no_need);
+  EXPECT_NE(reason(*no_need).find("next to nothing"), std::string::npos) << reason(*no_need);
+  EXPECT_EQ(verdict_of(*no_need).grade, Grade::marginal);
+  noisy.noise_mm = 6;
+  const auto hopeless = fit_field(grid_samples(straight, noisy, 1));
+  ASSERT_TRUE(hopeless);
+  EXPECT_EQ(verdict_of(*hopeless).grade, Grade::fail);
+
+  auto fit = fit_field(grid_samples(hw_sim::FieldDistortion(10, 2), {}, 2));
+  ASSERT_TRUE(fit);
+  EXPECT_EQ(verdict_of(*fit).grade, Grade::pass) << reason(*fit);
+  FieldFit one_place = *fit;
+  one_place.held_out_worst_mm = 9 * fit->held_out_mm;
+  EXPECT_NE(reason(one_place).find("times the rest"), std::string::npos);
+  FieldFit sparse = *fit;
+  sparse.mapped_part = 0.4;
+  EXPECT_NE(reason(sparse).find("40 % of the box"), std::string::npos);
+  FieldFit wrong = *fit;
+  for (std::size_t i = 0; i < wrong.residuals.size(); i += 6) wrong.residuals[i].outlier = true;
+  EXPECT_EQ(verdict_of(wrong).grade, Grade::marginal);
+  for (std::size_t i = 0; i < wrong.residuals.size(); i += 3) wrong.residuals[i].outlier = true;
+  EXPECT_EQ(verdict_of(wrong).grade, Grade::fail);
+}
+
+TEST(FieldFit, InputThatCannotBeUsedIsNamed) {
+  const hw_sim::FieldDistortion field(10, 1);
+  const auto what = [](const Result<FieldFit>& fit) { return fit ? "it was taken" : fit.error().what; };
+  EXPECT_NE(what(fit_field(grid_samples(field, {3, 3, 2}, 1))).find("18 samples"), std::string::npos);
+  auto metres = grid_samples(field, {}, 1);
+  for (FieldSample& s : metres) s.true_mm /= 1000;
+  EXPECT_NE(what(fit_field(metres)).find("both in mm"), std::string::npos) << what(fit_field(metres));
+  auto flat = grid_samples(field, {}, 1);
+  std::erase_if(flat, [](const FieldSample& s) { return std::abs(s.measured.translation().z()) > 20; });
+  EXPECT_NE(what(fit_field(flat)).find("along each axis"), std::string::npos) << what(fit_field(flat));
+  auto sentinel = grid_samples(field, {}, 1);
+  sentinel[4].true_mm.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(what(fit_field(sentinel)).find("node 5"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace birdseye::calibration

@@ -1,0 +1,125 @@
+#include "calibration/hand_eye/pose_streams.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "calibration/base/units.hpp"
+#include "tests/support/data.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+struct Row {
+  double time_s;
+  Eigen::Vector3d position_mm;
+  Eigen::Quaterniond rotation;
+};
+
+std::vector<Row> read_rows(const std::filesystem::path& path) {
+  std::ifstream in(path);
+  std::vector<Row> out;
+  std::string line;
+  while (std::getline(in, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream words(line);
+    double t = 0, x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 0;
+    if (words >> t >> x >> y >> z >> qx >> qy >> qz >> qw)
+      out.push_back({t, 1000 * Eigen::Vector3d(x, y, z), Eigen::Quaterniond(qw, qx, qy, qz)});
+  }
+  return out;
+}
+
+TEST(PoseStreams, RobotArmAsPublished) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const std::string stem = "robot_arm_complete_bag_color_and_ir_";
+  const auto folder = *data / "handeye_pose_streams";
+  std::vector<StampedSensor> sensor;
+  for (const Row& r : read_rows(folder / (stem + "base_link_sr300_hinge.csv")))
+    sensor.push_back({r.time_s, {r.rotation, r.position_mm}});
+  std::vector<StampedView> views;
+  for (const Row& r : read_rows(folder / (stem + "target_ir.csv")))
+    views.push_back({r.time_s, Transform<Marker, Camera>(r.rotation, r.position_mm).inverse()});
+  const auto paired = pair_pose_streams(sensor, views);
+  ASSERT_TRUE(paired) << paired.error().what;
+  HandEyeInput input;
+  input.stations = paired->stations;
+  input.estimate_time_offset = true;
+  const auto result = calibrate_hand_eye(input);
+  ASSERT_TRUE(result && result->solved);
+  EXPECT_NEAR(paired->offset_s + *result->time_offset_s, -0.015, 0.003);
+  const auto sensor_from_camera = result->camera_from_sensor.inverse();
+  EXPECT_LT((sensor_from_camera.translation() - Eigen::Vector3d(-1.4, -17.4, 3.8)).norm(), 3);
+  const Eigen::Quaterniond published(-0.5993, 0.6064, -0.3721, 0.3671);
+  EXPECT_LT(
+      rotation_angle_between(sensor_from_camera.rotation(), published.normalized().toRotationMatrix()) * kDegPerRad, 1);
+  EXPECT_LE(result->held_out_mm, 5);
+  EXPECT_NEAR(result->observability.board_scale, 1, 0.01);
+  EXPECT_NE(judge(*result).grade, Grade::fail);
+  RecordProperty("offset_ms", std::to_string(1000 * (paired->offset_s + *result->time_offset_s)));
+  RecordProperty("held_out_mm", std::to_string(result->held_out_mm));
+}
+
+/// A hand that turns this way and that, sampled by two clocks.
+struct Recording {
+  std::vector<StampedSensor> sensor;
+  std::vector<StampedView> views;
+};
+Recording record(double offset_s, double speed) {
+  const Transform<Camera, Sensor> camera_from_sensor(rotation_exp(Eigen::Vector3d(1, -0.4, 0.3)),
+                                                     Eigen::Vector3d(10, 20, -150));
+  const Transform<Tracker, Marker> tracker_from_marker(rotation_exp(Eigen::Vector3d(0, 2, 0.3)),
+                                                       Eigen::Vector3d(200, 20, 300));
+  const auto hand = [speed](double t) {
+    const double s = speed * t;
+    return Transform<Tracker, Sensor>(
+        rotation_exp(
+            Eigen::Vector3d(0.5 * std::sin(s), 0.6 * std::sin(1.7 * s + 1), 0.4 * std::sin(0.6 * s * s / (1 + s)))),
+        Eigen::Vector3d(50 * std::sin(1.1 * s), 40 * std::cos(0.7 * s), 300 + 30 * std::sin(1.9 * s)));
+  };
+  Recording out;
+  for (int i = 0; i < 2000; ++i) out.sensor.push_back({0.01 * i, hand(0.01 * i)});
+  for (int i = 10; i < 560; ++i) {
+    const double t = i / 30.0 + 0.003;
+    out.views.push_back({t, camera_from_sensor * hand(t + offset_s).inverse() * tracker_from_marker});
+  }
+  return out;
+}
+
+TEST(PoseStreams, FindsTheOffsetOfTheClocks) {
+  for (const double offset_s : {0.0, 0.083, -0.4, 1.25}) {
+    const Recording r = record(offset_s, 1.5);
+    const auto paired = pair_pose_streams(r.sensor, r.views);
+    ASSERT_TRUE(paired) << paired.error().what;
+    EXPECT_NEAR(paired->offset_s, offset_s, 0.002);
+    HandEyeInput input;
+    input.stations = paired->stations;
+    input.estimate_time_offset = true;
+    const auto result = calibrate_hand_eye(input);
+    ASSERT_TRUE(result && result->solved);
+    EXPECT_NEAR(paired->offset_s + *result->time_offset_s, offset_s, 1e-4);
+    EXPECT_LT((result->camera_from_sensor.translation() - Eigen::Vector3d(10, 20, -150)).norm(), 0.05);
+  }
+}
+
+TEST(PoseStreams, RefusesWhatDoesNotCorrelate) {
+  const Recording still = record(0, 0);
+  EXPECT_FALSE(pair_pose_streams(still.sensor, still.views));
+  Recording other = record(0, 1.5);
+  other.sensor = record(0, 2.3).sensor;
+  const auto refused = pair_pose_streams(other.sensor, other.views);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().what, ::testing::HasSubstr("do not correlate"));
+  Recording apart = record(0, 1.5);
+  for (StampedView& v : apart.views) v.time_s += 1e6;
+  EXPECT_FALSE(pair_pose_streams(apart.sensor, apart.views));
+  EXPECT_FALSE(pair_pose_streams(apart.sensor, std::span(apart.views).first(20)));
+}
+
+}  // namespace
+}  // namespace birdseye::calibration

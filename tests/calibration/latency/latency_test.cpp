@@ -1,0 +1,222 @@
+#include "calibration/latency/latency.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "tests/calibration/latency/latency_streams.hpp"
+#include "tests/support/data.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+using simulated::Hand;
+using simulated::record;
+using simulated::Rotations;
+using simulated::StreamSettings;
+
+const Eigen::Quaterniond kBody(rotation_exp({0.4, -1.9, 0.7})), kBase(rotation_exp({-1.1, 0.6, 2.0}));
+
+/// The bird of a miniBIRD: 103 Hz, half a degree.
+StreamSettings tracker_of(unsigned seed) {
+  StreamSettings s;
+  s.rate_hz = 103;
+  s.noise_deg = 0.5;
+  s.seed = seed;
+  return s;
+}
+/// Poses of the camera from a board, whose stamps are late.
+StreamSettings camera_of(unsigned seed, double rate_hz) {
+  StreamSettings s;
+  s.rate_hz = rate_hz;
+  s.noise_deg = 0.1;
+  s.stamp_jitter_ms = 1;
+  s.offset_ms = 83;
+  s.seed = seed + 1000;
+  s.body = kBody;
+  s.base = kBase;
+  return s;
+}
+
+bool covers(const std::array<double, 2>& interval, double value) {
+  return interval[0] <= value && value <= interval[1];
+}
+
+TEST(Latency, EightyThreeMillisecondsToWithinOneWithAnIntervalThatIsTrueNineteenTimesOfTwenty) {
+  int covered = 0, trials = 0;
+  double worst = 0;
+  for (const double rate_hz : {25.0, 60.0}) {
+    for (unsigned seed = 1; seed <= 50; ++seed, ++trials) {
+      const Hand hand(seed);
+      const auto found = find_latency(record(hand, tracker_of(seed)), record(hand, camera_of(seed, rate_hz)));
+      ASSERT_TRUE(found) << found.error().what;
+      ASSERT_TRUE(found->determined);
+      worst = std::max(worst, std::abs(found->offset_ms - 83));
+      covered += covers(found->offset_ci95_ms, 83);
+    }
+  }
+  EXPECT_LT(worst, 1);
+  EXPECT_GE(covered, 90);
+  EXPECT_LE(covered, 99);
+}
+
+TEST(Latency, FromTheMotionOfPicturesAlone) {
+  int covered = 0, trials = 0;
+  double worst = 0;
+  for (const double rate_hz : {25.0, 60.0}) {
+    for (unsigned seed = 1; seed <= 50; ++seed, ++trials) {
+      const Hand hand(seed);
+      StreamSettings camera = camera_of(seed, rate_hz);
+      camera.stamp_jitter_ms = 0.3;
+      const auto found =
+          find_latency(simulated::record_poses(hand, tracker_of(seed), 1.8), simulated::film(hand, camera, 0.2));
+      ASSERT_TRUE(found) << found.error().what;
+      ASSERT_TRUE(found->determined);
+      worst = std::max(worst, std::abs(found->offset_ms - 83));
+      covered += covers(found->offset_ci95_ms, 83);
+    }
+  }
+  EXPECT_LT(worst, 1);
+  EXPECT_GE(covered, 90);
+  EXPECT_LE(covered, 99);
+}
+
+Rotations read_stream(const std::string& name) {
+  Rotations rows;
+  std::ifstream in(*testing::data_dir() / "handeye_pose_streams" / name);
+  std::string line;
+  while (std::getline(in, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream words(line);
+    double t, x, y, z, qx, qy, qz, qw;
+    if (words >> t >> x >> y >> z >> qx >> qy >> qz >> qw) rows.push_back({t, Eigen::Quaterniond(qw, qx, qy, qz)});
+  }
+  return rows;
+}
+
+TEST(Latency, OfARealRobotAndCameraIsThePublishedOne) {
+  if (!testing::data_dir()) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA";
+  const Rotations hand = read_stream("robot_arm_complete_bag_color_and_ir_base_link_sr300_hinge.csv");
+  const Rotations eye = read_stream("robot_arm_complete_bag_color_and_ir_target_ir.csv");
+  const auto found = find_latency(hand, eye);
+  ASSERT_TRUE(found) << found.error().what;
+  EXPECT_NEAR(found->offset_ms, 15, 3);  // the eye is late: the published -0.015 s is what its times want added
+}
+
+TEST(Latency, DriftOfFiftyPpmIsRecoveredWithItsInterval) {
+  int covered = 0;
+  constexpr unsigned kTrials = 20;
+  for (unsigned seed = 1; seed <= kTrials; ++seed) {
+    const Hand hand(seed);
+    StreamSettings tracker = tracker_of(seed), camera = camera_of(seed, 25);
+    tracker.seconds = camera.seconds = 120;
+    camera.drift_ppm = 50;
+    camera.drift_from_s = 60;
+    const auto found = find_latency(record(hand, tracker), record(hand, camera));
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->drift_ppm, 50, 20);
+    EXPECT_GT(found->drift_ci95_ppm[0], 0);
+    EXPECT_NEAR(found->offset_ms, 83, 0.5);
+    covered += covers(found->drift_ci95_ppm, 50);
+  }
+  EXPECT_GE(covered, 17);
+}
+
+TEST(Latency, ExchangedStreamsGiveTheOpposite) {
+  const Hand hand(9);
+  const Rotations a = record(hand, tracker_of(9)), b = record(hand, camera_of(9, 60));
+  const auto there = find_latency(a, b), back = find_latency(b, a);
+  ASSERT_TRUE(there && back);
+  EXPECT_NEAR(there->offset_ms, -back->offset_ms, 0.3);
+  EXPECT_LT(rotation_angle_between(there->b_from_a, back->b_from_a.transpose()), 0.3 * kRadPerDeg);
+  EXPECT_LT(rotation_angle_between(there->b_from_a, kBody.toRotationMatrix().transpose()), 0.3 * kRadPerDeg);
+}
+
+std::string reasons_of(const Verdict& verdict) {
+  std::string text;
+  for (const std::string& reason : verdict.reasons) text += reason + "; ";
+  for (const std::string& step : verdict.next_steps) text += step + "; ";
+  return text;
+}
+
+/// Fails, and says so in these words.
+void expect_fail(const Rotations& a, const Rotations& b, const std::vector<std::string>& words) {
+  const auto found = find_latency(a, b);
+  ASSERT_TRUE(found) << found.error().what;
+  const Verdict verdict = latency_verdict(*found, "tracker", "video");
+  EXPECT_EQ(verdict.grade, Grade::fail) << found->offset_ms;
+  for (const std::string& word : words)
+    EXPECT_NE(reasons_of(verdict).find(word), std::string::npos) << reasons_of(verdict);
+}
+
+TEST(Latency, WhatDeterminesNothingFailsWithTheReason) {
+  const Hand hand(4), other(77), still(4, 0.2);
+  expect_fail(record(still, tracker_of(4)), record(still, camera_of(4, 25)),
+              {"the tracker hardly moves", "the video hardly moves", "of at least 5 deg/s", "to and fro"});
+  // Two bodies that have nothing to do with each other.
+  expect_fail(record(hand, tracker_of(4)), record(other, camera_of(4, 25)), {"correlation"});
+  StreamSettings tracker = tracker_of(4), camera = camera_of(4, 25);
+  tracker.seconds = camera.seconds = 5;
+  expect_fail(record(hand, tracker), record(hand, camera), {"in common, of at least 8"});
+  // Further away than is sought.
+  camera = camera_of(4, 25);
+  camera.offset_ms = 1500;
+  expect_fail(record(hand, tracker_of(4)), record(hand, camera), {});
+}
+
+TEST(Latency, AnEvenSwingIsAmbiguousAndSaidToBe) {
+  for (const double hz : {0.9, 1.5}) {
+    const auto swing = [hz](double t) {
+      return Eigen::Quaterniond(
+          Eigen::AngleAxisd(0.3 * std::sin(2 * std::numbers::pi * hz * t), Eigen::Vector3d::UnitX()));
+    };
+    expect_fail(record(swing, tracker_of(6)), record(swing, camera_of(6, 25)),
+                {"the motion repeats itself", "change pace"});
+  }
+}
+
+TEST(Latency, OddRowsAreToldAndDoNoHarm) {
+  const Hand hand(8);
+  Rotations a = record(hand, tracker_of(8)), b = record(hand, camera_of(8, 25));
+  a[50].time_s = std::nan("");
+  a[60].base_from_body.coeffs().setConstant(std::nan(""));
+  a[70].base_from_body.coeffs().setZero();
+  a[80].time_s = a[79].time_s;
+  std::swap(a[90], a[91]);
+  for (int k = 0; k < 40; ++k)
+    a[static_cast<std::size_t>(100 + 45 * k)].base_from_body = Eigen::Quaterniond(0, 1, 0, 0);
+  a.erase(a.begin() + 800, a.begin() + 880);
+  const auto found = find_latency(a, b);
+  ASSERT_TRUE(found) << found.error().what;
+  EXPECT_NEAR(found->offset_ms, 83, 1.5);
+  const std::string reasons = reasons_of(latency_verdict(*found, "tracker", "video"));
+  for (const char* words : {"3 rows of a", "1 rows of a were out of order", "1 rows of a bear the time of another",
+                            "the tracker has a hole of 0.8 s"})
+    EXPECT_NE(reasons.find(words), std::string::npos) << reasons;
+}
+
+TEST(Latency, StreamsThatCannotBeUsedAreRefused) {
+  const Hand hand(8);
+  const Rotations a = record(hand, tracker_of(8));
+  const auto refused = [](const Rotations& p, const Rotations& q, const std::string& words) {
+    const auto found = find_latency(p, q);
+    ASSERT_FALSE(found);
+    EXPECT_NE(found.error().what.find(words), std::string::npos) << found.error().what;
+  };
+  refused(a, {}, "stream b: 0 usable rows");
+  StreamSettings later = camera_of(8, 25);
+  later.begin_s = 60;
+  refused(a, record(hand, later), "do not overlap");
+  Rotations backwards = a;
+  for (std::size_t i = 1000; i < backwards.size(); ++i) backwards[i].time_s -= 9;
+  refused(backwards, a, "jumps back by");
+  Rotations shuffled = a;
+  for (std::size_t i = 0; i + 1 < shuffled.size(); i += 20) std::swap(shuffled[i], shuffled[i + 1]);
+  refused(shuffled, a, "earlier than the row before");
+}
+
+}  // namespace
+}  // namespace birdseye::calibration

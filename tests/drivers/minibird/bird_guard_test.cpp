@@ -1,0 +1,267 @@
+#include "drivers/minibird/bird_guard.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "calibration/geometry/transform.hpp"
+#include "tests/drivers/minibird/wire_records.hpp"
+
+namespace birdseye::drivers::minibird {
+namespace {
+
+using birdseye::testing::wire_record;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+constexpr double kPeriodS = 0.01;
+
+/// A guard and the time. Readings carry noise, as a real sensor's do, unless told otherwise.
+class Watch {
+ public:
+  explicit Watch(const Plausibility& limits = {}, Hemisphere hemisphere = Hemisphere::forward)
+      : guard_({RecordFormat::position_matrix, kMmPerCount36Inch, into(hemisphere)}, limits) {}
+
+  BirdReading see(const Vector3d& position_mm, const Matrix3d& rotation = Matrix3d::Identity(), double noise_mm = 0.3) {
+    std::normal_distribution<double> noise(0, noise_mm);
+    Vector3d noisy = position_mm;
+    if (noise_mm > 0) noisy += Vector3d(noise(random_), noise(random_), noise(random_));
+    const Bytes bytes = wire_record(noisy, rotation);
+    Record record;
+    for (std::size_t i = 0; i < bytes.size(); i += 2) record.words.push_back(decode_word(bytes[i], bytes[i + 1]));
+    return see(record);
+  }
+  BirdReading see(const Record& record) {
+    seconds += kPeriodS;
+    return guard_.judge(record, {static_cast<std::int64_t>(seconds * 1e9)}, Duration{200'000}, time_certain);
+  }
+  /// So many readings at a place; how many of them have a pose.
+  int see_often(int count, const Vector3d& position_mm) {
+    int poses = 0;
+    for (int i = 0; i < count; ++i) poses += see(position_mm).pose ? 1 : 0;
+    return poses;
+  }
+
+  double seconds = 0;
+  bool time_certain = true;
+
+ private:
+  BirdGuard guard_;
+  std::mt19937 random_{7};
+};
+
+const Vector3d kHere(300, 80, -40);
+
+TEST(BirdGuard, TheFirstReadingIsConfirmedByTheNext) {
+  Watch watch;
+  const BirdReading first = watch.see(kHere);
+  EXPECT_EQ(first.kind, Doubt::unconfirmed);
+  EXPECT_FALSE(first.pose);
+  EXPECT_THAT(first.doubt, HasSubstr("not yet confirmed"));
+  const BirdReading second = watch.see(kHere);
+  EXPECT_TRUE(second.pose);
+  EXPECT_EQ(second.doubt, "");
+  EXPECT_EQ(watch.see_often(1000, kHere), 1000);
+}
+
+TEST(BirdGuard, TimesThatAreNotCertainMakeNoTrack) {
+  Watch watch;
+  const auto moving = [](double s) { return Vector3d(300 + 400 * s, 80, -40); };
+  double now = 0;
+  const auto see = [&](double by_s) { return watch.see(moving(now += by_s)); };
+  for (int i = 0; i < 20; ++i) see(kPeriodS);
+  // Measurements are lost and their times not counted: for a while readings seem to come twice as fast.
+  watch.time_certain = false;
+  for (int i = 0; i < 10; ++i) EXPECT_TRUE(see(i == 0 ? 3 * kPeriodS : kPeriodS).pose) << i;
+  // Now they are counted.
+  watch.time_certain = true;
+  watch.seconds += 2 * kPeriodS;
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(see(kPeriodS).pose) << i;
+}
+
+TEST(BirdGuard, AHandThatMovesIsNotDoubted) {
+  // Up to 1.2 m/s and 18 m/s^2, with noise as at the edge of the tracker's range.
+  Watch watch;
+  watch.see({400, 0, 0});
+  int doubted = 0;
+  for (int i = 1; i < 4000; ++i) {
+    const double s = i * kPeriodS;
+    const BirdReading reading =
+        watch.see(Vector3d(400 + 80 * std::sin(15 * s), 80 * std::cos(15 * s) - 80, 50 * s / 40),
+                  rotation_exp(Vector3d(0, 0, 1.5 * std::sin(4 * s))), 1.0);
+    doubted += reading.pose ? 0 : 1;
+  }
+  EXPECT_LE(doubted, 4);
+}
+
+TEST(BirdGuard, ASingleWildReadingIsDoubtedAndTheStreamGoesOn) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  const BirdReading wild = watch.see(kHere + Vector3d(0, 60, 0));
+  EXPECT_EQ(wild.kind, Doubt::step);
+  EXPECT_THAT(wild.doubt, HasSubstr("a step of 60 mm"));
+  EXPECT_EQ(watch.see_often(100, kHere), 100);
+  EXPECT_EQ(watch.see(kHere, rotation_exp(Vector3d(0.8, 0, 0))).kind, Doubt::step);
+  EXPECT_EQ(watch.see_often(100, kHere), 100);
+}
+
+TEST(BirdGuard, AStepThatStaysIsBelievedAfterAWhile) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  const Vector3d there = kHere + Vector3d(0, 200, 0);
+  EXPECT_EQ(watch.see_often(5, there), 0);
+  EXPECT_EQ(watch.see_often(100, there), 100);
+}
+
+TEST(BirdGuard, StepsThatDoNotAgreeAreNeverBelieved) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> anywhere(-300, 300);
+  for (int i = 0; i < 40; ++i) {
+    const BirdReading reading = watch.see({500 + anywhere(random), anywhere(random) + 500, anywhere(random)});
+    EXPECT_FALSE(reading.pose);
+  }
+  // So long, that the first is to be confirmed.
+  EXPECT_EQ(watch.see_often(50, kHere), 49);
+}
+
+TEST(BirdGuard, AfterAGapTheSensorMayBeElsewhere) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  watch.seconds += 3;
+  EXPECT_EQ(watch.see({350, -200, 300}).kind, Doubt::unconfirmed);
+  EXPECT_EQ(watch.see_often(100, {350, -200, 300}), 100);
+}
+
+TEST(BirdGuard, SaturationAndTheEndOfTheScaleAreNamed) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  const BirdReading zero = watch.see(kHere, Matrix3d::Zero());
+  EXPECT_EQ(zero.kind, Doubt::saturated);
+  EXPECT_THAT(zero.doubt, HasSubstr("saturated"));
+  const BirdReading far = watch.see({kHere.x(), 914.4, 0});
+  EXPECT_EQ(far.kind, Doubt::beyond_scale);
+  EXPECT_THAT(far.doubt, HasSubstr("914 mm"));
+  EXPECT_EQ(watch.see({kHere.x(), -914.4, 0}, Matrix3d::Identity(), 0).kind, Doubt::beyond_scale);
+  EXPECT_EQ(watch.see(kHere, 0.97 * Matrix3d::Identity()).kind, Doubt::senseless);
+  EXPECT_EQ(watch.see_often(50, kHere), 50);
+}
+
+TEST(BirdGuard, ARecordThatRepeatsWhereThereWasNoiseIsFrozen) {
+  Watch watch;
+  watch.see_often(60, kHere);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+  const BirdReading frozen = watch.see(kHere, Matrix3d::Identity(), 0);
+  EXPECT_EQ(frozen.kind, Doubt::frozen);
+  EXPECT_THAT(frozen.doubt, HasSubstr("101 times"));
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, Doubt::frozen);
+  watch.see(kHere);
+  EXPECT_EQ(watch.see_often(10, kHere), 10);
+}
+
+TEST(BirdGuard, WhereThereNeverWasNoiseARepeatedRecordIsASensorAtRest) {
+  Watch watch;
+  const auto see = [&watch](double y) { return watch.see({300, y, -40}, Matrix3d::Identity(), 0); };
+  see(0);
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(see(0).pose) << i;
+  // It starts, gently, and comes to rest again.
+  for (int i = 0; i < 400; ++i) ASSERT_TRUE(see(50 - 50 * std::cos(i * 3.14159265 / 400)).pose) << i;
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(see(100).pose) << i;
+}
+
+TEST(BirdGuard, WhatMovedIsFrozenAtOnce) {
+  Watch watch;
+  for (int i = 0; i < 50; ++i) watch.see(kHere + Vector3d(0, 4.0 * i, 0));  // 400 mm/s
+  const Vector3d last = kHere + Vector3d(0, 4.0 * 50, 0);
+  ASSERT_TRUE(watch.see(last, Matrix3d::Identity(), 0).pose);
+  for (int i = 0; i < 80; ++i) EXPECT_EQ(watch.see(last, Matrix3d::Identity(), 0).kind, Doubt::frozen);
+  watch.see(kHere);
+  EXPECT_EQ(watch.see_often(10, kHere), 10);
+}
+
+TEST(BirdGuard, AFlipIsNamedAsLongAsItLastsWhileTheSensorMoves) {
+  Watch watch;
+  const auto at = [](int i) { return Vector3d(300 - 0.5 * i, 80 + i, -40); };
+  for (int i = 0; i < 50; ++i) watch.see(at(i));
+  for (int i = 50; i < 250; ++i) {
+    const BirdReading reading = watch.see(-at(i));
+    EXPECT_EQ(reading.kind, Doubt::hemisphere_flip) << i;
+    EXPECT_THAT(reading.doubt, HasSubstr("hemisphere flip"));
+  }
+  for (int i = 250; i < 300; ++i) EXPECT_TRUE(watch.see(at(i)).pose) << i;
+}
+
+TEST(BirdGuard, ASensorThatCrossesTheBorderIsNotBelievedBeyondIt) {
+  // The unit reports what lies in its half-space: +X. The sensor goes through the plane, and comes back.
+  Watch watch;
+  int near = 0, flipped = 0, good = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double x = 200 - 2.0 * std::min(i, 400 - i);  // 200 down to -200 and back
+    const Vector3d truth(x, 150, 60);
+    const BirdReading reading = watch.see(x < 0 ? Vector3d(-truth) : truth);
+    if (reading.pose) {
+      ++good;
+      EXPECT_LT((*reading.pose->position_mm - truth).norm(), 2) << i;
+    }
+    near += reading.kind == Doubt::hemisphere_border ? 1 : 0;
+    flipped += reading.kind == Doubt::hemisphere_flip ? 1 : 0;
+  }
+  EXPECT_GT(good, 180);
+  EXPECT_GT(near, 10);
+  EXPECT_GT(flipped, 150);
+}
+
+TEST(BirdGuard, AFlipIsRememberedOverAShortGapAndNotForEver) {
+  Watch watch;
+  watch.see_often(20, kHere);
+  watch.seconds += 1;
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(watch.see(-kHere).kind, Doubt::hemisphere_flip);
+  // Whatever it was: after seconds of nothing, what the unit says is believed again.
+  watch.seconds += 5;
+  watch.see(kHere);
+  EXPECT_EQ(watch.see_often(50, kHere), 50);
+}
+
+TEST(BirdGuard, OutsideTheHalfSpaceThatIsSetNothingIsBelieved) {
+  Watch watch({}, Hemisphere::lower);  // +Z
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(watch.see({300, 0, -100}).kind, Doubt::outside_hemisphere);
+  watch.seconds += 3;
+  watch.see({300, 0, 100});
+  EXPECT_EQ(watch.see_often(50, {300, 0, 100}), 50);
+}
+
+TEST(BirdGuard, NoStreamThatIsGoodIsDoubtedForEver) {
+  // Whatever came before, soon after it is over the sensor's readings have poses.
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> anywhere(-800, 800);
+    Watch watch;
+    for (int i = 0; i < 60; ++i) {
+      const auto what = random() % 6;
+      if (what == 0) watch.seconds += 0.3 * static_cast<double>(random() % 12);
+      if (what == 1) watch.see(Vector3d(anywhere(random), anywhere(random), anywhere(random)));
+      if (what == 2) watch.see(-kHere);
+      if (what == 3) watch.see(kHere, Matrix3d::Zero());
+      if (what == 4) watch.see_often(static_cast<int>(random() % 8), kHere);
+      if (what == 5) watch.see_often(static_cast<int>(random() % 8), Vector3d(anywhere(random), 100, 0));
+    }
+    watch.see_often(40, kHere);
+    EXPECT_EQ(watch.see_often(100, kHere), 100) << seed;
+  }
+}
+
+TEST(BirdGuard, NoisePassesOnceItIsKnown) {
+  // 1.8 mm RMS, the tracker's static accuracy, all of it as noise.
+  Watch watch;
+  for (int i = 0; i < 300; ++i) watch.see(kHere, Matrix3d::Identity(), 1.8);
+  int poses = 0;
+  for (int i = 0; i < 2000; ++i) poses += watch.see(kHere, Matrix3d::Identity(), 1.8).pose ? 1 : 0;
+  EXPECT_GT(poses, 1960);
+}
+
+}  // namespace
+}  // namespace birdseye::drivers::minibird

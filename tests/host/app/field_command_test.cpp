@@ -1,0 +1,208 @@
+// `calibrate field` and `calibrate field check`, from the outside.
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "calibration/record/field_map_file.hpp"
+#include "tests/calibration/field/simulated_field.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::expect_refused;
+using testing::run;
+using testing::Scratch;
+
+nlohmann::json read(const fs::path& path) {
+  return nlohmann::json::parse(std::ifstream(path));
+}
+
+std::string pose_row(const Transform<Tracker, Sensor>& pose) {
+  const Eigen::Quaterniond q = pose.quaternion();
+  const Eigen::Vector3d& p = pose.translation();
+  return fmt::format("{},{},{},{},{},{},{}", p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+std::string grid_csv(const std::vector<calibration::FieldSample>& samples) {
+  std::string out = "name,true_x,true_y,true_z,x,y,z,qx,qy,qz,qw\n";
+  for (const auto& s : samples) {
+    out += fmt::format("{},{},{},{},{}\n", s.name.substr(s.name.find(' ') + 1), s.true_mm.x(), s.true_mm.y(),
+                       s.true_mm.z(), pose_row(s.measured));
+  }
+  return out;
+}
+
+TEST(FieldCommand, FromTheTableToTheAppliance) {
+  const Scratch scratch;
+  const hw_sim::FieldDistortion field(10, 6);
+  auto samples = testing::grid_samples(field, {}, 6);
+  samples[70].measured = Transform<Tracker, Sensor>(
+      samples[70].measured.rotation(), Eigen::Vector3d(samples[70].measured.translation() + Eigen::Vector3d(25, 0, 0)));
+  std::string table = grid_csv(samples);
+  table += "gone,1,2,3,-3.697314E28,-3.697314E28,-3.697314E28,0,0,0,1\nnan,1,2,3,nan,0,0,0,0,0,1\n";
+  const std::string out = (scratch / "field.json").string();
+  const auto made =
+      run("birdseye", "calibrate field --grid " + scratch.file("grid.csv", table) + " --held-alike --out " + out +
+                          " --json " + (scratch / "r.json").string() + " --report " + (scratch / "r.html").string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  const nlohmann::json r = read(scratch / "r.json");
+  EXPECT_EQ(r["verdict"], "pass") << r["reasons"];
+  EXPECT_LT(r["held_out_mm"].get<double>(), 0.8);
+  EXPECT_GT(r["before_mm"].get<double>(), 2);
+  EXPECT_LT(r["held_out_deg"].get<double>(), r["before_deg"].get<double>());
+  EXPECT_GT(r["candidates"].size(), 8U);
+  ASSERT_EQ(r["outliers"].size(), 1U) << r["outliers"];
+  EXPECT_EQ(r["outliers"][0]["name"], "71");
+  EXPECT_EQ(r["rejected"].size(), 2U) << r["rejected"];
+  EXPECT_EQ(r["box_mm"].size(), 2U);
+  const auto map = calibration::parse_field_map(testing::contents_of(out));
+  ASSERT_TRUE(map) << map.error().what;
+  EXPECT_EQ(map->notes.held_out_mm, r["held_out_mm"]);
+  const std::string page = testing::contents_of(scratch / "r.html");
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_NE(page.find("outlier, not used"), std::string::npos);
+  const auto checked = run("birdseyed", "--check --config " + scratch.file("cart.toml",
+                                                                           "[tracker]\ndevice = \"/dev/ttyS0\"\n"
+                                                                           "[camera]\nsource = \"v4l2:/dev/video0\"\n"
+                                                                           "[calibration]\nfield = \"" +
+                                                                               out + "\"\n"));
+  EXPECT_EQ(checked.code, 0) << checked.output;
+}
+
+TEST(FieldCommand, PosesInTheOrderOfTheNodes) {
+  const Scratch scratch;
+  const hw_sim::FieldDistortion field(10, 2);
+  std::string poses = "t,x,y,z,qx,qy,qz,qw\n";
+  const auto samples = testing::grid_samples(field, {}, 2);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    poses += fmt::format("{},{}\n", i, i == 10 ? "nan,nan,nan,0,0,0,1" : pose_row(samples[i].measured));
+  const std::string common = "calibrate field --poses " + scratch.file("p.csv", poses) + " --kind polynomial --json " +
+                             (scratch / "r.json").string() + " --grid-spec ";
+  const auto made = run("birdseye", common + "6x6x5:100x96x100mm");
+  ASSERT_EQ(made.code, 0) << made.output;
+  const nlohmann::json r = read(scratch / "r.json");
+  EXPECT_EQ(r["kind"], "polynomial");
+  EXPECT_LT(r["held_out_mm"].get<double>(), 0.8);
+  EXPECT_EQ(r["measurements"], 179);
+  EXPECT_EQ(r["rejected"].size(), 1U);
+  expect_refused("birdseye", common + "6x6x6:100x96x100mm", {"180 poses for 216 nodes"});
+  expect_refused("birdseye", common + "6x6x5", {"6x6x5:100mm"});
+  expect_refused("birdseye", common + "6x6x5:0.1x0.096x0.1mm", {"both in mm"});
+}
+
+TEST(FieldCommand, TwoSensorsOnABar) {
+  const Scratch scratch;
+  const hw_sim::FieldDistortion field(10, 1);
+  std::mt19937 rng(4);
+  std::uniform_real_distribution<double> part(0, 1);
+  std::string a = "t,x,y,z,qx,qy,qz,qw\n", b = a;
+  for (int i = 0; i < 400; ++i) {
+    const Eigen::Vector3d place(220 + 300 * part(rng), 300 * part(rng) - 150, 240 * part(rng) - 120);
+    const Eigen::Matrix3d turn = rotation_exp(Eigen::Vector3d(2 * part(rng) - 1, 2 * part(rng) - 1, 2 * part(rng) - 1));
+    const Transform<Tracker, Sensor> first(turn, place), second(turn, Eigen::Vector3d(place + 120 * turn.col(0)));
+    a += fmt::format("{:.3f},{}\n", 100 + 0.02 * i, pose_row(testing::measured(field, first, 0.3, 0.1, rng)));
+    if (i != 7)
+      b += fmt::format("{:.3f},{}\n", 100.002 + 0.02 * i, pose_row(testing::measured(field, second, 0.3, 0.1, rng)));
+  }
+  const std::string common = "calibrate field --kind polynomial --json " + (scratch / "r.json").string() + " --pair " +
+                             scratch.file("a.csv", a) + " ";
+  const auto made =
+      run("birdseye", common + scratch.file("b.csv", b) + " --distance 120 --out " + (scratch / "field.json").string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  const nlohmann::json r = read(scratch / "r.json");
+  EXPECT_NE(r["verdict"], "fail") << r["reasons"];
+  EXPECT_EQ(r["measurements"], 399);
+  EXPECT_NEAR(r["sensor_distance_mm"].get<double>(), 120, 0.5);
+  EXPECT_LT(r["held_out_mm"].get<double>(), r["before_mm"].get<double>());
+  EXPECT_TRUE(fs::exists(scratch / "field.json"));
+}
+
+TEST(FieldCommand, WhatIsNotWorthAMapIsNotWritten) {
+  const Scratch scratch;
+  testing::GridSpec noisy;
+  noisy.noise_mm = 8;
+  const auto samples = testing::grid_samples(hw_sim::FieldDistortion(1, 1), noisy, 1);
+  const auto made = run("birdseye", "calibrate field --grid " + scratch.file("g.csv", grid_csv(samples)) + " --out " +
+                                        (scratch / "field.json").string() + " --json " + (scratch / "r.json").string());
+  EXPECT_EQ(made.code, 3) << made.output;
+  EXPECT_FALSE(fs::exists(scratch / "field.json"));
+  EXPECT_EQ(read(scratch / "r.json")["verdict"], "fail");
+  EXPECT_FALSE(read(scratch / "r.json")["next_steps"].empty());
+}
+
+TEST(FieldCommand, InputThatCannotBeUsedIsRefused) {
+  const Scratch scratch;
+  const std::string out = (scratch / "f.json").string();
+  const auto refused = [&](const std::string& arguments, const std::vector<std::string>& words) {
+    expect_refused("birdseye", "calibrate field --out " + out + " " + arguments, words, out);
+  };
+  refused("", {"--grid", "--pair"});
+  refused("--grid " + (scratch / "none.csv").string(), {"none.csv", "no such file"});
+  refused("--grid " + scratch.file("a.csv", "x,y,z\n1,2,3\n"), {"a.csv", "true_x"});
+  refused("--grid " + scratch.file("b.csv", "true_x,true_y,true_z,x,y,z\n1,2,3,4,5,6\n"), {"b.csv", "1 samples"});
+  refused("--grid " + scratch.file("c.csv", "true_x,true_y,true_z,x,y,z\n1,2,3,nan,5,6\n"), {"c.csv", "no row"});
+  refused("--kind spline --grid x", {"spline"});
+}
+
+std::string places_csv(double bend_mm, unsigned seed) {
+  std::mt19937 rng(seed);
+  std::normal_distribution<double> noise(0, 0.2);
+  std::string out = "name,x,y,z\n";
+  for (int i = 0; i < 6; ++i) {
+    const double x = 80 * (i % 3), y = 110 * (i / 3);
+    out += fmt::format("d{},{},{},{}\n", i + 1, 300 + y + noise(rng), x + noise(rng) + (i == 5 ? bend_mm : 0),
+                       -40 + noise(rng));
+  }
+  return out;
+}
+
+TEST(FieldCheckCommand, DayByDayUntilMetalComes) {
+  const Scratch scratch;
+  std::string plate = "name,x,y,z\n";
+  for (int i = 0; i < 6; ++i) plate += fmt::format("d{},{},{},0\n", i + 1, 80 * (i % 3), -110 * (i / 3));
+  const std::string history = (scratch / "history.csv").string();
+  const std::string common = "calibrate field check --plate " + scratch.file("plate.csv", plate) + " --history " +
+                             history + " --json " + (scratch / "r.json").string() + " --report " +
+                             (scratch / "r.html").string() + " --measured ";
+  for (unsigned day = 1; day <= 10; ++day) {
+    const auto done =
+        run("birdseye", common + scratch.file("m.csv", places_csv(0, day)) + fmt::format(" --when 'day {}'", day));
+    ASSERT_EQ(done.code, 0) << done.output;
+  }
+  const auto bent = run("birdseye", common + scratch.file("m.csv", places_csv(3.5, 99)) + " --when 'a,day'");
+  EXPECT_EQ(bent.code, 3) << bent.output;
+  const nlohmann::json r = read(scratch / "r.json");
+  EXPECT_EQ(r["verdict"], "fail");
+  EXPECT_EQ(r["days"], 11);
+  EXPECT_EQ(r["worst"], "d6");
+  EXPECT_GT(r["rms_mm"].get<double>(), r["limits"]["rms_mm"]["high"].get<double>());
+  const std::string kept = testing::contents_of(history);
+  EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n'), 12);
+  EXPECT_NE(kept.find("\na-day,"), std::string::npos);
+  EXPECT_NE(testing::contents_of(scratch / "r.html").find("+3 sigma"), std::string::npos);
+}
+
+TEST(FieldCheckCommand, InputThatCannotBeUsedIsRefusedAndNoDayIsAdded) {
+  const Scratch scratch;
+  const std::string plate = scratch.file("plate.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n");
+  const fs::path history = scratch / "h.csv";
+  const std::string common =
+      "calibrate field check --plate " + plate + " --history " + history.string() + " --measured ";
+  expect_refused("birdseye", common + scratch.file("a.csv", "name,x,y,z\nd1,0,0,0\nd9,80,0,0\n"), {"d9", "plate.csv"},
+                 history);
+  expect_refused("birdseye", common + scratch.file("b.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\n"), {"2 places"},
+                 history);
+  expect_refused("birdseye", common + scratch.file("c.csv", "name,x,y,z\nd1,0,zero,0\n"), {"c.csv:2"}, history);
+  std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nmonday,much,0,0,d1\n";
+  expect_refused("birdseye", common + scratch.file("d.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n"),
+                 {"h.csv:2"});
+}
+
+}  // namespace
+}  // namespace birdseye

@@ -1,0 +1,278 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "host/recording/recording_reader.hpp"
+#include "host/recording/recording_writer.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using testing::contents_of;
+using testing::Scratch;
+
+wire::VideoFrame frame(int n, int width_px, int height_px) {
+  std::mt19937 random(static_cast<unsigned>(n));
+  std::vector<std::uint8_t> rgb(3 * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
+  for (std::uint8_t& byte : rgb) byte = static_cast<std::uint8_t>(random());
+  wire::VideoFrame out;
+  out.info.sequence = 100 + static_cast<std::uint64_t>(n);
+  out.info.acquired = {5'000'000'000'123 + 40'000'000LL * n};
+  out.info.acquired_sigma = {70'123};
+  out.info.arrived = {out.info.acquired.ns + 30'000'001};
+  out.info.pose.reason = "the tracker is silent";
+  if (n % 4 != 3) {
+    out.info.pose.kind = PoseKind::interpolated;
+    out.info.pose.reason = "";
+    out.info.pose.position_sigma_mm = 0.1 + 1e-17 * n;
+    out.info.pose.tracker_from_sensor =
+        Transform<Tracker, Sensor>(rotation_exp(Eigen::Vector3d(0.1 * n, 1.0 / 3, 0)), Eigen::Vector3d(n, 2, 3.1));
+  }
+  out.width_px = width_px;
+  out.height_px = height_px;
+  out.rgb = std::make_shared<const std::vector<std::uint8_t>>(std::move(rgb));
+  return out;
+}
+
+wire::Birds birds(int n) {
+  const Transform<Tracker, Sensor> pose(rotation_exp(Eigen::Vector3d(0.3, 0.01 * n, 0)), Eigen::Vector3d(1, n, 0.7));
+  wire::Birds out{{5'000'000'000'000 + 10'000'000LL * n}, {{"scope", pose}}};
+  if (n % 5 != 0) out.birds.push_back({"pointer", pose});
+  return out;
+}
+
+/// As an appliance tells: all kinds, in their order.
+std::vector<wire::Event> session(int frames, int width_px = 16, int height_px = 12) {
+  wire::Health health;
+  health.state = "ready";
+  health.instruments.push_back({"tracker", "running", "miniBIRD 800", 0, {{"serial", "4711"}}});
+  health.clock.wall_minus_monotonic_ns = 1'700'000'000'000'000'000;
+  std::vector<wire::Event> events = {wire::Status{true, "ready"}, wire::Calibration{false, "no record", ""}, health};
+  for (int n = 0; n < frames; ++n) {
+    for (int m = 0; m < 4; ++m) events.emplace_back(birds(4 * n + m));
+    if (n == 1) events.emplace_back(wire::Doubt{{7}, "pointer", "it jumped"});
+    if (n == 1) events.emplace_back(wire::ClockChange{{8}, "camera", "step", {9}, 0.5});
+    if (n == 2) events.emplace_back(wire::Pedal{true, {77}});
+    if (n == 2) events.emplace_back(wire::CameraControls{true, {"gain"}, {"focus"}});
+    events.emplace_back(frame(n, width_px, height_px));
+  }
+  return events;
+}
+
+/// All that an event says, with its pixels.
+std::string said(const wire::Event& event) {
+  std::string text = event_line(event);
+  if (const auto* f = std::get_if<wire::VideoFrame>(&event)) text.append(f->rgb->begin(), f->rgb->end());
+  return text;
+}
+
+void record(const fs::path& folder, const std::vector<wire::Event>& events, RecordingSettings settings = {}) {
+  settings.folder = folder;
+  settings.source = "test";
+  auto writer = RecordingWriter::create(settings);
+  ASSERT_TRUE(writer) << writer.error().what;
+  for (const wire::Event& event : events) {
+    const auto added = (*writer)->add(event);
+    ASSERT_TRUE(added) << added.error().what;
+  }
+  const auto finished = (*writer)->finish("the test is over");
+  ASSERT_TRUE(finished) << finished.error().what;
+}
+
+struct Played {
+  std::vector<wire::Event> events;
+  Error ending;
+  std::vector<std::string> notes;
+};
+
+Played play(const fs::path& path, const RecordingReader::Settings& settings = {}) {
+  Played played;
+  const auto reader = RecordingReader::open(path, settings);
+  if (!reader) {
+    played.ending = reader.error();
+    return played;
+  }
+  for (;;) {
+    auto event = (*reader)->next(Clock::now() + std::chrono::seconds(5));
+    if (!event) {
+      played.ending = event.error();
+      played.notes = (*reader)->notes();
+      return played;
+    }
+    if (*event) played.events.push_back(**std::move(event));
+  }
+}
+
+TEST(Recording, PlaysTheSameEventsInTheSameOrderToTheBit) {
+  const auto events = session(6);
+  for (const bool pair : {false, true}) {
+    const Scratch scratch;
+    record(scratch / "r", events, {.pair = pair});
+    EXPECT_EQ(fs::exists(scratch / "r/video.igs.mha"), !pair);
+    const Played played = play(scratch / "r");
+    EXPECT_EQ(played.ending.code, Errc::disconnected);
+    EXPECT_NE(played.ending.what.find("6 frames"), std::string::npos) << played.ending.what;
+    EXPECT_TRUE(played.notes.empty());
+    ASSERT_EQ(played.events.size(), events.size());
+    for (std::size_t i = 0; i < events.size(); ++i) EXPECT_EQ(said(played.events[i]), said(events[i])) << i;
+  }
+}
+
+TEST(Recording, ItsSheetSaysWhatIsInIt) {
+  const Scratch scratch;
+  auto events = session(6);
+  events.erase(events.begin() + 10);  // some measurement
+  std::erase_if(events, [](const wire::Event& e) {
+    const auto* f = std::get_if<wire::VideoFrame>(&e);
+    return f != nullptr && f->info.sequence == 103;
+  });
+  record(scratch / "r", events);
+  const auto sheet = nlohmann::json::parse(contents_of(scratch / "r/recording.json"));
+  EXPECT_EQ(sheet["ended"], true);
+  EXPECT_EQ(sheet["why"], "the test is over");
+  EXPECT_EQ(sheet["frames"], 5);
+  EXPECT_EQ(sheet["frames_missing"], 1);
+  EXPECT_EQ(sheet["tracker"]["measurements"], 23);
+  EXPECT_EQ(sheet["video"][0]["file"], "video.igs.mha");
+  EXPECT_EQ(sheet["instruments"][0]["identity"]["serial"], "4711");
+  EXPECT_EQ(sheet["clock"]["wall_minus_monotonic_ns"], 1'700'000'000'000'000'000);
+}
+
+TEST(Recording, ASequenceAloneIsPlayedToo) {
+  const Scratch scratch;
+  const auto events = session(6);
+  record(scratch / "r", events);
+  const Played played = play(scratch / "r/video.igs.mha");
+  EXPECT_EQ(played.ending.code, Errc::disconnected) << played.ending.what;
+  std::vector<wire::VideoFrame> frames;
+  std::size_t pointers = 0;
+  for (const wire::Event& event : played.events) {
+    if (const auto* f = std::get_if<wire::VideoFrame>(&event)) frames.push_back(*f);
+    if (const auto* b = std::get_if<wire::Birds>(&event)) {
+      for (const wire::Bird& bird : b->birds) pointers += bird.name == "pointer" ? 1 : 0;
+    }
+  }
+  ASSERT_EQ(frames.size(), 6U);
+  EXPECT_GT(pointers, 4U);
+  for (int n = 0; n < 6; ++n) {
+    const wire::VideoFrame want = frame(n, 16, 12);
+    const wire::VideoFrame& got = frames[static_cast<std::size_t>(n)];
+    EXPECT_EQ(*got.rgb, *want.rgb);
+    EXPECT_EQ(got.info.sequence, want.info.sequence);
+    EXPECT_EQ(got.info.acquired.ns, want.info.acquired.ns);
+    ASSERT_EQ(got.info.pose.tracker_from_sensor.has_value(), want.info.pose.tracker_from_sensor.has_value());
+    if (want.info.pose.tracker_from_sensor) {
+      EXPECT_TRUE(got.info.pose.tracker_from_sensor->matrix().isApprox(want.info.pose.tracker_from_sensor->matrix()));
+    } else {
+      EXPECT_EQ(got.info.pose.reason, "ScopeToTracker INVALID");
+    }
+  }
+  const Played other = play(scratch / "r/video.igs.mha", {.transform = "ProbeToTracker"});
+  EXPECT_NE(other.ending.what.find("PointerToTracker, ScopeToTracker"), std::string::npos) << other.ending.what;
+}
+
+TEST(Recording, ACompressedOneHasAllFramesAndAllEvents) {
+  const Scratch scratch;
+  auto events = session(8, 64, 48);
+  for (wire::Event& event : events) {  // flat pictures, that compression leaves alone
+    auto* f = std::get_if<wire::VideoFrame>(&event);
+    if (f == nullptr) continue;
+    const auto grey = static_cast<std::uint8_t>(20 * (f->info.sequence - 100) + 40);
+    f->rgb = std::make_shared<const std::vector<std::uint8_t>>(f->rgb->size(), grey);
+  }
+  record(scratch / "r", events, {.compressed = true});
+  EXPECT_TRUE(fs::exists(scratch / "r/video.mp4"));
+  const Played played = play(scratch / "r");
+  ASSERT_EQ(played.events.size(), events.size()) << played.ending.what;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    EXPECT_EQ(event_line(played.events[i]), event_line(events[i])) << i;
+    const auto* f = std::get_if<wire::VideoFrame>(&played.events[i]);
+    if (f == nullptr) continue;
+    EXPECT_NEAR((*f->rgb)[3000], (*std::get<wire::VideoFrame>(events[i]).rgb)[3000], 4) << i;
+  }
+}
+
+TEST(Recording, AnotherSizeBeginsAnotherFile) {
+  const Scratch scratch;
+  auto events = session(2);
+  events.emplace_back(frame(2, 20, 10));
+  record(scratch / "r", events);
+  EXPECT_TRUE(fs::exists(scratch / "r/video-2.igs.mha"));
+  const Played played = play(scratch / "r");
+  ASSERT_EQ(played.events.size(), events.size()) << played.ending.what;
+  EXPECT_EQ(said(played.events.back()), said(events.back()));
+}
+
+TEST(Recording, OneThatWasCutPlaysWhatIsWhole) {
+  const Scratch scratch;
+  {
+    // The program ends without finish(), as by a signal that cannot be caught.
+    auto writer = RecordingWriter::create({.folder = scratch / "r", .source = "test"});
+    ASSERT_TRUE(writer) << writer.error().what;
+    for (const wire::Event& event : session(5)) ASSERT_TRUE((*writer)->add(event));
+  }
+  Played played = play(scratch / "r");
+  EXPECT_EQ(played.ending.code, Errc::disconnected);
+  EXPECT_EQ(played.events.size(), session(5).size());
+  ASSERT_EQ(played.notes.size(), 1U);
+  EXPECT_NE(played.notes[0].find("cut short"), std::string::npos);
+  // Less of the pixels, and half a line.
+  fs::resize_file(scratch / "r/video.raw", 3 * 3 * 16 * 12 + 5);
+  fs::resize_file(scratch / "r/events.jsonl", fs::file_size(scratch / "r/events.jsonl") - 9);
+  played = play(scratch / "r");
+  EXPECT_NE(played.ending.what.find("3 frames are whole, 1 more"), std::string::npos) << played.ending.what;
+  EXPECT_EQ(played.notes.size(), 2U);
+}
+
+TEST(Recording, DamageIsNamed) {
+  const Scratch scratch;
+  record(scratch / "r", session(2));
+  const std::string lines = contents_of(scratch / "r/events.jsonl");
+  const auto expect = [&](const std::vector<std::string>& words) {
+    const Played played = play(scratch / "r");
+    EXPECT_NE(played.ending.code, Errc::disconnected);
+    for (const std::string& word : words)
+      EXPECT_NE(played.ending.what.find(word), std::string::npos) << word << "\n" << played.ending.what;
+  };
+  const auto put = [&](const std::string& text) { std::ofstream(scratch / "r/events.jsonl") << text; };
+  put("{}\n" + lines);
+  expect({"events.jsonl", "line 1"});
+  put("{\"Sound\":{}}\n" + lines);
+  expect({"line 1", "Sound"});
+  put("{\"Birds\":{\"acquired_ns\":1,\"birds\":[{\"name\":\"scope\",\"tracker_from_sensor\":[2,0,0,0,0,1,0,0,0,0,1,0,0,"
+      "0,0,1]}]}}\n" +
+      lines);
+  expect({"line 1", "no pose"});
+  put(lines);
+  fs::rename(scratch / "r/video.igs.mha", scratch / "r/other.igs.mha");
+  expect({"lacks the video", "video.igs.mha"});
+  std::ofstream(scratch / "r/recording.json") << "{\"birdseye_recording\": 2}";
+  expect({"recording.json", "another version"});
+  fs::remove(scratch / "r/events.jsonl");
+  expect({"holds no recording"});
+  EXPECT_EQ(play(scratch / "none").ending.code, Errc::not_found);
+  EXPECT_EQ(RecordingWriter::create({.folder = scratch / "r", .source = ""}).error().code, Errc::in_use);
+}
+
+TEST(Recording, AtItsPaceAnEventWaitsForItsTime) {
+  const Scratch scratch;
+  record(scratch / "r", session(50));  // two seconds
+  const auto reader = RecordingReader::open(scratch / "r", {.speed = 1e-3});
+  ASSERT_TRUE(reader);
+  const auto now = Clock::now();
+  int events = 0;
+  for (int i = 0; i < 100; ++i) {
+    const auto event = (*reader)->next(now);
+    ASSERT_TRUE(event);
+    events += *event ? 1 : 0;
+  }
+  EXPECT_EQ(events, 4);  // status, calibration, health and the first measurement: the second is 10 s away
+}
+
+}  // namespace
+}  // namespace birdseye::host

@@ -1,0 +1,58 @@
+#include "host/registration/rigid/touch_detector.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+namespace birdseye::host {
+namespace {
+
+constexpr double kRateHz = 103.3;
+
+/// A tip that is parked, rests at each of points for dwell_s and glides between them in 0.5 s, then goes back.
+std::vector<Touch> run(const std::vector<Eigen::Vector3d>& points, double noise_mm, double dwell_s) {
+  std::mt19937 rng(7);
+  std::normal_distribution<double> noise(0, noise_mm);
+  const Eigen::Vector3d park(400, 100, 50);
+  std::vector<Eigen::Vector3d> stops{park};
+  stops.insert(stops.end(), points.begin(), points.end());
+  stops.push_back(park);
+  TouchDetector detector;
+  std::vector<Touch> touches;
+  double t_s = 0;
+  const auto push = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector3d noisy = p + Eigen::Vector3d(noise(rng), noise(rng), noise(rng));
+    if (const auto touch = detector.push({Duration::from_seconds(t_s).ns}, noisy)) touches.push_back(*touch);
+    t_s += 1 / kRateHz;
+  };
+  for (std::size_t i = 0; i < stops.size(); ++i) {
+    for (int k = 0; k < dwell_s * kRateHz; ++k) push(stops[i]);
+    if (i + 1 == stops.size()) break;
+    for (int k = 0; k < 0.5 * kRateHz; ++k) {
+      const double u = std::min(1.0, k / (0.5 * kRateHz));
+      push(stops[i] + (stops[i + 1] - stops[i]) * (u * u * (3 - 2 * u)));
+    }
+  }
+  return touches;
+}
+
+TEST(TouchDetector, FindsEachRestOnceAndNotTheParkingPlace) {
+  const std::vector<Eigen::Vector3d> points{{200, 0, 0}, {260, 10, 0}, {260, 80, 20}, {200, 90, 5}};
+  for (const double noise_mm : {0.0, 0.6}) {
+    const std::vector<Touch> touches = run(points, noise_mm, 0.7);
+    ASSERT_EQ(touches.size(), points.size()) << noise_mm;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      // Half a millimetre: what is left of the approach, plus four standard errors of the averaged noise.
+      EXPECT_LT((touches[i].tip_in_tracker_mm - points[i]).norm(), 0.5) << i;
+    }
+  }
+}
+
+TEST(TouchDetector, AShortStopIsNoTouch) {
+  EXPECT_TRUE(run({{200, 0, 0}}, 0.3, 0.1).empty());
+}
+
+}  // namespace
+}  // namespace birdseye::host
