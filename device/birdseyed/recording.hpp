@@ -9,8 +9,9 @@
 
 #include "device/birdseyed/core.hpp"
 
-/// A file of raw events (docs/manual/recording.md): eight bytes of magic, then blocks of kind, size, payload, checksum.
-/// A block is whole or it is not: a file that was cut anywhere, as by a power cut, is good up to the last whole block.
+/// An appliance recording, a file of raw events (docs/manual/appliance-recording.md): eight bytes of magic, then blocks of
+/// kind, size, payload, checksum. A block is whole or it is not: a file that was cut anywhere, as by a power cut, is good
+/// up to the last whole block.
 namespace birdseye::device {
 
 using Bytes = std::vector<std::uint8_t>;
