@@ -6,7 +6,7 @@
 
 namespace birdseye {
 
-/// Everything that can go wrong with the world. Bugs of ours are asserts, not codes.
+/// What can go wrong with the world outside the program. A bug of the program is an assert, not a code.
 enum class Errc {
   not_found,     ///< a file, folder or device that is not there
   unreadable,    ///< it is there and cannot be read or written

@@ -16,10 +16,12 @@ struct Verdict {
   std::vector<std::string> reasons;     ///< each names the figure and its limit
   std::vector<std::string> next_steps;  ///< what would make it better, most useful first
 
-  /// One more finding: the grade is the worst of all, the texts are kept, a next step once (none that is empty).
+  /// Adds a finding. The grade becomes the worst of all findings. The reason is kept; the next step too, unless it is
+  /// empty or was added before.
   void add(Grade found, std::string reason, std::string next_step = {});
-  /// A figure against two limits: above pass_up_to it is marginal, above marginal_up_to (or not finite) a fail. The
-  /// reason is made from the figure: "held-out error 1.20 px, of at most 1.00". next_step is kept unless it passes.
+  /// Adds a figure judged by two limits: above pass_up_to it is marginal, above marginal_up_to (or not finite) a fail.
+  /// The reason is made from the figure: "held-out error 1.20 px, of at most 1.00". next_step is kept unless the figure
+  /// passes.
   void judge(const std::string& figure, double value, const std::string& unit, double pass_up_to, double marginal_up_to,
              const std::string& next_step);
 };

@@ -28,8 +28,8 @@ struct BundleSummary {
   std::vector<double> rms_px;  ///< after each step, over the weights
 };
 
-/// Least squares over the lens (of its parameters those that `solved` names) and all the views' poses, from where they
-/// stand, in place. Ceres with Schur's complement over the poses.
+/// Least squares over those parameters of the lens that `solved` names and over all views' poses. It starts from the
+/// values given and overwrites them. Ceres with Schur's complement over the poses.
 BundleSummary refine_bundle(CameraModel& camera, std::span<BundleView> views,
                             const std::array<bool, CameraModel::kParameters>& solved,
                             const BundleSettings& settings = {});
@@ -37,7 +37,8 @@ BundleSummary refine_bundle(CameraModel& camera, std::span<BundleView> views,
 /// Seen minus predicted, px, for each point; a point behind the camera is off by the picture's diagonal.
 std::vector<Eigen::Vector2d> residuals_px(const CameraModel& camera, const BundleView& view);
 
-/// The pose that fits one view best with the lens as it is, from where it stands (Gauss-Newton with damping).
+/// The pose that fits one view best with the lens as it is, starting from the view's own pose (Gauss-Newton with
+/// damping).
 Transform<Camera, Marker> fit_pose(const CameraModel& camera, const BundleView& view);
 
 /// The normal matrix of the lens's nine parameters, the views' poses eliminated (Schur's complement).

@@ -96,7 +96,7 @@ struct CameraCalibration {
   std::size_t outliers = 0;
   double noise_sigma_px = 0;  ///< per axis, from the residuals and their degrees of freedom
   double rms_px = 0;          ///< root mean square distance, over the used points
-  double held_out_px = 0;     ///< the same with each view's lens from the other groups: only its pose is its own
+  double held_out_px = 0;     ///< the same, each view with the lens of the other groups; only its pose is fitted to it
   double held_out_mm = 0;     ///< at the board's mean distance
   std::vector<LensModelFit> models;
   int columns = 0, rows = 0;
@@ -114,10 +114,10 @@ struct CameraCalibration {
 /// Lens and boards' poses from views of a flat pattern (z = 0).
 ///
 /// Z. Zhang's closed form (2000, through OpenCV) starts a least-squares fit over all corners (Ceres, analytic
-/// derivatives). Residuals are first weighed by Cauchy's function at a scale from their median; what lies further out
-/// than chance puts one of that many points with 1 % is an outlier, views most of whose points do not fit are rejected,
-/// and the rest is fitted plainly. Each lens model is fitted and held out; the simplest one is taken whose held-out
-/// error is within one standard error of the best's.
+/// derivatives). Residuals are first weighed by Cauchy's function at a scale from their median. A point is an outlier
+/// if, by chance, the worst of so many points would lie that far out in only 1 % of cases. Views most of whose points
+/// do not fit are rejected, and the rest is fitted plainly. Each lens model is fitted and held out; of the models whose
+/// held-out error is within one standard error of the best's, the simplest is taken.
 ///
 /// Views that cannot be used are named in `rejected`: numbers that are not finite, points outside the picture, the same
 /// number twice, fewer than six points, the same pose as another view's. The order of views and of points in them
@@ -130,7 +130,8 @@ Result<CameraCalibration> calibrate_camera(std::span<const PatternView> views, i
 /// The limits against which a calibration is judged. Those in pixels are for a picture 1920 wide and go with the width.
 namespace camera_limits {
 inline constexpr double kWidth_px = 1920;
-// A pixel is 0.07 mm at 10 cm before a 70 degree lens: under what a tracker adds. Five are 0.35 mm, and show.
+// At 10 cm before a 70 degree lens a pixel is 0.07 mm, less than the tracker adds. Five pixels are 0.35 mm, which
+// shows.
 inline constexpr double kHeldOutPass_px = 1, kHeldOutMarginal_px = 5;
 // Ten views let one in ten be held out; with fewer than five one bad view decides.
 inline constexpr std::size_t kViewsPass = 10, kViewsMarginal = 5;
@@ -148,7 +149,7 @@ inline constexpr double kNearest_mm = 5, kFarthest_mm = 5000;
 }  // namespace camera_limits
 
 Verdict judge_camera(const CameraCalibration& calibration);
-/// The same for views that determine no camera: fail, with the error's words and what to do.
+/// The verdict where the views determine no camera: fail, with the error's words and what to do.
 Verdict judge_no_camera(const Error& error);
 
 /// Whether some pixel of the picture, corners included, has no ray: the lens folds inside it.

@@ -89,7 +89,7 @@ void add_geometry(CameraCalibration& out) {
     out.least_distance_mm = std::min(out.least_distance_mm, distance_mm);
     out.largest_distance_mm = std::max(out.largest_distance_mm, distance_mm);
     for (std::size_t b = 0; b < a; ++b) {
-      // Whichever way the normals point: a board that is numbered from its other side lies as it lies.
+      // The sign of a normal does not count: a board that is numbered from its other side lies in the same plane.
       const double cosine =
           std::abs(out.camera_from_marker[a].rotation().col(2).dot(out.camera_from_marker[b].rotation().col(2)));
       out.tilt_spread_deg = std::max(out.tilt_spread_deg, std::acos(std::min(cosine, 1.0)) * kDegPerRad);

@@ -24,15 +24,15 @@ struct SoundViews {
   std::vector<RejectedView> rejected;
 };
 
-/// Checks each view and puts views and points into an order that follows from what they hold, not from how they were
-/// handed over: sums are then added up in one order, and results do not depend on it by so much as a bit.
+/// Checks each view, and sorts views and points by what they hold. Sums are then added in the same order however the
+/// views were handed over, so that results are the same to the bit.
 Result<SoundViews> sort_out(std::span<const PatternView> views, int width_px, int height_px);
 
 /// A first lens without distortion, and each view's pose with it. A view whose points lie on no flat board is moved to
 /// `rejected` if robust. Errc::degenerate with fewer than three views.
 Result<CameraModel> start_camera(SoundViews& views, int width_px, int height_px, bool robust);
 
-/// "3 views" and what was wrong with the others, for an error.
+/// The error where too few views are usable: how many there are, and what was wrong with the others.
 Error too_few_views(std::size_t usable, const std::vector<RejectedView>& rejected);
 
 inline constexpr std::size_t kLeastViews = 3;

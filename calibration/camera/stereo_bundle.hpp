@@ -5,7 +5,7 @@
 
 namespace birdseye::calibration {
 
-/// One board in two pictures; its pose is left's, right's is unused.
+/// One board in two pictures. The board's pose is `left`'s; `right`'s pose is unused.
 struct BundlePair {
   BundleView left, right;
 };

@@ -9,8 +9,8 @@ struct RightCamera;  ///< the other camera of a stereo scope, as Camera, which i
 namespace birdseye::calibration {
 
 struct StereoCalibration {
-  /// Each camera from its own views, with all its figures; its lens and its boards' poses are those of the joint fit,
-  /// its covariance and held-out error those of its own.
+  /// Each camera with all figures of its own calibration, covariance and held-out error among them; only the lens and
+  /// the boards' poses are those of the joint fit.
   CameraCalibration left, right;
   Transform<RightCamera, Camera> right_from_left;
   /// Of a small turn (rad) and a shift (mm) of the right camera's frame, exp(turn) right_from_left + shift, in this
@@ -27,8 +27,8 @@ struct StereoCalibration {
 
 /// Both lenses and how the cameras stand to each other, from the same boards seen at the same time: left_views[i] and
 /// right_views[i] are a pair, points go together by their number, and neither picture need show all of the board.
-/// Each camera is calibrated by calibrate_camera, then everything is refined together; a pair whose pictures do not put
-/// the board at one place, as where it moved between them, is rejected by name.
+/// Each camera is calibrated by calibrate_camera, then everything is refined together. A pair whose pictures put the
+/// board at two places, because the board moved between them, is rejected by name.
 /// Errors: as calibrate_camera's, with the camera named; Errc::bad_value for lists of unequal length;
 /// Errc::degenerate where fewer than three pairs are left.
 Result<StereoCalibration> calibrate_stereo(std::span<const PatternView> left_views,
@@ -41,9 +41,10 @@ Verdict judge_stereo(const StereoCalibration& calibration);
 
 namespace stereo_limits {
 inline constexpr std::size_t kPairsPass = 8, kPairsMarginal = 4;
-// 0.05 degrees turn a point at 10 cm by 0.09 mm; 0.2 by 0.35 mm, and show, as five pixels do.
+// A turn of 0.05 degrees moves a point at 10 cm by 0.09 mm; 0.2 degrees move it by 0.35 mm, which shows as five pixels
+// do.
 inline constexpr double kTurnSigmaPass_deg = 0.05, kTurnSigmaMarginal_deg = 0.2;
-// Depth from the pair is off by the share by which the baseline is.
+// Depth from the pair is wrong by the same share as the baseline.
 inline constexpr double kBaselineSigmaPass = 0.01, kBaselineSigmaMarginal = 0.03;
 }  // namespace stereo_limits
 

@@ -15,8 +15,8 @@ struct Cross {
   bool dark_ahead = false;        ///< the square towards +x, +y is dark
 };
 
-/// How far around a cross its picture is used, in squares: along the edges, and to either side of them. Tags begin
-/// beyond the latter.
+/// How far around a cross the picture is used, in squares: along the edges, and to either side of them. Tags begin
+/// farther to the side than that.
 struct CrossReach {
   double along = 0, aside = 0;
 };
@@ -32,8 +32,8 @@ class SmoothPicture {
   std::vector<std::uint8_t> grey_;
 };
 
-/// The centre, where all the edges' gradients stand across the lines to it (Förstner and Gülch 1987), using only what
-/// lies beside the four edges. Empty where that leads away or out of the picture.
+/// The cross's centre: the point to which the gradients at all edges stand at right angles (Förstner and Gülch 1987),
+/// from pixels beside the four edges alone. Empty where the search leads away from the cross or out of the picture.
 std::optional<Eigen::Vector2d> refine_cross(const GreyView& smooth, const Cross& cross, const CrossReach& reach);
 
 struct CrossLook {

@@ -17,22 +17,23 @@ struct Detection {
 
   int points_seen = 0, points_of_pattern = 0;
   double sharpness_px = 0;  ///< how wide the pattern's edges are, median; 0: none measured
-  /// Where edges are much wider one way than the other: along which line the picture moved, degrees from x towards y
-  /// of the picture, -90 to 90.
+  /// The line along which the picture moved, degrees from the picture's x towards its y, -90 to 90. Only where edges
+  /// are much wider one way than the other.
   std::optional<double> motion_deg;
   double glare = 0;       ///< share of the pattern's dark places that are saturated
   double contrast = 0;    ///< light less dark of the pattern, grey levels
   double area_share = 0;  ///< of the picture, within the outline of the points
 };
 
-/// How much time a picture without the pattern may take: thorough searches again, and for words that tell why, which
-/// may take seconds; quick gives up after a part of one, as a guided procedure needs it.
+/// How much time a picture without the pattern may take. `thorough` searches again and looks for the reason why nothing
+/// was found, which may take seconds; `quick` gives up within a second, as a guided procedure needs.
 enum class Search { thorough, quick };
 
 /// The pattern in a grey picture, points to some hundredths of a pixel. A chessboard and a plain dot grid must be seen
-/// whole; of a ChArUco board and of a grid with larger dots a part does.
-/// The first point: a chessboard with one odd and one even count begins at the corner whose square, on the board, is
-/// dark; where turns of the pattern look alike (Pattern::half_turn_ambiguous) its columns run to the picture's right.
+/// whole; of a ChArUco board, and of a grid with larger dots, a part is enough.
+/// Which point is the first: a chessboard with one odd and one even count begins at the corner of the board whose
+/// square is dark. Where turns of the pattern look alike (Pattern::half_turn_ambiguous), the numbering is taken whose
+/// columns run to the picture's right.
 Detection detect(const Pattern& pattern, const GreyView& picture, const std::string& name,
                  Search search = Search::thorough);
 

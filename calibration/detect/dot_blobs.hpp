@@ -15,7 +15,8 @@ struct DotBlob {
   double contrast = 0;          ///< ground less dot, grey levels, above 0
 };
 
-/// Spots darker (or lighter) than the mean of the window_px around them, those cut by the border left out.
+/// Spots darker (or lighter) than the mean of the window of window_px around them. Spots that the border cuts are left
+/// out.
 std::vector<DotBlob> find_dot_blobs(const GreyView& picture, bool dark, int window_px);
 
 /// Widths of a spot's edge, at several places around it.

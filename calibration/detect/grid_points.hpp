@@ -46,18 +46,18 @@ struct LocalMap {
   Eigen::Vector2d hxx, hxy, hyy;
 };
 
-/// The map fitted to the points within `reach` steps of `place` (of at least six; without curvature where fewer than
-/// ten), the one at `place` itself left out if told. Empty where the points do not determine it.
+/// The map fitted to the points within `reach` steps of `place`; the point at `place` itself is left out if told. Needs
+/// six points; below ten the map has no curvature. Empty where the points do not determine the map.
 std::optional<LocalMap> fit_local_map(const std::vector<GridPoint>& points, const Eigen::Vector2i& place, int reach,
                                       bool without_itself);
 
-/// Takes out, worst first, points that lie off what their neighbours say by more than allowed_px(px per step).
+/// Removes points, worst first, that lie more than allowed_px(px per step) from where their neighbours put them.
 void drop_strays(std::vector<GridPoint>& points, const std::function<double(double)>& allowed_px);
 
-/// Of several ways to number the same points, how far the columns run to the picture's right: 1 to -1.
+/// How far the columns run to the picture's right, 1 to -1: to choose among several ways of numbering the same points.
 double uprightness(const std::vector<GridPoint>& points);
 
-/// Grey between pixels, bilinear; the border's beyond it.
+/// Grey between pixels, bilinear. Beyond the border, the border's grey.
 double grey_at(const GreyView& picture, const Eigen::Vector2d& px);
 bool inside(const GreyView& picture, const Eigen::Vector2d& px, double margin_px);
 

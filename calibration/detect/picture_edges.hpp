@@ -12,14 +12,15 @@ std::vector<EdgeWidth> edges_of_picture(const GreyView& picture);
 
 /// Edges wider than this, and a corner is known to some tenths of a pixel only.
 inline constexpr double kWidestEdge_px = 12;
-/// By the median of edges_of_picture: no use in searching it.
+/// Whether the median of edges_of_picture is so wide that searching the picture is of no use.
 bool is_blurred(const GreyView& picture);
 
-/// How much light and dark differ within some ten pixels, grey levels: in the tenth of the picture where they do most.
+/// How much light and dark differ within some ten pixels, grey levels, in the tenth of the picture that has most
+/// contrast.
 double local_contrast(const GreyView& picture);
 
 /// The share of the pattern's dark places that are saturated: dark squares and dots within the outline of the points
-/// found, or all that their neighbours tell the place of.
+/// found, and those whose place follows from found neighbours.
 double glare_of(const Pattern& pattern, const GreyView& picture, const std::vector<int>& ids,
                 const std::vector<Eigen::Vector2d>& points_px);
 

@@ -21,8 +21,8 @@ struct CheckedPlace {
 struct FieldCheck {
   std::string when;          ///< of the day, for people
   double rms_mm = 0;         ///< of the places after a rigid fit
-  double scale_percent = 0;  ///< by so much the tracker has distances longer than the plate
-  double worst_mm = 0;       ///< largest of the places
+  double scale_percent = 0;  ///< by how much the tracker measures distances longer than the plate has them
+  double worst_mm = 0;       ///< distance of the place that is farthest off
   std::string worst_place;
   std::vector<double> off_mm;  ///< each place; empty where it comes from a history
 };
@@ -43,12 +43,12 @@ struct ControlChart {
   ControlLimits rms_mm, scale_percent;  ///< days 0: not known yet
 };
 
-/// Of the first kLearningDays of a history that did not fail; empty until there are so many.
+/// The limits from the first kLearningDays days of a history that did not fail. Empty until there are so many days.
 std::optional<ControlChart> control_chart(std::span<const FieldCheck> history);
 
 /// What the last of the days is worth: against an absolute limit always, and against its own history by the Western
 /// Electric rules (1956): one value beyond 3 sigma, two of three beyond 2 sigma on one side, eight in a row on one side
-/// of the mean. An rms that is lower than usual is not held against the day.
+/// of the mean. An rms lower than usual is no fault.
 Verdict verdict_of(std::span<const FieldCheck> history);
 
 }  // namespace birdseye::calibration

@@ -19,14 +19,14 @@ namespace birdseye::calibration {
 struct FieldSample {
   std::string name;                                   ///< for messages
   Eigen::Vector3d true_mm = Eigen::Vector3d::Zero();  ///< in the board's frame
-  /// How the sensor was turned in the board's frame, up to a rotation that is the same for all samples: the identity
-  /// where it was held the same way at each place. Empty: not known; then orientation is not mapped.
+  /// How the sensor was turned in the board's frame, up to one rotation that is the same for all samples; the identity
+  /// where the sensor was held the same way at each place. Empty where not known: orientation is then not mapped.
   std::optional<Eigen::Matrix3d> true_rotation;
   Transform<Tracker, Sensor> measured;
 };
 
 struct FieldFitSettings {
-  std::optional<FieldBasis> basis;  ///< empty: whichever does best on what it was not shown
+  std::optional<FieldBasis> basis;  ///< empty: the one that does best on samples it was not shown
 };
 
 /// What one kind of map makes of regions it was not shown, mm RMS.
@@ -71,15 +71,15 @@ struct FieldFit {
 };
 
 /// The map that takes measured poses to where the board has them. The board's own place in the tracker's frame is not
-/// known: it is the rigid fit of all samples (K. S. Arun et al., 1987), and distortion is what is left. So a part of
-/// the distortion that moves everything alike counts as the board's place: it makes no difference to anything that is
-/// calibrated with the corrected tracker. All families of functions hold the affine maps, so that the choice of the
-/// rigid part loses nothing.
+/// known: it is the rigid fit of all samples (K. S. Arun et al., 1987), and distortion is what is left. A part of the
+/// distortion that moves everything alike is therefore taken for the board's place. That makes no difference to
+/// anything that is calibrated with the corrected tracker. All families of functions hold the affine maps, so that the
+/// choice of the rigid part loses nothing.
 /// Family, order and smoothing are those with the least error in regions that were left out (11 folds of scattered
 /// cells, each a fifth of the box wide); within 2 % the one with fewer functions. Samples more than 4.5 robust sigmas
-/// off are named and not used. Orientations, where known, get a map of the same family from
-/// w = log(R_board turned_i sensor R_i^T); its mean over samples that are all turned alike cannot be told from how the
-/// sensor sits in its holder and is taken for that.
+/// off are named and not used. Orientations, where known, get a map of the same family from w = log(R_board turned_i
+/// sensor R_i^T). Where all samples are turned alike, the mean of w cannot be told from how the sensor sits in its
+/// holder, and is taken for that.
 /// Refuses fewer than 30 samples, samples in a plane or thinner than 100 mm, places that are not finite, and units that
 /// differ (a factor beyond 0.8..1.25).
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
@@ -96,11 +96,11 @@ struct FieldPairSettings {
 };
 
 /// The map that makes the body rigid: with p and R corrected, R_a^T (p_b - p_a) and R_a^T R_b are the same in all
-/// pairs. This says nothing of a rigid motion of everything, which is fixed by asking that the map has none over the
-/// samples, nor of the scale unless the distance is known. Solved by Gauss-Newton over both maps and the sensors'
-/// distance; an orientation counts as much as 200 mm/rad would make of it. Held-out errors are those of p_b - p_a. At
-/// most 1500 pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors closer than 30 mm, and volumes thinner
-/// than 100 mm.
+/// pairs. That leaves open a rigid motion of everything, so the map is asked to have none over the samples. It leaves
+/// the scale open too, unless the distance is known. Solved by Gauss-Newton over both maps and the sensors' distance;
+/// an orientation counts as much as 200 mm/rad would make of it. Held-out errors are those of p_b - p_a. At most 1500
+/// pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors closer than 30 mm, and volumes thinner than 100
+/// mm.
 Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const FieldPairSettings& settings = {});
 
 /// What a map is good for, from its own figures.

@@ -13,22 +13,23 @@
 namespace birdseye::calibration::detail {
 
 inline constexpr double kOutlierSigmas = 4.5;
-// A tracker repeats itself to 1.8 mm. Before there is a map of the right kind, more than that may be the map's fault.
+// A tracker repeats itself to 1.8 mm. While the kind of map is not yet chosen, a larger error may be the map's fault.
 inline constexpr double kLeastOutlierMm = 2, kLeastOutlierAtFirstMm = 5;
 inline constexpr double kThinnestBoxMm = 100;  // a thinner one says nothing about the third direction
 
 /// The box around places; an error where it is too thin to map.
 Result<FieldFunctions> box_of(std::span<const Eigen::Vector3d> places_mm);
 
-/// Families and orders that are tried with so many measurements and parameters at most.
+/// The families and orders to try, given how many measurements there are and how many parameters are allowed.
 std::vector<FieldFunctions> families(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm,
                                      const std::optional<FieldBasis>& only, std::size_t most_functions);
 
 /// The best by held-out error; within 2 % of it the one with the fewest functions. Index into candidates.
 std::size_t best_of(std::span<const FieldCandidate> candidates, std::span<const FieldFunctions> functions);
 
-/// Which are too far off to belong to the rest: more than kOutlierSigmas robust sigmas, of which the median distance in
-/// space is 1.538, and more than least_mm: what a map does not quite follow is no mistake of the measurement.
+/// Which measurements are too far off to belong to the rest: by more than kOutlierSigmas robust sigmas (the median
+/// distance in space is 1.538 of them) and by more than least_mm, for what a map does not quite follow is no mistake of
+/// the measurement.
 std::vector<bool> far_off(std::span<const Eigen::Vector3d> errors_mm, const std::vector<bool>& used, double least_mm);
 
 double rms(std::span<const Eigen::Vector3d> errors, const std::vector<bool>& used);

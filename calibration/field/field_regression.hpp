@@ -9,8 +9,8 @@
 /// What both fits of the field stand on: smoothed least squares, judged on regions that were left out.
 namespace birdseye::calibration::detail {
 
-/// Eleven parts of a box cut into 5x5x5 cells: cell (i, j, k) is of part (i + 3j + 5k) mod 11, so that none of its 26
-/// neighbours is. A region that is left out so has data all around it and none inside.
+/// Eleven parts of a box cut into 5x5x5 cells: cell (i, j, k) belongs to part (i + 3j + 5k) mod 11, so that none of its
+/// 26 neighbours belongs to the same part. A cell that is left out thus has data all around it and none inside.
 inline constexpr int kFolds = 11;
 int fold_of(const FieldFunctions& box, const Eigen::Vector3d& position_mm);
 
@@ -73,8 +73,8 @@ std::vector<double> sigma_lattice(const FieldFunctions& box, std::span<const Eig
   return out;
 }
 
-/// How far from a measured place the field still counts as mapped: so far as the places are from each other, with
-/// something to spare, and no less than an eighth of the box's diagonal.
+/// How far from a measured place the field still counts as mapped: somewhat farther than the places are from each
+/// other, and at least an eighth of the box's diagonal.
 double reach_mm(const FieldFunctions& box, std::span<const Eigen::Vector3d> places_mm);
 
 }  // namespace birdseye::calibration::detail

@@ -22,8 +22,8 @@ enum class FieldBasis {
 const char* name_of(FieldBasis basis);
 std::optional<FieldBasis> field_basis_of(const std::string& name);
 
-/// Functions over a box. Places are scaled to the box, -1..1 along each axis, so that the size of the box does not
-/// matter to the numbers.
+/// Functions over a box. Places are scaled to the box, -1..1 along each axis, so that coefficients do not depend on the
+/// box's size.
 struct FieldFunctions {
   static constexpr int kMostCentres = 200;
   static constexpr std::size_t kMost = 216;  ///< functions: 6^3 of Bernstein, 200 + 4 of distances
@@ -37,7 +37,7 @@ struct FieldFunctions {
   /// All functions at a place, into the first count() of values (at least kMost long). The centres' come before the
   /// affine 1, x, y, z; Bernstein's with x fastest; polynomials by degree in z, then y, then x.
   void evaluate(const Eigen::Vector3d& position_mm, std::span<double> values) const;
-  /// What makes no sense, in words; empty where all does.
+  /// What makes no sense in these functions, in words; empty where all is well.
   [[nodiscard]] std::string fault() const;
 };
 
@@ -53,10 +53,10 @@ struct FieldMapData {
   std::vector<double> sigma_mm;
 };
 
-/// Where metal bends a tracker's field its poses are off by amounts that depend on the place: this takes them away.
+/// Corrects the poses of a tracker whose field is bent by metal: they are off by amounts that depend on the place.
 ///   p_true = p + c(p),   R_true = exp(w(p)) R
-/// with p and R as measured. Only where the field was mapped: there is no extrapolation, for a map says nothing about
-/// where it was not made.
+/// with p and R as measured. Only where the field was mapped: a map says nothing about other places, so nothing is
+/// extrapolated.
 class FieldMap {
  public:
   static Result<FieldMap> from(FieldMapData data);

@@ -8,7 +8,7 @@ namespace birdseye {
 /// in every direction, so that no two rays meet in one pixel. Infinite where it does not fold within kWidestTangent.
 double fold_radius(const CameraModel& camera);
 
-/// As far off the axis as a picture is of use, 84 degrees.
+/// The tangent of the widest angle off the axis at which a picture is of use: 84 degrees.
 inline constexpr double kWidestTangent = 10;
 
 /// As project does, but empty for points that the lens does not see: beyond a fold the polynomial leads back into the

@@ -25,8 +25,8 @@ struct RodScope {
 /// The turn of the rod itself: of points of the sensor's frame about the axis.
 Transform<Sensor, Sensor> rod_turn(const RodScope& scope, double theta_rad);
 
-/// The inverse: what was found with the rod at theta, brought back to zero. scope.camera_from_sensor_at_zero is not
-/// looked at.
+/// The inverse of camera_from_sensor(theta): brings a hand-eye that was found with the rod at theta back to zero. Does
+/// not read scope.camera_from_sensor_at_zero.
 Transform<Camera, Sensor> at_zero(const RodScope& scope, const Transform<Camera, Sensor>& camera_from_sensor,
                                   double theta_rad);
 

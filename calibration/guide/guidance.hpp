@@ -19,15 +19,15 @@ struct Station {
   std::vector<Eigen::Vector2d> corners_px;
 };
 
-/// What the stations so far have been to see.
+/// What the stations so far cover.
 struct Coverage {
   static constexpr int kColumns = 5, kRows = 4;
   static constexpr int kSectors = 8;
   static constexpr int kTurns = 4;
   std::array<bool, std::size_t{kColumns} * kRows>
-      cells{};  ///< of the picture, row by row: those that some corner was in
-  /// Where the scope's tip pointed over the board, in eighths from the board's x axis to its y axis: tilted by 8 to 25
-  /// degrees against its normal, then those by more.
+      cells{};  ///< of the picture, row by row: true where some station had a corner in the cell
+  /// In which directions the scope's tip pointed over the board, in eighths of a turn from the board's x axis towards
+  /// its y axis: first at tilts of 8 to 25 degrees against the board's normal, then at larger ones.
   std::array<bool, std::size_t{2} * kSectors> tilts{};
   std::array<bool, kTurns> turns{};        ///< about the scope's own axis, in quarters against the board
   double nearest_mm = 0, furthest_mm = 0;  ///< to the board's plane, along the scope's axis; 0 without stations
@@ -54,13 +54,13 @@ struct NextPose {
 
 /// The pose that would teach most of the hand-eye, of a grid of poses about the board: tilts of 0, 18 and 36 degrees in
 /// eight directions, eight turns, three distances about those of the stations so far, the board in the middle of the
-/// picture or towards a corner. They are compared by the error to expect of the hand-eye (StationInformation:
-/// A-optimal, a rotation counted at the working distance); of those nearly as good as the best it is the one nearest to
-/// where the scope is. Directions within 15 degrees of a station's are left out while there are others, for there a
-/// tracker repeats its error. As much of the board has to be in the picture as at the station that saw least of it; all
-/// of it where there are no stations. board_extent_mm: from the board's first point to its last, along its x and y; its
-/// frame begins at the first. now: where the scope is; without it the words begin at a view from straight before the
-/// board. Poses that are not finite are passed over.
+/// picture or towards a corner. The poses are compared by the error to expect of the hand-eye afterwards
+/// (StationInformation: A-optimal, a rotation counted at the working distance). Of the poses nearly as good as the
+/// best, the one nearest to the scope is taken. Directions within 15 degrees of a station's are left out while there
+/// are others, because a tracker repeats its error there. A pose must show at least as much of the board as the station
+/// that saw least of it; all of the board where there are no stations. board_extent_mm: from the board's first point to
+/// its last, along its x and y; its frame begins at the first. now: where the scope is; without it the words start from
+/// a view straight onto the board. Poses that are not finite are passed over.
 NextPose next_best_pose(std::span<const Station> stations, const CameraModel& camera,
                         const Eigen::Vector3d& board_extent_mm, const std::optional<Transform<Camera, Marker>>& now,
                         const StationNoise& noise = {});

@@ -17,8 +17,8 @@ struct ScopeView {
 };
 ScopeView scope_view(const Transform<Camera, Marker>& camera_from_marker);
 
-/// The other way round: the pose that looks so, the board's point `centre_mm` at `centre_tangent` (x / z, y / z in the
-/// camera frame) and as far along the axis as the view says.
+/// The inverse: the pose that gives this view and shows the board's point `centre_mm` at `centre_tangent` (x / z, y / z
+/// in the camera frame), at the view's distance along the axis.
 Transform<Camera, Marker> pose_of(const ScopeView& view, const Eigen::Vector3d& centre_mm,
                                   const Eigen::Vector2d& centre_tangent);
 

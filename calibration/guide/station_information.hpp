@@ -30,18 +30,18 @@ class StationInformation {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   using Matrix12 = Eigen::Matrix<double, 12, 12>;
 
-  /// board_points_mm: in the frame Marker, about where the corners are; those in the picture count. working_mm: at
-  /// this distance a rotation moves what an error of the hand-eye is counted in.
+  /// board_points_mm: in the frame Marker, about where the corners are; only those in the picture count. working_mm:
+  /// the distance at which an error of rotation is turned into mm.
   StationInformation(const CameraModel& camera, std::vector<Eigen::Vector3d> board_points_mm,
                      const Transform<Camera, Sensor>& camera_from_sensor, double working_mm, const StationNoise& noise);
 
   void add(const Transform<Camera, Marker>& camera_from_marker);
-  /// After the last add and before the questions below.
+  /// Must be called after the last add and before the questions below.
   void solve();
 
   /// The expected error of the hand-eye: the root of the sum of its variances, rotations times the working distance.
   [[nodiscard]] double expected_error_mm() const;
-  /// As much, with one more station.
+  /// The same with one more station.
   [[nodiscard]] double expected_error_mm(const Transform<Camera, Marker>& one_more) const;
 
  private:
@@ -56,8 +56,8 @@ class StationInformation {
 };
 
 /// The hand-eye that motions between stations suggest: the rotation that brings the axes of the sensor's motions to
-/// those of the camera's (after F. Park and B. Martin, 1994), least squares for the translation. For weighing only:
-/// what the stations leave open is left at nothing.
+/// those of the camera's (after F. Park and B. Martin, 1994), least squares for the translation. Good enough for
+/// weighing only: what the stations leave open is set to zero.
 Transform<Camera, Sensor> rough_hand_eye(std::span<const Transform<Tracker, Sensor>> tracker_from_sensor,
                                          std::span<const Transform<Camera, Marker>> camera_from_marker);
 

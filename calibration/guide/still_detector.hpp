@@ -14,7 +14,7 @@ struct StillSettings {
   Duration kept = Duration::from_ms(1500);  ///< poses of the past that are remembered
   Duration before = Duration::from_ms(60);  ///< of the moment asked about: the window that is looked at
   Duration after = Duration::from_ms(40);   ///< poses have to have come in up to here
-  // Beyond what the fitted motion of a noisy tracker at rest reaches; a move to another station is many times as much.
+  // More than the motion fitted to a noisy tracker at rest; a move to another station is many times as much.
   double still_mm = 3, still_rad = 1.0 * kRadPerDeg;
 };
 
@@ -26,16 +26,16 @@ struct Rest {
   double position_squares_mm2 = 0, angle_squares_rad2 = 0;
 };
 
-/// Says from a stream of poses when the scope was held still, so that a picture of then and a pose of then belong
-/// together whatever their clocks do.
+/// Says from a stream of poses when the scope was held still. A picture and a pose of such a time belong together,
+/// however their clocks differ.
 class StillDetector {
  public:
   explicit StillDetector(const StillSettings& settings = {}) : settings_(settings) {}
 
   /// In the order of time. A pose that is not finite is passed over.
   void push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
-  /// Whether it was at rest around this time. False where either half of the window has fewer than two poses: also
-  /// where they have not come in yet.
+  /// Whether the sensor was at rest around this time. False where either half of the window has fewer than two poses,
+  /// as when the poses have not come in yet.
   [[nodiscard]] bool still_at(DeviceTime time) const;
   /// The mean of the poses from first to last, both included. Empty where they are fewer than four.
   [[nodiscard]] std::optional<Rest> rest_between(DeviceTime first, DeviceTime last) const;

@@ -8,7 +8,7 @@
 
 namespace birdseye::calibration {
 
-/// A board that looks the same when turned about its middle by a whole circle over `fold`, 2 or 4: which of its ends is
+/// A board that looks the same after a `fold`-th of a turn about its middle, fold being 2 or 4. Which of its ends is
 /// the first is then a guess in each picture.
 struct BoardSymmetry {
   Eigen::Vector2d centre_mm = Eigen::Vector2d::Zero();  ///< in the frame Marker
@@ -17,8 +17,8 @@ struct BoardSymmetry {
   [[nodiscard]] Transform<Marker, Marker> turned(int times) const;
 };
 
-/// How many turns of the board each station needs for the board to be named alike in all of them: those with which the
-/// pictures turn between stations by as much as the tracker says. The first needs none.
+/// For each station, by how many such turns its board must be renumbered so that all stations number it alike: the
+/// turns with which the pictures turn between stations by as much as the tracker says. The first station needs none.
 std::vector<int> resolve_symmetry(std::span<const SummedStation> stations, const BoardSymmetry& symmetry);
 
 }  // namespace birdseye::calibration

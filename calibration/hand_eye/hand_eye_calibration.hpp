@@ -16,7 +16,7 @@
 
 namespace birdseye::calibration {
 
-/// One moment at which the scope was looked through and tracked.
+/// One moment with both a picture through the scope and a tracked pose of it.
 struct HandEyeStation {
   std::string name;  ///< for messages, as of its picture
   PatternView view;
@@ -44,7 +44,7 @@ struct Finding {
   std::string reason, next_step;
 };
 
-/// What the stations can tell, found before anything is solved.
+/// What the stations determine, found before anything is solved.
 struct HandEyeObservability {
   std::size_t stations = 0;  ///< that are used
   /// Principal axes of the turns between stations, the most turned about first, in the sensor's frame and the camera's
@@ -52,7 +52,7 @@ struct HandEyeObservability {
   Eigen::Matrix3d axes_in_sensor = Eigen::Matrix3d::Identity(), axes_in_camera = Eigen::Matrix3d::Identity();
   Eigen::Vector3d turns_deg = Eigen::Vector3d::Zero();
   double greatest_turn_deg = 0;
-  /// By how much the tracker and the pictures disagree about the angles of the same turns: median over all pairs.
+  /// By how much tracker and pictures disagree about the angle of the same turn: median over all pairs of stations.
   double angle_mismatch_deg = 0;
   /// True size of the board over its stated size, by the tracker's distances against the camera's; 0 if not determined.
   double board_scale = 0, board_scale_sigma = 0;
@@ -98,8 +98,9 @@ struct HandEyeResult {
   double corner_sigma_px = 0;
   TrackerNoise tracker_noise;  ///< stated, or as estimated
   bool noise_estimated = false;
-  double variance_factor = 1;  ///< of residuals against the stated noise, in which the covariance is multiplied if > 1
-  double rms_px = 0;           ///< corners against the fit, in which the tracked poses may err
+  double variance_factor =
+      1;              ///< of the residuals, over what the stated noise lets expect; multiplies the covariance if > 1
+  double rms_px = 0;  ///< corners against the fit, in which the tracked poses may err
   double tracked_px = 0, held_out_px = 0, held_out_mm = 0;  ///< over the stations used, as above
   double held_out_median_px = 0;                            ///< over the stations, which one bad pose does not move
   double working_distance_mm = 0;                           ///< median, camera to board
@@ -113,7 +114,7 @@ struct HandEyeResult {
 
   [[nodiscard]] Eigen::Vector3d rotation_sigma_deg() const;
   [[nodiscard]] Eigen::Vector3d translation_sigma_mm() const;
-  /// By how much a point straight ahead at the working distance is off: one sigma, root mean square over directions
+  /// How far off a point straight ahead at the working distance is: one sigma, root mean square over the directions
   /// across the line of sight.
   [[nodiscard]] double sigma_at_board_mm() const;
 };
@@ -122,8 +123,8 @@ struct HandEyeResult {
 /// start; the best by reprojection is refined to the most likely solution over all corners and tracked poses
 /// (hand_eye_refinement.hpp). Does not depend on the order of the stations.
 /// What cannot be used is an error: no stations, stations unlike each other (some with a tracked board, some without),
-/// no camera for corners, a camera that fails its check. Stations that do not determine hand-eye are a result that is
-/// not solved, whose observability says why. May be called again and again while stations come in.
+/// no camera for corners, a camera that fails its check. Where the stations do not determine hand-eye, the result is
+/// not `solved` and its observability says why. May be called again and again while stations come in.
 Result<HandEyeResult> calibrate_hand_eye(const HandEyeInput& input);
 
 /// The verdict on a result; the limits are constants in hand_eye_verdict.cpp.

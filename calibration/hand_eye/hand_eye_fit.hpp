@@ -31,11 +31,11 @@ struct ChainFit {
   bool converged = false;
 };
 
-/// Degrees of freedom of the t distribution that stands in for the normal one where stations may be outliers.
+/// Degrees of freedom of the t distribution that takes the place of the normal one where stations may be outliers.
 inline constexpr double kRobustFreedom = 4;
 
-/// The normal equations of all stations at a state: each station's residual weighed by the inverse of its covariance,
-/// in which the view's own is folded (the pose of the board at each station is eliminated: the Schur complement).
+/// The normal equations of all stations at a state. Each station's residual is weighed by the inverse of its
+/// covariance, which includes that of the view: the board's pose at each station is eliminated (Schur complement).
 struct ChainNormal {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
@@ -54,15 +54,15 @@ TrackerNoise estimate_noise(std::span<const SummedStation> stations, ChainFit& f
                             const ChainFreedom& freedom);
 inline constexpr TrackerNoise kLeastNoise{0.003, 1e-5};  ///< no tracker is better; exact data would make it zero
 
-/// The two variances are told apart by few residuals where there are few stations: as if so many more of each had
-/// been seen that agree with one noise for both, the position's sigma being a tracker's usual multiple of the angle's.
+/// Few stations hardly tell the two variances apart. So this many degrees of freedom are added to each, as if seen with
+/// one noise for both: the position's sigma a tracker's usual multiple of the angle's.
 inline constexpr double kNoisePriorFreedom = 6;
 
-/// The noise that medians of the residuals tell: a start that a few outliers do not move.
+/// The noise estimated from medians of the residuals: a start that a few outliers do not move.
 TrackerNoise median_noise(std::span<const Vector6d> residuals, const ChainFreedom& freedom);
 
-/// Fit without one station, by Gauss-Newton from the fit with all, robust or not as that was. Empty if the others do
-/// not determine it.
+/// The fit without one station, by Gauss-Newton from the fit with all stations, and robust if that fit was. Empty if
+/// the other stations do not determine it.
 struct HeldOut {
   ChainState state;
   double distance_squared = 0;  ///< of the station's residual, against its own covariance and the fit's
@@ -70,8 +70,8 @@ struct HeldOut {
 std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::size_t which, const ChainFit& fit,
                                 const TrackerNoise& noise, const ChainFreedom& freedom, bool robust);
 
-/// The value that an F distribution of (6, freedom) exceeds with that probability, times six: the limit of a
-/// Mahalanobis distance squared in six dimensions whose covariance rests on so many residuals.
+/// Six times the value that an F distribution of (6, freedom) exceeds with the probability exceeded_with: the limit of
+/// a squared Mahalanobis distance in six dimensions, if the covariance rests on `freedom` degrees of freedom.
 double distance_limit(double exceeded_with, double freedom);
 
 }  // namespace birdseye::calibration

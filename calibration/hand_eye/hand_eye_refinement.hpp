@@ -24,11 +24,11 @@ struct HandEyeRefinement {
 
 /// The most likely hand-eye, board and, if wanted, time offset over everything measured: every corner under Huber's
 /// loss (kCornerHuberSigmas), and every tracked pose under its noise. Each station has a true pose of its own, unknown,
-/// which is carried as the board's pose in the camera: with hand-eye and board, that is the sensor's true pose in the
-/// tracker, but the corners then depend on it alone. Ceres eliminates these poses by the Schur complement; rotations
-/// move by local quaternions. Gauss-Newton steps end it, whose gradient is exact where the cost no longer tells one
-/// answer from the next; their Schur complement gives the covariance. starts: one pose per station. Empty if it does
-/// not converge.
+/// which is carried as the board's pose in the camera: the corners then depend on that pose alone, and with hand-eye
+/// and board it gives the sensor's true pose in the tracker. Ceres eliminates these poses by the Schur complement;
+/// rotations move by local quaternions. Gauss-Newton steps finish the refinement, because their gradient is exact where
+/// the cost no longer tells one answer from the next; their Schur complement gives the covariance. starts: one pose per
+/// station. Empty if it does not converge.
 std::optional<HandEyeRefinement> refine_hand_eye(std::span<const CornerStation> stations,
                                                  std::span<const Transform<Camera, Marker>> starts,
                                                  const ChainState& start, const TrackerNoise& noise, double sigma_px,

@@ -11,9 +11,9 @@ namespace birdseye::calibration {
 
 /// The answers of all closed forms: R. Tsai and R. Lenz (1989), F. Park and B. Martin (1994), R. Horaud and F. Dornaika
 /// (1995), N. Andreff et al. (1999), K. Daniilidis (1999), through OpenCV, and rotation by the turns' axes with
-/// translation by least squares after it. Each is tried and kept with why it failed: they return NaN, or a matrix that
-/// is no rotation, for turns of half a circle, for turns about one axis and for very small ones. Lengths are made of
-/// order one first, as some mix them with rotations. No scores yet.
+/// translation by least squares after it. Each form is tried, and is kept even if it failed, with the reason: for turns
+/// of half a circle, for turns about one axis and for very small ones they return NaN or a matrix that is no rotation.
+/// Lengths are scaled to order one first, as some forms mix them with rotations. Scores are not filled in yet.
 std::vector<HandEyeStart> closed_forms(std::span<const SummedStation> stations);
 
 /// The rotation camera <- sensor that best takes the axes of the sensor's turns between stations to those of the

@@ -17,7 +17,7 @@ struct PreparedStation {
   double view_rms_px = 0;
 };
 
-/// The stations that can be used, in an order that is theirs alone, that nothing may depend on how they came.
+/// The stations that can be used, sorted by what they hold, so that nothing depends on the order in which they came.
 struct HandEyeStations {
   std::vector<PreparedStation> used;
   struct Rejected {
@@ -37,7 +37,7 @@ struct HandEyeStations {
   ~HandEyeStations() = default;
 };
 
-/// What makes the input as a whole unusable: see calibrate_hand_eye.
+/// An error where the input as a whole is unusable: see calibrate_hand_eye.
 Result<void> check_stations(const HandEyeInput& input);
 
 /// Rejects, with the reason, stations with numbers that are not finite or no rotation, pictures whose corners give no

@@ -21,14 +21,14 @@ struct StampedView {
 struct StreamPairing {
   double offset_s = 0;     ///< a picture of time t shows what the tracker's stream has at t + offset
   double correlation = 0;  ///< of the two angular speeds there
-  /// Pictures far enough apart, each with the tracker's pose at its time + offset, interpolated, and its motion: input
-  /// for calibrate_hand_eye, whose time offset then adds to this one.
+  /// Pictures far enough apart, each with the tracker's motion and its pose interpolated at the picture's time +
+  /// offset: input for calibrate_hand_eye. The time offset found there adds to this one.
   std::vector<HandEyeStation> stations;
 };
 
 /// Finds the clocks' offset, up to 2 s either way, where the angular speeds correlate best: both instruments turn
 /// equally fast, whatever hand-eye is. Refuses streams that do not overlap, do not move, or do not correlate.
-/// Both in the order of their times.
+/// Both streams must be in the order of their times.
 Result<StreamPairing> pair_pose_streams(std::span<const StampedSensor> sensor, std::span<const StampedView> views);
 
 }  // namespace birdseye::calibration

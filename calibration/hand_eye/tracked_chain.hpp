@@ -6,7 +6,8 @@
 
 namespace birdseye::calibration {
 
-struct TrackedBody;  ///< frame: what carries the board, as the tracker knows it; the tracker itself for a board at rest
+struct TrackedBody;  ///< frame of what carries the board, as the tracker knows it; the tracker's own for a board at
+                     ///< rest
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -36,7 +37,7 @@ struct TrackedChain {
 struct ChainState {
   Transform<Camera, Sensor> camera_from_sensor;
   Transform<TrackedBody, Marker> body_from_marker;
-  double time_offset_s = 0;  ///< the pictures show what the tracker's poses, moved on by this, say
+  double time_offset_s = 0;  ///< a picture of time t shows the tracker's pose at t + time_offset_s
   double board_scale = 1;    ///< of the camera's distances: the true size of the board over its stated size
 };
 
@@ -53,7 +54,7 @@ struct ChainResidual {
 ChainResidual chain_residual(const TrackedChain& chain, const Transform<Camera, Marker>& camera_from_marker,
                              const ChainState& state);
 
-/// Where the tracker alone says that the board is.
+/// The board's pose in the camera as the tracker alone has it.
 Transform<Camera, Marker> tracked_view(const TrackedChain& chain, const ChainState& state);
 
 /// The covariance of a residual by the noise of the tracked poses, per unit of variance (mm^2, rad^2): the noise turns

@@ -51,7 +51,7 @@ std::optional<CornerSum> sum_corners(const std::vector<SeenCorners>& corners, co
 
 /// Starts at the homography's two poses of a flat board (T. Collins and A. Bartoli, 2014, through OpenCV) or, for a
 /// board with depth, at G. Terzakis and M. Lourakis's (2020), refines each by Gauss-Newton under Huber's weights and
-/// keeps the better. sigma_px scales the weights. Refuses fewer than six corners, corners on one line, and those that
+/// keeps the better. sigma_px scales the weights. Refuses fewer than six corners, corners on one line, and corners that
 /// the lens cannot show.
 Result<ViewPose> find_view_pose(const std::vector<SeenCorners>& corners, double sigma_px);
 

@@ -17,14 +17,14 @@ struct TimedRotation {
   Eigen::Quaterniond base_from_body = Eigen::Quaterniond::Identity();
 };
 
-/// The same with its place, for motion that is seen in pictures: there a shift looks like a turn.
+/// The same with the body's place, for motion that is seen in pictures: there a shift looks like a turn.
 struct TimedMotionPose {
   double time_s = 0;
   Eigen::Quaterniond base_from_body = Eigen::Quaterniond::Identity();
   Eigen::Vector3d origin_in_base_mm = Eigen::Vector3d::Zero();
 };
 
-/// By how much a picture moved since the one before (calibration/solve/image_motion.hpp makes them).
+/// By how much a picture moved since the one before (image_motion.hpp measures it).
 struct ImageMotion {
   double from_s = 0, to_s = 0;  ///< the stamps of the two pictures
   /// Right, down, turned, grown: all in pixels, the last two at the radius of the part that was looked at.
@@ -53,7 +53,7 @@ struct LatencyCurves {
   std::vector<double> lag_s, correlation;  ///< the scan
   std::vector<double> a_s, a_speed;        ///< a's own times; speeds as b has them: rad/s, or px/s
   std::vector<double> b_s, b_speed;        ///< of pictures: a's is what the fit makes of the tracker's motion
-  std::vector<double> part_s, part_offset_ms, part_sigma_ms;  ///< the offset that parts of the recording ask for
+  std::vector<double> part_s, part_offset_ms, part_sigma_ms;  ///< the offset that each part of the streams asks for
 };
 
 /// How late stream b is against stream a: what a's clock calls t happens in b at
@@ -62,7 +62,7 @@ struct Latency {
   bool determined = false;  ///< false: nothing below but motion and correlation is meant; latency_verdict says why
   double offset_ms = 0, drift_ppm = 0;
   std::array<double, 2> offset_ci95_ms{0, 0}, drift_ci95_ppm{0, 0};
-  double at_s = 0;  ///< the middle of the recording by b's clock, where offset_ms holds
+  double at_s = 0;  ///< the middle of the streams by b's clock, where offset_ms holds
   Eigen::Matrix3d b_from_a = Eigen::Matrix3d::Identity();  ///< of bodies (hand-eye); of two streams of rotations only
   double residual = 0;                                     ///< root mean square per axis: deg, or px per picture
   double outlier_share = 0;                                ///< of b's samples
@@ -71,7 +71,7 @@ struct Latency {
   bool at_edge = false;                                    ///< the best lag is the end of the range
   double rival_lag_s = 0;                                  ///< the second best peak; 0 where there is none
   double rival_correlation = 0;
-  double rival_sigmas = 0;  ///< by so many standard errors the best explains the recording better than the rival
+  double rival_sigmas = 0;  ///< by how many standard errors the best lag explains the streams better than the rival
   double overlap_s = 0;
   StreamMotion a, b;
   LatencyCurves curves;
@@ -88,7 +88,7 @@ Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const T
 Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const ImageMotion> b,
                              const LatencySettings& settings = {});
 
-/// Of a live recording or two files; a_name and b_name are for the texts: "tracker", "video".
+/// What a latency is good for. a_name and b_name name the streams in the texts: "tracker", "video".
 Verdict latency_verdict(const Latency& latency, const std::string& a_name, const std::string& b_name);
 
 }  // namespace birdseye::calibration

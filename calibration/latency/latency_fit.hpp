@@ -5,8 +5,8 @@
 
 namespace birdseye::calibration {
 
-/// How two streams follow from each other, given an offset in time and a drift; other unknowns (hand-eye ..) are the
-/// model's own state.
+/// How stream b follows from stream a, given an offset in time and a drift. Other unknowns (hand-eye and the like) are
+/// the model's own state.
 class TimingModel {
  public:
   /// What the model leaves of b, and how it changes: residual = observed - modelled, in `rows_per_sample` rows a
@@ -31,16 +31,16 @@ class TimingModel {
 struct TimingFit {
   double offset_s = 0, drift = 0;
   double offset_sigma_s = 0, drift_sigma = 0;
-  double student95 = 0;  ///< so many sigmas are the 95 % interval, for the number of parts that sigma is made from
+  double student95 = 0;  ///< how many sigmas the 95 % interval reaches, given the number of parts that sigma rests on
   double rms = 0;        ///< per row, of samples that are no outliers
   double outlier_share = 0;
   std::vector<double> losses;  ///< of each sample, the square of its residual: to compare two fits of the same samples
   std::vector<double> part_s, part_offset_s, part_sigma_s;  ///< by how much the offset of parts differs
 };
 
-/// Gauss-Newton with Huber's weights from this offset on. The sigmas are those of a jackknife over parts of a second or
-/// more (linearised: Cameron, Gelbach, Miller 2008, the estimator called CR3), which assumes nothing about noise but
-/// that parts are independent: residuals may be correlated within them.
+/// Gauss-Newton with Huber's weights, starting at this offset. The sigmas are those of a jackknife over parts of a
+/// second or more (linearised: Cameron, Gelbach, Miller 2008, the estimator called CR3), which assumes nothing about
+/// noise but that parts are independent: residuals may be correlated within them.
 TimingFit fit_timing(TimingModel& model, double offset_s, bool find_drift);
 
 /// By how many standard errors of its mean over parts `other` fits worse than `best`.

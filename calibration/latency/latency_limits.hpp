@@ -4,14 +4,14 @@
 
 namespace birdseye::calibration {
 
-// Slower than this, what a tracker's noise pretends (1.7 deg/s over 0.3 s, for half a degree) and what a hand does
-// without meaning to are no longer small beside it.
+// In motion slower than this, the tracker's noise (half a degree looks like 1.7 deg/s over 0.3 s) and the tremor of a
+// hand are no longer small beside the motion.
 inline constexpr double kLeastTurnDegS = 5, kLeastShiftMmS = 20, kLeastImagePxS = 15;
 inline constexpr double kShortestS = 8;  ///< fewer parts than this many seconds give no interval to rely on
 inline constexpr double kGoodS = 15;
-// Where less than this is common to the two, chance reaches as high within a second to either side.
+// Below this, chance reaches as high a correlation at some lag within a second to either side.
 inline constexpr double kLeastCorrelation = 0.5, kGoodCorrelation = 0.8;
-// A rival must explain the recording worse by this many standard errors: chance in a scan of 200 lags reaches 3.
+// A rival lag must explain the streams worse by this many standard errors: in a scan of 200 lags chance reaches 3.
 inline constexpr double kRivalSigmas = 4;
 // Half of the interval. A scope that is led with care turns by 30 deg/s: 2 ms are 0.06 deg, 0.1 mm at 100 mm.
 inline constexpr double kGoodHalfMs = 2, kMostHalfMs = 5;

@@ -10,8 +10,8 @@
 
 namespace birdseye::calibration {
 
-/// base_b_from_body_b(t) = turn_of_bases * base_a_from_body_a(t - offset - drift t) * a_from_b, of rotations: what is
-/// compared is how the bodies stand, not how fast they turn, so that nothing is differentiated.
+/// base_b_from_body_b(t) = turn_of_bases * base_a_from_body_a(t - offset - drift t) * a_from_b, of rotations. Compared
+/// is how the bodies stand, not how fast they turn, so that nothing need be differentiated.
 class RotationTiming final : public TimingModel {
  public:
   /// b_from_a: of the bodies, near enough. The samples of b must be covered by a at offset_s.
@@ -31,9 +31,10 @@ class RotationTiming final : public TimingModel {
 };
 
 /// motion of the picture = map (4x6) * the body's turn and shift in its own axes, between the same two times by a's
-/// clock. Both sides are summed up from picture to picture, forgetting within half a second: from one picture to the
-/// next a tracker's noise is not small beside what the hand does, and least squares would take it for a weak response,
-/// which in several axes at once looks like time; summed up, it is what it was in the poses.
+/// clock. Both sides are summed up from picture to picture, forgetting within half a second. From one picture to the
+/// next the tracker's noise is not small beside the hand's motion, and least squares would take the noise for a weak
+/// response, which in several axes at once looks like a shift in time. Summed up, the noise is no larger than in the
+/// poses.
 class ImageTiming final : public TimingModel {
  public:
   ImageTiming(const MotionSpline& a, std::vector<ImageMotion> b, double offset_s);

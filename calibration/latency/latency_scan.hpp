@@ -24,15 +24,15 @@ struct LagScan {
   bool at_edge = false;
   bool has_rival = false;
   double rival_s = 0, rival = 0;  ///< the next best peak that a dip parts from the best
-  /// RateMap::rotation: what brings a's rates to b's, at the two lags.
+  /// With RateMap::rotation: the rotation that brings a's rates to b's, at the best lag and at the rival.
   Eigen::Matrix3d turn = Eigen::Matrix3d::Identity(), rival_turn = Eigen::Matrix3d::Identity();
 };
 
 /// How b's rates may follow from a's: by a rotation alone, or by any linear map.
 enum class RateMap { rotation, linear };
 
-/// The correlation of b's rates with those that a's make of them by the best map, at each lag (b later than a) from
-/// -most_lag_s to most_lag_s; over 0 to 1, means removed, extremes clipped.
+/// The correlation of b's rates with a's rates under the best map, 0 to 1, at each lag (b later than a) from
+/// -most_lag_s to most_lag_s. Means are removed and extremes clipped.
 LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double most_lag_s);
 
 }  // namespace birdseye::calibration

@@ -19,12 +19,12 @@ Result<MotionSamples> clean(std::span<const TimedMotionPose> rows, const std::st
 Result<std::vector<ImageMotion>> clean(std::span<const ImageMotion> rows, const std::string& name,
                                        StreamMotion& motion);
 
-/// Fills in everything else.
+/// Fills in everything of motion but what clean() does.
 void measure(const MotionSamples& samples, StreamMotion& motion);
 void measure(const std::vector<ImageMotion>& samples, StreamMotion& motion);
 
-/// Rates at the samples' own times, by lines through what lies within some 80 ms: in the body's axes, rad/s. Samples
-/// with nothing to either side are left out.
+/// Rates at the samples' own times, rad/s in the body's axes, by lines through the samples within half_window_s.
+/// Samples without neighbours on both sides are left out.
 RateSignal turn_rates(const MotionSamples& samples, double half_window_s);
 /// At half time of each pair of pictures, px/s.
 RateSignal image_rates(const std::vector<ImageMotion>& samples);

@@ -34,11 +34,12 @@ struct OddPoints {
 
 /// Names up to two points of a rigid fit that are wrong: touched beside the marker, taken for another, moved.
 ///
-/// Leaving out a wrong point drops the sum of squared residuals to what localisation error leaves. How far a drop is no
-/// longer chance is an F test of the 3 coordinates of each point left out against the 3 (n - m) - 6 degrees of freedom
-/// of the rest, corrected for how many choices there were (Bonferroni); a sound set is accused in at most 1 of 100
-/// cases. Which point it is follows from how well the rest fits without each, and is said only if it is 95 % sure.
-/// With the localisation error given the test is a chi-square one, which is sharper for few points.
+/// Leaving out a wrong point drops the sum of squared residuals to what localisation error leaves. Whether a drop is
+/// more than chance is decided by an F test of the 3 coordinates of each point left out against the 3 (n - m) - 6
+/// degrees of freedom of the rest, corrected for the number of choices (Bonferroni): a sound set is accused in at most
+/// 1 of 100 cases. Which point is wrong follows from how well the rest fits without each, and is said only with 95 %
+/// certainty. Where the localisation error is given, a chi-square test is used instead, which is sharper for few
+/// points.
 /// Four points leave a rest of three, which fits almost anything: they are never told apart.
 /// Requires what fit_points accepts.
 OddPoints find_odd_points(std::span<const Eigen::Vector3d> to_mm, std::span<const Eigen::Vector3d> from_mm,

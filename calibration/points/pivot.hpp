@@ -43,14 +43,14 @@ struct Pivot {
   std::vector<std::size_t> outliers;        ///< poses that were not used, by index, from 0
   Eigen::Matrix3d tip_covariance_mm2 = Eigen::Matrix3d::Zero();
   double tip_sigma_mm = 0;  ///< in the direction in which the tip is known least
-  /// Root mean square distance of tip from pivot at poses that a fit had not seen: all that lean to one of eight sides
-  /// are left out together, for neighbours in time are too alike to test each other. Not a number where too few are
-  /// left.
+  /// Root mean square distance of tip from pivot at poses that the fit had not seen. All poses that lean to one of
+  /// eight sides are left out together, for neighbours in time are too alike to test each other. NaN where too few
+  /// poses are left.
   double held_out_mm = 0;
   PivotTilt tilt;
   std::size_t distinct_poses = 0;  ///< without those that repeat another to the last digit
-  /// Median place of the tip in the last third of the poses of a divot against that in the first, of the divot where
-  /// that is largest; and what chance makes of it (one sigma).
+  /// How far the tip slid: the median place of the tip in the last third of a divot's poses against that in the first
+  /// third, of the divot where this is largest; and what chance makes of it (one sigma).
   double slid_mm = 0, slid_sigma_mm = 0;
   std::size_t slid_divot = 0;
 };
@@ -58,10 +58,10 @@ struct Pivot {
 /// Linear least squares of R_i t + q_i = p_k for the tip t and the pivots p_k (the algebraic one-step method as Z.
 /// Yaniv names it, "Which pivot calibration?", Proc. SPIE 9415, 2015, each p_k replaced by its mean); then random
 /// samples (M. Fischler and R. Bolles, 1981; the same ones each time) find the tip whose median residual is least (P.
-/// Rousseeuw, 1984), and poses beyond 2.5 robust deviations are outliers. What the poses leave open is set to the least
-/// length and told in tilt. The covariance is that of H. White (1980), by each pose's own residual, for a tracker's
-/// errors of angle make tips err across the shaft more than along it. The order of the poses does not matter. Refuses
-/// fewer than four poses (Errc::degenerate) and numbers that are not finite.
+/// Rousseeuw, 1984), and poses beyond 2.5 robust deviations are outliers. Along a direction that the poses leave open
+/// the tip gets the least length, and `tilt` tells the direction. The covariance is that of H. White (1980), by each
+/// pose's own residual, because a tracker's errors of angle move a tip across the shaft more than along it. The order
+/// of the poses does not matter. Refuses fewer than four poses (Errc::degenerate) and numbers that are not finite.
 Result<Pivot> solve_pivot(std::span<const PivotPose> poses);
 
 }  // namespace birdseye::calibration

@@ -73,7 +73,7 @@ void judge_tilt(Verdict& verdict, const PivotTilt& tilt) {
   const double swing_deg = tilt.weakest_swing_deg;
   if (swing_deg >= kWeakest_deg.pass) return;
   const bool fail = swing_deg < kWeakest_deg.marginal;
-  // Where there is no tilt at all every direction is weak, and the one is no news.
+  // With hardly any tilt every direction is weak: naming one of them would tell nothing.
   if (tilt.widest_deg < kTilt_deg.marginal && fail) return;
   verdict.add(
       fail ? Grade::fail : Grade::marginal,

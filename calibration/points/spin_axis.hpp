@@ -10,7 +10,7 @@
 
 namespace birdseye::calibration {
 
-/// The direction of a pointer's shaft, from poses at which it was spun about it.
+/// The direction of a pointer's shaft, from poses while the pointer was spun about the shaft.
 struct SpinAxis {
   Eigen::Vector3d axis_in_sensor = Eigen::Vector3d::UnitZ();  ///< of length one
   double sigma_deg = 0;   ///< of the axis, in the direction in which it is known least

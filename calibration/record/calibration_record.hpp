@@ -65,8 +65,8 @@ struct LatencyEntry {
   double offset_ms = 0, ci95_low_ms = 0, ci95_high_ms = 0, drift_ppm = 0;
 };
 
-/// All that was found of one scope on one cart. The text is JSON for people to read, with a checksum over what it says,
-/// so that one that was cut, mixed up or changed by hand is not taken.
+/// All that was found of one scope on one cart. Its text is JSON for people to read, with a checksum over the content:
+/// a text that was cut, mixed up or changed by hand is refused.
 struct CalibrationRecord {
   static constexpr int kVersion = 1;
 
@@ -77,12 +77,14 @@ struct CalibrationRecord {
   std::optional<TipEntry> tip;
   std::optional<LatencyEntry> latency;
 
-  /// A hand-eye calibration holds for the lens it was made with: another lens takes it away. True: it did.
+  /// Enters a lens. A hand-eye calibration holds for the lens it was made with only, so entering another lens removes
+  /// it; the answer is true if it did.
   bool set_lens(LensEntry entry);
 };
 
 std::string record_text(const CalibrationRecord& record);
-/// Refuses what is no record, a later version, a checksum that does not fit, and numbers that make no sense.
+/// Refuses what is no calibration record, a later version, a checksum that does not fit, and numbers that make no
+/// sense.
 Result<CalibrationRecord> parse_record(const std::string& text);
 
 /// Why a record made with one instrument is not to be used with another, in words; empty where all that the record

@@ -8,8 +8,8 @@
 
 namespace birdseye::calibration {
 
-/// Of what a JSON file says, by its text without white space: it may be laid out anew but not changed. CRC-64 of
-/// ECMA-182.
+/// The checksum of what a JSON file says: CRC-64 of ECMA-182 over its text without white space, so that the file may be
+/// laid out anew but not changed.
 template <typename Json>
 std::string checksum_of(const Json& json) {
   const std::string text = json.dump();

@@ -7,7 +7,7 @@
 
 #include "calibration/geometry/field_map.hpp"
 
-/// A map of the field as JSON, exactly: wherever it is stored it is the same map again.
+/// A map of the field as JSON, exactly: what is read back is the same map to the bit.
 namespace birdseye::calibration {
 
 namespace field_json {
@@ -43,7 +43,7 @@ inline void to_json(nlohmann::json& json, const FieldMapData& data) {
           {"sigma_mm", data.sigma_mm}};
 }
 
-/// Throws what nlohmann does, or std::invalid_argument. Whether it is a map FieldMap::from says.
+/// Throws what nlohmann throws, or std::invalid_argument. Whether the data make a map is for FieldMap::from to say.
 inline void from_json(const nlohmann::json& json, FieldMapData& data) {
   const auto basis = field_basis_of(json.at("kind").get<std::string>());
   if (!basis) throw std::invalid_argument("a kind of map that is unknown");

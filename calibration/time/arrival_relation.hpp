@@ -10,10 +10,10 @@ namespace birdseye {
 
 /// Relates the host's clock to that of a sender which stamps what it sends and answers no questions, by arrivals
 /// alone. What arrives is late by a delay that is never negative, so the earliest arrivals lie on a line, the lower
-/// edge. What even the earliest were late by shows in no number of arrivals: times are put earlier by
-/// Settings::unseen_delay, so that what is shown is rather taken for older than for newer, and sigma is never less.
-/// A network that grows slower is not followed: the edge rises no faster than clocks drift, so that what comes late for
-/// good is taken for as old as it is.
+/// edge. How late even the earliest were shows in no number of arrivals. Times are therefore put earlier by
+/// Settings::unseen_delay, so that a picture is taken for older rather than newer than it is, and sigma is never less
+/// than that. The edge rises no faster than clocks drift: when a network grows slower for good, what it carries is
+/// taken for as old as it is.
 class ArrivalRelation {
  public:
   struct Settings {
@@ -28,13 +28,14 @@ class ArrivalRelation {
   ArrivalRelation() = default;
   explicit ArrivalRelation(const Settings& settings) : settings_(settings) {}
 
-  /// Stamps need not be in order. A step of the sender's clock that the arrival shows; what was known is dropped then.
+  /// Stamps need not be in order. Returns a step of the sender's clock if the arrival shows one; what was known before
+  /// is then dropped.
   std::optional<ClockEvent> push(DeviceTime stamp, HostTime arrived);
   /// Empty until something arrived.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
   [[nodiscard]] std::optional<DeviceTime> device_from_host(HostTime time) const;
-  /// What all that comes is late by, against the earliest, where that is more than a step for some seconds: the network
-  /// does not carry what is sent.
+  /// By how much everything comes later than the earliest did, where that has been more than a step for some seconds:
+  /// the network does not carry what is sent.
   [[nodiscard]] std::optional<Duration> behind() const { return behind_; }
 
  private:

@@ -37,7 +37,7 @@ struct HostClock;    ///< the host's CLOCK_MONOTONIC
 using DeviceTime = Instant<DeviceClock>;
 using HostTime = Instant<HostClock>;
 
-/// A sample with the time at which the world was as it says (acquisition), how sure we are of that, and when we got it.
+/// A sample with its acquisition time (when the world was as the sample says), that time's sigma, and its arrival time.
 template <typename T>
 struct Stamped {
   T value;

@@ -7,8 +7,9 @@
 namespace birdseye {
 namespace {
 
-/// What chance explains only once in e^9 times is not to be relied on.
-constexpr std::int64_t kGiveUpNs = 1'800'000'000;  // a doubt that lasts
+/// A doubt that lasts so long is given up.
+constexpr std::int64_t kGiveUpNs = 1'800'000'000;
+/// What chance explains only once in e^kDoubted times is not to be relied on.
 constexpr double kDoubted = 9, kSafeSigmas = 16;
 
 std::int64_t floor_div(std::int64_t a, std::int64_t b) {

@@ -26,27 +26,26 @@ struct ClockEvent {
 };
 const char* to_string(ClockEvent::Kind kind);
 
-/// How well a time is known that a program reads once the kernel has woken it, beyond what a clock line sees: waking
-/// always takes something, 0.05 to 0.2 ms where it was measured (docs/clocks.md), and no line can tell it from delay.
+/// Sigma to add to times that a program stamps once the kernel has woken it. Waking always takes something, 0.05 to 0.2
+/// ms where it was measured (docs/clocks.md), and no clock line can tell that from delay.
 inline constexpr Duration kWakeSigma{100'000};
 
-/// Gives a periodic measurement back its regular times. What arrives is late by a delay that is never negative and
-/// jitters; the earliest arrivals lie on a line, and that lower edge is the clock: its level and its slope (the
-/// instrument's drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for
-/// days.
+/// Finds the regular times of a periodic measurement. Arrivals are late by a delay that is never negative and jitters;
+/// the earliest arrivals lie on a line, and that lower edge is the clock. Its level and its slope (the instrument's
+/// drift) are estimated, with a sigma. Bounded in memory and in work per arrival; exact to the ns for days.
 class ClockLine {
  public:
   struct Settings {
     Duration period;  ///< nominal
     Duration window = Duration::from_ms(20'000);
-    std::size_t slip_confirms = 8;   ///< late arrivals, apart in time, that it takes at least to believe in a loss
+    std::size_t slip_confirms = 8;   ///< how many late arrivals, apart in time, it takes at least to believe in a loss
     double drift_sigma_ppm = 300;    ///< what is expected of the nominal period
-    double wander_ppm_per_s = 0.02;  ///< by so much the drift may change, unnoticed within the window
+    double wander_ppm_per_s = 0.02;  ///< how much the drift may change unnoticed within the window
     Duration resolution{1000};       ///< of arrivals
   };
   struct Tick {
     DeviceTime time;         ///< on the line
-    Duration sigma;          ///< of time: 68 % of ticks are this close. What it is late by, where that is in doubt
+    Duration sigma;          ///< of time: 68 % of ticks are this close; in doubt, as much as the arrival is late
     Duration late_by;        ///< this arrival behind its tick
     std::int64_t index = 0;  ///< of the measurement, counting those that were lost
     bool certain = false;    ///< false while measurements may be missing or the line may have moved, and at the start
@@ -54,14 +53,14 @@ class ClockLine {
 
   explicit ClockLine(const Settings& settings);
 
-  /// The next arrival, or one after some that are known to be lost. `perhaps_more`: there are signs that more were lost
-  /// since the one before than is known; lateness by whole periods is then believed sooner.
+  /// Takes the next arrival; `lost` measurements before it are known to be missing. `perhaps_more`: there are signs
+  /// that more than those are missing; lateness by whole periods is then believed sooner.
   Tick push(DeviceTime arrived, std::int64_t lost = 0, bool perhaps_more = false);
   /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a
   /// restart.
   Tick push_numbered(DeviceTime arrived, std::int64_t index);
 
-  /// By so much the true period is longer than the nominal one.
+  /// By how much the true period is longer than the nominal one.
   [[nodiscard]] double drift_ppm() const { return fit_.slope * 1e-3; }
   [[nodiscard]] double drift_sigma_ppm() const;
   /// What happened since the last call; the oldest are dropped beyond 64.
@@ -80,7 +79,7 @@ class ClockLine {
   struct Block {
     std::int64_t id = 0, index = 0, offset_ns = 0, count = 0;  ///< index and offset of its earliest arrival
   };
-  /// The latest arrivals, that late all of them.
+  /// A run of the latest arrivals, all of them late.
   struct Run {
     std::size_t length = 0;
     double doubt = 0;                    ///< how little chance explains it, in nats

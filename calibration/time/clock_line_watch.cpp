@@ -198,7 +198,8 @@ void ClockLine::slip(std::size_t run, std::int64_t periods) {
     if (recent_[i].held) add(recent_[i]);
     recent_[i].held = false;
   }
-  // Those before it that were held back are of a loss that this one has overtaken: of which measurement is not known.
+  // Arrivals before this run that were held back belong to an earlier loss, which this slip has overtaken. Nobody knows
+  // which measurements they are: drop them.
   std::size_t keep = first;
   while (keep > 0 && recent_[keep - 1].held) --keep;
   recent_.erase(recent_.begin() + static_cast<std::ptrdiff_t>(keep),
@@ -217,8 +218,8 @@ void ClockLine::begin_from(std::size_t first_recent, double jump_ns, bool is_eve
                      anchor_offset_ns_ + std::llround(line_at(start.index))};
   }
   ++restarts_;
-  // The drift of before: the first arrivals after the jump may have bent the line. Jumps that follow each other are one
-  // drift that it does not know.
+  // Keep the drift from before the jump: the first arrivals after it may have bent the line. Several jumps soon after
+  // each other are one drift that the line has not learnt.
   const bool again = jumped_at_ && (index_ - *jumped_at_) * settings_.period.ns < settings_.window.ns / 4;
   if (large) jumped_at_ = index_;
   prior_ = {calm_drifts_[0].slope,

@@ -24,9 +24,9 @@ struct RelatedTime {
 
 /// Relates the host's clock to the device's by the exchanges that took least time. An exchange leaves the offset
 /// anywhere within plus and minus half its round trip, for nobody knows how the two ways share it; the narrowest
-/// exchanges give the narrowest bounds. A constant asymmetry shows in no number of exchanges, so that sigma is never
-/// less than half of the best half round trip: an even distribution over its bounds has 0.58 of it, and a way there
-/// that takes three times as long as the way back is at just one sigma.
+/// exchanges give the narrowest bounds. A constant asymmetry shows in no number of exchanges. So sigma is never less
+/// than half of the best half round trip: an even distribution within the bounds has a sigma of 0.58 of the half round
+/// trip, and a way there that takes three times as long as the way back is off by just one sigma.
 class ClockRelation {
  public:
   struct Settings {
@@ -43,7 +43,7 @@ class ClockRelation {
   /// Empty until there was an exchange.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
   [[nodiscard]] std::optional<RelatedTime<DeviceTime>> device_from_host(HostTime time) const;
-  /// By so much the host's clock is faster than the device's.
+  /// By how much the host's clock is faster than the device's.
   [[nodiscard]] double drift_ppm() const { return slope_ * 1e-3; }
   [[nodiscard]] double drift_sigma_ppm() const { return slope_sigma_ * 1e-3; }
   /// Half the round trip of the best exchange in the window: no asymmetry makes the offset worse than this.

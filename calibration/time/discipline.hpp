@@ -23,9 +23,9 @@ struct ClockChoice {
   std::string reason;  ///< in words
 };
 
-/// How far apart two disciplined clocks are (one sigma), by what both kernels say: each side's estimate, but no less
-/// than a tenth of its bound, in quadrature; bound / sqrt 3 where there is no estimate. Empty unless both are
-/// synchronised.
+/// How far apart two disciplined clocks are (one sigma), by what both kernels say: for each side the estimated error,
+/// but no less than a tenth of the maximum error, or maximum / sqrt 3 without an estimate; both sides in quadrature.
+/// Empty unless both are synchronised.
 std::optional<Duration> common_clock_sigma(const ClockDiscipline& device, const ClockDiscipline& host);
 
 /// By which way host and device time are to be related: the one with the smaller honest sigma. exchange_sigma: empty

@@ -12,7 +12,7 @@ struct EdgePoint {
   double count = 1;
 };
 
-/// What is known of the slope before: ns of lateness gained per nominal second, normally distributed.
+/// What is known of the slope beforehand: ns of lateness gained per nominal second, normally distributed.
 struct EdgePrior {
   double slope = 0;
   double sigma = 3e5;
@@ -26,8 +26,8 @@ struct EdgeFit {
 };
 
 struct EdgeSettings {
-  /// Of the points, so many by their distance to the edge say how densely arrivals lie there; of the others it is only
-  /// used that they are further away. Arrivals far from the edge may be distributed as they please.
+  /// The share of points, nearest to the edge first, whose heights tell how densely arrivals lie there. Of the others
+  /// only that they are farther away is used, so arrivals far from the edge may be distributed in any way.
   double used = 0.5;
   double resolution_ns = 1000;  ///< of arrival stamps: the edge is not sharper than this
 };
@@ -39,8 +39,8 @@ struct EdgeSettings {
 std::optional<EdgeFit> fit_edge(std::span<const EdgePoint> points, const EdgePrior& prior, double at_s,
                                 const EdgeSettings& settings);
 
-/// How far the points lie above the best line under them, in units of spacing_ns and none counted for more than five:
-/// what two lines for the parts of a window save over one for all tells a change.
+/// How far the points lie above the best line under them, in units of spacing_ns, no point counted for more than five.
+/// Where two lines for the parts of a window have a much lower sum than one line for all of it, the clock has changed.
 double edge_misfit(std::span<const EdgePoint> points, double spacing_ns);
 
 }  // namespace birdseye

@@ -17,12 +17,12 @@ enum class PoseKind {
 };
 const char* to_string(PoseKind kind);
 
-/// The pose at a time that was asked for, and how it was come by.
+/// The pose at the time that was asked for, and how it was obtained.
 struct PoseAnswer {
   PoseKind kind = PoseKind::refused;
   std::optional<Transform<Tracker, Sensor>> tracker_from_sensor;  ///< empty exactly when refused
   /// Per axis: from the scatter of the samples about the fit (0 where there are too few), and from what the hand may
-  /// have done since, or between them. What the time's sigma does at this speed comes on top.
+  /// have done between or after them. What an error of time_sigma makes at this speed comes on top.
   double position_sigma_mm = 0;
   Duration time_sigma;    ///< of the samples used
   double speed_mm_s = 0;  ///< 0 for a single sample
@@ -38,7 +38,7 @@ class PoseHistory {
     Duration max_gap = Duration::from_ms(60);          ///< wider holes are not bridged
     Duration max_prediction = Duration::from_ms(100);  ///< further ahead is refused
     Duration max_time_sigma = Duration::from_ms(10);   ///< poses whose time is less sure are refused
-    double acceleration_mm_s2 = 500;  ///< what a hand's changes of speed come to, per axis: how prediction gets worse
+    double acceleration_mm_s2 = 500;                   ///< of a hand, per axis: how predictions grow worse with time
     /// Half the width of a window of samples to which a line is fitted (position along it, rotation about one axis), to
     /// average the tracker's noise. 0 interpolates between the two neighbours. A prediction is made from the whole
     /// window's width before the newest sample.

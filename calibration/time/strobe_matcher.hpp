@@ -9,11 +9,11 @@
 
 namespace birdseye {
 
-/// Pairs a camera's frames with the edges of its strobe line (start of exposure, stamped by the kernel), for edges know
-/// when and frames know what. The delivery delay is not known, but stable: it is learnt from frames of which only one
-/// delay fits. A strobe and frames that are both regular fit any delay that differs by whole periods: then the bounds
-/// on the delay must leave one only, or exposures that were left out or a stream's beginning must tell, and until then
-/// no frame is paired. Once frames and edges have been counted differently the bounds are not believed either.
+/// Pairs a camera's frames with the edges of its strobe line (start of exposure, stamped by the kernel): an edge knows
+/// when, a frame knows what. The delivery delay is unknown but stable, and is learnt from frames that only one delay
+/// fits. Where strobe and frames are both regular, delays that differ by whole periods all fit. Then the bounds on the
+/// delay must leave one only, or exposures that were left out, or a stream's beginning, must tell which; until then no
+/// frame is paired. Once frames and edges have been counted differently, the bounds are no longer believed either.
 class StrobeMatcher {
  public:
   struct Settings {
@@ -39,7 +39,7 @@ class StrobeMatcher {
   /// it are frames lost.
   Match match(DeviceTime stamp, std::int64_t number);
 
-  /// Learnt; empty while it is ambiguous.
+  /// The delay that was learnt; empty while it is ambiguous.
   [[nodiscard]] std::optional<Duration> delay() const;
   [[nodiscard]] std::uint64_t spurious_edges() const { return spurious_; }
 
