@@ -7,9 +7,9 @@
 
 namespace birdseye::drivers {
 
-/// A contact that bounces: edges in, presses and releases out. A change counts once the contact has stayed for `hold`;
-/// its time is that of the edge that began it, so that neither bounces nor the wait make it late. A spike shorter than
-/// `hold` is none. Pure: time comes with the edges.
+/// A contact that bounces: edges in, presses and releases out. A change counts once the contact has stayed for `hold`.
+/// The time of the change is that of the edge that began it, so that neither bounces nor the wait make it late. A spike
+/// shorter than `hold` is no change. Pure: time comes with the edges.
 class Debouncer {
  public:
   struct Change {
@@ -21,11 +21,11 @@ class Debouncer {
 
   /// Edges in the order of their times. Two to the same level mean that one between them was lost.
   void push(bool active, DeviceTime at);
-  /// The change that has lasted long enough by now; to be asked before a later edge is pushed.
+  /// The change that has lasted long enough by now. Must be asked before a later edge is pushed.
   std::optional<Change> settle(DeviceTime now);
   /// When to ask next; empty while nothing changes.
   [[nodiscard]] std::optional<DeviceTime> due() const;
-  /// The contact is closed or open by the last edge.
+  /// Whether the contact is closed, by the last edge.
   [[nodiscard]] bool level() const { return level_; }
   /// Edges that made no change.
   [[nodiscard]] std::uint64_t bounces() const { return bounces_; }

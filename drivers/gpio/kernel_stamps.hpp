@@ -4,8 +4,8 @@
 
 namespace birdseye::drivers {
 
-/// Whether a Linux of this release stamps the edges of GPIO lines with CLOCK_MONOTONIC: before 5.7 it was the clock of
-/// the day, which is set and leaps. False for what is no release.
+/// Whether a Linux of this release stamps the edges of GPIO lines with CLOCK_MONOTONIC: before 5.7 it was the time of
+/// day, which is set and leaps. False for a text that is no release.
 bool stamps_edges_monotonic(const std::string& release);
 
 }  // namespace birdseye::drivers

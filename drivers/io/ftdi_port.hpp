@@ -20,11 +20,11 @@ struct FtdiSettings {
   std::size_t buffer = 65'536;  ///< bytes that wait for a reader; six seconds at 115200 baud
 };
 
-/// An FTDI serial adapter driven straight over USB: 8N1, no flow control, RTS and DTR ours alone. A kernel's serial
-/// port asserts RTS whenever it is opened, which some instruments take for a reset; this does not.
+/// An FTDI serial adapter driven straight over USB: 8N1, no flow control, RTS and DTR ours alone. The kernel's serial
+/// port asserts RTS whenever it is opened, which some instruments take for a reset; FtdiPort does not.
 class FtdiPort final : public ByteStream {
  public:
-  /// Resets and sets up the adapter, and begins to read. Refuses a chip that is not known here.
+  /// Resets the adapter, sets it up and begins to read. Refuses a chip that chip_of() does not know.
   static Result<std::unique_ptr<FtdiPort>> open(std::unique_ptr<UsbPort> usb, const FtdiSettings& settings);
   ~FtdiPort() override;
   FtdiPort(const FtdiPort&) = delete;

@@ -12,14 +12,14 @@ namespace birdseye::drivers::ftdi {
 
 enum class Chip { am, bm, ft2232c, ft232r, ft2232h, ft4232h, ft232h, ft_x };
 
-/// By bcdDevice; the product number says less, since vendors change it. has_serial: a BM without a valid EEPROM says
-/// that it is an AM, but has no serial number string. Empty for a chip that is not known here.
+/// Which chip it is, by bcdDevice; the product number says less, since vendors change it. has_serial tells a BM without
+/// a valid EEPROM, which calls itself an AM but has no serial number string. Empty for a chip that is not known here.
 std::optional<Chip> chip_of(std::uint16_t bcd_device, bool has_serial);
 const char* name_of(Chip chip);
 bool is_high_speed(Chip chip);
-/// An AM passes its bytes on as it likes.
+/// False for an AM, which passes its bytes on as it likes.
 bool has_latency_timer(Chip chip);
-/// What requests for the chip's first port carry in their index: 1 where there are several ports, else 0.
+/// The index that requests for the chip's first port carry: 1 where there are several ports, else 0.
 std::uint16_t port_index(Chip chip);
 
 enum class Purge : std::uint8_t { first = 1, second = 2 };  // sources disagree on which is which: send both
@@ -51,7 +51,7 @@ struct BaudRate {
   SetupPacket request;
   double actual;  ///< what the divisor gives, bit/s
 };
-/// Errc::bad_value when no divisor of the chip comes within 3 %, which a frame of ten bits still bears.
+/// Errc::bad_value when no divisor of the chip comes within 3 % of baud; a frame of ten bits still bears 3 %.
 Result<BaudRate> set_baud(int baud, Chip chip);
 
 /// One packet of a bulk IN transfer, taken apart.
@@ -59,11 +59,11 @@ struct Piece {
   std::uint8_t modem = 0;
   std::uint8_t line = 0;
   std::span<const std::uint8_t> payload;
-  /// Overrun, parity, framing or break: of some byte of the packet, nobody knows which.
+  /// An overrun, parity, framing error or break befell some byte of the packet; nobody knows which.
   [[nodiscard]] bool damaged() const { return (line & 0x1E) != 0; }
 };
-/// Cuts the next piece off a transfer: each max_packet bytes of it begin with two status bytes of their own. Empty when
-/// nothing is left. A rest of one byte, which no chip sends, is a piece without anything.
+/// Cuts the next piece off a transfer, of which each max_packet bytes begin with two status bytes of their own. Empty
+/// when nothing is left. A rest of one byte, which no chip sends, gives an empty piece.
 std::optional<Piece> next_piece(std::span<const std::uint8_t>& transfer, std::size_t max_packet);
 
 }  // namespace birdseye::drivers::ftdi

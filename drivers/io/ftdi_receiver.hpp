@@ -27,7 +27,7 @@ class FtdiReceiver {
   void push(std::span<const std::uint8_t> transfer, DeviceTime arrived);
   /// A transfer that the bus lost: there may have been bytes in it.
   void push_failed();
-  /// Drops what has come, on the reader's wish.
+  /// Drops the bytes that wait; the reader asks for it.
   void clear();
 
   struct Taken {
@@ -38,8 +38,8 @@ class FtdiReceiver {
   Taken take(std::span<std::uint8_t> into);
 
   [[nodiscard]] bool empty() const { return packets_.empty(); }
-  /// Errors before the bytes last taken, or all when there was nothing to take: it changes with take() alone, so that
-  /// a reader sees it change with the first bytes behind the hole, never with those before.
+  /// How many errors lie before the bytes last taken; all errors, when there was nothing to take. The count changes in
+  /// take() alone, so that a reader sees it change with the first bytes behind the hole, never with those before.
   [[nodiscard]] std::uint64_t errors_passed() const { return errors_passed_; }
   [[nodiscard]] const FtdiCounters& counters() const { return counters_; }
 

@@ -7,7 +7,7 @@
 
 namespace birdseye::drivers {
 
-/// What a code of libusb's means for the device called name, and what to do about it.
+/// What a libusb error code means for the device `name`, and what to do about it.
 Error usb_error(const std::string& name, int libusb_code, const char* doing);
 
 /// Finds the device, takes its first interface from the kernel's driver (which gets it back at the end) and claims it.

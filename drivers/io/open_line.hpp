@@ -15,10 +15,10 @@ struct LineSettings {
   int usb_latency_ms = 1;  ///< how long an FTDI adapter collects bytes before it passes them on, 1 to 255
 };
 
-/// Whether settings can be right at all, before anything is opened: what is wrong is said with all forms there are.
+/// Checks settings before anything is opened. The error lists all forms that `device` may have.
 Result<void> check_line(const LineSettings& settings);
 
-/// Takes seconds at most. Errors name the device and the remedy.
+/// Opens the line, within seconds at most. Errors name the device and the remedy.
 Result<std::unique_ptr<ByteStream>> open_line(const LineSettings& settings);
 
 }  // namespace birdseye::drivers

@@ -17,9 +17,9 @@ bool is_serial_speed(int baud);
 /// A serial port of the operating system: 8N1, raw, no flow control of either kind.
 class SerialPort final : public ByteStream {
  public:
-  /// baud: one of kSerialSpeeds. RTS is released at once: opening asserts it, and some instruments take it
-  /// for a reset. Refuses what is not there, is no terminal, or is held by another program. usb_latency_ms: for the
-  /// timer of an FTDI adapter, where the kernel lets it be set.
+  /// baud: one of kSerialSpeeds. Releases RTS at once, which opening asserts and some instruments take for a reset.
+  /// Refuses a device that is not there, is no terminal, or is held by another program. usb_latency_ms: for the timer
+  /// of an FTDI adapter, where the kernel lets it be set.
   static Result<std::unique_ptr<SerialPort>> open(const std::filesystem::path& device, int baud,
                                                   int usb_latency_ms = 1);
 
@@ -44,7 +44,7 @@ class SerialPort final : public ByteStream {
   std::size_t raw_begin_ = 0, raw_end_ = 0;  ///< what of it waits to be decoded
   bool marked_ = false;                      ///< whether the terminal marks damage
   SerialMarks marks_;
-  bool damage_next_ = false;  ///< between what was read last and what comes next
+  bool damage_next_ = false;  ///< damage lies between the last bytes read and the next
   std::uint64_t line_errors_ = 0;
   std::optional<std::uint64_t> overruns_;  ///< as the driver counts them, if it does
 };

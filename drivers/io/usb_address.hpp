@@ -13,7 +13,7 @@ namespace birdseye::drivers {
 struct UsbAddress {
   std::string name;  ///< as it was written
   std::uint16_t vendor = 0, product = 0;
-  std::string serial;  ///< empty: whichever there is, if there is only one
+  std::string serial;  ///< empty: the only adapter with these numbers
 };
 Result<UsbAddress> parse_usb_address(std::string_view text);
 
@@ -22,7 +22,7 @@ struct UsbCandidate {
   std::uint16_t vendor = 0, product = 0;
   std::string product_text, serial;
 };
-/// The index of the one device that is meant; else an error that tells what there is.
+/// The index of the one device that address means; else an error that lists the candidates.
 Result<std::size_t> choose_adapter(const std::vector<UsbCandidate>& candidates, const UsbAddress& address);
 
 }  // namespace birdseye::drivers

@@ -40,7 +40,7 @@ class UsbPort {
   [[nodiscard]] virtual const UsbIdentity& identity() const = 0;
   /// The data stage's bytes, which are none or as many as setup asks for. Errc::unsupported: the device stalls it.
   virtual Result<std::vector<std::uint8_t>> control(const SetupPacket& setup, DeviceTime deadline) = 0;
-  /// How many bytes the device has taken by the deadline, perhaps none.
+  /// Sends bytes; returns how many the device has taken by the deadline, perhaps none.
   virtual Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, DeviceTime deadline) = 0;
   /// Keeps that many IN transfers of one packet each going from now on.
   virtual Result<void> start_reading(int transfers) = 0;

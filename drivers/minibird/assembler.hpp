@@ -19,11 +19,11 @@ class MeasurementAssembler {
  public:
   explicit MeasurementAssembler(const StreamLayout& layout);
 
-  /// The measurements that are whole with these bytes, oldest first. One of which records are missing is whole when a
-  /// record of the next has come.
+  /// The measurements that these bytes complete, oldest first. A measurement of which records are missing is complete
+  /// when a record of the next one has come.
   std::vector<Measurement> push(const Chunk& chunk);
   [[nodiscard]] MiniBirdCounters counters() const;
-  /// By so much the unit's true period is longer than the nominal one.
+  /// By how much the unit's true period is longer than the nominal one.
   [[nodiscard]] double drift_ppm() const { return clock_line_.drift_ppm(); }
   /// Where the unit's beat did what jitter does not, since the last call: steps, losses that only time showed, changes
   /// of drift, restarts.
@@ -35,7 +35,7 @@ class MeasurementAssembler {
     DeviceTime at;
   };
   struct Cycle {
-    std::int64_t first_record;  ///< where in the stream the first of its records that came begins
+    std::int64_t first_record;  ///< where in the stream the first record of the cycle begins that came
     std::int64_t before_it;     ///< bytes of the birds before that one
     DeviceTime arrived;
     std::vector<std::optional<Record>> records;

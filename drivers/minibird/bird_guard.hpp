@@ -11,13 +11,14 @@
 
 namespace birdseye::drivers::minibird {
 
-/// Decides whether one bird's records make sense, each by itself and after those before it. It follows the sensor also
-/// through readings that it withholds, so that a position that has flipped to its negative stays known as one.
+/// Decides whether one bird's records make sense, each by itself and after those before it. The guard follows the
+/// sensor through readings that it withholds too, so that a position that has flipped to its negative stays known as
+/// flipped.
 class BirdGuard {
  public:
   BirdGuard(const BirdLayout& layout, const Plausibility& limits) : layout_(layout), limits_(limits) {}
 
-  /// Of a reading whose time is not certain the place is judged, but nobody's speed by it.
+  /// Judges one reading. Where its time is not certain, its place is judged but no speed is computed from it.
   BirdReading judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain = true);
 
  private:

@@ -15,26 +15,27 @@ struct Setting {
   std::string name;                       ///< for messages, as "hemisphere of bird 2"
   std::uint8_t unit = 0;                  ///< 0: the one that has the port
   Bytes command;                          ///< empty: not to be set, only looked at
-  std::optional<std::uint8_t> parameter;  ///< that tells; absent where this firmware has none
+  std::optional<std::uint8_t> parameter;  ///< that reads it back; absent where this firmware has none
   Bytes value;                            ///< of the parameter, once set
-  bool as_after_reset = false;            ///< a unit that has been reset is so by itself
+  bool as_after_reset = false;            ///< a reset alone sets it so
 };
 
-/// Everything but the rate, and group mode, in the order in which it is to be sent. What the firmware cannot do is left
-/// out and told in notes.
+/// All settings of a unit except rate and group mode, in the order in which they are to be sent. What the firmware
+/// cannot do is left out and told in notes.
 std::vector<Setting> settings_of_unit(const MiniBirdSettings& settings, const UnitInfo& info, std::size_t index,
                                       std::vector<std::string>& notes);
 /// What goes to the unit that has the port, after all others.
 std::vector<Setting> settings_of_port(const MiniBirdSettings& settings, const UnitInfo& master);
 
-/// Sends, and reads back what can be. was_reset: leave out what is so by itself. Errc::bad_value: the unit will not.
+/// Sends the settings, and reads back those that can be read. was_reset: leaves out what the reset has set.
+/// Errc::bad_value: the unit does not take a setting.
 Result<void> apply(Dialogue& dialogue, const std::vector<Setting>& list, bool was_reset);
-/// Has a unit that was not reset all this already? The first thing that it has not, or that it cannot be asked, by
-/// name; empty if all is well.
+/// Whether a unit that was not reset has all these settings already: the name of the first that it has not, or cannot
+/// be asked for; empty if it has all.
 Result<std::string> first_difference(Dialogue& dialogue, const std::vector<Setting>& list);
 
-/// Sets the measurement rate by whichever parameter the firmware has, and returns what it then is. only_look: sets
-/// nothing.
+/// Sets the measurement rate by the parameter that the firmware has, and returns the rate that the unit then has.
+/// only_look: sets nothing.
 Result<double> settle_rate(Dialogue& dialogue, const MiniBirdSettings& settings, const UnitInfo& master,
                            bool only_look = false);
 /// Reads the position scale.

@@ -14,11 +14,11 @@ namespace birdseye::drivers::minibird {
 /// wait has an end, and a stop ends it early (Errc::timeout).
 class Dialogue {
  public:
-  /// quiet: silence after which nothing more is taken to come; more than a measurement cycle.
+  /// quiet: after so much silence no more bytes are expected; more than a measurement cycle.
   Dialogue(ByteStream& line, Duration reply_timeout, Duration quiet)
       : line_(line), reply_timeout_(reply_timeout), quiet_(quiet) {}
 
-  /// still: called every few ten ms while it talks, for whoever watches that nothing hangs.
+  /// still: called every few tens of ms during the conversation, for whoever watches that nothing hangs.
   void obey(std::stop_token stop, std::function<void()> still = {}) {
     stop_ = std::move(stop);
     still_ = std::move(still);
@@ -27,13 +27,15 @@ class Dialogue {
 
   /// unit: 0 for the one that has the port, else the address in a flock.
   Result<void> send(const Bytes& command, std::uint8_t unit = 0);
-  /// The reply to EXAMINE, asked for twice. Errc::timeout: it does not answer, or not wholly.
+  /// The reply to EXAMINE, asked for a second time where it fails. Errc::timeout: the unit does not answer, or not with
+  /// a whole reply.
   Result<Bytes> ask(std::uint8_t parameter, std::uint8_t unit = 0);
-  /// The same, asked for once, of a parameter that the unit may not know: then it says nothing.
+  /// The same, asked for once, for a parameter that the unit may not know. Empty where the unit says nothing.
   Result<std::optional<Bytes>> ask_if_known(std::uint8_t parameter, std::uint8_t unit = 0);
-  /// Stops a stream, and takes what still comes of it. Errc::bad_format: it sends on whatever it is told.
+  /// Stops a stream and discards what still comes of it. Errc::bad_format: the other side goes on sending, whatever it
+  /// is told.
   Result<void> hush();
-  /// All that comes until nothing has for as long as `quiet`, or `most` bytes have, or the time is up.
+  /// All bytes that come until nothing has come for `quiet`, or `most` bytes have come, or `within` is over.
   Result<Bytes> listen(std::size_t most, Duration quiet, Duration within);
   Result<void> pause(Duration span);
 

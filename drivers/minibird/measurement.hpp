@@ -23,9 +23,9 @@ enum class Doubt : std::uint8_t {
   step,                ///< farther from the last than a sensor can move
   hemisphere_flip,     ///< at the negative of where it was
   hemisphere_border,   ///< so near the plane that it may flip
-  outside_hemisphere,  ///< where a unit that is set as we set it never reports
+  outside_hemisphere,  ///< where a unit with our settings never reports
   unconfirmed,         ///< the first after a start or a gap
-  unmapped,            ///< where the field's map does not reach; found by who applies the map, never by the driver
+  unmapped,            ///< outside the field map; found by whoever applies the map, never by the driver
 };
 inline constexpr std::size_t kDoubts = 12;
 std::string_view name_of(Doubt doubt);  ///< "hemisphere flip" and so on, for counters
@@ -43,7 +43,7 @@ struct Measurement {
   DeviceTime acquired;
   Duration acquired_sigma;
   /// False while measurements may have been lost uncounted, or the unit's beat may have moved, and the arrival does not
-  /// bound the time: acquired may then be off by far more than its sigma.
+  /// bound the time either. `acquired` may then be off by far more than its sigma.
   bool time_certain = true;
   DeviceTime arrived;              ///< of its last byte
   std::vector<BirdReading> birds;  ///< by address, 1 first
@@ -51,7 +51,7 @@ struct Measurement {
 
 struct MiniBirdCounters {
   std::uint64_t measurements = 0;
-  std::uint64_t lost_measurements = 0;  ///< that the clock line says must have been
+  std::uint64_t lost_measurements = 0;  ///< that must have happened before, by the clock line
   std::uint64_t phase_errors = 0, discarded_bytes = 0, line_errors = 0, restarts = 0;
   std::uint64_t senseless_records = 0;           ///< all that decode_pose() refused
   std::array<std::uint64_t, kDoubts> doubted{};  ///< readings, by Doubt

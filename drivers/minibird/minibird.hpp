@@ -22,27 +22,27 @@ struct MiniBirdInfo {
   double rate_hz = 0;  ///< of measurements
   double mm_per_count = kMmPerCount36Inch;
   bool has_reset_line = false;
-  bool warm = false;          ///< it was as wanted already, and was not reset
+  bool warm = false;          ///< the unit had all settings already, and was not reset
   std::string not_warm;       ///< why not, in words
-  std::string latched_error;  ///< of any unit, from before, in words; empty for none
+  std::string latched_error;  ///< an error that some unit had latched before the start, in words; empty for none
   std::vector<UnitInfo> units;
-  std::vector<std::string> notes;  ///< what was wanted and its firmware cannot do, and the like
+  std::vector<std::string> notes;  ///< settings that the firmware cannot do, and the like
 };
 
 /// What a unit in trouble says.
 struct Diagnosis {
   std::string words;              ///< of all units, one line
   std::vector<UnitError> errors;  ///< that were latched; they are cleared by now
-  bool needs_start = false;       ///< it has lost its settings or has halted: the stream was not begun again
+  bool needs_start = false;       ///< a unit has lost its settings or has halted; the stream was not begun again
 };
 
-/// The conversation with a miniBIRD, or with a flock of them behind one port: set up, then streaming. What the bytes of
-/// the stream mean is MeasurementAssembler's.
+/// The conversation with a miniBIRD, or with a flock of them behind one port: set up, then streaming.
+/// MeasurementAssembler knows what the bytes of the stream mean.
 class MiniBird {
  public:
-  /// Resets, examines and configures the unit, and starts its stream; one that is as wanted already is not reset.
-  /// Errors name the port and the remedy: nothing answers (timeout), what answers is something else (bad_format), it
-  /// will not do what is wanted (bad_value). Takes up to seconds, and half a minute
+  /// Resets, examines and configures the unit, and starts its stream. A unit that has all settings already is not
+  /// reset. Errors name the port and the remedy: nothing answers (timeout), what answers is something else
+  /// (bad_format), the unit does not take a setting (bad_value). Takes up to seconds, and half a minute
   /// for a large flock; stop ends it early, and `still` is called all the while.
   static Result<std::unique_ptr<MiniBird>> start(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings,
                                                  const std::stop_token& stop = {},

@@ -28,7 +28,8 @@ std::size_t word_count(RecordFormat format);
 bool has_position(RecordFormat format);
 bool has_orientation(RecordFormat format);
 
-/// Two 7-bit bytes, low part first -> the signed word, whose two low bits were not sent. The phase bit is ignored.
+/// Two 7-bit bytes, low part first -> the signed word. Its two low bits were not sent and are 0; the phase bit is
+/// ignored.
 std::int16_t decode_word(std::uint8_t low, std::uint8_t high);
 
 /// Millimetres per count of a position word.
@@ -36,13 +37,13 @@ inline constexpr double kMmPerCount36Inch = 914.4 / 32768.0;
 inline constexpr double kMmPerCount72Inch = 1828.8 / 32768.0;
 inline constexpr double kDegPerCount = 180.0 / 32768.0;
 
-/// What a record says: tracker_from_sensor, as far as the format carries it.
+/// What a miniBIRD record says: tracker_from_sensor, as far as the record's format carries it.
 struct RecordPose {
   std::optional<Eigen::Vector3d> position_mm;
   std::optional<Eigen::Matrix3d> rotation;
 };
 
-/// Words in wire order -> pose. Matrices are made orthonormal (their words are rounded). Refuses what no pose can send:
+/// Words in wire order -> pose. Matrices are made orthonormal (their words are rounded). Refuses what no pose can give:
 /// a matrix that is far from orthonormal or all zero (a saturated sensor), a quaternion whose norm is not 1 within
 /// 0.01, an elevation outside 90 degrees, a wrong number of words.
 Result<RecordPose> decode_pose(RecordFormat format, std::span<const std::int16_t> words, double mm_per_count);

@@ -9,19 +9,20 @@
 
 namespace birdseye::drivers::minibird {
 
-/// One whole record as it came off the line.
+/// One whole miniBIRD record as it came off the line: the bytes of one measurement of one bird.
 struct Record {
   std::vector<std::int16_t> words;
   std::uint8_t button = 0;   ///< 0 where the records carry none
   std::uint8_t address = 0;  ///< the unit that sent it; 0 where the records carry none
-  std::int64_t begin = 0;    ///< of all bytes ever pushed, the index of its first
-  /// Of the parser when the record was whole: a step between two means that bytes were lost, or came to them.
+  std::int64_t begin = 0;    ///< the index of its first byte among all bytes ever pushed
+  /// The parser's counts when the record was whole: a step from one record to the next means that bytes were lost or
+  /// added between them.
   std::uint64_t phase_errors = 0, discarded_bytes = 0;
 };
 
 /// The receiver: finds records in a stream of bytes by the phase bit, which only the first byte of a record has set.
-/// What it cannot know, for the wire does not say: a corrupted byte with that bit clear. decode_pose() checks the
-/// sense.
+/// The parser cannot see a corrupted byte whose phase bit is clear, for the wire carries no checksum: decode_pose()
+/// checks whether the pose makes sense.
 class RecordParser {
  public:
   /// The formats of the units, in the order of their addresses; one unit without group mode: one format. A record's
@@ -31,7 +32,7 @@ class RecordParser {
   explicit RecordParser(const StreamLayout& layout);
 
   std::vector<Record> push(std::span<const std::uint8_t> bytes);
-  /// Drops a partial record, as after a line error whose place is not known, and hunts.
+  /// Drops a partial record, as after a line error whose place is not known, and looks for the next phase bit.
   void reset();
 
   [[nodiscard]] std::uint64_t phase_errors() const { return phase_errors_; }

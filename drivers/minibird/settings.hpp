@@ -23,7 +23,7 @@ struct FilterSettings {
   std::optional<std::array<double, 7>> dc_alpha_min, dc_alpha_max;
 };
 
-/// What differs from the others for one bird; what is absent is as for all.
+/// Settings of one bird that differ from those of all; what is absent is as for all.
 struct BirdSettings {
   std::optional<RecordFormat> format;
   std::optional<Hemisphere> hemisphere;
@@ -45,10 +45,10 @@ struct MiniBirdSettings {
   std::optional<AnglesDeg> reference_frame;     ///< turns the axes that orientations are told in
   bool reference_frame_turns_position = false;  ///< and positions too; firmware 3.45 and later
   std::optional<bool> sudden_change_lock;       ///< parameter 14
-  int baud = 115200;                            ///< to tell when a byte began from when it had come
+  int baud = 115200;                            ///< from it follows when a byte began, given when the byte had come
   /// From the middle of a measurement to its first byte on the line, filters off.
   Duration delay = Duration::from_ms(7) + Duration{500'000};
-  /// A unit that answers at once and is as wanted is not reset: seconds are saved.
+  /// A unit that answers at once and has all settings is not reset, which saves seconds.
   bool warm_restart = true;
   Plausibility plausibility;
 

@@ -8,19 +8,19 @@
 
 namespace birdseye::drivers::minibird {
 
-/// What a sensor in somebody's hand cannot do. A reading that does it has no pose, only words.
+/// Limits of what a sensor in somebody's hand can do. A reading beyond them has no pose, only words.
 struct Plausibility {
   double most_speed_mm_s = 2000;
   double most_turn_deg_s = 1000;
   double most_acceleration_mm_s2 = 20'000;  ///< against the line through the last readings
   double slack_mm = 4, slack_deg = 5;       ///< on top of these, for noise
-  int step_confirms = 5;                    ///< so many readings in a row after a step, agreeing: it was one after all
+  int step_confirms = 5;                    ///< so many agreeing readings in a row after a step confirm it
   int start_confirms = 1;                   ///< the same at the start and after a gap
   Duration gap = Duration::from_ms(150);    ///< after so long without a good reading the sensor may be anywhere
-  /// Noise keeps a record from being repeated exactly: where there was some, after so many that are it is frozen. 0:
-  /// however often, it is not.
+  /// Noise keeps records from repeating exactly. Where there was noise, a reading is frozen after so many equal
+  /// records. 0: never.
   int frozen_after = 100;
-  double frozen_moved_mm = 2;        ///< and at once, where the speed until then would have moved it so far
+  double frozen_moved_mm = 2;        ///< frozen at once, where the speed until then would have moved the sensor so far
   double hemisphere_border_mm = 15;  ///< so near the plane through the transmitter, p and -p are not told apart
   /// After a flip and a gap of at most this, the sensor is still taken to be where it was.
   Duration flip_memory = Duration::from_ms(2000);
@@ -34,7 +34,8 @@ struct BirdLayout {
   Eigen::Vector3d into_hemisphere = Eigen::Vector3d::UnitX();
 };
 
-/// How the bytes of a stream are to be read: plain data, all that MeasurementAssembler needs. To be recorded with them.
+/// How the bytes of a stream are to be read: plain data, all that MeasurementAssembler needs, recorded together with
+/// the bytes.
 struct StreamLayout {
   std::vector<BirdLayout> birds = {BirdLayout{}};  ///< by address, 1 first
   bool group_mode = false;                         ///< each record ends with its bird's address

@@ -18,7 +18,7 @@ std::string words_of(const Status& status);
 
 /// A unit's error code in words; unknown codes say so.
 std::string error_text(std::uint8_t code);
-/// The unit stops at such an error, and its lamp blinks the code, until it is reset.
+/// Whether the unit stops at such an error until it is reset; its lamp blinks the code meanwhile.
 bool is_fatal(std::uint8_t code);
 
 /// One latched error. detail: of the expanded error (parameter 16), where the unit has one.

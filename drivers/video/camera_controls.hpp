@@ -24,16 +24,16 @@ class ControlPort {
   virtual Result<void> set(std::uint32_t id, int value) = 0;
 };
 
-/// Exposure, gain, white balance and focus: sets them, and holds what the camera would else change by itself.
+/// Sets exposure, gain, white balance and focus, and holds those that the camera would otherwise change by itself.
 class CameraControls {
  public:
   explicit CameraControls(ControlPort& port) : port_(port) {}
   ControlReport apply(const CameraSettings& settings);
-  /// Every automatism off, its value as it was when it was on. A second time nothing happens.
+  /// Switches every automatism off and keeps the value that it had. A second call does nothing.
   ControlReport lock();
-  /// The automatisms that lock() switched off, on again.
+  /// Switches those automatisms on again that lock() switched off.
   ControlReport unlock();
-  /// When nothing but us changes it.
+  /// The exposure, where the camera does not change it by itself.
   [[nodiscard]] std::optional<Duration> exposure();
 
  private:

@@ -11,13 +11,13 @@
 
 namespace birdseye::drivers {
 
-/// Rates at one size: some, or all in a range (of which the steps are too fine to matter). Neither: it does not say.
+/// Rates at one size: single ones, or a range (whose steps are too fine to matter). Neither: the camera does not say.
 struct RateOffer {
   std::vector<double> rates_hz;
   double lowest_hz = 0, highest_hz = 0;
 };
 
-/// One size (least = most), or all in a range by steps.
+/// One size (least = most), or all sizes of a range by steps.
 struct SizeOffer {
   int least_width_px = 0, most_width_px = 0, step_width_px = 1;
   int least_height_px = 0, most_height_px = 0, step_height_px = 1;
@@ -26,7 +26,7 @@ struct SizeOffer {
 
 struct FormatOffer {
   std::uint32_t fourcc = 0;
-  std::vector<SizeOffer> sizes;  ///< none: it does not say
+  std::vector<SizeOffer> sizes;  ///< none: the camera does not say
 };
 
 /// What to ask a camera for.

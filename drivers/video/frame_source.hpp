@@ -17,7 +17,7 @@ struct Frame {
   std::shared_ptr<const std::vector<std::uint8_t>> rgb;
   int width_px = 0, height_px = 0;
   std::uint64_t sequence = 0;  ///< the camera's own count: a hole is a frame that was lost
-  /// The middle of the exposure, if acquired_known; else nothing is known but arrived, and these two are zero.
+  /// The middle of the exposure and its sigma, if acquired_known; else both are zero and only `arrived` is known.
   DeviceTime acquired;
   Duration acquired_sigma;
   bool acquired_known = false;
@@ -25,7 +25,8 @@ struct Frame {
   Duration stamp_ahead;  ///< how far the camera's stamp lay ahead of arrived: some drivers stamp an end yet to come
 };
 
-/// Of one frame. More than any laparoscope's; three bytes each are less than the largest message of the wire.
+/// The most pixels of a frame: more than any laparoscope has, and with three bytes each less than the largest message
+/// of the wire.
 inline constexpr std::int64_t kMostPixels = std::int64_t{4096} * 4096;
 
 struct CameraSettings {
@@ -61,12 +62,12 @@ class FrameSource {
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// One line: device, driver, format, size, rate, stamps.
   [[nodiscard]] virtual std::string describe() const = 0;
-  /// What tells this camera from another: "model", and "serial" where it has one.
+  /// What distinguishes this camera from another: "model", and "serial" where it has one.
   [[nodiscard]] virtual std::map<std::string, std::string> identity() const = 0;
   [[nodiscard]] virtual FrameCounters counters() const = 0;
-  /// As the camera says, whatever was asked; 0: it does not say.
+  /// The rate that the camera says it has, whatever was asked for; 0: it does not say.
   [[nodiscard]] virtual double rate_hz() const { return 0; }
-  /// When the camera says it and does not change it by itself.
+  /// The exposure, where the camera tells it and does not change it by itself.
   [[nodiscard]] virtual std::optional<Duration> exposure() const { return std::nullopt; }
   /// What became of exposure, gain and white balance as set.
   [[nodiscard]] virtual ControlReport controls() const { return {}; }
@@ -77,9 +78,9 @@ class FrameSource {
   virtual Result<void> restart_stream() { return {}; }
 };
 
-/// What open_camera() could never take, known without a camera: "key: why".
+/// Settings that open_camera() could never take, found without a camera: "key: why".
 std::vector<std::string> faults_of(const CameraSettings& settings);
-/// Opens what settings.source names; an unknown kind is an error that says which there are.
+/// Opens what settings.source names. For an unknown kind the error says which kinds there are.
 Result<std::unique_ptr<FrameSource>> open_camera(const CameraSettings& settings);
 
 }  // namespace birdseye::drivers

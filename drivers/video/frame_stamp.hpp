@@ -20,17 +20,17 @@ struct MidExposure {
   Duration sigma;
 };
 
-/// What is unknown adds its mean and its spread, so that the sigma covers it.
+/// The middle of the exposure. Whatever is unknown enters with its mean and its spread, so that the sigma covers it.
 MidExposure mid_exposure(DeviceTime stamp, const StampMeaning& meaning);
 
 /// A camera's count of frames, of 32 bits (Video4Linux) -> one that goes up, in which every hole is a lost frame.
-/// - The first buffer of some drivers (v4l2loopback) is 0 whatever comes next: a hole after that says nothing.
+/// - Some drivers (v4l2loopback) number the first buffer 0 whatever comes next: a hole after it is no loss.
 /// - A count that stands still is no count; one that goes back began again.
 class SequenceLine {
  public:
   struct Step {
     std::uint64_t sequence = 0;
-    std::uint64_t lost = 0;  ///< between the one before and this
+    std::uint64_t lost = 0;  ///< between the frame before and this one
   };
   Step push(std::uint32_t count);
   /// The stream was stopped and started: the next count follows from nothing.

@@ -6,8 +6,8 @@
 
 namespace birdseye::drivers {
 
-/// A picture of exactly this size -> RGB. False for whatever is damaged, cut short, of another size, or no JPEG, and
-/// for pictures in passes (progressive), which no camera makes and which can be small and yet take long.
+/// Decodes a picture of exactly this size to RGB. False for data that are damaged, cut short, of another size, or no
+/// JPEG, and for progressive pictures, which no camera makes and which may take long although they are small.
 /// Frames may lack their Huffman tables, as those of many USB cameras do.
 bool decode_jpeg(std::span<const std::uint8_t> jpeg, int width_px, int height_px, std::vector<std::uint8_t>& rgb);
 

@@ -13,9 +13,9 @@ class PixelPool {
  public:
   using Pixels = std::vector<std::uint8_t>;
 
-  /// A buffer of whatever was in it before, perhaps empty.
+  /// A buffer, empty or with whatever was in it before.
   [[nodiscard]] std::unique_ptr<Pixels> take();
-  /// To the readers; the pool may be gone by the time the last of them is.
+  /// Hands a buffer to its readers. The last of them may outlive the pool.
   [[nodiscard]] std::shared_ptr<const Pixels> share(std::unique_ptr<Pixels> pixels);
   void give_back(std::unique_ptr<Pixels> pixels) { shelf_->put(std::move(pixels)); }
 

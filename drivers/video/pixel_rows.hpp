@@ -10,10 +10,11 @@ struct YuvMatrix {
   std::int16_t black = 0;  ///< the luma of black
 };
 
-/// Where the bytes of luma and chroma lie in a row. Chroma is u, v, u, v in all of them.
+/// Where the bytes of luma and chroma lie in a row. Chroma is u, v, u, v in every packing.
 enum class YuvPacking { luma_first, chroma_first, two_planes };
 
-/// One row to RGB. luma is the row's packed bytes, of two_planes those of its luma; chroma is only of two_planes.
+/// Converts one row to RGB. luma: the row's packed bytes, or with two_planes its luma alone. chroma: used with
+/// two_planes only.
 void yuv_row_to_rgb(const std::uint8_t* luma, const std::uint8_t* chroma, int width_px, YuvPacking packing,
                     const YuvMatrix& matrix, std::uint8_t* rgb);
 void bgr_row_to_rgb(const std::uint8_t* bgr, int width_px, std::uint8_t* rgb);

@@ -9,8 +9,9 @@
 
 namespace birdseye::drivers {
 
-/// Frames from a program on this machine, over a Unix stream socket that it listens at. Each is a little-endian header
-/// of 64 bytes (docs/manual/frame-socket.md) and its pixels. The clock is this machine's CLOCK_MONOTONIC.
+/// Frames from a program on this machine, over a Unix stream socket at which that program listens. Each frame is a
+/// little-endian header of 64 bytes (docs/manual/frame-socket.md) and its pixels. The clock is this machine's
+/// CLOCK_MONOTONIC.
 class SocketCamera final : public FrameSource {
  public:
   static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path);
@@ -32,7 +33,7 @@ class SocketCamera final : public FrameSource {
   std::string name_;
   FrameCounters counters_;
   PixelPool pool_;
-  // A frame that the deadline cut is gone on with at the next call.
+  // A frame that a deadline cut in two is completed at the next call.
   std::vector<std::uint8_t> header_;
   std::size_t header_have_ = 0, payload_have_ = 0;
   PixelLayout layout_;                          // as the header says, once it is whole

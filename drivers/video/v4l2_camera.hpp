@@ -11,8 +11,9 @@
 
 namespace birdseye::drivers {
 
-/// A Video4Linux2 capture device, streaming into memory-mapped buffers. Of one thread. A frame's time is the driver's
-/// stamp where that is one of CLOCK_MONOTONIC, moved to the middle of the exposure as far as the exposure is known.
+/// A Video4Linux2 capture device, streaming into memory-mapped buffers. One thread uses it. A frame's time is the
+/// driver's stamp where that is one of CLOCK_MONOTONIC, moved to the middle of the exposure as far as the exposure is
+/// known.
 class V4l2Camera final : public FrameSource {
  public:
   static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path, const CameraSettings& settings);
@@ -34,7 +35,7 @@ class V4l2Camera final : public FrameSource {
   struct Buffer {
     void* start = nullptr;
     std::size_t length = 0;
-    UniqueFd dmabuf;  // for whoever would take the pixels without a copy; empty where the driver has none
+    UniqueFd dmabuf;  // for a reader that takes the pixels without a copy; empty where the driver has none
   };
   enum class StampKind { unseen, none, start_of_exposure, end_of_frame };
 

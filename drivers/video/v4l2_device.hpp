@@ -20,14 +20,15 @@ class V4l2Device final : public ControlPort {
   [[nodiscard]] int fd() const { return fd_.get(); }
   [[nodiscard]] const std::string& card() const { return card_; }
   [[nodiscard]] const std::string& driver() const { return driver_; }
-  /// Of the USB device behind the node, as the kernel tells it; empty where there is none.
+  /// The serial number of the USB device behind the node, as the kernel tells it; empty where there is none.
   [[nodiscard]] std::string usb_serial() const;
 
-  /// 0, or -1 with errno; gone on with after a signal.
+  /// ioctl(2), repeated after a signal: 0, or -1 with errno.
   int control(unsigned long request, void* argument) const;
-  /// Formats, sizes, and the rates at the size asked for. Bounded, whatever the driver goes on saying.
+  /// Formats, sizes, and the rates at the size asked for. The lists are bounded, however many the driver offers.
   [[nodiscard]] std::vector<FormatOffer> offers(const CameraSettings& asked) const;
-  /// Of inputs such as HDMI: takes up what comes in. Its rate; empty where there is no such thing.
+  /// For inputs such as HDMI: sets the device to the signal that comes in and returns the signal's rate. Empty for
+  /// other inputs.
   /// Errc::not_found when the cable brings nothing.
   [[nodiscard]] Result<std::optional<double>> follow_signal() const;
 
