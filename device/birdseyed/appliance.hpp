@@ -13,9 +13,9 @@
 
 namespace birdseye::device {
 
-/// The appliance at work: a thread for each instrument hands over what comes, one makes messages of it and publishes
-/// them, one reports health each second. An instrument that is not there, goes away or falls silent is said so on the
-/// wire and looked for until it is back; the others go on.
+/// The appliance at work: a thread for each instrument hands over what comes, one thread makes messages of it and
+/// publishes them, one reports health each second. When an instrument is not there, goes away or falls silent, the
+/// appliance says so on the wire and looks for it until it is back; the others go on.
 class Appliance {
  public:
   /// server: outlives the appliance, so that clients stay connected when the configuration is read again.
@@ -24,9 +24,9 @@ class Appliance {
   Appliance(const Appliance&) = delete;
   Appliance& operator=(const Appliance&) = delete;
 
-  /// Every thread has shown itself lately.
+  /// Whether every thread has shown a sign of life lately.
   [[nodiscard]] bool alive() const;
-  /// For the service manager: the state and what is wrong.
+  /// The state and what is wrong, for the service manager.
   [[nodiscard]] std::string summary() const;
 
  private:
@@ -39,12 +39,12 @@ class Appliance {
   Config config_;
   wire::Server& server_;
   std::unique_ptr<Recorder> recorder_;  ///< null where nothing is recorded
-  std::string not_recording_;           ///< why there is none, where there should be
+  std::string not_recording_;           ///< why nothing is recorded, where something should be
   EventQueue queue_;
   InstrumentPost tracker_post_, camera_post_, gpio_post_;
   std::atomic<std::int64_t> core_alive_ns_;
   std::atomic<ApplianceState> state_ = ApplianceState::starting;
-  mutable std::mutex told_mutex_;  ///< of what the core's thread tells the one that reports
+  mutable std::mutex told_mutex_;  ///< guards what the core's thread tells the reporting thread
   Core::Counters counters_;
   InstrumentBoard board_;
   std::vector<std::jthread> threads_;

@@ -9,7 +9,7 @@
 
 namespace birdseye::device {
 
-/// Numbers and texts as little-endian bytes, as every machine that this runs on has them.
+/// Writes numbers and texts as little-endian bytes, the order of every machine that this runs on.
 class ByteWriter {
  public:
   template <typename T>
@@ -31,7 +31,7 @@ class ByteWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// What is not there reads as zero, and good() says that it was not.
+/// Reads them back. Bytes that are not there read as zero, and good() is false from then on.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

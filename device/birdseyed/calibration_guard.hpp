@@ -9,18 +9,19 @@
 
 namespace birdseye::device {
 
-/// Whether the calibration record that the appliance was told of is of the instruments that are here. One of another
-/// camera or tracker is not passed on: an overlay by it would be wrong.
+/// Decides whether the calibration record that the configuration names belongs to the instruments that are here. A
+/// record of another camera or tracker is not passed on: an overlay by it would be wrong.
 class CalibrationGuard {
  public:
-  /// record: as record_text() makes it; empty: there is none. One that cannot be read is never in force.
+  /// record: a calibration record as record_text() makes it; empty: there is none. A record that cannot be read is
+  /// never in force.
   explicit CalibrationGuard(const std::string& record);
 
   void note(const InstrumentChanged& changed);
   void note_frame(int width_px, int height_px);
-  /// When it became another than was last taken.
+  /// What to tell clients, if it differs from what was last taken; else empty.
   std::optional<wire::Calibration> take_change();
-  /// Why it is refused, in words; empty where it is not, or where the instruments have yet to come.
+  /// Why the record is refused, in words; empty where it is in force, or where the instruments have yet to come.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
  private:

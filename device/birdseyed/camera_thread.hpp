@@ -8,13 +8,14 @@
 
 namespace birdseye::device {
 
-/// Who wants the camera's exposure, gain, white balance and focus held, and hears what became of that.
+/// Whether a client wants the camera's exposure, gain, white balance and focus held, and where to say what became of
+/// that.
 struct ControlsLock {
   std::function<bool()> wanted = [] { return false; };
   std::function<void(bool locked, const drivers::ControlReport&)> tell = [](bool, const drivers::ControlReport&) {};
 };
 
-/// Finds the camera and hands over its frames, and begins again when it is lost. Until stop.
+/// Finds the camera, hands over its frames, and begins again when it is lost. Returns at stop.
 void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const ControlsLock& lock,
                 const std::stop_token& stop);
 

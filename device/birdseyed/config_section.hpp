@@ -16,7 +16,7 @@ namespace birdseye::device {
 class ConfigFaults {
  public:
   explicit ConfigFaults(std::filesystem::path file) : file_(std::move(file)) {}
-  /// line 0: of the file as a whole.
+  /// line: 0 for a fault of the file as a whole.
   void add(std::int64_t line, const std::string& text);
   [[nodiscard]] std::size_t count() const { return faults_.size(); }
   [[nodiscard]] std::string text() const;  ///< in the order of the lines
@@ -27,7 +27,7 @@ class ConfigFaults {
 };
 
 /// One table of a configuration file. A value that is absent leaves what was there; one of the wrong type or out of its
-/// range is a fault. Every key that is asked for is noted, so that what is left over can be named.
+/// range is a fault. Every key that is asked for is noted, so that finish() can name the others.
 class ConfigSection {
  public:
   /// table: null where the file has no such section.
@@ -49,10 +49,10 @@ class ConfigSection {
 
   [[nodiscard]] bool present() const { return table_ != nullptr; }
   [[nodiscard]] bool has(const char* key) const;
-  /// key "": the one that why begins with, else of the section as a whole. A key fails once: what follows from that is
-  /// not told.
+  /// Tells a fault of key. With an empty key it is that of the key with which `why` begins, else of the section as a
+  /// whole. Only the first fault of a key is told, for others follow from it.
   void fail(const char* key, const std::string& why);
-  /// Something was wrong with it.
+  /// Whether a fault of key was told.
   [[nodiscard]] bool failed(const std::string& key) const { return failed_.count(key) != 0; }
   /// Names the keys that nobody asked for. To be called last.
   void finish();

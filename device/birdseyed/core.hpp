@@ -24,7 +24,7 @@ struct CoreSettings {
   Duration pose_wait{0};
   FrameClock::Settings frame_clock;
   std::string calibration;                     ///< a calibration record's text; empty: none
-  std::optional<calibration::FieldMap> field;  ///< corrects every pose, and doubts those that it does not reach
+  std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
 };
 
 /// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.
@@ -34,7 +34,7 @@ class Core {
 
   /// The messages that an event brings about, in order.
   std::vector<wire::Packet> take(const RawEvent& event);
-  /// Frames wait for poses: events, if only ticks, must go on.
+  /// Whether frames wait for poses: then events must go on coming, if only ticks.
   [[nodiscard]] bool waiting() const { return !frames_.empty(); }
 
   struct Counters {
@@ -67,7 +67,7 @@ class Core {
   void note(const Tick&) {}
   void publish(const drivers::minibird::Measurement& measurement);
   void tell(Instrument instrument, const std::vector<ClockEvent>& events);
-  /// The reading with the field's bend taken away, or in doubt where that is not known.
+  /// The reading corrected by the field map; doubted where the field was not mapped.
   [[nodiscard]] drivers::minibird::BirdReading corrected(const drivers::minibird::BirdReading& reading);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
   void release_frames(DeviceTime now);

@@ -11,9 +11,9 @@
 
 namespace birdseye::device {
 
-/// From the instruments' threads to the one that makes messages. Bounded: of the frames that wait, the oldest goes when
-/// there are too many, for what is live matters more than what was; everything else is small and has a bound of
-/// minutes, but for what becomes of instruments. What is dropped is counted.
+/// From the instruments' threads to the one that makes messages. Bounded: when too many frames wait, the oldest goes,
+/// for what is live matters more than what was. Everything else is small and may wait for minutes; changes of
+/// instruments are never dropped. What is dropped is counted.
 class EventQueue {
  public:
   static constexpr std::size_t kMostFrames = 8;  // 50 MB of 1080p

@@ -12,35 +12,36 @@
 
 namespace birdseye::device {
 
-/// When a frame was taken: by the strobe where there is one and it is surely this frame's, else by the camera's stamp,
-/// else from when frames arrive. Which edge is a frame's, its stamp tells, or its arrival less the delay: either must
-/// be right to half a period.
+/// Tells when a frame was taken: by the strobe, where an edge is surely this frame's; else by the camera's stamp; else
+/// from the arrivals of frames. The frame's stamp, or its arrival less the delay, tells which edge is its own, and must
+/// be right to half a period for that.
 class FrameClock {
  public:
   struct Settings {
     double rate_hz = 25;
-    /// Of a frame without a stamp: from the middle of the exposure to its arrival, at the least. Empty: anything up to
-    /// a period; or, with a strobe, no time at all until the strobe gives one.
+    /// For frames without a stamp: the least time from the middle of the exposure to the arrival. Empty: anything up to
+    /// a period; with a strobe, a frame then has no time until the strobe gives one.
     std::optional<Duration> delay;
-    /// For the strobe, which marks the exposure's start, where the camera does not say.
+    /// The exposure, where the camera does not tell it: the strobe marks the exposure's start, and its middle is
+    /// sought.
     Duration exposure{0};
     bool strobe = false;  ///< edges come
   };
   struct Time {
     DeviceTime acquired;
     Duration sigma;
-    bool certain = true;  ///< false: it has yet to be made out
+    bool certain = true;  ///< false: the time has yet to be made out
     std::string reason;   ///< why not, in words
   };
 
   explicit FrameClock(const Settings& settings);
 
-  /// A camera that (re)starts: what was learned of the old one is forgotten.
+  /// A camera starts, or starts anew: what was learned before is forgotten.
   void restart(double rate_hz, std::optional<Duration> exposure);
   void take(const drivers::GpioEdge& edge);
-  /// Of each frame, in order.
+  /// The time of a frame. Must be called for each frame, in order.
   Time time_of(const drivers::Frame& frame);
-  /// Of the line under the arrivals; 0 where the camera stamps its frames.
+  /// Drift of the line under the arrivals; 0 where the camera stamps its frames.
   [[nodiscard]] double drift_ppm() const { return line_ ? line_->drift_ppm() : 0; }
   /// What happened to the camera's clock since the last call.
   std::vector<ClockEvent> take_events() { return std::exchange(events_, {}); }

@@ -11,11 +11,11 @@ namespace birdseye::device {
 
 struct GpioConfig {
   drivers::GpioSettings lines;  ///< no chip: not used
-  /// Of pulses on the trigger line, which make a camera take a frame; 0: none.
+  /// Rate of the pulses on the trigger line, which make a camera take a frame; 0: none.
   double trigger_rate_hz = 0;
 };
 
-/// Hands over strobe and pedal, shows the appliance's state on the LED, pulses the trigger. Until stop.
+/// Hands over edges of strobe and pedal, shows the appliance's state on the LED, pulses the trigger. Returns at stop.
 void run_gpio(const GpioConfig& config, const std::atomic<ApplianceState>& state, InstrumentPost& post,
               const std::stop_token& stop);
 

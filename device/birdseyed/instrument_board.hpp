@@ -11,11 +11,11 @@ namespace birdseye::device {
 enum class ApplianceState : std::uint8_t {
   starting,  ///< an instrument has yet to run for the first time
   ready,     ///< all that is configured runs
-  degraded,  ///< something that has run does not
+  degraded,  ///< an instrument that has run does not run now
 };
 const char* name_of(ApplianceState state);
 
-/// How each instrument is, and what that makes of the whole.
+/// The state of each instrument, and the state of the appliance that follows from them.
 class InstrumentBoard {
  public:
   struct Entry {
@@ -36,7 +36,8 @@ class InstrumentBoard {
   std::array<Entry, kInstruments> entries_;
 };
 
-/// The status LED: steady when ready, slow when starting, fast when degraded; dark means that nobody is there.
+/// Whether the status LED is lit now: steadily when ready, blinking slowly when starting and fast when degraded. Dark
+/// means that birdseyed does not run.
 bool led_on(ApplianceState state, DeviceTime now);
 
 }  // namespace birdseye::device

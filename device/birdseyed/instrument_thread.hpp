@@ -28,7 +28,7 @@ class InstrumentPost {
   std::string text_;
 };
 
-inline constexpr Duration kPatience = Duration::from_ms(100);   ///< how soon a thread sees that it shall stop
+inline constexpr Duration kPatience = Duration::from_ms(100);   ///< within which a thread sees that it shall stop
 inline constexpr Duration kLookAgain = Duration::from_ms(400);  ///< for an instrument that is not there
 
 }  // namespace birdseye::device

@@ -5,7 +5,7 @@
 #include "calibration/record/field_map_json.hpp"
 #include "device/birdseyed/core.hpp"
 
-/// What a recording keeps as JSON: how a tracker's bytes are to be read, and what the core was told.
+/// What an appliance recording keeps as JSON: how a tracker's bytes are to be read, and the core's settings.
 namespace birdseye {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Duration, ns)
@@ -69,7 +69,7 @@ inline void to_json(nlohmann::json& json, const CoreSettings& settings) {
           {"calibration", settings.calibration}};
   if (settings.field) json["field"] = settings.field->data();
 }
-/// Throws where a map is none: going on without it would publish other poses.
+/// Throws where the field map makes no sense: going on without it would publish other poses.
 inline void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("bird_names").get_to(settings.bird_names);
   json.at("pose").get_to(settings.pose);

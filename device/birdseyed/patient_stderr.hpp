@@ -9,13 +9,13 @@
 
 namespace birdseye::device {
 
-/// The log on standard error, for whoever keeps it. If that takes nothing (a full pipe, a journal that hangs) lines are
-/// left out: instruments and clients do not wait for them.
+/// The log on standard error. While the reader of standard error takes nothing (a full pipe, a journal that hangs),
+/// lines are left out: instruments and clients do not wait for the log.
 class PatientStderr final : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& message) override {
     spdlog::memory_buf_t line;
     formatter_->format(message, line);
-    // What is ready takes at least so much without waiting.
+    // A pipe that poll(2) calls ready takes at least so many bytes without waiting.
     constexpr std::size_t kAtOnce = 4096;
     pollfd entry{STDERR_FILENO, POLLOUT, 0};
     if (::poll(&entry, 1, 0) == 1 && (entry.revents & POLLOUT) != 0)

@@ -7,7 +7,7 @@
 namespace birdseye::device {
 
 /// Opens each instrument that is configured, prints a line of what it is, and closes it. The error has a line for each
-/// that cannot be used.
+/// instrument that cannot be used.
 Result<void> probe(const Config& config, const std::stop_token& stop);
 
 }  // namespace birdseye::device

@@ -32,12 +32,12 @@ struct InstrumentChanged {
   InstrumentState state = InstrumentState::absent;
   std::string text = {};  ///< what it is, or what is wrong, in words
   DeviceTime at = {};
-  /// Of a tracker that runs: how its bytes are to be read.
+  /// For a tracker that runs: how its bytes are to be read.
   std::optional<drivers::minibird::StreamLayout> layout = std::nullopt;
-  /// Of a camera that runs; 0: it does not say.
+  /// For a camera that runs: its rate; 0: it does not say.
   double rate_hz = 0;
   std::optional<Duration> exposure = std::nullopt;
-  /// Of one that runs: what tells it from another.
+  /// For an instrument that runs: what distinguishes it from others of its kind.
   std::map<std::string, std::string> identity = {};
 };
 
@@ -61,7 +61,7 @@ struct Tick {
 
 using RawEvent = std::variant<InstrumentChanged, TrackerBytes, FrameCame, EdgesCame, Tick>;
 
-/// When it was handed over, on the appliance's clock.
+/// When the event was handed over, on the appliance's clock.
 DeviceTime time_of(const RawEvent& event);
 
 }  // namespace birdseye::device

@@ -12,13 +12,13 @@
 
 namespace birdseye::device {
 
-/// What a recording is written to. Each call may take as long as a disk likes.
+/// The file of an appliance recording. Each call may take as long as the disk takes.
 class RecordFile {
  public:
   virtual ~RecordFile() = default;
-  /// All of it: 0, or errno.
+  /// Writes all bytes: 0, or errno.
   virtual int write(std::span<const std::uint8_t> bytes) = 0;
-  /// Everything so far, so that a power cut does not lose it: 0, or errno.
+  /// Brings everything written so far onto the disk, so that a power cut does not lose it: 0, or errno.
   virtual int sync() = 0;
 };
 
@@ -27,20 +27,21 @@ struct NewRecordFile {
   std::filesystem::path path;
 };
 
-/// birdseyed-<UTC date and time>.berec in the folder; with -2, -3 and so on where there is one of that name.
+/// Creates birdseyed-<UTC date and time>.berec in the folder, with -2, -3 and so on where there is one of that name.
 Result<NewRecordFile> create_record_file(const RecordConfig& config);
 
-/// Writes raw events to a file on a thread of its own. A disk that keeps up has what was taken more than a second ago:
-/// a power cut loses no more. One that does not, is full, or goes away ends the recording and is said; it holds up
-/// nothing, the end included: a thread that hangs in a disk is let go.
+/// Writes raw events to a file on a thread of its own. If the disk keeps up, everything that was taken more than a
+/// second ago is on it, so a power cut loses no more than that. A disk that does not keep up, is full, or goes away
+/// ends the recording, and text() says so. A disk never holds up the appliance, not even at the end: a thread that
+/// hangs in a disk is abandoned.
 class Recorder {
  public:
   using Create = std::function<Result<NewRecordFile>(const RecordConfig&)>;
 
-  /// What waits for the disk, what is being written included: 64 MB, or two frames where these are larger.
+  /// The most that may wait for the disk, including what is being written: 64 MB, or two frames where these are larger.
   static constexpr std::size_t kMostHeldBytes = 64'000'000;
 
-  /// An error where no file could be begun, within a second or at all.
+  /// An error where no file could be begun within a second.
   static Result<std::unique_ptr<Recorder>> start(const RecordConfig& config, const CoreSettings& settings,
                                                  Create create = create_record_file);
   /// Writes what waits, for a second at most.
@@ -49,7 +50,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void take(const RawEvent& event);
-  /// The file, or why it ended.
+  /// The file's path, or why the recording ended.
   [[nodiscard]] std::string text() const;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
@@ -58,7 +59,7 @@ class Recorder {
 
   explicit Recorder(std::shared_ptr<Writer> writer);
 
-  std::shared_ptr<Writer> writer_;  ///< the thread's too, which may be let go
+  std::shared_ptr<Writer> writer_;  ///< shared with the thread, which may be abandoned
   std::filesystem::path path_;
   std::thread thread_;
 };

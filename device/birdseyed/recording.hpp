@@ -9,29 +9,29 @@
 
 #include "device/birdseyed/core.hpp"
 
-/// An appliance recording, a file of raw events (docs/manual/appliance-recording.md): eight bytes of magic, then blocks of
-/// kind, size, payload, checksum. A block is whole or it is not: a file that was cut anywhere, as by a power cut, is good
-/// up to the last whole block.
+/// An appliance recording, a file of raw events (docs/manual/appliance-recording.md): eight bytes of magic, then blocks
+/// of kind, size, payload, checksum. A block is whole or it is not: a file that was cut anywhere, as by a power cut, is
+/// good up to the last whole block.
 namespace birdseye::device {
 
 using Bytes = std::vector<std::uint8_t>;
 
 inline constexpr std::size_t kMagicBytes = 8;
 Bytes recording_magic();
-/// What the core was told; the first block of a file.
+/// The core's settings: the first block of a file.
 Bytes block_of(const CoreSettings& settings);
 Bytes block_of(const RawEvent& event);
 
 /// Reads a file front to back.
 class RecordingReader {
  public:
-  /// Refuses what is no recording, and one of another version.
+  /// Refuses what is no appliance recording, and one of another version.
   static Result<RecordingReader> open(const std::filesystem::path& path);
 
   [[nodiscard]] const CoreSettings& settings() const { return settings_; }
   /// The next event; empty at the end. An error where a block is damaged: what follows cannot be trusted.
   Result<std::optional<RawEvent>> next();
-  /// The file ended inside a block.
+  /// Whether the file ended inside a block.
   [[nodiscard]] bool cut_short() const { return cut_short_; }
 
  private:

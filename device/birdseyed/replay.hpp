@@ -8,8 +8,8 @@
 
 namespace birdseye::device {
 
-/// Publishes what a recording's appliance said, byte for byte, at the pace of its events. An error where the recording
-/// is damaged, after all that is sound.
+/// Publishes again, byte for byte and at the pace of the events, what the appliance said during a recording. Where the
+/// recording is damaged: an error, after all that is sound was published.
 Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop);
 
 }  // namespace birdseye::device

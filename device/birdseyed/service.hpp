@@ -4,7 +4,7 @@
 
 namespace birdseye::device {
 
-/// What the service manager is told; nothing where there is none. See sd_notify(3).
+/// Tells the service manager, where there is one. See sd_notify(3).
 void notify_ready(const std::string& status);
 void notify_status(const std::string& status);
 void notify_reloading();

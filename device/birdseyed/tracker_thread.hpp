@@ -9,14 +9,15 @@
 
 namespace birdseye::device {
 
-/// Finds the tracker, starts it, hands over its bytes, and begins again when it is lost or falls silent. Until stop.
+/// Finds the tracker, starts it, hands over its bytes, and begins again when it is lost or falls silent. Returns at
+/// stop.
 void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop);
 
-/// Finds and starts it, once; `still` is called while that lasts.
+/// Finds the tracker and starts it, trying once; calls `still` meanwhile.
 Result<std::unique_ptr<drivers::minibird::MiniBird>> open_tracker(const TrackerConfig& config,
                                                                   const std::stop_token& stop,
                                                                   const std::function<void()>& still = {});
-/// One line of what it is.
+/// One line that says what the tracker is.
 std::string describe(const drivers::minibird::MiniBird& tracker, const std::string& device);
 
 }  // namespace birdseye::device

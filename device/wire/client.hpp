@@ -11,8 +11,8 @@
 
 namespace birdseye::wire {
 
-/// A host's end of the wire: of an appliance's, or of any OpenIGTLink server's that sends video and poses, which is
-/// told by the first messages that come.
+/// A host's end of the wire. The other end is an appliance, or any OpenIGTLink server that sends video and poses; the
+/// first messages tell which.
 class Client {
  public:
   using Clock = std::chrono::steady_clock;
@@ -28,17 +28,20 @@ class Client {
   Result<std::optional<Event>> next(Clock::time_point deadline);
   /// Says what this client wants; without it, it gets everything.
   Result<void> subscribe(const Subscription& subscription, Clock::time_point deadline);
-  /// Has the camera's exposure, gain, white balance and focus held, or let go; what became of it comes as an event.
-  /// They are let go when the last client that held them leaves.
+  /// Asks that the camera's exposure, gain, white balance and focus be held, or let go; what became of it comes as an
+  /// event. When the last client that holds them leaves, they are let go.
   Result<void> lock_camera(bool on, Clock::time_point deadline);
 
-  /// The appliance's time on this machine's CLOCK_MONOTONIC, with a sigma: by the narrowest of the questions that
-  /// next() asks it from time to time, or by clocks that a network protocol (PTP, NTP) keeps together at both ends,
-  /// whichever is surer. Empty until there was an answer. Of a server that is no appliance: by arrivals.
+  /// A time of the appliance on this machine's CLOCK_MONOTONIC, with a sigma. It is related by the narrowest of the
+  /// questions that next() asks the appliance from time to time, or by clocks that a network protocol (PTP, NTP) keeps
+  /// together at both ends, whichever is surer. Times of a server that is no appliance are related by arrivals. Empty
+  /// until there was an answer.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
-  /// What this machine's kernel says of its clock; without it, only questions count. Monotonic + offset = wall clock.
+  /// Lets host_from_device() use the clocks that a network protocol keeps together; without this call, only questions
+  /// count. discipline: what this machine's kernel says of its clock. wall_minus_monotonic: the time of day less
+  /// CLOCK_MONOTONIC.
   void use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic);
-  /// Why the way that host_from_device() goes was chosen, in words.
+  /// How host_from_device() relates the clocks, and why that way was chosen, in words.
   [[nodiscard]] std::string clock_choice() const;
   /// What a server that is no appliance of ours is, and what of it is passed over; empty for an appliance.
   [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
@@ -50,9 +53,9 @@ class Client {
   Result<bool> fill(std::size_t size, Clock::time_point deadline);
   /// The next message, header and body; empty at the deadline. It lies in buffer_ until the next call.
   Result<std::optional<std::span<const std::uint8_t>>> next_message(Clock::time_point deadline);
-  /// Judges by a message what the other side is, where that is not known yet.
-  /// Gives the foreign feed what has come already.
+  /// Gives the foreign feed the messages that have come already, some of them at a time.
   Result<void> drain();
+  /// Judges by a message what the other side is, where that is not known yet.
   void judge(const Header& header);
   void ask();
   void ask_the_time();
@@ -65,8 +68,8 @@ class Client {
   std::size_t have_ = 0;
   Unpacker unpacker_;
   ForeignSettings foreign_settings_;
-  std::optional<ForeignFeed> foreign_;  ///< the other side is no appliance
-  bool appliance_ = false;              ///< it is one
+  std::optional<ForeignFeed> foreign_;  ///< set once the other side has shown itself to be no appliance
+  bool appliance_ = false;              ///< the other side has shown itself to be an appliance
   bool asked_for_poses_ = false;
   Clock::time_point connected_;
   ClockRelation relation_;

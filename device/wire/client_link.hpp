@@ -14,12 +14,13 @@ DeviceTime monotonic_now();
 
 /// From the last byte in to the last byte handed to the operating system.
 struct Latencies {
-  LatencyLog tracker;                ///< of clients that take no frames
-  LatencyLog tracker_beside_frames;  ///< of those that do: a pose waits while a frame before it is on its way
+  LatencyLog tracker;  ///< of clients that take no frames
+  LatencyLog
+      tracker_beside_frames;  ///< of clients that take frames too: a pose waits while a frame before it is on its way
   LatencyLog frame;
 };
 
-/// One client's end at the server: what waits to be sent to it, and what it has begun to ask. Used by one thread.
+/// The server's end of one client: the packets that wait for it, and the request that it has begun. Used by one thread.
 class ClientLink {
  public:
   explicit ClientLink(int fd);  ///< a connected, non-blocking socket, which is closed with this object
@@ -29,27 +30,28 @@ class ClientLink {
 
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
-  /// Queues a packet, if the client wants its kind. How many older ones are lost to it for that.
+  /// Queues a packet if the client wants its kind. Returns how many older packets were dropped for it.
   std::size_t offer(const Packet& packet);
   /// Hands one slice to the operating system, so that a frame to one client does not keep the others waiting; small
   /// packets go before frames that have not begun. A packet has begun when its first byte was taken; from then on it is
   /// sent whole. False: the client has gone.
   bool send_some(Latencies& latencies);
-  /// What the client asked. An error: it has gone, or it does not speak the protocol.
+  /// The requests that have come from the client. An error: the client has gone, or does not speak the protocol.
   Result<std::vector<Request>> receive();
-  /// Takes what a request changes about what this client gets.
+  /// Changes what this client gets, as its request says.
   void take(const Subscription& subscription);
   void take(const TrackingRequest& request);
   void take(const CameraLock& lock) { locks_camera_ = lock.on; }
   [[nodiscard]] bool locks_camera() const { return locks_camera_; }
-  /// It has taken nothing for long although there was something, or left a message of its own half sent.
+  /// Whether the client has taken nothing for long although there was something, or has left a message of its own half
+  /// sent.
   [[nodiscard]] bool stuck() const;
 
   [[nodiscard]] std::size_t frames_waiting() const { return waiting_.frames().size(); }
   std::size_t shed_frame() { return waiting_.shed_frame(); }
   [[nodiscard]] bool sends_frame() const { return sending_ && sending_->kind == Packet::Kind::frame; }
   [[nodiscard]] DeviceTime last_progress() const { return progress_; }
-  /// The pixels of every frame that waits or is being sent.
+  /// Appends the pixels of every frame that waits or is being sent.
   void add_pixels_to(std::vector<const std::vector<std::uint8_t>*>& pixels) const;
 
  private:

@@ -13,29 +13,31 @@
 
 namespace birdseye::wire {
 
-/// Whom to believe of what a server sends that is no appliance of ours.
+/// Which devices to use of a server that is no appliance.
 struct ForeignSettings {
-  std::string scope_device{};        ///< whose poses are the scope's; empty: the only one's that sends any
-  std::string video_device{};        ///< whose pictures are the scope's; empty: the only one's that sends any
-  std::string not_scope{};           ///< the pointer's: never the scope's, even where no other sends any
+  std::string scope_device{};  ///< the device whose poses are the scope's; empty: the only device that sends poses
+  std::string
+      video_device{};       ///< the device whose pictures are the scope's; empty: the only device that sends pictures
+  std::string not_scope{};  ///< the pointer's device: never taken for the scope's, even where no other sends poses
   std::string scope_bird = "scope";  ///< the name under which the scope's poses are given on
 };
 
-/// Makes of an OpenIGTLink server's video and poses what an appliance sends: frames with the scope's pose at their
-/// time. Times are the server's; a frame waits a moment for poses from after it. What keeps the overlay from being
-/// drawn is told as an appliance tells it, by Status. Bounded. Times are given, never read.
+/// Makes what an appliance sends, frames with the scope's pose at their time, from the video and poses of another
+/// OpenIGTLink server. Times are the server's; a frame waits a moment for poses from after it. What keeps the overlay
+/// from being drawn is told by Status, as an appliance tells it. Bounded. Reads no clock: times are given.
 class ForeignFeed {
  public:
   ForeignFeed(ForeignSettings settings, HostTime began) : settings_(std::move(settings)), began_(began) {}
 
   /// A message, its last byte having come at `arrived`.
   void push(const Header& header, std::span<const std::uint8_t> body, HostTime arrived);
-  /// The next of what has become of it by now.
+  /// The next event that has come of the messages by now.
   std::optional<Event> next(HostTime now);
-  /// When the frame that waits longest for its pose will do without; empty: none waits.
+  /// When the frame that has waited longest for its pose will go without one; empty: none waits.
   [[nodiscard]] std::optional<HostTime> due() const;
 
-  /// Empty until something came. Of a server that stamps nothing, what it sends has the time at which it came.
+  /// Relates the clocks by arrivals; empty until something came. Where a server stamps nothing, messages have the time
+  /// of their arrival.
   [[nodiscard]] std::optional<RelatedTime<HostTime>> host_from_device(DeviceTime time) const;
   /// What kind of server it is, and what of it is passed over, in words.
   [[nodiscard]] std::string words() const;

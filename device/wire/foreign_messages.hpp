@@ -10,8 +10,8 @@
 /// standard: header versions 1 to 3, and of the meta data whether a pose is valid.
 namespace birdseye::wire {
 
-/// One picture; grey ones are made RGB. The matrix of an IMAGE says where it lies in a room, which a camera's picture
-/// does not: pixels are taken in their order, the first row at the top.
+/// One picture, RGB; grey pictures are converted. The matrix of an IMAGE, which places it in a room, means nothing for
+/// a camera's picture: pixels are taken in their order, the first row at the top.
 struct ForeignPicture {
   int width_px = 0, height_px = 0;
   std::shared_ptr<const std::vector<std::uint8_t>> rgb;
@@ -24,7 +24,8 @@ struct ForeignVolume {};
 /// element's.
 struct ForeignPoses {
   std::vector<Bird> birds;
-  /// Tools whose matrix or quaternion is none, or of which the meta data say that it is not valid: out of sight, say.
+  /// Tools without a pose, out of sight for example: their matrix or quaternion is no rotation, or the meta data call
+  /// it invalid.
   std::vector<std::string> no_poses;
 };
 
@@ -36,8 +37,8 @@ using ForeignMessage = std::variant<ForeignPicture, ForeignVolume, ForeignPoses,
 /// A name as it may be shown and written: whatever is no printable ASCII becomes a question mark.
 std::string readable(std::string name);
 
-/// header: its device name is readable. Errc::bad_format: damaged, or its lengths lie. Errc::unsupported: pictures that
-/// are not of 8 bits with one or three components. The error names the message's type and device.
+/// header: with a readable() device name. Errc::bad_format: damaged, or its lengths lie. Errc::unsupported: pictures
+/// that are not of 8 bits with one or three components. The error names the message's type and device.
 Result<ForeignMessage> read_foreign(const Header& header, std::span<const std::uint8_t> body);
 
 /// Whether the message is one that only an appliance of ours sends.

@@ -14,15 +14,15 @@ namespace birdseye::wire {
 
 inline constexpr std::size_t kHeaderBytes = 58;
 
-/// The protocol's checksum: CRC-64 of ECMA-182. ISA-L's, which is thirty times as fast as the library's own.
-/// crc: of the bytes before these.
+/// The protocol's checksum: CRC-64 of ECMA-182, by ISA-L, which is thirty times as fast as the protocol library's own.
+/// crc: that of the bytes before these.
 std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t crc = 0);
 
 /// The standard's stamp: seconds, and a fraction in units of 2^-32 s, rounded so that nanoseconds come back exactly.
 std::uint64_t stamp_from(DeviceTime time);
 DeviceTime time_from(std::uint64_t stamp);
 
-/// A message's header by hand: the library's own unpacking reports no failure.
+/// A message's header, unpacked here because the library's own unpacking reports no failure.
 struct Header {
   unsigned version = 0;
   std::string type, device;
@@ -35,7 +35,7 @@ Result<Header> read_header(std::span<const std::uint8_t> bytes, std::uint64_t mo
 /// The text of a STRING's body; empty where its lengths lie.
 std::optional<std::string> text_of_string(const Header& header, std::span<const std::uint8_t> body);
 
-/// Bytes of the content: in version 2 after an extended header, whose own size comes first.
+/// Size of the content in bytes. In version 2 an extended header precedes the content, and begins with its own size.
 std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body);
 /// The content alone, without the meta data that follows it in version 2; empty where their lengths lie.
 std::optional<std::span<const std::uint8_t>> content_of(const Header& header, std::span<const std::uint8_t> body);

@@ -26,7 +26,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(InstrumentHealth, name, state, t
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Calibration, in_force, why_not, record)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(WallClock, known, synchronised, tai_known, max_error_ns, est_error_ns,
                                    wall_minus_monotonic_ns, source)
-// What an older appliance does not count yet is 0.
+// Counters that an older appliance does not have are 0.
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(
     Health, state, instruments, tracker_rate_hz, frame_rate_hz, measurements, measurements_lost, phase_errors,
     senseless_records, doubted, line_errors, clock_events, frames, frames_dropped, frames_repeated, messages_shed,

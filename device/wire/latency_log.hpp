@@ -9,8 +9,8 @@
 
 namespace birdseye::wire {
 
-/// Written by one thread, taken by another: the latencies since they were last asked for; past kMost, every second one
-/// is kept, then every fourth ...
+/// The latencies since they were last taken. One thread writes them, another takes them. Past kMost, only every second
+/// one is kept, then every fourth, and so on.
 class LatencyLog {
  public:
   void add(Duration latency) {

@@ -13,7 +13,7 @@
 /// What the appliance says to hosts, as OpenIGTLink messages (docs/manual/wire.md). Times are of the appliance's clock.
 namespace birdseye::wire {
 
-/// What IMAGE has no room for: travels in a STRING just before it.
+/// What IMAGE has no room for. Travels in a STRING just before the IMAGE.
 struct FrameInfo {
   std::uint64_t sequence = 0;
   DeviceTime acquired;  ///< middle of the exposure
@@ -40,7 +40,7 @@ struct Birds {
   std::vector<Bird> birds;
 };
 
-/// Travels in a STRING beside the birds, where one of them gave none or the time is not sure.
+/// Why a bird gave no pose, or why the time is not sure. Travels in a STRING beside TDATA.
 struct Doubt {
   DeviceTime acquired;
   std::string bird, why;
@@ -92,13 +92,13 @@ struct Health {
   std::uint64_t line_errors = 0, clock_events = 0;
   std::uint64_t frames = 0, frames_dropped = 0, frames_repeated = 0;
   std::uint64_t messages_shed = 0, clients = 0, clients_shed = 0, requests_refused = 0;
-  std::uint64_t events_dropped = 0;  ///< what instruments gave faster than messages could be made of it
+  std::uint64_t events_dropped = 0;  ///< events that came faster than messages could be made of them
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   // From the last byte in to the last byte out, since the last report. Poses to clients that take frames too wait while
   // a frame is on its way; the first figure is of those that do not.
   double latency_ms_p99_tracker = 0, latency_ms_p99_tracker_beside_frames = 0, latency_ms_p99_frame = 0;
   WallClock clock;
-  std::string recording;  ///< the file, or why there is none; empty: not asked for
+  std::string recording;  ///< the appliance recording's file, or why there is none; empty: none was asked for
 };
 
 /// What became of the camera's exposure, gain, white balance and focus, which a client had held or let go.
@@ -107,8 +107,8 @@ struct CameraControls {
   std::vector<std::string> done, refused;  ///< a line of text each
 };
 
-/// The scope's calibration, by the record that the appliance was told of. Travels in a STRING, to each client that
-/// comes and when it changes.
+/// The scope's calibration, by the calibration record that the appliance's configuration names. Travels in a STRING to
+/// each client that comes, and to all when it changes.
 struct Calibration {
   bool in_force = false;  ///< the instruments are those that it was made with
   std::string why_not;

@@ -17,10 +17,10 @@ struct Packet {
   Kind kind = Kind::other;
   std::shared_ptr<const std::vector<std::uint8_t>> head;
   std::shared_ptr<const std::vector<std::uint8_t>> pixels;  ///< null for all but frames and volumes
-  DeviceTime arrived;                                       ///< the last byte of what it tells of; 0: of nothing
+  DeviceTime arrived;  ///< when the last byte came of what the packet tells; 0: it tells of nothing that came
 
   [[nodiscard]] std::size_t size() const { return head->size() + (pixels ? pixels->size() : 0); }
-  /// Everything as one run of bytes, for whoever wants to look at it.
+  /// Head and pixels as one run of bytes, for looking at them.
   [[nodiscard]] std::vector<std::uint8_t> bytes() const;
 };
 
@@ -52,7 +52,7 @@ struct PublishedVolume {
 Packet pack(const PublishedTransform& transform);
 Packet pack(const PublishedVolume& volume);
 
-/// The messages of one client's questions and their answers; times as each side's clock has them, ns.
+/// A client's questions and the answers to them; times are ns of each side's own clock.
 struct ClockPing {
   std::int64_t host_sent_ns = 0;
 };

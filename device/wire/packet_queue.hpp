@@ -17,7 +17,8 @@ class PacketQueue {
   static constexpr std::size_t kMostFrames = 3;
   static constexpr std::size_t kMostOfAKind = 256;  ///< of small ones: of poses more than two seconds
 
-  /// How many were shed for it. One of these takes the place of the one that waits, which then tells nobody anything.
+  /// Queues a packet and returns how many were shed for it. A STATUS, Calibration or volume replaces the one that
+  /// waits, which is then out of date and not counted as shed.
   std::size_t push(const Packet& packet) {
     if (packet.kind == Packet::Kind::frame) {
       frames_.push_back(packet);
@@ -40,7 +41,7 @@ class PacketQueue {
     small_.erase(std::ranges::find_if(small_, same));
     return 1;
   }
-  /// The oldest frame goes; how many that were.
+  /// Sheds the oldest frame; returns how many were shed, 0 or 1.
   std::size_t shed_frame() {
     if (frames_.empty()) return 0;
     frames_.pop_front();
@@ -49,7 +50,8 @@ class PacketQueue {
   void forget_frames() { frames_.clear(); }
 
   [[nodiscard]] bool empty() const { return small_.empty() && frames_.empty() && !volume_; }
-  /// Small ones before frames and those before the volume, otherwise in the order in which they came.
+  /// The packet to send next: small packets before frames, frames before the volume, otherwise in the order in which
+  /// they came.
   [[nodiscard]] const Packet& front() const { return small_.empty() && frames_.empty() ? *volume_ : next().front(); }
   Packet pop() {
     if (small_.empty() && frames_.empty()) return *std::exchange(volume_, std::nullopt);

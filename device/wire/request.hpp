@@ -19,7 +19,7 @@ struct TrackingRequest {
 };
 /// GET_STATUS.
 struct StatusRequest {};
-/// A message that is whole and that nobody here answers: any client may send such.
+/// A whole message of a kind that the server does not answer. Any client may send such.
 struct UnknownRequest {
   std::string type;
 };
@@ -30,15 +30,15 @@ struct DamagedRequest {
 using Request =
     std::variant<ClockPing, Subscription, CameraLock, TrackingRequest, StatusRequest, UnknownRequest, DamagedRequest>;
 
-/// What a client sends, put together from however it comes. Bounded: no request is longer than kLargestRequest.
+/// Puts a client's requests together from the bytes as they come. Bounded: no request is longer than kLargestRequest.
 class RequestReader {
  public:
   static constexpr std::uint64_t kLargestRequest = 64U << 10U;
 
-  /// The requests that are whole by now. An error is the end of the connection: its bytes are no message, and nobody
+  /// The requests that are whole by now. After an error the connection must end: the bytes are no message, and nobody
   /// can tell where the next one would begin.
   Result<std::vector<Request>> push(std::span<const std::uint8_t> bytes);
-  /// A message has begun and is not whole.
+  /// Whether a message has begun and is not whole.
   [[nodiscard]] bool waiting() const { return !buffer_.empty(); }
 
  private:

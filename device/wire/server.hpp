@@ -13,7 +13,7 @@
 
 namespace birdseye::wire {
 
-/// An IPv4 address in dots, which Server::listen() takes.
+/// Whether text is an IPv4 address in dots, as Server::listen() takes.
 bool is_address(const std::string& text);
 
 /// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
@@ -21,7 +21,7 @@ bool is_address(const std::string& text);
 /// for ten seconds, or does not speak the protocol, is disconnected.
 class Server {
  public:
-  /// port 0 takes any that is free. A port in use is an error that names it and the setting.
+  /// port: 0 takes any that is free. For a port in use the error names the port and the setting.
   static Result<std::unique_ptr<Server>> listen(const std::string& bind_address, int port);
   ~Server();
   Server(const Server&) = delete;
@@ -38,23 +38,23 @@ class Server {
   };
   Counters take_counters();
   [[nodiscard]] std::size_t clients() const { return clients_count_; }
-  /// A client that is here wants the camera's controls held.
+  /// Whether a connected client wants the camera's controls held.
   [[nodiscard]] bool camera_locked() const { return camera_locked_; }
 
  private:
   Server(int fd, int wake_fd, int port);
   void run(const std::stop_token& stop);
   void accept_one();
-  /// Whether there were frames.
+  /// Gives published packets to the clients; returns whether there were frames among them.
   bool distribute();
   void offer(ClientLink& client, const Packet& packet) { messages_shed_ += client.offer(packet); }
   std::list<ClientLink>::iterator put_out(std::list<ClientLink>::iterator client);
   /// Keeps the frames that all clients hold within one bound.
   void bound_frames();
-  /// Each counted once, however many clients hold it.
+  /// Bytes of all frames held, each frame counted once however many clients hold it.
   [[nodiscard]] std::size_t frame_bytes_held() const;
   void wake() const;
-  /// False: the client is to be disconnected.
+  /// Sends to a client and reads from it. False: the client is to be disconnected.
   bool serve(ClientLink& client, short events);
   void answer(ClientLink& client, const Request& request);
 
@@ -65,8 +65,8 @@ class Server {
   std::mutex mutex_;
   PacketQueue inbox_;  ///< published, not yet distributed
   Latencies latencies_;
-  std::list<ClientLink> clients_;  ///< of the thread below alone, as is what follows
-  // A client that comes is told at once how things are.
+  std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
+  // A new client gets these at once.
   std::optional<Packet> last_status_, last_calibration_, last_volume_;
   std::jthread thread_;
 };
