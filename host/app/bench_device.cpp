@@ -316,7 +316,8 @@ Result<void> measure_recovery(const std::filesystem::path& folder, nlohmann::jso
       }
       return 1e9;
     };
-    // The unplug of which instrument it is, its own messages tell: whichever comes back later.
+    // Both instruments have a fault called unplug, and the event does not say whose it was. Take the later of the two
+    // recoveries.
     const double poses_s = after(listener.birds_at, [](DeviceTime t) { return t; });
     const double frames_s = after(listener.frames, [](const Listener::Heard& f) { return f.at; });
     const double took_s = of_camera.count(fault.name) != 0 ? frames_s : std::max(poses_s, frames_s);

@@ -6,7 +6,7 @@
 
 namespace birdseye::host {
 
-/// What has to be said of a server that is no appliance. foreign outlives the command's parsing.
+/// Adds the options that name devices of a server that is no appliance. foreign must outlive the command's parsing.
 inline void add_foreign_options(CLI::App& command, wire::ForeignSettings& foreign) {
   command
       .add_option("--scope-device", foreign.scope_device,

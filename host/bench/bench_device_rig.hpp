@@ -16,7 +16,7 @@
 
 namespace birdseye::host {
 
-/// What the simulated instruments are asked to be.
+/// Settings of the simulated instruments.
 struct DeviceRigSettings {
   std::filesystem::path folder;  ///< for configuration, logs and truth
   double tracker_rate_hz = 144;
@@ -34,7 +34,7 @@ struct InstrumentTruth {
   double rate_hz = 0;
 };
 
-/// A fault that the simulator had.
+/// The begin or end of a fault that the simulator injected.
 struct FaultEvent {
   std::string name;
   bool begins = true;
@@ -53,7 +53,7 @@ class DeviceRig {
   /// Processor time that birdseyed has used, s, and what it holds in memory, MB, now and at most.
   [[nodiscard]] double cpu_s() const;
   [[nodiscard]] double resident_mb() const;
-  /// As the simulator has written it by now.
+  /// The truth as the simulator has written it so far.
   [[nodiscard]] Result<InstrumentTruth> tracker_truth() const;
   [[nodiscard]] Result<InstrumentTruth> camera_truth() const;
   [[nodiscard]] std::vector<FaultEvent> faults() const;

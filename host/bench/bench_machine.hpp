@@ -5,7 +5,7 @@
 
 namespace birdseye::host {
 
-/// Of what ran: cores, instruction set, kernel.
+/// The machine that a benchmark runs on: cores, instruction set, kernel.
 nlohmann::json bench_machine();
 
 }  // namespace birdseye::host

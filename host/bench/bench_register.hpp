@@ -15,9 +15,9 @@ struct StudyOptions {
   SimulatedCase usual;  ///< what does not change
 };
 
-/// What `birdseye bench register --study` does: what is left of the error for every measure and light, and over noise,
-/// number of views and initial error; with the light, also curves of similarity through the truth. Writes study.json,
-/// sweeps.svg and cost-curves.svg into the folder, which is there.
+/// `birdseye bench register --study`: measures what is left of the error for every measure and light, and over noise,
+/// number of views and initial error; with the sweep over light also curves of similarity through the truth. Writes
+/// study.json, sweeps.svg and cost-curves.svg into the folder, which must exist.
 Result<void> register_study(const StudyOptions& options);
 
 }  // namespace birdseye::host

@@ -17,10 +17,10 @@ struct SimulatedCase {
   double amplitude_mm = 10, noise = 1, light_offset_mm = 0;
   bool plain_background = false;  ///< nothing behind the organ
 };
-/// Errc::bad_value with the simulator's own words for a seed that it refuses.
+/// Has the simulator make the case. Errc::bad_value, with the simulator's words, for a seed that the simulator refuses.
 Result<RegistrationCase> simulate(const SimulatedCase& wanted);
 
-/// How a case is registered; with as many unknowns as its truth has.
+/// How a case is registered. The registration has as many unknowns as the case's truth.
 struct Method {
   std::string optimiser = "gradient", similarity = "mi";
   int most_evaluations = 55;  ///< the paper's, for simplex and powell
@@ -29,13 +29,13 @@ struct Method {
 struct Trial {
   double epsilon_before = 0, epsilon_after = 0, tre_before_mm = 0, tre_after_mm = 0;
   double surface_after_mm = 0, inside_after_mm = 0;
-  double time_s = 0, processor_s = 0;  ///< the latter of all cores together; a busy machine adds little to it
+  double time_s = 0, processor_s = 0;  ///< processor_s: of all cores together; a busy machine adds little to it
   int evaluations = 0;
 };
 Result<Trial> try_once(const RegistrationCase& c, const Method& method);
 
-/// Cases of seeds 1, 2 and on, until there are so many; those that the simulator refuses are passed over. `work` is
-/// given each in turn, with its seed.
+/// Makes `count` cases of seeds 1, 2 and on, passing over seeds that the simulator refuses, and calls `work` with each
+/// case and its seed.
 Result<void> for_cases(SimulatedCase wanted, int count,
                        const std::function<Result<void>(const RegistrationCase&, int seed)>& work);
 

@@ -9,15 +9,15 @@
 
 namespace birdseye::host {
 
-/// What this machine takes to hand a byte from thread to thread to thread, 144 times a second, with nothing else to do:
-/// as often as a measurement changes hands on its way through birdseyed. The floor under birdseyed's own latency.
+/// Measures what this machine takes to hand a byte over twice, from thread to thread to thread, 144 times a second: as
+/// often as a measurement changes hands on its way through birdseyed. The floor under birdseyed's own latency.
 class TwoWakes {
  public:
   static Result<std::unique_ptr<TwoWakes>> start();
   ~TwoWakes();
   TwoWakes(const TwoWakes&) = delete;
   TwoWakes& operator=(const TwoWakes&) = delete;
-  /// Ends it. The 99th percentile of each whole second, ms.
+  /// Ends the measurement. Returns the 99th percentile of each whole second, ms.
   std::vector<double> stop();
 
  private:

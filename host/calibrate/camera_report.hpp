@@ -11,10 +11,10 @@ namespace birdseye::host {
 /// The figures of one camera, as the manual names them.
 nlohmann::json camera_json(const calibration::CameraCalibration& calibration);
 nlohmann::json rejected_json(const std::vector<calibration::RejectedView>& rejected);
-/// What a pair adds to them.
+/// The figures that a stereo pair adds.
 nlohmann::json stereo_json(const calibration::StereoCalibration& calibration);
 
-/// Pictures and tables of one camera; which: "" or "left camera: ", before each heading.
+/// Adds pictures and tables of one camera. which: put before each heading, "" or "left camera: ".
 void add_camera_to(HtmlPage& page, const calibration::CameraCalibration& calibration, const std::string& which = {});
 
 }  // namespace birdseye::host

@@ -8,9 +8,9 @@
 
 namespace birdseye::host {
 
-/// Slices through the volume, across z: an arrow for each measurement, from where it should be to where it was
-/// measured (left, before) and to where a map that was not shown its region puts it (right), ten times as long as it is
-/// or less. Grey: where the field is not mapped. Outliers are crosses.
+/// Slices through the volume, across z: an arrow for each measurement, drawn up to ten times as long as it is. On the
+/// left it leads from the true place to the measured one, on the right to where a map puts it that was not shown its
+/// region. Grey: where the field is not mapped. Outliers are crosses.
 std::string field_arrows_svg(const calibration::FieldFit& fit);
 
 /// The held-out error of all kinds of map, as bars; the chosen one is dark.

@@ -24,21 +24,22 @@ struct HandEyeFiles {
   double mm_per_unit = 1;
 };
 
-/// The solver's input, and what there is to tell of how it came about.
+/// The solver's input, and what to tell about how it was read.
 struct HandEyeRecording {
   calibration::HandEyeInput input;
   std::vector<std::string> notes;
   std::vector<std::string> pictures;                   ///< names of all that were read, used or not
   std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images; of a stereo scope, the left
   Verdict camera_verdict;                              ///< on that
-  double stream_offset_s = 0;     ///< of two streams' clocks, found from their motion; the solver's adds to it
+  double stream_offset_s =
+      0;  ///< offset of two streams' clocks, found from their motion; the solver's offset adds to it
   double stream_correlation = 0;  ///< 0 if there are no two streams
 };
 
-/// Reads and pairs pictures and poses: by their order, that of their names with numbers in them by value. As many
-/// pictures as poses are wanted, those that cannot be used counted. Right pictures pair with left ones by name, one
-/// with each. eye_poses are poses of the camera in the board's frame (marker_from_camera); where both they and poses
-/// have times they pair by time.
+/// Reads pictures and poses and pairs them in the order of their names, numbers in them by value. There must be as many
+/// pictures as poses, counting those that cannot be used. Each right picture pairs with a left one by name. eye_poses
+/// are poses of the camera in the board's frame (marker_from_camera); where they and the poses have times, they pair by
+/// time.
 Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files);
 
 }  // namespace birdseye::host

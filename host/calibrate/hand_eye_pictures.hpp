@@ -4,8 +4,8 @@
 
 namespace birdseye::host {
 
-/// One station for each picture, in the order of their names (numbers in them by value), without a view where the board
-/// was not found; the lens, read or calibrated from the same pictures; the board's symmetry.
+/// Fills in one station for each picture, in the order of the names (numbers in them by value), without a view where
+/// the board was not found; the lens, read or calibrated from the same pictures; and the board's symmetry.
 Result<void> read_hand_eye_pictures(const HandEyeFiles& files, HandEyeRecording& out);
 
 }  // namespace birdseye::host

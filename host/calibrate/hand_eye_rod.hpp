@@ -9,10 +9,10 @@
 
 namespace birdseye::host {
 
-/// At what the rod of an oblique scope stood, degrees, by the picture's name, with its ending or without.
+/// The angle of an oblique scope's rod, degrees, by the name of the picture, with its ending or without.
 using RodAngles = std::map<std::string, double>;
 
-/// Lines of a picture's name and an angle, separated by a comma; a first line "name,angle_deg" is passed over.
+/// Reads lines of a picture's name and an angle, separated by a comma; a first line "name,angle_deg" is passed over.
 Result<RodAngles> read_rod_angles(const std::filesystem::path& path);
 
 /// The stations of one angle, and hand-eye from them alone.
@@ -21,7 +21,8 @@ struct RodGroup {
   std::vector<calibration::HandEyeStation> stations;
   calibration::HandEyeResult result;
   Verdict verdict;
-  /// The rod's model, from the reference, against this hand-eye: the turn, and at the board, straight ahead.
+  /// By how much the rod's model, turned from the reference, misses this group's hand-eye: in turn, and at the board
+  /// straight ahead.
   double off_deg = 0, off_mm = 0;
 };
 
@@ -33,11 +34,11 @@ struct RodCalibration {
   [[nodiscard]] const RodGroup& at_reference() const { return groups[reference]; }
 };
 
-/// Hand-eye for each angle, and the rod's axis from them. A station whose angle is not stated and an angle of no
-/// picture are errors that name it.
+/// Hand-eye for each angle, and the rod's axis from them. A station without a stated angle, and an angle that belongs
+/// to no picture, are errors that name it.
 Result<RodCalibration> calibrate_rod(const HandEyeRecording& recording, const RodAngles& angles);
 
-/// What the rod adds to the verdict of its reference.
+/// Adds the rod's figures to the verdict of its reference.
 void judge_rod(const RodCalibration& rod, Verdict& verdict);
 nlohmann::json rod_json(const RodCalibration& rod);
 void add_rod_to(HtmlPage& page, const RodCalibration& rod);

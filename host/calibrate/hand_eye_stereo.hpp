@@ -12,13 +12,13 @@ struct RightPictures {
   std::optional<calibration::StereoLens> lens;  ///< none: to be calibrated from the same pictures
 };
 
-/// Pictures pair with the left ones by name. Those in which the board is not found are told in notes.
+/// Reads the right pictures, which pair with the left ones by name. Notes tell in which the board is not found.
 Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const calibration::Pattern& pattern,
                                           const std::vector<calibration::PatternView>& left,
                                           std::vector<std::string>& notes);
 
-/// Refuses a relation of the cameras that puts the boards of the left pictures elsewhere in the right ones than they
-/// are seen there.
+/// Refuses a relation of the cameras that contradicts the pictures: boards placed by the left pictures are then not
+/// where the right pictures show them.
 Result<void> check_relation(const HandEyeFiles& files, const calibration::HandEyeInput& input);
 
 }  // namespace birdseye::host

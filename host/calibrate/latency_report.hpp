@@ -16,7 +16,8 @@ struct StreamNames {
 
 /// The figures; offsets are null where the verdict is fail.
 nlohmann::json latency_json(const calibration::Latency& latency, const Verdict& verdict);
-/// Title and pictures: both motions before and after, the scan, the offset over time.
+/// A page with title and pictures: both motions before and after the offset is taken away, the scan of lags, the offset
+/// over time.
 HtmlPage latency_page(const calibration::Latency& latency, const Verdict& verdict, const StreamNames& names,
                       const std::string& advice);
 

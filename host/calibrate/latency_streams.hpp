@@ -12,7 +12,7 @@
 
 namespace birdseye::host {
 
-/// What an appliance gave of its tracker and its camera, by its own clock.
+/// Poses and picture motion that an appliance gave, both by the appliance's clock.
 struct LatencyStreams {
   std::vector<calibration::TimedMotionPose> tracker;
   std::vector<calibration::ImageMotion> video;
@@ -26,11 +26,11 @@ struct LatencySource {
   double seconds = 20;  ///< 0: until the stream ends
 };
 
-/// Takes the stream's events for so long. Errors: it gives no poses of that bird, or no frames.
+/// Takes the stream's events for source.seconds. Errors: the stream gives no poses of the bird, or no frames.
 Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress);
 /// From an appliance that runs, HOST:PORT.
 Result<LatencyStreams> record_streams(const std::string& server, const LatencySource& source, Progress& progress);
-/// From a recording, which birdseyed plays again at its own pace.
+/// From an appliance recording, which birdseyed replays at its own pace.
 Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, const LatencySource& source,
                                       Progress& progress);
 

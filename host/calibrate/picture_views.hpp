@@ -19,8 +19,8 @@ struct PictureViews {
   int width_px = 0, height_px = 0;
 };
 
-/// The pattern in each picture (PNG, JPEG, BMP, TIFF), on all cores. Of a folder, all pictures in it. One that cannot
-/// be read is rejected by name; pictures of two sizes are an error that names both.
+/// Finds the pattern in each picture (PNG, JPEG, BMP, TIFF), on all cores. A folder stands for all pictures in it. A
+/// picture that cannot be read is rejected by name; pictures of two sizes are an error that names both.
 Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
                                         const std::vector<std::filesystem::path>& images_or_folders);
 

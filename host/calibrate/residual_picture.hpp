@@ -12,14 +12,14 @@ struct PixelResidual {
   bool outlier = false;  ///< drawn in red, and never left out
 };
 
-/// An SVG of the picture's frame with an arrow at each pixel from where the point was predicted towards where it was
-/// seen, drawn longer than it is: by `times`, or where that is 0 by the round number that makes the median arrow
-/// readable, cut where it would hide others. A scale says by how much. Of more than some thousands every n-th is drawn.
+/// An SVG of the picture's frame with an arrow for each point, from where the point was predicted towards where it was
+/// seen. Arrows are drawn `times` longer than they are (0: the round number that makes the median arrow readable), and
+/// cut where they would hide others; a scale says by how much. Of more than some thousands only every n-th is drawn.
 std::string residual_picture_svg(std::span<const PixelResidual> residuals, int width_px, int height_px,
                                  double times = 0);
 
-/// An SVG of the picture's frame cut into columns x rows cells, each as dark as it holds many of the points, with their
-/// number in it; cells that hold none stay white.
+/// An SVG of the picture's frame cut into columns x rows cells. A cell is the darker the more points it holds, and
+/// shows their number; a cell without points stays white.
 std::string coverage_picture_svg(std::span<const Eigen::Vector2d> points_px, int width_px, int height_px, int columns,
                                  int rows);
 

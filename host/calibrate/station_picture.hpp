@@ -13,9 +13,9 @@ struct StationMark {
   bool odd = false;  ///< drawn in red
 };
 
-/// An SVG of where the scope looked from: the lines of sight as seen from straight above the board, the further out the
-/// more tilted, with a tick for the direction of the picture's upper edge, that is for roll; and, beside it, the
-/// camera's places from the side.
+/// An SVG of where the scope looked from. On the left the lines of sight as seen from straight above the board: the
+/// farther out, the more tilted; a tick for each shows the direction of the picture's upper edge (roll). On the right
+/// the camera's places seen from the side.
 std::string station_picture_svg(const std::vector<StationMark>& stations);
 
 }  // namespace birdseye::host

@@ -8,7 +8,7 @@
 
 namespace birdseye::host {
 
-/// Poses at which the tip stood in one divot, by their place in the recording; both ends belong to it.
+/// Poses at which the tip stood in one divot, by their index among all poses; both ends belong to the phase.
 struct Phase {
   std::size_t first = 0, last = 0;
 };

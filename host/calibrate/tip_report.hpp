@@ -9,7 +9,7 @@ namespace birdseye::host {
 
 // Pictures of a tip's calibration, as SVG.
 
-/// A bar for each pose, in the order given, those of outliers marked; lines between divots.
+/// A bar for each pose, in the order given, with outliers marked and lines between divots.
 std::string tip_residuals_svg(const std::vector<calibration::PivotPose>& poses, const calibration::Pivot& pivot);
 
 /// Where the tip was at each pose, about its pivot, from three sides.

@@ -46,7 +46,8 @@ struct RegistrationCase {
   std::optional<Transform<Patient, Patient>> true_pose;
 };
 
-/// Refuses, naming file and key: what is missing or of another size than it says, and two views that are the same.
+/// Reads a case. Refuses, naming file and key: what is missing, what has another size than the case says, and two views
+/// that are the same.
 Result<RegistrationCase> read_case(const std::filesystem::path& path);
 
 }  // namespace birdseye::host

@@ -14,11 +14,11 @@ namespace birdseye::host {
 /// Similarity over the optimiser's evaluations.
 std::string trace_svg(const std::vector<TracePoint>& trace);
 
-/// How far the view's grey is from the overlay's, once that is scaled to it: red where the video is brighter, blue
-/// where it is darker; RGB.
+/// The difference between the view's grey and the overlay's, once the overlay's is scaled to the view's: red where the
+/// video is brighter, blue where it is darker; RGB.
 std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageRgba& overlay);
 
-/// A page that shows the pictures beside it.
+/// A report page; it shows pictures that lie beside its file.
 std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
                                 const nlohmann::json& json);
 

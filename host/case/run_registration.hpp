@@ -8,7 +8,7 @@
 
 namespace birdseye::host {
 
-/// Registers a case by the optimiser that it names. tell is called with a line for a person now and then.
+/// Registers a case by the optimiser that the case names. Now and then calls tell with a line for a person.
 Result<ViewRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
                                           bool estimate_uncertainty,
                                           const std::function<void(const std::string&)>& tell);

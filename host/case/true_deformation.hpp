@@ -18,8 +18,8 @@ struct TrueDeformation {
 /// The simulator's truth/control_points.json. Errc::bad_format, naming the file, for what is none.
 Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path);
 
-/// The paper's Equation 7: the sum of squared distances, the box being the unit cube, between where the free vertices
-/// of a level 3 octree are displaced to in truth and by field (none: not at all).
+/// The paper's Equation 7: the sum of squared distances, the box being the unit cube, between the true displacements of
+/// a level 3 octree's free vertices and those by field (null: zero).
 double epsilon(const TrueDeformation& truth, const DisplacementField* field);
 
 }  // namespace birdseye::host

@@ -27,7 +27,7 @@ class BezierPatch {
   /// Displacements of the inner control points, x fastest, units of the cube.
   void set_displacements(const std::vector<Eigen::Vector3d>& displacements);
   [[nodiscard]] Eigen::Vector3d displacement(const Eigen::Vector3d& point) const;
-  /// Puts the octree's free vertices where the patch has them.
+  /// Sets the octree's free vertices to the patch's displacements.
   void drive(PatchOctree& tree) const;
 
  private:

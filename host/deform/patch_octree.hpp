@@ -16,9 +16,9 @@ namespace birdseye::host {
 /// displacements of its eight corners. The cube's surface does not move.
 ///
 /// Patches are of levels 0 (the cube) to kDeepest (32 an axis), in any mix. A corner of a small patch that lies in a
-/// face or on an edge of a larger one is constrained to what that one has there, so that u is continuous everywhere: no
-/// crack opens where levels meet. Free vertices are those that are neither on the cube's surface nor constrained: 1,
-/// 27, 343, 3375 and 29791 of them where all patches are of level 1 to 5.
+/// face or on an edge of a larger patch is constrained to the larger patch's value there, so that u is continuous
+/// everywhere: no crack opens where levels meet. Free vertices are those that are neither on the cube's surface nor
+/// constrained: 1, 27, 343, 3375 and 29791 of them where all patches are of level 1 to 5.
 class PatchOctree {
  public:
   static constexpr int kDeepest = 5;
@@ -26,7 +26,8 @@ class PatchOctree {
 
   /// All patches of one level, 0 to kDeepest.
   static Result<PatchOctree> uniform(int level);
-  /// A patch is divided where wanted(low, high, level) says so of it (its corners in the unit cube), down to deepest.
+  /// Divides each patch for which wanted(low, high, level) is true, down to the level deepest; low and high are the
+  /// patch's corners in the unit cube.
   static Result<PatchOctree> adaptive(
       const std::function<bool(const Eigen::Vector3d& low, const Eigen::Vector3d& high, int level)>& wanted,
       int deepest);
@@ -37,7 +38,8 @@ class PatchOctree {
     [[nodiscard]] int size() const { return kLattice >> level; }
   };
   [[nodiscard]] const std::vector<Patch>& patches() const { return patches_; }
-  /// The patch that holds a point of the unit cube; points on a face belong to the patch above it, but for the last.
+  /// The patch that holds a point of the unit cube. A point on a face between two patches belongs to the one with the
+  /// larger coordinates.
   [[nodiscard]] std::size_t patch_at(const Eigen::Vector3d& point) const;
 
   [[nodiscard]] std::size_t free_vertices() const { return free_.size(); }

@@ -18,10 +18,10 @@ struct RestMap {
   [[nodiscard]] Eigen::Vector3d operator()(const Eigen::Vector3d& seen_mm) const;
 };
 
-/// As ITK's transform, LPS mm: what resampling takes, and what 3D Slicer applies to the CT to bring it where it is
-/// seen. path: .tfm (text) or .h5.
+/// Writes the map as an ITK transform, LPS mm. It is the transform that resampling takes, and that 3D Slicer applies to
+/// the CT to bring the CT to where it is seen. path: .tfm (text) or .h5.
 Result<void> write_transform(const std::filesystem::path& path, const RestMap& map);
-/// Where the transform in a file takes points, by ITK. Refuses, naming it, what is no such file.
+/// Takes points through the transform in a file, by ITK. Refuses, naming the file, what is no transform.
 Result<std::vector<Eigen::Vector3d>> transform_by_file(const std::filesystem::path& path,
                                                        const std::vector<Eigen::Vector3d>& points_mm);
 

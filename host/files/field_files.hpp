@@ -11,7 +11,7 @@
 
 namespace birdseye::host {
 
-/// What was read, and what was passed over and why: "line 8: not finite".
+/// Samples that were read, and lines that were passed over with the reason: "line 8: not finite".
 struct FieldSamples {
   std::vector<calibration::FieldSample> samples;
   std::vector<std::string> rejected;
@@ -28,7 +28,7 @@ struct GridSpec {
 };
 /// "6x6x5:100mm", or "6x6x5:100x96x100mm" where the steps differ.
 Result<GridSpec> parse_grid_spec(const std::string& text);
-/// Poses in the order of the grid's nodes; those that were rejected count as nodes that were left out.
+/// Reads a file of poses, one for each node of the grid in order. A rejected pose counts as a node that was left out.
 Result<FieldSamples> read_field_poses(const std::filesystem::path& path, const GridSpec& spec, bool held_alike);
 
 struct FieldPairs {
@@ -38,13 +38,13 @@ struct FieldPairs {
 /// Two files of poses, paired by their times (to 5 ms), or by their order where they have none.
 Result<FieldPairs> read_field_pairs(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// A map as birdseye calibrate field wrote it; an error names the file.
+/// Reads a field map that `birdseye calibrate field` wrote; an error names the file.
 Result<calibration::FieldMapFile> read_field_map(const std::filesystem::path& path);
 
-/// A table name, x, y, z: a plate's places as they are, or as they were touched.
+/// Reads a table name,x,y,z: a plate's places, true or touched.
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const std::filesystem::path& path);
 
-/// The days so far; empty where there is no such file yet.
+/// Reads the days of a history; empty where there is no such file yet.
 Result<std::vector<calibration::FieldCheck>> read_history(const std::filesystem::path& path);
 std::string history_text(const std::vector<calibration::FieldCheck>& history);
 

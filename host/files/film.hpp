@@ -37,8 +37,8 @@ class FilmReader {
  public:
   static Result<FilmReader> open(const std::filesystem::path& path, int width_px, int height_px);
 
-  /// RGB, rows from the top; what comes before it is passed over. An error at the film's end, or where the index has
-  /// been read already.
+  /// The frame at index: RGB, rows from the top. Frames before it are passed over. An error at the film's end, or for
+  /// an index that was read or passed over already.
   Result<std::vector<std::uint8_t>> read(std::size_t index);
 
  private:

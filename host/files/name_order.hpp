@@ -9,8 +9,8 @@ inline bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-/// The order in which pictures and poses pair, by their names: pose.2 before pose.10, for runs of digits count by their
-/// value; the rest by its letters, and of names that are alike in that the one with fewer zeros ahead first.
+/// The order of names in which pictures and poses pair. Runs of digits compare by value (pose.2 before pose.10), the
+/// rest by letters; of names that are equal in this, the one with fewer leading zeros comes first.
 inline bool before_by_number(const std::string& a, const std::string& b) {
   std::size_t i = 0, k = 0;
   while (i < a.size() && k < b.size()) {

@@ -36,9 +36,9 @@ class PoseCollector {
   /// Keeps the pose, or names what is wrong with it.
   void add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose);
   void reject(const std::string& name, const std::string& why);
-  /// Where the file numbers its poses itself: the number of what is added or rejected next.
+  /// For files that number their poses: sets the number of the pose that is added or rejected next.
   void set_next_index(std::size_t index) { next_index_ = index; }
-  /// All of it, by time; or that there is no pose in path.
+  /// All poses in the order of time. An error where path held no pose.
   Result<PoseSet> finish(const std::filesystem::path& path) &&;
 
  private:

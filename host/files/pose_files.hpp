@@ -14,9 +14,9 @@ namespace birdseye::host {
 /// One pose of a file or folder of them.
 struct TimedPose {
   std::string name;       ///< the file's, "line 7" or "frame 7", for messages
-  std::size_t index = 0;  ///< its place among all that was recorded, from 0, those that were rejected counted
+  std::size_t index = 0;  ///< its place among all poses of the file, from 0, counting rejected ones
   double time_s = 0;      ///< as recorded; a filtered stamp where the file holds such
-  /// As it arrived, jitter and all, where the file holds that too; otherwise the same as time_s.
+  /// The stamp as the pose arrived, with its jitter, where the file holds that too; otherwise time_s.
   double unfiltered_time_s = 0;
   Transform<Tracker, Sensor> tracker_from_sensor;
 };
@@ -38,9 +38,9 @@ struct PoseSet {
 Result<PoseSet> read_pose_set(const std::filesystem::path& path, const std::string& transform = {},
                               double mm_per_unit = 1);
 
-/// Of a PLUS sequence, frame by frame, the pose of one sensor against another that is tracked too:
-/// reference_from_sensor = tracker_from_reference^-1 * tracker_from_sensor, so that the reference stands where the
-/// tracker does in TimedPose. A frame counts only where both are sound. reference: as "ReferenceToTracker".
+/// Reads from a PLUS sequence, frame by frame, the pose of one sensor against another tracked one:
+/// reference_from_sensor = tracker_from_reference^-1 * tracker_from_sensor. In TimedPose the reference takes the place
+/// of the tracker. A frame counts only where both poses are sound. reference: as "ReferenceToTracker".
 Result<PoseSet> read_relative_pose_set(const std::filesystem::path& path, const std::string& transform,
                                        const std::string& reference, double mm_per_unit = 1);
 

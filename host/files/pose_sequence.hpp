@@ -4,7 +4,7 @@
 
 namespace birdseye::host {
 
-/// Whether the file is such a sequence, by its name or its first bytes.
+/// Whether the file is a PLUS sequence, by its name or its first bytes.
 bool is_sequence(const std::filesystem::path& path);
 
 /// What read_pose_set does for a PLUS sequence; with a reference, what read_relative_pose_set does.

@@ -8,19 +8,19 @@
 
 namespace birdseye::host {
 
-/// What a calibration has to write into a scope's record: the entry is made from the provenance that it is given.
+/// What a calibration writes into a scope's calibration record; the entry is made when its provenance is known.
 struct RecordEntry {
   std::string made_from;  ///< the board and how many views, in words
   std::function<void(calibration::CalibrationRecord&, const calibration::Provenance&)> enter;
 };
 
-/// An error names the file.
+/// Reads a calibration record; an error names the file.
 Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& path);
-/// The record's text with the entry in it: of the file that is there, or of a new one where there is none. A file that
-/// is there and is no sound record is an error: it is not overwritten.
+/// The text of the calibration record with the entry in it: of the file at path, or of a new record where there is no
+/// file. A file that is no sound calibration record is an error, so that it is not overwritten.
 Result<std::string> record_with(const std::filesystem::path& path, const RecordEntry& entry, Grade grade);
 
-/// The record's lens from now on. Says so where a hand-eye goes with the lens before.
+/// Enters the lens into the record, and prints a line where a hand-eye entry is removed with the former lens.
 void enter_lens(calibration::CalibrationRecord& record, calibration::LensEntry entry);
 
 }  // namespace birdseye::host

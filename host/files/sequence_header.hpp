@@ -27,11 +27,12 @@ struct SequenceHeader {
   Fields fields;                         ///< of the whole, as DimSize
   std::map<std::size_t, Fields> frames;  ///< by number: what Seq_Frame0007_... says, as "StylusToTrackerTransform"
   std::set<std::string> transforms;      ///< that any frame has, without "Transform" at the end
-  bool whole = false;                    ///< it came to its end, where it says where the pixels are
-  std::uint64_t data_offset = 0;         ///< from where on the file holds what comes after it
+  bool whole = false;                    ///< the header came to its end, where it says where the pixels are
+  std::uint64_t data_offset = 0;         ///< where in the file the header ends
 };
 
-/// Refuses, naming the file, what is not there or cannot be opened. Whatever holds no such field is an empty header.
+/// Reads the header. Refuses, naming the file, what is not there or cannot be opened. A file without such fields gives
+/// an empty header.
 Result<SequenceHeader> read_sequence_header(const std::filesystem::path& path);
 
 std::string_view value_of(const SequenceHeader::Fields& fields, std::string_view key);

@@ -18,8 +18,8 @@ Result<std::vector<Eigen::Vector3d>> read_points(const std::filesystem::path& pa
 /// and an upper left block that is no rotation (to 1e-3).
 Result<Eigen::Matrix4d> read_pose(const std::filesystem::path& path);
 /// Key poses of a camera's way, camera_from_patient, at least two: a folder of such matrices, in the order of their
-/// names; or a file with one a line, its 16 numbers row by row. A first line of names, and a number and a time before
-/// the 16, are passed over: the simulator's frames.csv is such a file.
+/// names; or a file with one a line, its 16 numbers row by row. A first line of names is passed over, and so are a
+/// number and a time before the 16: the simulator's frames.csv can be read.
 Result<std::vector<Transform<Camera, Patient>>> read_path(const std::filesystem::path& path);
 /// The text that read_pose reads back exactly.
 std::string pose_text(const Eigen::Matrix4d& matrix);

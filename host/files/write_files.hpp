@@ -9,7 +9,7 @@
 
 namespace birdseye::host {
 
-/// What a file is to hold.
+/// A file to write, and its text.
 struct FileText {
   std::filesystem::path path;
   std::string text;

@@ -19,20 +19,21 @@ struct GuidedCalibration {
   Verdict verdict;  ///< of hand-eye and, where it was found too, of the lens
 };
 
-/// The guided hand-eye calibration on a thread of its own, which looks at frames and solves while the window goes on.
+/// Runs the guided hand-eye calibration on a thread of its own, which looks at frames and solves while the window goes
+/// on.
 class GuideWorker {
  public:
   explicit GuideWorker(GuidePlan plan);
 
-  /// Bounded: where it falls behind, the oldest frames are left out.
+  /// Hands over an event. Bounded: where the thread falls behind, the oldest frames are left out.
   void push(const wire::Event& event);
-  /// Ends it with the stations that it has.
+  /// Ends the calibration with the stations that it has.
   void end(const std::string& why);
 
   [[nodiscard]] GuideState state() const;
-  /// The lines so far that stay, the newest last; at most some dozens.
+  /// The lasting lines so far, the newest last; at most some dozens.
   [[nodiscard]] std::vector<std::string> lines() const;
-  /// What came of it, once it has ended; an error where something could not be used.
+  /// The outcome, once the calibration has ended; an error where something could not be used.
   std::optional<Result<GuidedCalibration>> take();
 
  private:

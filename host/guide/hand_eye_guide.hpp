@@ -15,7 +15,7 @@
 
 namespace birdseye::host {
 
-/// What a guided hand-eye calibration is told.
+/// Settings of a guided hand-eye calibration.
 struct GuidePlan {
   std::string bird = "scope";  ///< the scope's, as the appliance names it
   calibration::Pattern pattern;
@@ -24,7 +24,7 @@ struct GuidePlan {
   std::size_t fewest_stations = 12, most_stations = 40;
 };
 
-/// What it came to.
+/// The stations that a guided calibration took, and why it ended.
 struct GuidedStations {
   calibration::HandEyeInput input;
   int width_px = 0, height_px = 0;
@@ -33,7 +33,7 @@ struct GuidedStations {
   std::string ended;                                   ///< why, in words
 };
 
-/// Where it stands, for whoever holds the scope.
+/// Where a guided calibration stands, for whoever holds the scope.
 struct GuideState {
   std::string next = "hold the scope over the pattern, all of it in the picture, and still for a second";
   calibration::Coverage coverage;  ///< of the stations, once a lens is known
@@ -44,13 +44,13 @@ struct GuideState {
   Grade grade = Grade::fail;
 };
 
-/// Leads a person through the stations of a hand-eye calibration: fed with the appliance's events in order, it takes a
-/// station whenever the scope is held still over the pattern, solves after each, says what is covered and where to go
-/// next, and ends when the verdict is pass or at the most stations. Solving holds the caller up for some tenths of a
-/// second.
+/// Leads a person through the stations of a hand-eye calibration. Fed with the appliance's events in order, it takes a
+/// station whenever the scope is held still over the pattern, solves after each station, and says what is covered and
+/// where to go next. It ends when the verdict is pass, or at the most stations. Solving holds the caller up for some
+/// tenths of a second.
 class HandEyeGuide {
  public:
-  /// now: a line that the next replaces; lasting: one that stays.
+  /// now: called with a line that the next one replaces; lasting: called with a line that stays.
   struct Teller {
     std::function<void(const std::string&)> now, lasting;
   };
@@ -59,12 +59,12 @@ class HandEyeGuide {
   static Result<void> check(const GuidePlan& plan);
   HandEyeGuide(GuidePlan plan, Teller tell);
 
-  /// Errors: frames of another size than before, a picture that cannot be kept.
+  /// Takes the next event. Errors: frames of another size than before, a picture that cannot be kept.
   Result<void> take(const wire::Event& event);
-  /// Ends it with the stations that it has; why in words.
+  /// Ends the calibration with the stations that it has. why: in words.
   void end(const std::string& why);
   [[nodiscard]] bool ended() const { return !session_.ended.empty(); }
-  /// Works out the last solution and gives all that was taken. Once, at the end.
+  /// Works out the last solution and gives all that was taken. To be called once, at the end.
   GuidedStations finish();
 
   [[nodiscard]] const GuideState& state() const { return state_; }

@@ -7,7 +7,7 @@
 
 namespace birdseye::host {
 
-/// What the guided procedure is told.
+/// Settings of the guided procedure at an appliance.
 struct LivePlan {
   std::string server = "127.0.0.1";  ///< HOST:PORT of the appliance
   GuidePlan guide;

@@ -20,8 +20,8 @@ struct LiveStation {
   wire::VideoFrame frame;
 };
 
-/// Takes stations from an appliance's stream: each time the scope is held still with the pattern in view becomes one,
-/// after half a second, or when the scope moves on after a fifth of one. What waits is bounded.
+/// Takes stations from an appliance's stream. Each time the scope is held still with the pattern in view, a station is
+/// taken after half a second, or when the scope moves on after at least a fifth of a second. What waits is bounded.
 class LiveStations {
  public:
   /// bird: the scope's, as the appliance names it.
@@ -31,7 +31,7 @@ class LiveStations {
   /// Frames are looked at once the tracker's poses reach past them.
   void push(const wire::VideoFrame& frame);
 
-  /// Nothing more will come: a rest that lasts is over.
+  /// Says that nothing more will come: a rest that still lasts is over.
   void finish() { finish_rest(); }
 
   /// The next station that was taken; empty where there is none.
@@ -40,7 +40,7 @@ class LiveStations {
   std::string take_remark();
   /// The pattern in the newest picture, to say how to go on from there; empty where it is not seen.
   [[nodiscard]] std::optional<calibration::PatternView> look() const;
-  /// The scope is at rest, and whether that becomes a station is not decided yet.
+  /// Whether the scope is at rest and it is not yet decided if the rest becomes a station.
   [[nodiscard]] bool deciding() const { return rest_ && !rest_->done; }
 
  private:

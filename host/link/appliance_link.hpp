@@ -8,7 +8,7 @@
 namespace birdseye::host {
 
 /// Connects to an appliance, or to another OpenIGTLink server, named as "HOST:PORT", or as "HOST" for the usual port.
-/// Waits for one that is starting for some seconds; the error names the address and what to look at.
+/// Waits some seconds for a server that is starting; the error names the address and what to look at.
 Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& address,
                                                         const wire::ForeignSettings& foreign = {});
 

@@ -12,7 +12,7 @@ namespace birdseye::host {
 class EventSource {
  public:
   virtual ~EventSource() = default;
-  /// The next event; empty at the deadline; Errc::disconnected once it is at its end and all events are taken.
+  /// The next event; empty at the deadline; Errc::disconnected once the source has ended and all its events are taken.
   virtual Result<std::optional<wire::Event>> next(std::chrono::steady_clock::time_point deadline) = 0;
 };
 

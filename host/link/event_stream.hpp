@@ -13,7 +13,7 @@
 
 namespace birdseye::host {
 
-/// This machine's CLOCK_MONOTONIC less the appliance's, and how sure that is.
+/// This machine's CLOCK_MONOTONIC less the appliance's, with a sigma.
 struct ClockGap {
   Duration gap, sigma;
 };
@@ -28,7 +28,7 @@ class EventStream : public EventSource {
   Result<std::optional<wire::Event>> next(wire::Client::Clock::time_point deadline) override;
   /// By how much this machine's clock is ahead of the appliance's, by the newest frame; empty until that is known.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
-  /// What a server that is no appliance is, and what of it is passed over; empty for an appliance.
+  /// For a server that is no appliance: what it is, and which of its messages are passed over. Empty for an appliance.
   [[nodiscard]] std::string peer_words() const;
 
  private:
@@ -36,7 +36,7 @@ class EventStream : public EventSource {
   void keep(wire::Event event);
   [[nodiscard]] std::optional<ClockGap> gap_at(const wire::Event& event) const;
 
-  /// Everything that is no frame is small, and comes a hundred times a second: a minute of it is bound enough.
+  /// Other events than frames are small and come a hundred times a second: this bound holds a minute of them.
   static constexpr std::size_t kMostOthers = 8192;
 
   std::unique_ptr<wire::Client> client_;

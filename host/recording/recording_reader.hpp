@@ -15,8 +15,8 @@
 
 namespace birdseye::host {
 
-/// Plays a recording again: the same events in the same order, each frame with its pixels. Of a PLUS sequence, which
-/// has none, they are made from its frames: Birds of all transforms that are OK, and a VideoFrame with the scope's.
+/// Plays a session recording again: the same events in the same order, each frame with its pixels. A PLUS sequence has
+/// no events; they are made from its frames: Birds of all transforms that are OK, and a VideoFrame with the scope's.
 class RecordingReader : public EventSource {
  public:
   struct Settings {
@@ -28,9 +28,10 @@ class RecordingReader : public EventSource {
   /// path: a folder that `birdseye record` made, or a .igs.mha or .igs.mhd. Refuses, naming it, what is neither.
   static Result<std::unique_ptr<RecordingReader>> open(const std::filesystem::path& path, const Settings& settings);
 
-  /// Errc::disconnected at its end, which says how many frames there were. Any other error: the recording is damaged.
+  /// The next event. Errc::disconnected at the recording's end, with words that say how many frames there were. Any
+  /// other error: the recording is damaged.
   Result<std::optional<wire::Event>> next(std::chrono::steady_clock::time_point deadline) override;
-  /// What is odd about it, in words: it was cut short, and so on.
+  /// What is odd about the recording, in words: it was cut short, and so on.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   [[nodiscard]] std::size_t frames() const { return frames_; }            ///< given so far
   [[nodiscard]] std::size_t frames_lost() const { return frames_lost_; }  ///< told of so far, and not whole

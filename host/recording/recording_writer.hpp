@@ -15,7 +15,7 @@
 
 namespace birdseye::host {
 
-// The files of a recording.
+// The files of a session recording.
 inline constexpr const char* kRecordingSheet = "recording.json";
 inline constexpr const char* kRecordingEvents = "events.jsonl";
 inline constexpr const char* kRecordingTracker = "tracker";  ///< .igs.mha
@@ -48,20 +48,20 @@ struct RecordingFigures {
   [[nodiscard]] double seconds() const { return first ? (*last - *first).seconds() : 0; }
 };
 
-/// Writes what an appliance tells into a folder: events.jsonl, all of it, to play again; tracker.igs.mha and the
-/// video's sequence, for Slicer and PLUS; recording.json, what is in it. What was added stays good whatever ends the
-/// program.
+/// Writes a session recording, a folder of what an appliance tells: events.jsonl holds all of it, to play again;
+/// tracker.igs.mha and the video's sequence are for Slicer and PLUS; recording.json says what is in the folder. What
+/// was added stays good whatever ends the program.
 class RecordingWriter {
  public:
   /// Makes the folder, which must hold no recording yet.
   static Result<std::unique_ptr<RecordingWriter>> create(const RecordingSettings& settings);
 
-  /// An error ends the recording: what came before it is kept, and finish() is to follow.
+  /// Adds an event. An error ends the recording: what came before is kept, and finish() must follow.
   Result<void> add(const wire::Event& event);
-  /// Completes the files. why: it ended, in words.
+  /// Completes the files. why: the reason why the recording ended, in words.
   Result<void> finish(const std::string& why);
   [[nodiscard]] const RecordingFigures& figures() const { return figures_; }
-  /// What is not as it was asked for, in words.
+  /// What is not as the settings asked for, in words.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
 
  private:

@@ -23,13 +23,13 @@ class SequenceReader {
   [[nodiscard]] const SequenceHeader& header() const { return header_; }
   [[nodiscard]] int width_px() const { return width_px_; }
   [[nodiscard]] int height_px() const { return height_px_; }
-  /// That are there, whole.
+  /// How many whole frames the file holds.
   [[nodiscard]] std::size_t frames() const { return whole_; }
-  /// That the header tells of: more, where the file was cut.
+  /// How many frames the header tells of: more than frames() where the file was cut.
   [[nodiscard]] std::size_t frames_told() const { return told_; }
 
-  /// RGB, rows from the top. Of a compressed file those that come before it are decompressed too, unless they are read
-  /// in order.
+  /// The frame at index, RGB, rows from the top. In a compressed file all frames before it must be decompressed too,
+  /// unless frames are read in order.
   Result<std::vector<std::uint8_t>> read(std::size_t index);
 
  private:

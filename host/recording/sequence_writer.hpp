@@ -26,7 +26,7 @@ class OutputFile {
   void cut(std::uint64_t bytes);
   /// Appends so many bytes of another file from its beginning on.
   Result<void> append(const std::filesystem::path& other, std::uint64_t at);
-  /// On the disk, whatever happens next.
+  /// Brings what was written onto the disk, so that it is there whatever happens next.
   Result<void> sync();
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
@@ -53,13 +53,14 @@ class SequenceWriter {
   static Result<SequenceWriter> create(const std::filesystem::path& folder, const std::string& name, int width_px,
                                        int height_px);
 
-  /// rgb: rows from the top; empty where there are no pixels. What cannot be added leaves the frames before it.
+  /// Adds a frame. rgb: rows from the top; empty where there are no pixels. A frame that cannot be added leaves those
+  /// before it as they are.
   Result<void> add(const Fields& fields, std::span<const std::uint8_t> rgb);
-  /// Makes one file of header and pixels, NAME.igs.mha, in place of the pair. For that time the disk holds both: where
-  /// there is no room the pair stays, and the error says so. Nothing can be added after it.
+  /// Joins header and pixels into one file, NAME.igs.mha, in place of the pair. Meanwhile the disk holds both: where
+  /// there is no room the pair stays, and the error says so. Nothing can be added afterwards.
   Result<void> join();
   [[nodiscard]] std::size_t frames() const { return frames_; }
-  /// What to open.
+  /// The file to open.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:

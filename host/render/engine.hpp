@@ -15,7 +15,7 @@
 
 namespace birdseye::host {
 
-/// Anything that draws a volume: docs/image-formation.md says what.
+/// Draws a volume as docs/image-formation.md defines it.
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -26,18 +26,18 @@ class Engine {
                            const RenderSettings& settings) = 0;
   /// What runs, in words: "cpu, avx512".
   [[nodiscard]] virtual std::string name() const = 0;
-  /// What went wrong below that no call could say; empty for nothing.
+  /// What went wrong in the driver without any call saying so; empty where nothing did.
   [[nodiscard]] virtual std::string fault() const { return {}; }
   /// Main memory beyond the volume's own; 0 for what lies on the graphics card.
   [[nodiscard]] virtual std::size_t bytes() const { return 0; }
 };
 
-/// cpu, gl (the same rays on the graphics card), slices (the paper's method, on the card), or auto: gl where there is a
-/// graphics card, else cpu.
+/// The names that make_engine() takes: cpu; gl, the same rays on the graphics card; slices, the paper's method on the
+/// card; auto, gl where there is a graphics card, else cpu.
 std::vector<std::string> engine_names();
 /// Keeps a reference to volume, which must outlive it. With auto, `why` says what was chosen and why.
-/// prune: false draws what is not seen too, for measurements; the picture is the same. context: a window's to draw
-/// with, which must outlive the engine; without one, the engines that need the card make their own, off-screen.
+/// prune: false also works on bricks that are not seen, for measurements; the picture is the same. context: a window's
+/// to draw with, which must outlive the engine; without one, the engines that need the card make their own, off-screen.
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
                                             const TransferFunction& transfer, std::string* why = nullptr,
                                             bool prune = true, GlContext* context = nullptr);

@@ -17,12 +17,12 @@ struct Range {
 };
 
 struct Axis {
-  Range range;        ///< where it is empty or of no size, one that is not stands for it
+  Range range;        ///< an empty range, or one without size, is replaced by one with a size
   std::string label;  ///< what it shows and the unit: "lag, ms"
   int ticks = 4;      ///< about so many, at round numbers; 0: none
 };
 
-/// Of a plot on its picture; its axes' numbers and labels lie outside of it.
+/// The area of a plot on its picture; numbers and labels of the axes lie outside of it.
 struct PlotArea {
   double left, top, width, height;
 };
@@ -30,7 +30,7 @@ struct PlotArea {
 /// The axes of a plot: where its numbers lie on the picture.
 class Axes {
  public:
-  /// What numbers and label need to the left of the area and below it.
+  /// The room that numbers and label need to the left of the area and below it.
   static constexpr double kLeft = 58, kBelow = 40;
 
   Axes(const PlotArea& area, Axis x, Axis y);

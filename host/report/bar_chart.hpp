@@ -13,8 +13,8 @@ struct Bar {
   const char* colour = kBlue;
 };
 
-/// An SVG of bars, one below the other, with their names before and their values behind them. label: what they are, and
-/// the unit.
+/// An SVG of bars, one below the other, each with its name before and its value behind it. label: what the values are,
+/// and their unit.
 std::string bars_svg(const std::vector<Bar>& bars, const std::string& label);
 
 }  // namespace birdseye::host

@@ -9,8 +9,8 @@
 
 namespace birdseye::host {
 
-/// The page of a result: an HTML file that loads nothing from a network, with title, verdict and what is added to it,
-/// from top to bottom. Texts are escaped; SVGs are not.
+/// The page of a result: an HTML file that loads nothing from a network. It holds title, verdict and then what was
+/// added, in that order. Texts are escaped; SVGs are not.
 class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}

@@ -10,7 +10,7 @@ struct Curve {
   std::string name;
   std::vector<std::pair<double, double>> points;  ///< one that is not finite breaks the line
 };
-/// A line up through the plot where something begins.
+/// A vertical line through the plot where something begins.
 struct Mark {
   double x;
   std::string text;
@@ -18,7 +18,7 @@ struct Mark {
 struct Panel {
   std::string title, x_label, y_label;
   std::vector<Curve> curves;  ///< at most six; a curve of the same name has the same colour in every panel
-  bool from_zero = true;      ///< the y axis, where nothing is below
+  bool from_zero = true;      ///< the y axis begins at 0, where no value is below
   std::vector<Mark> marks = {};
 };
 struct PanelSize {

@@ -31,7 +31,7 @@ SlicePlane slice_plane(SliceKind kind, const Eigen::Vector3d& centre_in_patient_
 
 /// Grey from low_hu to high_hu, interpolated; black outside of the CT.
 Picture draw_slice(const Volume& ct, const SlicePlane& plane, double low_hu, double high_hu);
-/// The brightest of what lies within depth_mm on either side of the plane.
+/// For each pixel the brightest value within depth_mm on either side of the plane.
 Picture draw_brightest(const Volume& ct, const SlicePlane& plane, double depth_mm, double low_hu, double high_hu);
 
 using Colour = std::array<std::uint8_t, 3>;

@@ -25,7 +25,7 @@ std::string svg_text(double x, double y, std::string_view text, Anchor anchor = 
                      const char* colour = kInk);
 /// more: further attributes, as "stroke-width='2'".
 std::string svg_line(double x1, double y1, double x2, double y2, const char* colour, const char* more = "");
-/// Of a line, among its further attributes.
+/// A further attribute of svg_line().
 inline constexpr const char* kDashed = "stroke-dasharray='5 4'";
 std::string svg_dot(double x, double y, double radius, const char* colour);
 /// The whole picture, on white, as a file of its own or inside a page.

@@ -9,7 +9,7 @@
 
 namespace birdseye::host {
 
-/// What a map of the predicted target error shows besides it. Patient frame, mm.
+/// What a map of the predicted target error shows besides the error. Patient frame, mm.
 struct TargetErrorScene {
   std::span<const Eigen::Vector3d> fiducials_mm, targets_mm;
   const Volume* ct = nullptr;  ///< drawn under the map; may be null

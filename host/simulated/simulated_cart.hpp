@@ -26,15 +26,15 @@ struct SimulatedCartSettings {
   double angle_noise_deg = 0.1;
   int width_px = 768, height_px = 576;
   double video_rate_hz = 25;
-  double dwell_s = 0.3;                 ///< for which the scope is held still at each station over the board
-  double pause_s = 0;                   ///< for which it then stays there, so that the calibration can be worked out
-  double look_s = 7;                    ///< for which it sweeps over the liver
+  double dwell_s = 0.3;  ///< how long the scope is held still at each station over the board
+  double pause_s = 0;    ///< how long it then stays at the last one, so that the calibration can be worked out
+  double look_s = 7;     ///< how long it sweeps over the liver
   int smoothing_ms = 40, wait_ms = 90;  ///< [pose] of birdseyed: frames wait for the poses that are averaged
-  bool drop_late = false;               ///< frames that a busy machine has no time to trace; else they come late
-  std::filesystem::path faults;         ///< script of faults, or empty
+  bool drop_late = false;  ///< true: frames that a busy machine has no time to trace are left out; else they come late
+  std::filesystem::path faults;  ///< script of faults, or empty
 };
 
-/// What an operator of the cart knows without looking inside: the board, the pointer, how many fiducials there are.
+/// What an operator of the cart knows without the truth: the board, the pointer, how many fiducials there are.
 struct CartSheet {
   std::string board;
   Eigen::Vector3d tip_in_pointer_mm = Eigen::Vector3d::Zero();

@@ -13,7 +13,7 @@
 
 namespace birdseye::host {
 
-/// What the simulator knows and only the report reads.
+/// The truth, which the simulator knows and only reports read.
 struct SimulatedTruth {
   CameraModel camera;
   Eigen::Vector3d tumour_centre_in_patient_mm;  ///< in the operation: deformed, where the liver is
@@ -23,17 +23,17 @@ struct SimulatedTruth {
 /// How far an overlay puts the tumour's centre from where it truly is.
 struct OverlayError {
   double target_mm = 0, overlay_px = 0;
-  /// In the picture; both or none.
+  /// The tumour's centre in the picture, where it truly is and where the overlay puts it; both or none.
   std::optional<std::pair<Eigen::Vector2d, Eigen::Vector2d>> true_and_overlaid_px;
 };
-/// Of one frame, overlaid with this lens from this pose; tumour_in_patient_mm: as the CT that is drawn shows it. Empty
-/// where the truth knows no such frame.
+/// The error of one frame's overlay, drawn with this lens from this pose. tumour_in_patient_mm: where the CT that is
+/// drawn shows the tumour. Empty where the truth knows no such frame.
 std::optional<OverlayError> overlay_error(const SimulatedTruth& truth, std::uint64_t sequence,
                                           const CameraModel& camera,
                                           const Transform<Camera, Patient>& camera_from_patient,
                                           const Eigen::Vector3d& tumour_in_patient_mm);
 
-/// folder: the simulator's truth/.
+/// Reads the truth. folder: the simulator's truth/.
 Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder);
 
 }  // namespace birdseye::host

@@ -12,7 +12,7 @@ namespace birdseye::host {
 /// Told each file's path before a decoder touches it.
 using Announce = std::function<void(const std::filesystem::path&)>;
 
-// The decoders may end the process on damaged files, so that only read_image's copy of it calls these.
+// Only read_image's copy of the process may call these: a decoder may end its process on a damaged file.
 bool is_dicom(const std::filesystem::path& path);
 Result<ImageFile> decode_dicom_folder(const std::filesystem::path& folder, const Announce& announce);
 Result<ImageFile> decode_dicom_file(const std::filesystem::path& path, const Announce& announce);

@@ -14,16 +14,16 @@ namespace birdseye::host {
 struct ImageFile {
   std::array<int, 3> size{};
   int components = 1;                     ///< values a voxel
-  std::vector<std::int16_t> hu;           ///< where that is one: rounded, halves away from 0
-  std::vector<float> values;              ///< where there are more: those of a voxel side by side
+  std::vector<std::int16_t> hu;           ///< with one value a voxel: rounded, halves away from 0
+  std::vector<float> values;              ///< with more values a voxel: those of a voxel side by side
   Eigen::Vector3d spacing_mm, origin_mm;  ///< origin: the centre of the first voxel
   Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
 };
 
-/// Reads a folder of one DICOM series, a DICOM file, or a NIfTI, NRRD, MHA or MHD file, with so many values a voxel.
-/// The decoders run in a process of their own (docs/decisions/0012-isolated-import.md), for no longer than five
-/// minutes. Refuses in one line that names the path whatever is missing, unreadable, cut short, has no sound geometry,
-/// or one value a voxel that is not finite or beyond 16 bits.
+/// Reads a folder of one DICOM series, a DICOM file, or a NIfTI, NRRD, MHA or MHD file, with `components` values a
+/// voxel. The decoders run in a process of their own (docs/decisions/0012-isolated-import.md), for no longer than five
+/// minutes. Refuses, in one line that names the path, a file that is missing, unreadable or cut short, one without a
+/// sound geometry, and (with one value a voxel) values that are not finite or beyond 16 bits.
 Result<ImageFile> read_image(const std::filesystem::path& path, int components);
 
 enum class StoredAs { uint8, int16, float32 };

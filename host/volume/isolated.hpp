@@ -14,12 +14,12 @@ namespace birdseye::host {
 
 /// Sends bytes to the process that asked for the work.
 using Send = std::function<void(const void* data, std::size_t size)>;
-/// Takes the next bytes that the work sends. False where they do not come: it has ended, by a signal perhaps, or is
-/// late.
+/// Takes the next bytes that the work sends. False where they do not come: the work has ended, by a signal perhaps, or
+/// is late.
 using Receive = std::function<bool(void* to, std::size_t size)>;
 
-/// While one lives, no copy of this process is made. For work on a thread with a library that decoders use too: a copy
-/// would inherit its locks as they are, and nobody who lets go of them.
+/// While such an object lives, no copy of this process is made. Hold one while a thread works with a library that
+/// decoders use too: a copy would inherit that library's locks as they are, and no thread that releases them.
 class CopiesHeldOff {
  public:
   CopiesHeldOff();
@@ -28,15 +28,15 @@ class CopiesHeldOff {
   std::shared_lock<std::shared_mutex> held_;
 };
 
-/// Runs work in a copy of this process, whose output goes nowhere and whose death is not ours, and take in this one,
-/// at the same time. For decoders of files from elsewhere: Debian's GDCM meets damage with an assertion, which no catch
-/// can hold (docs/decisions/0012-isolated-import.md). What take receives is not to be trusted. work must not use
-/// threads of ours; it is killed at the deadline, or when take returns.
+/// Runs `work` in a copy of this process, and at the same time `take` in this process. The copy's output goes nowhere,
+/// and its death does not end this process. For decoders of files from elsewhere: Debian's GDCM meets damage with an
+/// assertion, which no catch can hold (docs/decisions/0012-isolated-import.md). What take receives is not to be
+/// trusted. work must not use threads of this process. The copy is killed at the deadline, or when take returns.
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
                           Duration within);
 
-/// So many values, as far as they come: the count is only what the other process says, so that no memory is touched
-/// before there is something to put there. Empty where they do not all come.
+/// Receives `count` values. The count is only what the other process says, so memory is touched only as values come.
+/// Empty where not all of them come.
 template <typename T>
 std::optional<std::vector<T>> receive_values(const Receive& receive, std::size_t count) {
   constexpr std::size_t kStep = (1U << 18U) / sizeof(T), kReserved = (1U << 30U) / sizeof(T);

@@ -8,12 +8,12 @@
 
 namespace birdseye::host {
 
-/// Reads a label volume of any format that import_volume reads, on the same grid as ct, or says that it is not.
+/// Reads a label volume of any format that import_volume reads. An error where it is not on the same grid as ct.
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct);
 
-/// ct where labels has one of values or a neighbour (of 26) that has, -1024 HU elsewhere: the neighbours keep the soft
-/// edge that partial volume gives an organ. Cut to the box that holds them, so patient_from_voxel is another.
-/// Errc::not_found where no voxel has one of values.
+/// The CT at voxels whose label is one of values and at their 26 neighbours, -1024 HU elsewhere: the neighbours keep
+/// the soft edge that partial volume gives an organ. Cut to the box that holds these voxels, so patient_from_voxel
+/// differs from ct's. Errc::not_found where no voxel has one of values.
 Result<Volume> keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values);
 
 /// The mean position of the voxels with this label, patient LPS mm; Errc::not_found where there are none.

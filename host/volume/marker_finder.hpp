@@ -16,7 +16,7 @@ struct MarkerSearch {
   std::optional<std::int16_t> threshold_hu;
 };
 
-/// Looks like a marker, and its centre cannot be had.
+/// Looks like a marker, but its centre cannot be determined.
 struct DoubtfulMarker {
   Eigen::Vector3d centre_in_patient_mm;
   std::string reason;
@@ -28,9 +28,9 @@ struct FoundMarkers {
   int passed_over = 0;                   ///< bright things of about the size, of another shape
 };
 
-/// Finds markers of one shape in a CT. What is connected and brighter than the threshold, and of about the size, is
-/// fitted (fit_marker), and taken for a marker where the shape explains the voxels.
-/// stop: what was found until then is given.
+/// Finds markers of one shape in a CT. Connected voxels brighter than the threshold, together of about the marker's
+/// size, are fitted (fit_marker), and taken for a marker where the shape explains them.
+/// stop: ends the search; what was found until then is returned.
 FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search = {}, const std::stop_token& stop = {});
 
 }  // namespace birdseye::host

@@ -18,8 +18,8 @@ struct MarkerFit {
 };
 
 /// Fits centre, axis, size, blur and density of one marker, from a centre that is right to a third of the marker. Each
-/// voxel is taken for a mixture: the share of it that the shape fills has the marker's density, the rest that of the
-/// surroundings next to it. Air on one side and skin on the other thus do not pull the centre.
+/// voxel is taken for a mixture: the share that the shape fills has the marker's density, the rest has the density of
+/// the surroundings beside it. Air on one side and skin on the other thus do not pull the centre.
 /// directions: first guesses of the axis, columns. Empty where too few voxels surround the place, or the fit runs away.
 std::optional<MarkerFit> fit_marker(const Volume& ct, const MarkerShape& shape,
                                     const Eigen::Vector3d& centre_in_patient_mm, const Eigen::Matrix3d& directions);

@@ -17,7 +17,7 @@ struct MarkerShape {
 
   /// How far a point lies outside of the marker's surface (inside: negative). The marker's centre is the origin.
   [[nodiscard]] double outside_mm(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& axis) const;
-  /// Half of what it takes up along a direction.
+  /// Half of the marker's extent along a direction.
   [[nodiscard]] double half_extent_mm(const Eigen::Vector3d& direction, const Eigen::Vector3d& axis) const;
   [[nodiscard]] double volume_mm3() const;
   [[nodiscard]] double thinnest_mm() const;  ///< the least of its outer dimensions

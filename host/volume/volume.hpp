@@ -9,7 +9,7 @@
 
 namespace birdseye::host {
 
-/// Where (i, j, k) lies in what a grid of this size holds, x fastest.
+/// The index of (i, j, k) among the values of a grid of this size, x fastest.
 inline std::size_t grid_index(const std::array<int, 3>& size, int i, int j, int k) {
   return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
              static_cast<std::size_t>(size[0]) +

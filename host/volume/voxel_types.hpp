@@ -14,7 +14,7 @@
 
 namespace birdseye::host {
 
-/// f(T()) for the type of a file's values; false where they are no numbers.
+/// Calls f(T()) with the type T of a file's values; false where they are no numbers.
 template <typename F>
 bool with_type(itk::IOComponentEnum type, const F& f) {
   using Type = itk::IOComponentEnum;
@@ -44,7 +44,7 @@ bool with_type(itk::IOComponentEnum type, const F& f) {
   }
 }
 
-/// Rounds values of this type, halves away from 0, and puts them behind hu. path is what to refuse.
+/// Rounds values of this type, halves away from 0, and appends them to hu. path: named by the error.
 template <typename T>
 Result<void> append_hu(const std::filesystem::path& path, const std::vector<char>& bytes,
                        std::vector<std::int16_t>& hu) {

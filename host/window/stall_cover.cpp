@@ -110,7 +110,8 @@ int StallCover::covered() const {
 }
 
 void StallCover::watch(const std::stop_token& stop) {
-  // Before all that keeps the window's own thread from running; who may not have it does without.
+  // Real-time scheduling puts this thread before whatever keeps the window's thread from running. Without the right to
+  // it the call fails, and the thread runs as any other.
   const sched_param least{.sched_priority = 1};
   ::pthread_setschedparam(::pthread_self(), SCHED_RR, &least);
   std::unique_lock lock(mutex_);

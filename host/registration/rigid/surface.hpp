@@ -22,7 +22,7 @@ struct Surface {
 /// missing, unreadable, damaged, or holds no triangles.
 Result<Surface> read_surface(const std::filesystem::path& path);
 
-/// Where a surface is nearest to a point.
+/// The point of a surface that is nearest to a given point.
 struct SurfacePoint {
   Eigen::Vector3d point_mm, normal;  ///< normal: of the triangle, unit length, of either sign
   double distance_mm = 0;

@@ -8,7 +8,7 @@
 
 namespace birdseye::host {
 
-/// The fiducials a surface refinement starts from, and may not contradict.
+/// The fiducials that a surface refinement starts from and may not contradict.
 struct FiducialAnchor {
   Transform<Patient, Tracker> patient_from_tracker;
   std::span<const Eigen::Vector3d> touched_in_tracker_mm;
@@ -17,7 +17,7 @@ struct FiducialAnchor {
 };
 
 struct SurfaceRefinement {
-  /// Refined; the fiducials' own where the surface would move it farther than they allow.
+  /// The refined pose; or the fiducials' own pose, where the surface would move it farther than they allow.
   Transform<Patient, Tracker> patient_from_tracker;
   Transform<Patient, Tracker> surface_pose;  ///< where the surface puts it, accepted or not
   bool accepted = false;
@@ -32,11 +32,11 @@ struct SurfaceRefinement {
 };
 
 /// Moves touched points onto the patient's surface: iterative closest points, with the distance along the surface's
-/// normal (Y. Chen, G. Medioni, 1992), leaving out the farthest tenth of the points, while the fiducials keep their
-/// weight, so that what the surface leaves open (a plane slides) stays where they put it.
+/// normal (Y. Chen, G. Medioni, 1992), leaving out the farthest tenth of the points. The fiducials keep their weight,
+/// so that what the surface leaves open (a plane slides along itself) stays where the fiducials put it.
 ///
-/// The fiducials know where they are to within their localisation error. A surface that moves them farther than that
-/// explains is another surface, or touched elsewhere: refused, and said. Refuses fewer than ten points
+/// The fiducials are right to within their localisation error. A surface that moves them farther than that explains is
+/// another surface, or was touched elsewhere: it is refused, and `told` says so. Refuses fewer than ten points
 /// (Errc::degenerate) and coordinates that are not finite.
 Result<SurfaceRefinement> refine_on_surface(const Surface& surface,
                                             std::span<const Eigen::Vector3d> touched_in_tracker_mm,

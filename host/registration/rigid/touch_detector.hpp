@@ -8,16 +8,16 @@
 
 namespace birdseye::host {
 
-/// One touched point: where the tip rested, and how much it spread while it did.
+/// One touched point: where the tip rested, and how much its positions spread meanwhile.
 struct Touch {
   Eigen::Vector3d tip_in_tracker_mm;
   double rms_mm = 0;
   int samples = 0;
 };
 
-/// Finds the points at which a tracked tip rests. The tip is at rest while, over `window`, a line fitted to its
-/// positions moves by less than `still_mm`: a slope averages the tracker's noise where a spread would not. A touch is
-/// reported when the tip leaves; where it rested before its first move does not count.
+/// Finds the points at which a tracked tip rests. The tip is at rest while a line fitted to its positions over `window`
+/// moves by less than `still_mm`: a line averages the tracker's noise, which the spread of positions would not. A touch
+/// is reported when the tip leaves. A rest before the tip's first move does not count.
 class TouchDetector {
  public:
   struct Settings {

@@ -35,7 +35,7 @@ class BinnedPicture {
   [[nodiscard]] std::span<const std::size_t> blocks() const { return blocks_; }
   [[nodiscard]] const std::uint8_t* bins(std::size_t first) const { return &bins_[first]; }
 
-  /// A block of another picture of this size; through spare where the picture ends before the block does.
+  /// A block of another picture of this size. Where the picture ends inside the block, the block is copied into spare.
   template <typename T>
   [[nodiscard]] const T* block(std::span<const T> picture, std::size_t first, std::array<T, kBlock>& spare) const {
     if (first + kBlock <= size_) return &picture[first];

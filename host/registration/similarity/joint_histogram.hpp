@@ -18,7 +18,7 @@ class JointHistogram {
   /// reference, overlap: of one size, the overlap not empty. bins: 2 to 128.
   JointHistogram(std::span<const std::uint8_t> reference, std::span<const std::uint8_t> overlap, int bins);
 
-  /// Of the pixels in the overlap, [bin of the reference * bins + bin of the synthetic picture].
+  /// Counts of the pixels in the overlap, at [bin of the reference * bins + bin of the synthetic picture].
   [[nodiscard]] std::vector<std::uint32_t> count(std::span<const std::uint8_t> synthetic) const;
   [[nodiscard]] Entropies entropies(std::span<const std::uint8_t> synthetic) const;
 

@@ -15,9 +15,10 @@ struct LensField {
   double centre_x_px = 0, centre_y_px = 0, radius_x_px = 0, radius_y_px = 0;
 };
 
-/// rgb: 8 bits, rows from the top. Nothing where there is no dark surround with the edge of a round field, whole or cut
-/// by the picture's border, at least 0.8 of the picture's shorter side across. What is dark inside it does not matter,
-/// nor does a little light outside. A round organ that large before black looks the same.
+/// Finds the lens field. rgb: 8 bits, rows from the top. Empty where there is no dark surround with the edge of a round
+/// field, whole or cut by the picture's border, at least 0.8 of the picture's shorter side across. Dark parts inside
+/// the field do not matter, nor does a little light outside. A round organ of that size before black is mistaken for a
+/// field.
 std::optional<LensField> find_lens_field(std::span<const std::uint8_t> rgb, int width_px, int height_px);
 
 /// Where a video picture can be compared with a synthetic one, not zero: inside the lens field, if there is one; not in

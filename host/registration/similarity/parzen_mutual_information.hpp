@@ -14,7 +14,8 @@ class ParzenMutualInformation {
   struct Settings {
     int reference_bins = 32;  ///< 2 to 128
     int synthetic_bins = 32;  ///< 2 to 256, over lowest to highest; the window adds three beyond them
-    /// What synthetic greys are cut to. A renderer's background may so have a value of its own, apart from black.
+    /// Synthetic greys are cut to this range. It reaches below black, so that a renderer's background can have a value
+    /// of its own.
     double lowest = -0.25, highest = 1;
   };
 
@@ -28,7 +29,7 @@ class ParzenMutualInformation {
   [[nodiscard]] double value_and_gradient(std::span<const double> synthetic, std::span<double> gradient) const;
 
  private:
-  /// Of a block's greys: the cells between neighbouring bins that they lie in, and how far in them.
+  /// For the greys of a block: the cells between neighbouring bins in which they lie, and how far into the cells.
   struct Places {
     std::array<int, BinnedPicture::kBlock> cell;
     std::array<double, BinnedPicture::kBlock> part;  ///< 0 to 1

@@ -20,8 +20,8 @@ struct Reference {
 /// Errc::bad_value for spans of another size; Errc::degenerate for an overlap of nothing, or of one grey level.
 Result<void> check(const Reference& reference);
 
-/// How alike a synthetic picture is to the reference it was made for: larger is more alike. Safe to ask from several
-/// threads; the same to the bit for any number of them.
+/// How alike a synthetic picture and the reference are; larger is more alike. Safe to ask from several threads; the
+/// same to the bit for any number of them.
 class Similarity {
  public:
   virtual ~Similarity() = default;

@@ -21,7 +21,7 @@ class ControlGrid {
   /// which has no fewer points on any axis.
   [[nodiscard]] std::vector<double> refine(const std::vector<double>& parameters, const ControlGrid& finer) const;
 
-  /// The patch that moves so, in units of the box.
+  /// The Bezier patch with these parameters, in units of the box.
   [[nodiscard]] BezierPatch patch(const std::vector<double>& parameters, const Eigen::Vector3d& box_mm) const;
 
   /// The mean of |du/dx|^2 over the box: how much the deformation strains what it moves. Adds weight times its gradient
@@ -29,8 +29,8 @@ class ControlGrid {
   double strain(const std::vector<double>& parameters, const Eigen::Vector3d& box_mm, double weight,
                 std::vector<double>& gradient) const;
 
-  /// Control points are far from independent: neighbours pull against one another. In these coordinates the sum of
-  /// squares is the mean of |u|^2 over the box, and an optimiser's steps are alike in all directions.
+  /// Control points are far from independent: neighbours pull against one another. In `even` coordinates the sum of
+  /// squares is the mean of |u|^2 over the box, so that an optimiser's steps have a like effect in all directions.
   [[nodiscard]] std::vector<double> from_even(const std::vector<double>& even) const;
   [[nodiscard]] std::vector<double> to_even(const std::vector<double>& parameters) const;
   /// d(value)/d(even) from d(value)/d(parameters).
@@ -45,8 +45,8 @@ class ControlGrid {
   std::array<Eigen::MatrixXd, 3> root_, inverse_root_;  ///< upper triangles: mass = root^T root
 };
 
-/// The displacements that a control grid gives at the points of a regular grid over the box, and back again: what a
-/// change at those points means for the control points. Both factor into one axis after another.
+/// The displacements that a control grid gives at the points of a regular grid over the box; and back again, what a
+/// change at those points means for the control points. Both are computed one axis after another.
 class ControlledGrid {
  public:
   /// points: of the regular grid, along each axis, the first and the last on the box's faces.

@@ -5,11 +5,11 @@
 
 namespace birdseye::host {
 
-/// Powell's direction set (Powell, Computer Journal 7(2), 1964): line searches along a set of directions, of which the
-/// one that brought most gives way to where a whole round went. The value alone is asked for, and may be a little
-/// rough: lines are searched by parabolas that look no closer than `close`. Makes value large from `start`; first steps
-/// are of length `step`, all units those of the unknowns. Returns the best place when a round moves less than close.
-/// What value throws passes through.
+/// Makes value large, starting at `start`, by Powell's direction set (Computer Journal 7(2), 1964): line searches along
+/// a set of directions, one round after another. After a round, the direction that brought most is replaced by the
+/// direction in which the whole round went. Needs no gradient, and value may be a little rough: lines are searched by
+/// parabolas that look no closer than `close`. First steps have the length `step`; step and close are in units of the
+/// unknowns. Returns the best place once a round moves less than close. Passes on what value throws.
 std::vector<double> climb_by_direction_set(const std::function<double(const std::vector<double>&)>& value,
                                            const std::vector<double>& start, double step, double close);
 

@@ -11,11 +11,12 @@ namespace birdseye::host {
 /// From the unit cube of a patch or an octree to the patient: the tissue's box.
 Eigen::Affine3d patient_from_cube(const Tissue& tissue);
 
-/// Parameters of control, mm, that come closest to a field, by least squares over a grid of the tissue's box.
+/// The parameters of control, mm, whose deformation comes closest to a field, by least squares over a grid of the
+/// tissue's box.
 std::vector<double> closest_parameters(const DisplacementField& field, const ControlGrid& control,
                                        const Tissue& tissue);
 
-/// The field of an octree of this level over the tissue's box whose free vertices the control points drive.
+/// The field of an octree of this level over the tissue's box, its free vertices driven by the control points.
 DisplacementField driven_field(const ControlGrid& control, const std::vector<double>& parameters, const Tissue& tissue,
                                int level);
 

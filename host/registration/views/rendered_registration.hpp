@@ -27,7 +27,8 @@ struct RenderedRegistrationSettings {
   /// Where to start; must not fold. The deformation of the chosen kind that comes closest to it is taken.
   std::optional<DisplacementField> initial;
   int most_evaluations = 400;
-  /// Of the first steps, root mean square over the organ's box: about a third of how far its surface may have moved.
+  /// Size of the first steps, root mean square over the organ's box: about a third of how far the organ's surface may
+  /// have moved.
   double first_step_mm = 2;
   std::function<void(const std::string&)> progress = [](const std::string&) {};
 };
@@ -35,7 +36,7 @@ struct RenderedRegistrationSettings {
 /// The paper's registration: an optimiser that asks for values alone, of pictures at their full size. Deformations that
 /// fold are worth less than any that does not. Gives what register_views() gives, but no uncertainty and no lamp;
 /// similarity in the measure's own unit. Parameters are mm along the box's axes, three a control point or free vertex;
-/// control_points is zero for vertices. Refuses what register_views() refuses, and a similarity that is none.
+/// control_points is zero for vertices. Refuses what register_views() refuses, and an unknown similarity.
 Result<ViewRegistration> register_rendered(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
                                            std::span<const int> label_values, const TransferFunction& transfer,
                                            const RenderedRegistrationSettings& settings);

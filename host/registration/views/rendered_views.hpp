@@ -17,7 +17,7 @@ namespace birdseye::host {
 /// and compared with its video over the pixels that count. One deformation is resampled once for all views.
 class RenderedViews {
  public:
-  /// The tissue is copied, as a shell: what lies deeper than light gets in an opaque organ is left out, for it would be
+  /// Copies the tissue as a shell: what lies deeper than light reaches in an opaque organ is left out, for it would be
   /// resampled and lit and never be seen. similarity: one of similarity_names(). Refuses, naming the view, what
   /// make_similarity() refuses.
   static Result<RenderedViews> make(const std::vector<VideoView>& views, const Tissue& tissue,
@@ -25,7 +25,7 @@ class RenderedViews {
 
   /// Mean similarity over the views (equation 6, over their number).
   double similarity(const DisplacementField& field);
-  /// Of each view, after similarity().
+  /// The similarity of each view, after similarity().
   [[nodiscard]] const std::vector<double>& per_view() const { return per_view_; }
   /// Of view n, after similarity(): how many pixels that count show tissue.
   [[nodiscard]] std::size_t tissue_pixels(std::size_t n) const { return tissue_pixels_[n]; }

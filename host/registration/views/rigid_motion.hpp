@@ -15,7 +15,7 @@ struct Wrench {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< value per mm
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< value per rad
 
-  /// Of a point, at which the value changes by by_point per mm.
+  /// Adds the part of one point, at which the value changes by by_point per mm.
   void add(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& by_point) {
     force += by_point;
     moment += point_mm.cross(by_point);
@@ -31,14 +31,14 @@ struct Wrench {
 /// gyration, so that a step in any of them moves the organ about equally far, as ControlGrid's even coordinates do.
 using PoseUnknowns = std::array<double, 6>;
 
-/// The rigid motion between where the given poses take the patient to be and where its pictures show it. About the
-/// organ's centre, so that shift and turn pull little against one another.
+/// The rigid motion between where the given poses have the patient and where the pictures show the patient. It turns
+/// about the organ's centre, so that shift and turn pull little against one another.
 class RigidMotion {
  public:
   explicit RigidMotion(const Tissue& tissue);
 
   /// Takes a place of the model (the CT's patient frame) to the patient frame of the given poses:
-  /// patient = exp(turn) (model - centre) + centre + shift. Of zeros, the identity.
+  /// patient = exp(turn) (model - centre) + centre + shift. The identity for zeros.
   [[nodiscard]] Transform<Patient, Patient> patient_from_model(const PoseUnknowns& unknowns) const;
   /// d(value)/d(unknowns), from the wrench on the cameras' rays, about the grid's origin and along its axes.
   [[nodiscard]] PoseUnknowns gradient(const PoseUnknowns& unknowns, const Wrench& on_rays) const;

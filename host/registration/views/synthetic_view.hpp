@@ -12,7 +12,7 @@
 
 namespace birdseye::host {
 
-/// A laparoscope's picture with a known pose, to be matched.
+/// A laparoscope's picture with a known pose, which the registration is to match.
 struct VideoView {
   std::string name;
   CameraModel camera;
@@ -29,7 +29,7 @@ struct Headlight {
   double vignette = 0.4;  ///< how much darker the rim of the lens's field is than its middle; grows with radius squared
 };
 
-/// What shows where there is no tissue: darker than any of it can be.
+/// The grey of pixels without tissue: darker than tissue can be.
 inline constexpr double kBackground = -0.25;
 
 /// The synthetic picture of one view, and what a change of its pixels means for the tissue. Rays are cast through
@@ -41,18 +41,19 @@ class SyntheticView {
   /// Every `reduction`-th pixel along each axis, the mean of the pixels about it.
   SyntheticView(const VideoView& view, const Tissue& tissue, int reduction);
 
-  /// Of the pixels that count.
+  /// The video's greys at the pixels that count.
   [[nodiscard]] const std::vector<std::uint8_t>& video() const { return video_; }
   /// After render(): how many pixels show tissue.
   [[nodiscard]] std::size_t tissue_pixels() const;
 
-  /// Casts from camera_from_patient * patient_from_model; the brightness stays what suits the pose that was given.
+  /// Casts rays from camera_from_patient * patient_from_model from now on. The brightness stays as it suits the given
+  /// pose.
   void look_from(const Transform<Patient, Patient>& patient_from_model);
 
   /// The grey of each pixel that counts, kBackground to 1.
   const std::vector<double>& render(const std::vector<float>& occupancy, const Headlight& light);
-  /// After render(): by_occupancy += d(value)/d(occupancy), from d(value)/d(grey); and where it is asked for,
-  /// on_camera += what a motion of rays and lamp does, about the grid's origin and along its axes.
+  /// After render(): by_occupancy += d(value)/d(occupancy), from d(value)/d(grey). Where on_camera is given, adds to it
+  /// what a motion of rays and lamp does, about the grid's origin and along its axes.
   void pull_back(const std::vector<float>& occupancy, const std::vector<double>& by_grey,
                  std::vector<float>& by_occupancy, Wrench* on_camera = nullptr);
 

@@ -15,16 +15,16 @@ namespace birdseye::host {
 /// Below this share of tissue a place is empty; half is its surface.
 inline constexpr float kSurface = 0.3F;
 
-/// What a laparoscope's light meets, for matching with video: which share of what is round each point of a regular grid
-/// belongs to the organ, smooth enough for derivatives, over the volume's box (from the first voxel's centre to the
-/// last's). An organ's inside is opaque, as it is to a camera, whatever its transfer function says of it.
+/// What a laparoscope's light meets, for matching with video. For each point of a regular grid over the volume's box
+/// (from the first voxel's centre to the last's): the share of its surroundings that belongs to the organ, smooth
+/// enough for derivatives. An organ's inside is opaque, as it is to a camera, whatever the transfer function says.
 struct Tissue {
   std::array<int, 3> points{};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
   /// From places on the grid, in mm along its axes, to the patient; a rigid motion.
   Eigen::Affine3d patient_from_grid = Eigen::Affine3d::Identity();
   std::vector<float> occupancy;     ///< 0 to 1, x fastest
-  std::vector<std::uint8_t> level;  ///< 1 where nothing changes about the cell from a point on
+  std::vector<std::uint8_t> level;  ///< 1 where occupancy is constant around the cell that begins at the point
 
   [[nodiscard]] Eigen::Vector3d box_mm() const {
     return spacing_mm.cwiseProduct(Eigen::Vector3d(points[0] - 1, points[1] - 1, points[2] - 1));

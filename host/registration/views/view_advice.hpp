@@ -12,15 +12,15 @@ namespace birdseye::host {
 struct ViewAdvice {
   /// By how much one more view from where the camera is shrinks what the views leave open, in [0, 1].
   double gain_now = 0;
-  double gain_best = 0;  ///< and from the best place in reach
+  double gain_best = 0;  ///< the same for the best place in reach
   std::string words;     ///< what to do, as seen in the picture now
 };
 
 /// A view tells where things are across its ray, not along it: of n views with unit rays d, the information on a place
 /// is the sum of I - d d^T, and what stays open is the trace of its inverse. (The same rule as for tracked points seen
-/// by several cameras: A. Davison and D. Murray, 2002, choose measurements by it.) Compared are rays to the organ's
-/// middle, up to 40 degrees from that of now, as far as a port in the abdominal wall lets a laparoscope go. A weak
-/// prior stands in for the views that are still missing.
+/// by several cameras: A. Davison and D. Murray, 2002, choose measurements by it.) Rays to the organ's middle are
+/// compared, up to 40 degrees from the present one, as far as a port in the abdominal wall lets a laparoscope go. A
+/// weak prior stands in for views that are still missing.
 ViewAdvice advise_view(std::span<const Transform<Camera, Patient>> kept, const Transform<Camera, Patient>& now,
                        const Eigen::Vector3d& middle_in_patient_mm);
 

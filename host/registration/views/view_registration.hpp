@@ -21,7 +21,7 @@ struct TracePoint {
   double similarity = 0;
 };
 
-/// Whoever waits for a registration: sees each step, and may call it off. Called on the registration's thread.
+/// For whoever waits for a registration: sees each step, and may cancel it. Called on the registration's thread.
 struct RegistrationWatch {
   std::function<void(const TracePoint&)> step = [](const TracePoint&) {};
   std::function<bool()> cancelled = [] { return false; };
@@ -49,11 +49,12 @@ struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
   DisplacementField field;         ///< rest = deformed + u(deformed)
-  /// Of the given poses, where it is refined: camera_from_patient * patient_from_model is where the pictures were taken
-  /// from. The field is in the model's frame.
+  /// The correction of the given poses, where it was asked for: the pictures were taken from camera_from_patient *
+  /// patient_from_model. The field is in the model's frame.
   std::optional<PoseUnknowns> pose;
   Transform<Patient, Patient> patient_from_model;
-  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< of the organ, about which it turns; model's frame
+  Eigen::Vector3d centre_mm =
+      Eigen::Vector3d::Zero();  ///< of the organ, about which the pose's correction turns; model's frame
   Headlight light;
   double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
   std::vector<double> per_view_before, per_view_after;
@@ -64,14 +65,14 @@ struct ViewRegistration {
   /// asked for or nothing better than the start was found.
   std::optional<double> uncertainty_mm;
   std::string why_so_many_points;  ///< in words
-  bool worse_than_start = false;   ///< the start is what is returned then: the initial field itself, or none
-  bool folded = false;             ///< and that is why: every deformation that was found folds
+  bool worse_than_start = false;   ///< the start is returned: the initial field itself, or none
+  bool folded = false;             ///< the reason for that: every deformation that was found folds
   bool lamp_at_limit = false;      ///< the lamp is at the end of where it was searched
 };
 
 /// Deforms the tissue until synthetic views look like the video: L-BFGS with the analytic gradient, coarse to fine.
-/// Refuses, naming the view: one that sees nothing of the organ, a picture of a single grey; and a start that folds,
-/// also as the control points give it again. Errc::disconnected where the watch calls it off.
+/// Refuses, naming the view, a view that sees nothing of the organ and a picture of a single grey; and a start that
+/// folds, by itself or as the control points reproduce it. Errc::disconnected where the watch cancels.
 Result<ViewRegistration> register_views(const std::vector<VideoView>& views, const Volume& ct, const Volume* labels,
                                         std::span<const int> label_values, const TransferFunction& transfer,
                                         const ViewRegistrationSettings& settings);

@@ -6,19 +6,20 @@
 
 namespace birdseye::host::cpu {
 
-// What the inner loops are given. Plain structures, for these loops are compiled once per instruction set, and anything
-// inline that they shared with the rest of the program might be kept in a form that not every machine can run.
+// What the inner loops are given: plain structures. The loops are compiled once per instruction set. If they shared
+// inline functions with the rest of the program, the linker might keep a version of such a function that not every
+// machine can run.
 
 inline constexpr int kBrick = 4;  ///< cells of a brick along an axis
-/// A brick's distance to the nearest that is seen; of one that is seen itself, this and how many bricks all around it
-/// are seen too.
+/// GridView::distance holds for each brick its distance to the nearest brick that is seen. For a brick that is seen
+/// itself it holds kSeenBrick plus how many bricks all around it are seen too.
 inline constexpr int kSeenBrick = 128;
 
-inline constexpr int kLowestHu = -1024, kHighestHu = 3071;  ///< what HU are cut to: those of a transfer function
+inline constexpr int kLowestHu = -1024, kHighestHu = 3071;  ///< HU are cut to this range, that of a transfer function
 
-/// Voxels from one slice to the next are a multiple of this.
+/// The count of voxels from one slice to the next is a multiple of this.
 inline constexpr int kSliceUnitBits = 8, kSliceUnit = 1 << kSliceUnitBits;
-/// Rows of a slice, and slices by kSliceUnit, are at most so long: they are multiplied in 16 bits.
+/// The strides of rows, and of slices in units of kSliceUnit, are at most this: they are multiplied in 16 bits.
 inline constexpr int kLongestRow = 32767;
 inline constexpr int kHuBits = 4;                        ///< HU are kept times 16, in 16 bits
 inline constexpr float kLightUnit = 1.0F / (255 * 127);  ///< of a sample's shade and highlight
@@ -38,7 +39,8 @@ struct CastJob {
   GridView grid;
   /// Blocks of 4x4 pixels: 16 x, 16 y, 16 z; unit, camera frame; zero where the lens does not see.
   const float* directions = nullptr;
-  const float* ranges = nullptr;  ///< of each block: from where to where anything is seen, mm; none where to < from
+  const float* ranges =
+      nullptr;  ///< of each block: from where to where anything is seen, mm; nothing is where to < from
   int width_px = 0, height_px = 0, blocks_per_row = 0;
   float origin[3] = {};                 ///< of the rays, voxels
   float voxels_from_camera[3][3] = {};  ///< row by row
@@ -81,7 +83,7 @@ struct Kernels {
   /// Voxels x_begin to x_end (excluded) of a row.
   void (*light)(const LightJob& job, int x_begin, int x_end, int y, int z);
   void (*warp)(const WarpJob& job, int x_begin, int x_end, int y, int z);
-  /// The least and the greatest HU over the rows y, z of a box, for each x of it.
+  /// The least and the greatest HU over all y and z of a box, for each of its x.
   void (*bounds)(const GridView& grid, int x_begin, int x_end, int y_begin, int y_end, int z_begin, int z_end, int* low,
                  int* high);
 };

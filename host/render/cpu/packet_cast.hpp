@@ -6,7 +6,8 @@
 
 namespace birdseye::host::cpu {
 
-/// Samples between two looks at the bricks and at the transmittance: their loads need not wait for one another.
+/// A run: the samples between two looks at the bricks and at the transmittance. Their loads need not wait for one
+/// another.
 inline constexpr int kRun = 4;
 /// Voxels that a run may go on past what is seen.
 inline constexpr float kStray = 5;
@@ -87,8 +88,8 @@ void cast_packet(const CastJob& job, int block, int part) {
   const F end = P::floor(P::min(far, P::f(range[1])) * per_h - P::f(0.5F));
   M active = P::both(P::lt(P::f(0), in_camera.z), P::le(i, end));
 
-  // From here on places are in 1/65536 voxel: a sample's cell and its place in that are bits of one whole number. They
-  // are counted from where the ray enters the volume, whatever is leapt over.
+  // From here on places are in 1/65536 voxel: a sample's cell, and its place in the cell, are bits of one whole number.
+  // Places are counted from where the ray enters the volume, whatever is leapt over.
   constexpr float kUnit = 65536;
   const auto start = [&](F from, F rate, F index) {
     return P::round((from + (index + P::f(0.5F)) * P::f(job.step_mm) * rate) * P::f(kUnit));

@@ -14,8 +14,8 @@ struct BlendedBytes {
 };
 
 /// At x, y, z in 1/65536 voxel. Two voxels side by side come with one load of 64 bits, so a packet is worked on as two
-/// halves of twice as wide lanes, each a voxel's four bytes in four words: HU in two of them, shade, highlight. They
-/// are blended alike, with weights of 7 bits along x and of 15 along y and z.
+/// halves of twice as wide lanes. A lane holds a voxel's four bytes in four words: two for HU, one for shade, one for
+/// highlight. All are blended alike, with weights of 7 bits along x and of 15 bits along y and z.
 template <typename P>
 inline BlendedBytes<P> blend_bytes(const GridView& grid, typename P::I x, typename P::I y, typename P::I z,
                                    typename P::M m) {

@@ -7,7 +7,7 @@
 
 namespace birdseye::host::cpu {
 
-/// A place along one axis of a field: the point before it and how far past that it is.
+/// A place along one axis of a field: the field's point before the place, and how far past that point the place is.
 template <typename P>
 struct LatticePlace {
   typename P::I base;
@@ -58,7 +58,7 @@ inline void store_resampled(const WarpJob& job, typename P::F* to, int x, int x_
   P::store_first(row + x, P::template shift_left<kHuBits>(cut), x_end - x);
 }
 
-/// Where the field's axes are the volume's, all of a row of voxels lies between the same four rows of the field: they
+/// Where the field's axes are the volume's, a whole row of voxels lies between the same four rows of the field, which
 /// are blended into one first.
 template <typename P>
 void warp_aligned(const WarpJob& job, int x_begin, int x_end, int y, int z, std::uint32_t* row) {

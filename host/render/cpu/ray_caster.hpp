@@ -42,7 +42,8 @@ class RayCaster {
   RayCaster(const RayCaster&) = delete;
   RayCaster& operator=(const RayCaster&) = delete;
 
-  /// Until the next call, or undeform(), pictures show the volume deformed; every axis of it has two voxels or more.
+  /// Until the next call, or undeform(), pictures show the volume deformed. Every axis of the volume must have two
+  /// voxels or more.
   void deform(const DisplacementField& field) { grid_.deform(field); }
   void undeform() { grid_.undeform(); }
   [[nodiscard]] ImageRgba render(const LensRays& rays, const Transform<Camera, Patient>& camera_from_patient,

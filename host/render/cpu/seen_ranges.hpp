@@ -8,16 +8,17 @@
 
 namespace birdseye::host::cpu {
 
-/// From where to where along its rays each block of 4x4 pixels can see anything at all. The outermost of the bricks
-/// that are seen are drawn, as boxes, into a coarse picture of the plane z = 1 of the camera, nearest and furthest
-/// distance of each: rays start and end there instead of feeling their way through the empty part of the volume.
+/// Tells for each block of 4x4 pixels between which distances its rays can see anything. The outermost of the bricks
+/// that are seen are drawn as boxes, with their nearest and furthest distance, into a coarse picture of the camera's
+/// plane z = 1. Rays start and end at these distances instead of feeling their way through the empty part of the
+/// volume.
 class SeenRanges {
  public:
   /// directions: as CastJob::directions.
   SeenRanges(const float* directions, int blocks_per_row, int blocks);
 
-  /// Nearest and furthest of each block, mm along the rays, so two numbers a block; furthest < nearest where nothing
-  /// is.
+  /// Nearest and furthest distance for each block, two numbers a block, mm along the rays; furthest < nearest where
+  /// nothing is seen.
   [[nodiscard]] std::vector<float> of(const GridView& grid, const Eigen::Affine3d& camera_from_voxel) const;
 
  private:

@@ -15,8 +15,8 @@
 
 namespace birdseye::host::cpu {
 
-/// The volume as the ray caster walks through it: HU with the light on them, and which bricks are seen. Deforming it
-/// resamples the bricks that may be seen then; casting rays costs the same whatever the deformation.
+/// The volume as the ray caster walks through it: HU with light, and which bricks are seen. Deforming the grid
+/// resamples the bricks that the deformed volume may show; casting rays costs the same whatever the deformation.
 class VoxelGrid {
  public:
   /// Keeps references to all three.

@@ -53,13 +53,13 @@ using GlFramebuffer = GlObject<DeleteFramebuffer>;
 using GlVertexArray = GlObject<DeleteVertexArray>;
 using GlProgram = GlObject<DeleteProgram>;
 
-/// Compiles and links; a failure is a bug of ours and carries the compiler's words.
+/// Compiles and links. A failure is a bug of ours; the error carries the compiler's words.
 Result<GlProgram> make_program(std::initializer_list<std::pair<GLenum, std::string>> shaders);
-/// Nearest, clamped, of one level.
+/// A texture of one level, with nearest sampling, clamped at its borders.
 GlTexture make_texture(GLenum target, GLenum format, GLsizei width, GLsizei height, GLsizei depth);
-/// Whether the driver has textures of a volume's size; Errc::unsupported.
+/// Errc::unsupported where the driver has no textures of a volume's size.
 Result<void> check_texture_size(const std::array<int, 3>& size);
-/// What the bound framebuffer holds, as 8 bits; row 0 of the picture is the first that the card keeps.
+/// Reads the bound framebuffer as 8 bits; row 0 of the picture is the card's first row.
 ImageRgba read_picture(int width_px, int height_px);
 GlBuffer make_buffer(GLsizeiptr bytes, const void* data);
 

@@ -13,7 +13,7 @@
 
 namespace birdseye::host {
 
-/// The picture of RayCaster from the graphics card. All its work is done there: resampling, light, bricks, rays.
+/// Draws RayCaster's picture on the graphics card, which does all the work: resampling, light, bricks, rays.
 class GlRayCaster {
  public:
   /// Keeps references to context, which must be current whenever this is used, and to volume.

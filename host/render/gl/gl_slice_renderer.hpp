@@ -18,10 +18,10 @@
 namespace birdseye::host {
 
 /// The paper's own method (section 3): slices of the volume along the axis that the camera looks along most, drawn from
-/// back to front as textured patches. A patch stands still; its texture moves. Each is tessellated so that its polygons
-/// are planar in the texture too, lit by an affine map of its own (Equation 3), and left out where the interval of its
-/// grey values holds nothing that is seen. Its samples lie a slice apart, not a step: a coarser picture than
-/// RayCaster's.
+/// back to front as textured patches. A patch stands still; its texture moves. Each patch is tessellated so that its
+/// polygons are planar in the texture too, lit by an affine map of its own (Equation 3), and left out where the
+/// interval of its grey values holds nothing that is seen. Samples lie a slice apart, not a step: the picture is
+/// coarser than RayCaster's.
 class GlSliceRenderer {
  public:
   /// Keeps references to context, which must be current whenever this is used, and to volume.
@@ -31,7 +31,7 @@ class GlSliceRenderer {
   void undeform();
   [[nodiscard]] ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                                  const RenderSettings& settings);
-  /// Of the last picture: patches of slices that were drawn, and all there are.
+  /// Counts of the last picture: patches of slices that were drawn, and all patches.
   [[nodiscard]] std::size_t patches_drawn() const { return patches_drawn_; }
   [[nodiscard]] std::size_t patches() const;
 
@@ -59,7 +59,7 @@ class GlSliceRenderer {
   std::array<std::optional<Slices>, 3> slices_;
   std::size_t patches_drawn_ = 0;
   int width_px_ = 0, height_px_ = 0;
-  CameraModel folded_;  ///< whose fold fold_ is, which takes a while to find
+  CameraModel folded_;  ///< the lens whose fold is in fold_, kept because finding it takes a while
   double fold_ = 0;
 };
 

@@ -13,7 +13,7 @@ struct ClipPlane {
   double offset_mm = 0;
 };
 
-/// docs/image-formation.md names each of these.
+/// Settings of a picture; docs/image-formation.md explains each.
 struct RenderSettings {
   double step_mm = 0.7;
   double near_mm = 1;

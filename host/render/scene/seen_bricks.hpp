@@ -10,7 +10,7 @@
 
 namespace birdseye::host {
 
-/// Which bricks of cells of a volume hold anything that a transfer function shows: the interval of their HU tells.
+/// Which bricks of cells of a volume hold anything that a transfer function shows, by the interval of their HU.
 class SeenBricks {
  public:
   static constexpr int kBrick = 4;  ///< cells of a brick along an axis

@@ -26,9 +26,9 @@ class TransferFunction {
   struct Entry {
     float r, g, b, extinction_per_mm;
   };
-  /// At a whole HU, clamped to what a CT can hold.
+  /// The entry for a whole HU, clamped to what a CT can hold.
   [[nodiscard]] const Entry& at(int hu) const;
-  /// As they were given.
+  /// The points as they were given.
   [[nodiscard]] const std::vector<TransferPoint>& points() const { return points_; }
   /// Whether any HU of [low, high] is seen at all.
   [[nodiscard]] bool any_seen(int low, int high) const;
@@ -40,7 +40,7 @@ class TransferFunction {
   std::vector<int> seen_up_to_;  ///< running count of entries that are seen
 };
 
-/// By the name of a preset, or from a JSON file {"points": [{"hu":, "rgb": [r, g, b], "extinction_per_mm":}, ...]}.
+/// Loads a preset by its name, or a JSON file {"points": [{"hu":, "rgb": [r, g, b], "extinction_per_mm":}, ...]}.
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path);
 std::vector<std::string> transfer_presets();
 /// The text of a file that load_transfer_function reads back exactly.
