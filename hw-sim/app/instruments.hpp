@@ -8,7 +8,7 @@
 
 namespace birdseye::hw_sim {
 
-/// What main() does with the outcome of a command.
+/// Called with the outcome of a command; main() does the rest.
 using Take = std::function<void(const Result<void>&)>;
 
 /// WIDTHxHEIGHT of 64 to 4096 pixels.

@@ -5,7 +5,7 @@
 
 namespace birdseye::hw_sim {
 
-/// Set from now on by SIGTERM and SIGINT.
+/// A flag that SIGTERM and SIGINT set from now on.
 inline const std::atomic<bool>& stop_on_signal() {
   static std::atomic<bool> stop = false;
   std::signal(SIGTERM, [](int) { stop = true; });

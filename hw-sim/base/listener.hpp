@@ -8,9 +8,9 @@
 
 namespace birdseye::hw_sim {
 
-/// A socket, not blocking, that listens at a path, whatever was there before.
+/// A non-blocking socket that listens at a path, replacing whatever was there.
 Result<drivers::UniqueFd> listen_at_path(const std::filesystem::path& path);
-/// Likewise at a TCP port of an IPv4 address; port 0 takes a free one, and says which.
+/// The same at a TCP port of an IPv4 address. Port 0 takes a free one and is set to it.
 Result<drivers::UniqueFd> listen_at_port(const std::string& host, int& port);
 
 }  // namespace birdseye::hw_sim

@@ -11,7 +11,7 @@
 
 namespace birdseye::hw_sim {
 
-/// Surfaces to be met by rays, in a frame of their own.
+/// Surfaces for rays to hit, in a frame of their own.
 class EmbreeScene {
  public:
   explicit EmbreeScene(RTCDevice device) : device_(device), scene_(rtcNewScene(device)) {}
@@ -24,7 +24,7 @@ class EmbreeScene {
   void commit() { rtcCommitScene(scene_); }
   [[nodiscard]] RTCScene get() const { return scene_; }
 
-  /// The normal at a hit: between those of the vertices where the mesh has them, else that of the triangle.
+  /// The normal at a hit: interpolated between the vertices' normals where the mesh has them, else the triangle's.
   [[nodiscard]] Eigen::Vector3f normal(const RTCRayHit8& packet, int lane) const;
   /// Where the point at a hit was before the mesh was deformed.
   [[nodiscard]] Eigen::Vector3f rest(const RTCRayHit8& packet, int lane, const Eigen::Vector3f& point) const;

@@ -30,8 +30,9 @@ struct Cavity {
   std::vector<Eigen::Vector3f> rest_mm = {};  ///< of each vertex before the organ was deformed, or empty where it was
                                               ///< not: the texture stays on the tissue
   Coat coat = Coat::liver;
-  std::optional<Eigen::Vector3d> wall_centre_mm = {};  ///< of a round wall about all; without it, black is behind
-  double wall_radius_mm = 300;                         ///< beyond every place to look from
+  std::optional<Eigen::Vector3d> wall_centre_mm =
+      {};                       ///< of a round wall about everything; empty: the background is black
+  double wall_radius_mm = 300;  ///< must reach beyond every place to look from
 };
 
 struct LaparoscopeSettings {
@@ -62,8 +63,8 @@ class Laparoscope {
 
   /// 255 at pixels that the round field of the lens shows whole, else 0.
   [[nodiscard]] virtual std::vector<std::uint8_t> lens_circle() const = 0;
-  /// Whether a point of the organ's surface, with this normal there, faces the lens, lies in its field, and has nothing
-  /// of the cavity before it.
+  /// Whether a point of the organ's surface with this normal faces the lens, lies in the lens's field, and is not
+  /// hidden by anything in the cavity.
   [[nodiscard]] virtual bool sees(const Transform<Camera, Patient>& camera_from_patient,
                                   const Eigen::Vector3d& point_in_patient_mm, const Eigen::Vector3d& normal) const = 0;
 };

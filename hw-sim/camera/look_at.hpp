@@ -6,7 +6,8 @@
 
 namespace birdseye::hw_sim {
 
-/// A camera at eye that looks at target, with the image's down nearest to `down`; rotated by roll about its axis.
+/// A camera at eye that looks at target. The picture's downward direction is as near as possible to `down`, then turned
+/// by roll about the camera's axis.
 template <typename Frame>
 Transform<Frame, Camera> look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target, const Eigen::Vector3d& down,
                                  double roll_rad) {

@@ -18,11 +18,12 @@ struct CaseSettings {
   int liver_label = 5;
   int views = 5;
   int width_px = 768, height_px = 576;
-  std::array<int, 3> inner = {1, 1, 1};  ///< control points of the true deformation that move, an axis
-  double amplitude_mm = 10;              ///< how far the point of the organ's surface moves that moves most
-  double distance_mm = 0;                ///< about, from the organ's surface to the lens; 0 as suits the organ
-  double noise = 1;                      ///< of the sensor, as a multiple of the usual
-  double lamp_offset_mm = 0;             ///< of the lamp to the right of the lens
+  std::array<int, 3> inner = {1, 1,
+                              1};  ///< inner control points, those that move, along each axis of the true deformation
+  double amplitude_mm = 10;        ///< how far that point of the organ's surface moves that moves most
+  double distance_mm = 0;          ///< from the organ's surface to the lens, about; 0: as suits the organ
+  double noise = 1;                ///< of the sensor, as a multiple of the usual
+  double lamp_offset_mm = 0;       ///< of the lamp to the right of the lens
   bool plain_background = false;
 };
 

@@ -29,9 +29,9 @@ struct Subject {
   double view_distance_mm = 0;    ///< from its surface to a lens that has it well in the picture
 };
 
-/// Of the procedural body.
+/// The liver of the procedural body.
 Result<Subject> liver_subject(std::uint64_t seed);
-/// Of a CT of the user's own, as body_from_ct reads it.
+/// The liver of a CT of the user's own, as body_from_ct reads it.
 Result<Subject> liver_subject(const std::filesystem::path& ct, const std::filesystem::path& labels, int liver_label,
                               std::uint64_t seed);
 Subject head_subject(std::uint64_t seed);

@@ -22,8 +22,8 @@ class TissueMap {
 
   TissueMap(const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm, const std::array<int, 3>& inner);
 
-  /// Seeded displacements of all inner control points, such that the points of the organ given, which are at rest,
-  /// move by at most amplitude_mm and the one that moves most by just that. Refused where every draw would fold.
+  /// Draws displacements of all inner control points from the seed, scaled so that of the given points of the organ at
+  /// rest the one that moves most moves by amplitude_mm. Refused where every draw would fold.
   static Result<TissueMap> random(const TissueMap& still, double amplitude_mm,
                                   std::span<const Eigen::Vector3f> organ_at_rest_mm, std::uint64_t seed);
 
@@ -39,7 +39,7 @@ class TissueMap {
   [[nodiscard]] const Eigen::Vector3d& low_mm() const { return low_mm_; }
   [[nodiscard]] const Eigen::Vector3d& high_mm() const { return high_mm_; }
   [[nodiscard]] const std::array<int, 3>& inner() const { return inner_; }
-  /// Of the inner control points, x fastest.
+  /// Displacements of the inner control points, x fastest.
   [[nodiscard]] const std::vector<Eigen::Vector3d>& control_mm() const { return control_mm_; }
 
  private:

@@ -8,10 +8,10 @@
 
 namespace birdseye::hw_sim {
 
-/// One JSON line on standard output, at once.
+/// Writes one JSON line to standard output, at once.
 void announce(const nlohmann::json& event);
 void announce(const FaultEvent& event);
-/// Replaces the file as a whole, so that whoever reads it never meets half of it.
+/// Replaces the file as a whole, so that a reader never sees half of it.
 Result<void> replace_json(const std::filesystem::path& path, const nlohmann::json& json);
 
 }  // namespace birdseye::hw_sim

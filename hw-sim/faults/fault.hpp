@@ -42,11 +42,11 @@ std::string_view fault_name(FaultKind kind);
 
 enum class FaultTarget { tracker, camera };
 
-/// One fault of a script. values: its parameters, each of those that the kind has, given or by default.
+/// One fault of a script. values: all parameters that the kind has, given or by default.
 struct Fault {
   FaultKind kind = FaultKind::drop_byte;
   double at_s = 0;              ///< after the start of streaming
-  std::optional<double> for_s;  ///< empty: once, or from then on, as the kind has it
+  std::optional<double> for_s;  ///< empty: once, or from then on, as the kind says
   std::map<std::string, double, std::less<>> values;
   [[nodiscard]] double value(std::string_view name) const;
 };
@@ -65,13 +65,13 @@ class FaultTimeline {
   FaultTimeline() = default;
   FaultTimeline(std::vector<Fault> faults, FaultTarget target);
 
-  /// The script's second 0. Before it is known nothing begins; once known it stays.
+  /// Sets the script's second 0. Nothing begins before that; later calls change nothing.
   void begin(std::int64_t zero_ns);
   [[nodiscard]] bool begun() const { return zero_ns_.has_value(); }
   void advance(std::int64_t now_ns);
-  /// The fault of this kind that holds now, the first of the script's where several do; null where none does.
+  /// The fault of this kind that holds now; the first in the script where several hold; null where none does.
   [[nodiscard]] const Fault* active(FaultKind kind) const;
-  /// A fault that happens once has happened.
+  /// Tells that a fault which happens once has happened.
   void done(FaultKind kind, std::int64_t now_ns);
   /// When a fault begins or ends next.
   [[nodiscard]] std::optional<std::int64_t> next_change_ns() const;

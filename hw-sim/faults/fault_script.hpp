@@ -13,11 +13,11 @@ struct FaultScript {
   std::vector<Fault> tracker, camera;
 };
 
-/// Which instruments there are for a script's faults to befall.
+/// The instruments that a script's faults can befall.
 enum class Instruments { tracker, camera, both };
 
-/// Reads a script (TOML, docs/manual/simulated-minibird.md). seed: what times drawn at random follow from, unless the
-/// script has a seed of its own. The error tells everything that is wrong with the file, each with its line.
+/// Reads a script (TOML, docs/manual/simulated-minibird.md). Times drawn at random follow from seed, unless the script
+/// has one of its own. The error tells everything that is wrong with the file, with line numbers.
 Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instruments instruments, std::uint64_t seed);
 
 }  // namespace birdseye::hw_sim

@@ -7,7 +7,7 @@
 
 namespace birdseye::hw_sim {
 
-/// What a fault does whose script does not say for how long.
+/// How long a fault lasts whose script does not say so.
 enum class WithoutEnd { once, for_good, refused };
 
 struct ParameterSpec {
@@ -16,7 +16,7 @@ struct ParameterSpec {
   bool whole = false;  ///< a whole number
 };
 
-/// What a script may say of a kind of fault.
+/// A kind of fault, and what a script may say of it.
 struct FaultSpec {
   FaultKind kind;
   bool of_tracker, of_camera;
@@ -25,7 +25,7 @@ struct FaultSpec {
 };
 
 std::span<const FaultSpec> fault_table();
-/// Null for a name that there is not.
+/// The kind of fault with this name; null where there is none.
 const FaultSpec* fault_spec(std::string_view name);
 
 }  // namespace birdseye::hw_sim

@@ -9,7 +9,7 @@
 
 namespace birdseye::hw_sim {
 
-/// What the chip says of itself: device, configuration and string descriptors, whole. Nothing for one it does not have.
+/// The chip's device, configuration and string descriptors, whole. Empty for a descriptor that the chip does not have.
 std::optional<std::vector<std::uint8_t>> descriptor(std::uint8_t type, std::uint8_t index,
                                                     const Ft232rSettings& settings);
 

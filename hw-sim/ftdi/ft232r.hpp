@@ -28,9 +28,10 @@ struct Ft232rSettings {
   double line_baud = 115200;  ///< what the instrument at the other end of the line speaks
 };
 
-/// An FT232R: USB on one side, a serial line of 8N1 on the other. No USB and no clock of its own: the time is told at
-/// every call and may not go back. Its answers are those of the chip rather than of QEMU's usb-serial: two status bytes
-/// at each tick of the latency timer, bytes that take their time on the line, fifos that overrun, an EEPROM to read.
+/// An FT232R: USB on one side, a serial line of 8N1 on the other. It has no USB and no clock of its own: every call
+/// tells the time, which may not go back. Its answers are those of the chip rather than of QEMU's usb-serial: two
+/// status bytes at each tick of the latency timer, bytes that take their time on the line, fifos that overrun, an
+/// EEPROM to read.
 class Ft232r {
  public:
   static constexpr std::size_t kPacket = 64;
@@ -40,10 +41,10 @@ class Ft232r {
   /// Power on: all that the host has set is lost.
   void power_up(DeviceTime now);
 
-  /// A control transfer without its data, which no request of the chip has on its way out. The bytes to return (none
-  /// for an out transfer), or nothing where the chip refuses with a stall.
+  /// Answers a control transfer. No request of the chip has data on its way out, so none are passed. Returns the bytes
+  /// for the host (none for an out transfer); empty where the chip refuses with a stall.
   std::optional<std::vector<std::uint8_t>> control(const UsbSetup& setup, DeviceTime now);
-  /// Bytes for the line, as many as there is room for; how many that was.
+  /// Takes bytes for the line, as many as there is room for, and returns how many.
   std::size_t take(std::span<const std::uint8_t> bytes, DeviceTime now);
   /// The next packet for the host, if one is due: full, or at the latency timer's tick with what there is.
   std::optional<std::vector<std::uint8_t>> packet(DeviceTime now);

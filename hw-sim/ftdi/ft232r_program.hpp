@@ -18,9 +18,9 @@ struct Ft232rProgram {
   std::string motion = "circle";
 };
 
-/// Plugs the adapter, with the tracker behind it, into QEMU and serves it in real time until `stop`; a QEMU that is
-/// not there yet, or goes, is waited for. Commands come on standard input, one a line: unplug, plug, overrun, parity,
-/// framing, break. What happens is told on standard output as JSON lines.
+/// Plugs the adapter, with the tracker behind it, into QEMU and serves it in real time until `stop`; waits for a QEMU
+/// that is not there yet, or has gone. Commands come on standard input, one a line: unplug, plug, overrun, parity,
+/// framing, break. Tells what happens on standard output, as JSON lines.
 Result<void> run_ft232r(const Ft232rProgram& program, const std::atomic<bool>& stop);
 
 }  // namespace birdseye::hw_sim

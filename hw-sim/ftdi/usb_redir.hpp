@@ -11,25 +11,26 @@
 
 namespace birdseye::hw_sim {
 
-/// One connection to QEMU's usb-redir device, in which the chip is plugged in: the usbredir protocol, bytes in and
-/// bytes out. To QEMU this is the side with the real USB. No clock, no socket.
+/// One connection to QEMU's usb-redir device, with the chip plugged in: the usbredir protocol, bytes in and bytes out.
+/// QEMU takes this for the side with the real USB. No clock, no socket.
 class UsbRedir {
  public:
   explicit UsbRedir(Ft232r& chip);
 
-  /// Bytes from QEMU. What is no usbredir, or not from a QEMU that is new enough, is an error: the connection is lost.
+  /// Takes bytes from QEMU. Bytes that are no usbredir, or come from a QEMU that is too old, are an error: the
+  /// connection is lost.
   Result<void> receive(std::span<const std::uint8_t> bytes, DeviceTime now);
   /// Gives QEMU what has become due.
   void pump(DeviceTime now);
-  /// What to send to QEMU.
+  /// The bytes to send to QEMU.
   std::vector<std::uint8_t> output();
   /// When pump() next has something to give, unless something comes before; empty while QEMU waits for nothing.
   [[nodiscard]] std::optional<DeviceTime> next_event() const;
 
-  /// The cable: plugged in from the first. A chip that is plugged in again has lost power in between.
+  /// Pull and plug the cable, which is plugged in at first. A chip that is plugged in again has lost power in between.
   void unplug();
   void plug(DeviceTime now);
-  /// QEMU knows of the chip.
+  /// Whether QEMU knows of the chip.
   [[nodiscard]] bool plugged() const { return greeted_ && plugged_; }
 
  private:

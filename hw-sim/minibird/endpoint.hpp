@@ -16,18 +16,18 @@ class Endpoint {
  public:
   virtual ~Endpoint() = default;
 
-  /// What the host has sent by now, without waiting. Takes in a host that knocks.
+  /// What the host has sent by now, without waiting. Accepts a host that wants to connect.
   virtual std::vector<std::uint8_t> read() = 0;
-  /// What the line cannot take at once, or nobody is there to take, is lost, as on a real line.
+  /// Sends bytes. What the line cannot take at once, or nobody is there to take, is lost, as on a real line.
   virtual void write(std::span<const std::uint8_t> bytes) = 0;
-  /// Somebody is at the other end. A pseudo-terminal cannot tell and says yes.
+  /// Whether somebody is at the other end. A pseudo-terminal cannot tell and says yes.
   [[nodiscard]] virtual bool connected() const = 0;
-  /// Returns when the host has sent something or knocks, at the latest at this time of CLOCK_MONOTONIC.
+  /// Returns when the host has sent something or wants to connect, at the latest at this time of CLOCK_MONOTONIC.
   virtual void wait(std::int64_t until_ns) = 0;
   /// The cable is pulled: hosts are hung up on and none can come before replug().
   virtual void unplug() = 0;
   virtual Result<void> replug() = 0;
-  /// What a host opens: a path, or HOST:PORT with the port that was taken.
+  /// The name that a host opens: a path, or HOST:PORT with the port that was taken.
   [[nodiscard]] virtual const std::string& name() const = 0;
 };
 

@@ -21,7 +21,7 @@ class FieldDistortion {
 
   [[nodiscard]] Eigen::Vector3d displacement_mm(const Eigen::Vector3d& position_mm) const;
   [[nodiscard]] Eigen::Vector3d rotation_rad(const Eigen::Vector3d& position_mm) const;
-  /// The pose as measured, where strength 1 is the whole field.
+  /// The pose as measured. strength: 1 for the whole distortion.
   [[nodiscard]] BirdPose apply(const BirdPose& pose, double strength = 1) const;
 
  private:

@@ -8,8 +8,8 @@
 
 namespace birdseye::hw_sim {
 
-/// A circle about the z axis that says what time it is: at t the first bird is at centre + radius (cos wt, sin wt, 0),
-/// turned by Rz(wt), w = 2 pi / period. Each further bird is ahead by phase_rad.
+/// A circle about the z axis, on which the pose tells the time: at t the first bird is at centre + radius (cos wt, sin
+/// wt, 0), turned by Rz(wt), w = 2 pi / period. Each further bird is ahead by phase_rad.
 struct Circle {
   Eigen::Vector3d centre_mm{400, 0, 0};
   double radius_mm = 200;
@@ -28,13 +28,13 @@ struct PivotMotion {
   [[nodiscard]] BirdPose pose(std::size_t bird, double t_s) const;
 };
 
-/// t counts from zero_ns.
+/// The motion on a circle; t counts from zero_ns.
 Motion circle_motion(const Circle& circle, std::int64_t zero_ns);
 Motion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns);
-/// Each bird for itself at (400, 60 * bird, 0) mm, not turned.
+/// Each bird rests at (400, 60 * bird, 0) mm, not turned.
 Motion still_motion();
 
-/// "circle", "pivot" or "still", each with the parameters that it has by default; the circle for any other name.
+/// The motion "circle", "pivot" or "still" with its default parameters; the circle for any other name.
 Motion motion_named(const std::string& name, std::int64_t zero_ns);
 
 }  // namespace birdseye::hw_sim

@@ -54,11 +54,11 @@ struct ParameterRule {
   unsigned since_revision;     ///< the first firmware that knows it
 };
 
-/// Null for a number that firmware of this revision does not know.
+/// The rule of a parameter; null for a number that firmware of this revision does not know.
 const ParameterRule* parameter_rule(std::uint8_t number, unsigned revision);
-/// Some replies are longer where there may be more units.
+/// The length of the reply to EXAMINE; some replies are longer where there may be more units.
 std::size_t examine_bytes(const ParameterRule& rule, Addressing addressing);
-/// What it holds after power-up, where it is merely stored.
+/// The value after power-up of a parameter that is merely stored.
 std::vector<std::uint8_t> default_value(const ParameterRule& rule);
 
 /// Whole length of a command by its first byte; 0 for a byte that is no command. EXAMINE and CHANGE without the value.

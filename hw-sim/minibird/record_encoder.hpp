@@ -23,8 +23,9 @@ enum class OutputFormat : std::uint8_t {
   position_quaternion = 8,
 };
 
-/// The words of one record in the order they are sent. Written against the unit's manual, apart from the driver's
-/// decoder, so that a misreading in one shows against the other. full_scale_mm: what the word 0x8000 stands for.
+/// The words of one miniBIRD record in the order in which they are sent. Written from the unit's manual, independently
+/// of the driver's decoder, so that a misreading in one shows against the other. full_scale_mm: what the word 0x8000
+/// stands for.
 std::vector<std::int16_t> record_words(OutputFormat format, const BirdPose& pose, double full_scale_mm);
 
 /// Words -> wire: each as two 7-bit bytes, low part first, its two low bits lost; bit 7 marks the first byte.

@@ -10,7 +10,7 @@
 
 namespace birdseye::hw_sim {
 
-/// A tracker in real time: a TrackerScript, on CLOCK_MONOTONIC, at an endpoint, by a thread of its own.
+/// A tracker in real time: a thread of its own runs a TrackerScript on CLOCK_MONOTONIC at an endpoint.
 class TrackerLoop {
  public:
   /// Called from the loop's thread.
@@ -22,7 +22,7 @@ class TrackerLoop {
   TrackerLoop(std::unique_ptr<Endpoint> endpoint, TrackerScript script, Listeners listeners);
 
   [[nodiscard]] bool streaming() const { return streaming_; }
-  /// TrackerScript::align, before the time comes.
+  /// As TrackerScript::align. To be called before zero_ns has come.
   void align(std::int64_t zero_ns) { align_ns_ = zero_ns; }
 
  private:

@@ -35,29 +35,30 @@ struct TrackerSettings {
   bool faults_from_streaming = true;  ///< otherwise from align()
 };
 
-/// Bytes for the host and when the last of them is there.
+/// Bytes for the host, and when the last of them arrives.
 struct Delivery {
   std::int64_t due_ns = 0;
   std::vector<std::uint8_t> bytes;
   bool line_error = false;  ///< among them are some that a UART would have marked as damaged
 };
 
-/// A miniBIRD, or a flock of them, at the end of a serial line, in time but without a clock: the caller says what time
-/// it is, in ns of whatever clock it likes, never going back. Everything random follows from the seed.
+/// A miniBIRD, or a flock of them, at the end of a serial line. It keeps time but reads no clock: the caller tells the
+/// time at every call, in ns of any clock, never going back. Everything random follows from the seed.
 ///
 ///   TrackerScript tracker(settings, motion, now);
 ///   loop: tracker.receive(bytes from the host, now);
 ///         for (const Delivery& d : tracker.advance(now)) hand over d.bytes;
 ///         wait for bytes from the host, at most until tracker.next_ns();
 ///
-/// One call of measure per measurement cycle is made on absolute times of the unit's own clock; its records take the
-/// line's time at the baud rate and are late by the jitter. Bytes never overtake each other.
+/// The unit measures once per cycle, at absolute times of its own clock. The records take the line's time at the baud
+/// rate and are late by the jitter. Bytes never overtake each other.
 class TrackerScript {
  public:
   TrackerScript(const TrackerSettings& settings, Motion motion, std::int64_t start_ns);
 
   void receive(std::span<const std::uint8_t> bytes, std::int64_t now_ns);
-  /// RTS, where the transport carries it: asserted holds the unit in reset; released, it boots, every setting lost.
+  /// Sets RTS, where the transport carries it. Asserted, it holds the unit in reset; when it is released, the unit
+  /// boots, and every setting is lost.
   void set_reset(bool asserted, std::int64_t now_ns);
   /// Deliveries due by now, in order.
   std::vector<Delivery> advance(std::int64_t now_ns);
@@ -69,7 +70,7 @@ class TrackerScript {
   [[nodiscard]] bool streaming() const { return unit_.streaming(); }
   /// Measurements a second as they truly come, drift included.
   [[nodiscard]] double rate_hz() const;
-  /// False while a fault keeps the line unplugged: the transport is to vanish and to return.
+  /// False while a fault keeps the line unplugged: the transport must vanish meanwhile.
   [[nodiscard]] bool plugged() const { return faults_.active(FaultKind::unplug) == nullptr; }
   std::vector<FaultEvent> take_events() { return faults_.take_events(); }
   [[nodiscard]] const Unit& unit() const { return unit_; }

@@ -14,16 +14,16 @@
 
 namespace birdseye::hw_sim {
 
-/// What cannot be set over the wire.
+/// Settings that cannot be changed over the wire.
 struct UnitSettings {
-  int birds = 1;  ///< up to 14; more need another addressing mode, which the constructor then takes
+  int birds = 1;  ///< for more than 14 the constructor takes another addressing mode
   double rate_hz = 103.3;
   std::string model = "6DFOB     ";  ///< ten characters
   std::uint8_t revision_major = 3, revision_minor = 67;
   std::uint8_t crystal_mhz = 40;
 };
 
-/// What can be wrong with a measurement without the unit's noticing.
+/// What can be wrong with a measurement without the unit noticing.
 struct Disturbance {
   bool mirrored = false;        ///< the solution on the other side of the transmitter
   bool no_orientation = false;  ///< all words of the orientation are zero
@@ -38,17 +38,17 @@ class Unit {
 
   /// As after power-up or a pulse on RTS: every setting is lost.
   void reset();
-  /// One byte from the host; the reply it provokes at once, often none.
+  /// Takes one byte from the host; returns the reply that it provokes at once, often none.
   std::vector<std::uint8_t> receive(std::uint8_t byte);
-  /// The measurement cycle has ended with these poses (tracker_from_sensor), one per bird; the records it sends, and
-  /// the data-ready character.
+  /// Ends a measurement cycle with these poses (tracker_from_sensor), one per bird. Returns the records that the unit
+  /// sends, and the data-ready character.
   std::vector<std::uint8_t> measure(std::span<const BirdPose> poses);
 
   /// Sets an error of the first bird as its own checks would.
   void latch_error(std::uint8_t code, std::uint8_t detail = 0) { latch(birds_.front(), code, detail); }
-  /// What the next records suffer from.
+  /// Sets what is wrong with the next records.
   void disturb(const Disturbance& disturbance) { disturbance_ = disturbance; }
-  /// The level code of a bird's mouse buttons: 0x00, 0x10, 0x30 or 0x70.
+  /// Sets the level code of a bird's mouse buttons: 0x00, 0x10, 0x30 or 0x70.
   void press(std::size_t bird, std::uint8_t button) { birds_.at(bird).button = button; }
 
   [[nodiscard]] int birds() const { return static_cast<int>(birds_.size()); }

@@ -19,9 +19,9 @@ struct Body {
 
 /// A procedural torso: wall of fat and muscle, ribs, spine, kidneys, spleen, great vessels and a liver of two lobes.
 Body procedural_body(std::uint64_t seed);
-/// What a scan on this grid has of it.
+/// The same, scanned on this grid.
 Body procedural_body(std::uint64_t seed, const Grid& grid);
-/// Signed distance to the surface of its liver.
+/// Signed distance to the surface of the procedural body's liver.
 double procedural_liver_mm(const Eigen::Vector3d& point_in_patient_mm);
 
 /// A CT of the user's own (a folder of one DICOM series, NIfTI, NRRD or MHA), resampled to axes along the patient and

@@ -19,7 +19,7 @@ using VesselTree = std::vector<Rod>;
 
 double distance_mm(const VesselTree& tree, const Eigen::Vector3d& point);
 
-/// What is put into a body: all that the demo looks for, and knows the truth of.
+/// What is put into a body: everything that the demo looks for and whose truth is known.
 struct Implants {
   Eigen::Vector3d liver_centre_mm;
   Eigen::Vector3d tumour_centre_mm;
@@ -29,7 +29,8 @@ struct Implants {
 };
 
 inline constexpr double kMarkerRadiusMm = 4;
-/// From the liver towards the laparoscope, which comes in by the navel: forward and towards the feet (LPS, unit).
+/// The direction from the liver towards the laparoscope, which comes in by the navel: forward and towards the feet
+/// (LPS, unit length).
 Eigen::Vector3d towards_scope();
 
 /// Chooses places: a tumour some 27 mm under the face of the liver that the scope sees, two vessel trees grown from

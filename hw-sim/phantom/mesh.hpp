@@ -25,7 +25,7 @@ Mesh surface_of(const ScalarGrid& field);
 /// The surface of a field within a box, closed where the box cuts it off.
 Mesh closed_surface(const Field& field, const Eigen::Vector3d& low_mm, const Eigen::Vector3d& high_mm,
                     double spacing_mm);
-/// The normals that follow from where the vertices are now.
+/// Computes the normals from where the vertices are now.
 void compute_normals(Mesh& mesh);
 /// The least and the largest coordinates of its vertices.
 std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Mesh& mesh);

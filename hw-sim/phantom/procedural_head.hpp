@@ -22,7 +22,7 @@ struct Head {
 
 /// Signed distance to the head's skin.
 double procedural_head_mm(const Eigen::Vector3d& point_in_patient_mm);
-/// What a scan on this grid has of it.
+/// The head, scanned on this grid.
 Head procedural_head(std::uint64_t seed, const Grid& grid);
 
 }  // namespace birdseye::hw_sim

@@ -23,7 +23,7 @@ struct FramePlan {
   std::uint64_t number = 0;     ///< of the exposure, from 0
   std::uint64_t sequence = 0;   ///< as the camera counts
   std::int64_t exposed_ns = 0;  ///< true middle of the exposure
-  std::int64_t stamp_ns = 0;    ///< what the camera says of it; 0 where it says nothing
+  std::int64_t stamp_ns = 0;    ///< the stamp that the camera gives; 0 where it gives none
   std::int64_t sigma_ns = 0;
   std::int64_t due_ns = 0;  ///< when its first byte leaves
   bool lost = false;        ///< it never leaves
@@ -33,17 +33,18 @@ struct FramePlan {
   std::uint64_t garbage_bytes = 0;  ///< that leave before it
 };
 
-/// A camera in time but without a clock or pixels: frame n is exposed at zero + n / rate of its own clock. Everything
-/// random follows from the seed.
+/// A camera that keeps time but has no pixels and reads no clock: frame n is exposed at zero + n / rate of the camera's
+/// own clock. Everything random follows from the seed.
 class CameraScript {
  public:
   CameraScript(const CameraTiming& timing, std::int64_t zero_ns);
 
   /// The next exposure. Frames leave in their order.
   FramePlan next();
-  /// Somebody is watching: the faults' second 0, the first time. Faults touch frames exposed from then on.
+  /// Tells that somebody is watching. The first call sets the faults' second 0; faults touch frames exposed from then
+  /// on.
   void watched(std::int64_t now_ns);
-  /// Follows the plug up to this time; what befalls frames goes by their exposure.
+  /// Follows the plug up to this time. Faults of frames go by the time of their exposure instead.
   void advance(std::int64_t now_ns) { plug_.advance(now_ns); }
   /// Frames a second as they truly come, drift included.
   [[nodiscard]] double rate_hz() const { return rate_hz_; }

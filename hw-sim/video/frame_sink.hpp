@@ -22,13 +22,14 @@ struct Picture {
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  /// Somebody takes the frames.
+  /// Whether somebody takes the frames.
   [[nodiscard]] virtual bool connected() const = 0;
-  /// The latest frame has not gone out whole: its pixels must stay as they are, and there can be no next.
+  /// Whether the latest frame has not gone out whole yet. Until then its pixels must stay as they are, and no other
+  /// frame can begin.
   [[nodiscard]] virtual bool busy() const = 0;
-  /// Begins to send a frame, with what the plan says is wrong with it.
+  /// Begins to send a frame, with the faults that the plan has for it.
   virtual void begin(const FramePlan& plan, const Picture& picture) = 0;
-  /// Goes on sending, takes in whoever knocks, and returns at this time of CLOCK_MONOTONIC, or earlier.
+  /// Goes on sending, accepts a reader that wants to connect, and returns at this time of CLOCK_MONOTONIC or earlier.
   virtual void work(std::int64_t until_ns) = 0;
   virtual void unplug() = 0;
   virtual Result<void> replug() = 0;

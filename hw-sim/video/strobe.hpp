@@ -9,13 +9,13 @@
 
 namespace birdseye::hw_sim {
 
-/// The camera's strobe output: high while a frame is exposed, whether that frame ever leaves or not. It is told to a
-/// file as Linux's gpio-sim wants it for a line that the world outside drives: "pull-up" and "pull-down".
+/// The camera's strobe output: high while a frame is exposed, whether that frame ever leaves or not. It is written to a
+/// file as "pull-up" and "pull-down", as Linux's gpio-sim wants it for a line that the world outside drives.
 class Strobe {
  public:
   static Result<Strobe> open(const std::filesystem::path& file);
 
-  /// From now on, until this object ends.
+  /// Drives the line from now on, until this object ends.
   void start(const CameraTiming& timing, double true_rate_hz, std::int64_t zero_ns);
 
  private:

@@ -10,7 +10,7 @@ namespace birdseye::hw_sim {
 
 enum class PixelLayout { rgb3, yuyv, uyvy, nv12, grey };
 
-/// By its Video4Linux name: RGB3, YUYV, UYVY, NV12 or GREY.
+/// The layout with this Video4Linux name: RGB3, YUYV, UYVY, NV12 or GREY.
 std::optional<PixelLayout> pixel_layout_of(std::string_view fourcc);
 std::string_view fourcc_of(PixelLayout layout);
 std::size_t frame_bytes(PixelLayout layout, int width_px, int height_px);

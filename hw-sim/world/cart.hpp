@@ -20,8 +20,8 @@ struct CartSettings {
   int width_px = 768, height_px = 576;
   double rate_hz = 25;
   Pace pace;
-  double camera_delay_ms = 0;    ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
-  bool drop_late = false;        ///< frames that are not traced in time
+  double camera_delay_ms = 0;    ///< from exposure to arrival; frames then bear no stamp. 0: frames are stamped
+  bool drop_late = false;        ///< true: frames that are not traced in time are left out
   double deformation_mm = 0;     ///< how far the liver's surface has moved since the CT, where it has moved most
   double distortion_mm = 0;      ///< of the tracker's field, where it is largest
   std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty

@@ -26,9 +26,9 @@ class FrameCamera {
     CameraModel lens;
     double rate_hz = 25;
     std::uint64_t seed = 1;
-    double delay_ms = 0;  ///< from exposure to arrival, of frames that then bear no stamp; 0: stamped
-    /// Frames that cannot be traced before their exposure are left out, and whoever is to show them has the processor
-    /// first; else they come late.
+    double delay_ms = 0;  ///< from exposure to arrival; frames then bear no stamp. 0: frames are stamped
+    /// True: frames that cannot be traced before their exposure are left out, and whoever shows the frames has the
+    /// processor first. False: such frames come late.
     bool drop_late = false;
     std::vector<Fault> faults;  ///< from the world's time 0 on
   };
@@ -40,11 +40,11 @@ class FrameCamera {
   FrameCamera(const FrameCamera&) = delete;
   FrameCamera& operator=(const FrameCamera&) = delete;
 
-  /// Somebody is connected and enough frames are ready.
+  /// Whether somebody is connected and enough frames are ready.
   [[nodiscard]] bool ready() const;
-  /// The world's time 0, on CLOCK_MONOTONIC; frames start to flow.
+  /// Sets the world's time 0 on CLOCK_MONOTONIC; frames start to flow.
   void start(std::int64_t world_zero_ns);
-  /// All frames of the world have had their time.
+  /// Whether all frames of the world have had their time.
   [[nodiscard]] bool done() const { return done_; }
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
 
@@ -58,7 +58,7 @@ class FrameCamera {
   void serve(const std::stop_token& stop);
   void serve_world(CameraScript& script, const std::stop_token& stop);
   void follow(CameraScript& script, std::int64_t until_ns);
-  /// Whether a frame is exposed before it could be traced, which takes so long.
+  /// Whether a frame is exposed before it could be traced. tracing_ns: how long tracing takes.
   [[nodiscard]] bool too_late_for(std::uint64_t sequence, std::int64_t tracing_ns) const;
   [[nodiscard]] bool take(Rendered& rendered, const std::stop_token& stop);
   [[nodiscard]] Picture picture_of(const Rendered& rendered, bool half_size);

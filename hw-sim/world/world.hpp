@@ -19,10 +19,10 @@ struct Stage {
 
 /// How long the operator takes over the board and the liver.
 struct Pace {
-  double sway_s = 0;     ///< for which the scope is turned to and fro over it before anything else
-  double dwell_s = 0.3;  ///< for which it is held still at each station
-  double pause_s = 0;    ///< for which it stays at the last one, while whoever calibrates works it out
-  double look_s = 7;     ///< for which the scope sweeps over the liver
+  double sway_s = 0;     ///< how long the scope is turned to and fro over the board before anything else
+  double dwell_s = 0.3;  ///< how long the scope is held still at each station
+  double pause_s = 0;    ///< how long it stays at the last one, while the calibration is worked out
+  double look_s = 7;     ///< how long the scope sweeps over the liver
 };
 
 /// The scripted operation: where everything truly is at any world time. If asked for, the scope is first turned to and
@@ -30,8 +30,8 @@ struct Pace {
 /// fiducial in turn, then the scope, turning about its port in the abdominal wall, sweeps over the liver.
 class World {
  public:
-  /// liver: its surface in the patient frame, which the scope looks at. Refused where the script would take a bird out
-  /// of the tracker's range.
+  /// liver: the liver's surface in the patient frame, at which the scope looks. Refused where the script would take a
+  /// bird out of the tracker's range.
   static Result<World> create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
                               const Pace& pace = {});
 

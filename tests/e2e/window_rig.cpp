@@ -23,7 +23,7 @@ namespace birdseye::testing {
 namespace {
 
 constexpr int kVideoWidth = 320, kVideoHeight = 240, kWindowWidth = 1280, kWindowHeight = 720;
-// Where the window has the video (host/app/live/live_panels.cpp): right of the workflow, above the strip.
+// Where the window has the video (host/window/live_panels.cpp): right of the workflow, above the strip.
 constexpr double kSidePx = 330, kStripPx = 118;
 constexpr double kZoom = (kWindowHeight - kStripPx) / kVideoHeight;
 constexpr double kLeftPx = kSidePx + (kWindowWidth - kSidePx - kZoom * kVideoWidth) / 2;
