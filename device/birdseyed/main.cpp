@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
   CLI::Option* const probe =
       app.add_flag("--probe", probe_only, "open each instrument once, say what it is or what is wrong, and end")
           ->excludes(check);
-  app.add_option("--replay", recording, "a recording, to be published in place of instruments")
+  app.add_option("--replay", recording, "an appliance recording, to be published in place of instruments")
       ->excludes(check)
       ->excludes(probe);
   return run_program(app, argc, argv, [&] {

@@ -183,7 +183,7 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   command.add_option("--server", options->server, "an appliance that runs: record from it now")->type_name("HOST:PORT");
   command.add_option("--seconds", options->source.seconds, "how long to record from it (default 20)")
       ->check(CLI::Range(8.0, 600.0));
-  command.add_option("--recording", options->recording, "a recording of an appliance (.berec), played again")
+  command.add_option("--recording", options->recording, "an appliance recording (.berec), played again")
       ->type_name("FILE");
   command.add_option("--bird", options->source.bird, "the bird on the scope, by its name (default scope)");
   command.add_option("--delay-ms", options->delay_ms, "what [camera] delay_ms is now, to be told what to set")

@@ -89,7 +89,7 @@ Result<void> run(const Options& options) {
 void add_calibrate_record(CLI::App& calibrate, CommandStatus& status) {
   CLI::App* command = calibrate.add_subcommand("record", "shows a scope's calibration record, names it, binds it");
   const auto options = std::make_shared<Options>();
-  command->add_option("record", options->record, "the record")->type_name("FILE")->required();
+  command->add_option("record", options->record, "the calibration record")->type_name("FILE")->required();
   command->add_option("--scope", options->scope, "the scope's name or serial number, to be written into it");
   command->add_option("--bind", options->bind, "an appliance whose tracker and camera it holds for")
       ->type_name("HOST:PORT");

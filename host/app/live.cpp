@@ -249,7 +249,7 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--server", options->server, "the appliance, or another OpenIGTLink server of tracked video")
       ->type_name("HOST:PORT");
   add_foreign_options(*command, options->foreign);
-  command->add_option("--recording", options->recording, "what birdseye record wrote, or a PLUS sequence: played again")
+  command->add_option("--recording", options->recording, "a session recording, or a PLUS sequence: played again")
       ->type_name("PATH");
   command->add_option("--speed", options->speed, "of the recording: 2 plays it twice as fast (default 1)")
       ->check(CLI::Range(0.05, 20.0));
@@ -280,7 +280,7 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--landmarks", patient.landmarks, "a table name, x, y, z of places to check by")
       ->type_name("FILE");
   command->add_option("--board", options->board, "the board to calibrate with")->type_name("SPEC");
-  command->add_option("--tip", options->tip, "the pointer's tip, by calibrate tip; else by the scope's record")
+  command->add_option("--tip", options->tip, "the pointer's tip, by calibrate tip; else by the calibration record")
       ->type_name("FILE");
   command->add_option("--scope", options->live.scope, "the scope's bird (default scope)");
   command->add_option("--pointer", options->live.pointer, "the pointer's bird (default pointer)");

@@ -200,20 +200,22 @@ Result<ExitCode> run(const Options& options) {
 }
 
 void add_inputs(CLI::App& command, ReplayInputs& inputs) {
-  command.add_option("recording", inputs.recording, "folder of birdseye record, or a .igs.mha")->required();
+  command.add_option("recording", inputs.recording, "a session recording (a folder), or a .igs.mha")->required();
   command.add_option("--transform", inputs.transform, "of a .igs.mha: which transform is the scope's");
-  command.add_option("--calibration", inputs.calibration, "record of the scope (default: the recording's own)");
-  command.add_option("--camera", inputs.camera, "lens, OpenCV YAML, in place of a record's");
+  command.add_option("--calibration", inputs.calibration, "the calibration record (default: the recording's own)");
+  command.add_option("--camera", inputs.camera, "lens, OpenCV YAML, in place of the calibration record's");
   command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm");
   command.add_option("--registration", inputs.patient_from_tracker, "patient_from_tracker, of register fiducials");
   command.add_option("--tracker-from-patient", inputs.tracker_from_patient, "its inverse, as the demo writes it");
   CLI::Option* const fiducials = command.add_option(
       "--fiducials", inputs.fiducials, "markers in the CT, which the pointer touches in the recording: registers anew");
-  command.add_option("--tip", inputs.tip, "the pointer's tip, x y z, mm (default: the record's)")->needs(fiducials);
+  command.add_option("--tip", inputs.tip, "the pointer's tip, x y z, mm (default: the calibration record's)")
+      ->needs(fiducials);
   command.add_option("--pointer", inputs.pointer, "the bird that touches (default pointer)")->needs(fiducials);
   command.add_option("--touched", inputs.touched_s, "from and to, s: when it touches")->expected(2)->needs(fiducials);
   command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views");
-  command.add_option("--camera-rms-px", inputs.camera_rms_px, "how well the lens is known, where no record says");
+  command.add_option("--camera-rms-px", inputs.camera_rms_px,
+                     "how well the lens is known, where no calibration record says");
   command.add_option("--hand-eye-rms-px", inputs.tracked_rms_px, "and hand-eye");
   command.add_option("--fre-mm", inputs.fre_mm, "and the registration");
 }
