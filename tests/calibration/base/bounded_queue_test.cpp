@@ -1,0 +1,74 @@
+#include "calibration/base/bounded_queue.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+namespace birdseye {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+template <std::size_t kLanes>
+std::vector<int> drain(BoundedQueue<int, kLanes>& queue) {
+  std::vector<int> values;
+  while (const auto value = queue.pop()) values.push_back(*value);
+  return values;
+}
+
+TEST(BoundedQueue, GivesInTheOrderInWhichItWasGivenWhateverTheLane) {
+  BoundedQueue<int, 3> queue({{{4}, {4}, {4}}});
+  EXPECT_TRUE(queue.empty());
+  for (const auto& [lane, value] : {std::pair{1, 10}, {0, 11}, {2, 12}, {1, 13}, {0, 14}})
+    EXPECT_TRUE(queue.push(static_cast<std::size_t>(lane), value));
+  EXPECT_FALSE(queue.empty());
+  EXPECT_THAT(drain(queue), ElementsAre(10, 11, 12, 13, 14));
+  EXPECT_TRUE(queue.empty());
+}
+
+TEST(BoundedQueue, DropsTheOldestOfItsLaneOrRefusesAndCountsIt) {
+  BoundedQueue<int, 2> queue({{{2, WhenFull::drop_oldest}, {2, WhenFull::refuse}}});
+  for (const int value : {1, 2}) {
+    EXPECT_TRUE(queue.push(0, value));
+    EXPECT_TRUE(queue.push(1, -value));
+  }
+  EXPECT_FALSE(queue.push(0, 3));
+  EXPECT_FALSE(queue.push(1, -3));
+  EXPECT_EQ(queue.dropped(0), 1U);
+  EXPECT_EQ(queue.dropped(1), 1U);
+  EXPECT_THAT(drain(queue), ElementsAre(-1, 2, -2, 3));
+}
+
+TEST(BoundedQueue, WithoutRoomLosesAllAndCountsAll) {
+  BoundedQueue<int, 2> queue({{{0, WhenFull::drop_oldest}, {0, WhenFull::refuse}}});
+  for (const std::size_t lane : {0, 1}) EXPECT_FALSE(queue.push(lane, 7));
+  EXPECT_THAT(drain(queue), IsEmpty());
+  EXPECT_EQ(queue.dropped(0) + queue.dropped(1), 2U);
+}
+
+TEST(BoundedQueue, WhatIsPushedIsTakenWaitsOrIsCounted) {
+  std::mt19937 random(7);
+  BoundedQueue<int, 2> queue({{{5, WhenFull::drop_oldest}, {3, WhenFull::refuse}}});
+  std::uint64_t pushed = 0, taken = 0;
+  int newest = -1;
+  for (int step = 0; step < 20'000; ++step) {
+    if (random() % 5 < 3) {
+      queue.push(random() % 2, step);
+      ++pushed;
+    } else if (const auto value = queue.pop()) {
+      EXPECT_GT(*value, newest);
+      newest = *value;
+      ++taken;
+    }
+  }
+  taken += drain(queue).size();
+  EXPECT_GT(queue.dropped(0), 0U);
+  EXPECT_GT(queue.dropped(1), 0U);
+  EXPECT_EQ(pushed, taken + queue.dropped(0) + queue.dropped(1));
+}
+
+}  // namespace
+}  // namespace birdseye
