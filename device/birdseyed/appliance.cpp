@@ -9,13 +9,12 @@
 #include "device/birdseyed/gpio_thread.hpp"
 #include "device/birdseyed/tracker_thread.hpp"
 #include "device/wire/clock_discipline.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
 namespace {
-
-using drivers::now;
 
 constexpr Duration kTickWaiting = Duration::from_ms(5);  // while frames wait for poses
 constexpr Duration kTickIdle = Duration::from_ms(100);
@@ -30,7 +29,7 @@ Appliance::Appliance(const Config& config, wire::Server& server)
       tracker_post_(Instrument::tracker, queue_),
       camera_post_(Instrument::camera, queue_),
       gpio_post_(Instrument::gpio, queue_),
-      core_alive_ns_(now().ns) {}
+      core_alive_ns_(device_now().ns) {}
 
 Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::Server& server) {
   std::unique_ptr<Appliance> appliance(new Appliance(config, server));
@@ -45,7 +44,7 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
   const ControlsLock lock{
       [a] { return a->server_.camera_locked(); },
       [a](bool locked, const drivers::ControlReport& report) {
-        a->server_.publish(wire::pack(wire::CameraControls{locked, report.done, report.refused}, now()));
+        a->server_.publish(wire::pack(wire::CameraControls{locked, report.done, report.refused}, device_now()));
       }};
   begin(a->camera_post_,
         [a, lock](const std::stop_token& s) { run_camera(a->config_.camera, a->camera_post_, lock, s); });
@@ -69,23 +68,23 @@ void Appliance::start_recording() {
 }
 
 Appliance::~Appliance() {
-  for (std::jthread& thread : threads_) thread.request_stop();
-  for (std::jthread& thread : threads_) thread.join();
+  for (OwnedThread& thread : threads_) thread.request_stop();
+  for (OwnedThread& thread : threads_) thread.join();
 }
 
 void Appliance::make_messages(const std::stop_token& stop) {
   Core core(config_.core);
   std::string status;
   while (!stop.stop_requested()) {
-    auto event = queue_.pop(now() + (core.waiting() ? kTickWaiting : kTickIdle), stop);
-    if (!event) event = Tick{now()};
+    auto event = queue_.pop(device_now() + (core.waiting() ? kTickWaiting : kTickIdle), stop);
+    if (!event) event = Tick{device_now()};
     if (recorder_) recorder_->take(*event);
     for (const wire::Packet& packet : core.take(*event)) server_.publish(packet);
     if (core.status_text() != status) {
       status = core.status_text();
       spdlog::info("status: {}", status.empty() ? "all is well" : status);
     }
-    core_alive_ns_ = now().ns;
+    core_alive_ns_ = device_now().ns;
     state_ = core.board().state();
     const std::lock_guard lock(told_mutex_);
     counters_ = core.counters();
@@ -98,7 +97,7 @@ namespace {
 wire::WallClock read_wall_clock() {
   const auto read = wire::read_clock_discipline();
   if (!read) return {};
-  const std::int64_t shift_ns = wire::wall_minus_monotonic().ns;
+  const std::int64_t shift_ns = wall_minus_monotonic().ns;
   return {true, read->synchronised, read->tai_known, read->max_error.ns, read->est_error.ns, shift_ns, read->source};
 }
 
@@ -146,15 +145,15 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
 
 void Appliance::report_health(const std::stop_token& stop) {
   Core::Counters before;
-  DeviceTime began = now();
+  DeviceTime began = device_now();
   while (!stop.stop_requested()) {
-    drivers::sleep_for(kHealthEvery, stop);
+    sleep_for(kHealthEvery, stop);
     Core::Counters counters;
     {
       const std::lock_guard lock(told_mutex_);
       counters = counters_;
     }
-    const DeviceTime ended = now();
+    const DeviceTime ended = device_now();
     server_.publish(wire::pack(health(before, counters, (ended - began).seconds()), ended));
     before = counters;
     began = ended;
@@ -162,7 +161,7 @@ void Appliance::report_health(const std::stop_token& stop) {
 }
 
 bool Appliance::alive() const {
-  const DeviceTime least = now() - kAliveWithin;
+  const DeviceTime least = device_now() - kAliveWithin;
   const bool gpio = config_.gpio.lines.chip.empty() || gpio_post_.last_alive() > least;
   return DeviceTime{core_alive_ns_} > least && tracker_post_.last_alive() > least &&
          camera_post_.last_alive() > least && gpio;

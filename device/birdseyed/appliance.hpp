@@ -3,13 +3,14 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
-#include <thread>
+#include <vector>
 
 #include "device/birdseyed/config.hpp"
 #include "device/birdseyed/instrument_thread.hpp"
 #include "device/birdseyed/recorder.hpp"
 #include "device/wire/server.hpp"
 #include "drivers/minibird/measurement.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::device {
 
@@ -47,7 +48,7 @@ class Appliance {
   mutable std::mutex told_mutex_;  ///< guards what the core's thread tells the reporting thread
   Core::Counters counters_;
   InstrumentBoard board_;
-  std::vector<std::jthread> threads_;
+  std::vector<OwnedThread> threads_;
 };
 
 }  // namespace birdseye::device

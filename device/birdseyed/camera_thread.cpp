@@ -5,13 +5,12 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
 namespace {
-
-using drivers::now;
 
 constexpr int kSilentPeriods = 8;                            // frames that do not come
 constexpr Duration kSilentAtLeast = Duration::from_ms(300);  // a busy machine is no silent camera
@@ -34,7 +33,7 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
                .identity = camera.identity()});
   };
   const Duration silence = silence_of(camera, settings);
-  DeviceTime heard = now();
+  DeviceTime heard = device_now();
   std::optional<std::uint64_t> newest;
   int restarts = 0;
   bool known = false;  // to run: a program that feeds a socket says what it sends with its first frame only
@@ -45,21 +44,21 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
       lock.tell(locked, locked ? camera.lock_controls() : camera.unlock_controls());
       if (known) running();  // its exposure is known now, or no longer
     }
-    auto frame = camera.next(now() + kPatience);
+    auto frame = camera.next(device_now() + kPatience);
     if (!frame) return frame.error();
     const bool came = frame->has_value();
     if (came) {
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       // One frame over and over is no stream.
-      if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = now();
+      if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = device_now();
       post.push(FrameCame{**std::move(frame)});
     }
-    if (now() - heard > silence) {
+    if (device_now() - heard > silence) {
       const std::string text = fmt::format("{}: the camera sends no {}frames", camera.name(), came ? "new " : "");
       if (restarts++ == kRestarts) return {Errc::timeout, text};
       post.tell({.state = InstrumentState::silent, .text = text});
       if (auto restarted = camera.restart_stream(); !restarted) return restarted.error();
-      heard = now();
+      heard = device_now();
     }
   }
   return {};
@@ -78,7 +77,7 @@ void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, c
           {.state = lost.code == Errc::timeout ? InstrumentState::silent : InstrumentState::absent, .text = lost.what});
     }
     camera = Error{};  // closed before it is looked for again
-    drivers::sleep_for(kLookAgain, stop);
+    sleep_for(kLookAgain, stop);
   }
 }
 

@@ -1,19 +1,18 @@
 #pragma once
 
-#include <condition_variable>
+#include <atomic>
 #include <cstdint>
-#include <deque>
-#include <mutex>
 #include <optional>
 #include <stop_token>
 
 #include "device/birdseyed/raw_event.hpp"
+#include "drivers/system/blocking_queue.hpp"
 
 namespace birdseye::device {
 
-/// From the instruments' threads to the one that makes messages. Bounded: when too many frames wait, the oldest goes,
-/// for what is live matters more than what was. Everything else is small and may wait for minutes; changes of
-/// instruments are never dropped. What is dropped is counted.
+/// From the instruments' threads to the one that makes messages. Bounded: of the frames that wait, the oldest goes when
+/// there are too many, for what is live matters more than what was; everything else is small and has a bound of
+/// minutes. What becomes of instruments comes seldom, and has a bound of its own. What is dropped is counted.
 class EventQueue {
  public:
   static constexpr std::size_t kMostFrames = 8;  // 50 MB of 1080p
@@ -21,17 +20,16 @@ class EventQueue {
 
   void push(RawEvent event);
   /// The oldest event; empty at the deadline, or once stop is requested.
-  std::optional<RawEvent> pop(DeviceTime deadline, const std::stop_token& stop);
-  [[nodiscard]] std::uint64_t frames_dropped() const;
-  [[nodiscard]] std::uint64_t others_dropped() const;
+  std::optional<RawEvent> pop(Deadline deadline, const std::stop_token& stop) { return events_.pop(deadline, stop); }
+  [[nodiscard]] std::uint64_t frames_dropped() const { return events_.dropped(kFrames); }
+  [[nodiscard]] std::uint64_t others_dropped() const { return events_.dropped(kOthers) + events_.dropped(kChanges); }
 
  private:
-  mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
-  std::deque<RawEvent> events_;
-  std::size_t frames_ = 0;
-  std::uint64_t frames_dropped_ = 0, others_dropped_ = 0;
-  bool tracker_bytes_dropped_ = false;
+  enum Lane : std::size_t { kFrames, kOthers, kChanges, kLanes };
+
+  BlockingQueue<RawEvent, kLanes> events_{
+      {{{kMostFrames, WhenFull::drop_oldest}, {kMostEvents, WhenFull::refuse}, {kMostEvents, WhenFull::drop_oldest}}}};
+  std::atomic<bool> tracker_bytes_dropped_ = false;
 };
 
 }  // namespace birdseye::device

@@ -3,25 +3,24 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
 namespace {
-
-using drivers::now;
 
 constexpr Duration kLedStep = Duration::from_ms(50);
 
 /// Pulses at a fixed rate, half of each period high. Late is late: a missed edge is not made up for by two at once.
 class Trigger {
  public:
-  explicit Trigger(double rate_hz) : half_ns_(rate_hz > 0 ? std::llround(0.5e9 / rate_hz) : 0), due_(now()) {}
+  explicit Trigger(double rate_hz) : half_ns_(rate_hz > 0 ? std::llround(0.5e9 / rate_hz) : 0), due_(device_now()) {}
   [[nodiscard]] DeviceTime next(DeviceTime otherwise) const {
     return half_ns_ > 0 ? std::min(due_, otherwise) : otherwise;
   }
   Result<void> step(drivers::GpioLines& lines) {
-    const DeviceTime time = now();
+    const DeviceTime time = device_now();
     if (half_ns_ == 0 || time < due_) return {};
     high_ = !high_;
     due_ = {due_.ns + half_ns_ * (1 + (time - due_).ns / (2 * half_ns_) * 2)};
@@ -40,11 +39,11 @@ Error work(drivers::GpioLines& lines, const GpioConfig& config, const std::atomi
   bool lit = false;
   while (!stop.stop_requested()) {
     post.alive();
-    auto edges = lines.read(trigger.next(now() + kLedStep));
+    auto edges = lines.read(trigger.next(device_now() + kLedStep));
     if (!edges) return edges.error();
-    if (!edges->empty()) post.push(EdgesCame{*std::move(edges), now()});
+    if (!edges->empty()) post.push(EdgesCame{*std::move(edges), device_now()});
     if (auto set = trigger.step(lines); !set) return set.error();
-    const bool on = led_on(state, now());
+    const bool on = led_on(state, device_now());
     if (on == lit) continue;
     lit = on;
     if (auto set = lines.set_led(on); !set) return set.error();
@@ -68,7 +67,7 @@ void run_gpio(const GpioConfig& config, const std::atomic<ApplianceState>& state
       post.tell({.state = InstrumentState::absent, .text = lines.error().what});
     }
     lines = Error{};
-    drivers::sleep_for(kLookAgain, stop);
+    sleep_for(kLookAgain, stop);
   }
 }
 

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::device {
 
@@ -14,7 +14,7 @@ void InstrumentPost::tell(InstrumentChanged changed) {
   state_ = changed.state;
   text_ = changed.text;
   changed.instrument = instrument_;
-  changed.at = drivers::now();
+  changed.at = device_now();
   const bool good = state_ == InstrumentState::running || state_ == InstrumentState::starting;
   spdlog::log(good ? spdlog::level::info : spdlog::level::warn, "{} {}: {}", name_of(instrument_), name_of(state_),
               text_);
@@ -22,7 +22,7 @@ void InstrumentPost::tell(InstrumentChanged changed) {
 }
 
 void InstrumentPost::alive() {
-  alive_ns_ = drivers::now().ns;
+  alive_ns_ = device_now().ns;
 }
 
 }  // namespace birdseye::device

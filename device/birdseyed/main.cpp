@@ -1,14 +1,9 @@
 #include <fmt/core.h>
-#include <signal.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
-#include <ctime>
 #include <filesystem>
 #include <sstream>
-#include <stop_token>
-#include <thread>
 
 #include "device/birdseyed/appliance.hpp"
 #include "device/birdseyed/patient_stderr.hpp"
@@ -16,46 +11,22 @@
 #include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
-#include "drivers/system/monotonic.hpp"
-#include "drivers/system/program.hpp"
+#include "drivers/system/command_line.hpp"
+#include "drivers/system/service_signals.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace {
 
 using namespace birdseye;
 namespace fs = std::filesystem;
 
+constexpr int kUnusable = static_cast<int>(ExitCode::unusable_input);
+
 int refuse(const Error& error) {
   std::istringstream lines(error.what);
   for (std::string line; std::getline(lines, line);) print_error("birdseyed", line);
-  return 2;
+  return kUnusable;
 }
-
-/// Signals are taken by one thread alone, and by waiting for them: no handler, nothing interrupted. To be made before
-/// any other thread is, so that all inherit the mask.
-class Signals {
- public:
-  Signals() {
-    sigemptyset(&awaited_);
-    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&awaited_, signal);
-    pthread_sigmask(SIG_BLOCK, &awaited_, nullptr);
-    watcher_ = std::jthread([this](const std::stop_token& done) {
-      while (!done.stop_requested()) {
-        const timespec tick{0, 100'000'000};
-        const int signal = sigtimedwait(&awaited_, nullptr, &tick);
-        if (signal == SIGHUP) reload_ = true;
-        if (signal == SIGTERM || signal == SIGINT) stop_.request_stop();
-      }
-    });
-  }
-  [[nodiscard]] std::stop_token stop() const { return stop_.get_token(); }
-  bool take_reload() { return reload_.exchange(false); }
-
- private:
-  sigset_t awaited_{};
-  std::atomic<bool> reload_ = false;
-  std::stop_source stop_;
-  std::jthread watcher_;
-};
 
 /// Reads the configuration again. What cannot be used is said, and the appliance goes on as it was.
 void reload(const fs::path& path, device::Config& config, wire::Server& server,
@@ -85,7 +56,7 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
   device::notify_ready(appliance ? appliance->summary() : "cannot go on");
 }
 
-int serve(const fs::path& path, Signals& signals) {
+int serve(const fs::path& path, ServiceSignals& signals) {
   auto config = device::read_config(path);
   if (!config) return refuse(config.error());
   auto server = wire::Server::listen(config->wire.bind, config->wire.port);
@@ -97,7 +68,7 @@ int serve(const fs::path& path, Signals& signals) {
   device::notify_ready(appliance->summary());
   const auto stop = signals.stop();
   while (!stop.stop_requested() && appliance) {
-    drivers::sleep_for(Duration::from_ms(500), stop);
+    sleep_for(Duration::from_ms(500), stop);
     if (signals.take_reload()) reload(path, *config, **server, appliance);
     if (!appliance) break;
     if (appliance->alive()) device::notify_alive();
@@ -105,10 +76,10 @@ int serve(const fs::path& path, Signals& signals) {
   }
   device::notify_stopping();
   spdlog::info("ending");
-  return appliance ? 0 : 2;
+  return appliance ? 0 : kUnusable;
 }
 
-int replay(const fs::path& path, const fs::path& recording, const Signals& signals) {
+int replay(const fs::path& path, const fs::path& recording, const ServiceSignals& signals) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
   const auto server = wire::Server::listen(config->wire.bind, config->wire.port);
@@ -143,7 +114,7 @@ int main(int argc, char** argv) {
     }
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("birdseyed", std::make_shared<device::PatientStderr>()));
-    Signals signals;
+    ServiceSignals signals;
     if (probe_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());

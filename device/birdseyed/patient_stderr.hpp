@@ -1,11 +1,12 @@
 #pragma once
 
-#include <poll.h>
 #include <spdlog/sinks/base_sink.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <mutex>
+
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
@@ -17,8 +18,7 @@ class PatientStderr final : public spdlog::sinks::base_sink<std::mutex> {
     formatter_->format(message, line);
     // A pipe that poll(2) calls ready takes at least so many bytes without waiting.
     constexpr std::size_t kAtOnce = 4096;
-    pollfd entry{STDERR_FILENO, POLLOUT, 0};
-    if (::poll(&entry, 1, 0) == 1 && (entry.revents & POLLOUT) != 0)
+    if ((wait_ready(STDERR_FILENO, POLLOUT, Deadline::after({})) & POLLOUT) != 0)
       (void)!::write(STDERR_FILENO, line.data(), std::min(line.size(), kAtOnce));
   }
   void flush_() override {}

@@ -3,7 +3,7 @@
 #include <fmt/core.h>
 
 #include "device/birdseyed/tracker_thread.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::device {
 
@@ -20,7 +20,7 @@ Result<std::string> probe_tracker(const TrackerConfig& config, const std::stop_t
 Result<std::string> probe_camera(const drivers::CameraSettings& settings) {
   const auto camera = drivers::open_camera(settings);
   if (!camera) return camera.error();
-  const auto frame = (*camera)->next(drivers::now() + Duration::from_ms(2000));
+  const auto frame = (*camera)->next(device_now() + Duration::from_ms(2000));
   if (!frame) return frame.error();
   if (!*frame) return Error{Errc::timeout, fmt::format("{}: the camera sends no frames", (*camera)->name())};
   return (*camera)->describe();

@@ -1,34 +1,32 @@
 #include "device/birdseyed/recorder.hpp"
 
 #include <fcntl.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <system_error>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/condition.hpp"
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::device {
 
 namespace {
 
-constexpr std::chrono::milliseconds kLookEvery{100};
+constexpr Duration kLookEvery = Duration::from_ms(100);
 constexpr Duration kSyncEvery = Duration::from_ms(500);
 constexpr std::size_t kSyncBytes = 16'000'000;  // more at once, and frames overrun the bound while they wait for it
-constexpr std::chrono::milliseconds kBeginWithin{1000};
+constexpr Duration kBeginWithin = Duration::from_ms(1000);
 constexpr Duration kWriteAfterStop = Duration::from_ms(1000);
-constexpr std::chrono::milliseconds kEndWithin{2000};  // the last write and its sync included
+constexpr Duration kEndWithin = Duration::from_ms(2000);  // the last write and its sync included
 constexpr int kMostOfOneName = 1000;
 
 std::string words(int os_errno) {
@@ -45,7 +43,7 @@ std::size_t size_of(const RawEvent& event) {
 
 class DiskFile : public RecordFile {
  public:
-  explicit DiskFile(drivers::UniqueFd fd) : fd_(std::move(fd)) {}
+  explicit DiskFile(UniqueFd fd) : fd_(std::move(fd)) {}
 
   int write(std::span<const std::uint8_t> bytes) override {
     while (!bytes.empty()) {
@@ -59,20 +57,21 @@ class DiskFile : public RecordFile {
   int sync() override { return ::fdatasync(fd_.get()) == 0 || errno == EINVAL ? 0 : errno; }  // EINVAL: it cannot
 
  private:
-  drivers::UniqueFd fd_;
+  UniqueFd fd_;
 };
 
 }  // namespace
 
 Result<NewRecordFile> create_record_file(const RecordConfig& config) {
-  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const std::string name = fmt::format("birdseyed-{:%Y%m%dT%H%M%SZ}", fmt::gmtime(now));
+  std::string stamp = utc_now();
+  std::erase_if(stamp, [](char c) { return c == '-' || c == ':'; });
+  const std::string name = "birdseyed-" + stamp;
   std::error_code ignored;
   std::filesystem::create_directories(config.folder, ignored);
   std::filesystem::path path = config.folder / (name + ".berec");
   int os_errno = EEXIST;
   for (int i = 2; os_errno == EEXIST && i <= kMostOfOneName; ++i) {
-    drivers::UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
+    UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
     if (fd) return NewRecordFile{std::make_unique<DiskFile>(std::move(fd)), path};
     os_errno = errno;
     if (os_errno == EEXIST) path = config.folder / fmt::format("{}-{}.berec", name, i);
@@ -116,7 +115,7 @@ class Recorder::Writer {
   DeviceTime synced_;
 
   mutable std::mutex mutex_;  // of what follows
-  std::condition_variable work_, told_;
+  Condition work_, told_;
   std::optional<Result<std::filesystem::path>> begun_;
   std::string name_;
   std::deque<RawEvent> waiting_;
@@ -158,13 +157,13 @@ void Recorder::Writer::run() {
 
 Result<std::filesystem::path> Recorder::Writer::wait_for_begin() {
   std::unique_lock lock(mutex_);
-  if (told_.wait_for(lock, kBeginWithin, [this] { return begun_.has_value(); })) return *begun_;
+  if (told_.wait(lock, Deadline::after(kBeginWithin), [this] { return begun_.has_value(); })) return *begun_;
   return Error{Errc::timeout,
                fmt::format("{}: the disk does not answer; see [record] folder", config_.folder.string())};
 }
 
 void Recorder::Writer::write_events() {
-  synced_ = drivers::now();
+  synced_ = device_now();
   std::size_t in_hand_bytes = 0;
   for (;;) {
     std::optional<RawEvent> event;
@@ -172,9 +171,9 @@ void Recorder::Writer::write_events() {
       std::unique_lock lock(mutex_);
       held_bytes_ -= std::exchange(in_hand_bytes, 0);
       const auto ending = [this] { return give_up_ || !ended_.empty(); };
-      work_.wait_for(lock, kLookEvery, [&] { return !waiting_.empty() || ending(); });
+      work_.wait(lock, Deadline::after(kLookEvery), [&] { return !waiting_.empty() || ending(); });
       if (waiting_.empty() && ending()) break;
-      if (give_up_ && drivers::now() > *give_up_) {
+      if (give_up_ && device_now() > *give_up_) {
         lock.unlock();
         end("cut short, the disk was too slow for what waited");
         break;
@@ -186,7 +185,7 @@ void Recorder::Writer::write_events() {
       }
     }
     if (event && !write(*std::exchange(event, std::nullopt))) break;
-    if (unsynced_bytes_ > kSyncBytes || drivers::now() - synced_ > kSyncEvery) sync();
+    if (unsynced_bytes_ > kSyncBytes || device_now() - synced_ > kSyncEvery) sync();
   }
   sync();
 }
@@ -210,7 +209,7 @@ void Recorder::Writer::sync() {
   // What the kernel could not write it may have thrown away, and it says so once.
   if (const int failed = file_->sync(); failed != 0)
     end(fmt::format("ended, the disk has lost some of it ({})", words(failed)));
-  synced_ = drivers::now();
+  synced_ = device_now();
 }
 
 void Recorder::Writer::end(const std::string& why) {
@@ -250,9 +249,9 @@ std::string Recorder::Writer::ended() const {
 
 bool Recorder::Writer::stop() {
   std::unique_lock lock(mutex_);
-  give_up_ = drivers::now() + kWriteAfterStop;
+  give_up_ = device_now() + kWriteAfterStop;
   work_.notify_one();
-  return told_.wait_for(lock, kEndWithin, [this] { return done_; });
+  return told_.wait(lock, Deadline::after(kEndWithin), [this] { return done_; });
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, const CoreSettings& settings,
@@ -265,14 +264,14 @@ Result<std::unique_ptr<Recorder>> Recorder::start(const RecordConfig& config, co
 }
 
 Recorder::Recorder(std::shared_ptr<Writer> writer)
-    : writer_(std::move(writer)), thread_([shared = writer_] { shared->run(); }) {}
+    : writer_(std::move(writer)), thread_([shared = writer_](const std::stop_token&) { shared->run(); }) {}
 
 Recorder::~Recorder() {
   if (writer_->stop()) {
     thread_.join();
   } else {
     if (!path_.empty()) spdlog::warn("recording: {}: the disk does not answer; going on without it", path_.string());
-    thread_.detach();
+    thread_.let_go();
   }
 }
 

@@ -5,10 +5,10 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <thread>
 
 #include "device/birdseyed/config.hpp"
 #include "device/birdseyed/recording.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::device {
 
@@ -61,7 +61,7 @@ class Recorder {
 
   std::shared_ptr<Writer> writer_;  ///< shared with the thread, which may be abandoned
   std::filesystem::path path_;
-  std::thread thread_;
+  OwnedThread thread_;
 };
 
 }  // namespace birdseye::device

@@ -3,7 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include "device/birdseyed/instrument_thread.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
@@ -17,8 +18,8 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
     if (!event) return event.error();
     if (!*event) break;
     const DeviceTime at = time_of(**event);
-    if (!shift) shift = drivers::now() - at;
-    drivers::sleep_for(at + *shift - drivers::now(), stop);
+    if (!shift) shift = device_now() - at;
+    sleep_for(at + *shift - device_now(), stop);
     for (const wire::Packet& packet : core.take(**event)) server.publish(packet);
   }
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());

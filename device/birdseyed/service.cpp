@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::device {
 
@@ -16,7 +16,7 @@ void notify_status(const std::string& status) {
 }
 
 void notify_reloading() {
-  ::sd_notify(0, fmt::format("RELOADING=1\nMONOTONIC_USEC={}", drivers::now().ns / 1000).c_str());
+  ::sd_notify(0, fmt::format("RELOADING=1\nMONOTONIC_USEC={}", device_now().ns / 1000).c_str());
 }
 
 void notify_stopping() {

@@ -4,13 +4,13 @@
 
 #include "drivers/io/open_line.hpp"
 #include "drivers/minibird/record_parser.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
 
 namespace {
 
-using drivers::now;
 using drivers::minibird::MiniBird;
 
 constexpr Duration kSilent = Duration::from_ms(500);  // of a unit that streams: 7 to 72 cycles
@@ -18,19 +18,19 @@ constexpr Duration kSilent = Duration::from_ms(500);  // of a unit that streams:
 /// Until the tracker is lost; why. Bytes alone are no sign of life: another baud rate, or noise, has them too.
 Error stream(MiniBird& tracker, const TrackerConfig& config, InstrumentPost& post, const std::stop_token& stop) {
   drivers::minibird::RecordParser records(tracker.layout());
-  DeviceTime heard = now();
+  DeviceTime heard = device_now();
   bool bytes = false;  // since then
   while (!stop.stop_requested()) {
     post.alive();
-    auto chunk = tracker.read(now() + kPatience);
+    auto chunk = tracker.read(device_now() + kPatience);
     if (!chunk) return chunk.error();
     if (*chunk) {
       const bool whole = !records.push((*chunk)->bytes).empty();
       bytes = !whole;
-      if (whole) heard = now();
+      if (whole) heard = device_now();
       post.push(TrackerBytes{**std::move(chunk)});
     }
-    if (now() - heard > kSilent) {
+    if (device_now() - heard > kSilent) {
       return {Errc::timeout, fmt::format("{}: the tracker {}", config.line.device,
                                          bytes ? "sends no whole record; check its cable, and what is near it"
                                                : "has fallen silent; check its power and cable")};
@@ -78,7 +78,7 @@ void run_tracker(const TrackerConfig& config, InstrumentPost& post, const std::s
     if (stop.stop_requested()) return;
     if (!tracker) {
       post.tell({.state = InstrumentState::absent, .text = tracker.error().what});
-      drivers::sleep_for(kLookAgain, stop);
+      sleep_for(kLookAgain, stop);
       continue;
     }
     post.tell({.state = InstrumentState::running,

@@ -3,17 +3,18 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <gpiod.h>
-#include <poll.h>
 #include <sys/utsname.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <span>
 #include <utility>
 
 #include "drivers/gpio/debouncer.hpp"
 #include "drivers/gpio/kernel_stamps.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::drivers {
 
@@ -86,7 +87,7 @@ class KernelGpioLines final : public GpioLines {
     return request_output(trigger_, "trigger", s.trigger, s.trigger_active_low);
   }
 
-  Result<std::vector<GpioEdge>> read(DeviceTime deadline) override;
+  Result<std::vector<GpioEdge>> read(Deadline deadline) override;
   Result<void> set_led(bool on) override { return set(led_, on); }
   Result<void> set_trigger(bool on) override { return set(trigger_, on); }
   [[nodiscard]] GpioCounters counters() const override { return {counters_.edges, pedal_.bounces(), counters_.lost}; }
@@ -99,7 +100,7 @@ class KernelGpioLines final : public GpioLines {
   Result<void> request_line(gpiod_line* line, const char* purpose, const std::string& wanted, int type, int flags);
   Result<void> request_input(GpioInput input, const std::string& wanted, bool active_low, GpioBias bias);
   Result<void> request_output(gpiod_line*& line, const char* purpose, const std::string& wanted, bool active_low);
-  Result<void> wait(DeviceTime until, std::array<pollfd, 2>& entries);
+  Result<void> wait(Deadline until, std::array<pollfd, 2>& entries);
   Result<void> drain(InputLine& line, std::vector<GpioEdge>& edges);
   void take(InputLine& line, bool active, DeviceTime at, std::vector<GpioEdge>& edges);
   Result<void> settle_pedal(std::vector<GpioEdge>& edges);
@@ -189,9 +190,9 @@ Result<void> KernelGpioLines::request_output(gpiod_line*& line, const char* purp
 }
 
 /// A kernel older than 6.6 does not wake who waits for a chip that goes: it says so only when asked anew.
-Result<void> KernelGpioLines::wait(DeviceTime until, std::array<pollfd, 2>& entries) {
+Result<void> KernelGpioLines::wait(Deadline until, std::array<pollfd, 2>& entries) {
   for (std::size_t i = 0; i < inputs_.size(); ++i) entries[i] = {inputs_[i].fd, POLLIN | POLLPRI, 0};
-  if (::poll(entries.data(), inputs_.size(), poll_ms(until)) < 0 && errno != EINTR) return gone();
+  wait_ready(std::span(entries).first(inputs_.size()), until);
   for (const pollfd& entry : entries) {
     if ((entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return gone();
   }
@@ -225,7 +226,7 @@ void KernelGpioLines::take(InputLine& line, bool active, DeviceTime at, std::vec
 
 /// Looks at the pedal itself once it is still: the edge that would have said so may be one that the kernel dropped.
 Result<void> KernelGpioLines::settle_pedal(std::vector<GpioEdge>& edges) {
-  const DeviceTime time = now();
+  const DeviceTime time = device_now();
   if (!pedal_.due() || time < *pedal_.due()) return {};
   for (const InputLine& line : inputs_) {
     if (line.input != GpioInput::pedal) continue;
@@ -244,20 +245,21 @@ Result<void> KernelGpioLines::still_there() const {
   return {};
 }
 
-Result<std::vector<GpioEdge>> KernelGpioLines::read(DeviceTime deadline) {
+Result<std::vector<GpioEdge>> KernelGpioLines::read(Deadline deadline) {
   std::vector<GpioEdge> edges;
-  if (std::exchange(flooded_, false)) sleep_until(std::min(now() + kFloodPause, deadline));
+  if (std::exchange(flooded_, false)) sleep_until(std::min(Deadline::after(kFloodPause), deadline));
   for (;;) {
     std::array<pollfd, 2> entries{};
     const auto due = pedal_.due();
-    if (auto waited = wait(due ? std::min(*due, deadline) : deadline, entries); !waited) return waited.error();
+    if (auto waited = wait(due ? std::min(Deadline(*due), deadline) : deadline, entries); !waited)
+      return waited.error();
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       if ((entries[i].revents & (POLLIN | POLLPRI)) == 0) continue;
       if (auto drained = drain(inputs_[i], edges); !drained) return drained.error();
     }
     if (auto settled = settle_pedal(edges); !settled) return settled.error();
     if (!edges.empty()) break;
-    if (now() < deadline) continue;
+    if (!deadline.passed()) continue;
     if (auto there = still_there(); !there) return there.error();
     break;
   }

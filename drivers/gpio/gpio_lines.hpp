@@ -7,6 +7,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -46,7 +47,7 @@ class GpioLines {
 
   /// The edges since the last call, oldest first, as soon as there is one; empty at the deadline. At most kMostEdges;
   /// the next call gives the rest. Errc::disconnected when the chip is gone.
-  virtual Result<std::vector<GpioEdge>> read(DeviceTime deadline) = 0;
+  virtual Result<std::vector<GpioEdge>> read(Deadline deadline) = 0;
   /// Does nothing where the settings name no such line.
   virtual Result<void> set_led(bool on) = 0;
   virtual Result<void> set_trigger(bool on) = 0;

@@ -7,6 +7,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -17,9 +18,9 @@ class ByteStream {
 
   /// Waits for at least one byte and returns how many were read; 0 at the deadline. Errc::disconnected when the line is
   /// gone.
-  virtual Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) = 0;
+  virtual Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) = 0;
   /// Writes all bytes, else Errc::timeout.
-  virtual Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime deadline) = 0;
+  virtual Result<void> write(std::span<const std::uint8_t> bytes, Deadline deadline) = 0;
   virtual void discard_input() = 0;
   /// False where the line has no RTS (a pseudo-terminal, a three-wire cable's adapter).
   virtual bool set_rts(bool asserted) = 0;

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::drivers {
 
@@ -13,10 +13,6 @@ namespace {
 
 constexpr Duration kRequest = Duration::from_ms(500);
 constexpr Duration kCollect = Duration::from_ms(200);
-
-std::chrono::steady_clock::time_point steady(DeviceTime time) {
-  return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(time.ns));
-}
 
 }  // namespace
 
@@ -42,19 +38,18 @@ Result<std::unique_ptr<FtdiPort>> FtdiPort::open(std::unique_ptr<UsbPort> usb, c
   std::unique_ptr<FtdiPort> port(new FtdiPort(std::move(usb), settings, *chip));
   if (auto done = port->set_up(); !done) return done.error();
   if (auto reading = port->usb_->start_reading(settings.transfers); !reading) return reading.error();
-  port->pump_ = std::jthread([p = port.get()](const std::stop_token& stop) { p->pump(stop); });
+  port->pump_ = OwnedThread([p = port.get()](const std::stop_token& stop) { p->pump(stop); });
   return port;
 }
 
 FtdiPort::~FtdiPort() {
-  if (!pump_.joinable()) return;
   pump_.request_stop();
   usb_->wake();
   pump_.join();
 }
 
 Result<void> FtdiPort::send(const SetupPacket& request) {
-  auto sent = usb_->control(request, now() + kRequest);
+  auto sent = usb_->control(request, device_now() + kRequest);
   if (!sent) return sent.error();
   return {};
 }
@@ -88,7 +83,7 @@ Result<void> FtdiPort::set_up_latency() {
   for (const int wanted : {settings_.latency_ms, std::max(2, settings_.latency_ms)}) {
     auto set = send(ftdi::set_latency(static_cast<std::uint8_t>(wanted), port));
     if (!set && set.error().code != Errc::unsupported) return set;
-    const auto back = usb_->control(ftdi::get_latency(port), now() + kRequest);
+    const auto back = usb_->control(ftdi::get_latency(port), device_now() + kRequest);
     if (!back && back.error().code != Errc::unsupported) return back.error();
     actual_latency_ms_ = back && !back->empty() ? std::optional<int>(back->front()) : std::nullopt;
     if (actual_latency_ms_ == wanted) break;
@@ -98,7 +93,7 @@ Result<void> FtdiPort::set_up_latency() {
 
 void FtdiPort::pump(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    auto input = usb_->collect(now() + kCollect);
+    auto input = usb_->collect(device_now() + kCollect);
     const std::lock_guard lock(mutex_);
     if (!input) {
       ended_ = input.error();
@@ -115,9 +110,9 @@ void FtdiPort::pump(const std::stop_token& stop) {
   }
 }
 
-Result<std::size_t> FtdiPort::read(std::span<std::uint8_t> into, DeviceTime deadline) {
+Result<std::size_t> FtdiPort::read(std::span<std::uint8_t> into, Deadline deadline) {
   std::unique_lock lock(mutex_);
-  came_.wait_until(lock, steady(deadline), [this] { return !receiver_.empty() || ended_; });
+  came_.wait(lock, deadline, [this] { return !receiver_.empty() || ended_; });
   // What came before the end is still to be had.
   if (receiver_.empty() && ended_) return *ended_;
   const FtdiReceiver::Taken taken = receiver_.take(into);
@@ -125,12 +120,12 @@ Result<std::size_t> FtdiPort::read(std::span<std::uint8_t> into, DeviceTime dead
   return taken.bytes;
 }
 
-Result<void> FtdiPort::write(std::span<const std::uint8_t> bytes, DeviceTime deadline) {
+Result<void> FtdiPort::write(std::span<const std::uint8_t> bytes, Deadline deadline) {
   while (!bytes.empty()) {
     const auto put = usb_->bulk_out(bytes, deadline);
     if (!put) return put.error();
     bytes = bytes.subspan(*put);
-    if (!bytes.empty() && now() >= deadline) {
+    if (!bytes.empty() && deadline.passed()) {
       return Error{Errc::timeout, fmt::format("{}: does not take commands", name())};
     }
   }

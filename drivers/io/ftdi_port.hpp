@@ -1,15 +1,15 @@
 #pragma once
 
-#include <condition_variable>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 
 #include "drivers/io/byte_stream.hpp"
 #include "drivers/io/ftdi_protocol.hpp"
 #include "drivers/io/ftdi_receiver.hpp"
 #include "drivers/io/usb_port.hpp"
+#include "drivers/system/condition.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::drivers {
 
@@ -30,8 +30,8 @@ class FtdiPort final : public ByteStream {
   FtdiPort(const FtdiPort&) = delete;
   FtdiPort& operator=(const FtdiPort&) = delete;
 
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) override;
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime deadline) override;
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) override;
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline deadline) override;
   void discard_input() override;
   bool set_rts(bool asserted) override;
   [[nodiscard]] const std::string& name() const override { return usb_->identity().name; }
@@ -57,11 +57,11 @@ class FtdiPort final : public ByteStream {
   std::optional<DeviceTime> arrival_;
 
   mutable std::mutex mutex_;  // of all below
-  std::condition_variable came_;
+  Condition came_;
   FtdiReceiver receiver_;
   std::optional<Error> ended_;
 
-  std::jthread pump_;
+  OwnedThread pump_;
 };
 
 }  // namespace birdseye::drivers

@@ -10,7 +10,7 @@
 #include <mutex>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -37,8 +37,9 @@ using Context = std::unique_ptr<libusb_context, ContextEnd>;
 using Handle = std::unique_ptr<libusb_device_handle, HandleEnd>;
 using Devices = std::unique_ptr<libusb_device*, DevicesEnd>;
 
-unsigned timeout_ms(DeviceTime deadline) {
-  return static_cast<unsigned>(std::max(1, poll_ms(deadline)));  // 0 would be for ever
+unsigned timeout_ms(Deadline deadline) {
+  return static_cast<unsigned>(
+      std::clamp<std::int64_t>((deadline.left().ns + 999'999) / 1'000'000, 1, 60'000));  // 0 would be for ever
 }
 
 /// What the kernel has read from the device when it came; asking the device itself takes the right to open it.
@@ -146,7 +147,7 @@ class Reading {
  private:
   // Called in whichever thread handles libusb's events just then.
   static void LIBUSB_CALL finished(libusb_transfer* transfer) {
-    const DeviceTime arrived = now();
+    const DeviceTime arrived = device_now();
     Slot* const slot = static_cast<Slot*>(transfer->user_data);
     const std::lock_guard lock(slot->owner->mutex_);
     slot->arrived = arrived;
@@ -170,10 +171,10 @@ class LibusbPort final : public UsbPort {
   ~LibusbPort() override;
 
   [[nodiscard]] const UsbIdentity& identity() const override { return identity_; }
-  Result<std::vector<std::uint8_t>> control(const SetupPacket& setup, DeviceTime deadline) override;
-  Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, DeviceTime deadline) override;
+  Result<std::vector<std::uint8_t>> control(const SetupPacket& setup, Deadline deadline) override;
+  Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, Deadline deadline) override;
   Result<void> start_reading(int transfers) override;
-  Result<std::optional<UsbInput>> collect(DeviceTime deadline) override;
+  Result<std::optional<UsbInput>> collect(Deadline deadline) override;
   void wake() override;
 
  private:
@@ -194,7 +195,7 @@ LibusbPort::~LibusbPort() {
   if (reading_) {
     reading_->cancel_all();
     int code = 0;
-    for (const DeviceTime until = now() + kDrain; reading_->in_flight() > 0 && now() < until;)
+    for (const Deadline until = Deadline::after(kDrain); reading_->in_flight() > 0 && !until.passed();)
       handle_events(Duration::from_ms(10), code);
     if (reading_->in_flight() > 0) {
       // The kernel still holds buffers of ours: to give them up would let it write into somebody else's memory.
@@ -214,7 +215,7 @@ void LibusbPort::handle_events(Duration most, int& code) {
   code = libusb_handle_events_timeout_completed(context_.get(), &wait, nullptr);
 }
 
-Result<std::vector<std::uint8_t>> LibusbPort::control(const SetupPacket& setup, DeviceTime deadline) {
+Result<std::vector<std::uint8_t>> LibusbPort::control(const SetupPacket& setup, Deadline deadline) {
   const auto word = [&](std::size_t at) { return static_cast<std::uint16_t>(setup[at] | setup[at + 1] << 8); };
   std::vector<std::uint8_t> reply(word(6));
   const int got = libusb_control_transfer(handle_.get(), setup[0], setup[1], word(2), word(4), reply.data(), word(6),
@@ -227,7 +228,7 @@ Result<std::vector<std::uint8_t>> LibusbPort::control(const SetupPacket& setup, 
   return reply;
 }
 
-Result<std::size_t> LibusbPort::bulk_out(std::span<const std::uint8_t> bytes, DeviceTime deadline) {
+Result<std::size_t> LibusbPort::bulk_out(std::span<const std::uint8_t> bytes, Deadline deadline) {
   int put = 0;
   const int code = libusb_bulk_transfer(handle_.get(), endpoints_.out, const_cast<std::uint8_t*>(bytes.data()),
                                         static_cast<int>(bytes.size()), &put, timeout_ms(deadline));
@@ -266,13 +267,13 @@ Result<std::optional<UsbInput>> LibusbPort::settle(Reading::Slot& slot) {
   return input;
 }
 
-Result<std::optional<UsbInput>> LibusbPort::collect(DeviceTime deadline) {
+Result<std::optional<UsbInput>> LibusbPort::collect(Deadline deadline) {
   for (;;) {
     if (Reading::Slot* const slot = reading_ ? reading_->next_finished() : nullptr) return settle(*slot);
     if (broken_ != 0) return usb_error(identity_.name, broken_, "read from it");
-    if (woken_.exchange(false) || now() >= deadline) return std::optional<UsbInput>();
+    if (woken_.exchange(false) || deadline.passed()) return std::optional<UsbInput>();
     int code = 0;
-    handle_events(deadline - now(), code);
+    handle_events(deadline.left(), code);
     if (code != 0 && code != LIBUSB_ERROR_INTERRUPTED && code != LIBUSB_ERROR_TIMEOUT) broken_ = code;
   }
 }

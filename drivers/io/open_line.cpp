@@ -10,7 +10,7 @@
 #include "drivers/io/libusb_port.hpp"
 #include "drivers/io/serial_port.hpp"
 #include "drivers/io/socket_line.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -92,9 +92,9 @@ Result<std::unique_ptr<ByteStream>> open_line(const LineSettings& settings) {
   }
   if (device.starts_with("tcp:")) {
     const TcpAddress address = *parse_tcp(std::string_view(device).substr(4));
-    return upcast(SocketLine::connect_tcp(address.host, address.port, now() + kConnect));
+    return upcast(SocketLine::connect_tcp(address.host, address.port, device_now() + kConnect));
   }
-  if (device.starts_with("unix:")) return upcast(SocketLine::connect_unix(device.substr(5), now() + kConnect));
+  if (device.starts_with("unix:")) return upcast(SocketLine::connect_unix(device.substr(5), device_now() + kConnect));
   return upcast(SerialPort::open(device, settings.baud, settings.usb_latency_ms));
 }
 

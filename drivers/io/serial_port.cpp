@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/serial.h>
-#include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -16,7 +15,7 @@
 #include <utility>
 
 #include "drivers/io/serial_latency.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::drivers {
 
@@ -147,7 +146,7 @@ std::size_t SerialPort::decode(std::span<std::uint8_t> into) {
   return 0;
 }
 
-Result<std::size_t> SerialPort::read(std::span<std::uint8_t> into, DeviceTime deadline) {
+Result<std::size_t> SerialPort::read(std::span<std::uint8_t> into, Deadline deadline) {
   if (into.empty()) return std::size_t{0};
   if (std::exchange(damage_next_, false)) ++line_errors_;
   if (const std::size_t made = decode(into); made > 0) return made;
@@ -159,19 +158,18 @@ Result<std::size_t> SerialPort::read(std::span<std::uint8_t> into, DeviceTime de
       raw_end_ = static_cast<std::size_t>(got);
       const std::size_t made = lost_bytes() ? 0 : decode(into);
       // Nothing but damage may go on for ever.
-      if (made > 0 || now() >= deadline) return made;
+      if (made > 0 || deadline.passed()) return made;
       continue;
     }
     // A line that has hung up is always ready to be read, and what is read is nothing.
     if (hung_up || (got < 0 && errno != EAGAIN && errno != EINTR)) return gone();
-    pollfd entry{fd_.get(), POLLIN, 0};
-    const int ready = ::poll(&entry, 1, poll_ms(deadline));
-    hung_up = ready > 0 && (entry.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0;
-    if (!hung_up && now() >= deadline && (entry.revents & POLLIN) == 0) return std::size_t{0};
+    const short ready = wait_ready(fd_.get(), POLLIN, deadline);
+    if (ready == 0) return std::size_t{0};
+    hung_up = (ready & (POLLHUP | POLLERR | POLLNVAL)) != 0;
   }
 }
 
-Result<void> SerialPort::write(std::span<const std::uint8_t> bytes, DeviceTime deadline) {
+Result<void> SerialPort::write(std::span<const std::uint8_t> bytes, Deadline deadline) {
   while (!bytes.empty()) {
     const ssize_t put = ::write(fd_.get(), bytes.data(), bytes.size());
     if (put > 0) {
@@ -179,8 +177,7 @@ Result<void> SerialPort::write(std::span<const std::uint8_t> bytes, DeviceTime d
       continue;
     }
     if (put < 0 && errno != EAGAIN && errno != EINTR) return gone();
-    pollfd entry{fd_.get(), POLLOUT, 0};
-    if (::poll(&entry, 1, poll_ms(deadline)) == 0 && now() >= deadline) {
+    if (wait_ready(fd_.get(), POLLOUT, deadline) == 0) {
       return Error{Errc::timeout, fmt::format("{}: does not take commands", name_)};
     }
   }

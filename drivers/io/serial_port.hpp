@@ -23,8 +23,8 @@ class SerialPort final : public ByteStream {
   static Result<std::unique_ptr<SerialPort>> open(const std::filesystem::path& device, int baud,
                                                   int usb_latency_ms = 1);
 
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) override;
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime deadline) override;
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) override;
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline deadline) override;
   void discard_input() override;
   bool set_rts(bool asserted) override;
   [[nodiscard]] const std::string& name() const override { return name_; }

@@ -4,19 +4,16 @@
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
-#include <future>
-#include <thread>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/thread.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::drivers {
 
@@ -37,26 +34,18 @@ Addresses look_up(const std::string& host, std::uint16_t port, int flags) {
   return Addresses(failed == 0 ? found : nullptr);
 }
 
-/// Looking a name up has no deadline of its own and cannot be cut short: it goes on in a thread that owns all it uses,
-/// and what it finds too late is thrown away. Addresses need no looking up and no thread.
-Addresses resolve(const std::string& host, std::uint16_t port, DeviceTime deadline) {
+/// Looking a name up has no deadline of its own and cannot be cut short. Addresses need no looking up and no thread.
+Addresses resolve(const std::string& host, std::uint16_t port, Deadline deadline) {
   if (Addresses numeric = look_up(host, port, AI_NUMERICHOST)) return numeric;
-  std::promise<Addresses> promise;
-  std::future<Addresses> future = promise.get_future();
-  std::thread([host, port, p = std::move(promise)]() mutable { p.set_value(look_up(host, port, 0)); }).detach();
-  const auto left = std::chrono::nanoseconds((deadline - now()).ns);
-  return future.wait_for(left) == std::future_status::ready ? future.get() : nullptr;
+  return given_by<Addresses>(deadline, [host, port] { return look_up(host, port, 0); }).value_or(nullptr);
 }
 
 /// 0, or why not.
-int connect_by(int fd, const sockaddr* address, socklen_t bytes, DeviceTime deadline) {
+int connect_by(int fd, const sockaddr* address, socklen_t bytes, Deadline deadline) {
   if (::connect(fd, address, bytes) == 0) return 0;
   if (errno == EAGAIN) return ETIMEDOUT;  // a Unix socket whose queue is full
   if (errno != EINPROGRESS) return errno;
-  pollfd entry{fd, POLLOUT, 0};
-  while (::poll(&entry, 1, poll_ms(deadline)) <= 0) {
-    if (now() >= deadline) return ETIMEDOUT;
-  }
+  if (wait_ready(fd, POLLOUT, deadline) == 0) return ETIMEDOUT;
   int failed = 0;
   socklen_t size = sizeof failed;
   ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &failed, &size);
@@ -105,7 +94,7 @@ void watch_peer(int fd) {
 }  // namespace
 
 Result<std::unique_ptr<SocketLine>> SocketLine::connect_tcp(const std::string& host, std::uint16_t port,
-                                                            DeviceTime deadline) {
+                                                            Deadline deadline) {
   const std::string name =
       fmt::format("tcp:{}:{}", host.find(':') == std::string::npos ? host : "[" + host + "]", port);
   const Addresses addresses = resolve(host, port, deadline);
@@ -124,7 +113,7 @@ Result<std::unique_ptr<SocketLine>> SocketLine::connect_tcp(const std::string& h
   return connect_error(name, failed);
 }
 
-Result<std::unique_ptr<SocketLine>> SocketLine::connect_unix(const std::filesystem::path& path, DeviceTime deadline) {
+Result<std::unique_ptr<SocketLine>> SocketLine::connect_unix(const std::filesystem::path& path, Deadline deadline) {
   const std::string name = "unix:" + path.string();
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -148,19 +137,18 @@ Error SocketLine::gone(int failed) const {
           failed};
 }
 
-Result<std::size_t> SocketLine::read(std::span<std::uint8_t> into, DeviceTime deadline) {
+Result<std::size_t> SocketLine::read(std::span<std::uint8_t> into, Deadline deadline) {
   if (into.empty()) return std::size_t{0};
   for (;;) {
     const ssize_t got = ::recv(fd_.get(), into.data(), into.size(), 0);
     if (got > 0) return static_cast<std::size_t>(got);
     if (got == 0) return gone(0);
     if (errno != EAGAIN && errno != EINTR) return gone(errno);
-    pollfd entry{fd_.get(), POLLIN, 0};
-    if (::poll(&entry, 1, poll_ms(deadline)) <= 0 && now() >= deadline) return std::size_t{0};
+    if (wait_ready(fd_.get(), POLLIN, deadline) == 0) return std::size_t{0};
   }
 }
 
-Result<void> SocketLine::write(std::span<const std::uint8_t> bytes, DeviceTime deadline) {
+Result<void> SocketLine::write(std::span<const std::uint8_t> bytes, Deadline deadline) {
   while (!bytes.empty()) {
     const ssize_t put = ::send(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (put > 0) {
@@ -168,8 +156,7 @@ Result<void> SocketLine::write(std::span<const std::uint8_t> bytes, DeviceTime d
       continue;
     }
     if (put < 0 && errno != EAGAIN && errno != EINTR) return gone(errno);
-    pollfd entry{fd_.get(), POLLOUT, 0};
-    if (::poll(&entry, 1, poll_ms(deadline)) <= 0 && now() >= deadline) {
+    if (wait_ready(fd_.get(), POLLOUT, deadline) == 0) {
       return Error{Errc::timeout, fmt::format("{}: does not take commands", name_)};
     }
   }

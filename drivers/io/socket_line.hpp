@@ -15,12 +15,12 @@ class SocketLine final : public ByteStream {
  public:
   /// host: a name or an address. A peer that dies without a word is seen to be gone within kDeadPeer.
   static Result<std::unique_ptr<SocketLine>> connect_tcp(const std::string& host, std::uint16_t port,
-                                                         DeviceTime deadline);
-  static Result<std::unique_ptr<SocketLine>> connect_unix(const std::filesystem::path& path, DeviceTime deadline);
+                                                         Deadline deadline);
+  static Result<std::unique_ptr<SocketLine>> connect_unix(const std::filesystem::path& path, Deadline deadline);
   static constexpr Duration kDeadPeer = Duration::from_ms(5000);
 
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) override;
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime deadline) override;
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) override;
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline deadline) override;
   void discard_input() override;
   bool set_rts(bool /*asserted*/) override { return false; }
   [[nodiscard]] const std::string& name() const override { return name_; }

@@ -9,6 +9,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -39,13 +40,13 @@ class UsbPort {
 
   [[nodiscard]] virtual const UsbIdentity& identity() const = 0;
   /// The data stage's bytes, which are none or as many as setup asks for. Errc::unsupported: the device stalls it.
-  virtual Result<std::vector<std::uint8_t>> control(const SetupPacket& setup, DeviceTime deadline) = 0;
+  virtual Result<std::vector<std::uint8_t>> control(const SetupPacket& setup, Deadline deadline) = 0;
   /// Sends bytes; returns how many the device has taken by the deadline, perhaps none.
-  virtual Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, DeviceTime deadline) = 0;
+  virtual Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, Deadline deadline) = 0;
   /// Keeps that many IN transfers of one packet each going from now on.
   virtual Result<void> start_reading(int transfers) = 0;
   /// The oldest finished IN transfer; none by the deadline or after wake(). Errc::disconnected once it is unplugged.
-  virtual Result<std::optional<UsbInput>> collect(DeviceTime deadline) = 0;
+  virtual Result<std::optional<UsbInput>> collect(Deadline deadline) = 0;
   /// Ends a collect() that waits, or the next one.
   virtual void wake() = 0;
 };

@@ -6,7 +6,8 @@
 #include <array>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::drivers::minibird {
 
@@ -43,23 +44,23 @@ Result<void> Dialogue::pause(Duration span) {
 
 Result<void> Dialogue::send(const Bytes& command, std::uint8_t unit) {
   if (stop_.stop_requested()) return stopped();
-  return line_.write(unit == 0 ? command : to_unit(unit, command), now() + reply_timeout_);
+  return line_.write(unit == 0 ? command : to_unit(unit, command), device_now() + reply_timeout_);
 }
 
 Result<Bytes> Dialogue::listen(std::size_t most, Duration quiet, Duration within) {
   Bytes heard;
-  const DeviceTime end = now() + within;
-  DeviceTime last = now();
+  const DeviceTime end = device_now() + within;
+  DeviceTime last = device_now();
   std::array<std::uint8_t, 256> chunk;
   while (heard.size() < most) {
     if (stop_.stop_requested()) return stopped();
     if (still_) still_();
-    const DeviceTime deadline = std::min({last + quiet, end, now() + kLook});
+    const DeviceTime deadline = std::min({last + quiet, end, device_now() + kLook});
     const auto got = line_.read(std::span(chunk).first(std::min(chunk.size(), most - heard.size())), deadline);
     if (!got) return got.error();
-    if (*got > 0) last = now();
+    if (*got > 0) last = device_now();
     for (std::size_t i = 0; i < *got; ++i) heard.push_back(chunk[i]);
-    if (now() >= end || (*got == 0 && now() >= last + quiet)) break;
+    if (device_now() >= end || (*got == 0 && device_now() >= last + quiet)) break;
   }
   return heard;
 }

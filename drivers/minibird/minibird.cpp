@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "drivers/minibird/configuration.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers::minibird {
 
@@ -43,7 +43,7 @@ MiniBird::MiniBird(std::unique_ptr<ByteStream> line, const MiniBirdSettings& set
 MiniBird::~MiniBird() {
   // Leave the unit quiet for whoever opens the line next.
   const std::array<std::uint8_t, 1> point{kPoint};
-  (void)line_->write(point, now() + Duration::from_ms(50));
+  (void)line_->write(point, device_now() + Duration::from_ms(50));
 }
 
 Result<std::unique_ptr<MiniBird>> MiniBird::start(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings,
@@ -152,7 +152,7 @@ Result<void> MiniBird::reset() {
     if (auto waited = dialogue_.pause(settings_.reset_settle); !waited) return waited;
   }
   // A unit that boots says nothing until it is ready.
-  const DeviceTime deadline = now() + settings_.answer_within;
+  const Deadline deadline = Deadline::after(settings_.answer_within);
   for (bool first = true;; first = false) {
     auto quiet = dialogue_.hush();
     if (quiet) {
@@ -163,7 +163,7 @@ Result<void> MiniBird::reset() {
     } else if (quiet.error().code != Errc::bad_format) {
       return quiet;
     }
-    if (now() < deadline) continue;
+    if (!deadline.passed()) continue;
     if (!quiet) return quiet;
     const auto revision = dialogue_.ask(kRevision);
     return revision ? Result<void>() : revision.error();
@@ -301,14 +301,14 @@ Result<void> MiniBird::stream() {
   return dialogue_.send({kStream});
 }
 
-Result<std::optional<Chunk>> MiniBird::read(DeviceTime deadline) {
+Result<std::optional<Chunk>> MiniBird::read(Deadline deadline) {
   std::array<std::uint8_t, 4096> bytes;
   const auto got = line_->read(bytes, deadline);
   if (!got) return got.error();
   const std::uint64_t errors = line_->line_errors();
   if (*got == 0) return std::optional<Chunk>();
   Chunk chunk;
-  chunk.arrived = now();
+  chunk.arrived = device_now();
   chunk.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*got));
   chunk.after_line_error = std::exchange(line_errors_, errors) != errors;
   chunk.after_restart = std::exchange(restarted_, false);

@@ -57,7 +57,7 @@ class MiniBird {
   [[nodiscard]] const StreamLayout& layout() const { return layout_; }
   /// The bytes that have come, as soon as there are some; none at the deadline. Errc::disconnected when the line is
   /// gone.
-  Result<std::optional<Chunk>> read(DeviceTime deadline);
+  Result<std::optional<Chunk>> read(Deadline deadline);
 
   /// For a stream in trouble (saturated, silent, phase errors): stops it, has the units tell their status and errors,
   /// and begins it again. About half a second. Errc::timeout: nothing answers.

@@ -6,10 +6,11 @@
 #include <optional>
 #include <stop_token>
 #include <string>
-#include <thread>
 #include <utility>
 
-namespace birdseye::host {
+#include "drivers/system/thread.hpp"
+
+namespace birdseye {
 
 /// One piece of work at a time on a thread of its own, so that the window goes on meanwhile. Ends its thread with
 /// itself.
@@ -26,7 +27,7 @@ class Background {
     (void)take();  // what came of the work before is not of this
     running_ = true;
     say("");
-    thread_ = std::jthread([this, work = std::move(work)](const std::stop_token& stop) {
+    thread_ = OwnedThread([this, work = std::move(work)](const std::stop_token& stop) {
       T result = work(stop, [this](const std::string& line) { say(line); });
       const std::lock_guard lock(mutex_);
       result_ = std::move(result);
@@ -55,7 +56,7 @@ class Background {
   mutable std::mutex mutex_;
   std::optional<T> result_;
   std::string line_;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
-}  // namespace birdseye::host
+}  // namespace birdseye

@@ -2,28 +2,23 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <thread>
+
+#include "drivers/system/wait.hpp"
 
 extern char** environ;
 
-namespace birdseye::host {
+namespace birdseye {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-int remaining_ms(Clock::time_point deadline) {
-  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
-  return static_cast<int>(std::clamp<std::int64_t>(left, 0, 60'000));
-}
+constexpr Duration kLook = Duration::from_ms(5);      // how soon its end is seen
+constexpr Duration kGrace = Duration::from_ms(2000);  // to end by itself, once it is asked to
 
 }  // namespace
 
@@ -32,20 +27,20 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   int fds[2] = {-1, -1};
   if (pipe != Pipe::none && ::pipe2(fds, O_CLOEXEC) != 0) return Error{Errc::io, "pipe: no descriptors left", errno};
   const bool child_writes = pipe == Pipe::stdout_from_child;
-  const int ours = pipe == Pipe::none ? -1 : fds[child_writes ? 0 : 1];
-  const int theirs = pipe == Pipe::none ? -1 : fds[child_writes ? 1 : 0];
+  UniqueFd ours(fds[child_writes ? 0 : 1]);
+  const UniqueFd theirs(fds[child_writes ? 1 : 0]);
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   const int log_flags = O_WRONLY | O_CREAT | O_APPEND;
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), log_flags, 0644);
   if (pipe == Pipe::stdin_to_child) {
-    posix_spawn_file_actions_adddup2(&actions, theirs, STDIN_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, theirs.get(), STDIN_FILENO);
   } else {
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   }
   if (child_writes) {
-    posix_spawn_file_actions_adddup2(&actions, theirs, STDOUT_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, theirs.get(), STDOUT_FILENO);
   } else {
     posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), log_flags, 0644);
   }
@@ -62,18 +57,16 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   const int failed = posix_spawnp(&pid, argv[0], &actions, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  if (theirs >= 0) ::close(theirs);
   if (failed != 0) {
-    if (ours >= 0) ::close(ours);
     return Error{Errc::not_found, fmt::format("{}: cannot be started; is it built and installed?", command[0]), failed};
   }
-  if (ours >= 0) ::fcntl(ours, F_SETFL, O_NONBLOCK);
-  return ChildProcess(pid, ours, command[0]);
+  if (ours) ::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
+  return ChildProcess(pid, std::move(ours), command[0]);
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, -1)),
-      fd_(std::exchange(other.fd_, -1)),
+      fd_(std::move(other.fd_)),
       name_(std::move(other.name_)),
       buffer_(std::move(other.buffer_)),
       exit_code_(other.exit_code_) {}
@@ -81,9 +74,8 @@ ChildProcess::ChildProcess(ChildProcess&& other) noexcept
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   if (this != &other) {
     stop();
-    close_fd();
     pid_ = std::exchange(other.pid_, -1);
-    fd_ = std::exchange(other.fd_, -1);
+    fd_ = std::move(other.fd_);
     name_ = std::move(other.name_);
     buffer_ = std::move(other.buffer_);
     exit_code_ = other.exit_code_;
@@ -93,31 +85,22 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
 
 ChildProcess::~ChildProcess() {
   stop();
-  close_fd();
-}
-
-void ChildProcess::close_fd() {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
 }
 
 void ChildProcess::close_input() {
-  close_fd();
+  fd_ = UniqueFd();
 }
 
-Result<std::optional<std::string>> ChildProcess::read_line(Clock::time_point deadline) {
+Result<std::optional<std::string>> ChildProcess::read_line(Deadline deadline) {
   for (;;) {
     if (const auto end = buffer_.find('\n'); end != std::string::npos) {
       std::string line = buffer_.substr(0, end);
       buffer_.erase(0, end + 1);
       return std::optional<std::string>(std::move(line));
     }
-    pollfd entry{fd_, POLLIN, 0};
-    const int ready = ::poll(&entry, 1, remaining_ms(deadline));
-    if (ready == 0 && Clock::now() >= deadline) return std::optional<std::string>();
-    if (ready <= 0) continue;
+    if (!wait_ready(fd_.get(), POLLIN, deadline)) return std::optional<std::string>();
     char chunk[4096];
-    const ssize_t got = ::read(fd_, chunk, sizeof chunk);
+    const ssize_t got = ::read(fd_.get(), chunk, sizeof chunk);
     if (got > 0) {
       buffer_.append(chunk, static_cast<std::size_t>(got));
     } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
@@ -126,14 +109,11 @@ Result<std::optional<std::string>> ChildProcess::read_line(Clock::time_point dea
   }
 }
 
-Result<std::size_t> ChildProcess::read(void* bytes, std::size_t size, Clock::time_point deadline) {
+Result<std::size_t> ChildProcess::read(void* bytes, std::size_t size, Deadline deadline) {
   std::size_t have = 0;
   while (have < size) {
-    pollfd entry{fd_, POLLIN, 0};
-    const int ready = ::poll(&entry, 1, remaining_ms(deadline));
-    if (ready == 0 && Clock::now() >= deadline) return Error{Errc::timeout, fmt::format("{}: gives nothing", name_)};
-    if (ready <= 0) continue;
-    const ssize_t got = ::read(fd_, static_cast<char*>(bytes) + have, size - have);
+    if (!wait_ready(fd_.get(), POLLIN, deadline)) return Error{Errc::timeout, fmt::format("{}: gives nothing", name_)};
+    const ssize_t got = ::read(fd_.get(), static_cast<char*>(bytes) + have, size - have);
     if (got > 0) {
       have += static_cast<std::size_t>(got);
     } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
@@ -143,14 +123,13 @@ Result<std::size_t> ChildProcess::read(void* bytes, std::size_t size, Clock::tim
   return have;
 }
 
-Result<void> ChildProcess::write(const void* bytes, std::size_t size, Clock::time_point deadline) {
+Result<void> ChildProcess::write(const void* bytes, std::size_t size, Deadline deadline) {
   const char* data = static_cast<const char*>(bytes);
   while (size > 0) {
-    pollfd entry{fd_, POLLOUT, 0};
-    if (::poll(&entry, 1, remaining_ms(deadline)) == 0 && Clock::now() >= deadline) {
+    if (!wait_ready(fd_.get(), POLLOUT, deadline)) {
       return Error{Errc::timeout, fmt::format("{}: does not take its input", name_)};
     }
-    const ssize_t put = ::write(fd_, data, size);
+    const ssize_t put = ::write(fd_.get(), data, size);
     if (put > 0) {
       data += put;
       size -= static_cast<std::size_t>(put);
@@ -161,7 +140,7 @@ Result<void> ChildProcess::write(const void* bytes, std::size_t size, Clock::tim
   return {};
 }
 
-std::optional<int> ChildProcess::wait(Clock::time_point deadline) {
+std::optional<int> ChildProcess::wait(Deadline deadline) {
   while (pid_ > 0) {
     int status = 0;
     if (::waitpid(pid_, &status, WNOHANG) == pid_) {
@@ -169,8 +148,8 @@ std::optional<int> ChildProcess::wait(Clock::time_point deadline) {
       pid_ = -1;
       break;
     }
-    if (Clock::now() >= deadline) return std::nullopt;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (deadline.passed()) return std::nullopt;
+    sleep_for(kLook);
   }
   return exit_code_;
 }
@@ -178,9 +157,9 @@ std::optional<int> ChildProcess::wait(Clock::time_point deadline) {
 void ChildProcess::stop() {
   if (pid_ <= 0) return;
   ::kill(pid_, SIGTERM);
-  if (wait(Clock::now() + std::chrono::seconds(2))) return;
+  if (wait(Deadline::after(kGrace))) return;
   ::kill(pid_, SIGKILL);
-  wait(Clock::now() + std::chrono::seconds(2));
+  wait(Deadline::after(kGrace));
 }
 
-}  // namespace birdseye::host
+}  // namespace birdseye

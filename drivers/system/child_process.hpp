@@ -2,15 +2,17 @@
 
 #include <sys/types.h>
 
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/unique_fd.hpp"
 
-namespace birdseye::host {
+namespace birdseye {
 
 /// A program we started and own: it is asked to end (SIGTERM), then made to (SIGKILL), when this goes out of scope.
 class ChildProcess {
@@ -27,27 +29,26 @@ class ChildProcess {
   ~ChildProcess();
 
   /// The next whole line of the child's standard output; empty at the deadline; Errc::disconnected at its end.
-  Result<std::optional<std::string>> read_line(std::chrono::steady_clock::time_point deadline);
+  Result<std::optional<std::string>> read_line(Deadline deadline);
   /// So many bytes of the child's standard output, or fewer at its end. Errc::timeout at the deadline.
-  Result<std::size_t> read(void* bytes, std::size_t size, std::chrono::steady_clock::time_point deadline);
+  Result<std::size_t> read(void* bytes, std::size_t size, Deadline deadline);
   /// All of bytes to the child's standard input, or why not.
-  Result<void> write(const void* bytes, std::size_t size, std::chrono::steady_clock::time_point deadline);
+  Result<void> write(const void* bytes, std::size_t size, Deadline deadline);
   void close_input();
 
   /// The exit code (128 + signal if it was killed); empty if it still runs at the deadline.
-  std::optional<int> wait(std::chrono::steady_clock::time_point deadline);
+  std::optional<int> wait(Deadline deadline);
   void stop();
   [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:
-  ChildProcess(pid_t pid, int fd, std::string name) : pid_(pid), fd_(fd), name_(std::move(name)) {}
-  void close_fd();
+  ChildProcess(pid_t pid, UniqueFd fd, std::string name) : pid_(pid), fd_(std::move(fd)), name_(std::move(name)) {}
 
   pid_t pid_ = -1;
-  int fd_ = -1;
+  UniqueFd fd_;
   std::string name_;
   std::string buffer_;
   std::optional<int> exit_code_;
 };
 
-}  // namespace birdseye::host
+}  // namespace birdseye

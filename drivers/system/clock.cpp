@@ -1,42 +1,45 @@
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
-#include <algorithm>
+#include <fmt/chrono.h>
+
 #include <ctime>
 
-namespace birdseye::drivers {
+namespace birdseye {
 
-DeviceTime now() {
+namespace {
+
+std::int64_t read_ns(clockid_t clock) {
   timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return {time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec};
+  clock_gettime(clock, &time);
+  return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
 }
 
-int poll_ms(DeviceTime deadline) {
-  const std::int64_t left_ns = (deadline - now()).ns;
-  return static_cast<int>(std::clamp<std::int64_t>((left_ns + 999'999) / 1'000'000, 0, 60'000));
+}  // namespace
+
+DeviceTime device_now() {
+  return {read_ns(CLOCK_MONOTONIC)};
 }
 
-void sleep_until(DeviceTime time) {
-  timespec until{};
-  until.tv_sec = time.ns / 1'000'000'000;
-  until.tv_nsec = time.ns % 1'000'000'000;
-  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+HostTime host_now() {
+  return {read_ns(CLOCK_MONOTONIC)};
 }
 
-void sleep_for(Duration span) {
-  timespec time{};
-  time.tv_sec = span.ns / 1'000'000'000;
-  time.tv_nsec = span.ns % 1'000'000'000;
-  nanosleep(&time, nullptr);
+Duration wall_minus_monotonic() {
+  const std::int64_t wall_ns = read_ns(CLOCK_REALTIME);
+  return {wall_ns - read_ns(CLOCK_MONOTONIC)};
 }
 
-bool sleep_for(Duration span, const std::stop_token& stop) {
-  const DeviceTime until = now() + span;
-  while (now() < until) {
-    if (stop.stop_requested()) return false;
-    sleep_for(std::min(until - now(), Duration::from_ms(20)));
-  }
-  return true;
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time_t{read_ns(CLOCK_REALTIME) / 1'000'000'000}));
 }
 
-}  // namespace birdseye::drivers
+Deadline Deadline::after(Duration span) {
+  return device_now() + span;
+}
+
+Duration Deadline::left() const {
+  const std::int64_t now_ns = read_ns(CLOCK_MONOTONIC);
+  return {ns_ > now_ns ? ns_ - now_ns : 0};
+}
+
+}  // namespace birdseye

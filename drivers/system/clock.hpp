@@ -1,18 +1,45 @@
 #pragma once
 
-#include <stop_token>
+#include <chrono>
+#include <compare>
+#include <cstdint>
+#include <string>
 
 #include "calibration/time/clock.hpp"
 
-namespace birdseye::drivers {
+namespace birdseye {
 
-/// CLOCK_MONOTONIC of this machine.
-DeviceTime now();
-/// Milliseconds until deadline for poll(): at least 0, rounded up.
-int poll_ms(DeviceTime deadline);
-void sleep_for(Duration span);
-/// Or until stop is requested, as it looks for every few ms; false then.
-bool sleep_for(Duration span, const std::stop_token& stop);
-void sleep_until(DeviceTime time);
+// Clocks are read here and nowhere else. A machine has one CLOCK_MONOTONIC; who reads it says which machine it is.
 
-}  // namespace birdseye::drivers
+/// CLOCK_MONOTONIC of this machine, the appliance: for drivers, the appliance's daemon and simulated instruments.
+DeviceTime device_now();
+/// CLOCK_MONOTONIC of this machine, the host.
+HostTime host_now();
+/// By how much the time of day is ahead of CLOCK_MONOTONIC.
+Duration wall_minus_monotonic();
+/// The time of day, UTC, as "2026-11-22T22:51:36Z".
+std::string utc_now();
+
+/// The moment at which a wait ends, on this machine's clock. Every wait takes this one type, for the same waits serve
+/// appliance and host: the former gives a DeviceTime, the latter a HostTime. Neither comes out again, so a time of one
+/// machine never becomes a time of the other by way of a deadline; and no number or Duration is taken for one.
+class Deadline {
+ public:
+  Deadline(DeviceTime time) : ns_(time.ns) {}
+  Deadline(HostTime time) : ns_(time.ns) {}
+  // For callers that still ask the standard library for the time.
+  Deadline(std::chrono::steady_clock::time_point time)
+      : ns_(std::chrono::nanoseconds(time.time_since_epoch()).count()) {}
+  static Deadline after(Duration span);
+
+  [[nodiscard]] bool passed() const { return left().ns == 0; }
+  /// Until then; 0 once it has passed.
+  [[nodiscard]] Duration left() const;
+  auto operator<=>(const Deadline&) const = default;
+
+ private:
+  friend void sleep_until(Deadline deadline);
+  std::int64_t ns_;
+};
+
+}  // namespace birdseye

@@ -2,22 +2,21 @@
 
 #include <signal.h>
 
-#include <atomic>
-
-namespace birdseye::host {
+namespace birdseye {
 
 namespace {
 std::atomic<bool> g_interrupted = false;
 }
 
-void note_interrupts() {
+const std::atomic<bool>& note_interrupts() {
   for (const int ending : {SIGINT, SIGTERM}) {
     ::signal(ending, [](int) { g_interrupted = true; });
   }
+  return g_interrupted;
 }
 
 bool interrupted() {
   return g_interrupted;
 }
 
-}  // namespace birdseye::host
+}  // namespace birdseye

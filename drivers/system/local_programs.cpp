@@ -3,11 +3,12 @@
 #include <netinet/in.h>
 #include <stdlib.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <cerrno>
 
-namespace birdseye::host {
+#include "drivers/system/unique_fd.hpp"
+
+namespace birdseye {
 
 std::string beside_us(const std::string& name) {
   std::error_code error;
@@ -17,14 +18,13 @@ std::string beside_us(const std::string& name) {
 }
 
 Result<int> free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   socklen_t size = sizeof address;
-  const bool bound = fd >= 0 && ::bind(fd, reinterpret_cast<sockaddr*>(&address), size) == 0 &&
-                     ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  if (fd >= 0) ::close(fd);
+  const bool bound = fd && ::bind(fd.get(), reinterpret_cast<sockaddr*>(&address), size) == 0 &&
+                     ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) == 0;
   if (!bound) return Error{Errc::in_use, "127.0.0.1: no TCP port is free", errno};
   return static_cast<int>(ntohs(address.sin_port));
 }
@@ -40,4 +40,4 @@ RendezvousFolder::~RendezvousFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-}  // namespace birdseye::host
+}  // namespace birdseye

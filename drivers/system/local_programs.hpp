@@ -6,7 +6,7 @@
 
 #include "calibration/base/result.hpp"
 
-namespace birdseye::host {
+namespace birdseye {
 
 /// A program that is installed, or built, beside this one.
 std::string beside_us(const std::string& name);
@@ -28,4 +28,4 @@ class RendezvousFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace birdseye::host
+}  // namespace birdseye

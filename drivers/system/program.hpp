@@ -1,49 +1,13 @@
 #pragma once
 
-#include <signal.h>
-
-#include <CLI/CLI.hpp>
-#include <cstdio>
-#include <exception>
-#include <new>
 #include <string>
 
 namespace birdseye {
 
-/// Prints "program: what" as the one line on standard error that an error is, whatever names it holds.
-inline void print_error(const std::string& program, std::string what) {
-  for (char& c : what) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  std::fprintf(stderr, "%s: %s\n", program.c_str(), what.c_str());
-}
+/// What a program of ours tells whoever started it.
+enum class ExitCode : int { success = 0, unusable_input = 2, verdict_fail = 3 };
 
-/// What every program's main() ends in: parses, runs the callbacks, then `finish`, whose value is the exit code. Wrong
-/// usage, and whatever a library throws, becomes one line on standard error, "name: what", and exit code 2.
-template <typename Finish>
-int run_program(CLI::App& app, int argc, char** argv, const Finish& finish) {
-  constexpr int kUnusable = 2;
-  // Whoever reads our pipes may go first. Writing then fails with an error, which is said; it does not end us unheard.
-  ::signal(SIGPIPE, SIG_IGN);
-  const std::string name = app.get_name();
-  app.failure_message([name](const CLI::App*, const CLI::Error& error) {
-    return name + ": " + error.what() + "; --help says what there is\n";
-  });
-  try {
-    app.parse(argc, argv);
-    const int code = finish();
-    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
-    print_error(name, "standard output: cannot be written; is the disk full?");
-    return kUnusable;
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUnusable;
-  } catch (const std::bad_alloc&) {
-    print_error(name, "there is not enough memory for this; close other programs, or give it less");
-    return kUnusable;
-  } catch (const std::exception& error) {
-    print_error(name, error.what());
-    return kUnusable;
-  }
-}
+/// Prints "program: what" as the one line on standard error that an error is, whatever names it holds.
+void print_error(const std::string& program, std::string what);
 
 }  // namespace birdseye

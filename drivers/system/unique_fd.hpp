@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace birdseye::drivers {
+namespace birdseye {
 
 /// A file descriptor with one owner.
 class UniqueFd {
@@ -13,7 +13,7 @@ class UniqueFd {
   explicit UniqueFd(int fd) : fd_(fd) {}
   UniqueFd(UniqueFd&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   UniqueFd& operator=(UniqueFd&& other) noexcept {
-    std::swap(fd_, other.fd_);
+    const UniqueFd old(std::exchange(fd_, std::exchange(other.fd_, -1)));
     return *this;
   }
   ~UniqueFd() {
@@ -27,4 +27,4 @@ class UniqueFd {
   int fd_ = -1;
 };
 
-}  // namespace birdseye::drivers
+}  // namespace birdseye

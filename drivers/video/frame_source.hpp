@@ -9,6 +9,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::drivers {
 
@@ -58,7 +59,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   /// The next frame; empty at the deadline; Errc::disconnected when the camera is gone: open it again.
-  virtual Result<std::optional<Frame>> next(DeviceTime deadline) = 0;
+  virtual Result<std::optional<Frame>> next(Deadline deadline) = 0;
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// One line: device, driver, format, size, rate, stamps.
   [[nodiscard]] virtual std::string describe() const = 0;

@@ -1,14 +1,14 @@
 #include "drivers/video/socket_camera.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
 #include <cerrno>
 #include <cstring>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "drivers/video/jpeg_decoder.hpp"
 
 namespace birdseye::drivers {
@@ -56,12 +56,9 @@ std::string SocketCamera::describe() const {
                      layout_.height_px);
 }
 
-Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& have, DeviceTime deadline) {
+Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& have, Deadline deadline) {
   while (have < buffer.size()) {
-    pollfd entry{fd_.get(), POLLIN, 0};
-    const int ready = ::poll(&entry, 1, poll_ms(deadline));
-    if (ready == 0 && now() >= deadline) return false;
-    if (ready <= 0) continue;
+    if (wait_ready(fd_.get(), POLLIN, deadline) == 0) return false;
     const ssize_t got = ::recv(fd_.get(), buffer.data() + have, buffer.size() - have, MSG_DONTWAIT);
     if (got > 0) {
       have += static_cast<std::size_t>(got);
@@ -72,7 +69,7 @@ Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& 
   return true;
 }
 
-Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
+Result<std::optional<Frame>> SocketCamera::next(Deadline deadline) {
   for (;;) {
     if (!payload_) {
       header_.resize(kHeaderBytes);
@@ -85,7 +82,7 @@ Result<std::optional<Frame>> SocketCamera::next(DeviceTime deadline) {
     if (!whole) return whole.error();
     if (!*whole) return std::optional<Frame>();
     if (auto frame = finish()) return frame;
-    if (now() >= deadline) return std::optional<Frame>();
+    if (deadline.passed()) return std::optional<Frame>();
   }
 }
 
@@ -120,7 +117,7 @@ Result<void> SocketCamera::read_header() {
 /// Of header and payload as they lie there; empty when the pixels are damaged.
 std::optional<Frame> SocketCamera::finish() {
   Frame frame;
-  frame.arrived = now();
+  frame.arrived = device_now();
   frame.width_px = layout_.width_px;
   frame.height_px = layout_.height_px;
   frame.sequence = get<std::uint64_t>(header_, 24);

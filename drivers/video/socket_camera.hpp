@@ -15,7 +15,7 @@ namespace birdseye::drivers {
 class SocketCamera final : public FrameSource {
  public:
   static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path);
-  Result<std::optional<Frame>> next(DeviceTime deadline) override;
+  Result<std::optional<Frame>> next(Deadline deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string describe() const override;
   [[nodiscard]] std::map<std::string, std::string> identity() const override { return {{"model", "a program"}}; }
@@ -23,7 +23,7 @@ class SocketCamera final : public FrameSource {
 
  private:
   SocketCamera(UniqueFd fd, std::string name) : fd_(std::move(fd)), name_(std::move(name)) {}
-  Result<bool> fill(std::vector<std::uint8_t>& buffer, std::size_t& have, DeviceTime deadline);
+  Result<bool> fill(std::vector<std::uint8_t>& buffer, std::size_t& have, Deadline deadline);
   Result<void> read_header();
   std::optional<Frame> finish();
   std::shared_ptr<const PixelPool::Pixels> to_pixels();

@@ -2,13 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/mman.h>
 
 #include <algorithm>
 #include <cerrno>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "drivers/video/jpeg_decoder.hpp"
 
 namespace birdseye::drivers {
@@ -180,17 +180,15 @@ ControlReport V4l2Camera::unlock_controls() {
   return report;
 }
 
-Result<std::optional<Frame>> V4l2Camera::next(DeviceTime deadline) {
+Result<std::optional<Frame>> V4l2Camera::next(Deadline deadline) {
   for (;;) {
-    pollfd entry{device_.fd(), POLLIN, 0};
-    const int ready = ::poll(&entry, 1, poll_ms(deadline));
-    if (ready > 0) {
+    if (const short ready = wait_ready(device_.fd(), POLLIN, deadline); ready != 0) {
       auto frame = take();
       if (!frame || *frame) return frame;
       // A driver in trouble says at once, and again and again, that there is something.
-      if ((entry.revents & POLLERR) != 0) sleep_for(std::min(kBreath, std::max(deadline - now(), Duration{})));
+      if ((ready & POLLERR) != 0) sleep_for(std::min(kBreath, deadline.left()));
     }
-    if (now() >= deadline) return std::optional<Frame>();
+    if (deadline.passed()) return std::optional<Frame>();
   }
 }
 
@@ -205,7 +203,7 @@ Result<std::optional<Frame>> V4l2Camera::take() {
     return std::optional<Frame>();
   }
   Frame frame;
-  frame.arrived = now();
+  frame.arrived = device_now();
   frame.width_px = layout_.width_px;
   frame.height_px = layout_.height_px;
   const auto step = sequence_.push(buffer.sequence);

@@ -19,7 +19,7 @@ class V4l2Camera final : public FrameSource {
   static Result<std::unique_ptr<FrameSource>> open(const std::filesystem::path& path, const CameraSettings& settings);
   ~V4l2Camera() override;
 
-  Result<std::optional<Frame>> next(DeviceTime deadline) override;
+  Result<std::optional<Frame>> next(Deadline deadline) override;
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] std::string describe() const override;
   [[nodiscard]] std::map<std::string, std::string> identity() const override;

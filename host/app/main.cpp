@@ -1,4 +1,4 @@
-#include "drivers/system/program.hpp"
+#include "drivers/system/command_line.hpp"
 #include "host/app/commands.hpp"
 
 int main(int argc, char** argv) {

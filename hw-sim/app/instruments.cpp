@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "hw-sim/app/stop_signal.hpp"
+#include "drivers/system/interrupt.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/ftdi/ft232r_program.hpp"
 #include "hw-sim/minibird/program.hpp"
@@ -49,7 +49,7 @@ Result<void> finish(MiniBirdOptions& options) {
 
 Result<void> run(MiniBirdOptions& options) {
   if (auto finished = finish(options); !finished) return finished;
-  return run_minibird(options.program, stop_on_signal());
+  return run_minibird(options.program, note_interrupts());
 }
 
 /// The tracker behind a USB adapter.
@@ -62,7 +62,7 @@ Result<void> run(Ft232rOptions& options) {
   if (auto finished = finish(options.behind); !finished) return finished;
   options.program.tracker = options.behind.program.tracker;
   options.program.motion = options.behind.program.motion;
-  return run_ft232r(options.program, stop_on_signal());
+  return run_ft232r(options.program, note_interrupts());
 }
 
 struct CameraOptions {
@@ -87,7 +87,7 @@ Result<void> run(CameraOptions& options) {
     if (!script) return script.error();
     program.timing.faults = std::move(script->camera);
   }
-  return run_camera(program, stop_on_signal());
+  return run_camera(program, note_interrupts());
 }
 
 }  // namespace

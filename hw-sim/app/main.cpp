@@ -1,9 +1,9 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "drivers/system/program.hpp"
+#include "drivers/system/command_line.hpp"
+#include "drivers/system/interrupt.hpp"
 #include "hw-sim/app/instruments.hpp"
-#include "hw-sim/app/stop_signal.hpp"
 #include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
       take(parsed);
       return;
     }
-    take(hw_sim::run_cart(cart, hw_sim::stop_on_signal()));
+    take(hw_sim::run_cart(cart, note_interrupts()));
   });
 
   hw_sim::add_minibird_command(app, take);

@@ -24,7 +24,7 @@ bool bound(int fd, const Address& address) {
 
 }  // namespace
 
-Result<drivers::UniqueFd> listen_at_path(const std::filesystem::path& path) {
+Result<UniqueFd> listen_at_path(const std::filesystem::path& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const std::string name = path.string();
@@ -34,21 +34,21 @@ Result<drivers::UniqueFd> listen_at_path(const std::filesystem::path& path) {
   std::memcpy(address.sun_path, name.c_str(), name.size() + 1);
   std::error_code error;
   if (std::filesystem::is_socket(path, error)) ::unlink(name.c_str());
-  drivers::UniqueFd fd(::socket(AF_UNIX, kKind, 0));
+  UniqueFd fd(::socket(AF_UNIX, kKind, 0));
   if (!bound(fd.get(), address)) {
     return Error{Errc::unreadable, fmt::format("{}: cannot be listened at; does its folder exist?", name), errno};
   }
   return fd;
 }
 
-Result<drivers::UniqueFd> listen_at_port(const std::string& host, int& port) {
+Result<UniqueFd> listen_at_port(const std::string& host, int& port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   if (::inet_pton(AF_INET, host == "localhost" ? "127.0.0.1" : host.c_str(), &address.sin_addr) != 1) {
     return Error{Errc::bad_value, fmt::format("{}: is no IPv4 address of this machine; give one, as 127.0.0.1", host)};
   }
-  drivers::UniqueFd fd(::socket(AF_INET, kKind, 0));
+  UniqueFd fd(::socket(AF_INET, kKind, 0));
   const int yes = 1;
   ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (!bound(fd.get(), address)) {

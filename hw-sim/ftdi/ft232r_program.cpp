@@ -1,7 +1,6 @@
 #include "hw-sim/ftdi/ft232r_program.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -9,8 +8,9 @@
 #include <array>
 #include <cerrno>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/ftdi/usb_redir.hpp"
 #include "hw-sim/minibird/motion.hpp"
@@ -19,13 +19,10 @@ namespace birdseye::hw_sim {
 
 namespace {
 
-using drivers::now;
-using drivers::UniqueFd;
-
 constexpr Duration kLongestWait = Duration::from_ms(50);
 
 void tell(nlohmann::json event) {
-  event["monotonic_ns"] = now().ns;
+  event["monotonic_ns"] = device_now().ns;
   announce(event);
 }
 
@@ -85,7 +82,7 @@ class Bench {
       auto fd = connect(program_.socket);
       if (!fd) return fd.error();
       if (!*fd) {
-        wait(-1, now() + kLongestWait);
+        wait(-1, device_now() + kLongestWait);
         continue;
       }
       UsbRedir usb(chip_);
@@ -101,7 +98,7 @@ class Bench {
   void serve(int fd, const std::atomic<bool>& stop) {
     bool told = false;
     while (!stop) {
-      const DeviceTime time = now();
+      const DeviceTime time = device_now();
       move_bytes(time);
       usb_->pump(time);
       if (!send_all(fd, usb_->output())) return;
@@ -114,9 +111,9 @@ class Bench {
       const ssize_t got = ::recv(fd, chunk.data(), chunk.size(), MSG_DONTWAIT);
       if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return;
       if (got < 0) continue;
-      if (auto taken = usb_->receive(std::span(chunk.data(), static_cast<std::size_t>(got)), now()); !taken) {
+      if (auto taken = usb_->receive(std::span(chunk.data(), static_cast<std::size_t>(got)), device_now()); !taken) {
         tell({{"event", "refused"}, {"reason", taken.error().what}});
-        wait(-1, now() + Duration::from_ms(1000));
+        wait(-1, device_now() + Duration::from_ms(1000));
         return;
       }
       watch_lines();
@@ -146,18 +143,16 @@ class Bench {
   /// RTS is wired to the tracker's reset.
   void watch_lines() {
     if (chip_.rts() == rts_ && chip_.dtr() == dtr_) return;
-    if (chip_.rts() != rts_) tracker_.set_reset(chip_.rts(), now().ns);
+    if (chip_.rts() != rts_) tracker_.set_reset(chip_.rts(), device_now().ns);
     rts_ = chip_.rts();
     dtr_ = chip_.dtr();
     tell({{"event", "lines"}, {"rts", rts_}, {"dtr", dtr_}});
   }
 
   /// Until there is something to read from fd; commands that come meanwhile are carried out.
-  bool wait(int fd, DeviceTime until) {
+  bool wait(int fd, Deadline until) {
     std::array<pollfd, 2> entries{{{fd, POLLIN, 0}, {commands_.fd(), POLLIN, 0}}};
-    const std::int64_t left_ns = std::max<std::int64_t>(0, (until - now()).ns);
-    const timespec span{left_ns / 1'000'000'000, left_ns % 1'000'000'000};
-    if (::ppoll(entries.data(), entries.size(), &span, nullptr) <= 0) return false;
+    if (!wait_ready(entries, until)) return false;
     if (entries[1].revents != 0) {
       for (const std::string& command : commands_.read()) carry_out(command);
     }
@@ -190,7 +185,7 @@ class Bench {
     if (pulled_by_hand_ || pulled_by_script_) {
       usb_->unplug();
     } else {
-      usb_->plug(now());
+      usb_->plug(device_now());
       watch_lines();
     }
   }
@@ -203,7 +198,7 @@ class Bench {
   static TrackerScript tracker_of(const Ft232rProgram& program) {
     TrackerSettings settings = program.tracker;
     settings.baud = 1'000'000'000;  // its bytes take their time in the chip
-    const std::int64_t now_ns = now().ns;
+    const std::int64_t now_ns = device_now().ns;
     return {settings, motion_named(program.motion, now_ns), now_ns};
   }
 

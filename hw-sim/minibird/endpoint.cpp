@@ -13,17 +13,14 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/base/listener.hpp"
-#include "hw-sim/base/wait_for_fd.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
-
-using drivers::UniqueFd;
 
 class Terminal final : public Endpoint {
  public:
@@ -37,7 +34,7 @@ class Terminal final : public Endpoint {
   }
   [[nodiscard]] bool connected() const override { return terminal_.has_value(); }
   void wait(std::int64_t until_ns) override {
-    wait_for_fd(terminal_ ? terminal_->fd() : -1, POLLIN, drivers::now().ns, until_ns);
+    wait_ready(terminal_ ? terminal_->fd() : -1, POLLIN, DeviceTime{until_ns});
   }
   void unplug() override { terminal_.reset(); }
   Result<void> replug() override {
@@ -88,7 +85,7 @@ class Socket final : public Endpoint {
   }
   [[nodiscard]] bool connected() const override { return static_cast<bool>(host_); }
   void wait(std::int64_t until_ns) override {
-    wait_for_fd(host_ ? host_.get() : listener_.get(), POLLIN, drivers::now().ns, until_ns);
+    wait_ready(host_ ? host_.get() : listener_.get(), POLLIN, DeviceTime{until_ns});
   }
   void unplug() override {
     host_ = UniqueFd();

@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/minibird/motion.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
@@ -47,7 +48,7 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   auto endpoint = open_endpoint(program);
   if (!endpoint) return std::move(endpoint).error();
   const std::string name = (*endpoint)->name();
-  const std::int64_t zero_ns = drivers::now().ns;
+  const std::int64_t zero_ns = device_now().ns;
   const auto write_truth = [&program, zero_ns](double rate_hz) -> Result<void> {
     return program.truth.empty() ? Result<void>() : replace_json(program.truth, truth_of(program, zero_ns, rate_hz));
   };
@@ -63,8 +64,8 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   const TrackerLoop loop(*std::move(endpoint), TrackerScript(program.tracker, motion, zero_ns), listeners);
   announce({{"event", "ready"}, {"tracker", name}});
   const std::int64_t end_ns = zero_ns + static_cast<std::int64_t>(program.seconds * 1e9);
-  while (!stop && (program.seconds <= 0 || drivers::now().ns < end_ns)) {
-    drivers::sleep_until({drivers::now().ns + 20'000'000});
+  while (!stop && (program.seconds <= 0 || device_now().ns < end_ns)) {
+    sleep_for(Duration::from_ms(20));
   }
   return {};
 }

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::hw_sim {
 
 TrackerLoop::TrackerLoop(std::unique_ptr<Endpoint> endpoint, TrackerScript script, Listeners listeners)
     : endpoint_(std::move(endpoint)), script_(std::move(script)), listeners_(std::move(listeners)) {
-  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  thread_ = OwnedThread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void TrackerLoop::follow_plug() {
@@ -45,7 +45,7 @@ void TrackerLoop::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     if (const std::int64_t zero_ns = align_ns_.exchange(0); zero_ns != 0) script_.align(zero_ns);
     const auto bytes = endpoint_->read();
-    const std::int64_t now_ns = drivers::now().ns;
+    const std::int64_t now_ns = device_now().ns;
     if (!bytes.empty()) script_.receive(bytes, now_ns);
     for (const Delivery& delivery : script_.advance(now_ns)) endpoint_->write(delivery.bytes);
     follow_plug();

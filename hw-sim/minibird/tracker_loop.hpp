@@ -3,8 +3,8 @@
 #include <atomic>
 #include <functional>
 #include <memory>
-#include <thread>
 
+#include "drivers/system/thread.hpp"
 #include "hw-sim/minibird/endpoint.hpp"
 #include "hw-sim/minibird/tracker_script.hpp"
 
@@ -38,7 +38,7 @@ class TrackerLoop {
   int violations_ = 0;
   std::atomic<bool> streaming_ = false;
   std::atomic<std::int64_t> align_ns_ = 0;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
 }  // namespace birdseye::hw_sim

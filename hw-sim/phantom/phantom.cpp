@@ -6,8 +6,8 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <thread>
 
+#include "drivers/system/thread.hpp"
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
 #include "hw-sim/phantom/image_files.hpp"
@@ -92,7 +92,7 @@ Result<void> write_phantom(const PhantomSettings& settings) {
 
   // The series is one file after another through one codec; the surfaces are sums. They take each other's time.
   Result<void> series;
-  std::jthread writer([&] {
+  OwnedThread writer([&](const std::stop_token&) {
     series = write_dicom_series(settings.folder / "ct", body->grid, body->hu, settings.seed);
     if (series) series = write_labels(settings.folder / "segmentation.nii.gz", body->grid, labels);
   });

@@ -7,18 +7,16 @@
 #include <deque>
 #include <vector>
 
-#include "drivers/system/monotonic.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/base/listener.hpp"
-#include "hw-sim/base/wait_for_fd.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
 
-using drivers::UniqueFd;
 using Header = std::array<std::uint8_t, 64>;
 
 template <typename T>
@@ -68,7 +66,7 @@ class FrameSocket final : public FrameSink {
     const bool stuck = busy();
     const int fd = reader_ ? reader_.get() : listener_.get();
     const auto events = static_cast<short>(stuck ? POLLIN | POLLOUT : POLLIN);
-    if (!wait_for_fd(fd, events, drivers::now().ns, until_ns)) return;
+    if (wait_ready(fd, events, DeviceTime{until_ns}) == 0) return;
     if (!reader_ && listener_) {
       reader_ = UniqueFd(::accept4(listener_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
       const int bytes = 4 << 20;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 #include "hw-sim/video/strobe.hpp"
@@ -72,7 +72,7 @@ class Camera {
     // Once at least: a camera that is late still sends, and hears that its reader has gone.
     std::int64_t now_ns = 0;
     do {
-      now_ns = drivers::now().ns;
+      now_ns = device_now().ns;
       if (sink_->connected()) script_.watched(now_ns);
       script_.advance(now_ns);
       if (script_.plugged() != plugged_) {
@@ -81,7 +81,7 @@ class Camera {
       }
       for (const FaultEvent& event : script_.take_events()) announce(event);
       sink_->work(std::min(until_ns, now_ns + kLongestWaitNs));
-    } while (drivers::now().ns < until_ns && !stop && (!only_while_busy || sink_->busy()));
+    } while (device_now().ns < until_ns && !stop && (!only_while_busy || sink_->busy()));
   }
 
   const CameraProgram& program_;
@@ -105,7 +105,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
     strobe = *std::move(opened);
   }
   ::prctl(PR_SET_TIMERSLACK, 1000UL, 0UL, 0UL, 0UL);  // frames leave on time, not when it suits the power supply
-  const std::int64_t zero_ns = drivers::now().ns;
+  const std::int64_t zero_ns = device_now().ns;
   Camera camera(program, *std::move(sink), zero_ns);
   const nlohmann::json truth{{"zero_monotonic_ns", zero_ns},
                              {"rate_hz", camera.rate_hz()},

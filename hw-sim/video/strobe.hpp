@@ -1,9 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <thread>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/thread.hpp"
 #include "drivers/system/unique_fd.hpp"
 #include "hw-sim/video/camera_script.hpp"
 
@@ -19,10 +19,10 @@ class Strobe {
   void start(const CameraTiming& timing, double true_rate_hz, std::int64_t zero_ns);
 
  private:
-  explicit Strobe(drivers::UniqueFd fd) : fd_(std::move(fd)) {}
+  explicit Strobe(UniqueFd fd) : fd_(std::move(fd)) {}
 
-  drivers::UniqueFd fd_;
-  std::jthread thread_;
+  UniqueFd fd_;
+  OwnedThread thread_;
 };
 
 }  // namespace birdseye::hw_sim

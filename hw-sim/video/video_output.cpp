@@ -9,16 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "drivers/system/monotonic.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
-
-using drivers::UniqueFd;
 
 int control(int fd, unsigned long request, void* argument) {
   int done = -1;
@@ -94,7 +92,7 @@ class VideoOutput final : public FrameSink {
       }
     }
   }
-  void work(std::int64_t until_ns) override { drivers::sleep_until({until_ns}); }
+  void work(std::int64_t until_ns) override { sleep_until(DeviceTime{until_ns}); }
   void unplug() override { fd_ = UniqueFd(); }
   Result<void> replug() override { return open(width_px_, height_px_); }
 

@@ -8,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "hw-sim/case/tissue_map.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/faults/fault_script.hpp"
@@ -99,7 +100,7 @@ TrackerScript tracker_of(const CartSettings& settings, const World& world, std::
     const auto pointer = world.tracker_from_pointer(world_s);
     return {pointer.rotation(), pointer.translation()};
   };
-  return TrackerScript(tracker, motion, drivers::now().ns);
+  return TrackerScript(tracker, motion, device_now().ns);
 }
 
 }  // namespace
@@ -158,26 +159,26 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
                       listeners);
   announce({{"event", "ready"}});
 
-  while (!stop && !(tracker.streaming() && (*camera)->ready())) drivers::sleep_until({drivers::now().ns + 10'000'000});
-  const std::int64_t zero_ns = drivers::now().ns + 1'000'000'000;
+  while (!stop && !(tracker.streaming() && (*camera)->ready())) sleep_for(Duration::from_ms(10));
+  const std::int64_t zero_ns = device_now().ns + 1'000'000'000;
   world_zero_ns = zero_ns;
   tracker.align(zero_ns);
   (*camera)->start(zero_ns);
   for (const Stage& stage : world->stages()) {
     const std::int64_t begins_ns = zero_ns + static_cast<std::int64_t>(stage.begins_s * 1e9);
-    while (!stop && drivers::now().ns < begins_ns) {
-      drivers::sleep_until({std::min(begins_ns, drivers::now().ns + 20'000'000)});
+    while (!stop && device_now().ns < begins_ns) {
+      sleep_until(std::min(Deadline(DeviceTime{begins_ns}), Deadline::after(Duration::from_ms(20))));
     }
     // The end is when the last frame is out, which a slow machine may see later than the script has it.
     const std::int64_t latest_ns = begins_ns + 30'000'000'000;
-    while (!stop && stage.name == "end" && !(*camera)->done() && drivers::now().ns < latest_ns) {
-      drivers::sleep_until({drivers::now().ns + 20'000'000});
+    while (!stop && stage.name == "end" && !(*camera)->done() && device_now().ns < latest_ns) {
+      sleep_for(Duration::from_ms(20));
     }
     if (stop) return {};
     announce({{"event", "stage"}, {"name", stage.name}, {"world_s", stage.begins_s}, {"monotonic_ns", begins_ns}});
   }
   // The tracker goes on a little, so that whoever pairs the last frame has poses from after it.
-  drivers::sleep_until({drivers::now().ns + 500'000'000});
+  sleep_for(Duration::from_ms(500));
   return {};
 }
 

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "hw-sim/faults/announce.hpp"
 
 namespace birdseye::hw_sim {
@@ -47,16 +47,16 @@ FrameCamera::FrameCamera(Settings settings, const World& world, Laparoscope& lap
       laparoscope_(laparoscope),
       sink_(std::move(sink)),
       frames_(static_cast<std::uint64_t>(std::ceil(world.ends_s() * settings_.rate_hz))) {
-  renderer_ = std::jthread([this](const std::stop_token& stop) { render(stop); });
-  server_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+  renderer_ = OwnedThread([this](const std::stop_token& stop) { render(stop); });
+  server_ = OwnedThread([this](const std::stop_token& stop) { serve(stop); });
 }
 
 FrameCamera::~FrameCamera() {
   renderer_.request_stop();
   server_.request_stop();
   changed_.notify_all();
-  if (renderer_.joinable()) renderer_.join();
-  if (server_.joinable()) server_.join();
+  renderer_.join();
+  server_.join();
 }
 
 bool FrameCamera::ready() const {
@@ -81,13 +81,13 @@ void FrameCamera::render(const std::stop_token& stop) {
     }
     if (stop.stop_requested()) return;
     if (settings_.drop_late && sequence + 1 < frames_ && too_late_for(sequence, tracing_ns)) continue;
-    const std::int64_t began_ns = drivers::now().ns;
+    const std::int64_t began_ns = device_now().ns;
     const double world_s = static_cast<double>(sequence) / settings_.rate_hz;
     const Transform<Tracker, Camera> pose = world_.tracker_from_camera(world_s);
     Rendered rendered{sequence, world_.at_bench(world_s)
                                     ? laparoscope_.look_at_bench((marker_from_tracker * pose).inverse(), sequence)
                                     : laparoscope_.look_into_cavity((patient_from_tracker * pose).inverse(), sequence)};
-    tracing_ns = drivers::now().ns - began_ns;
+    tracing_ns = device_now().ns - began_ns;
     {
       const std::lock_guard lock(mutex_);
       queue_.push_back(std::move(rendered));
@@ -98,7 +98,7 @@ void FrameCamera::render(const std::stop_token& stop) {
 
 bool FrameCamera::too_late_for(std::uint64_t sequence, std::int64_t tracing_ns) const {
   const auto after_zero_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(sequence) / settings_.rate_hz);
-  return zero_ns_ != 0 && drivers::now().ns + tracing_ns > zero_ns_ + after_zero_ns;
+  return zero_ns_ != 0 && device_now().ns + tracing_ns > zero_ns_ + after_zero_ns;
 }
 
 bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {
@@ -127,7 +127,7 @@ Picture FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
 
 /// Faults of the plug up to now, then bytes out and readers in, until the time at the latest.
 void FrameCamera::follow(CameraScript& script, std::int64_t until_ns) {
-  const std::int64_t now_ns = drivers::now().ns;
+  const std::int64_t now_ns = device_now().ns;
   script.advance(now_ns);
   if (script.plugged() != plugged_) {
     if (plugged_) sink_->unplug();
@@ -142,23 +142,23 @@ void FrameCamera::serve_world(CameraScript& script, const std::stop_token& stop)
   while (!stop.stop_requested() && sent_ < frames_) {
     FramePlan plan = script.next();
     // A frame goes out whole, however slow its reader: the world is short, and none of it may be missed.
-    while (sink_->busy() && !stop.stop_requested()) follow(script, drivers::now().ns + kListenNs);
+    while (sink_->busy() && !stop.stop_requested()) follow(script, device_now().ns + kListenNs);
     if (!take(rendered, stop)) return;
     for (; sent_ < rendered.number; ++sent_) plan = script.next();
     do {
       follow(script, plan.due_ns);
-    } while (!stop.stop_requested() && drivers::now().ns < plan.due_ns);
+    } while (!stop.stop_requested() && device_now().ns < plan.due_ns);
     if (!plan.lost && !sink_->busy()) sink_->begin(plan, picture_of(rendered, plan.half_size));
     ++sent_;
   }
-  while (sink_->busy() && !stop.stop_requested()) follow(script, drivers::now().ns + kListenNs);
+  while (sink_->busy() && !stop.stop_requested()) follow(script, device_now().ns + kListenNs);
 }
 
 void FrameCamera::serve(const std::stop_token& stop) {
-  while (!stop.stop_requested() && !sink_->connected()) sink_->work(drivers::now().ns + kListenNs);
+  while (!stop.stop_requested() && !sink_->connected()) sink_->work(device_now().ns + kListenNs);
   connected_ = sink_->connected();
   // Until the world begins no frame comes, and a reader may lose its patience and come again.
-  while (!stop.stop_requested() && zero_ns_ == 0) sink_->work(drivers::now().ns + 5'000'000);
+  while (!stop.stop_requested() && zero_ns_ == 0) sink_->work(device_now().ns + 5'000'000);
   CameraTiming timing;
   timing.rate_hz = settings_.rate_hz;
   timing.seed = settings_.seed;

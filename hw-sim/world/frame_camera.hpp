@@ -1,16 +1,16 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
-#include <thread>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/condition.hpp"
+#include "drivers/system/thread.hpp"
 #include "hw-sim/camera/laparoscope.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 #include "hw-sim/world/world.hpp"
@@ -71,12 +71,12 @@ class FrameCamera {
   std::vector<std::uint8_t> half_;
   std::uint64_t frames_;
   mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
+  Condition changed_;
   std::deque<Rendered> queue_;
   std::atomic<bool> connected_ = false, done_ = false;
   std::atomic<std::int64_t> zero_ns_ = 0;
   std::atomic<std::uint64_t> sent_ = 0;
-  std::jthread renderer_, server_;
+  OwnedThread renderer_, server_;
 };
 
 }  // namespace birdseye::hw_sim

@@ -38,7 +38,7 @@ class RudeClient {
   void say(const std::string& bytes) const { (void)!::send(fd_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL); }
 
  private:
-  drivers::UniqueFd fd_;
+  UniqueFd fd_;
   bool connected_ = false;
 };
 

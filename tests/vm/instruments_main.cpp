@@ -1,6 +1,6 @@
 #include <CLI/CLI.hpp>
 
-#include "drivers/system/program.hpp"
+#include "drivers/system/command_line.hpp"
 #include "hw-sim/app/instruments.hpp"
 
 int main(int argc, char** argv) {

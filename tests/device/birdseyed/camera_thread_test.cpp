@@ -11,8 +11,9 @@
 
 #include "device/birdseyed/event_queue.hpp"
 #include "device/birdseyed/instrument_thread.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::device {
@@ -31,8 +32,8 @@ class Program {
       while (!stop.stop_requested()) {
         pollfd entry{listener_.get(), POLLIN, 0};
         if (::poll(&entry, 1, 20) <= 0) continue;
-        const drivers::UniqueFd client(::accept(listener_.get(), nullptr, nullptr));
-        while (!stop.stop_requested() && send(client.get())) drivers::sleep_for(Duration::from_ms(10));
+        const UniqueFd client(::accept(listener_.get(), nullptr, nullptr));
+        while (!stop.stop_requested() && send(client.get())) sleep_for(Duration::from_ms(10));
       }
     });
   }
@@ -56,7 +57,7 @@ class Program {
     return ::send(client, bytes.data(), bytes.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(bytes.size());
   }
 
-  drivers::UniqueFd listener_;
+  UniqueFd listener_;
   std::uint64_t sequence_ = 0;
   std::jthread thread_;
 };
@@ -72,7 +73,7 @@ class ACamera : public ::testing::Test {
   /// The text of the next change to that state, and whether a frame came before it.
   std::pair<std::string, bool> next(InstrumentState state) {
     bool frame = false;
-    for (const DeviceTime until = drivers::now() + Duration::from_ms(20'000); drivers::now() < until;) {
+    for (const DeviceTime until = device_now() + Duration::from_ms(20'000); device_now() < until;) {
       const auto event = queue_.pop(until, {});
       if (!event) break;
       frame = frame || std::holds_alternative<FrameCame>(*event);

@@ -8,7 +8,7 @@
 
 #include "device/birdseyed/event_queue.hpp"
 #include "device/birdseyed/recording.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "tests/support/core_session.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -316,7 +316,7 @@ TEST(EventQueue, DropsTheOldestFrameAndNothingElse) {
   queue.push(Tick{at(0)});
   for (std::uint64_t n = 0; n < EventQueue::kMostFrames + 5; ++n) queue.push(FrameCame{frame(n, 0, 0)});
   EXPECT_EQ(queue.frames_dropped(), 5U);
-  const DeviceTime soon = drivers::now() + Duration::from_ms(1000);
+  const DeviceTime soon = device_now() + Duration::from_ms(1000);
   EXPECT_TRUE(std::holds_alternative<Tick>(*queue.pop(soon, {})));
   EXPECT_EQ(std::get<FrameCame>(*queue.pop(soon, {})).frame.sequence, 5U);
 }
@@ -328,11 +328,11 @@ TEST(EventQueue, AHoleInTheTrackersBytesIsMarked) {
   EXPECT_EQ(queue.others_dropped(), 1U);
   queue.push(camera_runs(1));  // never dropped
   EXPECT_EQ(queue.others_dropped(), 1U);
-  const DeviceTime soon = drivers::now() + Duration::from_ms(1000);
+  const DeviceTime soon = device_now() + Duration::from_ms(1000);
   for (int i = 0; i < 2; ++i) queue.pop(soon, {});
   queue.push(TrackerBytes{{{2}, at(2)}});
   std::optional<RawEvent> last;
-  while (auto event = queue.pop(drivers::now(), {})) last = std::move(event);
+  while (auto event = queue.pop(device_now(), {})) last = std::move(event);
   EXPECT_TRUE(std::get<TrackerBytes>(*last).chunk.after_line_error);
 }
 

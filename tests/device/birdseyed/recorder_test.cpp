@@ -14,7 +14,8 @@
 #include "device/birdseyed/appliance.hpp"
 #include "device/birdseyed/instrument_board.hpp"
 #include "device/wire/client.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::device {
@@ -26,8 +27,8 @@ RawEvent bytes(std::uint8_t value) {
 
 template <typename Condition>
 bool comes_true(Condition condition) {
-  const DeviceTime deadline = drivers::now() + Duration::from_ms(20'000);
-  while (!condition() && drivers::now() < deadline) drivers::sleep_for(Duration::from_ms(2));
+  const DeviceTime deadline = device_now() + Duration::from_ms(20'000);
+  while (!condition() && device_now() < deadline) sleep_for(Duration::from_ms(2));
   return condition();
 }
 
@@ -62,7 +63,7 @@ class DiskFile : public RecordFile {
     disk_->asked += 'w';
     const bool slow = disk_->slow;
     lock.unlock();
-    if (slow) drivers::sleep_for(Duration::from_ms(50));
+    if (slow) sleep_for(Duration::from_ms(50));
     return 0;
   }
   int sync() override {
@@ -204,11 +205,11 @@ class DoomedFile : public RecordFile {
     return made;
   });
   if (!recorder) ::_exit(1);
-  const DeviceTime deadline = drivers::now() + Duration::from_ms(10'000);
+  const DeviceTime deadline = device_now() + Duration::from_ms(10'000);
   for (std::uint8_t i = 0; counted.syncs < 3 || counted.writes < counted.synced_writes + 40; ++i) {
-    if (drivers::now() > deadline) ::_exit(2);
+    if (device_now() > deadline) ::_exit(2);
     (*recorder)->take(bytes(i));
-    drivers::sleep_for(Duration::from_ms(2));
+    sleep_for(Duration::from_ms(2));
   }
   ::kill(::getpid(), SIGKILL);
   ::_exit(3);
@@ -318,10 +319,10 @@ TEST(Recorder, EndsAtItsLimitAndSaysSo) {
   config.most_gb = 1e-6;
   const auto recorder = *Recorder::start(config, {});
   for (int i = 0; i < 200; ++i) recorder->take(bytes(1));
-  const DeviceTime deadline = drivers::now() + Duration::from_ms(5000);
-  while (recorder->text().find("most_gb") == std::string::npos && drivers::now() < deadline) {
+  const DeviceTime deadline = device_now() + Duration::from_ms(5000);
+  while (recorder->text().find("most_gb") == std::string::npos && device_now() < deadline) {
     recorder->take(bytes(1));
-    drivers::sleep_for(Duration::from_ms(5));
+    sleep_for(Duration::from_ms(5));
   }
   EXPECT_NE(recorder->text().find("most_gb"), std::string::npos) << recorder->text();
 }

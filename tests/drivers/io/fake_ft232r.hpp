@@ -1,8 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "drivers/io/usb_port.hpp"
+#include "drivers/system/condition.hpp"
 
 namespace birdseye::testing {
 
@@ -52,12 +51,12 @@ class FakeFt232r {
   /// Until everything delivered has been collected.
   [[nodiscard]] bool drained() {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return input_.empty(); });
+    return changed_.wait(lock, Deadline::after(Duration::from_ms(20'000)), [this] { return input_.empty(); });
   }
   /// Until whoever collects has been told that it is unplugged.
   [[nodiscard]] bool seen_gone() {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, std::chrono::seconds(20), [this] { return told_gone_; });
+    return changed_.wait(lock, Deadline::after(Duration::from_ms(20'000)), [this] { return told_gone_; });
   }
   int transfers_going = 0;
   bool claimed = false;
@@ -70,7 +69,7 @@ class FakeFt232r {
   static Error gone() { return {Errc::disconnected, "fake: unplugged"}; }
 
   std::mutex mutex_;
-  std::condition_variable changed_;
+  Condition changed_;
   std::deque<drivers::UsbInput> input_;
   std::vector<drivers::SetupPacket> requests_;
   Bytes written_;
@@ -85,7 +84,7 @@ class FakeFt232r::Port final : public drivers::UsbPort {
 
   [[nodiscard]] const drivers::UsbIdentity& identity() const override { return chip_->identity; }
 
-  Result<std::vector<std::uint8_t>> control(const drivers::SetupPacket& setup, DeviceTime /*deadline*/) override {
+  Result<std::vector<std::uint8_t>> control(const drivers::SetupPacket& setup, Deadline /*deadline*/) override {
     const std::lock_guard lock(chip_->mutex_);
     if (chip_->unplugged_) return gone();
     chip_->requests_.push_back(setup);
@@ -95,7 +94,7 @@ class FakeFt232r::Port final : public drivers::UsbPort {
     if (setup[1] == 0x0A) return Bytes{chip_->latency_ms_};
     return Bytes(setup[6], 0);
   }
-  Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, DeviceTime /*deadline*/) override {
+  Result<std::size_t> bulk_out(std::span<const std::uint8_t> bytes, Deadline /*deadline*/) override {
     const std::lock_guard lock(chip_->mutex_);
     if (chip_->unplugged_) return gone();
     const std::size_t count = std::min(chip_->takes, bytes.size());
@@ -106,11 +105,10 @@ class FakeFt232r::Port final : public drivers::UsbPort {
     chip_->transfers_going = transfers;
     return {};
   }
-  Result<std::optional<drivers::UsbInput>> collect(DeviceTime deadline) override {
+  Result<std::optional<drivers::UsbInput>> collect(Deadline deadline) override {
     std::unique_lock lock(chip_->mutex_);
-    const std::chrono::steady_clock::time_point until{std::chrono::nanoseconds(deadline.ns)};
-    chip_->changed_.wait_until(lock, until,
-                               [this] { return !chip_->input_.empty() || chip_->unplugged_ || chip_->woken_; });
+    chip_->changed_.wait(lock, deadline,
+                         [this] { return !chip_->input_.empty() || chip_->unplugged_ || chip_->woken_; });
     chip_->woken_ = false;
     if (!chip_->input_.empty()) {
       std::optional<drivers::UsbInput> input = std::move(chip_->input_.front());

@@ -5,7 +5,8 @@
 
 #include <thread>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/drivers/io/fake_ft232r.hpp"
 
 namespace birdseye::drivers {
@@ -26,7 +27,7 @@ std::unique_ptr<FtdiPort> open(const std::shared_ptr<FakeFt232r>& chip, const Ft
 
 Bytes read_some(FtdiPort& port) {
   Bytes chunk(1024);
-  const auto got = port.read(chunk, now() + kLong);
+  const auto got = port.read(chunk, device_now() + kLong);
   EXPECT_TRUE(got) << (got ? "" : got.error().what);
   chunk.resize(got ? *got : 0);
   return chunk;
@@ -109,7 +110,7 @@ TEST(FtdiPort, RefusesAChipItDoesNotKnowAndARateOutOfReach) {
 TEST(FtdiPort, CarriesAShortExchange) {
   const auto chip = std::make_shared<FakeFt232r>();
   const auto port = open(chip);
-  ASSERT_TRUE(port->write(Bytes{0x4F, 0x00}, now() + kLong));
+  ASSERT_TRUE(port->write(Bytes{0x4F, 0x00}, device_now() + kLong));
   EXPECT_EQ(chip->written(), (Bytes{0x4F, 0x00}));
   chip->deliver({0x31, 0x60}, {10});
   chip->deliver({0x31, 0x60, 0x08}, {20});
@@ -126,10 +127,10 @@ TEST(FtdiPort, SilenceIsNoErrorWhetherOfEmptyPacketsOrOfNone) {
   const auto chip = std::make_shared<FakeFt232r>();
   const auto port = open(chip);
   Bytes chunk(64);
-  EXPECT_EQ(*port->read(chunk, now() + Duration::from_ms(5)), 0U);  // an adapter that says nothing at all
+  EXPECT_EQ(*port->read(chunk, device_now() + Duration::from_ms(5)), 0U);  // an adapter that says nothing at all
   for (int i = 0; i < 50; ++i) chip->deliver({0x01, 0x60});
   ASSERT_TRUE(chip->drained());
-  EXPECT_EQ(*port->read(chunk, now() + Duration::from_ms(5)), 0U);
+  EXPECT_EQ(*port->read(chunk, device_now() + Duration::from_ms(5)), 0U);
   EXPECT_FALSE(port->arrival());
   chip->deliver({0x01, 0x60, 0x42});
   EXPECT_EQ(read_some(*port), Bytes{0x42});
@@ -169,7 +170,7 @@ TEST(FtdiPort, NobodyReadingCostsMemoryWithinBoundsAndIsALineError) {
   bool newest = false;
   Bytes chunk(64);
   for (;;) {
-    const auto got = port->read(chunk, now() + Duration::from_ms(50));
+    const auto got = port->read(chunk, device_now() + Duration::from_ms(50));
     ASSERT_TRUE(got);
     if (*got == 0) break;
     bytes += *got;
@@ -190,9 +191,9 @@ TEST(FtdiPort, UnpluggingGivesWhatHadComeAndThenTheLoss) {
   sleep_for(Duration::from_ms(20));  // so that the loss is known before the bytes are asked for
   EXPECT_EQ(read_some(*port), (Bytes{0x11, 0x22}));
   Bytes chunk(64);
-  EXPECT_EQ(port->read(chunk, now() + kLong).error().code, Errc::disconnected);
-  EXPECT_EQ(port->read(chunk, now() + kLong).error().code, Errc::disconnected);  // and it stays lost
-  EXPECT_EQ(port->write(Bytes{1}, now() + kLong).error().code, Errc::disconnected);
+  EXPECT_EQ(port->read(chunk, device_now() + kLong).error().code, Errc::disconnected);
+  EXPECT_EQ(port->read(chunk, device_now() + kLong).error().code, Errc::disconnected);  // and it stays lost
+  EXPECT_EQ(port->write(Bytes{1}, device_now() + kLong).error().code, Errc::disconnected);
   EXPECT_FALSE(port->set_rts(true));
 }
 
@@ -204,9 +205,9 @@ TEST(FtdiPort, UnpluggingWakesAReaderThatWaits) {
     chip->unplug();
   });
   Bytes chunk(64);
-  const DeviceTime deadline = now() + kLong;
+  const DeviceTime deadline = device_now() + kLong;
   EXPECT_EQ(port->read(chunk, deadline).error().code, Errc::disconnected);
-  EXPECT_LT(now(), deadline);
+  EXPECT_LT(device_now(), deadline);
 }
 
 TEST(FtdiPort, UnpluggedWhileOpeningIsAnError) {
@@ -220,7 +221,7 @@ TEST(FtdiPort, PluggedInAgainIsANewLine) {
   auto port = open(first);
   first->unplug();
   Bytes chunk(64);
-  EXPECT_FALSE(port->read(chunk, now() + kLong));
+  EXPECT_FALSE(port->read(chunk, device_now() + kLong));
   port.reset();
   const auto second = std::make_shared<FakeFt232r>();
   port = open(second);
@@ -234,10 +235,10 @@ TEST(FtdiPort, WritesInPortionsAndGivesUpAtTheDeadline) {
   const auto port = open(chip);
   chip->takes = 3;
   const Bytes command{1, 2, 3, 4, 5, 6, 7};
-  ASSERT_TRUE(port->write(command, now() + kLong));
+  ASSERT_TRUE(port->write(command, device_now() + kLong));
   EXPECT_EQ(chip->written(), command);
   chip->takes = 0;
-  EXPECT_EQ(port->write(command, now() + Duration::from_ms(5)).error().code, Errc::timeout);
+  EXPECT_EQ(port->write(command, device_now() + Duration::from_ms(5)).error().code, Errc::timeout);
 }
 
 TEST(FtdiPort, DiscardsInputAndNoCommandOnItsWayOut) {

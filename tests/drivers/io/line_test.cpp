@@ -12,7 +12,7 @@
 #include "drivers/io/open_line.hpp"
 #include "drivers/io/socket_line.hpp"
 #include "drivers/io/usb_address.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -70,29 +70,30 @@ void carries_bytes_and_ends(const Listener& listener) {
   EXPECT_FALSE((*line)->set_rts(true));
   EXPECT_FALSE((*line)->arrival());
   Bytes chunk(16);
-  EXPECT_EQ(*(*line)->read(chunk, now() + Duration::from_ms(5)), 0U);
+  EXPECT_EQ(*(*line)->read(chunk, device_now() + Duration::from_ms(5)), 0U);
 
   const Bytes sent{0x00, 0xFF, 0x11, 0x13};
-  ASSERT_TRUE((*line)->write(sent, now() + kLong));
+  ASSERT_TRUE((*line)->write(sent, device_now() + kLong));
   ASSERT_EQ(::recv(peer.get(), chunk.data(), chunk.size(), 0), 4);
   EXPECT_TRUE(std::equal(sent.begin(), sent.end(), chunk.begin()));
   ASSERT_EQ(::send(peer.get(), sent.data(), sent.size(), 0), 4);
-  ASSERT_EQ(*(*line)->read(chunk, now() + kLong), 4U);
+  ASSERT_EQ(*(*line)->read(chunk, device_now() + kLong), 4U);
   EXPECT_TRUE(std::equal(sent.begin(), sent.end(), chunk.begin()));
 
   ASSERT_EQ(::send(peer.get(), sent.data(), sent.size(), 0), 4);
-  ASSERT_EQ(*(*line)->read(std::span(chunk).first(1), now() + kLong), 1U);  // all four are here now
+  ASSERT_EQ(*(*line)->read(std::span(chunk).first(1), device_now() + kLong), 1U);  // all four are here now
   (*line)->discard_input();
-  EXPECT_EQ(*(*line)->read(chunk, now() + Duration::from_ms(5)), 0U);
+  EXPECT_EQ(*(*line)->read(chunk, device_now() + Duration::from_ms(5)), 0U);
   EXPECT_EQ((*line)->line_errors(), 0U);
 
-  EXPECT_EQ((*line)->write(Bytes(64U << 20, 1), now() + Duration::from_ms(50)).error().code, Errc::timeout);
+  EXPECT_EQ((*line)->write(Bytes(64U << 20, 1), device_now() + Duration::from_ms(50)).error().code, Errc::timeout);
   peer = UniqueFd();
-  const auto after = (*line)->read(chunk, now() + kLong);
+  const auto after = (*line)->read(chunk, device_now() + kLong);
   ASSERT_FALSE(after);
   EXPECT_EQ(after.error().code, Errc::disconnected);
   EXPECT_THAT(after.error().what, HasSubstr(listener.device));
-  EXPECT_EQ((*line)->write(Bytes(64U << 20, 1), now() + kLong).error().code, Errc::disconnected);  // and no SIGPIPE
+  EXPECT_EQ((*line)->write(Bytes(64U << 20, 1), device_now() + kLong).error().code,
+            Errc::disconnected);  // and no SIGPIPE
 }
 
 TEST(SocketLine, CarriesBytesOverTcpAndSeesTheEnd) {

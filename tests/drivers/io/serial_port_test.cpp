@@ -12,7 +12,8 @@
 
 #include "drivers/io/serial_latency.hpp"
 #include "drivers/io/serial_marks.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::drivers {
@@ -42,7 +43,7 @@ struct Terminal {
 
 Bytes read_count(SerialPort& port, std::size_t count) {
   Bytes all, chunk(4096);
-  const DeviceTime deadline = now() + kLong;
+  const DeviceTime deadline = device_now() + kLong;
   while (all.size() < count) {
     const auto got = port.read(chunk, deadline);
     if (!got || *got == 0) break;
@@ -62,7 +63,7 @@ TEST(SerialPort, CarriesEveryByteBothWays) {
   terminal.send(sent);
   EXPECT_EQ(read_count(**port, sent.size()), sent);  // FF came doubled, and FF 00 was no mark
   EXPECT_EQ((*port)->line_errors(), 0U);
-  ASSERT_TRUE((*port)->write(sent, now() + kLong));
+  ASSERT_TRUE((*port)->write(sent, device_now() + kLong));
   Bytes back(sent.size());
   std::size_t have = 0;
   while (have < back.size()) {
@@ -92,17 +93,17 @@ TEST(SerialPort, AHangUpWakesAReaderThatWaits) {
     terminal.reset();
   });
   Bytes chunk(64);
-  const DeviceTime deadline = now() + kLong;
+  const DeviceTime deadline = device_now() + kLong;
   EXPECT_EQ((*port)->read(chunk, deadline).error().code, Errc::disconnected);
-  EXPECT_LT(now(), deadline);
-  EXPECT_EQ((*port)->write(chunk, now() + kLong).error().code, Errc::disconnected);
+  EXPECT_LT(device_now(), deadline);
+  EXPECT_EQ((*port)->write(chunk, device_now() + kLong).error().code, Errc::disconnected);
 }
 
 TEST(SerialPort, APeerThatTakesNothingIsATimeout) {
   const Terminal terminal;
   const auto port = SerialPort::open(terminal.path, 115200);
   ASSERT_TRUE(port);
-  EXPECT_EQ((*port)->write(Bytes(1U << 20, 0x42), now() + Duration::from_ms(50)).error().code, Errc::timeout);
+  EXPECT_EQ((*port)->write(Bytes(1U << 20, 0x42), device_now() + Duration::from_ms(50)).error().code, Errc::timeout);
 }
 
 TEST(SerialPort, DiscardsWhatHasCome) {
@@ -111,7 +112,7 @@ TEST(SerialPort, DiscardsWhatHasCome) {
   ASSERT_TRUE(port);
   terminal.send({1, 2, 3, 4});
   Bytes one(1);
-  ASSERT_EQ(*(*port)->read(one, now() + kLong), 1U);
+  ASSERT_EQ(*(*port)->read(one, device_now() + kLong), 1U);
   (*port)->discard_input();
   terminal.send({9});
   EXPECT_EQ(read_count(**port, 1), Bytes{9});

@@ -19,7 +19,7 @@ class Stranger final : public ByteStream {
   /// replies: to each byte; chatter: what comes by itself, at each read.
   Stranger(std::function<Bytes(std::uint8_t)> replies, std::function<Bytes()> chatter)
       : replies_(std::move(replies)), chatter_(std::move(chatter)) {}
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) override {
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) override {
     for (const std::uint8_t byte : chatter_()) pending_.push_back(byte);
     if (pending_.empty()) sleep_until(deadline);
     const std::size_t n = std::min(into.size(), pending_.size());
@@ -27,7 +27,7 @@ class Stranger final : public ByteStream {
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(n));
     return n;
   }
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime /*deadline*/) override {
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline /*deadline*/) override {
     for (const std::uint8_t byte : bytes) {
       for (const std::uint8_t reply : replies_(byte)) pending_.push_back(reply);
     }

@@ -10,7 +10,7 @@
 #include "calibration/geometry/transform.hpp"
 #include "drivers/io/serial_port.hpp"
 #include "drivers/minibird/assembler.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 #include "hw-sim/minibird/unit.hpp"
 
@@ -29,7 +29,7 @@ class UnitLine final : public ByteStream {
     poses.resize(static_cast<std::size_t>(birds));
   }
 
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime /*deadline*/) override {
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline /*deadline*/) override {
     if (unplugged) return Error{Errc::disconnected, "test: unplugged"};
     if (pending_.empty()) {
       for (const std::uint8_t byte : unit_.measure(poses)) pending_.push_back(byte);
@@ -51,7 +51,7 @@ class UnitLine final : public ByteStream {
     }
     return n;
   }
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime /*deadline*/) override {
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline /*deadline*/) override {
     if (silent) return {};
     for (const std::uint8_t byte : bytes) {
       for (const std::uint8_t reply : unit_.receive(byte)) pending_.push_back(reply);
@@ -89,7 +89,7 @@ class Stream {
   [[nodiscard]] MiniBirdCounters counters() const { return assembler_->counters(); }
   Result<std::vector<Measurement>> read() {
     for (int tries = 0; tries < 10; ++tries) {
-      const auto chunk = (*bird_)->read(now() + Duration::from_ms(100));
+      const auto chunk = (*bird_)->read(device_now() + Duration::from_ms(100));
       if (!chunk) return chunk.error();
       if (!*chunk) continue;
       if (auto measurements = assembler_->push(**chunk); !measurements.empty()) return measurements;
@@ -248,12 +248,12 @@ TEST(SerialPort, CarriesBytesAndSeesTheLineGo) {
   const Bytes sent{0x11, 0x13, 0x00, 0xFF, 0x0D, 0x0A};  // what a line discipline would eat or change
   terminal->write(sent);
   std::array<std::uint8_t, 16> got;
-  const auto count = (*port)->read(got, now() + Duration::from_ms(1000));
+  const auto count = (*port)->read(got, device_now() + Duration::from_ms(1000));
   ASSERT_TRUE(count);
   EXPECT_EQ(Bytes(got.begin(), got.begin() + static_cast<std::ptrdiff_t>(*count)), sent);
-  EXPECT_EQ(*(*port)->read(got, now() + Duration::from_ms(10)), 0U);
+  EXPECT_EQ(*(*port)->read(got, device_now() + Duration::from_ms(10)), 0U);
   terminal.reset();
-  EXPECT_EQ((*port)->read(got, now() + Duration::from_ms(1000)).error().code, Errc::disconnected);
+  EXPECT_EQ((*port)->read(got, device_now() + Duration::from_ms(1000)).error().code, Errc::disconnected);
 }
 
 TEST(SerialPort, NamesWhatCannotBeOpened) {

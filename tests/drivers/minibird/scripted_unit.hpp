@@ -9,7 +9,8 @@
 
 #include "drivers/io/byte_stream.hpp"
 #include "drivers/minibird/settings.hpp"
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::testing {
 
@@ -31,26 +32,26 @@ class ScriptedUnit final : public drivers::ByteStream {
     answers = fresh;
   }
 
-  Result<std::size_t> read(std::span<std::uint8_t> into, DeviceTime deadline) override {
+  Result<std::size_t> read(std::span<std::uint8_t> into, Deadline deadline) override {
     for (;;) {
       if (streaming && pending_.empty()) put(records());
       std::size_t n = 0;
-      while (n < into.size() && !pending_.empty() && pending_.front().due <= drivers::now()) {
+      while (n < into.size() && !pending_.empty() && pending_.front().due <= device_now()) {
         into[n++] = pending_.front().byte;
         pending_.pop_front();
       }
       if (n > 0) return n;
-      if (drivers::now() >= deadline) return std::size_t{0};
-      drivers::sleep_for(std::min(deadline - drivers::now(), Duration{500'000}));
+      if (deadline.passed()) return std::size_t{0};
+      sleep_for(std::min(deadline.left(), Duration{500'000}));
     }
   }
-  Result<void> write(std::span<const std::uint8_t> bytes, DeviceTime /*deadline*/) override {
+  Result<void> write(std::span<const std::uint8_t> bytes, Deadline /*deadline*/) override {
     for (const std::uint8_t byte : bytes) take(byte);
     return {};
   }
   void discard_input() override {
     // What is late has not come yet, and stays.
-    while (!pending_.empty() && pending_.front().due <= drivers::now()) pending_.pop_front();
+    while (!pending_.empty() && pending_.front().due <= device_now()) pending_.pop_front();
   }
   bool set_rts(bool asserted) override {
     if (!has_rts) return false;
@@ -103,7 +104,7 @@ class ScriptedUnit final : public drivers::ByteStream {
       --half_replies;
       reply.pop_back();
     }
-    for (const std::uint8_t byte : reply) pending_.push_back({byte, drivers::now() + late});
+    for (const std::uint8_t byte : reply) pending_.push_back({byte, device_now() + late});
   }
   static std::size_t length_of(const Bytes& command) {
     switch (command[0]) {

@@ -9,7 +9,7 @@
 #include <latch>
 #include <thread>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"
 #include "drivers/video/frame_source.hpp"
 #include "drivers/video/pixel_format.hpp"
@@ -85,14 +85,14 @@ std::vector<std::uint8_t> message() {
 }
 
 DeviceTime soon() {
-  return now() + Duration::from_ms(5000);
+  return device_now() + Duration::from_ms(5000);
 }
 
 TEST(SocketCamera, GivesAFrameEvenWhenADeadlineCutsIt) {
   Sender sender(message(), true);
   const auto camera = open_camera(sender.settings());
   ASSERT_TRUE(camera) << camera.error().what;
-  const auto early = (*camera)->next(now() + Duration::from_ms(20));
+  const auto early = (*camera)->next(device_now() + Duration::from_ms(20));
   ASSERT_TRUE(early);
   EXPECT_FALSE(*early);
   sender.send_rest();

@@ -10,7 +10,7 @@
 
 #include <cstring>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -18,7 +18,6 @@ namespace birdseye::hw_sim {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-using drivers::UniqueFd;
 
 UniqueFd connect_to_path(const std::string& path) {
   sockaddr_un address{};
@@ -45,7 +44,7 @@ Bytes read_from(Endpoint& endpoint, std::size_t count) {
   for (int i = 0; i < 200 && all.size() < count; ++i) {
     const Bytes part = endpoint.read();
     all.insert(all.end(), part.begin(), part.end());
-    if (all.size() < count) endpoint.wait(drivers::now().ns + 10'000'000);
+    if (all.size() < count) endpoint.wait(device_now().ns + 10'000'000);
   }
   return all;
 }

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "drivers/system/monotonic.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/video/frame_source.hpp"
 #include "hw-sim/video/camera_script.hpp"
 #include "hw-sim/video/frame_sink.hpp"
@@ -184,12 +184,12 @@ TEST(FrameSocket, FramesArriveAsPlannedAndAReaderMayComeAgain) {
     settings.source = "socket:" + (scratch / "frames").string();
     const auto camera = drivers::open_camera(settings);
     ASSERT_TRUE(camera) << camera.error().what;
-    while (!(*sink)->connected()) (*sink)->work(drivers::now().ns + 10'000'000);
+    while (!(*sink)->connected()) (*sink)->work(device_now().ns + 10'000'000);
     for (const FramePlan& plan : frames_of({}, 5)) {
       const auto pixels = pattern.draw(plan.number, 0, 0);
       (*sink)->begin(plan, {pixels, PixelLayout::rgb3, 96, 64});
-      while ((*sink)->busy()) (*sink)->work(drivers::now().ns + 10'000'000);
-      const auto frame = (*camera)->next(drivers::now() + Duration::from_ms(2000));
+      while ((*sink)->busy()) (*sink)->work(device_now().ns + 10'000'000);
+      const auto frame = (*camera)->next(device_now() + Duration::from_ms(2000));
       ASSERT_TRUE(frame) << frame.error().what;
       ASSERT_TRUE(*frame);
       EXPECT_EQ((*frame)->sequence, plan.sequence);

@@ -1,0 +1,53 @@
+#include "drivers/system/wait.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+
+namespace birdseye {
+
+namespace {
+
+timespec timespec_of(Duration span) {
+  return {span.ns / 1'000'000'000, span.ns % 1'000'000'000};
+}
+
+}  // namespace
+
+void sleep_until(Deadline deadline) {
+  const timespec until = timespec_of({std::max<std::int64_t>(0, deadline.ns_)});
+  while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+  }
+}
+
+void sleep_for(Duration span) {
+  sleep_until(Deadline::after(span));
+}
+
+bool sleep_for(Duration span, const std::stop_token& stop) {
+  constexpr Duration kLook = Duration::from_ms(20);
+  const Deadline end = Deadline::after(span);
+  while (!end.passed()) {
+    if (stop.stop_requested()) return false;
+    sleep_until(std::min(end, Deadline::after(kLook)));
+  }
+  return true;
+}
+
+bool wait_ready(std::span<pollfd> entries, Deadline deadline) {
+  for (;;) {
+    const timespec left = timespec_of(deadline.left());
+    const int ready = ::ppoll(entries.data(), entries.size(), &left, nullptr);
+    if (ready > 0) return true;
+    if (ready == 0 || errno != EINTR) break;
+  }
+  for (pollfd& entry : entries) entry.revents = 0;
+  return false;
+}
+
+short wait_ready(int fd, short events, Deadline deadline) {
+  pollfd entry{fd, events, 0};
+  return wait_ready(std::span(&entry, 1), deadline) ? entry.revents : short{0};
+}
+
+}  // namespace birdseye

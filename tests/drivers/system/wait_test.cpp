@@ -1,0 +1,74 @@
+#include "drivers/system/wait.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+
+#include "drivers/system/thread.hpp"
+#include "drivers/system/unique_fd.hpp"
+
+namespace birdseye {
+namespace {
+
+constexpr Duration kShort = Duration::from_ms(5), kLong = Duration::from_ms(60'000);
+
+struct Pipe {
+  Pipe() {
+    std::array<int, 2> ends{};
+    EXPECT_EQ(::pipe(ends.data()), 0);
+    out = UniqueFd(ends[0]);
+    in = UniqueFd(ends[1]);
+  }
+  void fill() const { EXPECT_EQ(::write(in.get(), "x", 1), 1); }
+  UniqueFd out, in;
+};
+
+TEST(Wait, SleepsUntilTheMomentAndNoLessThanTheSpan) {
+  const DeviceTime end = device_now() + kShort;
+  sleep_until(end);
+  EXPECT_GE(device_now(), end);
+  const DeviceTime began = device_now();
+  sleep_for(kShort);
+  EXPECT_GE(device_now(), began + kShort);
+  sleep_until(DeviceTime{-1});
+}
+
+TEST(Wait, AStopEndsASleepAndTheSpanEndsItElse) {
+  std::stop_source stop;
+  EXPECT_TRUE(sleep_for(kShort, stop.get_token()));
+  OwnedThread stopper([&](const std::stop_token&) { stop.request_stop(); });
+  const Deadline long_after = Deadline::after(kLong);
+  EXPECT_FALSE(sleep_for(kLong, stop.get_token()));
+  EXPECT_FALSE(long_after.passed());
+}
+
+TEST(Wait, AnEmptyPipeIsNotReadableAndAFullOneIs) {
+  const Pipe pipe;
+  const Deadline soon = Deadline::after(kShort);
+  EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, soon), 0);
+  EXPECT_TRUE(soon.passed());
+  EXPECT_EQ(wait_ready(pipe.in.get(), POLLOUT, device_now()), POLLOUT);
+  pipe.fill();
+  EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, device_now()), POLLIN);  // what is there is seen however late it is
+}
+
+TEST(Wait, AWriterThatHasGoneIsTold) {
+  Pipe pipe;
+  OwnedThread closer([&](const std::stop_token&) { pipe.in = UniqueFd(); });
+  EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, Deadline::after(kLong)), POLLHUP);
+}
+
+TEST(Wait, OfSeveralTheReadyOnesAreToldAndNobodyIsNeverReady) {
+  const Pipe silent, speaking;
+  std::array<pollfd, 3> entries{{{silent.out.get(), POLLIN, 0}, {-1, POLLIN, 0}, {speaking.out.get(), POLLIN, 0}}};
+  EXPECT_FALSE(wait_ready(entries, Deadline::after(kShort)));
+  OwnedThread speaker([&](const std::stop_token&) { speaking.fill(); });
+  EXPECT_TRUE(wait_ready(entries, Deadline::after(kLong)));
+  EXPECT_EQ(entries[0].revents, 0);
+  EXPECT_EQ(entries[1].revents, 0);
+  EXPECT_EQ(entries[2].revents, POLLIN);
+}
+
+}  // namespace
+}  // namespace birdseye
