@@ -7,6 +7,7 @@
 #include "calibration/time/clock_relation.hpp"
 #include "calibration/time/discipline.hpp"
 #include "device/wire/foreign_feed.hpp"
+#include "device/wire/link.hpp"
 #include "device/wire/unpacker.hpp"
 
 namespace birdseye::wire {
@@ -15,22 +16,21 @@ namespace birdseye::wire {
 /// first messages tell which.
 class Client {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = std::chrono::steady_clock;  // of callers that still ask the standard library for the time
 
   /// Tries until the deadline: an appliance that is starting is not an error yet.
-  static Result<std::unique_ptr<Client>> connect(const std::string& host, int port, Clock::time_point deadline,
+  static Result<std::unique_ptr<Client>> connect(const std::string& host, int port, Deadline deadline,
                                                  ForeignSettings foreign = {});
-  ~Client();
-  Client(const Client&) = delete;
-  Client& operator=(const Client&) = delete;
+  /// The same over a link that stands already. name: of the other side, for messages.
+  static std::unique_ptr<Client> over(std::unique_ptr<Link> link, std::string name, ForeignSettings foreign = {});
 
   /// The next event; empty at the deadline; Errc::disconnected when the appliance has gone.
-  Result<std::optional<Event>> next(Clock::time_point deadline);
+  Result<std::optional<Event>> next(Deadline deadline);
   /// Says what this client wants; without it, it gets everything.
-  Result<void> subscribe(const Subscription& subscription, Clock::time_point deadline);
+  Result<void> subscribe(const Subscription& subscription, Deadline deadline);
   /// Asks that the camera's exposure, gain, white balance and focus be held, or let go; what became of it comes as an
   /// event. When the last client that holds them leaves, they are let go.
-  Result<void> lock_camera(bool on, Clock::time_point deadline);
+  Result<void> lock_camera(bool on, Deadline deadline);
 
   /// A time of the appliance on this machine's CLOCK_MONOTONIC, with a sigma. It is related by the narrowest of the
   /// questions that next() asks the appliance from time to time, or by clocks that a network protocol (PTP, NTP) keeps
@@ -47,12 +47,12 @@ class Client {
   [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
 
  private:
-  Client(int fd, std::string name, ForeignSettings foreign);
-  Result<void> send(const Packet& packet, Clock::time_point deadline);
+  Client(std::unique_ptr<Link> link, std::string name, ForeignSettings foreign);
+  Result<void> send(const Packet& packet, Deadline deadline);
   [[nodiscard]] Error gone() const;
-  Result<bool> fill(std::size_t size, Clock::time_point deadline);
+  Result<bool> fill(std::size_t size, Deadline deadline);
   /// The next message, header and body; empty at the deadline. It lies in buffer_ until the next call.
-  Result<std::optional<std::span<const std::uint8_t>>> next_message(Clock::time_point deadline);
+  Result<std::optional<std::span<const std::uint8_t>>> next_message(Deadline deadline);
   /// Gives the foreign feed the messages that have come already, some of them at a time.
   Result<void> drain();
   /// Judges by a message what the other side is, where that is not known yet.
@@ -62,7 +62,7 @@ class Client {
   void take(const ClockPong& pong);
   [[nodiscard]] std::optional<ClockChoice> choose() const;
 
-  int fd_;
+  std::unique_ptr<Link> link_;
   std::string name_;
   std::vector<std::uint8_t> buffer_;
   std::size_t have_ = 0;
@@ -71,9 +71,9 @@ class Client {
   std::optional<ForeignFeed> foreign_;  ///< set once the other side has shown itself to be no appliance
   bool appliance_ = false;              ///< the other side has shown itself to be an appliance
   bool asked_for_poses_ = false;
-  Clock::time_point connected_;
+  HostTime connected_;
   ClockRelation relation_;
-  Clock::time_point next_question_{};
+  HostTime next_question_;
   int questions_ = 0;
   struct Discipline {
     ClockDiscipline discipline;

@@ -1,16 +1,19 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "device/wire/latency_log.hpp"
+#include "device/wire/link.hpp"
 #include "device/wire/packet_queue.hpp"
 #include "device/wire/request.hpp"
 
 namespace birdseye::wire {
 
-/// CLOCK_MONOTONIC.
-DeviceTime monotonic_now();
+inline DeviceTime monotonic_now() {
+  return device_now();
+}
 
 /// From the last byte in to the last byte handed to the operating system.
 struct Latencies {
@@ -23,12 +26,9 @@ struct Latencies {
 /// The server's end of one client: the packets that wait for it, and the request that it has begun. Used by one thread.
 class ClientLink {
  public:
-  explicit ClientLink(int fd);  ///< a connected, non-blocking socket, which is closed with this object
-  ~ClientLink();
-  ClientLink(const ClientLink&) = delete;
-  ClientLink& operator=(const ClientLink&) = delete;
+  explicit ClientLink(std::unique_ptr<Link> link);
 
-  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] Link& link() const { return *link_; }
   [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
   /// Queues a packet if the client wants its kind. Returns how many older packets were dropped for it.
   std::size_t offer(const Packet& packet);
@@ -58,7 +58,7 @@ class ClientLink {
   [[nodiscard]] bool wants(const Packet& packet);
   void finish(Latencies& latencies);
 
-  int fd_;
+  std::unique_ptr<Link> link_;
   RequestReader reader_;
   Subscription subscription_;
   bool locks_camera_ = false;

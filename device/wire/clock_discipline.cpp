@@ -7,10 +7,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
-
-#include "device/wire/client_link.hpp"
 
 namespace birdseye::wire {
 
@@ -35,12 +32,6 @@ Result<ClockDiscipline> read_clock_discipline() {
                  errno};
   }
   return decode_discipline(reading, state);
-}
-
-Duration wall_minus_monotonic() {
-  timespec wall{};
-  clock_gettime(CLOCK_REALTIME, &wall);
-  return {wall.tv_sec * std::int64_t{1'000'000'000} + wall.tv_nsec - monotonic_now().ns};
 }
 
 std::vector<std::string> ptp_devices(const std::string& folder) {

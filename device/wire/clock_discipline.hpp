@@ -5,19 +5,19 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/discipline.hpp"
+#include "drivers/system/clock.hpp"
 
 struct timex;
 
 namespace birdseye::wire {
+
+using birdseye::wall_minus_monotonic;
 
 /// What adjtimex(2) filled in, and what it returned.
 ClockDiscipline decode_discipline(const timex& reading, int state);
 
 /// Asks the kernel. Changes nothing, and needs no privilege.
 Result<ClockDiscipline> read_clock_discipline();
-
-/// By how much the time of day is ahead of CLOCK_MONOTONIC.
-Duration wall_minus_monotonic();
 
 /// Network cards' own clocks (/dev/ptp0 ...): where there are any, PTP can stamp packets in hardware.
 std::vector<std::string> ptp_devices(const std::string& folder = "/dev");

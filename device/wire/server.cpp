@@ -1,17 +1,12 @@
 #include "device/wire/server.hpp"
 
 #include <arpa/inet.h>
-#include <fmt/format.h>
-#include <netinet/tcp.h>
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <iterator>
 #include <utility>
+
+#include "device/wire/tcp_link.hpp"
 
 namespace birdseye::wire {
 
@@ -19,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
-constexpr int kMostUnsentBytes = 256 << 10;
+constexpr Duration kLook = Duration::from_ms(200);  // for clients that are stuck
 
 }  // namespace
 
@@ -29,47 +24,23 @@ bool is_address(const std::string& text) {
 }
 
 Result<std::unique_ptr<Server>> Server::listen(const std::string& bind_address, int port) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  if (::inet_pton(AF_INET, bind_address.c_str(), &address.sin_addr) != 1) {
-    return Error{Errc::bad_value, fmt::format("[wire] bind \"{}\": give an IPv4 address, as 127.0.0.1", bind_address)};
-  }
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int on = 1;
-  if (fd >= 0) ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  socklen_t size = sizeof address;
-  if (fd < 0 || ::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(fd, 8) != 0 ||
-      ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    const int failed = errno;
-    if (fd >= 0) ::close(fd);
-    if (failed == EADDRINUSE) {
-      return Error{
-          Errc::in_use,
-          fmt::format("[wire] port {} on {} is in use; stop the other program or choose another", port, bind_address),
-          failed};
-    }
-    return Error{Errc::bad_value,
-                 fmt::format("[wire] bind {} port {}: this machine cannot listen there", bind_address, port), failed};
-  }
-  return std::unique_ptr<Server>(new Server(fd, ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), ntohs(address.sin_port)));
+  auto listener = listen_tcp(bind_address, port);
+  if (!listener) return listener.error();
+  return over(*std::move(listener));
 }
 
-Server::Server(int fd, int wake_fd, int port) : fd_(fd), wake_fd_(wake_fd), port_(port) {
-  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+std::unique_ptr<Server> Server::over(std::unique_ptr<Listener> listener) {
+  return std::unique_ptr<Server>(new Server(std::move(listener)));
+}
+
+Server::Server(std::unique_ptr<Listener> listener) : listener_(std::move(listener)) {
+  thread_ = OwnedThread([this](const std::stop_token& stop) { run(stop); });
 }
 
 Server::~Server() {
   thread_.request_stop();
-  wake();
-  if (thread_.joinable()) thread_.join();
-  ::close(fd_);
-  ::close(wake_fd_);
-}
-
-void Server::wake() const {
-  const std::uint64_t one = 1;
-  (void)!::write(wake_fd_, &one, sizeof one);
+  listener_->wake();
+  thread_.join();
 }
 
 void Server::publish(const Packet& packet) {
@@ -77,7 +48,7 @@ void Server::publish(const Packet& packet) {
     const std::lock_guard lock(mutex_);
     messages_shed_ += inbox_.push(packet);
   }
-  wake();
+  listener_->wake();
 }
 
 Server::Counters Server::take_counters() {
@@ -89,18 +60,13 @@ Server::Counters Server::take_counters() {
 }
 
 void Server::accept_one() {
-  const int fd = ::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-  if (fd < 0) return;
+  auto link = listener_->accept();
+  if (!link) return;
   if (clients_.size() >= kMostClients) {
     ++clients_shed_;  // before the client can know
-    ::close(fd);
     return;
   }
-  const int on = 1;
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-  // What the kernel holds unsent is no longer ours to shed, and a pose waits behind it.
-  ::setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsentBytes, sizeof kMostUnsentBytes);
-  clients_.emplace_back(fd);
+  clients_.emplace_back(std::move(link));
   if (last_status_) offer(clients_.back(), *last_status_);
   if (last_calibration_) offer(clients_.back(), *last_calibration_);
   if (last_volume_) offer(clients_.back(), *last_volume_);
@@ -161,7 +127,7 @@ void Server::bound_frames() {
 
 void Server::answer(ClientLink& client, const Request& request) {
   if (const auto* ping = std::get_if<ClockPing>(&request)) {
-    const DeviceTime now = monotonic_now();
+    const DeviceTime now = device_now();
     offer(client, pack(ClockPong{ping->host_sent_ns, now, now}));
   } else if (const auto* subscription = std::get_if<Subscription>(&request)) {
     client.take(*subscription);
@@ -177,9 +143,9 @@ void Server::answer(ClientLink& client, const Request& request) {
   }
 }
 
-bool Server::serve(ClientLink& client, short events) {
-  if ((events & (POLLERR | POLLNVAL)) != 0) return false;
-  if ((events & (POLLIN | POLLHUP)) != 0) {
+bool Server::serve(ClientLink& client, const LinkWatch& told) {
+  if (told.broken) return false;
+  if (told.readable) {
     const auto requests = client.receive();
     if (!requests) {
       if (requests.error().code == Errc::bad_format) ++requests_refused_;
@@ -195,24 +161,19 @@ bool Server::serve(ClientLink& client, short events) {
 }
 
 void Server::run(const std::stop_token& stop) {
-  std::vector<pollfd> entries;
+  std::vector<LinkWatch> watches;
   while (!stop.stop_requested()) {
-    entries.assign({{fd_, POLLIN, 0}, {wake_fd_, POLLIN, 0}});
-    for (const ClientLink& client : clients_)
-      entries.push_back({client.fd(), static_cast<short>(client.wants_to_write() ? POLLIN | POLLOUT : POLLIN), 0});
-    if (::poll(entries.data(), entries.size(), 200) < 0) continue;
-    if ((entries[1].revents & POLLIN) != 0) {
-      std::uint64_t count = 0;
-      (void)!::read(wake_fd_, &count, sizeof count);
-    }
+    watches.clear();
+    for (const ClientLink& client : clients_) watches.push_back({&client.link(), client.wants_to_write()});
+    const bool somebody = listener_->wait(watches, Deadline::after(kLook));
     const bool frames = distribute();
-    auto entry = entries.begin() + 2;
-    for (auto client = clients_.begin(); client != clients_.end(); ++entry) {
-      client = serve(*client, entry->revents) ? std::next(client) : put_out(client);
+    auto watch = watches.begin();
+    for (auto client = clients_.begin(); client != clients_.end(); ++watch) {
+      client = serve(*client, *watch) ? std::next(client) : put_out(client);
     }
     if (frames) bound_frames();
     camera_locked_ = std::ranges::any_of(clients_, &ClientLink::locks_camera);
-    if ((entries[0].revents & POLLIN) != 0) accept_one();
+    if (somebody) accept_one();
   }
 }
 

@@ -7,9 +7,10 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "device/wire/client_link.hpp"
+#include "device/wire/link.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::wire {
 
@@ -23,12 +24,14 @@ class Server {
  public:
   /// port: 0 takes any that is free. For a port in use the error names the port and the setting.
   static Result<std::unique_ptr<Server>> listen(const std::string& bind_address, int port);
+  /// The same over whatever links a listener gives.
+  static std::unique_ptr<Server> over(std::unique_ptr<Listener> listener);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   void publish(const Packet& packet);
-  [[nodiscard]] int port() const { return port_; }
+  [[nodiscard]] int port() const { return listener_->port(); }
 
   struct Counters {
     std::uint64_t clients = 0, messages_shed = 0, requests_refused = 0;
@@ -42,7 +45,7 @@ class Server {
   [[nodiscard]] bool camera_locked() const { return camera_locked_; }
 
  private:
-  Server(int fd, int wake_fd, int port);
+  explicit Server(std::unique_ptr<Listener> listener);
   void run(const std::stop_token& stop);
   void accept_one();
   /// Gives published packets to the clients; returns whether there were frames among them.
@@ -53,12 +56,11 @@ class Server {
   void bound_frames();
   /// Bytes of all frames held, each frame counted once however many clients hold it.
   [[nodiscard]] std::size_t frame_bytes_held() const;
-  void wake() const;
   /// Sends to a client and reads from it. False: the client is to be disconnected.
-  bool serve(ClientLink& client, short events);
+  bool serve(ClientLink& client, const LinkWatch& told);
   void answer(ClientLink& client, const Request& request);
 
-  int fd_, wake_fd_, port_;
+  std::unique_ptr<Listener> listener_;
   std::atomic<std::size_t> clients_count_ = 0;
   std::atomic<bool> camera_locked_ = false;
   std::atomic<std::uint64_t> messages_shed_ = 0, clients_shed_ = 0, requests_refused_ = 0;
@@ -68,7 +70,7 @@ class Server {
   std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
   // A new client gets these at once.
   std::optional<Packet> last_status_, last_calibration_, last_volume_;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
 }  // namespace birdseye::wire

@@ -187,13 +187,13 @@ TEST(Server, ASubscriptionLeavesFramesAway) {
 TEST(Client, RelatesTheAppliancesClockToItsOwn) {
   const auto server = *Server::listen("127.0.0.1", 0);
   const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  EXPECT_FALSE(client->host_from_device(monotonic_now()));
-  while (!client->host_from_device(monotonic_now())) {
+  EXPECT_FALSE(client->host_from_device(device_now()));
+  while (!client->host_from_device(device_now())) {
     const auto event = client->next(Clock::now() + milliseconds(20));
     ASSERT_TRUE(event) << event.error().what;
   }
   // Both ends are this machine's clock: what the exchange says must be within what it claims.
-  const DeviceTime now = monotonic_now();
+  const DeviceTime now = device_now();
   const auto related = *client->host_from_device(now);
   EXPECT_LT(std::abs(related.time.ns - now.ns), 4 * related.sigma.ns);
   EXPECT_EQ(client->clock_choice(), "by questions");

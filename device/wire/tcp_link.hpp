@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "device/wire/link.hpp"
+
+namespace birdseye::wire {
+
+/// Tries until the deadline: an appliance that is starting is not an error yet.
+Result<std::unique_ptr<Link>> connect_tcp(const std::string& host, int port, Deadline deadline);
+
+/// port 0 takes any that is free. A port in use is an error that names it and the setting.
+Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, int port);
+
+}  // namespace birdseye::wire
