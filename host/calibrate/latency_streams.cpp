@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <fstream>
 #include <optional>
 #include <set>
@@ -20,11 +19,10 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Frames that wait while others are looked at: a second of them, of which the oldest goes first.
 constexpr std::size_t kMostFramesWaiting = 60;
-constexpr auto kPatience = std::chrono::seconds(15);
+constexpr Duration kPatience = Duration::from_ms(15'000);
+constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
 // A clock of a machine that runs for months would leave too few digits for ppm.
 double seconds_of(DeviceTime time, std::int64_t origin_ns) {
   return static_cast<double>(time.ns - origin_ns) * 1e-9;
@@ -114,20 +112,18 @@ std::string last_line(const std::filesystem::path& log) {
 
 Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress) {
   Gatherer gatherer(source);
-  auto heard = Clock::now();
+  HostTime heard = host_now();
   // Streams that come but tell nothing of this bird, or show no motion, do not last: finish() says why.
-  const auto latest =
-      heard + kPatience +
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(std::max(0.0, source.seconds)));
-  while (source.seconds <= 0 || (gatherer.lasted_s() < source.seconds && Clock::now() < latest)) {
+  const HostTime latest = heard + kPatience + Duration::from_seconds(std::max(0.0, source.seconds));
+  while (source.seconds <= 0 || (gatherer.lasted_s() < source.seconds && host_now() < latest)) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
-    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    auto event = stream.next(Deadline::after(kLook));
     if (!event) {
       if (source.seconds <= 0) break;  // a recording has come to its end
       return event.error();
     }
     if (!*event) {
-      if (Clock::now() - heard > kPatience)
+      if (host_now() - heard > kPatience)
         return Error{Errc::timeout, "the appliance has sent neither poses nor frames for 15 s; see its Health"};
       continue;
     }
@@ -138,7 +134,7 @@ Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& 
     } else {
       continue;
     }
-    heard = Clock::now();
+    heard = host_now();
     progress(source.seconds > 0 ? fmt::format("recording: {:.0f} of {:.0f} s", gatherer.lasted_s(), source.seconds)
                                 : fmt::format("playing: {:.0f} s", gatherer.lasted_s()));
   }
@@ -167,14 +163,14 @@ Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, co
       ChildProcess::start({beside_us("birdseyed"), "--config", config.string(), "--replay", recording.string()}, log);
   if (!birdseyed) return std::move(birdseyed).error();
   // What it refuses, it says at once; what it plays, it plays to whoever is there.
-  auto client = wire::Client::connect("127.0.0.1", *port, Clock::now() + std::chrono::seconds(5));
+  auto client = wire::Client::connect("127.0.0.1", *port, Deadline::after(Duration::from_ms(5000)));
   if (!client) {
-    if (birdseyed->wait(Clock::now())) return Error{Errc::bad_format, last_line(log)};
+    if (birdseyed->wait(host_now())) return Error{Errc::bad_format, last_line(log)};
     return client.error();
   }
   EventStream stream(*std::move(client), kMostFramesWaiting);
   auto streams = gather_streams(stream, source, progress);
-  const auto code = birdseyed->wait(Clock::now() + std::chrono::seconds(2));
+  const auto code = birdseyed->wait(Deadline::after(Duration::from_ms(2000)));
   if (!streams && code && *code != 0) return Error{Errc::bad_format, last_line(log)};
   return streams;
 }

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <system_error>
 
 namespace birdseye::host {
 
 namespace {
-constexpr std::chrono::seconds kEncoderPatience{20};
+constexpr Duration kEncoderPatience = Duration::from_ms(20'000);
 }
 
 Result<Film> Film::open(const std::filesystem::path& path, int width_px, int height_px, double rate_hz) {
@@ -57,12 +56,12 @@ Result<void> Film::add(std::span<const std::uint8_t> rgb) {
     return Error{Errc::bad_value, fmt::format("{}: a frame of {} bytes where the film's are {}", path_.string(),
                                               rgb.size(), frame_bytes_)};
   }
-  return encoder_.write(rgb.data(), rgb.size(), std::chrono::steady_clock::now() + kEncoderPatience);
+  return encoder_.write(rgb.data(), rgb.size(), Deadline::after(kEncoderPatience));
 }
 
 Result<void> Film::finish() {
   encoder_.close_input();
-  const std::optional<int> code = encoder_.wait(std::chrono::steady_clock::now() + kEncoderPatience);
+  const std::optional<int> code = encoder_.wait(Deadline::after(kEncoderPatience));
   std::filesystem::path log = path_;
   log.replace_extension(".ffmpeg.log");
   if (code != 0) {
@@ -91,7 +90,7 @@ Result<FilmReader> FilmReader::open(const std::filesystem::path& path, int width
 Result<std::vector<std::uint8_t>> FilmReader::read(std::size_t index) {
   std::vector<std::uint8_t> rgb(frame_bytes_);
   for (; next_ <= index; ++next_) {
-    const auto got = decoder_.read(rgb.data(), rgb.size(), std::chrono::steady_clock::now() + kEncoderPatience);
+    const auto got = decoder_.read(rgb.data(), rgb.size(), Deadline::after(kEncoderPatience));
     if (!got) return Error{got.error().code, fmt::format("{}: {}", path_.string(), got.error().what)};
     if (*got < rgb.size()) {
       return Error{Errc::bad_format,

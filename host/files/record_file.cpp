@@ -1,11 +1,11 @@
 #include "host/files/record_file.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <ctime>
 #include <fstream>
 #include <sstream>
+
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::host {
 
@@ -29,8 +29,7 @@ Result<std::string> record_with(const std::filesystem::path& path, const RecordE
     if (!read) return read.error();
     record = *std::move(read);
   }
-  const std::string now = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-  entry.enter(record, {now, "birdseye " BIRDSEYE_VERSION, entry.made_from, grade});
+  entry.enter(record, {utc_now(), "birdseye " BIRDSEYE_VERSION, entry.made_from, grade});
   return record_text(record);
 }
 

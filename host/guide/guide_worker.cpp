@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <utility>
 
 namespace birdseye::host {
 
 namespace {
 
-constexpr std::size_t kMostFrames = 50, kMostEvents = 2000, kMostLines = 40;
+constexpr std::size_t kMostLines = 40;
 
 Result<GuidedCalibration> solve(GuidedStations stations, const GuidePlan& plan) {
   GuidedCalibration out;
@@ -35,22 +35,8 @@ GuideWorker::GuideWorker(GuidePlan plan)
     : thread_([this, plan = std::move(plan)](const std::stop_token& stop) { work(stop, plan); }) {}
 
 void GuideWorker::push(const wire::Event& event) {
-  const auto is_frame = [](const wire::Event& e) { return std::holds_alternative<wire::VideoFrame>(e); };
-  if (!is_frame(event) && !std::holds_alternative<wire::Birds>(event)) return;
-  {
-    const std::lock_guard lock(mutex_);
-    if (is_frame(event)) {
-      if (frames_ == kMostFrames) {
-        events_.erase(std::find_if(events_.begin(), events_.end(), is_frame));
-        --frames_;
-      }
-      ++frames_;
-    } else if (events_.size() - frames_ >= kMostEvents) {
-      return;
-    }
-    events_.push_back(event);
-  }
-  changed_.notify_one();
+  if (std::holds_alternative<wire::VideoFrame>(event)) events_.push(kFrames, event);
+  if (std::holds_alternative<wire::Birds>(event)) events_.push(kPoses, event);
 }
 
 void GuideWorker::end(const std::string& why) {
@@ -58,7 +44,7 @@ void GuideWorker::end(const std::string& why) {
     const std::lock_guard lock(mutex_);
     if (end_.empty()) end_ = why;
   }
-  changed_.notify_one();
+  events_.close();
 }
 
 GuideState GuideWorker::state() const {
@@ -83,13 +69,9 @@ void GuideWorker::tell(const std::string& line) {
 }
 
 std::optional<wire::Event> GuideWorker::next(const std::stop_token& stop) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, stop, [this] { return !events_.empty() || !end_.empty(); });
-  if (events_.empty() || !end_.empty()) return std::nullopt;
-  wire::Event event = std::move(events_.front());
-  events_.pop_front();
-  if (std::holds_alternative<wire::VideoFrame>(event)) --frames_;
-  return event;
+  auto event = events_.pop(stop);
+  const std::lock_guard lock(mutex_);
+  return end_.empty() ? std::move(event) : std::nullopt;
 }
 
 void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {

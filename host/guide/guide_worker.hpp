@@ -1,13 +1,13 @@
 #pragma once
 
-#include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "drivers/system/blocking_queue.hpp"
+#include "drivers/system/thread.hpp"
 #include "host/guide/hand_eye_guide.hpp"
 
 namespace birdseye::host {
@@ -41,15 +41,16 @@ class GuideWorker {
   [[nodiscard]] std::optional<wire::Event> next(const std::stop_token& stop);
   void tell(const std::string& line);
 
-  mutable std::mutex mutex_;
-  std::condition_variable_any changed_;
-  std::deque<wire::Event> events_;
-  std::size_t frames_ = 0;
+  enum Lane : std::size_t { kFrames, kPoses, kLanes };
+  static constexpr std::size_t kMostFrames = 50, kMostPoses = 2000;
+
+  BlockingQueue<wire::Event, kLanes> events_{{{{kMostFrames, WhenFull::drop_oldest}, {kMostPoses, WhenFull::refuse}}}};
+  mutable std::mutex mutex_;  // of what follows
   std::string end_;
   GuideState state_;
   std::deque<std::string> lines_;
   std::optional<Result<GuidedCalibration>> result_;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
 }  // namespace birdseye::host

@@ -4,6 +4,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/hand_eye/view_pose.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -14,7 +15,7 @@ namespace {
 
 using calibration::HandEyeStation;
 
-constexpr auto kLookEvery = std::chrono::milliseconds(1500);
+constexpr Duration kLookEvery = Duration::from_ms(1500);
 constexpr std::size_t kFirstSolved = 6;
 // Nearer than this to a station, another tells nothing new: a tracker repeats its error there.
 constexpr double kSamePlaceMm = 4, kSameTurnRad = 2.5 * kRadPerDeg;
@@ -58,7 +59,7 @@ Result<void> HandEyeGuide::take(const wire::Event& event) {
     if (auto added = add(*std::move(station)); !added) return added;
   }
   if (const std::string remark = stations_.take_remark(); !remark.empty()) tell_.lasting(remark);
-  if (Clock::now() > next_look_) look();
+  if (host_now() > next_look_) look();
   return {};
 }
 
@@ -169,7 +170,7 @@ std::optional<Transform<Camera, Marker>> HandEyeGuide::pose_of(const calibration
 
 /// What is covered, and the next best pose from where the scope is.
 void HandEyeGuide::look() {
-  next_look_ = Clock::now() + kLookEvery;
+  next_look_ = host_now() + kLookEvery;
   if (stations_.deciding() || session_.width_px == 0) return;
   if (!session_.input.camera) {
     state_.next =

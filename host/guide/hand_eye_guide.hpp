@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -70,8 +69,6 @@ class HandEyeGuide {
   [[nodiscard]] const GuideState& state() const { return state_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   Result<void> take_frame(const wire::VideoFrame& frame);
   Result<void> add(LiveStation taken);
   Result<void> keep(const LiveStation& taken, std::size_t number);
@@ -83,7 +80,7 @@ class HandEyeGuide {
   GuidePlan plan_;
   Teller tell_;
   LiveStations stations_;
-  Clock::time_point next_look_{};
+  HostTime next_look_;
   Eigen::Vector3d extent_mm_;
   GuidedStations session_;
   GuideState state_;

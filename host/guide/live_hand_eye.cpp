@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/link/appliance_link.hpp"
 #include "host/link/event_stream.hpp"
@@ -10,9 +11,8 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = wire::Client::Clock;
-
-constexpr auto kSilence = std::chrono::seconds(6);
+constexpr Duration kSilence = Duration::from_ms(6000);
+constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
 
 /// Whether frames and the scope's poses come, and what the appliance says of it if not.
 class Silence {
@@ -20,13 +20,13 @@ class Silence {
   explicit Silence(const LivePlan& plan) : plan_(plan) {}
 
   void hear(const wire::Event& event) {
-    if (std::holds_alternative<wire::VideoFrame>(event)) heard_ = Clock::now();
+    if (std::holds_alternative<wire::VideoFrame>(event)) heard_ = host_now();
     if (const auto* status = std::get_if<wire::Status>(&event)) status_ = status->text;
     const auto* birds = std::get_if<wire::Birds>(&event);
     if (birds == nullptr) return;
     for (const wire::Bird& bird : birds->birds) {
       if (bird.name == plan_.guide.bird) {
-        posed_ = Clock::now();
+        posed_ = host_now();
       } else if (others_.find(bird.name) == std::string::npos) {
         others_ += (others_.empty() ? "" : ", ") + bird.name;
       }
@@ -34,12 +34,12 @@ class Silence {
   }
 
   [[nodiscard]] Result<void> check() const {
-    const auto seconds = kSilence / std::chrono::seconds(1);
-    if (Clock::now() - heard_ > kSilence) {
+    const std::int64_t seconds = kSilence.ns / 1'000'000'000;
+    if (host_now() - heard_ > kSilence) {
       return Error{Errc::timeout, fmt::format("{}: no frame has come for {} s{}{}", plan_.server, seconds,
                                               status_.empty() ? "" : ": ", status_)};
     }
-    if (Clock::now() - posed_ > kSilence) {
+    if (host_now() - posed_ > kSilence) {
       return Error{Errc::timeout, fmt::format("{}: no pose of \"{}\" has come for {} s{}{}", plan_.server,
                                               plan_.guide.bird, seconds, others_.empty() ? "" : "; there is " + others_,
                                               status_.empty() ? "" : "; it says: " + status_)};
@@ -49,7 +49,7 @@ class Silence {
 
  private:
   const LivePlan& plan_;
-  Clock::time_point heard_ = Clock::now(), posed_ = heard_;
+  HostTime heard_ = host_now(), posed_ = heard_;
   std::string status_, others_;
 };
 
@@ -57,11 +57,10 @@ Result<GuidedStations> lead(const LivePlan& plan, EventStream& stream, Progress&
   HandEyeGuide guide(plan.guide, {[&](const std::string& line) { progress(line); },
                                   [&](const std::string& line) { progress.keep(line); }});
   Silence silence(plan);
-  const auto ends =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(plan.seconds));
+  const HostTime ends = host_now() + Duration::from_seconds(plan.seconds);
   std::string said;
   while (!guide.ended()) {
-    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    auto event = stream.next(Deadline::after(kLook));
     if (!event) return event.error();
     if (*event) {
       silence.hear(**event);
@@ -73,7 +72,7 @@ Result<GuidedStations> lead(const LivePlan& plan, EventStream& stream, Progress&
     }
     if (const auto heard = silence.check(); !heard) return heard.error();
     if (interrupted()) guide.end("interrupted");
-    if (Clock::now() > ends) guide.end(fmt::format("{:g} s are over", plan.seconds));
+    if (host_now() > ends) guide.end(fmt::format("{:g} s are over", plan.seconds));
   }
   return guide.finish();
 }
@@ -85,7 +84,7 @@ Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) 
   auto client = connect_appliance(plan.server);
   if (!client) return client.error();
   // Focus or exposure that changes from view to view would be another lens.
-  if (const auto locked = (*client)->lock_camera(true, Clock::now() + std::chrono::seconds(2)); !locked)
+  if (const auto locked = (*client)->lock_camera(true, Deadline::after(Duration::from_ms(2000))); !locked)
     return locked.error();
   note_interrupts();
   EventStream stream(*std::move(client), 60);

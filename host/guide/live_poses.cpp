@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/link/appliance_link.hpp"
 
@@ -13,15 +14,15 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = wire::Client::Clock;
-constexpr auto kSilence = std::chrono::seconds(5);
+constexpr Duration kSilence = Duration::from_ms(5000);
+constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
 
 }  // namespace
 
 Result<PoseSet> collect_poses(const std::string& server, const std::string& bird, double seconds, Progress& progress) {
   auto client = connect_appliance(server);
   if (!client) return client.error();
-  if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Clock::now() + kSilence); !done)
+  if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(kSilence)); !done)
     return done.error();
   note_interrupts();
   PoseSet set;
@@ -30,13 +31,13 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
   std::string status;
   std::size_t index = 0;
   std::optional<DeviceTime> first;
-  auto heard = Clock::now();
+  HostTime heard = host_now();
   for (double since_s = 0; since_s < seconds && !interrupted();) {
-    const auto event = (*client)->next(Clock::now() + std::chrono::milliseconds(200));
+    const auto event = (*client)->next(Deadline::after(kLook));
     if (!event) return event.error();
-    if (Clock::now() - heard > kSilence) {
+    if (host_now() - heard > kSilence) {
       return Error{Errc::timeout,
-                   fmt::format("{}: no pose of \"{}\" for {} s{}{}", server, bird, kSilence / std::chrono::seconds(1),
+                   fmt::format("{}: no pose of \"{}\" for {} s{}{}", server, bird, kSilence.ns / 1'000'000'000,
                                others.empty() ? "" : fmt::format("; it tells of {}", fmt::join(others, ", ")),
                                status.empty() ? "" : "; it says: " + status)};
     }
@@ -50,7 +51,7 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
         others.insert(one.name);
         continue;
       }
-      heard = Clock::now();
+      heard = host_now();
       if (!first) first = birds->acquired;
       since_s = (birds->acquired - *first).seconds();
       set.poses.push_back({fmt::format("pose {}", index), index - 1, since_s, since_s, one.tracker_from_sensor});

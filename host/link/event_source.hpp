@@ -1,10 +1,10 @@
 #pragma once
 
-#include <chrono>
 #include <optional>
 
 #include "calibration/base/result.hpp"
 #include "device/wire/messages.hpp"
+#include "drivers/system/clock.hpp"
 
 namespace birdseye::host {
 
@@ -13,7 +13,7 @@ class EventSource {
  public:
   virtual ~EventSource() = default;
   /// The next event; empty at the deadline; Errc::disconnected once the source has ended and all its events are taken.
-  virtual Result<std::optional<wire::Event>> next(std::chrono::steady_clock::time_point deadline) = 0;
+  virtual Result<std::optional<wire::Event>> next(Deadline deadline) = 0;
 };
 
 }  // namespace birdseye::host

@@ -1,23 +1,28 @@
 #include "host/link/event_stream.hpp"
 
-#include <algorithm>
+#include <utility>
 
 #include "device/wire/clock_discipline.hpp"
 
 namespace birdseye::host {
 
+namespace {
+constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
+}
+
 EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
-    : client_(std::move(client)), most_frames_(most_frames) {
-  thread_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
+    : client_(std::move(client)),
+      events_(
+          {{{most_frames, WhenFull::drop_oldest}, {kMostOthers, WhenFull::refuse}, {kMostOthers, WhenFull::refuse}}}) {
+  thread_ = OwnedThread([this](const std::stop_token& stop) { read(stop); });
 }
 
 void EventStream::read(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    auto event = client_->next(wire::Client::Clock::now() + std::chrono::milliseconds(100));
+    auto event = client_->next(Deadline::after(kLook));
     const bool ended = !event;
     if (!ended && *event && std::holds_alternative<wire::Health>(**event)) {
-      if (const auto clock = wire::read_clock_discipline())
-        client_->use_discipline(*clock, wire::wall_minus_monotonic());
+      if (const auto clock = wire::read_clock_discipline()) client_->use_discipline(*clock, wall_minus_monotonic());
     }
     const std::optional<ClockGap> gap = ended || !*event ? std::nullopt : gap_at(**event);
     std::string words = client_->peer_words();
@@ -25,14 +30,16 @@ void EventStream::read(const std::stop_token& stop) {
       const std::lock_guard lock(mutex_);
       if (gap) gap_ = gap;
       peer_words_ = std::move(words);
-      if (ended) {
-        ended_ = event.error();
-      } else if (*event) {
-        keep(**std::move(event));
-      }
+      if (ended) ended_ = event.error();
     }
-    changed_.notify_one();
-    if (ended) return;
+    if (ended) {
+      events_.close();
+      return;
+    }
+    if (*event) {
+      const Lane lane = lane_of(**event);
+      events_.push(lane, **std::move(event));
+    }
   }
 }
 
@@ -54,30 +61,16 @@ std::string EventStream::peer_words() const {
   return peer_words_;
 }
 
-void EventStream::keep(wire::Event event) {
-  const auto is_frame = [](const wire::Event& e) { return std::holds_alternative<wire::VideoFrame>(e); };
-  if (is_frame(event)) {
-    if (frames_ == most_frames_) {
-      events_.erase(std::find_if(events_.begin(), events_.end(), is_frame));
-      --frames_;
-    }
-    ++frames_;
-  } else if (events_.size() - frames_ >= kMostOthers) {
-    return;
-  }
-  events_.push_back(std::move(event));
+EventStream::Lane EventStream::lane_of(const wire::Event& event) {
+  if (std::holds_alternative<wire::VideoFrame>(event)) return kFrames;
+  return std::holds_alternative<wire::Birds>(event) ? kPoses : kOthers;
 }
 
-Result<std::optional<wire::Event>> EventStream::next(wire::Client::Clock::time_point deadline) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_until(lock, deadline, [this] { return !events_.empty() || ended_.has_value(); });
-  if (events_.empty()) {
-    if (ended_) return *ended_;
-    return std::optional<wire::Event>();
-  }
-  std::optional<wire::Event> event = std::move(events_.front());
-  events_.pop_front();
-  if (std::holds_alternative<wire::VideoFrame>(*event)) --frames_;
-  return event;
+Result<std::optional<wire::Event>> EventStream::next(Deadline deadline) {
+  auto event = events_.pop(deadline);
+  if (event || !events_.finished()) return event;
+  const std::lock_guard lock(mutex_);
+  return *ended_;
 }
+
 }  // namespace birdseye::host

@@ -7,8 +7,8 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <thread>
 
+#include "drivers/system/wait.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/recording/recording_writer.hpp"
 
@@ -17,7 +17,6 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 /// "StylusToTracker" -> "stylus".
 std::string bird_name(std::string transform) {
@@ -224,20 +223,20 @@ Result<bool> RecordingReader::fetch_next() {
   }
 }
 
-Clock::time_point RecordingReader::due(const wire::Event& event) {
+std::optional<HostTime> RecordingReader::due(const wire::Event& event) {
   const auto time = time_of(event);
   if (!first_ && time) {
     first_ = last_ = time;
-    began_ = Clock::now();
-    return Clock::time_point::min();
+    began_ = host_now();
+    return std::nullopt;
   }
   if (time) last_ = std::max(*last_, *time);
-  if (!last_ || settings_.speed <= 0) return Clock::time_point::min();
+  if (!last_ || settings_.speed <= 0) return std::nullopt;
   const double since_s = (*last_ - *first_).seconds() / settings_.speed;
-  return began_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(since_s));
+  return began_ + Duration::from_seconds(since_s);
 }
 
-Result<std::optional<wire::Event>> RecordingReader::next(Clock::time_point deadline) {
+Result<std::optional<wire::Event>> RecordingReader::next(Deadline deadline) {
   if (ended_) return *ended_;
   if (!waiting_) {
     const auto fetched = fetch_next();
@@ -246,9 +245,10 @@ Result<std::optional<wire::Event>> RecordingReader::next(Clock::time_point deadl
       return *ended_;
     }
   }
-  const auto when = due(*waiting_);
-  std::this_thread::sleep_until(std::min(when, deadline));
-  if (when > deadline) return std::optional<wire::Event>();
+  if (const auto when = due(*waiting_)) {
+    sleep_until(std::min(Deadline(*when), deadline));
+    if (Deadline(*when) > deadline) return std::optional<wire::Event>();
+  }
   return std::exchange(waiting_, std::nullopt);
 }
 

@@ -30,7 +30,7 @@ class RecordingReader : public EventSource {
 
   /// The next event. Errc::disconnected at the recording's end, with words that say how many frames there were. Any
   /// other error: the recording is damaged.
-  Result<std::optional<wire::Event>> next(std::chrono::steady_clock::time_point deadline) override;
+  Result<std::optional<wire::Event>> next(Deadline deadline) override;
   /// What is odd about the recording, in words: it was cut short, and so on.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   [[nodiscard]] std::size_t frames() const { return frames_; }            ///< given so far
@@ -46,7 +46,8 @@ class RecordingReader : public EventSource {
   Result<bool> fetch_next();
   Result<bool> fetch_pixels(wire::VideoFrame& frame, const FramePlace& place);
   Result<void> open_video(const std::string& name, const wire::VideoFrame& frame);
-  [[nodiscard]] std::chrono::steady_clock::time_point due(const wire::Event& event);
+  /// When it is to be given; empty: as soon as it is asked for.
+  [[nodiscard]] std::optional<HostTime> due(const wire::Event& event);
   [[nodiscard]] Error end() const;
 
   std::filesystem::path path_;
@@ -61,7 +62,7 @@ class RecordingReader : public EventSource {
   std::deque<EventOfLine> made_;
   std::optional<wire::Event> waiting_;  ///< until it is due
   std::optional<DeviceTime> first_, last_;
-  std::chrono::steady_clock::time_point began_{};
+  HostTime began_;
   std::size_t frames_ = 0, frames_lost_ = 0;
   std::vector<std::string> notes_;
   std::optional<Error> ended_;

@@ -1,13 +1,12 @@
 #include "host/recording/recording_writer.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/clock.hpp"
 #include "host/files/sequence_header.hpp"
 #include "host/files/write_files.hpp"
 
@@ -235,7 +234,7 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
                 {"clock", {{"stamps", "the appliance's CLOCK_MONOTONIC, ns; in the sequences s"}}},
                 {"notes", notes_}};
   if (ended) {
-    sheet["made_utc"] = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+    sheet["made_utc"] = utc_now();
     sheet["seconds"] = figures_.seconds();
     sheet["frames"] = figures_.frames;
     sheet["frames_missing"] = figures_.frames_missing;

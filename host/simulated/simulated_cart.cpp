@@ -14,7 +14,7 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
 
 Result<CartSheet> read_sheet(const std::filesystem::path& path) {
   std::ifstream in(path);
@@ -79,9 +79,9 @@ Result<void> SimulatedCart::make_patient(const SimulatedCartSettings& settings) 
   auto child = ChildProcess::start(command, log);
   if (!child) return std::move(child).error();
   std::optional<int> code;
-  for (const auto deadline = Clock::now() + std::chrono::seconds(60);
-       !code && Clock::now() < deadline && !interrupted();) {
-    code = child->wait(Clock::now() + std::chrono::milliseconds(200));
+  for (const Deadline deadline = Deadline::after(Duration::from_ms(60'000));
+       !code && !deadline.passed() && !interrupted();) {
+    code = child->wait(Deadline::after(kLook));
   }
   if (code == 0) return {};
   if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
@@ -136,7 +136,7 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (!settings.faults.empty()) command.insert(command.end(), {"--faults", settings.faults.string()});
   auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child);
   if (!simulator) return std::move(simulator).error();
-  const auto line = simulator->read_line(Clock::now() + std::chrono::seconds(30));
+  const auto line = simulator->read_line(Deadline::after(Duration::from_ms(30'000)));
   if (!line) return line.error();
   if (!*line || line->value().find("\"ready\"") == std::string::npos) {
     return Error{Errc::timeout, "birdseye-sim: not ready within 30 s; see simulator.log"};
@@ -159,19 +159,19 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
 
 SimulatedCart::SimulatedCart(ChildProcess simulator, CartSheet sheet, int port)
     : simulator_(std::move(simulator)), sheet_(std::move(sheet)), port_(port) {
-  listener_ = std::jthread([this](const std::stop_token& stop) { listen(stop); });
+  listener_ = OwnedThread([this](const std::stop_token& stop) { listen(stop); });
 }
 
 SimulatedCart::~SimulatedCart() {
   listener_.request_stop();
-  if (listener_.joinable()) listener_.join();
+  listener_.join();
   if (appliance_) appliance_->stop();
   simulator_.stop();
 }
 
 void SimulatedCart::listen(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    auto line = simulator_.read_line(Clock::now() + std::chrono::milliseconds(100));
+    auto line = simulator_.read_line(Deadline::after(kLook));
     if (!line) {
       const std::lock_guard lock(mutex_);
       if (stages_.empty() || stages_.back().name != "end") failure_ = line.error().what;
@@ -195,9 +195,9 @@ std::string SimulatedCart::failure() const {
   return failure_;
 }
 
-Result<void> SimulatedCart::finish(Clock::time_point deadline) {
+Result<void> SimulatedCart::finish(Deadline deadline) {
   listener_.request_stop();
-  if (listener_.joinable()) listener_.join();
+  listener_.join();
   const std::optional<int> code = simulator_.wait(deadline);
   if (!code) return Error{Errc::timeout, "birdseye-sim: did not end; see simulator.log"};
   if (*code != 0) return Error{Errc::io, fmt::format("birdseye-sim: ended with code {}; see simulator.log", *code)};

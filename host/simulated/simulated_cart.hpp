@@ -1,11 +1,9 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <Eigen/Core>
@@ -14,6 +12,7 @@
 #include "calibration/time/clock.hpp"
 #include "drivers/system/child_process.hpp"
 #include "drivers/system/local_programs.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::host {
 
@@ -66,7 +65,7 @@ class SimulatedCart {
   /// Why the simulator ended early, if it did.
   [[nodiscard]] std::string failure() const;
   /// Waits for the simulator to end of its own, so that its truth is whole.
-  Result<void> finish(std::chrono::steady_clock::time_point deadline);
+  Result<void> finish(Deadline deadline);
 
  private:
   SimulatedCart(ChildProcess simulator, CartSheet sheet, int port);
@@ -80,7 +79,7 @@ class SimulatedCart {
   mutable std::mutex mutex_;
   std::vector<CartStage> stages_;
   std::string failure_;
-  std::jthread listener_;
+  OwnedThread listener_;
 };
 
 }  // namespace birdseye::host
