@@ -4,11 +4,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/calibration/latency/latency_streams.hpp"
 #include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/latency_streams.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {

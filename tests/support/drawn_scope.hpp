@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibration/base/units.hpp"
-#include "tests/calibration/detect/rendered_board.hpp"
+#include "tests/support/rendered_board.hpp"
 
 namespace birdseye::testing {
 

@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/detect/detect.hpp"
-#include "tests/calibration/detect/rendered_board.hpp"
+#include "tests/support/rendered_board.hpp"
 
 namespace birdseye::calibration {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "calibration/detect/detect.hpp"
-#include "tests/calibration/detect/rendered_board.hpp"
+#include "tests/support/rendered_board.hpp"
 
 namespace birdseye::calibration {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/points/point_fit.hpp"
-#include "tests/calibration/field/simulated_field.hpp"
+#include "tests/support/simulated_field.hpp"
 
 namespace birdseye::testing {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/field/field_fit.hpp"
-#include "tests/calibration/field/simulated_field.hpp"
+#include "tests/support/simulated_field.hpp"
 
 namespace birdseye::calibration {
 namespace {

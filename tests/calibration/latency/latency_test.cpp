@@ -7,8 +7,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "tests/calibration/latency/latency_streams.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/latency_streams.hpp"
 
 namespace birdseye::calibration {
 namespace {

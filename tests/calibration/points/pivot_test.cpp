@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "tests/calibration/points/simulated_pointer.hpp"
+#include "tests/support/simulated_pointer.hpp"
 
 namespace birdseye::calibration {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include "tests/calibration/points/simulated_pointer.hpp"
+#include "tests/support/simulated_pointer.hpp"
 
 namespace birdseye::calibration {
 namespace {

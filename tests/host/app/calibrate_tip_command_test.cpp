@@ -6,10 +6,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/calibration/points/simulated_pointer.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/simulated_pointer.hpp"
 
 namespace birdseye {
 namespace {

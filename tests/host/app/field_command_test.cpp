@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
-#include "tests/calibration/field/simulated_field.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/simulated_field.hpp"
 
 namespace birdseye {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/calibration/detect/rendered_board.hpp"
+#include "tests/support/rendered_board.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
