@@ -260,6 +260,11 @@ TEST(WindowFaults, NoStaleOrWrongOverlayIsOnTheScreen) {
   expect_complete(tracker, camera);
   for (int attempt = 0; attempt < kAttempts && tracker.size() + camera.size() > 0; ++attempt) {
     fmt::print("attempt {}: {} faults\n", attempt + 1, tracker.size() + camera.size());
+    for (const auto* faults : {&tracker, &camera}) {
+      for (const WindowFault& each : *faults) {
+        if (attempt > 0) fmt::print("tried again: {} {}\n", each.fault.name, each.fault.parameters);
+      }
+    }
     inject(tracker, camera);
   }
 }
