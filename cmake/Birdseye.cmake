@@ -1,6 +1,9 @@
 # birdseye_library(name SOURCES ... PUBLIC libs... PRIVATE libs...), birdseye_executable(...), birdseye_test(...):
 # our own targets, with the warnings and sanitizers that all of them share. Libraries are static.
 
+# The target all_verify_interface_header_sets compiles each header of a library alone, with what the library links PUBLIC.
+set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
+
 add_library(birdseye_options INTERFACE)
 target_compile_options(birdseye_options INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Werror
@@ -11,11 +14,15 @@ if(BIRDSEYE_SANITIZE)
   target_link_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE})
 endif()
 
+# The library's headers are those of its folder; NOT_ALONE names headers that are parts of one .cpp file and not for others.
 function(birdseye_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;NOT_ALONE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} birdseye_options)
-  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  file(GLOB headers CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.hpp)
+  list(TRANSFORM ARG_NOT_ALONE PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  list(REMOVE_ITEM headers ${ARG_NOT_ALONE})
+  target_sources(${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${CMAKE_SOURCE_DIR} FILES ${headers})
 endfunction()
 
 function(birdseye_executable name)

@@ -112,7 +112,7 @@ def read_build(root):
                 target = targets.setdefault(words[0], Target(words[0], here, kind))
                 part = "SOURCES"
                 for word in words[1:]:
-                    if word in ("SOURCES", "PUBLIC", "PRIVATE", "LABEL", "TIMEOUT", "HEADERS"):
+                    if re.fullmatch("[A-Z_]+", word):
                         part = word
                     elif part == "SOURCES" and word.endswith(CODE):
                         path = word.replace("${CMAKE_SOURCE_DIR}/", "") if "$" in word else f"{here}/{word}"
