@@ -76,10 +76,8 @@ Result<NewRecordFile> create_record_file(const RecordConfig& config) {
     os_errno = errno;
     if (os_errno == EEXIST) path = config.folder / fmt::format("{}-{}.berec", name, i);
   }
-  return Error{Errc::unreadable,
-               fmt::format("{}: cannot be written ({}); see [record] folder and its permissions", path.string(),
-                           words(os_errno)),
-               os_errno};
+  return Error{Errc::unreadable, fmt::format("{}: cannot be written ({}); see [record] folder and its permissions",
+                                             path.string(), words(os_errno))};
 }
 
 /// What the thread and its recorder share. A thread that hangs keeps it, and nothing else of the program: not even the
@@ -134,7 +132,7 @@ Result<std::filesystem::path> Recorder::Writer::begin() {
   if (failed == 0) return created->path;
   std::error_code ignored;
   std::filesystem::remove(created->path, ignored);
-  return Error{Errc::io, fmt::format("{}: cannot be written ({})", created->path.string(), words(failed)), failed};
+  return Error{Errc::io, fmt::format("{}: cannot be written ({})", created->path.string(), words(failed))};
 }
 
 void Recorder::Writer::run() {

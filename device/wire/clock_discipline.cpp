@@ -28,8 +28,7 @@ Result<ClockDiscipline> read_clock_discipline() {
   timex reading{};
   const int state = ::adjtimex(&reading);
   if (state < 0) {
-    return Error{Errc::io, fmt::format("adjtimex: {}; clocks are related by exchanges only", std::strerror(errno)),
-                 errno};
+    return Error{Errc::io, fmt::format("adjtimex: {}; clocks are related by exchanges only", std::strerror(errno))};
   }
   return decode_discipline(reading, state);
 }

@@ -61,17 +61,16 @@ std::string names_of(gpiod_chip* chip) {
 Result<Chip> open_chip(const std::string& name) {
   if (name.empty()) return Error{Errc::bad_value, "[gpio] chip: give /dev/gpiochipN, its name or its label"};
   if (Chip chip{gpiod_chip_open_lookup(name.c_str())}) return chip;
-  switch (const int error = errno) {
+  switch (errno) {
     case EACCES:
     case EPERM:
-      return Error{Errc::unreadable, fmt::format("{}: may not be opened; add this user to the group gpio", name),
-                   error};
+      return Error{Errc::unreadable, fmt::format("{}: may not be opened; add this user to the group gpio", name)};
     case ENOENT:
     case ENODEV:
     case ENXIO:
-      return Error{Errc::not_found, fmt::format("{}: no such GPIO chip; see [gpio] chip and gpiodetect", name), error};
+      return Error{Errc::not_found, fmt::format("{}: no such GPIO chip; see [gpio] chip and gpiodetect", name)};
     default:
-      return Error{Errc::unsupported, fmt::format("{}: is no GPIO chip; see [gpio] chip and gpiodetect", name), error};
+      return Error{Errc::unsupported, fmt::format("{}: is no GPIO chip; see [gpio] chip and gpiodetect", name)};
   }
 }
 
@@ -107,7 +106,7 @@ class KernelGpioLines final : public GpioLines {
   [[nodiscard]] Result<void> still_there() const;
   Result<void> set(gpiod_line* line, bool on);
   [[nodiscard]] Error gone() const {
-    return {Errc::disconnected, fmt::format("{}: the GPIO chip has gone; was it unplugged?", name_), errno};
+    return {Errc::disconnected, fmt::format("{}: the GPIO chip has gone; was it unplugged?", name_)};
   }
 
   Chip chip_;
@@ -142,20 +141,16 @@ Result<void> KernelGpioLines::request_line(gpiod_line* line, const char* purpose
   if (error == ENODEV) return gone();
   if (error == EBUSY) {
     const char* who = gpiod_line_consumer(line);
-    return Error{Errc::in_use,
-                 fmt::format("{}: line {} for [gpio] {} is held by {}", name_, wanted, purpose,
-                             who == nullptr ? "another program" : who),
-                 error};
+    return Error{Errc::in_use, fmt::format("{}: line {} for [gpio] {} is held by {}", name_, wanted, purpose,
+                                           who == nullptr ? "another program" : who)};
   }
   if (error == EACCES || error == EPERM) {
-    return Error{Errc::unreadable, fmt::format("{}: line {} for [gpio] {} is not allowed", name_, wanted, purpose),
-                 error};
+    return Error{Errc::unreadable, fmt::format("{}: line {} for [gpio] {} is not allowed", name_, wanted, purpose)};
   }
   return Error{
       Errc::unsupported,
       fmt::format("{}: line {} cannot be used for [gpio] {}: no interrupts, no such bias, or of the other direction",
-                  name_, wanted, purpose),
-      error};
+                  name_, wanted, purpose)};
 }
 
 Result<void> KernelGpioLines::request_input(GpioInput input, const std::string& wanted, bool active_low,
@@ -270,7 +265,7 @@ Result<std::vector<GpioEdge>> KernelGpioLines::read(Deadline deadline) {
 Result<void> KernelGpioLines::set(gpiod_line* line, bool on) {
   if (line == nullptr || gpiod_line_set_value(line, on ? 1 : 0) == 0) return {};
   if (errno == ENODEV) return gone();
-  return Error{Errc::io, fmt::format("{}: an output cannot be set", name_), errno};
+  return Error{Errc::io, fmt::format("{}: an output cannot be set", name_)};
 }
 
 }  // namespace

@@ -291,25 +291,22 @@ Error usb_error(const std::string& name, int libusb_code, const char* doing) {
       return {Errc::unreadable,
               fmt::format("{}: no permission; install packaging/60-birdseye.rules under /etc/udev/rules.d, add this "
                           "user to the group dialout and plug the adapter in again",
-                          name),
-              libusb_code};
+                          name)};
     case LIBUSB_ERROR_BUSY:
-      return {Errc::in_use, fmt::format("{}: held by another program; stop that one first", name), libusb_code};
+      return {Errc::in_use, fmt::format("{}: held by another program; stop that one first", name)};
     case LIBUSB_ERROR_NO_DEVICE:
     case LIBUSB_ERROR_NOT_FOUND:
-      return {Errc::disconnected, fmt::format("{}: the adapter is gone; was it unplugged?", name), libusb_code};
+      return {Errc::disconnected, fmt::format("{}: the adapter is gone; was it unplugged?", name)};
     case LIBUSB_ERROR_IO:
     case LIBUSB_ERROR_OVERFLOW:
-      return {Errc::disconnected, fmt::format("{}: the bus fails; check the cable and the hub", name), libusb_code};
+      return {Errc::disconnected, fmt::format("{}: the bus fails; check the cable and the hub", name)};
     case LIBUSB_ERROR_TIMEOUT:
-      return {Errc::timeout, fmt::format("{}: the adapter does not react; unplug it and plug it in again", name),
-              libusb_code};
+      return {Errc::timeout, fmt::format("{}: the adapter does not react; unplug it and plug it in again", name)};
     case LIBUSB_ERROR_PIPE:
-      return {Errc::unsupported, fmt::format("{}: the adapter refuses what was asked of it", name), libusb_code};
+      return {Errc::unsupported, fmt::format("{}: the adapter refuses what was asked of it", name)};
     default:
       return {Errc::io,
-              fmt::format("{}: cannot {}: {}", name, doing, libusb_strerror(static_cast<libusb_error>(libusb_code))),
-              libusb_code};
+              fmt::format("{}: cannot {}: {}", name, doing, libusb_strerror(static_cast<libusb_error>(libusb_code)))};
   }
 }
 

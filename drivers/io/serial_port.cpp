@@ -36,14 +36,14 @@ Error open_error(const std::string& name, int failed) {
     case ENODEV:
     case ENXIO:
       return {Errc::not_found,
-              fmt::format("{}: no such device; is the tracker plugged in and [tracker] device right?", name), failed};
+              fmt::format("{}: no such device; is the tracker plugged in and [tracker] device right?", name)};
     case EACCES:
     case EPERM:
-      return {Errc::unreadable, fmt::format("{}: no permission; add this user to the group dialout", name), failed};
+      return {Errc::unreadable, fmt::format("{}: no permission; add this user to the group dialout", name)};
     case EBUSY:
-      return {Errc::in_use, fmt::format("{}: held by another program; stop that one first", name), failed};
+      return {Errc::in_use, fmt::format("{}: held by another program; stop that one first", name)};
     default:
-      return {Errc::io, fmt::format("{}: cannot be opened (error {})", name, failed), failed};
+      return {Errc::io, fmt::format("{}: cannot be opened (error {})", name, failed)};
   }
 }
 
@@ -84,14 +84,14 @@ Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path
   if (!fd) return open_error(name, errno);
   termios settings{};
   if (::tcgetattr(fd.get(), &settings) != 0) {
-    return Error{Errc::bad_value, fmt::format("{}: is not a serial port; see [tracker] device", name), errno};
+    return Error{Errc::bad_value, fmt::format("{}: is not a serial port; see [tracker] device", name)};
   }
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) return open_error(name, EBUSY);
   // Against programs that do not lock, too.
   if (!is_pseudo_terminal(fd.get())) ::ioctl(fd.get(), TIOCEXCL);
   settings = raw_settings(settings, *speed);
   if (::tcsetattr(fd.get(), TCSANOW, &settings) != 0 || ::tcgetattr(fd.get(), &settings) != 0) {
-    return Error{Errc::io, fmt::format("{}: does not take {} baud, 8N1", name, baud), errno};
+    return Error{Errc::io, fmt::format("{}: does not take {} baud, 8N1", name, baud)};
   }
   std::unique_ptr<SerialPort> port(new SerialPort(std::move(fd), name));
   port->set_rts(false);
@@ -104,7 +104,7 @@ Result<std::unique_ptr<SerialPort>> SerialPort::open(const std::filesystem::path
 }
 
 Error SerialPort::gone() const {
-  return {Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_), errno};
+  return {Errc::disconnected, fmt::format("{}: the line is gone; was it unplugged?", name_)};
 }
 
 std::optional<std::uint64_t> SerialPort::overruns() const {

@@ -56,18 +56,16 @@ Error connect_error(const std::string& name, int failed) {
   switch (failed) {
     case ECONNREFUSED:
     case ENOENT:
-      return {Errc::not_found, fmt::format("{}: nothing listens there; is it on, and is that its port?", name), failed};
+      return {Errc::not_found, fmt::format("{}: nothing listens there; is it on, and is that its port?", name)};
     case ETIMEDOUT:
     case EHOSTUNREACH:
     case ENETUNREACH:
-      return {Errc::timeout, fmt::format("{}: does not answer; check its power, the network and the address", name),
-              failed};
+      return {Errc::timeout, fmt::format("{}: does not answer; check its power, the network and the address", name)};
     case EACCES:
     case EPERM:
-      return {Errc::unreadable, fmt::format("{}: no permission to connect; see the socket's owner and mode", name),
-              failed};
+      return {Errc::unreadable, fmt::format("{}: no permission to connect; see the socket's owner and mode", name)};
     default:
-      return {Errc::io, fmt::format("{}: cannot be connected to: {}", name, std::strerror(failed)), failed};
+      return {Errc::io, fmt::format("{}: cannot be connected to: {}", name, std::strerror(failed))};
   }
 }
 
@@ -133,8 +131,7 @@ Error SocketLine::gone(int failed) const {
   return {Errc::disconnected,
           failed == ETIMEDOUT
               ? fmt::format("{}: the other side has fallen silent; check the network and its power", name_)
-              : fmt::format("{}: the other side has closed the line", name_),
-          failed};
+              : fmt::format("{}: the other side has closed the line", name_)};
 }
 
 Result<std::size_t> SocketLine::read(std::span<std::uint8_t> into, Deadline deadline) {

@@ -25,7 +25,7 @@ constexpr Duration kGrace = Duration::from_ms(2000);  // to end by itself, once 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, const std::filesystem::path& log,
                                          Pipe pipe, Signals signals) {
   int fds[2] = {-1, -1};
-  if (pipe != Pipe::none && ::pipe2(fds, O_CLOEXEC) != 0) return Error{Errc::io, "pipe: no descriptors left", errno};
+  if (pipe != Pipe::none && ::pipe2(fds, O_CLOEXEC) != 0) return Error{Errc::io, "pipe: no descriptors left"};
   const bool child_writes = pipe == Pipe::stdout_from_child;
   UniqueFd ours(fds[child_writes ? 0 : 1]);
   const UniqueFd theirs(fds[child_writes ? 1 : 0]);
@@ -58,7 +58,7 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (failed != 0) {
-    return Error{Errc::not_found, fmt::format("{}: cannot be started; is it built and installed?", command[0]), failed};
+    return Error{Errc::not_found, fmt::format("{}: cannot be started; is it built and installed?", command[0])};
   }
   if (ours) ::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
   return ChildProcess(pid, std::move(ours), command[0]);

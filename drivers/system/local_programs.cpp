@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <sys/socket.h>
 
-#include <cerrno>
-
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye {
@@ -25,7 +23,7 @@ Result<int> free_port() {
   socklen_t size = sizeof address;
   const bool bound = fd && ::bind(fd.get(), reinterpret_cast<sockaddr*>(&address), size) == 0 &&
                      ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  if (!bound) return Error{Errc::in_use, "127.0.0.1: no TCP port is free", errno};
+  if (!bound) return Error{Errc::in_use, "127.0.0.1: no TCP port is free"};
   return static_cast<int>(ntohs(address.sin_port));
 }
 

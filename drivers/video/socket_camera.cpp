@@ -44,8 +44,7 @@ Result<std::unique_ptr<FrameSource>> SocketCamera::open(const std::filesystem::p
   if (!fd || ::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     return Error{Errc::not_found,
                  fmt::format("{}: {}; see [camera] source", name,
-                             errno == EAGAIN ? "the camera takes nobody in" : "no camera listens there"),
-                 errno};
+                             errno == EAGAIN ? "the camera takes nobody in" : "no camera listens there")};
   }
   return std::unique_ptr<FrameSource>(new SocketCamera(std::move(fd), name));
 }

@@ -157,15 +157,15 @@ V4l2Camera::~V4l2Camera() {
 }
 
 Error V4l2Camera::gone() const {
-  return {Errc::disconnected, fmt::format("{}: the camera has gone; was it unplugged?", name_), errno};
+  return {Errc::disconnected, fmt::format("{}: the camera has gone; was it unplugged?", name_)};
 }
 
 Error V4l2Camera::failed(const std::string& what) const {
   if (errno == ENODEV) return gone();
   if (errno == EBUSY) {
-    return {Errc::in_use, fmt::format("{}: {} failed: another program is using it", name_, what), errno};
+    return {Errc::in_use, fmt::format("{}: {} failed: another program is using it", name_, what)};
   }
-  return {Errc::io, fmt::format("{}: {} failed ({})", name_, what, fmt::system_error(errno, "").what()), errno};
+  return {Errc::io, fmt::format("{}: {} failed ({})", name_, what, fmt::system_error(errno, "").what())};
 }
 
 ControlReport V4l2Camera::lock_controls() {

@@ -31,11 +31,11 @@ Error cannot_open(const std::string& path, int error) {
   switch (error) {
     case EACCES:
     case EPERM:
-      return {Errc::unreadable, fmt::format("{}: may not be opened; add this user to the group video", path), error};
+      return {Errc::unreadable, fmt::format("{}: may not be opened; add this user to the group video", path)};
     case EBUSY:
-      return {Errc::in_use, fmt::format("{}: another program has this camera", path), error};
+      return {Errc::in_use, fmt::format("{}: another program has this camera", path)};
     default:
-      return {Errc::not_found, fmt::format("{}: no camera can be opened there; see [camera] source", path), error};
+      return {Errc::not_found, fmt::format("{}: no camera can be opened there; see [camera] source", path)};
   }
 }
 
@@ -46,7 +46,7 @@ Result<V4l2Device> V4l2Device::open(const std::string& path) {
   if (!device.fd_) return cannot_open(path, errno);
   v4l2_capability capability{};
   if (device.control(VIDIOC_QUERYCAP, &capability) != 0) {
-    return Error{Errc::unsupported, fmt::format("{}: is no Video4Linux device; see [camera] source", path), errno};
+    return Error{Errc::unsupported, fmt::format("{}: is no Video4Linux device; see [camera] source", path)};
   }
   const std::uint32_t has =
       (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps : capability.capabilities;
@@ -146,15 +146,14 @@ Result<std::optional<double>> V4l2Device::follow_signal() const {
   v4l2_dv_timings timings{};
   if (control(VIDIOC_QUERY_DV_TIMINGS, &timings) != 0) {
     if (errno == ENOLINK || errno == ENOLCK || errno == ERANGE) {
-      return Error{Errc::not_found, "no signal comes in, or none that it understands; see the cable and the source",
-                   errno};
+      return Error{Errc::not_found, "no signal comes in, or none that it understands; see the cable and the source"};
     }
     return std::optional<double>();
   }
   v4l2_dv_timings now{};
   const bool known = control(VIDIOC_G_DV_TIMINGS, &now) == 0 && std::memcmp(&now.bt, &timings.bt, sizeof now.bt) == 0;
   if (!known && control(VIDIOC_S_DV_TIMINGS, &timings) != 0) {
-    return Error{errno == EBUSY ? Errc::in_use : Errc::io, "does not take up the signal that comes in", errno};
+    return Error{errno == EBUSY ? Errc::in_use : Errc::io, "does not take up the signal that comes in"};
   }
   const double pixels = static_cast<double>(V4L2_DV_BT_FRAME_WIDTH(&timings.bt)) * V4L2_DV_BT_FRAME_HEIGHT(&timings.bt);
   if (pixels <= 0 || timings.bt.pixelclock == 0) return std::optional<double>();
@@ -177,8 +176,7 @@ std::optional<int> V4l2Device::get(std::uint32_t id) {
 Result<void> V4l2Device::set(std::uint32_t id, int value) {
   v4l2_control wanted{id, value};
   if (control(VIDIOC_S_CTRL, &wanted) == 0) return {};
-  return Error{Errc::io, fmt::format("the camera refuses it ({})", std::strerror(errno)),
-               errno};  // NOLINT(concurrency-*)
+  return Error{Errc::io, fmt::format("the camera refuses it ({})", std::strerror(errno))};  // NOLINT(concurrency-*)
 }
 
 YuvColour colour_of(const v4l2_pix_format& format) {

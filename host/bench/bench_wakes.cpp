@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstdint>
 
@@ -20,12 +19,11 @@ constexpr int kRate_hz = 144;
 
 Result<std::unique_ptr<TwoWakes>> TwoWakes::start() {
   std::array<int, 4> ends{};
-  if (::pipe2(&ends[0], O_CLOEXEC) != 0) return Error{Errc::unreadable, "no pipe can be opened", errno};
+  if (::pipe2(&ends[0], O_CLOEXEC) != 0) return Error{Errc::unreadable, "no pipe can be opened"};
   if (::pipe2(&ends[2], O_CLOEXEC) != 0) {
-    const int failed = errno;
     ::close(ends[0]);
     ::close(ends[1]);
-    return Error{Errc::unreadable, "no pipe can be opened", failed};
+    return Error{Errc::unreadable, "no pipe can be opened"};
   }
   return std::unique_ptr<TwoWakes>(new TwoWakes(ends));
 }

@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 Error cannot(const fs::path& path, int fault) {
   if (fault == ENOSPC || fault == EDQUOT || fault == EFBIG)
     return {Errc::io,
-            fmt::format("{}: the disk has no room for more; free some, or choose another --out", path.string()), fault};
-  return {Errc::unreadable, fmt::format("{}: cannot be written: {}", path.string(), std::strerror(fault)), fault};
+            fmt::format("{}: the disk has no room for more; free some, or choose another --out", path.string())};
+  return {Errc::unreadable, fmt::format("{}: cannot be written: {}", path.string(), std::strerror(fault))};
 }
 
 }  // namespace

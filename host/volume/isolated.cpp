@@ -96,7 +96,7 @@ CopiesHeldOff::CopiesHeldOff() : held_(copying()) {}
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
                           Duration within) {
   std::array<int, 2> fds{-1, -1};
-  if (::pipe2(fds.data(), O_CLOEXEC) != 0) return Error{Errc::io, "no pipe is free for a decoder", errno};
+  if (::pipe2(fds.data(), O_CLOEXEC) != 0) return Error{Errc::io, "no pipe is free for a decoder"};
   constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
   (void)::fcntl(fds[0], F_SETPIPE_SZ, kPipeBytes);
   const pid_t child = [] {
@@ -104,10 +104,9 @@ Result<void> run_isolated(const std::function<void(const Send&)>& work, const st
     return ::fork();
   }();
   if (child < 0) {
-    const int failed = errno;
     ::close(fds[0]);
     ::close(fds[1]);
-    return Error{Errc::io, "no process is free for a decoder", failed};
+    return Error{Errc::io, "no process is free for a decoder"};
   }
   if (child == 0) {
     ::close(fds[0]);

@@ -36,7 +36,7 @@ Result<UniqueFd> listen_at_path(const std::filesystem::path& path) {
   if (std::filesystem::is_socket(path, error)) ::unlink(name.c_str());
   UniqueFd fd(::socket(AF_UNIX, kKind, 0));
   if (!bound(fd.get(), address)) {
-    return Error{Errc::unreadable, fmt::format("{}: cannot be listened at; does its folder exist?", name), errno};
+    return Error{Errc::unreadable, fmt::format("{}: cannot be listened at; does its folder exist?", name)};
   }
   return fd;
 }
@@ -53,8 +53,7 @@ Result<UniqueFd> listen_at_port(const std::string& host, int& port) {
   ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (!bound(fd.get(), address)) {
     return Error{errno == EADDRINUSE ? Errc::in_use : Errc::unreadable,
-                 fmt::format("{}:{}: cannot be listened at: {}; give another port", host, port, std::strerror(errno)),
-                 errno};
+                 fmt::format("{}:{}: cannot be listened at: {}; give another port", host, port, std::strerror(errno))};
   }
   socklen_t size = sizeof address;
   ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size);

@@ -38,7 +38,7 @@ Result<UniqueFd> connect(const std::filesystem::path& path) {
   UniqueFd fd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return fd;
   if (errno == EACCES || errno == EPERM) {
-    return Error{Errc::unreadable, fmt::format("{}: no permission to connect; see --unix", name), errno};
+    return Error{Errc::unreadable, fmt::format("{}: no permission to connect; see --unix", name)};
   }
   return UniqueFd();
 }

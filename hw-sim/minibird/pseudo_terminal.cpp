@@ -16,9 +16,8 @@ Result<PseudoTerminal> PseudoTerminal::open(const std::filesystem::path& link) {
   const int ours = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   std::array<char, 128> name{};
   if (ours < 0 || ::grantpt(ours) != 0 || ::unlockpt(ours) != 0 || ::ptsname_r(ours, name.data(), name.size()) != 0) {
-    const int failed = errno;
     if (ours >= 0) ::close(ours);
-    return Error{Errc::io, "no pseudo-terminal is free; is /dev/pts mounted?", failed};
+    return Error{Errc::io, "no pseudo-terminal is free; is /dev/pts mounted?"};
   }
   const int theirs = ::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC);
   if (theirs >= 0) {

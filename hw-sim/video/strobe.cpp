@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <sys/prctl.h>
 
-#include <cerrno>
 #include <cmath>
 #include <string_view>
 
@@ -27,8 +26,7 @@ Result<Strobe> Strobe::open(const std::filesystem::path& file) {
   UniqueFd fd(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
   if (fd) return Strobe(std::move(fd));
   return Error{Errc::unreadable,
-               fmt::format("{}: cannot be written; give --strobe the file pull of a line of gpio-sim", file.string()),
-               errno};
+               fmt::format("{}: cannot be written; give --strobe the file pull of a line of gpio-sim", file.string())};
 }
 
 void Strobe::start(const CameraTiming& timing, double true_rate_hz, std::int64_t zero_ns) {

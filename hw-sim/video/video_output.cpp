@@ -46,8 +46,7 @@ class VideoOutput final : public FrameSink {
     now_width_px_ = 0;
     fd_ = UniqueFd(::open(device_.c_str(), O_RDWR | O_CLOEXEC));
     if (!fd_) {
-      return Error{Errc::unreadable, fmt::format("{}: cannot be opened: {}", device_.string(), std::strerror(errno)),
-                   errno};
+      return Error{Errc::unreadable, fmt::format("{}: cannot be opened: {}", device_.string(), std::strerror(errno))};
     }
     v4l2_format format{};
     format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
