@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -24,7 +25,11 @@ enum class Errc {
 struct Error {
   Errc code = Errc::io;
   std::string what;
-  int os_errno = 0;
+
+  /// The same, of `thing` (a file, a part): "thing: what".
+  [[nodiscard]] Error with_context(std::string_view thing) const {
+    return {code, std::string(thing).append(": ").append(what)};
+  }
 };
 
 /// A value or the Error that prevented it. Member names are those of std::expected (C++23), which g++ 12 and clang 14
@@ -52,6 +57,12 @@ class [[nodiscard]] Result {
   const Error& error() const& { return std::get<1>(state_); }
   Error&& error() && { return std::get<1>(std::move(state_)); }
 
+  /// The value, or the error of `thing`: Error::with_context.
+  [[nodiscard]] Result with_context(std::string_view thing) && {
+    if (has_value()) return std::move(*this);
+    return error().with_context(thing);
+  }
+
  private:
   std::variant<T, Error> state_;
 };
@@ -65,6 +76,11 @@ class [[nodiscard]] Result<void> {
   [[nodiscard]] bool has_value() const { return ok_; }
   explicit operator bool() const { return ok_; }
   const Error& error() const { return error_; }
+
+  [[nodiscard]] Result with_context(std::string_view thing) const {
+    if (has_value()) return {};
+    return error_.with_context(thing);
+  }
 
  private:
   Error error_;

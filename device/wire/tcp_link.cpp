@@ -58,7 +58,7 @@ class TcpLink final : public Link {
   bool wait_writable(Deadline deadline) override { return wait_ready(fd_.get(), POLLOUT, deadline) != 0; }
 
  private:
-  static Error gone() { return {Errc::disconnected, "the other side has gone", errno}; }
+  static Error gone() { return {Errc::disconnected, "the other side has gone"}; }
 
   UniqueFd fd_;
 };
@@ -159,15 +159,12 @@ Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, in
   socklen_t size = sizeof address;
   if (!fd || ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(fd.get(), 8) != 0 ||
       ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
-    const int failed = errno;
-    if (failed == EADDRINUSE) {
-      return Error{
-          Errc::in_use,
-          fmt::format("[wire] port {} on {} is in use; stop the other program or choose another", port, bind_address),
-          failed};
+    if (errno == EADDRINUSE) {
+      return Error{Errc::in_use, fmt::format("[wire] port {} on {} is in use; stop the other program or choose another",
+                                             port, bind_address)};
     }
     return Error{Errc::bad_value,
-                 fmt::format("[wire] bind {} port {}: this machine cannot listen there", bind_address, port), failed};
+                 fmt::format("[wire] bind {} port {}: this machine cannot listen there", bind_address, port)};
   }
   UniqueFd wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   return std::unique_ptr<Listener>(

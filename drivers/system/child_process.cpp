@@ -134,7 +134,7 @@ Result<void> ChildProcess::write(const void* bytes, std::size_t size, Deadline d
       data += put;
       size -= static_cast<std::size_t>(put);
     } else if (errno != EAGAIN && errno != EINTR) {
-      return Error{Errc::disconnected, fmt::format("{}: ended early; its log says why", name_), errno};
+      return Error{Errc::disconnected, fmt::format("{}: ended early; its log says why", name_)};
     }
   }
   return {};

@@ -29,7 +29,7 @@ Result<int> free_port() {
 
 Result<std::unique_ptr<RendezvousFolder>> RendezvousFolder::make() {
   std::string path = (std::filesystem::temp_directory_path() / "birdseye-XXXXXX").string();
-  if (::mkdtemp(path.data()) == nullptr) return Error{Errc::unreadable, path + ": cannot be created", errno};
+  if (::mkdtemp(path.data()) == nullptr) return Error{Errc::unreadable, path + ": cannot be created"};
   return std::unique_ptr<RendezvousFolder>(new RendezvousFolder(path));
 }
 

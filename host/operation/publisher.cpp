@@ -53,8 +53,7 @@ Result<std::unique_ptr<Publisher>> Publisher::listen(const std::string& address)
   if (!server && server.error().code == Errc::in_use) {
     return Error{
         Errc::in_use,
-        fmt::format("--publish: port {} on {} is in use; stop the other program or choose another", port, bind),
-        server.error().os_errno};
+        fmt::format("--publish: port {} on {} is in use; stop the other program or choose another", port, bind)};
   }
   if (!server) return Error{server.error().code, fmt::format("--publish: cannot listen on {}", address)};
   return std::unique_ptr<Publisher>(new Publisher(*std::move(server)));
