@@ -33,15 +33,14 @@ Lines sum_lines(const GreyView& smooth, const Eigen::Vector2d& centre, const Eig
   const int top = std::max(1, static_cast<int>(std::floor(centre.y())) - half.y());
   const int bottom = std::min(smooth.height_px - 2, static_cast<int>(std::ceil(centre.y())) + half.y());
   for (int y = top; y <= bottom; ++y) {
-    const std::uint8_t* row = smooth.data + static_cast<std::size_t>(y) * smooth.stride;
+    const std::uint8_t* row = smooth.row(y);
     for (int x = left; x <= right; ++x) {
       const Eigen::Vector2d d = Eigen::Vector2d(x, y) - centre;
       const Eigen::Vector2d place = (squares_per_px * d).cwiseAbs();
       const double along = place.maxCoeff() / reach.along;
       const double aside = place.minCoeff() / reach.aside;
       if (along >= 1 || aside >= 1) continue;
-      const Eigen::Vector2d gradient(row[x + 1] - row[x - 1], row[x + static_cast<std::ptrdiff_t>(smooth.stride)] -
-                                                                  row[x - static_cast<std::ptrdiff_t>(smooth.stride)]);
+      const Eigen::Vector2d gradient(row[x + 1] - row[x - 1], row[x + smooth.width_px] - row[x - smooth.width_px]);
       // Tapered, so that a pixel that enters or leaves as the centre moves counts for nothing.
       const double weight = (1 - along * along) * (1 - aside * aside);
       const Eigen::Matrix2d part = weight * gradient * gradient.transpose();
@@ -83,14 +82,13 @@ SmoothPicture::SmoothPicture(const GreyView& picture)
     : width_px_(picture.width_px),
       height_px_(picture.height_px),
       grey_(static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px)) {
-  const cv::Mat from(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-                     picture.stride);
+  const cv::Mat from(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat to(height_px_, width_px_, CV_8UC1, grey_.data());
   cv::GaussianBlur(from, to, cv::Size(0, 0), kSmoothing_px);
 }
 
 GreyView SmoothPicture::view() const {
-  return {grey_.data(), width_px_, height_px_, static_cast<std::size_t>(width_px_)};
+  return {grey_, width_px_, height_px_};
 }
 
 std::optional<Eigen::Vector2d> refine_cross(const GreyView& smooth, const Cross& cross, const CrossReach& reach) {

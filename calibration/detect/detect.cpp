@@ -108,7 +108,7 @@ struct Exposure {
 Exposure exposure_of(const GreyView& picture) {
   std::array<std::size_t, 256> counts{};
   for (int y = 0; y < picture.height_px; ++y) {
-    const std::uint8_t* row = picture.data + static_cast<std::size_t>(y) * picture.stride;
+    const std::uint8_t* row = picture.row(y);
     for (int x = 0; x < picture.width_px; ++x) ++counts[row[x]];
   }
   const double all = static_cast<double>(picture.width_px) * picture.height_px;
@@ -149,7 +149,7 @@ Detection detect(const Pattern& pattern, const GreyView& picture, const std::str
   Detection detection;
   const auto points_in_marker_mm = pattern_points_mm(pattern);
   detection.points_of_pattern = static_cast<int>(points_in_marker_mm.size());
-  if (picture.data == nullptr || picture.width_px < kLeastSide_px || picture.height_px < kLeastSide_px) {
+  if (!picture.whole() || picture.width_px < kLeastSide_px || picture.height_px < kLeastSide_px) {
     detection.rejected = fmt::format("smaller than {} px", kLeastSide_px);
     return detection;
   }

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "calibration/detect/grey_view.hpp"
+#include "calibration/base/image_view.hpp"
 #include "calibration/detect/pattern.hpp"
 #include "calibration/detect/pattern_view.hpp"
 

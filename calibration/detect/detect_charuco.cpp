@@ -187,8 +187,7 @@ bool is_other_layout(const Pattern& pattern, const std::map<int, Predicted>& pre
 }  // namespace
 
 FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Search search) {
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-                     picture.stride);
+  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   std::vector<int> ids;
   std::vector<std::vector<cv::Point2f>> quads;
   detect_tags(pattern, grey, ids, quads);

@@ -31,7 +31,7 @@ struct Spot {
 };
 
 cv::Mat mat_of(const GreyView& picture) {
-  return {picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.data), picture.stride};
+  return {picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data())};
 }
 
 Spot moments_of(const cv::Mat& labels, const cv::Rect& box, int label) {
@@ -96,7 +96,7 @@ std::optional<Eigen::Vector3d> ground_of(const GreyView& picture, const cv::Mat&
       if (labels.at<int>(y, x) != 0 || inner.holds(px) || !outer.holds(px)) continue;
       const Eigen::Vector3d row(1, px.x() - spot.centre.x(), px.y() - spot.centre.y());
       normal_matrix += row * row.transpose();
-      right += row * picture.data[static_cast<std::size_t>(y) * picture.stride + static_cast<std::size_t>(x)];
+      right += row * picture.row(y)[x];
     }
   }
   if (normal_matrix(0, 0) < kLeastGround) return std::nullopt;
@@ -123,9 +123,7 @@ std::optional<DotBlob> weigh(const GreyView& picture, const cv::Mat& labels, con
       if (!reach.holds(spot.centre + d)) continue;
       const int label = labels.at<int>(y, x);
       if (label != 0 && label != spot.label) continue;
-      const double depth =
-          sign * (ground->dot(Eigen::Vector3d(1, d.x(), d.y())) -
-                  picture.data[static_cast<std::size_t>(y) * picture.stride + static_cast<std::size_t>(x)]);
+      const double depth = sign * (ground->dot(Eigen::Vector3d(1, d.x(), d.y())) - picture.row(y)[x]);
       sum += depth;
       first += depth * d;
       if (label == spot.label) depths.push_back(depth);

@@ -23,8 +23,8 @@ double grey_at(const GreyView& picture, const Eigen::Vector2d& px) {
   const int row = static_cast<int>(y);
   const double fx = x - column;
   const double fy = y - row;
-  const std::uint8_t* top = picture.data + static_cast<std::size_t>(row) * picture.stride + column;
-  const std::uint8_t* bottom = top + picture.stride;
+  const std::uint8_t* top = picture.row(row) + column;
+  const std::uint8_t* bottom = top + picture.width_px;
   return (1 - fy) * ((1 - fx) * top[0] + fx * top[1]) + fy * ((1 - fx) * bottom[0] + fx * bottom[1]);
 }
 

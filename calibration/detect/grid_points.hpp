@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/base/image_view.hpp"
 #include "calibration/detect/detect.hpp"
-#include "calibration/detect/grey_view.hpp"
 #include "calibration/detect/pattern.hpp"
 
 namespace birdseye::calibration {

@@ -125,8 +125,7 @@ std::optional<Eigen::Vector2d> pixel_of(const std::vector<GridPoint>& points, co
 }  // namespace
 
 std::vector<EdgeWidth> edges_of_picture(const GreyView& picture) {
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-                     picture.stride);
+  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat smooth;
   grey.convertTo(smooth, CV_32F);
   cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kSmoothing_px);
@@ -157,8 +156,7 @@ bool is_blurred(const GreyView& picture) {
 double local_contrast(const GreyView& picture) {
   constexpr int kWindow_px = 25;
   constexpr int kStep_px = 8;
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-                     picture.stride);
+  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat smooth;
   cv::GaussianBlur(grey, smooth, cv::Size(0, 0), kSmoothing_px);
   const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {kWindow_px, kWindow_px});

@@ -36,15 +36,15 @@ struct ImageMotionTracker::State {
 ImageMotionTracker::ImageMotionTracker() = default;
 ImageMotionTracker::~ImageMotionTracker() = default;
 
-std::optional<ImageMotion> ImageMotionTracker::push(double time_s, const std::uint8_t* grey, int width_px,
-                                                    int height_px) {
+std::optional<ImageMotion> ImageMotionTracker::push(double time_s, const GreyView& picture) {
   const cv::Size window(21, 21);
   constexpr int kLevels = 3;
   auto next = std::make_unique<State>();
-  const cv::Mat whole(height_px, width_px, CV_8U, const_cast<std::uint8_t*>(grey));  // NOLINT: OpenCV has no const view
+  const cv::Mat whole(picture.height_px, picture.width_px, CV_8U,
+                      const_cast<std::uint8_t*>(picture.pixels.data()));  // NOLINT: OpenCV has no const view
   next->time_s = time_s;
-  next->size = {width_px, height_px};
-  next->scale = std::max(1.0, static_cast<double>(width_px) / kWorkingWidthPx);
+  next->size = {picture.width_px, picture.height_px};
+  next->scale = std::max(1.0, static_cast<double>(picture.width_px) / kWorkingWidthPx);
   cv::Mat small;
   cv::resize(whole, small, {}, 1 / next->scale, 1 / next->scale, cv::INTER_AREA);
   next->mask = state_ && state_->size == next->size ? state_->mask : field_mask(small.size());
@@ -82,7 +82,7 @@ std::optional<ImageMotion> ImageMotionTracker::push(double time_s, const std::ui
   if (similarity.empty() || votes < kLeastShareAgreed * static_cast<double>(from.size())) return std::nullopt;
   why_.clear();
   const double c = similarity.at<double>(0, 0), s = similarity.at<double>(1, 0);
-  const double radius_px = kFieldShare * height_px;
+  const double radius_px = kFieldShare * picture.height_px;
   ImageMotion motion{before->time_s, time_s, {}};
   motion.motion_px = {state_->scale * similarity.at<double>(0, 2), state_->scale * similarity.at<double>(1, 2),
                       radius_px * std::atan2(s, c), radius_px * std::log(std::hypot(c, s))};

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "calibration/base/image_view.hpp"
 #include "calibration/latency/latency.hpp"
 
 namespace birdseye::calibration {
@@ -19,9 +19,9 @@ class ImageMotionTracker {
   ImageMotionTracker(const ImageMotionTracker&) = delete;
   ImageMotionTracker& operator=(const ImageMotionTracker&) = delete;
 
-  /// grey: rows from the top, width * height bytes. The motion since the picture before; empty for the first one, after
-  /// another size or a hole of over 0.2 s, and where too little is to be seen, of which why() tells.
-  std::optional<ImageMotion> push(double time_s, const std::uint8_t* grey, int width_px, int height_px);
+  /// The motion since the picture before; empty for the first one, after another size or a hole of over 0.2 s, and
+  /// where too little is to be seen, of which why() tells.
+  std::optional<ImageMotion> push(double time_s, const GreyView& picture);
   [[nodiscard]] const std::string& why() const { return why_; }
 
  private:

@@ -171,7 +171,7 @@ Result<void> draw_level(const Options& options, const Case& c, Engine& engine, c
   const ImageRgba image = engine.render(bench_camera(kWidth_px, kHeight_px), bench_pose(20), settings);
   const std::string engine_name = engine.name().substr(0, engine.name().find(','));
   return write_file(options.pictures / fmt::format("{}-{}-level{}.png", c.phantom, engine_name, level.number),
-                    png_of(over_white(image), image.width_px, image.height_px, 3));
+                    png_of(RgbView{over_white(image), image.width_px, image.height_px}));
 }
 
 /// The undeformed case for another program: volume.mha and scene.json.

@@ -52,8 +52,7 @@ Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan
   if (videos.empty()) return {};
   for (const auto& [name, pictures] : {std::pair{"overlay.png", &overlays}, {"video.png", &videos}}) {
     const Picture grid = tile(*pictures, 3, 0.75);
-    if (auto written = write_file(out / name, png_of(grid.rgb, grid.width_px, grid.height_px, 3)); !written)
-      return written;
+    if (auto written = write_file(out / name, png_of(grid.view())); !written) return written;
   }
   return {};
 }

@@ -215,7 +215,7 @@ Result<ExitCode> register_fiducials(const Options& options) {
     const Picture picture =
         draw_target_error(calibration::TargetError(input->ct_mm, out->localisation.rms_mm),
                           {input->ct_mm, input->targets_mm, input->volume ? &*input->volume : nullptr});
-    png = png_of(picture.rgb, picture.width_px, picture.height_px, 3);
+    png = png_of(picture.view());
   }
   if (auto written = write_files({{options.out, pose_text(out->patient_from_tracker().matrix())},
                                   {options.map, std::move(png)},

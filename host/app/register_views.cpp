@@ -184,9 +184,10 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
       const auto mixed = composite(c.pictures[n].rgb, overlay, kStrength);
       const char* const when = after ? "after" : "before";
       files.push_back(
-          {fmt::format("view{}_{}.png", n, when), png_of(mixed, view.camera.width_px, view.camera.height_px, 3)});
-      files.push_back({fmt::format("view{}_difference_{}.png", n, when),
-                       png_of(difference_picture(view, overlay), view.camera.width_px, view.camera.height_px, 3)});
+          {fmt::format("view{}_{}.png", n, when), png_of(RgbView{mixed, view.camera.width_px, view.camera.height_px})});
+      files.push_back(
+          {fmt::format("view{}_difference_{}.png", n, when),
+           png_of(RgbView{difference_picture(view, overlay), view.camera.width_px, view.camera.height_px})});
     }
   }
   return files;

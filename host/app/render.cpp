@@ -124,7 +124,7 @@ std::string transparent_png_of(ImageRgba image) {
       image.rgba[i + c] = static_cast<std::uint8_t>(std::min(255, (image.rgba[i + c] * 255 + alpha / 2) / alpha));
     }
   }
-  return png_of(image.rgba, image.width_px, image.height_px, 4);
+  return png_of(RgbaView{image.rgba, image.width_px, image.height_px});
 }
 
 Result<void> write_still(const Options& options, const RenderScene& scene, Engine& engine) {
@@ -151,9 +151,10 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
   std::vector<std::uint8_t> in_front;
   if (options.surface_in_front) in_front = surface_cues(scene.behind.rgb, image.width_px, image.height_px);
-  const std::string png = options.over.empty() ? transparent_png_of(image)
-                                               : png_of(composite(scene.behind.rgb, image, options.opacity, in_front),
-                                                        image.width_px, image.height_px, 3);
+  const std::string png = options.over.empty()
+                              ? transparent_png_of(image)
+                              : png_of(RgbView{composite(scene.behind.rgb, image, options.opacity, in_front),
+                                               image.width_px, image.height_px});
   if (!options.movie.empty()) {
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }
@@ -192,7 +193,7 @@ Result<void> render(const Options& options) {
   const auto last = show_scene(*window, *scene, **engine, options.frames);
   if (!last) return last.error();
   if (options.out.empty()) return {};
-  return write_file(options.out, png_of(last->rgb, last->width_px, last->height_px, 3));
+  return write_file(options.out, png_of(last->view()));
 }
 
 }  // namespace

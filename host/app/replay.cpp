@@ -76,7 +76,7 @@ class Player {
     done.table += row_of(frame, drawn);
     if ((done.frames - 1) % static_cast<std::size_t>(options_.every) == 0) {
       const fs::path file = options_.out / fmt::format("overlay-{:06}.png", frame.info.sequence);
-      if (auto put = write_file(file, png_of(drawn.rgb, frame.width_px, frame.height_px, 3)); !put) return put;
+      if (auto put = write_file(file, png_of(RgbView{drawn.rgb, frame.width_px, frame.height_px})); !put) return put;
     }
     if (options_.film_hz <= 0) return {};
     if (!film_) {

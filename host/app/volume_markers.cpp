@@ -119,7 +119,7 @@ Result<ExitCode> volume_markers(const Options& options) {
   std::string png;
   if (!options.picture.empty()) {
     const Picture picture = picture_of(*ct, found, shape.widest_mm());
-    png = png_of(picture.rgb, picture.width_px, picture.height_px, 3);
+    png = png_of(picture.view());
   }
   if (auto written =
           write_files({{options.out, points}, {options.picture, std::move(png)}, {options.json, text_of(json)}});

@@ -44,9 +44,9 @@ class Gatherer {
   void take(const wire::VideoFrame& frame) {
     begin(frame.info.acquired);
     ++streams_.frames;
-    const std::vector<std::uint8_t> grey = grey_of(*frame.rgb, frame.width_px, frame.height_px);
+    const std::vector<std::uint8_t> grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
     const auto motion =
-        motion_.push(seconds_of(frame.info.acquired, *origin_ns_), grey.data(), frame.width_px, frame.height_px);
+        motion_.push(seconds_of(frame.info.acquired, *origin_ns_), {grey, frame.width_px, frame.height_px});
     if (motion) {
       streams_.video.push_back(*motion);
     } else if (++streams_.frames_without_motion > 1) {

@@ -54,7 +54,7 @@ Looked look(const calibration::Pattern& pattern, const fs::path& path) {
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;
-  looked.detection = detect(pattern, {grey.data, grey.cols, grey.rows, grey.step}, path.filename().string());
+  looked.detection = detect(pattern, {{grey.data, grey.total()}, grey.cols, grey.rows}, path.filename().string());
   return looked;
 }
 

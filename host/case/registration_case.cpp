@@ -240,7 +240,7 @@ Result<void> read_view(const Table& table, const fs::path& folder, RegistrationC
   }
   Picture picture{bgr.cols, bgr.rows, {}};
   picture.rgb.assign(rgb.datastart, rgb.dataend);
-  auto overlap = overlap_mask(picture.rgb, bgr.cols, bgr.rows, left_out);
+  auto overlap = overlap_mask(picture.view(), left_out);
   if (!overlap) return Error{overlap.error().code, fmt::format("{}: {}", image->string(), overlap.error().what)};
   view.mask = *std::move(overlap);
   constexpr double kLeast_percent = 1;

@@ -14,6 +14,21 @@ cv::Mat view_of(Picture& picture) {
   return {picture.height_px, picture.width_px, CV_8UC3, picture.rgb.data()};
 }
 
+/// For OpenCV to read, which has no view of what must not be written.
+template <std::size_t channels>
+cv::Mat mat_of(const ImageView<channels>& picture) {
+  return {picture.height_px, picture.width_px, CV_8UC(static_cast<int>(channels)),
+          const_cast<std::uint8_t*>(picture.pixels.data())};
+}
+
+std::string png_of(const cv::Mat& image, cv::ColorConversionCodes to_opencv) {
+  cv::Mat swapped;
+  cv::cvtColor(image, swapped, to_opencv);
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", swapped, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
 cv::Point point_of(const Eigen::Vector2d& p) {
   return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
 }
@@ -32,13 +47,12 @@ Result<Picture> read_picture(const std::filesystem::path& path) {
   return picture;
 }
 
-std::string png_of(std::span<const std::uint8_t> pixels, int width_px, int height_px, int channels) {
-  const cv::Mat image(height_px, width_px, channels == 4 ? CV_8UC4 : CV_8UC3, const_cast<std::uint8_t*>(pixels.data()));
-  cv::Mat swapped;
-  cv::cvtColor(image, swapped, channels == 4 ? cv::COLOR_RGBA2BGRA : cv::COLOR_RGB2BGR);
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", swapped, bytes);
-  return {bytes.begin(), bytes.end()};
+std::string png_of(const RgbView& picture) {
+  return png_of(mat_of(picture), cv::COLOR_RGB2BGR);
+}
+
+std::string png_of(const RgbaView& picture) {
+  return png_of(mat_of(picture), cv::COLOR_RGBA2BGRA);
 }
 
 Picture tile(std::span<const Picture> pictures, int columns, double scale) {
@@ -53,9 +67,8 @@ Picture tile(std::span<const Picture> pictures, int columns, double scale) {
   cv::Mat canvas = view_of(out);
   for (int i = 0; i < count; ++i) {
     const Picture& p = pictures[static_cast<std::size_t>(i)];
-    const cv::Mat source(p.height_px, p.width_px, CV_8UC3, const_cast<std::uint8_t*>(p.rgb.data()));
     cv::Mat cell = canvas(cv::Rect(i % columns * width, i / columns * height, width, height));
-    cv::resize(source, cell, cell.size(), 0, 0, cv::INTER_AREA);
+    cv::resize(mat_of(p.view()), cell, cell.size(), 0, 0, cv::INTER_AREA);
   }
   return out;
 }
@@ -72,11 +85,10 @@ void draw_circle(Picture& picture, const Eigen::Vector2d& centre_px) {
   cv::circle(image, point_of(centre_px), 14, kMark, 1, cv::LINE_AA);
 }
 
-std::vector<std::uint8_t> grey_of(std::span<const std::uint8_t> rgb, int width_px, int height_px) {
-  const cv::Mat image(height_px, width_px, CV_8UC3, const_cast<std::uint8_t*>(rgb.data()));
-  std::vector<std::uint8_t> grey(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
-  cv::Mat out(height_px, width_px, CV_8UC1, grey.data());
-  cv::cvtColor(image, out, cv::COLOR_RGB2GRAY);
+std::vector<std::uint8_t> grey_of(const RgbView& picture) {
+  std::vector<std::uint8_t> grey(picture.area_px());
+  cv::Mat out(picture.height_px, picture.width_px, CV_8UC1, grey.data());
+  cv::cvtColor(mat_of(picture), out, cv::COLOR_RGB2GRAY);
   return grey;
 }
 

@@ -116,7 +116,7 @@ Result<void> HandEyeGuide::keep(const LiveStation& taken, std::size_t number) {
   const std::string name = fmt::format("station{:03}", number);
   const wire::VideoFrame& frame = taken.frame;
   return write_files(
-      {{plan_.keep / "pictures" / (name + ".png"), png_of(*frame.rgb, frame.width_px, frame.height_px, 3)},
+      {{plan_.keep / "pictures" / (name + ".png"), png_of(RgbView{*frame.rgb, frame.width_px, frame.height_px})},
        {plan_.keep / "poses" / (name + ".txt"), pose_text(taken.tracker_from_sensor.matrix())}});
 }
 

@@ -15,10 +15,8 @@ constexpr std::size_t kMostPending = 12, kMostKept = 8;
 
 calibration::Detection find(const calibration::Pattern& pattern, const wire::VideoFrame& frame,
                             const std::string& name) {
-  const std::vector<std::uint8_t> grey = grey_of(*frame.rgb, frame.width_px, frame.height_px);
-  return calibration::detect(pattern,
-                             {grey.data(), frame.width_px, frame.height_px, static_cast<std::size_t>(frame.width_px)},
-                             name, calibration::Search::quick);
+  const std::vector<std::uint8_t> grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
+  return calibration::detect(pattern, {grey, frame.width_px, frame.height_px}, name, calibration::Search::quick);
 }
 
 }  // namespace

@@ -18,9 +18,10 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
   view.camera = camera;
   view.camera_from_patient = kept.camera_from_patient;
   const wire::VideoFrame& frame = kept.frame;
-  view.grey = grey_of(*frame.rgb, frame.width_px, frame.height_px);
+  const RgbView video{*frame.rgb, frame.width_px, frame.height_px};
+  view.grey = grey_of(video);
   const std::vector<std::uint8_t> nothing_left_out(view.grey.size(), 0);
-  auto mask = overlap_mask(*frame.rgb, frame.width_px, frame.height_px, nothing_left_out);
+  auto mask = overlap_mask(video, nothing_left_out);
   if (!mask) return Error{mask.error().code, view.name + ": " + mask.error().what};
   view.mask = *std::move(mask);
   return view;

@@ -58,8 +58,8 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
   const wire::VideoFrame& frame = snapshot.frame;
   const ShownPicture& shown = snapshot.shown;
   std::vector<FileText> files{
-      {folder / "video.png", png_of(*frame.rgb, frame.width_px, frame.height_px, 3)},
-      {folder / "picture.png", png_of(snapshot.picture, shown.width_px, shown.height_px, 3)},
+      {folder / "video.png", png_of(RgbView{*frame.rgb, frame.width_px, frame.height_px})},
+      {folder / "picture.png", png_of(RgbView{snapshot.picture, shown.width_px, shown.height_px})},
   };
   nlohmann::json sheet{{"sequence", frame.info.sequence}, {"acquired_ns", frame.info.acquired.ns},
                        {"age_ms", shown.age_ms},          {"overlaid", shown.overlaid},

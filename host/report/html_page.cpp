@@ -78,7 +78,7 @@ void HtmlPage::svg(const std::string& svg, const std::string& caption) {
 }
 
 void HtmlPage::picture(const Picture& picture, const std::string& caption) {
-  const std::string png = png_of(picture.rgb, picture.width_px, picture.height_px, 3);
+  const std::string png = png_of(picture.view());
   figure(fmt::format("<img src='data:image/png;base64,{}' alt='{}'>", base64(png), escape_markup(caption)), caption);
 }
 

@@ -271,7 +271,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->fre_mm = session_.fre_mm();
   }
   saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {
-    auto written = write_file(path, png_of(shot.rgb, shot.width_px, shot.height_px, 3));
+    auto written = write_file(path, png_of(RgbView{shot.rgb, shot.width_px, shot.height_px}));
     auto folder = path;
     if (written && parts) written = write_snapshot(folder.replace_extension(), *parts);
     return written ? "snapshot: " + path.string() : written.error().what;

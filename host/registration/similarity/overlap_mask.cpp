@@ -13,8 +13,10 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-cv::Mat view(std::span<const std::uint8_t> pixels, int width_px, int height_px, int type) {
-  return {height_px, width_px, type, const_cast<std::uint8_t*>(pixels.data())};
+template <std::size_t channels>
+cv::Mat mat_of(const ImageView<channels>& picture) {
+  return {picture.height_px, picture.width_px, CV_8UC(static_cast<int>(channels)),
+          const_cast<std::uint8_t*>(picture.pixels.data())};
 }
 
 /// Of each pixel, the least and the greatest of its channels.
@@ -162,21 +164,20 @@ std::optional<LensField> fit_robustly(const Points& rim, const cv::Size& picture
   return refined && std::ssize(on_it(*refined)) >= most ? refined : best;
 }
 
-Error wrong_size(const char* name, std::size_t size, int width_px, int height_px) {
+Error wrong_size(const char* name, std::size_t size, const RgbView& video) {
   return {Errc::bad_value, fmt::format("{}: {} values, not those of {}x{} pixels; give one of the video's size", name,
-                                       size, width_px, height_px)};
+                                       size, video.width_px, video.height_px)};
 }
 
 }  // namespace
 
-std::optional<LensField> find_lens_field(std::span<const std::uint8_t> rgb, int width_px, int height_px) {
+std::optional<LensField> find_lens_field(const RgbView& video) {
   constexpr int kSmallest = 16, kWidth = 480;
-  if (std::min(width_px, height_px) < kSmallest) return std::nullopt;
+  if (std::min(video.width_px, video.height_px) < kSmallest) return std::nullopt;
   // Coarse pixels are enough for an edge that is blurred, and have less noise.
-  const double scale = std::min(1.0, kWidth / static_cast<double>(width_px));
+  const double scale = std::min(1.0, kWidth / static_cast<double>(video.width_px));
   cv::Mat brightness;
-  cv::resize(channel_range(view(rgb, width_px, height_px, CV_8UC3)).second, brightness, {}, scale, scale,
-             cv::INTER_AREA);
+  cv::resize(channel_range(mat_of(video)).second, brightness, {}, scale, scale, cv::INTER_AREA);
   cv::medianBlur(brightness, brightness, 5);
   const auto level = lit_from(brightness);
   if (!level) return std::nullopt;
@@ -187,36 +188,34 @@ std::optional<LensField> find_lens_field(std::span<const std::uint8_t> rgb, int 
   const auto field = fit_robustly(rim, brightness.size());
   if (!field) return std::nullopt;
   // To the centres of the picture's own pixels.
-  const double x = width_px / static_cast<double>(brightness.cols),
-               y = height_px / static_cast<double>(brightness.rows);
+  const double x = video.width_px / static_cast<double>(brightness.cols),
+               y = video.height_px / static_cast<double>(brightness.rows);
   return LensField{(field->centre_x_px + 0.5) * x - 0.5, (field->centre_y_px + 0.5) * y - 0.5, field->radius_x_px * x,
                    field->radius_y_px * y};
 }
 
-Result<std::vector<std::uint8_t>> overlap_mask(std::span<const std::uint8_t> rgb, int width_px, int height_px,
-                                               std::span<const std::uint8_t> instruments) {
-  const auto pixels = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-  if (rgb.size() != 3 * pixels || pixels == 0) return wrong_size("video picture", rgb.size(), width_px, height_px);
-  if (!instruments.empty() && instruments.size() != pixels) {
-    return wrong_size("instrument mask", instruments.size(), width_px, height_px);
+Result<std::vector<std::uint8_t>> overlap_mask(const RgbView& video, std::span<const std::uint8_t> instruments) {
+  if (!video.whole() || video.area_px() == 0) return wrong_size("video picture", video.pixels.size(), video);
+  if (!instruments.empty() && instruments.size() != video.area_px()) {
+    return wrong_size("instrument mask", instruments.size(), video);
   }
-  const cv::Size size(width_px, height_px);
+  const cv::Size size(video.width_px, video.height_px);
   cv::Mat mask(size, CV_8U, cv::Scalar(255));
-  if (const auto field = find_lens_field(rgb, width_px, height_px)) {
+  if (const auto field = find_lens_field(video)) {
     // The edge is blurred: some of it is left out.
     mask = filled(*field, size, std::max(3.0, 0.015 * field->radius_x_px));
   }
   // Highlights: nearly white. A bright colour, such as fat close to the light, is tissue and stays.
   constexpr double kBright = 240, kLeastOfGreatest = 0.75;
-  const auto [least, greatest] = channel_range(view(rgb, width_px, height_px, CV_8UC3));
+  const auto [least, greatest] = channel_range(mat_of(video));
   cv::Mat scaled;
   greatest.convertTo(scaled, CV_8U, kLeastOfGreatest);
   cv::Mat highlights;
   cv::bitwise_and(greatest >= kBright, least >= scaled, highlights);
-  const int grow_px = std::max(2, width_px / 256);
+  const int grow_px = std::max(2, video.width_px / 256);
   cv::dilate(highlights, highlights, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * grow_px + 1, 2 * grow_px + 1}));
   mask.setTo(0, highlights);
-  if (!instruments.empty()) mask.setTo(0, view(instruments, width_px, height_px, CV_8U) != 0);
+  if (!instruments.empty()) mask.setTo(0, mat_of(GreyView{instruments, video.width_px, video.height_px}) != 0);
   if (cv::countNonZero(mask) == 0) {
     return Error{Errc::degenerate,
                  "overlap: nothing is left of the video picture but surround, highlights and "

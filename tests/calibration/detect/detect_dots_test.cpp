@@ -33,7 +33,7 @@ const CameraModel kCamera{.width_px = 800,
                           .p2 = -0.0008};
 
 GreyView view_of(const cv::Mat& grey) {
-  return {grey.data, grey.cols, grey.rows, grey.step};
+  return {{grey.data, grey.total()}, grey.cols, grey.rows};
 }
 
 /// How a grid is drawn and seen.

@@ -23,7 +23,7 @@ const BoardPainter& painter() {
 }
 
 GreyView view_of(const cv::Mat& grey) {
-  return {grey.data, grey.cols, grey.rows, grey.step};
+  return {{grey.data, grey.total()}, grey.cols, grey.rows};
 }
 
 Pattern pattern_of(const char* spec) {

@@ -14,7 +14,7 @@ namespace birdseye::calibration {
 namespace {
 
 GreyView view_of(const cv::Mat& grey) {
-  return {grey.data, grey.cols, grey.rows, grey.step};
+  return {{grey.data, grey.total()}, grey.cols, grey.rows};
 }
 
 TEST(Pattern, ReadsItsSpecsAndRefusesNonsense) {

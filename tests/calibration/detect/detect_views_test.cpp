@@ -27,7 +27,7 @@ const BoardPainter& painter() {
 }
 
 GreyView view_of(const cv::Mat& grey) {
-  return {grey.data, grey.cols, grey.rows, grey.step};
+  return {{grey.data, grey.total()}, grey.cols, grey.rows};
 }
 
 struct Errors {

@@ -21,6 +21,7 @@ struct Video {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x);
   }
   std::uint8_t* at(int x, int y) { return &rgb[3 * index(x, y)]; }
+  [[nodiscard]] RgbView view() const { return {rgb, width_px, height_px}; }
 };
 
 /// Noisy tissue inside the field, and a dark surround of noise outside; tissue is dark in the shadow of a corner.
@@ -43,7 +44,7 @@ Video tissue(int width_px, int height_px, const std::optional<LensField>& field)
 }
 
 std::vector<std::uint8_t> mask_of(const Video& video, std::span<const std::uint8_t> instruments = {}) {
-  auto mask = overlap_mask(video.rgb, video.width_px, video.height_px, instruments);
+  auto mask = overlap_mask(video.view(), instruments);
   EXPECT_TRUE(mask);
   return mask ? *std::move(mask) : std::vector<std::uint8_t>{};
 }
@@ -59,9 +60,9 @@ void expect_field(const std::optional<LensField>& found, const LensField& truth,
 TEST(OverlapMask, FindsTheLensFieldWholeOrCutDespiteShadow) {
   // Whole; cut above and below, which leaves less to fit; of pixels that are not square.
   const LensField whole{330, 250, 210, 210}, cut{300, 230, 280, 280}, oblong{370, 290, 250, 270};
-  expect_field(find_lens_field(tissue(640, 480, whole).rgb, 640, 480), whole, 1.5);
-  expect_field(find_lens_field(tissue(640, 480, cut).rgb, 640, 480), cut, 4);
-  expect_field(find_lens_field(tissue(720, 576, oblong).rgb, 720, 576), oblong, 2);
+  expect_field(find_lens_field(tissue(640, 480, whole).view()), whole, 1.5);
+  expect_field(find_lens_field(tissue(640, 480, cut).view()), cut, 4);
+  expect_field(find_lens_field(tissue(720, 576, oblong).view()), oblong, 2);
 }
 
 TEST(OverlapMask, APictureWithoutSurroundKeepsAll) {
@@ -75,7 +76,7 @@ TEST(OverlapMask, APictureWithoutSurroundKeepsAll) {
       if (std::hypot(x - 160, y - 120) > 80 + 25 * std::sin(3 * angle)) std::fill_n(organ.at(x, y), 3, std::uint8_t{3});
     }
   }
-  EXPECT_FALSE(find_lens_field(organ.rgb, 320, 240));
+  EXPECT_FALSE(find_lens_field(organ.view()));
   EXPECT_THAT(mask_of(organ), ::testing::Each(::testing::Ne(0)));
 }
 
@@ -117,9 +118,9 @@ TEST(OverlapMask, LeavesOutHighlightsAndInstrumentsButNotBrightColours) {
 TEST(OverlapMask, RefusesInOneLine) {
   const Video video = tissue(64, 48, std::nullopt);
   const std::vector<std::uint8_t> small(10), all(video.rgb.size() / 3, 1);
-  EXPECT_THAT(overlap_mask(video.rgb, 64, 48, small).error().what, HasSubstr("instrument mask: 10"));
-  EXPECT_THAT(overlap_mask(video.rgb, 64, 47).error().what, HasSubstr("video picture"));
-  EXPECT_EQ(overlap_mask(video.rgb, 64, 48, all).error().code, Errc::degenerate);
+  EXPECT_THAT(overlap_mask(video.view(), small).error().what, HasSubstr("instrument mask: 10"));
+  EXPECT_THAT(overlap_mask({video.rgb, 64, 47}).error().what, HasSubstr("video picture"));
+  EXPECT_EQ(overlap_mask(video.view(), all).error().code, Errc::degenerate);
 }
 
 TEST(OverlapMask, FindsTheFieldsOfRealLaparoscopes) {
@@ -134,13 +135,13 @@ TEST(OverlapMask, FindsTheFieldsOfRealLaparoscopes) {
     cv::Mat picture = cv::imread((*data / name).string());
     if (picture.empty()) GTEST_SKIP() << "no " << name;
     cv::cvtColor(picture, picture, cv::COLOR_BGR2RGB);
-    expect_field(find_lens_field({picture.data, picture.total() * 3}, picture.cols, picture.rows), truth,
+    expect_field(find_lens_field({{picture.data, picture.total() * 3}, picture.cols, picture.rows}), truth,
                  0.015 * truth.radius_x_px);
   }
   const char* const unround = "overlay_projection_reference/fig06_case1b.png";
   cv::Mat picture = cv::imread((*data / unround).string());
   if (picture.empty()) GTEST_SKIP() << "no " << unround;
-  EXPECT_FALSE(find_lens_field({picture.data, picture.total() * 3}, picture.cols, picture.rows));
+  EXPECT_FALSE(find_lens_field({{picture.data, picture.total() * 3}, picture.cols, picture.rows}));
 }
 
 }  // namespace
