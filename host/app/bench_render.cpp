@@ -212,7 +212,7 @@ Result<void> bench_case(const Case& c, const Options& options, nlohmann::json& r
     const Level level = make_level(c, volume, number);
     for (const std::string& name : options.engines) {
       for (const bool pruned : {true, false}) {
-        auto engine = make_engine(name, volume, bench_transfer(), nullptr, pruned);
+        auto engine = make_engine(name, volume, bench_transfer(), {.prune = pruned});
         if (!engine) return engine.error();
         auto row = bench_engine(c, options, volume, **engine, level, pruned);
         if (!row) return row.error();

@@ -184,10 +184,9 @@ Result<void> render(const Options& options) {
     if (!opened) return opened.error();
     window = *std::move(opened);
   }
-  std::string why;
-  const auto engine = make_engine(options.engine, scene->volume, *transfer, &why, true, window.get());
+  const auto engine = make_engine(options.engine, scene->volume, *transfer, {.window = window.get()});
   if (!engine) return engine.error();
-  if (!why.empty()) fmt::print(stderr, "{}\n", why);
+  if (!(*engine)->choice().empty()) fmt::print(stderr, "{}\n", (*engine)->choice());
   if (scene->deformation) (*engine)->deform(*scene->deformation);
   if (!options.window) return write_still(options, *scene, **engine);
   const auto last = show_scene(*window, *scene, **engine, options.frames);

@@ -158,10 +158,9 @@ Result<ExitCode> run(const Options& options) {
   if (!volume) return volume.error();
   const auto transfer = load_transfer_function(options.transfer);
   if (!transfer) return transfer.error();
-  std::string why;
-  const auto engine = make_engine(options.engine, *volume, *transfer, &why);
+  const auto engine = make_engine(options.engine, *volume, *transfer);
   if (!engine) return engine.error();
-  if (!why.empty()) fmt::print(stderr, "{}\n", why);
+  if (!(*engine)->choice().empty()) fmt::print(stderr, "{}\n", (*engine)->choice());
   if (!options.deformation.empty()) {
     const auto field = read_field(options.deformation);
     if (!field) return field.error();

@@ -88,8 +88,9 @@ bool is_software(const std::string& renderer) {
 
 /// gl or slices; or auto, gl where it is not done in software.
 Result<std::unique_ptr<Engine>> on_card(const std::string& name, const Volume& volume, const TransferFunction& transfer,
-                                        bool prune, GlContext* context) {
+                                        const EngineSettings& settings) {
   std::unique_ptr<GlContext> own;
+  GlContext* context = settings.window;
   if (context == nullptr) {
     auto made = GlContext::offscreen();
     if (!made) return made.error();
@@ -99,8 +100,9 @@ Result<std::unique_ptr<Engine>> on_card(const std::string& name, const Volume& v
   if (name == "auto" && is_software(context->renderer())) {
     return Error{Errc::unsupported, "OpenGL is here in software only (" + context->renderer() + ")"};
   }
-  if (name == "slices") return make_gl<GlSliceRenderer>(std::move(own), *context, volume, transfer, "slices", prune);
-  return make_gl<GlRayCaster>(std::move(own), *context, volume, transfer, "gl", prune);
+  if (name == "slices")
+    return make_gl<GlSliceRenderer>(std::move(own), *context, volume, transfer, "slices", settings.prune);
+  return make_gl<GlRayCaster>(std::move(own), *context, volume, transfer, "gl", settings.prune);
 }
 
 /// Engines keep two to three times the volume besides it; what does not fit would end us, or be swapped for minutes.
@@ -134,19 +136,20 @@ std::vector<std::string> engine_names() {
 }
 
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
-                                            const TransferFunction& transfer, std::string* why, bool prune,
-                                            GlContext* context) {
+                                            const TransferFunction& transfer, const EngineSettings& settings) {
   if (auto enough = check_memory(volume); !enough) return enough.error();
   const auto on_cpu = [&]() -> Result<std::unique_ptr<Engine>> {
     if (auto fits = check_size(volume); !fits) return fits.error();
-    return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, prune));
+    return std::unique_ptr<Engine>(std::make_unique<CpuEngine>(volume, transfer, settings.prune));
   };
   if (name == "cpu") return on_cpu();
-  if (name == "gl" || name == "slices") return on_card(name, volume, transfer, prune, context);
+  if (name == "gl" || name == "slices") return on_card(name, volume, transfer, settings);
   if (name == "auto") {
-    auto engine = on_card(name, volume, transfer, prune, context);
-    if (why != nullptr) *why = engine ? "engine " + (*engine)->name() : "engine cpu: " + engine.error().what;
-    return engine ? std::move(engine) : on_cpu();
+    auto engine = on_card(name, volume, transfer, settings);
+    std::string choice = engine ? "engine " + (*engine)->name() : "engine cpu: " + engine.error().what;
+    if (!engine) engine = on_cpu();
+    if (engine) (*engine)->set_choice(std::move(choice));
+    return engine;
   }
   return Error{Errc::bad_value, fmt::format("engine \"{}\" is none of {}", name, fmt::join(engine_names(), ", "))};
 }

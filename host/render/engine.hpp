@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -30,16 +31,28 @@ class Engine {
   [[nodiscard]] virtual std::string fault() const { return {}; }
   /// Main memory beyond the volume's own; 0 for what lies on the graphics card.
   [[nodiscard]] virtual std::size_t bytes() const { return 0; }
+
+  /// What "auto" chose and why, in words; empty where the engine was asked for by its name.
+  [[nodiscard]] const std::string& choice() const { return choice_; }
+  void set_choice(std::string choice) { choice_ = std::move(choice); }
+
+ private:
+  std::string choice_;
+};
+
+struct EngineSettings {
+  bool prune = true;  ///< false also works on bricks that are not seen, for measurements; the picture is the same
+  /// A window's, to draw with, which must outlive the engine. Without one, the engines that need the graphics card make
+  /// their own, off-screen.
+  GlContext* window = nullptr;
 };
 
 /// The names that make_engine() takes: cpu; gl, the same rays on the graphics card; slices, the paper's method on the
 /// card; auto, gl where there is a graphics card, else cpu.
 std::vector<std::string> engine_names();
-/// Keeps a reference to volume, which must outlive it. With auto, `why` says what was chosen and why.
-/// prune: false also works on bricks that are not seen, for measurements; the picture is the same. context: a window's
-/// to draw with, which must outlive the engine; without one, the engines that need the card make their own, off-screen.
+/// Keeps a reference to volume, which must outlive the engine. Errc::bad_value for another name, Errc::unsupported for
+/// what this machine or its graphics card cannot draw.
 Result<std::unique_ptr<Engine>> make_engine(const std::string& name, const Volume& volume,
-                                            const TransferFunction& transfer, std::string* why = nullptr,
-                                            bool prune = true, GlContext* context = nullptr);
+                                            const TransferFunction& transfer, const EngineSettings& settings = {});
 
 }  // namespace birdseye::host

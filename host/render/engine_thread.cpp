@@ -54,6 +54,7 @@ class EngineThread final : public Engine {
       auto made = make();
       if (made) {
         engine_ = *std::move(made);
+        set_choice(engine_->choice());
       } else {
         fault = made.error();
       }

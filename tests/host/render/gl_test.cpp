@@ -109,11 +109,10 @@ TEST(Engine, OfTheCardRefusesAVolumeBeyondItsTexturesAndAutoTakesTheOther) {
         << engine.error().what;
     EXPECT_NE(engine.error().what.find("--engine cpu"), std::string::npos);
   }
-  std::string why;
-  const auto engine = make_engine("auto", volume, soft(), &why);
+  const auto engine = make_engine("auto", volume, soft());
   ASSERT_TRUE(engine) << engine.error().what;
   EXPECT_EQ((*engine)->name().substr(0, 4), "cpu,");
-  EXPECT_EQ(why.find("engine cpu: OpenGL"), 0U) << why;
+  EXPECT_EQ((*engine)->choice().find("engine cpu: OpenGL"), 0U) << (*engine)->choice();
 }
 
 TEST(Engine, OfTheProcessorRefusesAVolumeThatItsLoopsCannotCount) {
