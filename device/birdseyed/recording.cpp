@@ -265,7 +265,7 @@ Bytes block_of(const RawEvent& event) {
   return block(kind, std::visit([](const auto& what) { return payload_of(what); }, event));
 }
 
-Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path) {
+Result<RawEventReader> RawEventReader::open(const std::filesystem::path& path) {
   const std::string name = path.string();
   std::ifstream in(path, std::ios::binary);
   if (!in) return Error{Errc::not_found, fmt::format("{}: no such recording, or not to be read", name)};
@@ -273,7 +273,7 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   in.read(reinterpret_cast<char*>(magic.data()), kMagicBytes);
   if (magic != recording_magic())
     return Error{Errc::bad_format, fmt::format("{}: is no recording of birdseyed, or one of another version", name)};
-  RecordingReader reader(std::move(in), name);
+  RawEventReader reader(std::move(in), name);
   const auto first = reader.next_block();
   if (!first) return first.error();
   try {
@@ -288,7 +288,7 @@ Result<RecordingReader> RecordingReader::open(const std::filesystem::path& path)
   return Error{Errc::bad_format, fmt::format("{}: does not say what it was recorded with", name)};
 }
 
-Result<std::optional<RecordingReader::Block>> RecordingReader::next_block() {
+Result<std::optional<RawEventReader::Block>> RawEventReader::next_block() {
   Bytes bytes(kBlockHead);
   const auto read = [&](std::size_t from) {
     in_.read(reinterpret_cast<char*>(bytes.data() + from), static_cast<std::streamsize>(bytes.size() - from));
@@ -316,7 +316,7 @@ Result<std::optional<RecordingReader::Block>> RecordingReader::next_block() {
   return std::optional<Block>(std::move(block));
 }
 
-Result<std::optional<RawEvent>> RecordingReader::next() {
+Result<std::optional<RawEvent>> RawEventReader::next() {
   auto block = next_block();
   if (!block) return block.error();
   if (!*block) return std::optional<RawEvent>();

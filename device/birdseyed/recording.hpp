@@ -23,10 +23,10 @@ Bytes block_of(const CoreSettings& settings);
 Bytes block_of(const RawEvent& event);
 
 /// Reads a file front to back.
-class RecordingReader {
+class RawEventReader {
  public:
   /// Refuses what is no appliance recording, and one of another version.
-  static Result<RecordingReader> open(const std::filesystem::path& path);
+  static Result<RawEventReader> open(const std::filesystem::path& path);
 
   [[nodiscard]] const CoreSettings& settings() const { return settings_; }
   /// The next event; empty at the end. An error where a block is damaged: what follows cannot be trusted.
@@ -39,7 +39,7 @@ class RecordingReader {
     std::uint32_t kind = 0;
     Bytes payload;
   };
-  RecordingReader(std::ifstream in, std::string name) : in_(std::move(in)), name_(std::move(name)) {}
+  RawEventReader(std::ifstream in, std::string name) : in_(std::move(in)), name_(std::move(name)) {}
   Result<std::optional<Block>> next_block();
 
   std::ifstream in_;

@@ -9,7 +9,7 @@
 namespace birdseye::device {
 
 Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop) {
-  auto reader = RecordingReader::open(recording);
+  auto reader = RawEventReader::open(recording);
   if (!reader) return reader.error();
   Core core(reader->settings());
   std::optional<Duration> shift;  // from the recording's clock to this one

@@ -193,7 +193,7 @@ TEST(Recording, ReplaysToTheSameBytes) {
     put(block_of(settings));
     for (const RawEvent& event : events) put(block_of(event));
   }
-  auto reader = RecordingReader::open(path);
+  auto reader = RawEventReader::open(path);
   ASSERT_TRUE(reader) << reader.error().what;
   Core live(settings), again(reader->settings());
   for (const RawEvent& event : events) {
@@ -229,7 +229,7 @@ TEST(Recording, IsGoodUpToWhereItWasCutOrDamaged) {
       bytes[place] ^= static_cast<std::uint8_t>(1U << rng() % 8);
     }
     const auto path = scratch.file("r.berec", {bytes.begin(), bytes.end()});
-    auto reader = RecordingReader::open(path);
+    auto reader = RawEventReader::open(path);
     ASSERT_TRUE(reader);
     const auto whole_blocks = std::count_if(ends.begin(), ends.end(), [&](std::size_t end) { return end <= place; });
     std::ptrdiff_t read = 0;
@@ -249,7 +249,7 @@ std::string refusal(const CoreSettings& settings, const std::vector<RawEvent>& e
   const auto put = [&bytes](const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
   put(block_of(settings));
   for (const RawEvent& event : events) put(block_of(event));
-  auto reader = RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
+  auto reader = RawEventReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
   if (!reader) return reader.error().what;
   const auto next = reader->next();
   return next ? "" : next.error().what;

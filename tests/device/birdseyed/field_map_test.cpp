@@ -110,7 +110,7 @@ TEST(CoreWithAFieldMap, ReplaysToTheSameBytes) {
   const auto put = [&bytes](const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); };
   put(block_of(settings));
   for (const RawEvent& event : events) put(block_of(event));
-  auto reader = RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
+  auto reader = RawEventReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()}));
   ASSERT_TRUE(reader) << reader.error().what;
   ASSERT_TRUE(reader->settings().field);
   Core live(settings), again(reader->settings());
@@ -139,7 +139,7 @@ TEST(CoreWithAFieldMap, ARecordingWhoseMapIsNoneIsRefused) {
     for (std::size_t i = 0; i < kCheck; ++i) block.push_back(static_cast<std::uint8_t>(check >> 8 * i));
     Bytes bytes = recording_magic();
     bytes.insert(bytes.end(), block.begin(), block.end());
-    return RecordingReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()})).has_value();
+    return RawEventReader::open(scratch.file("r.berec", {bytes.begin(), bytes.end()})).has_value();
   };
   EXPECT_TRUE(opens(settings));
   auto short_of_one = settings, no_kind = settings;

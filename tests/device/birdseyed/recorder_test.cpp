@@ -227,7 +227,7 @@ std::uint64_t given_back(bool power_fails, Counted& counted, bool& cut_short) {
   EXPECT_TRUE(WIFSIGNALED(status)) << "1: no file, 2: no syncs: " << WEXITSTATUS(status);
   std::uint64_t count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(config.folder)) {
-    auto reader = RecordingReader::open(entry.path());
+    auto reader = RawEventReader::open(entry.path());
     EXPECT_TRUE(reader);
     if (!reader) continue;
     for (;; ++count) {
@@ -302,7 +302,7 @@ TEST(Recorder, KeepsEverythingItIsGiven) {
     EXPECT_EQ((*recorder)->text(), path.string());
     for (int i = 0; i < 100; ++i) (*recorder)->take(bytes(static_cast<std::uint8_t>(i)));
   }
-  auto reader = RecordingReader::open(path);
+  auto reader = RawEventReader::open(path);
   ASSERT_TRUE(reader) << reader.error().what;
   for (int i = 0; i < 100; ++i) {
     const auto event = reader->next();
