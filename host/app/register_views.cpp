@@ -146,8 +146,8 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
   }
   for (const auto& [key, prefix] :
        {std::pair{"", ""}, {"surface_", "surface"}, {"vessel_", "vessel"}, {"tumour_", "tumour"}}) {
-    const auto before = target_error(c.landmarks, prefix, initial, error_before);
-    const auto after = target_error(c.landmarks, prefix, &found.field, error_after);
+    const auto before = landmark_error(c.landmarks, prefix, initial, error_before);
+    const auto after = landmark_error(c.landmarks, prefix, &found.field, error_after);
     if (!before || !after) continue;
     json[fmt::format("{}tre_before_mm_mean", key)] = before->mean_mm;
     json[fmt::format("{}tre_before_mm_max", key)] = before->max_mm;

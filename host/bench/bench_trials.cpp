@@ -111,7 +111,7 @@ Result<Trial> try_once(const RegistrationCase& c, const Method& method) {
   trial.epsilon_before = epsilon(*c.truth, nullptr);
   trial.epsilon_after = epsilon(*c.truth, &found->field);
   const auto mean_mm = [&](const char* prefix, const DisplacementField* field) {
-    const auto error = target_error(c.landmarks, prefix, field);
+    const auto error = landmark_error(c.landmarks, prefix, field);
     return error ? error->mean_mm : 0;
   };
   trial.tre_before_mm = mean_mm("", nullptr);

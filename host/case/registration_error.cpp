@@ -4,10 +4,10 @@
 
 namespace birdseye::host {
 
-std::optional<TargetError> target_error(const std::vector<Landmark>& landmarks, const std::string& prefix,
-                                        const DisplacementField* field,
-                                        const Transform<Patient, Patient>& model_from_found) {
-  TargetError error;
+std::optional<LandmarkError> landmark_error(const std::vector<Landmark>& landmarks, const std::string& prefix,
+                                            const DisplacementField* field,
+                                            const Transform<Patient, Patient>& model_from_found) {
+  LandmarkError error;
   int count = 0;
   for (const Landmark& landmark : landmarks) {
     if (landmark.name.rfind(prefix, 0) != 0) continue;

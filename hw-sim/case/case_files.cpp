@@ -41,9 +41,9 @@ Result<void> write_picture(const std::filesystem::path& path, std::span<const st
   return write_text(path, std::string(bytes.begin(), bytes.end()));
 }
 
-Result<void> write_landmarks(const std::filesystem::path& path, const std::vector<Landmark>& landmarks) {
+Result<void> write_landmarks(const std::filesystem::path& path, const std::vector<TrueLandmark>& landmarks) {
   std::string csv = "name,rest_x_mm,rest_y_mm,rest_z_mm,deformed_x_mm,deformed_y_mm,deformed_z_mm\n";
-  for (const Landmark& landmark : landmarks) {
+  for (const TrueLandmark& landmark : landmarks) {
     const Eigen::Vector3d& r = landmark.rest_mm;
     const Eigen::Vector3d& d = landmark.deformed_mm;
     csv += fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", landmark.name, r.x(), r.y(), r.z(), d.x(),

@@ -21,7 +21,7 @@ Result<void> write_pose(const std::filesystem::path& path, const Transform<Camer
 Result<void> write_picture(const std::filesystem::path& path, std::span<const std::uint8_t> pixels,
                            const CameraModel& camera);
 /// name, rest and deformed, patient LPS mm.
-Result<void> write_landmarks(const std::filesystem::path& path, const std::vector<Landmark>& landmarks);
+Result<void> write_landmarks(const std::filesystem::path& path, const std::vector<TrueLandmark>& landmarks);
 /// The map as an ITK displacement field on a lattice that spans its box.
 Result<void> write_map_field(const std::filesystem::path& path, const TissueMap& map);
 /// The map itself, as JSON.

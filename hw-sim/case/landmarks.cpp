@@ -47,9 +47,10 @@ std::vector<Vector3d> seen_vertices(const Subject& subject, const Mesh& deformed
 
 }  // namespace
 
-Result<std::vector<Landmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
-                                               const Laparoscope& scope,
-                                               std::span<const Transform<Camera, Patient>> views, std::uint64_t seed) {
+Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
+                                                   const Laparoscope& scope,
+                                                   std::span<const Transform<Camera, Patient>> views,
+                                                   std::uint64_t seed) {
   const auto surface = spread_out(seen_vertices(subject, deformed, scope, views, seed), kSurfacePoints);
   if (surface.size() < kFewestSurfacePoints) {
     return Error{Errc::degenerate, fmt::format("the views see {} points of the organ's surface where {} are needed; "
@@ -61,7 +62,7 @@ Result<std::vector<Landmark>> choose_landmarks(const Subject& subject, const Mes
     inner.push_back(rod.b);
     inner.emplace_back(0.5 * (rod.a + rod.b));
   }
-  std::vector<Landmark> landmarks;
+  std::vector<TrueLandmark> landmarks;
   const auto add = [&](std::string name, const Vector3d& rest) {
     landmarks.push_back({std::move(name), rest, map.deformed_of(rest)});
   };

@@ -14,7 +14,7 @@
 namespace birdseye::hw_sim {
 
 /// A point of the tissue, patient LPS mm.
-struct Landmark {
+struct TrueLandmark {
   std::string name;
   Eigen::Vector3d rest_mm, deformed_mm;
 };
@@ -22,8 +22,9 @@ struct Landmark {
 /// Points whose true place is known: surface_01.. on the deformed organ where a view sees it, vessel_01.. where vessels
 /// fork or halfway between forks, and tumour, its centre. All are spread out as far as possible. Refused where the
 /// views see too little of the organ. scope: a laparoscope with the deformed organ in its cavity.
-Result<std::vector<Landmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
-                                               const Laparoscope& scope,
-                                               std::span<const Transform<Camera, Patient>> views, std::uint64_t seed);
+Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
+                                                   const Laparoscope& scope,
+                                                   std::span<const Transform<Camera, Patient>> views,
+                                                   std::uint64_t seed);
 
 }  // namespace birdseye::hw_sim

@@ -32,7 +32,7 @@ struct Case {
   TissueMap map;
   CameraModel lens;
   std::vector<Transform<Camera, Patient>> views;
-  std::vector<Landmark> landmarks;
+  std::vector<TrueLandmark> landmarks;
   std::vector<std::vector<std::uint8_t>> pictures;
   std::vector<std::uint8_t> lens_circle;
 };
@@ -132,7 +132,7 @@ nlohmann::json truth_of(const CaseSettings& settings, const Case& made) {
   truth["tumour_centre_mm"] = json_of(made.subject.tumour_centre_mm);
   double sum_mm = 0;
   double most_mm = 0;
-  for (const Landmark& landmark : made.landmarks) {
+  for (const TrueLandmark& landmark : made.landmarks) {
     const double moved_mm = (landmark.deformed_mm - landmark.rest_mm).norm();
     sum_mm += moved_mm;
     most_mm = std::max(most_mm, moved_mm);

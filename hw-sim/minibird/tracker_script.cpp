@@ -15,8 +15,7 @@ namespace birdseye::hw_sim {
 namespace {
 
 /// Two birds share a measurement's sixteen draws; each further pair has a seed of its own.
-BirdPose noisy(const BirdPose& pose, const TrackerNoise& noise, std::uint64_t seed, std::int64_t cycle,
-               std::size_t bird) {
+BirdPose noisy(const BirdPose& pose, const BirdNoise& noise, std::uint64_t seed, std::int64_t cycle, std::size_t bird) {
   const std::uint64_t own = seed + 51 + 1000 * (bird / 2);
   const std::uint64_t key = static_cast<std::uint64_t>(cycle) * 16 + 8 * (bird % 2);
   const auto normal3 = [&](std::uint64_t first) {

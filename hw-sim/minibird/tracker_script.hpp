@@ -13,7 +13,7 @@
 
 namespace birdseye::hw_sim {
 
-struct TrackerNoise {
+struct BirdNoise {
   double position_mm = 0;  ///< standard deviation per axis and record
   double angle_deg = 0;    ///< likewise, about each axis
 };
@@ -23,7 +23,7 @@ using Motion = std::function<BirdPose(std::size_t bird, std::int64_t at_ns)>;
 
 struct TrackerSettings {
   UnitSettings unit;
-  TrackerNoise noise;
+  BirdNoise noise;
   double distortion_mm = 0;  ///< the largest displacement by the room's metal
   double delay_ms = 7.5;     ///< from measurement to the first byte
   double jitter_ms = 0;      ///< mean of the lateness of delivery: exponential, cut at 4 times the mean

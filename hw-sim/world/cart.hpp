@@ -16,7 +16,7 @@ struct CartSettings {
   std::filesystem::path tty;      ///< the name of the tracker's terminal
   std::filesystem::path folder;   ///< cart.json and truth/ go here
   std::uint64_t seed = 1;
-  TrackerNoise noise;
+  BirdNoise noise;
   int width_px = 768, height_px = 576;
   double rate_hz = 25;
   Pace pace;

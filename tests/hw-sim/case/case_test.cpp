@@ -47,15 +47,15 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
   return files;
 }
 
-std::vector<Landmark> read_landmarks(const fs::path& path) {
+std::vector<TrueLandmark> read_landmarks(const fs::path& path) {
   std::ifstream in(path);
   std::string line;
   std::getline(in, line);
-  std::vector<Landmark> landmarks;
+  std::vector<TrueLandmark> landmarks;
   while (std::getline(in, line)) {
     std::replace(line.begin(), line.end(), ',', ' ');
     std::istringstream words(line);
-    Landmark l;
+    TrueLandmark l;
     words >> l.name >> l.rest_mm.x() >> l.rest_mm.y() >> l.rest_mm.z() >> l.deformed_mm.x() >> l.deformed_mm.y() >>
         l.deformed_mm.z();
     EXPECT_TRUE(words) << line;
@@ -105,7 +105,7 @@ TEST(Case, TheFieldTakesTheDeformedLandmarksToRest) {
     field->SetInputImage(reader->GetOutput());
     int surface = 0, vessels = 0, tumours = 0;
     double furthest_mm = 0;
-    for (const Landmark& l : read_landmarks(scratch / phantom / "truth" / "landmarks.csv")) {
+    for (const TrueLandmark& l : read_landmarks(scratch / phantom / "truth" / "landmarks.csv")) {
       Field::PointType at;
       for (unsigned axis = 0; axis < 3; ++axis) at[axis] = l.deformed_mm[axis];
       const auto u = field->Evaluate(at);
@@ -181,7 +181,7 @@ TEST(Case, ALampBesideTheLensAndAStillOrganChangeThePictureAlone) {
       EXPECT_EQ(contents_of(scratch / "a" / same), contents_of(scratch / other / same)) << other << " " << same;
     EXPECT_NE(contents_of(scratch / "a" / "view0.png"), contents_of(scratch / other / "view0.png")) << other;
   }
-  for (const Landmark& l : read_landmarks(scratch / "still" / "truth" / "landmarks.csv"))
+  for (const TrueLandmark& l : read_landmarks(scratch / "still" / "truth" / "landmarks.csv"))
     EXPECT_EQ(l.rest_mm, l.deformed_mm);
 }
 
