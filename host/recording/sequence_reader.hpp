@@ -23,10 +23,8 @@ class SequenceReader {
   [[nodiscard]] const SequenceHeader& header() const { return header_; }
   [[nodiscard]] int width_px() const { return width_px_; }
   [[nodiscard]] int height_px() const { return height_px_; }
-  /// How many whole frames the file holds.
+  /// How many whole frames the file holds: fewer than the header tells of where the file was cut.
   [[nodiscard]] std::size_t frames() const { return whole_; }
-  /// How many frames the header tells of: more than frames() where the file was cut.
-  [[nodiscard]] std::size_t frames_told() const { return told_; }
 
   /// The frame at index, RGB, rows from the top. In a compressed file all frames before it must be decompressed too,
   /// unless frames are read in order.
