@@ -14,7 +14,8 @@ if(BIRDSEYE_SANITIZE)
   target_link_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE})
 endif()
 
-# The library's headers are those of its folder; NOT_ALONE names headers that are parts of one .cpp file and not for others.
+# The library's headers are those of its folder. NOT_ALONE names those that ask for more than the library has: whoever
+# includes one sees to what it needs.
 function(birdseye_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE;NOT_ALONE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})

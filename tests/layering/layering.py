@@ -7,6 +7,7 @@ usage: layering.py [ROOT]           tells what breaks a rule, one a line with th
 import configparser
 import fnmatch
 import pathlib
+import posixpath
 import re
 import sys
 
@@ -92,7 +93,8 @@ class Target:
 
     def __init__(self, name, folder, kind):
         self.name, self.folder, self.kind = name, folder, kind
-        self.sources, self.links = [], {}  # links: name -> (PUBLIC or PRIVATE)
+        self.sources, self.not_alone = [], []  # files, by their paths from the root
+        self.links = {}  # name: PUBLIC or PRIVATE
 
 
 def read_build(root):
@@ -114,12 +116,9 @@ def read_build(root):
                 for word in words[1:]:
                     if re.fullmatch("[A-Z_]+", word):
                         part = word
-                    elif part == "SOURCES" and word.endswith(CODE):
+                    elif part in ("SOURCES", "NOT_ALONE") and word.endswith(CODE):
                         path = word.replace("${CMAKE_SOURCE_DIR}/", "") if "$" in word else f"{here}/{word}"
-                        parts = []
-                        for piece in path.split("/"):
-                            parts = parts[:-1] if piece == ".." else parts + [piece]
-                        target.sources.append("/".join(parts))
+                        (target.sources if part == "SOURCES" else target.not_alone).append(posixpath.normpath(path))
                     elif part in ("PUBLIC", "PRIVATE"):
                         target.links[word] = part
             elif command == "target_link_libraries":
@@ -140,6 +139,7 @@ class Check:
         self.rules = Rules(root / "tests/layering/rules.ini")
         self.units = read_units(root)
         self.targets, self.added = read_build(root)
+        self.not_alone = {path for t in self.targets.values() for path in t.not_alone}
         self.library_of = {t.folder: t for t in self.targets.values() if t.kind == "library" and t.folder != "."}
         self.told = []
 
@@ -200,7 +200,8 @@ class Check:
                     self.tell("include", place, f"includes {name}, which {unit.folder} may not")
 
     def needs(self, path, seen):
-        """The targets and packages that a file's includes ask for, through headers of its own folder and of no target."""
+        """The targets and packages that a file's includes ask for: also through headers of its own folder, of no target, and
+        through those whose includers link what they need (NOT_ALONE)."""
         unit = self.units.get(path)
         if unit is None or path in seen:
             return set()
@@ -208,11 +209,11 @@ class Check:
         found = set()
         for _, name, _ in unit.includes:
             other = project_folder(name)
-            if other and (other == unit.folder or other not in self.library_of):
+            if other and (other == unit.folder or other not in self.library_of or name in self.not_alone):
                 found |= self.needs(name, seen)
-            elif other:
+            if other and other != unit.folder and other in self.library_of:
                 found.add(self.library_of[other].name)
-            elif name:
+            elif name and not other:
                 found.add(self.rules.package(name))
         return found - {None}
 
@@ -232,7 +233,7 @@ class Check:
             if target.kind == "library":
                 seen = set()
                 for path, unit in self.units.items():
-                    if unit.folder == target.folder and path.endswith(HEADERS):
+                    if unit.folder == target.folder and path.endswith(HEADERS) and path not in self.not_alone:
                         public |= self.needs(path, seen)
             for source in target.sources:
                 private |= self.needs(source, set())
