@@ -126,10 +126,6 @@ SetupPacket set_rts(bool on, std::uint16_t port) {
   return request(kOut, 0x01, on ? 0x0202 : 0x0200, port);
 }
 
-SetupPacket set_dtr_and_rts(bool dtr, bool rts, std::uint16_t port) {
-  return request(kOut, 0x01, 0x0300U | (dtr ? 1U : 0U) | (rts ? 2U : 0U), port);
-}
-
 SetupPacket set_flow_control(FlowControl flow, std::uint16_t port) {
   const unsigned characters = flow == FlowControl::xon_xoff ? 0x1311 : 0;
   return request(kOut, 0x02, characters, static_cast<unsigned>(flow) << 8 | port);
@@ -139,10 +135,6 @@ SetupPacket set_data_format(const DataFormat& format, std::uint16_t port) {
   const unsigned value = format.bits | static_cast<unsigned>(format.parity) << 8 |
                          static_cast<unsigned>(format.stop) << 11 | (format.send_break ? 1U << 14 : 0U);
   return request(kOut, 0x04, value, port);
-}
-
-SetupPacket get_modem_status(std::uint16_t port) {
-  return request(kIn, 0x05, 0, port, 2);
 }
 
 SetupPacket set_event_character(std::optional<std::uint8_t> character, std::uint16_t port) {
