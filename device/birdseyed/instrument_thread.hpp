@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <functional>
-#include <thread>
 
 #include "device/birdseyed/event_queue.hpp"
 

@@ -15,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/system/unique_fd.hpp"
 #include "drivers/system/wait.hpp"
 
 namespace birdseye::wire {
@@ -94,7 +93,7 @@ class TcpListener final : public Listener {
     ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     // What the kernel holds unsent is no longer ours to shed, and a pose waits behind it.
     ::setsockopt(fd.get(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kMostUnsentBytes, sizeof kMostUnsentBytes);
-    return std::make_unique<TcpLink>(std::move(fd));
+    return link_over(std::move(fd));
   }
 
   void wake() override {
@@ -125,6 +124,10 @@ UniqueFd try_connect(const addrinfo& address, Deadline deadline) {
 
 }  // namespace
 
+std::unique_ptr<Link> link_over(UniqueFd connected) {
+  return std::make_unique<TcpLink>(std::move(connected));
+}
+
 Result<std::unique_ptr<Link>> connect_tcp(const std::string& host, int port, Deadline deadline) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
@@ -135,9 +138,7 @@ Result<std::unique_ptr<Link>> connect_tcp(const std::string& host, int port, Dea
   }
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owner(found, ::freeaddrinfo);
   for (;;) {
-    if (UniqueFd fd = try_connect(*found, deadline)) {
-      return std::unique_ptr<Link>(std::make_unique<TcpLink>(std::move(fd)));
-    }
+    if (UniqueFd fd = try_connect(*found, deadline)) return link_over(std::move(fd));
     if (deadline.passed()) {
       return Error{Errc::not_found,
                    fmt::format("{}:{}: no appliance answers; is birdseyed running there?", host, port)};

@@ -10,6 +10,7 @@
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/json.hpp"
 #include "device/wire/server.hpp"
+#include "device/wire/tcp_link.hpp"
 #include "tests/support/wire_messages.hpp"
 
 namespace birdseye::wire {
@@ -133,16 +134,17 @@ TEST(Wire, AClientThatDoesNotReadLosesWholeFramesOnly) {
 }
 
 /// A client's end at the server, and the client's.
-struct Link {
-  Link() {
+struct Served {
+  Served() {
     int fds[2];
     EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, fds), 0);
-    link.emplace(fds[0]);
+    link.emplace(link_over(UniqueFd(fds[0])));
+    server_fd = fds[0];
     fd = fds[1];
   }
-  Link(const Link&) = delete;
-  Link& operator=(const Link&) = delete;
-  ~Link() { ::close(fd); }
+  Served(const Served&) = delete;
+  Served& operator=(const Served&) = delete;
+  ~Served() { ::close(fd); }
   /// Sends and reads until nothing is left: the messages, as the client understands them.
   std::vector<Event> drain() {
     std::vector<std::uint8_t> bytes(1U << 20U), all;
@@ -169,6 +171,7 @@ struct Link {
   std::size_t offer(const Packet& packet) { return link->offer(packet); }
 
   std::optional<ClientLink> link;
+  int server_fd = -1;  // the link's own
   int fd = -1;
   Latencies latencies;
   Unpacker unpacker;
@@ -183,7 +186,7 @@ std::vector<std::uint64_t> sequences_of(const std::vector<Event>& events) {
 }
 
 TEST(ClientLink, ASlowClientGetsTheFrameThatHasBegunAndThenTheNewest) {
-  Link link;
+  Served link;
   VideoFrame large = frame(0, 1024, 768);
   link.offer(pack(large));
   link.fill();
@@ -197,9 +200,9 @@ TEST(ClientLink, ASlowClientGetsTheFrameThatHasBegunAndThenTheNewest) {
 }
 
 TEST(ClientLink, AFrameOfWhichNothingWasTakenHasNotBegun) {
-  Link link;
+  Served link;
   const std::vector<std::uint8_t> junk(1U << 16U);
-  while (::send(link.link->fd(), junk.data(), junk.size(), MSG_NOSIGNAL) > 0) {
+  while (::send(link.server_fd, junk.data(), junk.size(), MSG_NOSIGNAL) > 0) {
   }
   for (std::uint64_t i = 0; i < 10; ++i) {
     link.offer(pack(frame(i)));
@@ -216,7 +219,7 @@ TEST(ClientLink, AFrameOfWhichNothingWasTakenHasNotBegun) {
 }
 
 TEST(ClientLink, PosesPushOutOlderPosesAndNothingElse) {
-  Link link;
+  Served link;
   link.offer(pack(frame(0, 1024, 768)));
   link.fill();
   link.offer(pack(Pedal{true, {5}}));
@@ -241,7 +244,7 @@ TEST(ClientLink, PosesPushOutOlderPosesAndNothingElse) {
 }
 
 TEST(ClientLink, WhatAnswersIsBoundedToo) {
-  Link link;
+  Served link;
   link.offer(pack(frame(0, 1024, 768)));
   link.fill();
   std::size_t shed = 0;
