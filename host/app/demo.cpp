@@ -77,7 +77,8 @@ void judge(DemoFigures& figures) {
   const double hidden_percent = 100 * figures.frames_without_overlay / (shown + figures.frames_without_overlay);
   const double dropped_percent = 100.0 * figures.frames_dropped / std::max(1, figures.frames + figures.frames_dropped);
   const Limit limits[] = {
-      {p95_mm, 3, 5, fmt::format("the tumour's centre is within {:.2f} mm in 95 % of the frames", p95_mm)},
+      {p95_mm, kTargetLimits.pass_mm, kTargetLimits.marginal_mm,
+       fmt::format("the tumour's centre is within {:.2f} mm in 95 % of the frames", p95_mm)},
       {worst_mm, 6, 10, fmt::format("the tumour's centre is off by {:.2f} mm in the worst frame", worst_mm)},
       {hidden_percent, 10, 50, fmt::format("{:.0f} % of the frames carry no overlay", hidden_percent)},
       {dropped_percent, 5, 20, fmt::format("{:.0f} % of the frames were dropped", dropped_percent)},

@@ -120,7 +120,7 @@ Result<void> prepare(Options& options) {
   return {};
 }
 
-nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
+nlohmann::json json_of(const LiveFigures& figures, const OperationView& operation) {
   nlohmann::json json{{"frames", figures.frames},
                       {"frames_skipped", figures.frames_skipped},
                       {"frames_overlaid", figures.frames_overlaid},
@@ -130,11 +130,11 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
                       {"age_ms_max", figures.ages.most_ms()},
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
                       {"stood_still", figures.stood_still},
-                      {"engine", session.engine_name()},
-                      {"link_says", session.link_words()},
-                      {"appliance_says", session.appliance_says()},
+                      {"engine", operation.engine_name()},
+                      {"link_says", operation.link.words},
+                      {"appliance_says", operation.link.appliance_says},
                       {"picture_says", figures.picture_says}};
-  if (const auto fre = session.fre_mm()) json["fre_mm"] = *fre;
+  if (const auto& fre = operation.fre_mm) json["fre_mm"] = *fre;
   if (figures.window_s) json["window_s"] = *figures.window_s;
   if (figures.ct_s) json["ct_s"] = *figures.ct_s;
   if (figures.fiducials_s) json["fiducials_s"] = *figures.fiducials_s;
@@ -142,40 +142,37 @@ nlohmann::json json_of(const LiveFigures& figures, LiveSession& session) {
 }
 
 /// Against the truth of a simulated cart, as far as an overlay was drawn.
-Result<void> judge(const Options& options, LiveApp& app, nlohmann::json& json, Verdict& verdict) {
-  const auto& setup = app.session().picture().setup();
-  const PatientPlan* const patient = app.session().patient();
-  if (!setup || patient == nullptr || patient->landmarks.empty()) {
+Result<void> judge(const Options& options, const LiveApp& app, nlohmann::json& json, Verdict& verdict) {
+  const OperationView operation = app.operation();
+  const auto& setup = app.setup();
+  if (!setup || !operation.patient || operation.patient->landmarks.empty()) {
     verdict.add(Grade::fail, "no overlay was reached");
     return {};
   }
-  const LiveSession& session = app.session();
-  const Eigen::Vector3d tumour_mm = patient->landmarks.front().place_mm;
-  const auto tumour_as_shown_mm = [&](std::uint64_t shape) -> Eigen::Vector3d {
-    const bool deformed = shape == session.shapes() && session.deformation();
-    return deformed ? session.deformation()->field.deformed_of(tumour_mm) : tumour_mm;
+  const Eigen::Vector3d tumour_mm = operation.patient->landmarks.front().place_mm;
+  const auto tumour_as_shown_mm = [&](std::uint64_t shape) {
+    return as_shown_mm(tumour_mm, shape == operation.shapes ? operation.deformed.get() : nullptr);
   };
   const auto by_shape =
       logged_target_errors(options.live.out, options.live.out / "truth", setup->camera, tumour_as_shown_mm);
   if (!by_shape) return by_shape.error();
   // What is on the screen at the end is judged.
-  const auto last = by_shape->find(session.shapes());
+  const auto last = by_shape->find(operation.shapes);
   if (last == by_shape->end()) {
     verdict.add(Grade::fail, "no frame bore an overlay");
     return {};
   }
   const LoggedErrors& errors = last->second;
-  constexpr double kPassMm = 3, kMarginalMm = 5;
   const double p95_mm = percentile(errors.mm, 0.95);
   json["target_error_mm_p50"] = percentile(errors.mm, 0.5);
   json["target_error_mm_p95"] = p95_mm;
   json["target_error_mm_max"] = *std::max_element(errors.mm.begin(), errors.mm.end());
   if (!errors.expected_mm.empty()) json["expected_error_mm_p50"] = percentile(errors.expected_mm, 0.5);
-  if (session.deformation() && last != by_shape->begin())
+  if (operation.deformed && last != by_shape->begin())
     json["target_error_before_deforming_mm_p50"] = percentile(std::prev(last)->second.mm, 0.5);
-  verdict.add(p95_mm <= kPassMm       ? Grade::pass
-              : p95_mm <= kMarginalMm ? Grade::marginal
-                                      : Grade::fail,
+  verdict.add(p95_mm <= kTargetLimits.pass_mm       ? Grade::pass
+              : p95_mm <= kTargetLimits.marginal_mm ? Grade::marginal
+                                                    : Grade::fail,
               fmt::format("the tumour's centre is within {:.2f} mm in 95 % of {} frames", p95_mm, errors.mm.size()));
   return {};
 }
@@ -217,7 +214,7 @@ Result<ExitCode> run(Options& options) {
   LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script), std::move(log),
               std::move(publisher));
   const auto ran = app.run(asked);
-  nlohmann::json json = json_of(app.figures(), app.session());
+  nlohmann::json json = json_of(app.figures(), app.operation());
   Verdict verdict;
   if (!ran) verdict.add(Grade::fail, ran.error().what);
   if (app.log()) {

@@ -12,9 +12,8 @@
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
-#include "host/overlay/compositor.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/render_scene.hpp"
-#include "host/overlay/surface_cues.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/window/window.hpp"
@@ -149,12 +148,12 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
-  std::vector<std::uint8_t> in_front;
-  if (options.surface_in_front) in_front = surface_cues(scene.behind.rgb, image.width_px, image.height_px);
-  const std::string png = options.over.empty()
-                              ? transparent_png_of(image)
-                              : png_of(RgbView{composite(scene.behind.rgb, image, options.opacity, in_front),
-                                               image.width_px, image.height_px});
+  // Lens and pose are somebody's files.
+  const double strength = decide_still(vouched_for({})).strength;
+  const OverlayLook look{scene.settings, options.opacity, options.surface_in_front};
+  const std::string png = options.over.empty() ? transparent_png_of(image)
+                                               : png_of(RgbView{lay_over(scene.behind.rgb, image, strength, look),
+                                                                image.width_px, image.height_px});
   if (!options.movie.empty()) {
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }

@@ -17,6 +17,7 @@
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/replay_setup.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/recording/recording_reader.hpp"
 
@@ -43,13 +44,14 @@ struct Replayed {
   std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
 };
 
-std::string row_of(const wire::VideoFrame& frame, const FrameOverlay::Drawn& drawn) {
-  std::string reason = drawn.decision.reason;
+std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
+                   const std::optional<FramePainter::Painted>& painted) {
+  std::string reason = decision.reason;
   std::replace(reason.begin(), reason.end(), ',', ';');
   std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
-                                to_string(frame.info.pose.kind), drawn.decision.strength, reason);
-  if (drawn.camera_from_patient) {
-    const Eigen::Matrix4d m = drawn.camera_from_patient->matrix();
+                                to_string(frame.info.pose.kind), decision.strength, reason);
+  if (painted) {
+    const Eigen::Matrix4d m = painted->camera_from_patient.matrix();
     for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));
   }
   return row + "\n";
@@ -58,25 +60,29 @@ std::string row_of(const wire::VideoFrame& frame, const FrameOverlay::Drawn& dra
 /// Draws every frame, and writes some.
 class Player {
  public:
-  Player(const Options& options, FrameOverlay overlay, const CameraModel& camera)
-      : options_(options), overlay_(std::move(overlay)), camera_(camera) {}
+  Player(const Options& options, const Setup& setup, const TrustFigures& figures, Engine& engine)
+      : options_(options), engine_(engine) {
+    look_.render.step_mm = options.step_mm;
+    painter_.set_setup(setup, figures);
+  }
 
   Result<void> take(const wire::VideoFrame& frame) {
     ++done.frames;
-    if (frame.width_px != camera_.width_px || frame.height_px != camera_.height_px) {
+    if (!painter_.fits(frame)) {
       ++done.other_size;
       return {};
     }
-    const FrameOverlay::Drawn drawn = overlay_.draw(frame);
-    if (drawn.camera_from_patient) ++done.overlaid;
-    if (drawn.decision.strength >= 1) ++done.whole;
-    if (!drawn.decision.reason.empty()) ++done.reasons[drawn.decision.reason];
-    done.checksum =
-        static_cast<std::uint32_t>(::crc32(done.checksum, drawn.rgb.data(), static_cast<uInt>(drawn.rgb.size())));
-    done.table += row_of(frame, drawn);
+    const OverlayGate::Decision decision = painter_.decide(frame);
+    const auto painted = painter_.paint(frame, decision, engine_, look_);
+    const std::vector<std::uint8_t>& rgb = painted ? painted->rgb : *frame.rgb;
+    if (painted) ++done.overlaid;
+    if (decision.strength >= 1) ++done.whole;
+    if (!decision.reason.empty()) ++done.reasons[decision.reason];
+    done.checksum = static_cast<std::uint32_t>(::crc32(done.checksum, rgb.data(), static_cast<uInt>(rgb.size())));
+    done.table += row_of(frame, decision, painted);
     if ((done.frames - 1) % static_cast<std::size_t>(options_.every) == 0) {
       const fs::path file = options_.out / fmt::format("overlay-{:06}.png", frame.info.sequence);
-      if (auto put = write_file(file, png_of(RgbView{drawn.rgb, frame.width_px, frame.height_px})); !put) return put;
+      if (auto put = write_file(file, png_of(RgbView{rgb, frame.width_px, frame.height_px})); !put) return put;
     }
     if (options_.film_hz <= 0) return {};
     if (!film_) {
@@ -84,7 +90,7 @@ class Player {
       if (!film) return film.error();
       film_ = *std::move(film);
     }
-    return film_->add(drawn.rgb);
+    return film_->add(rgb);
   }
   Result<void> finish() { return film_ ? film_->finish() : Result<void>(); }
 
@@ -92,12 +98,13 @@ class Player {
 
  private:
   const Options& options_;
-  FrameOverlay overlay_;
-  CameraModel camera_;
+  Engine& engine_;
+  OverlayLook look_;
+  FramePainter painter_;
   std::optional<Film> film_;
 };
 
-Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup) {
+Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayTrust& trust) {
   Verdict verdict;
   if (done.overlaid == 0) {
     verdict.add(Grade::fail, done.frames == 0 ? "the recording has no frames" : "no frame carries an overlay");
@@ -110,13 +117,13 @@ Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayS
   if (reader.frames_lost() > 0)
     verdict.add(Grade::marginal, fmt::format("{} frames are cut short or missing", reader.frames_lost()));
   for (const std::string& note : reader.notes()) verdict.add(Grade::marginal, note);
-  for (const std::string& figure : setup.unknown)
+  for (const std::string& figure : trust.vouched_for)
     verdict.add(Grade::pass, fmt::format("{} is not known and taken for perfect", figure));
   return verdict;
 }
 
-nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const std::string& engine,
-                       const Verdict& verdict) {
+nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const TrustFigures& figures,
+                       const std::string& engine, const Verdict& verdict) {
   nlohmann::json json = {{"frames", done.frames},
                          {"frames_overlaid", done.overlaid},
                          {"frames_overlaid_whole", done.whole},
@@ -124,10 +131,10 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const std
                          {"reasons_of_frames", done.reasons},
                          {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
                          {"engine", engine},
-                         {"camera_rms_px", setup.calibration.camera_rms_px},
-                         {"tracked_rms_px", setup.calibration.tracked_rms_px},
-                         {"fre_mm", setup.calibration.fre_mm},
-                         {"touches", setup.touches_in_tracker_mm.size()},
+                         {"camera_rms_px", *figures.scope.camera_rms_px},
+                         {"tracked_rms_px", *figures.scope.held_out_px},
+                         {"fre_mm", *figures.fre_mm},
+                         {"touches", setup.touches},
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
   return json;
@@ -175,16 +182,15 @@ Result<ExitCode> run(const Options& options) {
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
-  RenderSettings settings;
-  settings.step_mm = options.step_mm;
-  Player player(options, FrameOverlay(setup->setup, setup->calibration, **engine, settings), setup->setup.camera);
+  const ReplayTrust trust = trust_of(*setup, *volume);
+  Player player(options, setup->setup(), trust.figures, **engine);
   if (auto played = play(**reader, player, progress); !played) return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
-  const Verdict verdict = judge(player.done, **reader, *setup);
-  const std::string json = text_of(json_of(player.done, *setup, (*engine)->name(), verdict));
-  const std::string registration = pose_text(setup->setup.tracker_from_patient.inverse().matrix());
+  const Verdict verdict = judge(player.done, **reader, trust);
+  const std::string json = text_of(json_of(player.done, *setup, trust.figures, (*engine)->name(), verdict));
+  const std::string registration = pose_text(setup->setup().tracker_from_patient.inverse().matrix());
   if (auto written = write_files({{options.out / "frames.csv", player.done.table},
                                   {options.out / "patient_from_tracker.txt", registration},
                                   {options.out / "replay.json", json},
@@ -215,7 +221,7 @@ void add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views");
   command.add_option("--camera-rms-px", inputs.camera_rms_px,
                      "how well the lens is known, where no calibration record says");
-  command.add_option("--hand-eye-rms-px", inputs.tracked_rms_px, "and hand-eye");
+  command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye");
   command.add_option("--fre-mm", inputs.fre_mm, "and the registration");
 }
 

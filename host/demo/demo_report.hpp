@@ -38,6 +38,12 @@ struct DemoFigures {
 /// p in [0, 1]; the nearest-rank percentile; NaN of nothing.
 double percentile(std::vector<double> values, double p);
 
+/// How far the tumour's centre may be off in 95 % of the frames.
+struct TargetLimits {
+  double pass_mm = 3, marginal_mm = 5;
+};
+inline constexpr TargetLimits kTargetLimits;
+
 /// Writes report.json and report.html into folder; the page shows overlay.png, video.png and overlay.mp4 beside it and
 /// loads nothing from a network.
 Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFigures& figures);

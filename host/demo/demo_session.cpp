@@ -6,7 +6,7 @@
 #include "calibration/base/median.hpp"
 #include "calibration/camera/camera_calibration.hpp"
 #include "drivers/system/interrupt.hpp"
-#include "host/registration/rigid/point_matching.hpp"
+#include "host/operation/findings.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
@@ -68,14 +68,11 @@ Result<void> DemoSession::take(const wire::Birds& birds) {
     stations_.push(birds);
     take_stations();
   }
-  for (const wire::Bird& bird : birds.birds) {
-    if (bird.name == "pointer" && (stage == "touch" || stage == "look")) {
-      const Eigen::Vector3d tip = bird.tracker_from_sensor * cart_.sheet().tip_in_pointer_mm;
-      if (const auto touch = touch_detector_.push(birds.acquired, tip); touch && stage == "touch") {
-        touches_in_tracker_mm_.push_back(touch->tip_in_tracker_mm);
-        progress_(fmt::format("touched fiducial {} of {}", touches_in_tracker_mm_.size(), cart_.sheet().fiducials));
-      }
-    }
+  if (stage != "touch" && stage != "look") return {};
+  const auto touch = pointer_.take(birds, "pointer", cart_.sheet().tip_in_pointer_mm);
+  if (touch && stage == "touch") {
+    touches_in_tracker_mm_.push_back(touch->tip_in_tracker_mm);
+    progress_(fmt::format("touched fiducial {} of {}", touches_in_tracker_mm_.size(), cart_.sheet().fiducials));
   }
   return {};
 }
@@ -103,42 +100,41 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   if (!hand_eye) return Error{hand_eye.error().code, "hand-eye calibration: " + hand_eye.error().what};
   if (const Verdict verdict = calibration::judge(*hand_eye); verdict.grade == Grade::fail)
     return Error{Errc::degenerate, fmt::format("hand-eye calibration: {}", fmt::join(verdict.reasons, "; "))};
-  const auto fit = match_and_fit(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
+  const auto fit = register_by_touches(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
   if (!fit) return Error{fit.error().code, "registration: " + fit.error().what};
   figures.camera_rms_px = lens->rms_px;
   figures.hand_eye_rms_px = hand_eye->tracked_px;
   figures.board_views = static_cast<int>(seen_.stations.size());
-  figures.fre_mm = fit->fit.fre_rms_mm;
-  figures.fiducial_residuals_mm = fit->fit.residuals_mm;
-  setup = Setup{lens->camera, hand_eye->camera_from_sensor, fit->fit.to_from.inverse()};
+  figures.fre_mm = fit->registered.fre_mm;
+  figures.fiducial_residuals_mm = fit->residuals_mm;
+  const ScopeSetup scope = ScopeSetup::of_hand_eye(lens->camera, lens->rms_px, *hand_eye);
+  setup = scope.registered(fit->registered.tracker_from_patient);
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
   auto engine = make_engine("cpu", plan_.shown, *transfer);
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
-  RenderSettings settings;
-  settings.step_mm = 1.2;
-  drawing_.emplace(*setup, OverlayGate::Calibration{lens->rms_px, hand_eye->tracked_px, fit->fit.fre_rms_mm}, *engine_,
-                   settings);
+  look_.render.step_mm = 1.2;
+  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, plan_.tumour_centre_in_patient_mm));
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
-                             figures.board_views, hand_eye->tracked_px, fit->fit.fre_rms_mm));
+                             figures.board_views, figures.hand_eye_rms_px, fit->registered.fre_mm));
   return {};
 }
 
 Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
-  const FrameOverlay::Drawn drawn = drawing_->draw(frame);
-  if (drawn.camera_from_patient) {
+  const auto painted = painter_.paint(frame, painter_.decide(frame), *engine_, look_);
+  if (painted) {
     if (overlaid.size() % kKeepEvery == 0) {
       kept.push_back({frame.info.sequence,
                       {frame.width_px, frame.height_px, *frame.rgb},
-                      {frame.width_px, frame.height_px, drawn.rgb}});
+                      {frame.width_px, frame.height_px, painted->rgb}});
     }
-    overlaid.push_back({frame.info.sequence, frame.info.acquired, *drawn.camera_from_patient});
+    overlaid.push_back({frame.info.sequence, frame.info.acquired, painted->camera_from_patient});
     if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
   } else {
     ++figures.frames_without_overlay;
   }
-  return film_.add(drawn.rgb);
+  return film_.add(painted ? painted->rgb : *frame.rgb);
 }
 
 Result<void> DemoSession::take(const wire::VideoFrame& frame) {

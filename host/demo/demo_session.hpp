@@ -14,8 +14,8 @@
 #include "host/files/picture.hpp"
 #include "host/guide/live_stations.hpp"
 #include "host/link/event_stream.hpp"
-#include "host/overlay/frame_overlay.hpp"
-#include "host/registration/rigid/touch_detector.hpp"
+#include "host/operation/pointer_tip.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/render/engine.hpp"
 #include "host/simulated/simulated_cart.hpp"
 #include "host/volume/volume.hpp"
@@ -71,10 +71,11 @@ class DemoSession {
   Progress& progress_;
   LiveStations stations_;
   calibration::HandEyeInput seen_;
-  TouchDetector touch_detector_;
+  PointerTip pointer_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
   std::unique_ptr<Engine> engine_;
-  std::optional<FrameOverlay> drawing_;
+  FramePainter painter_;
+  OverlayLook look_;
   std::optional<std::uint64_t> first_sequence_;
   std::optional<DeviceTime> last_measured_;
   std::vector<double> tracker_periods_s_;

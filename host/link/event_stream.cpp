@@ -48,7 +48,7 @@ std::optional<ClockGap> EventStream::gap_at(const wire::Event& event) const {
   if (frame == nullptr) return std::nullopt;
   const auto related = client_->host_from_device(frame->info.acquired);
   if (!related) return std::nullopt;
-  return ClockGap{Duration{related->time.ns - frame->info.acquired.ns}, related->sigma};
+  return ClockGap{frame->info.acquired, *related};
 }
 
 std::optional<ClockGap> EventStream::host_from_device() const {

@@ -13,9 +13,13 @@
 
 namespace birdseye::host {
 
-/// This machine's CLOCK_MONOTONIC less the appliance's, with a sigma.
+/// How this machine's clock stands to the appliance's: one moment on both.
 struct ClockGap {
-  Duration gap, sigma;
+  DeviceTime at;
+  RelatedTime<HostTime> host;
+
+  /// Of times near that moment, between which and it no clock drifts by anything that counts.
+  [[nodiscard]] HostTime host_from_device(DeviceTime time) const { return host.time + (time - at); }
 };
 
 /// Reads the wire on a thread of its own, so that work on one frame does not make the appliance shed the next. Bounded:
@@ -27,7 +31,7 @@ class EventStream : public EventSource {
 
   /// The next event; empty at the deadline; an error once the appliance has gone and all its events are taken.
   Result<std::optional<wire::Event>> next(Deadline deadline) override;
-  /// By how much this machine's clock is ahead of the appliance's, by the newest frame; empty until that is known.
+  /// By the newest frame; empty until that is known.
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// For a server that is no appliance: what it is, and which of its messages are passed over. Empty for an appliance.
   [[nodiscard]] std::string peer_words() const;

@@ -29,17 +29,26 @@ std::span<const std::uint8_t> bytes_of(const T* data, std::size_t count) {
   return {reinterpret_cast<const std::uint8_t*>(data), count * sizeof(T)};
 }
 
-Result<Operation::Calibrated> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
-  auto camera = read_camera(folder / kCamera);
-  if (!camera) return camera.error();
-  const auto hand_eye = read_pose(folder / kHandEye);
-  if (!hand_eye) return hand_eye.error();
-  return Operation::Calibrated{*camera,
-                               Transform<Camera, Sensor>::from_matrix(*hand_eye),
-                               figures.at("camera_rms_px").get<double>(),
-                               figures.at("tracked_rms_px").get<double>(),
-                               figures.at("hand_eye_mm").get<double>(),
-                               figures.at("made_utc").get<std::string>()};
+std::optional<double> figure_of(const nlohmann::json& figures, const char* name) {
+  return figures.contains(name) ? std::optional(figures.at(name).get<double>()) : std::nullopt;
+}
+
+/// tracked_rms_px is what the file calls the held-out error.
+Result<CalibratedScope> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
+  auto scope = ScopeSetup::of_files(
+      folder / kCamera, folder / kHandEye,
+      {figure_of(figures, "camera_rms_px"), figure_of(figures, "tracked_rms_px"), figure_of(figures, "hand_eye_mm")});
+  if (!scope) return scope.error();
+  return CalibratedScope{*std::move(scope), figures.at("made_utc").get<std::string>(), true};
+}
+
+nlohmann::json figures_of(const CalibratedScope& found) {
+  nlohmann::json out{{"made_utc", found.made_utc}};
+  const ScopeFigures& figures = found.scope.figures();
+  if (figures.camera_rms_px) out["camera_rms_px"] = *figures.camera_rms_px;
+  if (figures.held_out_px) out["tracked_rms_px"] = *figures.held_out_px;
+  if (figures.held_out_mm) out["hand_eye_mm"] = *figures.held_out_mm;
+  return out;
 }
 
 }  // namespace
@@ -61,21 +70,18 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
   nlohmann::json sheet{{"made_utc", operation.made_utc}, {"ct_checksum", operation.ct_checksum}};
   std::vector<FileText> files;
   if (const auto& found = operation.calibrated) {
-    sheet["calibrated"] = {{"camera_rms_px", found->camera_rms_px},
-                           {"tracked_rms_px", found->tracked_rms_px},
-                           {"hand_eye_mm", found->hand_eye_mm},
-                           {"made_utc", found->made_utc}};
-    files.push_back({folder / kCamera, camera_text(found->camera)});
-    files.push_back({folder / kHandEye, pose_text(found->camera_from_sensor.matrix())});
+    sheet["calibrated"] = figures_of(*found);
+    files.push_back({folder / kCamera, camera_text(found->scope.camera())});
+    files.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
   }
   if (const auto& found = operation.registered) {
     sheet["registered"] = {{"fre_mm", found->fre_mm}, {"fiducials_in_patient_mm", nlohmann::json::array()}};
     for (const Eigen::Vector3d& place : found->fiducials_in_patient_mm)
       sheet["registered"]["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
-    files.push_back({folder / kRegistration, pose_text(found->patient_from_tracker.matrix())});
+    files.push_back({folder / kRegistration, pose_text(found->tracker_from_patient.inverse().matrix())});
   }
-  sheet["deformed"] = operation.deformation.has_value();
-  if (const auto& found = operation.deformation) {
+  sheet["deformed"] = operation.deformed != nullptr;
+  if (const auto& found = operation.deformed) {
     if (found->uncertainty_mm) sheet["uncertainty_mm"] = *found->uncertainty_mm;
     if (auto written = write_field(folder / kField, found->field); !written) return written;
   } else {
@@ -111,8 +117,9 @@ Result<Operation> read_operation(const fs::path& folder) {
     if (sheet.contains("registered")) {
       const auto matrix = read_pose(folder / kRegistration);
       if (!matrix) return matrix.error();
-      out.registered = {
-          Transform<Patient, Tracker>::from_matrix(*matrix), sheet.at("registered").at("fre_mm").get<double>(), {}};
+      out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix).inverse(),
+                        sheet.at("registered").at("fre_mm").get<double>(),
+                        {}};
       for (const auto& place : sheet.at("registered").at("fiducials_in_patient_mm"))
         out.registered->fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                                              place.at(2).get<double>());
@@ -123,9 +130,8 @@ Result<Operation> read_operation(const fs::path& folder) {
     if (sheet.at("deformed").get<bool>()) {
       auto field = read_field(folder / kField);
       if (!field) return field.error();
-      out.deformation.emplace();
-      out.deformation->field = *std::move(field);
-      if (sheet.contains("uncertainty_mm")) out.deformation->uncertainty_mm = sheet.at("uncertainty_mm").get<double>();
+      out.deformed =
+          std::make_shared<const DeformedOrgan>(DeformedOrgan{*std::move(field), figure_of(sheet, "uncertainty_mm")});
     }
     return out;
   } catch (const nlohmann::json::exception& wrong) {

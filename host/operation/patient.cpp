@@ -33,6 +33,14 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan) {
 
 }  // namespace
 
+Eigen::Vector3d middle_of_ct(const Volume& ct) {
+  return ct.patient_from_voxel * Eigen::Vector3d(0.5 * Eigen::Vector3d(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1));
+}
+
+Eigen::Vector3d target_in_patient_mm(const PatientPlan& plan) {
+  return plan.landmarks.empty() ? middle_of_ct(plan.ct) : plan.landmarks.front().place_mm;
+}
+
 Result<PatientPlan> read_patient(const PatientFiles& files) {
   PatientPlan plan;
   auto ct = import_volume(files.ct);

@@ -36,6 +36,11 @@ struct PatientPlan {
   std::vector<NamedPoint> landmarks;
 };
 
+/// What is taken for the target where no landmark is given; patient frame, mm.
+Eigen::Vector3d middle_of_ct(const Volume& ct);
+/// The first landmark, else the CT's middle; in the CT as it was taken.
+Eigen::Vector3d target_in_patient_mm(const PatientPlan& plan);
+
 /// An error names the file. Where no fiducials are given, they are left to find_fiducials.
 Result<PatientPlan> read_patient(const PatientFiles& files);
 /// The markers that the CT shows, the brightest first.

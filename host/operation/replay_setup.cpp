@@ -5,9 +5,9 @@
 #include "calibration/record/calibration_record.hpp"
 #include "host/files/record_file.hpp"
 #include "host/files/text_files.hpp"
+#include "host/operation/patient.hpp"
+#include "host/operation/pointer_tip.hpp"
 #include "host/recording/recording_reader.hpp"
-#include "host/registration/rigid/point_matching.hpp"
-#include "host/registration/rigid/touch_detector.hpp"
 
 namespace birdseye::host {
 
@@ -59,36 +59,23 @@ Result<Transform<To, From>> read_transform(const std::filesystem::path& path) {
   return Transform<To, From>::from_matrix(*matrix);
 }
 
-Result<void> take_calibration(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record,
-                              ReplaySetup& out) {
+Result<ScopeSetup> scope_of(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record) {
   if (inputs.camera.empty() != inputs.camera_from_sensor.empty())
     return Error{Errc::bad_value, "--camera and --camera-from-sensor go together; give both, or --calibration"};
-  if (!inputs.camera.empty()) {
-    auto camera = read_camera(inputs.camera);
-    if (!camera) return camera.error();
-    auto hand_eye = read_transform<Camera, Sensor>(inputs.camera_from_sensor);
-    if (!hand_eye) return hand_eye.error();
-    out.setup.camera = *camera;
-    out.setup.camera_from_sensor = *hand_eye;
-    return {};
-  }
+  const ScopeFigures stated{inputs.camera_rms_px, inputs.held_out_px, std::nullopt};
+  if (!inputs.camera.empty()) return ScopeSetup::of_files(inputs.camera, inputs.camera_from_sensor, stated);
   if (!record) {
     return Error{Errc::not_found, fmt::format("{}: no calibration was in force; give --calibration, or --camera and "
                                               "--camera-from-sensor",
                                               inputs.recording.string())};
   }
-  if (!record->lens || !record->hand_eye) {
-    return Error{Errc::bad_value,
-                 fmt::format("{}: the record has no {}; calibrate it, or give --camera and "
-                             "--camera-from-sensor",
-                             (inputs.calibration.empty() ? inputs.recording : inputs.calibration).string(),
-                             record->lens ? "hand-eye" : "lens")};
-  }
-  out.setup.camera = record->lens->camera;
-  out.setup.camera_from_sensor = record->hand_eye->camera_from_sensor;
-  out.calibration.camera_rms_px = record->lens->rms_px;
-  out.calibration.tracked_rms_px = record->hand_eye->held_out_px;
-  return {};
+  auto scope = ScopeSetup::of_record(*record, stated);
+  if (scope) return *std::move(scope);
+  return Error{Errc::bad_value,
+               fmt::format("{}: the record has no {}; calibrate it, or give --camera and "
+                           "--camera-from-sensor",
+                           (inputs.calibration.empty() ? inputs.recording : inputs.calibration).string(),
+                           record->lens ? "hand-eye" : "lens")};
 }
 
 Result<Eigen::Vector3d> tip_of(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record) {
@@ -103,35 +90,35 @@ Result<Eigen::Vector3d> tip_of(const ReplayInputs& inputs, const std::optional<C
                fmt::format("{}: {} points where the tip is one", inputs.tip.string(), points->size())};
 }
 
-Result<void> register_by_touches(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record,
-                                 ReplaySetup& out) {
+Result<void> register_anew(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record,
+                           ReplaySetup& out) {
   const auto markers = read_points(inputs.fiducials);
   if (!markers) return markers.error();
   const auto tip = tip_of(inputs, record);
   if (!tip) return tip.error();
-  TouchDetector detector;
+  PointerTip pointer;
   std::optional<DeviceTime> first;
+  std::vector<Eigen::Vector3d> touched_in_tracker_mm;
   const auto looked = look_through(inputs, [&](const wire::Event& event) {
     const auto* birds = std::get_if<wire::Birds>(&event);
     if (birds == nullptr) return;
     if (!first) first = birds->acquired;
     const double at_s = (birds->acquired - *first).seconds();
     if (!inputs.touched_s.empty() && (at_s < inputs.touched_s[0] || at_s > inputs.touched_s[1])) return;
-    for (const wire::Bird& bird : birds->birds) {
-      if (bird.name != inputs.pointer) continue;
-      if (const auto touch = detector.push(birds->acquired, bird.tracker_from_sensor * *tip))
-        out.touches_in_tracker_mm.push_back(touch->tip_in_tracker_mm);
-    }
+    if (const auto touch = pointer.take(*birds, inputs.pointer, *tip))
+      touched_in_tracker_mm.push_back(touch->tip_in_tracker_mm);
   });
   if (!looked) return looked.error();
-  const auto fit = match_and_fit(*markers, out.touches_in_tracker_mm);
+  auto fit = register_by_touches(*markers, touched_in_tracker_mm);
+  out.touches = touched_in_tracker_mm.size();
   if (!fit) {
-    return Error{fit.error().code, fmt::format("{}: {} rests of \"{}\", {}: {}; --touched says when to look",
-                                               inputs.recording.string(), out.touches_in_tracker_mm.size(),
-                                               inputs.pointer, inputs.fiducials.string(), fit.error().what)};
+    return Error{fit.error().code,
+                 fmt::format("{}: {} rests of \"{}\", {}: {}; --touched says when to look", inputs.recording.string(),
+                             out.touches, inputs.pointer, inputs.fiducials.string(), fit.error().what)};
   }
-  out.setup.tracker_from_patient = fit->fit.to_from.inverse();
-  out.calibration.fre_mm = fit->fit.fre_rms_mm;
+  out.tracker_from_patient = fit->registered.tracker_from_patient;
+  if (!out.fre_mm) out.fre_mm = fit->registered.fre_mm;
+  out.by_touches = fit->registered;
   return {};
 }
 
@@ -144,39 +131,50 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
                  "give one registration: --registration, --tracker-from-patient, or --fiducials that were touched"};
   }
   if (!inputs.fiducials.empty()) {
-    if (auto done = register_by_touches(inputs, record, out); !done) return done;
+    if (auto done = register_anew(inputs, record, out); !done) return done;
   } else if (!inputs.patient_from_tracker.empty()) {
     const auto read = read_transform<Patient, Tracker>(inputs.patient_from_tracker);
     if (!read) return read.error();
-    out.setup.tracker_from_patient = read->inverse();
+    out.tracker_from_patient = read->inverse();
   } else {
     const auto read = read_transform<Tracker, Patient>(inputs.tracker_from_patient);
     if (!read) return read.error();
-    out.setup.tracker_from_patient = *read;
+    out.tracker_from_patient = *read;
   }
   if (inputs.patient_from_model.empty()) return {};
   const auto model = read_transform<Patient, Patient>(inputs.patient_from_model);
   if (!model) return model.error();
-  out.setup.tracker_from_patient = out.setup.tracker_from_patient * *model;
+  out.patient_from_model = *model;
   return {};
 }
 
 }  // namespace
 
 Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
-  ReplaySetup out;
   const auto record = record_of(inputs);
   if (!record) return record.error();
-  if (auto taken = take_calibration(inputs, *record, out); !taken) return taken.error();
+  auto scope = scope_of(inputs, *record);
+  if (!scope) return scope.error();
+  ReplaySetup out{*std::move(scope), {}, {}, {}, inputs.fre_mm, 0};
   if (auto taken = take_registration(inputs, *record, out); !taken) return taken.error();
-  const auto figure = [&](const char* name, const std::optional<double>& told, bool found, double& value) {
-    if (told) value = *told;
-    if (!told && !found) out.unknown.emplace_back(name);
+  return out;
+}
+
+ReplayTrust trust_of(const ReplaySetup& setup, const Volume& ct) {
+  TrustFigures known{setup.scope.figures(), setup.fre_mm, std::nullopt};
+  if (setup.by_touches) {
+    RegisteredPatient registered = *setup.by_touches;
+    registered.fre_mm = *setup.fre_mm;
+    known = trust_figures(setup.scope.figures(), registered, setup.patient_from_model * middle_of_ct(ct));
+  }
+  ReplayTrust out{vouched_for(known), {}};
+  const auto note = [&out](const char* name, const std::optional<double>& figure) {
+    if (!figure) out.vouched_for.emplace_back(name);
   };
-  const bool from_record = inputs.camera.empty();
-  figure("camera_rms_px", inputs.camera_rms_px, from_record, out.calibration.camera_rms_px);
-  figure("tracked_rms_px", inputs.tracked_rms_px, from_record, out.calibration.tracked_rms_px);
-  figure("fre_mm", inputs.fre_mm, !inputs.fiducials.empty(), out.calibration.fre_mm);
+  note("camera_rms_px", known.scope.camera_rms_px);
+  note("tracked_rms_px", known.scope.held_out_px);
+  note("fre_mm", known.fre_mm);
+  note("target_mm", known.target_mm);
   return out;
 }
 

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host/overlay/frame_overlay.hpp"
+#include "host/operation/findings.hpp"
+#include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
@@ -20,18 +21,32 @@ struct ReplayInputs {
   std::string pointer = "pointer";           ///< the bird that touched them
   std::vector<double> touched_s;             ///< from and to, s of the recording: when; empty: any time
   std::filesystem::path patient_from_model;  ///< of `register views`
-  std::optional<double> camera_rms_px, tracked_rms_px, fre_mm;  ///< where no file says
+  std::optional<double> camera_rms_px, held_out_px, fre_mm;  ///< in place of what is found
 };
 
+/// What a recording is replayed by.
 struct ReplaySetup {
-  Setup setup;
-  OverlayGate::Calibration calibration;
-  std::vector<std::string> unknown;  ///< figures that nothing says: the gate takes them for perfect
-  std::vector<Eigen::Vector3d> touches_in_tracker_mm;
+  ScopeSetup scope;
+  Transform<Tracker, Patient> tracker_from_patient;
+  std::optional<RegisteredPatient> by_touches;     ///< where it is registered anew
+  Transform<Patient, Patient> patient_from_model;  ///< identity without a pose of `register views`
+  std::optional<double> fre_mm;                    ///< of the touches, or as it is stated
+  std::size_t touches = 0;
+
+  [[nodiscard]] Setup setup() const { return scope.registered(tracker_from_patient * patient_from_model); }
 };
 
 /// Refuses, naming file or option: what is missing, given twice, or not what it should be. The registration by touches
-/// is the demo's: rests of the pointer's tip, matched to the markers.
+/// is the operation's: rests of the pointer's tip, matched to the markers.
 Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs);
+
+/// By what the gate judges the replay, and which figures nothing says: files hold none, and whoever gives them answers
+/// for them.
+struct ReplayTrust {
+  TrustFigures figures;
+  std::vector<std::string> vouched_for;
+};
+/// The target is the middle of the CT, as in an operation without landmarks.
+ReplayTrust trust_of(const ReplaySetup& setup, const Volume& ct);
 
 }  // namespace birdseye::host

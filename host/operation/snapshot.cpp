@@ -36,12 +36,12 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   add("--pose", whole(folder / "camera_from_patient.txt"));
   add("--transfer", whole(folder / "transfer.json"));
   add("--over", whole(folder / "video.png"));
-  if (snapshot.deformation) add("--deformation", whole(folder / "field.mha"));
-  add("--step-mm", number(snapshot.render.step_mm));
-  add("--opacity", number(snapshot.opacity * snapshot.shown.strength));
+  if (snapshot.deformed) add("--deformation", whole(folder / "field.mha"));
+  add("--step-mm", number(snapshot.look.render.step_mm));
+  add("--opacity", number(snapshot.look.opacity * snapshot.shown.strength));
   add("--engine", snapshot.engine);
-  if (snapshot.surface_in_front) out.emplace_back("--surface-in-front");
-  if (const auto& clip = snapshot.render.clip) {
+  if (snapshot.look.surface_in_front) out.emplace_back("--surface-in-front");
+  if (const auto& clip = snapshot.look.render.clip) {
     out.emplace_back("--clip-plane");
     for (const double value : {clip->normal.x(), clip->normal.y(), clip->normal.z(), clip->offset_mm})
       out.push_back(number(value));
@@ -70,8 +70,8 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
     files.push_back({folder / "camera_from_patient.txt", pose_text(snapshot.camera_from_patient->matrix())});
     files.push_back({folder / "transfer.json", transfer_text(*snapshot.transfer)});
     sheet["drawn_again_by"] = render_arguments(folder, snapshot);
-    if (snapshot.deformation) {
-      if (auto written = write_field(folder / "field.mha", *snapshot.deformation); !written) return written;
+    if (snapshot.deformed) {
+      if (auto written = write_field(folder / "field.mha", snapshot.deformed->field); !written) return written;
     }
   }
   files.push_back({folder / "snapshot.json", text_of(sheet)});

@@ -1,9 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "device/wire/messages.hpp"
-#include "host/deform/displacement_field.hpp"
+#include "host/operation/findings.hpp"
 #include "host/operation/patient.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/render/scene/transfer_function.hpp"
@@ -17,13 +21,11 @@ struct Snapshot {
   ShownPicture shown;                                             ///< but for its pixels
   std::optional<Setup> setup;                                     ///< empty: nothing was registered
   std::optional<Transform<Camera, Patient>> camera_from_patient;  ///< empty: nothing was drawn
-  RenderSettings render;
-  double opacity = 1;
-  bool surface_in_front = false;
+  OverlayLook look;
   std::string engine;
-  std::optional<TransferFunction> transfer;
+  std::shared_ptr<const TransferFunction> transfer;
   PatientFiles patient;
-  std::optional<DisplacementField> deformation;  ///< of the picture
+  std::shared_ptr<const DeformedOrgan> deformed;  ///< null: the CT as it was taken
   std::optional<double> fre_mm;
 };
 

@@ -6,17 +6,27 @@
 
 namespace birdseye::host {
 
+std::string OverlayGate::doubt_of_figures() const {
+  const ScopeFigures& scope = figures_.scope;
+  if (!scope.camera_rms_px) return "how well the camera is calibrated is not known";
+  if (!(*scope.camera_rms_px <= settings_.most_camera_rms_px))
+    return fmt::format("the camera is calibrated to {:.1f} px only", *scope.camera_rms_px);
+  if (!scope.held_out_px) return "how far hand-eye is off is not known";
+  if (!(*scope.held_out_px <= settings_.most_held_out_px))
+    return fmt::format("hand-eye is off by {:.1f} px", *scope.held_out_px);
+  if (!figures_.fre_mm) return "how well the fiducials fit is not known";
+  if (!(*figures_.fre_mm <= settings_.most_fre_mm))
+    return fmt::format("the fiducials fit to {:.1f} mm only", *figures_.fre_mm);
+  if (!figures_.target_mm) return "how far the target may be off is not known";
+  if (!(*figures_.target_mm <= settings_.most_target_mm))
+    return fmt::format("fiducials as these leave the target open by {:.0f} mm: touch others, round about it",
+                       *figures_.target_mm);
+  return {};
+}
+
 std::string OverlayGate::doubt(const PoseAnswer& pose) const {
   if (!pose.tracker_from_sensor) return pose.reason.empty() ? "no pose" : pose.reason;
-  const Calibration& c = calibration_;
-  if (!(c.camera_rms_px <= settings_.most_camera_rms_px))
-    return fmt::format("the camera is calibrated to {:.1f} px only", c.camera_rms_px);
-  if (!(c.tracked_rms_px <= settings_.most_tracked_rms_px))
-    return fmt::format("hand-eye is off by {:.1f} px", c.tracked_rms_px);
-  if (!(c.fre_mm <= settings_.most_fre_mm)) return fmt::format("the fiducials fit to {:.1f} mm only", c.fre_mm);
-  if (!(c.target_mm <= settings_.most_target_mm))
-    return fmt::format("fiducials as these leave the target open by {:.0f} mm: touch others, round about it",
-                       c.target_mm);
+  if (std::string why = doubt_of_figures(); !why.empty()) return why;
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
     return fmt::format("the pose is predicted {:.0f} ms ahead", pose.age.seconds() * 1e3);
   }
@@ -38,6 +48,15 @@ OverlayGate::Decision OverlayGate::decide(DeviceTime time, const PoseAnswer& pos
   decision.tracker_from_sensor = pose.tracker_from_sensor;
   if (!pose.tracker_from_sensor) decision.strength = 0;
   return decision;
+}
+
+OverlayGate::Decision decide_still(const TrustFigures& figures) {
+  OverlayGate gate;
+  gate.set_figures(figures);
+  PoseAnswer exact;
+  exact.kind = PoseKind::exact;
+  exact.tracker_from_sensor.emplace();
+  return gate.decide({}, exact);
 }
 
 }  // namespace birdseye::host

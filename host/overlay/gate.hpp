@@ -4,6 +4,7 @@
 #include <string>
 
 #include "calibration/time/pose_history.hpp"
+#include "host/overlay/trust.hpp"
 
 namespace birdseye::host {
 
@@ -15,13 +16,7 @@ class OverlayGate {
     Duration most_predicted = Duration::from_ms(40);  ///< how far ahead of its newest sample a pose may be
     double most_sigma_mm = 1.5;                       ///< of the pose's position
     Duration fade = Duration::from_ms(200);
-    double most_camera_rms_px = 1.5, most_tracked_rms_px = 12, most_fre_mm = 5, most_target_mm = 8;
-  };
-  /// How well camera, hand-eye and patient are known. Zeros are perfect; what is not known must not be drawn with.
-  struct Calibration {
-    double camera_rms_px = 0, tracked_rms_px = 0, fre_mm = 0;
-    double target_mm = 0;    ///< what the fiducials' error comes to at the target
-    double hand_eye_mm = 0;  ///< the error of hand-eye, held out, at the working distance
+    double most_camera_rms_px = 1.5, most_held_out_px = 12, most_fre_mm = 5, most_target_mm = 8;
   };
   struct Decision {
     double strength = 0;  ///< of the overlay, 0 to 1
@@ -34,18 +29,23 @@ class OverlayGate {
   OverlayGate() = default;
   explicit OverlayGate(const Settings& settings) : settings_(settings) {}
 
-  void set_calibration(const Calibration& calibration) { calibration_ = calibration; }
+  /// Before them nothing is known, and nothing is drawn.
+  void set_figures(const TrustFigures& figures) { figures_ = figures; }
 
   /// The decision for a frame acquired at time, with the pose that came with it. Times must not go back.
   Decision decide(DeviceTime time, const PoseAnswer& pose);
 
  private:
+  [[nodiscard]] std::string doubt_of_figures() const;
   [[nodiscard]] std::string doubt(const PoseAnswer& pose) const;
 
   Settings settings_;
-  Calibration calibration_;
+  TrustFigures figures_;
   std::optional<DeviceTime> last_;
   double strength_ = 0;
 };
+
+/// For a still, of which somebody gives lens and pose: the decision on a pose that is exact.
+OverlayGate::Decision decide_still(const TrustFigures& figures);
 
 }  // namespace birdseye::host

@@ -2,11 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
-#include "host/overlay/compositor.hpp"
-#include "host/overlay/surface_cues.hpp"
-
 namespace birdseye::host {
 
 namespace {
@@ -23,23 +18,17 @@ std::vector<std::uint8_t> greyed(const std::vector<std::uint8_t>& rgb) {
 
 }  // namespace
 
-void LivePicture::set_setup(std::optional<Setup> setup, const OverlayGate::Calibration& calibration) {
-  setup_ = std::move(setup);
-  calibration_ = calibration;
-  gate_ = OverlayGate(settings_.gate);  // what was believed by another calibration has nothing to fade from
-  gate_.set_calibration(calibration_);
+void LivePicture::set_setup(std::optional<Setup> setup, const TrustFigures& figures, const std::string& why_none) {
+  painter_.set_setup(std::move(setup), figures);
+  why_no_setup_ = why_none;
   overlaid_.clear();
   kind_ = -1;
 }
 
 void LivePicture::take(const wire::VideoFrame& frame, HostTime exposed) {
-  if (frame_ && frame.info.acquired < frame_->info.acquired) {
-    gate_ = OverlayGate(settings_.gate);  // another clock: the times of one gate do not go back
-    gate_.set_calibration(calibration_);
-  }
   frame_ = frame;
   exposed_ = exposed;
-  decision_ = gate_.decide(frame.info.acquired, frame.info.pose);
+  decision_ = painter_.decide(frame);
   if (dirty_) ++skipped_;
   dirty_ = true;
 }
@@ -51,13 +40,11 @@ void LivePicture::draw() {
   stopped_.clear();
   camera_from_patient_.reset();
   kind_ = -1;
-  if (!setup_ || engine_ == nullptr || !decision_.tracker_from_sensor || decision_.strength <= 0) return;
-  if (frame_->width_px != setup_->camera.width_px || frame_->height_px != setup_->camera.height_px) return;
-  camera_from_patient_ = setup_->camera_from_patient(*decision_.tracker_from_sensor);
-  std::vector<std::uint8_t> in_front;
-  if (surface_in_front_) in_front = surface_cues(*frame_->rgb, frame_->width_px, frame_->height_px);
-  overlaid_ = composite(*frame_->rgb, engine_->render(setup_->camera, *camera_from_patient_, render_),
-                        decision_.strength * opacity_, in_front);
+  if (engine_ == nullptr) return;
+  auto painted = painter_.paint(*frame_, decision_, *engine_, look_);
+  if (!painted) return;
+  camera_from_patient_ = painted->camera_from_patient;
+  overlaid_ = std::move(painted->rgb);
 }
 
 ShownPicture LivePicture::at(HostTime now) {
@@ -69,22 +56,18 @@ ShownPicture LivePicture::at(HostTime now) {
   out.any = true;
   out.width_px = frame_->width_px;
   out.height_px = frame_->height_px;
-  const Duration age{now.ns - exposed_.ns}, predicted = frame_->info.pose.age;
-  out.age_ms = age.seconds() * 1e3;
-  out.stale = age > settings_.stopped;
-  if (!setup_) {
-    out.reason = without_setup_;
+  const Freshness fresh = freshness_at(now, exposed_, frame_->info.pose.age, settings_.freshness);
+  out.age_ms = fresh.age.seconds() * 1e3;
+  out.stale = fresh.stopped;
+  if (!setup()) {
+    out.reason = why_no_setup_;
   } else if (engine_ == nullptr) {
     out.reason = "the CT is not ready";
-  } else if (out.stale) {
-    out.reason = fmt::format("the video has stopped, {:.1f} s ago", age.seconds());
-  } else if (age > settings_.most_age) {
-    out.reason = fmt::format("the picture is {:.0f} ms old", out.age_ms);
-  } else if (predicted.ns > 0 && age + predicted > settings_.most_age) {
-    out.reason = fmt::format("the newest pose is {:.0f} ms old", (age + predicted).seconds() * 1e3);
-  } else if (frame_->width_px != setup_->camera.width_px || frame_->height_px != setup_->camera.height_px) {
+  } else if (!fresh.why_too_old.empty()) {
+    out.reason = fresh.why_too_old;
+  } else if (!painter_.fits(*frame_)) {
     out.reason = fmt::format("the video is {} x {} and the camera was calibrated at {} x {}", frame_->width_px,
-                             frame_->height_px, setup_->camera.width_px, setup_->camera.height_px);
+                             frame_->height_px, setup()->camera.width_px, setup()->camera.height_px);
   } else {
     out.reason = decision_.reason;
     out.overlaid = !overlaid_.empty();
@@ -95,8 +78,7 @@ ShownPicture LivePicture::at(HostTime now) {
   if (kind != kind_) ++changes_;
   kind_ = kind;
   out.changes = changes_;
-  const Duration most_age = settings_.most_age - std::max(predicted, Duration{});
-  if (!out.stale) out.believe_until = exposed_ + (out.overlaid ? most_age : settings_.stopped) + settings_.late;
+  if (!out.stale) out.believe_until = out.overlaid ? fresh.overlaid_until : fresh.bare_until;
   out.rgb = out.overlaid ? &overlaid_ : out.stale ? &stopped_ : frame_->rgb.get();
   return out;
 }

@@ -7,8 +7,8 @@
 
 #include "calibration/time/clock.hpp"
 #include "device/wire/messages.hpp"
-#include "host/overlay/frame_overlay.hpp"
-#include "host/overlay/gate.hpp"
+#include "host/overlay/frame_painter.hpp"
+#include "host/overlay/freshness.hpp"
 #include "host/render/engine.hpp"
 
 namespace birdseye::host {
@@ -39,41 +39,27 @@ class LivePicture {
     return settings;
   }
   struct Settings {
-    /// No overlay where the frame, or the newest measurement behind its pose, is older than this. With what it takes to
-    /// notice, less than 150 ms.
-    Duration most_age = Duration::from_ms(120);
-    /// A frame older than this is said to be stopped video.
-    Duration stopped = Duration::from_ms(300);
-    /// Whoever shows it is late where it is still on the screen so long after it grew too old: something else has to
-    /// take it away.
-    Duration late = Duration::from_ms(18);
+    FreshnessLimits freshness;
     OverlayGate::Settings gate = quick_to_fade();
   };
 
   LivePicture() : LivePicture(Settings{}) {}
-  explicit LivePicture(const Settings& settings) : settings_(settings), gate_(settings.gate) {}
+  explicit LivePicture(const Settings& settings) : settings_(settings), painter_(settings.gate) {}
 
-  /// engine: empty takes it away. Both must outlive this, or be taken away before.
-  void set_engine(Engine* engine) { engine_ = engine; }
-  [[nodiscard]] const RenderSettings& render() const { return render_; }
-  void set_render(const RenderSettings& render) {
-    render_ = render;
+  /// engine: empty, there is no CT to draw yet. The newest frame is drawn anew.
+  void set_engine(std::shared_ptr<Engine> engine) {
+    engine_ = std::move(engine);
     redraw();
   }
-  /// Whether the surface's edges and highlights stay before the overlay, so that it reads as inside.
-  void set_surface_in_front(bool in_front) {
-    surface_in_front_ = in_front;
+  [[nodiscard]] const OverlayLook& look() const { return look_; }
+  void set_look(const OverlayLook& look) {
+    look_ = look;
     redraw();
   }
-  void set_opacity(double opacity) {
-    opacity_ = opacity;
-    redraw();
-  }
-  /// Without it, or with a reason why not, nothing is drawn.
-  void set_setup(std::optional<Setup> setup, const OverlayGate::Calibration& calibration);
-  [[nodiscard]] const std::optional<Setup>& setup() const { return setup_; }
-  /// Why there is none, in words, where there is none.
-  void set_without_setup(const std::string& why) { without_setup_ = why; }
+  /// Without a setup nothing is drawn, and why_none says why, in words.
+  void set_setup(std::optional<Setup> setup, const TrustFigures& figures, const std::string& why_none = {});
+  [[nodiscard]] const std::optional<Setup>& setup() const { return painter_.setup(); }
+  [[nodiscard]] const TrustFigures& figures() const { return painter_.figures(); }
 
   /// A frame that has come; one that came before and was not drawn yet is skipped. exposed: when its exposure was, on
   /// this machine's clock; where that is not known, when it arrived.
@@ -82,7 +68,7 @@ class LivePicture {
   void draw();
   /// What of it may be shown at this moment.
   ShownPicture at(HostTime now);
-  /// Has the newest frame drawn anew, with other settings.
+  /// Has the newest frame drawn anew: the engine draws another CT.
   void redraw() { dirty_ = frame_.has_value(); }
 
   [[nodiscard]] const std::optional<wire::VideoFrame>& frame() const { return frame_; }
@@ -95,14 +81,10 @@ class LivePicture {
 
  private:
   Settings settings_;
-  OverlayGate gate_;
-  OverlayGate::Calibration calibration_;
-  Engine* engine_ = nullptr;
-  RenderSettings render_;
-  double opacity_ = 1;
-  bool surface_in_front_ = false;
-  std::optional<Setup> setup_;
-  std::string without_setup_ = "the patient is not registered yet";
+  FramePainter painter_;
+  std::shared_ptr<Engine> engine_;
+  OverlayLook look_;
+  std::string why_no_setup_ = "the patient is not registered yet";
   std::optional<wire::VideoFrame> frame_;
   HostTime exposed_;
   OverlayGate::Decision decision_;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "host/overlay/compositor.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
@@ -86,7 +86,8 @@ ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<C
 Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
              const RenderSettings& settings) {
   const ImageRgba image = overlay_of(engine, scene, camera_from_patient, settings);
-  return {image.width_px, image.height_px, composite(scene.behind.rgb, image, 1)};
+  return {image.width_px, image.height_px,
+          lay_over(scene.behind.rgb, image, decide_still(vouched_for({})).strength, {})};
 }
 
 }  // namespace birdseye::host

@@ -26,11 +26,7 @@ HostTime now() {
   return HostTime{std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count()};
 }
 
-RenderSettings usual_settings() {
-  RenderSettings settings;
-  settings.step_mm = 1.2;  // what two cores draw in time
-  return settings;
-}
+constexpr double kStepMm = 1.2;  // what two cores draw in time
 
 }  // namespace
 
@@ -39,14 +35,15 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
                  std::unique_ptr<Publisher> publisher)
     : window_(std::move(window)),
       source_(std::move(source)),
-      session_(std::move(settings)),
+      workflow_(std::move(settings)),
       simulated_(std::move(simulated)),
       script_(std::move(script)),
       log_(std::move(log)),
       publisher_(std::move(publisher)) {
   facts_.ages = &figures_.ages;
   facts_.recorded = !source_->live();
-  session_.picture().set_render(usual_settings());
+  look_.render.step_mm = kStepMm;
+  workflow_.set_look(look_);
 }
 
 Result<void> LiveApp::run(HostTime asked) {
@@ -59,12 +56,13 @@ Result<void> LiveApp::run(HostTime asked) {
     take_events();
     if (auto said = saving_.take()) facts_.said = *std::move(said);
     note_simulator();
-    session_.set_link(source_->connected(), source_->words());
-    session_.tick();
+    workflow_.set_link(source_->connected(), source_->words());
+    workflow_.tick();
+    operation_ = workflow_.view();
     note_patient();
     if (publisher_) {
-      const auto& deformation = session_.deformation();
-      publisher_->show(session_.shared_patient(), deformation ? &deformation->field : nullptr, session_.shapes());
+      const DeformedOrgan* const deformed = operation_.deformed.get();
+      publisher_->show(operation_.patient, deformed != nullptr ? &deformed->field : nullptr, operation_.shapes);
     }
     draw();
     draw_inset();
@@ -76,7 +74,7 @@ Result<void> LiveApp::run(HostTime asked) {
     figures_.stood_still = window_->stood_still();
     if (*ended) break;
   }
-  figures_.frames_skipped = session_.picture().frames_skipped();
+  figures_.frames_skipped = workflow_.picture().frames_skipped();
   return {};
 }
 
@@ -86,7 +84,7 @@ void LiveApp::take_events() {
   // Waits for a frame, then takes what has come besides: the newest frame is what is drawn.
   while (auto event = source_->next(frame ? Clock::now() : deadline)) {
     frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
-    session_.take(*event, now(), source_->host_from_device());
+    workflow_.take(*event, now(), source_->host_from_device());
   }
 }
 
@@ -96,50 +94,49 @@ void LiveApp::note_simulator() {
   sheet_read_ = facts_.simulated = true;
   const CartSheet& sheet = cart->sheet();
   if (const auto pattern = calibration::parse_pattern(sheet.board))
-    session_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
-  session_.load(simulated_);
+    workflow_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
+  workflow_.load(simulated_);
 }
 
 void LiveApp::note_patient() {
-  if (session_.markers_in_patient_mm() && !figures_.fiducials_s)
-    figures_.fiducials_s = Duration{now().ns - asked_.ns}.seconds();
-  if (session_.patient() == nullptr || histogram_) return;
-  histogram_.emplace(session_.patient()->shown);
+  if (operation_.markers_seen && !figures_.fiducials_s) figures_.fiducials_s = Duration{now().ns - asked_.ns}.seconds();
+  if (operation_.patient == nullptr || histogram_) return;
+  histogram_.emplace(operation_.patient->shown);
   facts_.histogram = &*histogram_;
-  inset_.emplace(session_.patient()->shown);
-  if (session_.transfer()) editor_.set_points(session_.transfer()->points());
+  inset_.emplace(operation_.patient->shown);
+  if (operation_.transfer) editor_.set_points(operation_.transfer->points());
   figures_.ct_s = Duration{now().ns - asked_.ns}.seconds();
 }
 
 /// Some times a second, between frames: it is no part of what must be live.
 void LiveApp::draw_inset() {
   constexpr Duration kEvery = Duration::from_ms(250);
-  Engine* const engine = session_.engine();
-  if (!inset_ || engine == nullptr || Duration{now().ns - inset_drawn_.ns} < kEvery) return;
+  if (!inset_ || !operation_.engine || Duration{now().ns - inset_drawn_.ns} < kEvery) return;
   inset_drawn_ = now();
-  const Picture picture = inset_->draw(*engine, session_.picture().camera_from_patient());
+  const Picture picture = inset_->draw(*operation_.engine, workflow_.picture().camera_from_patient());
   window_->set_picture(LiveWindow::Slot::inset, picture.rgb, picture.width_px, picture.height_px);
 }
 
 void LiveApp::draw() {
-  LivePicture& picture = session_.picture();
-  picture.draw();
+  const LivePicture& picture = workflow_.picture();
+  workflow_.draw();
   const HostTime began = now();
   // Judged as of when it will be seen: drawing the window takes its time too.
-  ShownPicture shown = picture.at(HostTime{began.ns + to_draw_.ns});
+  ShownPicture shown = workflow_.shown_at(began + to_draw_);
   const bool news = shown.changes != drawn_changes_ || !shot_.empty();
   if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
   drawn_ = began;
+  operation_ = workflow_.view();
   const PanelWishes wishes = draw_window(shown);
   figures_.picture_says = shown.reason;
   if (!shot_.empty()) snapshot(shot_, shown);
-  if (shown.overlaid && !picture.at(now()).overlaid) {
+  if (shown.overlaid && !workflow_.shown_at(now()).overlaid) {
     // It took longer than it was thought to: what has grown stale on the way is not shown.
-    shown = picture.at(now());
+    shown = workflow_.shown_at(now());
     draw_window(shown, true);
   }
   LiveWindow::Believed until;  // what is frozen or has stopped says so itself
-  if (shown.believe_until && !session_.frozen()) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
+  if (shown.believe_until && !operation_.frozen) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
   window_->swap(until);
   const HostTime swapped = now();
   if (!figures_.window_s) figures_.window_s = Duration{swapped.ns - asked_.ns}.seconds();
@@ -161,8 +158,8 @@ void LiveApp::draw() {
     while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
     facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
     if (log_) {
-      const auto mark = session_.target_mark();
-      log_->add(sequence, age_ms, shown.strength, session_.shapes(), mark ? mark->rms_mm : 0,
+      const auto& mark = operation_.target;
+      log_->add(sequence, age_ms, shown.strength, operation_.shapes, mark ? mark->rms_mm : 0,
                 shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
     }
   }
@@ -172,7 +169,7 @@ void LiveApp::draw() {
 /// What is on the screen, and no more than that: nothing goes out that no overlay was drawn by.
 void LiveApp::publish(const ShownPicture& shown) {
   if (!publisher_ || !shown.overlaid) return;
-  const LivePicture& picture = session_.picture();
+  const LivePicture& picture = workflow_.picture();
   PublishedFrame frame;
   frame.exposed = picture.exposed();
   if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient;
@@ -186,8 +183,8 @@ PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
     drawn_changes_ = shown.changes;
   }
   window_->begin_frame(again);
-  facts_.frames_skipped = session_.picture().frames_skipped();
-  PanelWishes wishes = draw_panels(*window_, session_, shown, facts_, editor_);
+  facts_.frames_skipped = workflow_.picture().frames_skipped();
+  PanelWishes wishes = draw_panels(*window_, operation_, shown, facts_, editor_);
   window_->end_frame();
   return wishes;
 }
@@ -205,29 +202,24 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (scripted_.surface_in_front) wishes.surface_in_front = scripted_.surface_in_front;
   scripted_ = {};
   key_waits_ = false;
-  if (wishes.primary) session_.primary();
-  if (wishes.next) session_.go_on();
-  if (wishes.undo) session_.undo();
-  if (wishes.freeze) session_.set_frozen(!session_.frozen());
-  if (wishes.step) session_.go_to(*wishes.step);
-  if (wishes.opacity) {
-    facts_.opacity = *wishes.opacity;
-    session_.picture().set_opacity(facts_.opacity);
-  }
+  if (wishes.primary) workflow_.primary();
+  if (wishes.next) workflow_.go_on();
+  if (wishes.undo) workflow_.undo();
+  if (wishes.freeze) workflow_.freeze_or_let_go();
+  if (wishes.step) workflow_.go_to(*wishes.step);
+  if (wishes.opacity) look_.opacity = facts_.opacity = *wishes.opacity;
   if (wishes.clip) facts_.clip = *wishes.clip;
-  if (wishes.surface_in_front) {
-    facts_.surface_in_front = *wishes.surface_in_front;
-    session_.picture().set_surface_in_front(facts_.surface_in_front);
-  }
+  if (wishes.surface_in_front) look_.surface_in_front = facts_.surface_in_front = *wishes.surface_in_front;
   if (wishes.plane) facts_.plane = *wishes.plane;
-  if ((wishes.clip || wishes.plane) && session_.patient() != nullptr) {
-    RenderSettings render = usual_settings();
-    if (facts_.clip) render.clip = clip_plane(facts_.plane, session_.patient()->shown);
-    session_.picture().set_render(render);
+  const bool cut = (wishes.clip || wishes.plane) && operation_.patient != nullptr;
+  if (cut) {
+    look_.render.clip.reset();
+    if (facts_.clip) look_.render.clip = clip_plane(facts_.plane, operation_.patient->shown);
   }
-  if (wishes.transfer) session_.set_transfer(TransferFunction(*wishes.transfer));
+  if (cut || wishes.opacity || wishes.surface_in_front) workflow_.set_look(look_);
+  if (wishes.transfer) workflow_.set_transfer(TransferFunction(*wishes.transfer));
   if (const auto preset = load_transfer_function(wishes.preset); !wishes.preset.empty() && preset) {
-    session_.set_transfer(*preset);
+    workflow_.set_transfer(*preset);
     editor_.set_points(preset->points());
   }
   if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
@@ -236,7 +228,7 @@ void LiveApp::grant(const PanelWishes& asked) {
 Result<bool> LiveApp::follow_script() {
   // One after the other, as a hand would.
   if (!script_ || key_waits_ || !shot_.empty() || saving_.running()) return false;
-  const auto act = script_->next(session_, now());
+  const auto act = script_->next(workflow_.view(), now());
   if (!act) return act.error();
   if (!act->key.empty()) {
     add_key(act->key, facts_, scripted_);
@@ -251,24 +243,22 @@ Result<bool> LiveApp::follow_script() {
 void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& shown) {
   if (saving_.running()) return;
   std::optional<Snapshot> parts;
-  const LivePicture& picture = session_.picture();
+  const LivePicture& picture = workflow_.picture();
   if (picture.frame() && shown.any) {
     parts.emplace();
     parts->frame = *picture.frame();
     parts->picture = *shown.rgb;
     parts->shown = shown;
     parts->shown.rgb = nullptr;
-    if (session_.frozen()) parts->shown.reason = "frozen";
+    if (operation_.frozen) parts->shown.reason = "frozen";
     parts->setup = picture.setup();
     parts->camera_from_patient = picture.camera_from_patient();
-    parts->render = picture.render();
-    parts->opacity = facts_.opacity;
-    parts->surface_in_front = facts_.surface_in_front;
-    parts->engine = session_.settings().engine;
-    parts->transfer = session_.drawn_by();
-    parts->patient = session_.settings().patient;
-    if (session_.deformation()) parts->deformation = session_.deformation()->field;
-    parts->fre_mm = session_.fre_mm();
+    parts->look = picture.look();
+    parts->engine = operation_.engine_asked;
+    parts->transfer = operation_.drawn_by;
+    parts->patient = operation_.patient_files;
+    parts->deformed = operation_.deformed;
+    parts->fre_mm = operation_.fre_mm;
   }
   saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {
     auto written = write_file(path, png_of(RgbView{shot.rgb, shot.width_px, shot.height_px}));

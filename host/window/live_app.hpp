@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "host/operation/live_session.hpp"
 #include "host/operation/live_source.hpp"
+#include "host/operation/live_workflow.hpp"
 #include "host/operation/publisher.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/inset_view.hpp"
@@ -30,7 +30,7 @@ struct LiveFigures {
   int stood_still = 0;       ///< how often it was covered, for it showed nothing newer in time
 };
 
-/// The window at the cart: takes events from the source to the session, draws, and does what keys, buttons and the
+/// The window at the cart: takes events from the source to the workflow, draws, and does what keys, buttons and the
 /// script ask for. All on the caller's thread but what the parts do on their own.
 class LiveApp {
  public:
@@ -43,7 +43,9 @@ class LiveApp {
   /// asked: when the program was started.
   Result<void> run(HostTime asked);
   [[nodiscard]] const LiveFigures& figures() const { return figures_; }
-  [[nodiscard]] LiveSession& session() { return session_; }
+  /// How the operation stands, and what its overlay is drawn by.
+  [[nodiscard]] OperationView operation() const { return workflow_.view(); }
+  [[nodiscard]] const std::optional<Setup>& setup() const { return workflow_.picture().setup(); }
   [[nodiscard]] std::optional<LiveLog>& log() { return log_; }
 
  private:
@@ -61,7 +63,9 @@ class LiveApp {
 
   std::unique_ptr<LiveWindow> window_;
   std::unique_ptr<LiveSource> source_;
-  LiveSession session_;
+  LiveWorkflow workflow_;
+  OperationView operation_;  ///< as it stood when it was last looked at
+  OverlayLook look_;
   PatientFiles simulated_;
   std::optional<LiveScript> script_;
   std::optional<LiveLog> log_;

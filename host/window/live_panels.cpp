@@ -41,10 +41,10 @@ void say(const ImVec4& colour, const std::string& text) {
   ImGui::PopStyleColor();
 }
 
-void draw_steps(const LiveSession& session, PanelWishes& wishes) {
+void draw_steps(const OperationView& operation, PanelWishes& wishes) {
   for (std::size_t i = 0; i < kLiveSteps; ++i) {
     const auto step = static_cast<LiveStep>(i);
-    const bool here = session.step() == step, done = session.note(step).done;
+    const bool here = operation.step == step, done = operation.note(step).done;
     ImGui::PushStyleColor(ImGuiCol_Text, here ? kText : done ? kGood : kQuiet);
     const std::string label = fmt::format("{}  {} {}", i + 1, name_of(step), done ? "(done)" : "");
     if (ImGui::Selectable(label.c_str(), here)) wishes.step = step;
@@ -52,10 +52,10 @@ void draw_steps(const LiveSession& session, PanelWishes& wishes) {
   }
 }
 
-void draw_connect(const LiveSession& session) {
-  say(session.connected() ? kGood : kWarn, session.link_words());
-  if (!session.appliance_says().empty()) say(kWarn, session.appliance_says());
-  const auto& health = session.health();
+void draw_connect(const OperationView& operation) {
+  say(operation.link.connected ? kGood : kWarn, operation.link.words);
+  if (!operation.link.appliance_says.empty()) say(kWarn, operation.link.appliance_says);
+  const auto& health = operation.link.health;
   if (!health) return;
   for (const wire::InstrumentHealth& one : health->instruments) {
     say(one.state == "running" ? kGood : kWarn, fmt::format("{}: {}", one.name, one.state));
@@ -79,8 +79,8 @@ void draw_cells(const std::array<bool, N>& cells, std::size_t columns, float siz
   ImGui::Dummy(ImVec2(static_cast<float>(columns) * size, static_cast<float>(rows) * size));
 }
 
-void draw_calibrate(const LiveSession& session, float scale) {
-  if (const auto guide = session.guide()) {
+void draw_calibrate(const OperationView& operation, float scale) {
+  if (const auto& guide = operation.guide) {
     say(kText, guide->next);
     ImGui::Separator();
     say(kQuiet, fmt::format("{} stations taken", guide->stations));
@@ -94,31 +94,31 @@ void draw_calibrate(const LiveSession& session, float scale) {
       say(colour_of(guide->grade),
           fmt::format("so far {}: {:.2f} mm held out", name_of(guide->grade), *guide->held_out_mm));
     }
-    if (const auto lines = session.guide_lines(); !lines.empty()) say(kQuiet, lines.back());
+    if (!operation.guide_lines.empty()) say(kQuiet, operation.guide_lines.back());
     return;
   }
-  say(session.note(LiveStep::calibrate).done ? kGood : kWarn, session.note(LiveStep::calibrate).line);
-  if (const auto& verdict = session.calibration_verdict()) {
+  say(operation.note(LiveStep::calibrate).done ? kGood : kWarn, operation.note(LiveStep::calibrate).line);
+  if (const auto& verdict = operation.calibration_verdict) {
     say(colour_of(verdict->grade), fmt::format("verdict: {}", name_of(verdict->grade)));
     for (const std::string& reason : verdict->reasons) say(kQuiet, reason);
     for (const std::string& next : verdict->next_steps) say(kText, next);
   }
-  if (!session.settings().pattern && !session.note(LiveStep::calibrate).done)
+  if (!operation.board_named && !operation.note(LiveStep::calibrate).done)
     say(kWarn, "no board is named: start with --board, or give the appliance the scope's record");
 }
 
-void draw_fiducials(const LiveSession& session, bool simulated) {
+void draw_fiducials(const OperationView& operation, bool simulated) {
   say(kText, simulated ? "the simulated operator touches each fiducial with the pointer: wait"
                        : "touch each fiducial with the pointer, and rest there for half a second");
-  if (const auto& markers = session.markers_in_patient_mm()) {
+  if (operation.markers_seen) {
     say(kQuiet,
-        fmt::format("the CT shows {}{}", markers->size(),
-                    session.fiducials_wanted() != 0 ? fmt::format("; {} are wanted", session.fiducials_wanted()) : ""));
-  } else if (session.patient() != nullptr) {
+        fmt::format("the CT shows {}{}", *operation.markers_seen,
+                    operation.fiducials_wanted != 0 ? fmt::format("; {} are wanted", operation.fiducials_wanted) : ""));
+  } else if (operation.patient != nullptr) {
     say(kQuiet, "markers are looked for in the CT");
   }
-  for (std::size_t i = 0; i < session.touches().size(); ++i) {
-    const TouchedFiducial& touch = session.touches()[i];
+  for (std::size_t i = 0; i < operation.touches.size(); ++i) {
+    const TouchedFiducial& touch = operation.touches[i];
     if (touch.residual_mm) {
       const Grade grade = *touch.residual_mm < 2 ? Grade::pass : *touch.residual_mm < 5 ? Grade::marginal : Grade::fail;
       say(colour_of(grade), fmt::format("{}: residual {:.2f} mm", i + 1, *touch.residual_mm));
@@ -126,15 +126,15 @@ void draw_fiducials(const LiveSession& session, bool simulated) {
       say(kQuiet, fmt::format("{}: touched, scatter {:.2f} mm", i + 1, touch.rms_mm));
     }
   }
-  if (const auto fre = session.fre_mm()) say(*fre < 2 ? kGood : kWarn, fmt::format("FRE {:.2f} mm", *fre));
-  if (!session.registration_fault().empty()) say(kBad, session.registration_fault());
+  if (const auto& fre = operation.fre_mm) say(*fre < 2 ? kGood : kWarn, fmt::format("FRE {:.2f} mm", *fre));
+  if (!operation.registration_fault.empty()) say(kBad, operation.registration_fault);
   say(kQuiet, "Backspace takes the last one back");
 }
 
-void draw_views(const LiveSession& session) {
+void draw_views(const OperationView& operation) {
   say(kText, "keep five views or more of the organ, from different sides; or go on without (Enter)");
-  say(kQuiet, session.note(LiveStep::views).line);
-  const auto advice = session.view_advice();
+  say(kQuiet, operation.note(LiveStep::views).line);
+  const auto& advice = operation.view_advice;
   if (!advice) return say(kWarn, "no overlay now: a view cannot be kept");
   say(advice->words == "keep this view" ? kGood : kText, advice->words);
   say(kQuiet, fmt::format("this view would shrink what is open by {:.0f} %, the best in reach by {:.0f} %",
@@ -142,11 +142,11 @@ void draw_views(const LiveSession& session) {
   say(kQuiet, "Backspace takes the last one back");
 }
 
-void draw_deform(const LiveSession& session, float scale) {
+void draw_deform(const OperationView& operation, float scale) {
   say(kText, "match the CT with the kept views, or go on without (Enter)");
-  say(session.note(LiveStep::deform).done ? kGood : kQuiet, session.note(LiveStep::deform).line);
-  const DeformProgress progress = session.deform_progress();
-  if (session.deforming()) say(kText, progress.line);
+  say(operation.note(LiveStep::deform).done ? kGood : kQuiet, operation.note(LiveStep::deform).line);
+  const DeformProgress& progress = operation.deform_progress;
+  if (operation.deforming) say(kText, progress.line);
   if (progress.similarity.size() > 1) {
     say(kQuiet,
         fmt::format("similarity, {} steps: {:.3f} nats", progress.similarity.size(), progress.similarity.back()));
@@ -154,13 +154,13 @@ void draw_deform(const LiveSession& session, float scale) {
     ImGui::PlotLines("##similarity", progress.similarity.data(), static_cast<int>(progress.similarity.size()), 0,
                      nullptr, *low, *high, ImVec2(ImGui::GetContentRegionAvail().x, 90 * scale));
   }
-  if (session.deformation()) say(kQuiet, "Backspace undoes it");
+  if (operation.deformed) say(kQuiet, "Backspace undoes it");
 }
 
-void draw_check(const LiveSession& session, bool simulated) {
+void draw_check(const OperationView& operation, bool simulated) {
   say(kText, simulated ? "nobody points at anything over the simulated cart: go on"
                        : "point at a landmark, and hold the pointer's tip to it: the distance below should be near 0");
-  const auto reading = session.check();
+  const auto& reading = operation.check;
   if (!reading) return say(kWarn, "no pointer is seen, or the patient is not registered");
   const Eigen::Vector3d& tip = reading->tip_in_patient_mm;
   say(kQuiet, fmt::format("the tip is at ({:.1f}, {:.1f}, {:.1f}) mm of the CT", tip.x(), tip.y(), tip.z()));
@@ -183,7 +183,7 @@ void draw_plane(const PanelFacts& facts, PanelWishes& wishes) {
   if (changed) wishes.plane = plane;
 }
 
-void draw_run(const LiveSession& session, const PanelFacts& facts, TransferEditor& editor, float scale,
+void draw_run(const OperationView& operation, const PanelFacts& facts, TransferEditor& editor, float scale,
               PanelWishes& wishes) {
   float opacity = static_cast<float>(facts.opacity);
   ImGui::SetNextItemWidth(-80 * scale);
@@ -199,61 +199,61 @@ void draw_run(const LiveSession& session, const PanelFacts& facts, TransferEdito
     ImGui::EndCombo();
   }
   if (facts.histogram != nullptr) wishes.transfer = editor.draw(*facts.histogram, scale);
-  if (session.frozen()) say(kWarn, "frozen: this is no live picture");
+  if (operation.frozen) say(kWarn, "frozen: this is no live picture");
   if (ImGui::Button("snapshot (S)")) wishes.snapshot = true;
 }
 
-void draw_side(const Layout& at, const LiveSession& session, const PanelFacts& facts, TransferEditor& editor,
+void draw_side(const Layout& at, const OperationView& operation, const PanelFacts& facts, TransferEditor& editor,
                PanelWishes& wishes) {
   ImGui::SetNextWindowPos(ImVec2(0, 0));
   ImGui::SetNextWindowSize(ImVec2(at.side, at.high));
   ImGui::Begin("workflow", nullptr, kPanel);
-  draw_steps(session, wishes);
+  draw_steps(operation, wishes);
   ImGui::Separator();
   ImGui::Spacing();
-  switch (session.step()) {
+  switch (operation.step) {
     case LiveStep::connect:
-      draw_connect(session);
+      draw_connect(operation);
       break;
     case LiveStep::calibrate:
-      draw_calibrate(session, at.scale);
+      draw_calibrate(operation, at.scale);
       break;
     case LiveStep::fiducials:
-      draw_fiducials(session, facts.simulated);
+      draw_fiducials(operation, facts.simulated);
       break;
     case LiveStep::views:
-      draw_views(session);
+      draw_views(operation);
       break;
     case LiveStep::deform:
-      draw_deform(session, at.scale);
+      draw_deform(operation, at.scale);
       break;
     case LiveStep::check:
-      draw_check(session, facts.simulated);
+      draw_check(operation, facts.simulated);
       break;
     case LiveStep::run:
-      draw_run(session, facts, editor, at.scale, wishes);
+      draw_run(operation, facts, editor, at.scale, wishes);
       break;
   }
   const float button = 44 * at.scale;
   ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY() + 8, at.high - button - 74 * at.scale));
-  if (ImGui::Button((session.primary_words() + "###primary").c_str(), ImVec2(-1, button))) wishes.primary = true;
+  if (ImGui::Button((primary_words(operation) + "###primary").c_str(), ImVec2(-1, button))) wishes.primary = true;
   say(kQuiet, "Space or the pedal: this. Enter: go on. 1 to 7: a step. F: freeze.");
   ImGui::End();
 }
 
 /// The safety of the picture, in words and colour, over its upper edge.
-void draw_banner(const ShownPicture& shown, const LiveSession& session, bool recorded, ImVec2 from, float wide,
+void draw_banner(const ShownPicture& shown, const OperationView& operation, bool recorded, ImVec2 from, float wide,
                  float scale) {
   std::string text;
   ImVec4 colour = kGood;
-  if (session.frozen()) {
+  if (operation.frozen) {
     text = "FROZEN: this is no live picture";
     colour = kWarn;
   } else if (shown.stale || !shown.any) {
     text = shown.any ? "NOT LIVE: " + shown.reason : shown.reason;
     colour = kBad;
   } else if (shown.overlaid && shown.reason.empty()) {
-    text = fmt::format("overlay; FRE {:.1f} mm", session.fre_mm().value_or(0));
+    text = fmt::format("overlay; FRE {:.1f} mm", operation.fre_mm.value_or(0));
   } else {
     text = (shown.overlaid ? "overlay fades: " : "no overlay: ") + shown.reason;
     colour = kWarn;
@@ -286,7 +286,7 @@ void draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) 
   list->AddText(from, colour, text.c_str());
 }
 
-void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
+void draw_video(const Layout& at, const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
                 bool recorded) {
   const ImVec2 size(at.wide - at.side, at.high - at.strip);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
@@ -300,9 +300,9 @@ void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& s
     ImGui::SetCursorPos(ImVec2((size.x - shape.x) / 2, (size.y - shape.y) / 2));
     const ImVec2 corner = ImGui::GetCursorScreenPos();
     ImGui::Image(texture(window.picture(LiveWindow::Slot::video)), shape);
-    if (const auto mark = session.target_mark(); mark && shown.overlaid) draw_target(*mark, corner, fit, at.scale);
+    if (operation.target && shown.overlaid) draw_target(*operation.target, corner, fit, at.scale);
   }
-  draw_banner(shown, session, recorded, ImVec2(at.side, 0), size.x, at.scale);
+  draw_banner(shown, operation, recorded, ImVec2(at.side, 0), size.x, at.scale);
   if (const std::uintptr_t inset = window.picture(LiveWindow::Slot::inset); inset != 0) {
     const ImVec2 small(at.scale * InsetView::kWidthPx * 0.75F, at.scale * InsetView::kHeightPx * 0.75F);
     ImGui::SetCursorPos(ImVec2(size.x - small.x - 8 * at.scale, size.y - small.y - 8 * at.scale));
@@ -312,7 +312,7 @@ void draw_video(const Layout& at, const LiveWindow& window, const LiveSession& s
   ImGui::PopStyleVar();
 }
 
-void draw_strip(const Layout& at, const LiveSession& session, const PanelFacts& facts) {
+void draw_strip(const Layout& at, const OperationView& operation, const PanelFacts& facts) {
   ImGui::SetNextWindowPos(ImVec2(at.side, at.high - at.strip));
   ImGui::SetNextWindowSize(ImVec2(at.wide - at.side, at.strip));
   ImGui::Begin("strip", nullptr, kPanel);
@@ -326,10 +326,10 @@ void draw_strip(const Layout& at, const LiveSession& session, const PanelFacts& 
   say(kText, fmt::format("exposure to screen, ms: p50 {:.0f}  p95 {:.0f}  max {:.0f}", facts.ages->percentile_ms(0.5),
                          facts.ages->percentile_ms(0.95), facts.ages->most_ms()));
   say(kQuiet, fmt::format("{:.1f} frames/s, {} skipped; engine {}", facts.frames_per_s, facts.frames_skipped,
-                          session.engine_name()));
-  if (const auto& health = session.health())
+                          operation.engine_name()));
+  if (const auto& health = operation.link.health)
     say(kQuiet, fmt::format("tracker {:.0f} Hz, {} doubted", health->tracker_rate_hz, health->doubted));
-  if (!session.fault().empty()) say(kBad, session.fault());
+  if (!operation.fault.empty()) say(kBad, operation.fault);
   if (!facts.said.empty()) say(kQuiet, facts.said);
   ImGui::EndGroup();
   ImGui::End();
@@ -356,15 +356,15 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
     wishes.step = static_cast<LiveStep>(key[0] - '1');
 }
 
-PanelWishes draw_panels(const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
+PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
                         const PanelFacts& facts, TransferEditor& editor) {
   PanelWishes wishes;
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   const float scale = window.scale();
   const Layout at{size.x, size.y, kSidePx * scale, kStripPx * scale, scale};
-  draw_side(at, session, facts, editor, wishes);
-  draw_video(at, window, session, shown, facts.recorded);
-  draw_strip(at, session, facts);
+  draw_side(at, operation, facts, editor, wishes);
+  draw_video(at, window, operation, shown, facts.recorded);
+  draw_strip(at, operation, facts);
   for (const std::string& key : window.keys()) add_key(key, facts, wishes);
   return wishes;
 }

@@ -2,7 +2,8 @@
 
 #include <string>
 
-#include "host/operation/live_session.hpp"
+#include "host/operation/operation_view.hpp"
+#include "host/overlay/live_picture.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/appearance.hpp"
 #include "host/window/live_window.hpp"
@@ -20,7 +21,7 @@ struct PanelWishes {
   std::string preset;
 };
 
-/// What the panels show beside the session.
+/// What the panels show beside the operation.
 struct PanelFacts {
   const AgeStrip* ages = nullptr;
   double frames_per_s = 0;
@@ -37,7 +38,7 @@ struct PanelFacts {
 /// How wide the workflow beside the video is.
 int side_px(float scale);
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
-PanelWishes draw_panels(const LiveWindow& window, const LiveSession& session, const ShownPicture& shown,
+PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
                         const PanelFacts& facts, TransferEditor& editor);
 /// The wish that a key stands for: "space", "enter", "backspace", "f", "s", "1" to "7", "+", "-", "c", "g".
 void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);

@@ -48,13 +48,13 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
   return script;
 }
 
-Result<LiveScript::Act> LiveScript::next(const LiveSession& session, HostTime now) {
+Result<LiveScript::Act> LiveScript::next(const OperationView& operation, HostTime now) {
   if (lines_.empty()) return Act{};
   if (!since_) since_ = now;
   const Line& line = lines_.front();
   const double waited_s = Duration{now.ns - since_->ns}.seconds();
   if (!line.step.empty()) {
-    const StepNote& note = session.note(*step_of(line.step));
+    const StepNote& note = operation.note(*step_of(line.step));
     if (!note.done && waited_s >= line.seconds) {
       return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.step,
                                               line.seconds, note.line)};

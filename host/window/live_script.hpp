@@ -7,7 +7,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
-#include "host/operation/live_session.hpp"
+#include "host/operation/operation_view.hpp"
 
 namespace birdseye::host {
 
@@ -30,7 +30,7 @@ class LiveScript {
     bool end = false;
   };
   /// What is to be done now; at most one act a call. An error where something was waited for in vain.
-  Result<Act> next(const LiveSession& session, HostTime now);
+  Result<Act> next(const OperationView& operation, HostTime now);
 
  private:
   struct Line {

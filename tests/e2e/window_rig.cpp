@@ -12,6 +12,7 @@
 #include <mutex>
 #include <sstream>
 
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "host/operation/operation.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
@@ -64,8 +65,12 @@ void write_registered(const std::filesystem::path& folder, const std::string& ct
   host::Operation operation;
   operation.made_utc = "2026-11-22T09:30:00Z";
   operation.ct_checksum = host::ct_checksum(*volume);
-  operation.calibrated = {camera(), camera_from_sensor(), 0.3, 1, 0.5, operation.made_utc};
-  operation.registered = {Transform<Patient, Tracker>(Eigen::Matrix3d::Identity(), -kBallInTracker_mm),
+  calibration::HandEyeResult hand_eye;
+  hand_eye.camera_from_sensor = camera_from_sensor();
+  hand_eye.held_out_px = 1;
+  hand_eye.held_out_mm = 0.5;
+  operation.calibrated = {host::ScopeSetup::of_hand_eye(camera(), 0.3, hand_eye), operation.made_utc, true};
+  operation.registered = {Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), kBallInTracker_mm),
                           0.2,
                           {{10, 0, 0}, {-10, 0, 0}, {0, 10, 0}, {0, 0, 10}}};
   std::filesystem::create_directories(folder);

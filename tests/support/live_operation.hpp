@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "host/operation/live_session.hpp"
+#include "host/operation/live_workflow.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
@@ -16,9 +16,9 @@
 /// pointer.
 namespace birdseye::testing {
 
-using host::LiveSession;
 using host::LiveSettings;
 using host::LiveStep;
+using host::LiveWorkflow;
 
 inline constexpr std::int64_t kMs = 1'000'000;
 
@@ -39,18 +39,18 @@ inline LiveSettings operation_settings(const Scratch& scratch) {
 }
 
 /// Waits for the CT, which another thread reads.
-inline void load(LiveSession& session) {
-  for (int i = 0; i < 1000 && session.patient() == nullptr && session.fault().empty(); ++i) {
+inline void load(LiveWorkflow& workflow) {
+  for (int i = 0; i < 1000 && workflow.view().patient == nullptr && workflow.view().fault.empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    session.tick();
+    workflow.tick();
   }
-  ASSERT_NE(session.patient(), nullptr) << session.fault();
+  ASSERT_NE(workflow.view().patient, nullptr) << workflow.view().fault;
 }
 
 /// The pointer's tip at places of the patient, one after the other.
 class Hand {
  public:
-  explicit Hand(LiveSession& session) : session_(session) {}
+  explicit Hand(LiveWorkflow& workflow) : workflow_(workflow) {}
   void rest_at(const Eigen::Vector3d& in_patient_mm, int samples) {
     const Eigen::Vector3d to_mm = kTrackerFromPatient * in_patient_mm;
     for (int i = 0; i < 30; ++i) push(at_mm_ + (to_mm - at_mm_) * (i / 29.0));
@@ -65,32 +65,32 @@ class Hand {
     time_ms_ += 10;
     birds.birds.push_back(
         {"pointer", Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), tip_mm - Eigen::Vector3d(0, 0, 150))});
-    session_.take(birds, HostTime{birds.acquired.ns}, std::nullopt);
+    workflow_.take(birds, HostTime{birds.acquired.ns}, std::nullopt);
   }
-  LiveSession& session_;
+  LiveWorkflow& workflow_;
   Eigen::Vector3d at_mm_ = Eigen::Vector3d(0, 0, 900);
   std::int64_t time_ms_ = 1000;
 };
 
 /// The appliance sends the scope's calibration record.
-inline void give_record(LiveSession& session,
+inline void give_record(LiveWorkflow& workflow,
                         const calibration::CalibrationRecord& record = example_record(768, 576, {}, {})) {
   wire::Calibration calibration;
   calibration.in_force = true;
   calibration.record = calibration::record_text(record);
-  session.take(calibration, HostTime{0}, std::nullopt);
+  workflow.take(calibration, HostTime{0}, std::nullopt);
 }
 
-inline void connect_and_calibrate(LiveSession& session) {
+inline void connect_and_calibrate(LiveWorkflow& workflow) {
   wire::Health health;
   health.state = "ready";
-  session.take(health, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
-  EXPECT_EQ(session.step(), LiveStep::calibrate);
-  give_record(session);
-  EXPECT_TRUE(session.note(LiveStep::calibrate).done);
-  session.primary();
-  EXPECT_EQ(session.step(), LiveStep::fiducials);
+  workflow.take(health, HostTime{0}, std::nullopt);
+  workflow.set_link(true, "connected");
+  EXPECT_EQ(workflow.view().step, LiveStep::calibrate);
+  give_record(workflow);
+  EXPECT_TRUE(workflow.view().note(LiveStep::calibrate).done);
+  workflow.primary();
+  EXPECT_EQ(workflow.view().step, LiveStep::fiducials);
 }
 
 }  // namespace birdseye::testing

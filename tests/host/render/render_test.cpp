@@ -5,7 +5,6 @@
 #include <random>
 
 #include "host/overlay/compositor.hpp"
-#include "host/overlay/gate.hpp"
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 #include "tests/support/render_scene.hpp"
@@ -253,55 +252,6 @@ TEST(Compositor, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
   EXPECT_EQ(composite(video, overlay, 0), video);
   const ImageRgba other{2, 1, {255, 255, 255, 255, 255, 255, 255, 255}};
   EXPECT_EQ(composite(video, other, 1), video);
-}
-
-PoseAnswer sound() {
-  PoseAnswer pose;
-  pose.kind = PoseKind::interpolated;
-  pose.tracker_from_sensor = Transform<Tracker, Sensor>();
-  pose.position_sigma_mm = 0.1;
-  return pose;
-}
-
-TEST(OverlayGate, DrawsWithASoundPoseAndNeverWithout) {
-  OverlayGate gate;
-  EXPECT_EQ(gate.decide({0}, sound()).strength, 1);
-  PoseAnswer none;
-  none.reason = "the newest pose is 300 ms old";
-  const auto refused = gate.decide({40'000'000}, none);
-  EXPECT_EQ(refused.strength, 0);
-  EXPECT_EQ(refused.reason, none.reason);
-}
-
-TEST(OverlayGate, DrawsNothingOverABadCalibration) {
-  OverlayGate gate;
-  OverlayGate::Calibration calibration;
-  calibration.fre_mm = 9;
-  gate.set_calibration(calibration);
-  const auto decision = gate.decide({0}, sound());
-  EXPECT_EQ(decision.strength, 0);
-  EXPECT_NE(decision.reason.find("9.0 mm"), std::string::npos);
-  gate.set_calibration({});
-  EXPECT_EQ(gate.decide({1'000'000'000}, sound()).strength, 1);
-}
-
-TEST(OverlayGate, FadesWhilePosesAreDoubtfulAndSaysWhy) {
-  OverlayGate gate;
-  gate.decide({0}, sound());
-  PoseAnswer shaky = sound();
-  shaky.position_sigma_mm = 5;
-  const auto first = gate.decide({40'000'000}, shaky);
-  EXPECT_NEAR(first.strength, 0.8, 1e-9);
-  EXPECT_NE(first.reason.find("scatters by 5.0 mm"), std::string::npos);
-  for (int i = 2; i < 6; ++i) gate.decide({i * 40'000'000}, shaky);
-  EXPECT_EQ(gate.decide({240'000'000}, shaky).strength, 0);
-  EXPECT_NEAR(gate.decide({280'000'000}, sound()).strength, 0.2, 1e-9);
-  PoseAnswer ahead = sound();
-  ahead.kind = PoseKind::predicted;
-  ahead.age = Duration::from_ms(70);
-  EXPECT_NE(gate.decide({320'000'000}, ahead).reason.find("70 ms"), std::string::npos);
-  shaky.position_sigma_mm = NAN;
-  EXPECT_FALSE(gate.decide({360'000'000}, shaky).reason.empty());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/live_panels.hpp"
@@ -39,12 +40,10 @@ double magenta_in(const std::vector<std::uint8_t>& rgb) {
 }
 
 Setup setup() {
-  Setup out;
-  out.camera.width_px = kWidth;
-  out.camera.height_px = kHeight;
-  out.camera.fx_px = out.camera.fy_px = 60;
-  return out;
+  return ScopeSetup::of_hand_eye({kWidth, kHeight, 60, 60, 0, 0}, 0.3, {}).registered({});
 }
+
+constexpr TrustFigures kGood{{0.3, 2, 1}, 0.5, 2};
 
 PoseAnswer good_pose() {
   PoseAnswer pose;
@@ -129,10 +128,10 @@ void play(LivePicture& picture, const Fault& fault,
 }
 
 TEST(LivePicture, ShowsTheOverlayWhileAllIsWell) {
-  Magenta engine;
+  const auto engine = std::make_shared<Magenta>();
   LivePicture picture;
-  picture.set_engine(&engine);
-  picture.set_setup(setup(), {});
+  picture.set_engine(engine);
+  picture.set_setup(setup(), kGood);
   int overlaid = 0;
   play(
       picture, [](auto, wire::VideoFrame f) { return std::optional(f); },
@@ -149,10 +148,10 @@ TEST(LivePicture, ShowsTheOverlayWhileAllIsWell) {
 TEST(LivePicture, NoStaleOverlayStaysLongerThan150MsUnderAnyFault) {
   for (const Named& one : faults()) {
     SCOPED_TRACE(one.name);
-    Magenta engine;
+    const auto engine = std::make_shared<Magenta>();
     LivePicture picture;
-    picture.set_engine(&engine);
-    picture.set_setup(setup(), {});
+    picture.set_engine(engine);
+    picture.set_setup(setup(), kGood);
     std::string words;
     play(picture, one.fault, [&](std::int64_t ms, const ShownPicture& shown) {
       if (ms > one.last_good_ms + 150) {
@@ -171,18 +170,32 @@ TEST(LivePicture, NoStaleOverlayStaysLongerThan150MsUnderAnyFault) {
 }
 
 TEST(LivePicture, NothingIsDrawnWithoutRegistrationOrWithABadOne) {
-  Magenta engine;
+  const auto engine = std::make_shared<Magenta>();
   LivePicture picture;
-  picture.set_engine(&engine);
+  picture.set_engine(engine);
   picture.take(frame_at(0, good_pose()), HostTime{0});
   picture.draw();
   EXPECT_EQ(picture.at(HostTime{kMs}).reason, "the patient is not registered yet");
-  picture.set_setup(setup(), {.camera_rms_px = 0.3, .tracked_rms_px = 2, .fre_mm = 9});
+  TrustFigures bad_fit = kGood;
+  bad_fit.fre_mm = 9;
+  picture.set_setup(setup(), bad_fit);
   picture.take(frame_at(40, good_pose()), HostTime{40 * kMs});
   picture.draw();
   const ShownPicture bad = picture.at(HostTime{50 * kMs});
   EXPECT_FALSE(bad.overlaid);
   EXPECT_EQ(bad.reason, "the fiducials fit to 9.0 mm only");
+}
+
+TEST(LivePicture, NothingIsDrawnByAFigureThatNobodyKnows) {
+  LivePicture picture;
+  picture.set_engine(std::make_shared<Magenta>());
+  picture.set_setup(setup(), {});
+  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.draw();
+  const ShownPicture shown = picture.at(HostTime{10 * kMs});
+  EXPECT_FALSE(shown.overlaid);
+  EXPECT_EQ(magenta_in(*shown.rgb), 0);
+  EXPECT_EQ(shown.reason, "how well the camera is calibrated is not known");
 }
 
 TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
@@ -200,10 +213,10 @@ TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
 }
 
 TEST(LivePicture, AClockThatStartsAnewDoesNotStopIt) {
-  Magenta engine;
+  const auto engine = std::make_shared<Magenta>();
   LivePicture picture;
-  picture.set_engine(&engine);
-  picture.set_setup(setup(), {});
+  picture.set_engine(engine);
+  picture.set_setup(setup(), kGood);
   picture.take(frame_at(90'000, good_pose()), HostTime{0});
   picture.take(frame_at(10, good_pose()), HostTime{40 * kMs});
   picture.draw();
@@ -247,13 +260,13 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
   PanelFacts facts;
   TransferEditor editor;
   facts.ages = &ages;
-  LiveSession session{LiveSettings{}};
+  const OperationView operation;
   for (const Named& one : faults()) {
     SCOPED_TRACE(one.name);
-    Magenta engine;
+    const auto engine = std::make_shared<Magenta>();
     LivePicture picture;
-    picture.set_engine(&engine);
-    picture.set_setup(setup(), {});
+    picture.set_engine(engine);
+    picture.set_setup(setup(), kGood);
     std::uint64_t changes = 0;
     int seen = 0;
     play(picture, one.fault, [&](std::int64_t ms, const ShownPicture& shown) {
@@ -262,7 +275,7 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
         (*window)->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
       changes = shown.changes;
       (*window)->begin_frame();
-      draw_panels(**window, session, shown, facts, editor);
+      draw_panels(**window, operation, shown, facts, editor);
       (*window)->end_frame();
       const double magenta = magenta_in((*window)->shot().rgb);
       (*window)->swap();

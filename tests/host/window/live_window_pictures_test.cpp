@@ -56,7 +56,7 @@ calibration::CalibrationRecord record() {
   auto out = birdseye::testing::example_record(kWidth, kHeight, {}, {});
   out.lens->camera = {kWidth, kHeight, 620, 620, 384, 288, -0.2, 0.05, 0, 0, 0};
   out.lens->rms_px = 0.3;
-  out.hand_eye->rms_px = 1;
+  out.hand_eye->held_out_px = 1;
   return out;
 }
 
@@ -93,20 +93,20 @@ class LiveWindowPictures : public ::testing::Test {
   }
 
   /// Draws it until its panels have found their places, and compares.
-  void expect_looks(const std::string& name, LiveSession& session, std::optional<HostTime> now) {
-    const ShownPicture shown = now ? session.picture().at(*now) : ShownPicture{};
+  void expect_looks(const std::string& name, LiveWorkflow& workflow, std::optional<HostTime> now) {
+    const ShownPicture shown = now ? workflow.shown_at(*now) : ShownPicture{};
     if (shown.any) window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
-    if (session.patient() != nullptr && session.engine() != nullptr) {
-      histogram_ = HuHistogram(session.patient()->shown);
+    if (workflow.view().patient != nullptr && workflow.view().engine != nullptr) {
+      histogram_ = HuHistogram(workflow.view().patient->shown);
       facts_.histogram = &histogram_;
-      editor_.set_points(session.transfer()->points());
-      const Picture inset =
-          InsetView(session.patient()->shown).draw(*session.engine(), session.picture().camera_from_patient());
+      editor_.set_points(workflow.view().transfer->points());
+      const Picture inset = InsetView(workflow.view().patient->shown)
+                                .draw(*workflow.view().engine, workflow.picture().camera_from_patient());
       window_->set_picture(LiveWindow::Slot::inset, inset.rgb, inset.width_px, inset.height_px);
     }
     for (int i = 0; i < 3; ++i) {
       window_->begin_frame();
-      draw_panels(*window_, session, shown, facts_, editor_);
+      draw_panels(*window_, workflow.view(), shown, facts_, editor_);
       window_->end_frame();
       if (i < 2) window_->swap();
     }
@@ -145,56 +145,56 @@ class LiveWindowPictures : public ::testing::Test {
   HuHistogram histogram_;
 };
 
-void begin(LiveSession& session, Hand& hand, std::size_t touched) {
-  birdseye::testing::load(session);
-  connect_and_calibrate(session);
-  birdseye::testing::give_record(session, record());
+void begin(LiveWorkflow& workflow, Hand& hand, std::size_t touched) {
+  birdseye::testing::load(workflow);
+  connect_and_calibrate(workflow);
+  birdseye::testing::give_record(workflow, record());
   const Eigen::Vector3d slip_mm(0.3, -0.2, 0.1);
   for (std::size_t i = 0; i < touched; ++i) hand.rest_at(kFiducials[i] + static_cast<double>(i) * slip_mm, 80);
   hand.rest_at({0, 0, 200}, 1);
 }
 
 /// The overlay runs; when, on this machine's clock, 45 ms after the newest frame.
-HostTime run_overlay(LiveSession& session) {
-  session.go_to(LiveStep::run);
+HostTime run_overlay(LiveWorkflow& workflow) {
+  workflow.go_to(LiveStep::run);
   HostTime exposed;
   for (std::uint64_t i = 1; i <= 50; ++i) {
     exposed = HostTime{static_cast<std::int64_t>(i) * 40'000'000};
-    session.take(tissue(i, looking_at_the_ball()), exposed, ClockGap{});
+    workflow.take(tissue(i, looking_at_the_ball()), exposed, ClockGap{});
   }
-  session.picture().draw();
+  workflow.draw();
   return HostTime{exposed.ns + 45'000'000};
 }
 
 TEST_F(LiveWindowPictures, BeforeAnythingHasCome) {
   ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
-  LiveSession session{LiveSettings{}};
-  session.set_link(false, "127.0.0.1:18944: nothing answers; does birdseyed run there?");
-  expect_looks("connect-1280x720", session, std::nullopt);
+  LiveWorkflow workflow{LiveSettings{}};
+  workflow.set_link(false, "127.0.0.1:18944: nothing answers; does birdseyed run there?");
+  expect_looks("connect-1280x720", workflow, std::nullopt);
 }
 
 TEST_F(LiveWindowPictures, FiducialsWithTheirResiduals) {
   ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  Hand hand(session);
-  begin(session, hand, 3);
-  session.take(tissue(1, looking_at_the_ball()), HostTime{0}, ClockGap{});
-  session.picture().draw();
-  expect_looks("fiducials-1280x720", session, HostTime{45'000'000});
+  LiveWorkflow workflow(operation_settings(scratch));
+  Hand hand(workflow);
+  begin(workflow, hand, 3);
+  workflow.take(tissue(1, looking_at_the_ball()), HostTime{0}, ClockGap{});
+  workflow.draw();
+  expect_looks("fiducials-1280x720", workflow, HostTime{45'000'000});
 }
 
 TEST_F(LiveWindowPictures, TheOverlayRunsAndOnADenseScreenTheVideoHasStopped) {
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  Hand hand(session);
-  begin(session, hand, 4);
-  const HostTime now = run_overlay(session);
-  ASSERT_TRUE(session.picture().at(now).overlaid) << session.picture().at(now).reason;
+  LiveWorkflow workflow(operation_settings(scratch));
+  Hand hand(workflow);
+  begin(workflow, hand, 4);
+  const HostTime now = run_overlay(workflow);
+  ASSERT_TRUE(workflow.shown_at(now).overlaid) << workflow.shown_at(now).reason;
   ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1));
-  expect_looks("run-1920x1080", session, now);
+  expect_looks("run-1920x1080", workflow, now);
   ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1.5));
-  expect_looks("stopped-1920x1080-dense", session, HostTime{now.ns + 2'000'000'000});
+  expect_looks("stopped-1920x1080-dense", workflow, HostTime{now.ns + 2'000'000'000});
 }
 
 TEST_F(LiveWindowPictures, AnEngineOnTheCardLeavesTheWindowItsOwnContext) {
@@ -202,13 +202,13 @@ TEST_F(LiveWindowPictures, AnEngineOnTheCardLeavesTheWindowItsOwnContext) {
   ASSERT_NO_FATAL_FAILURE(open(1920, 1080, 1));
   LiveSettings settings = operation_settings(scratch);
   settings.engine = "gl";
-  LiveSession session(settings);
-  Hand hand(session);
-  begin(session, hand, 4);
-  ASSERT_EQ(session.engine_name().substr(0, 2), "gl") << session.fault();
-  const HostTime now = run_overlay(session);
-  ASSERT_TRUE(session.picture().at(now).overlaid) << session.picture().at(now).reason;
-  expect_looks("run-1920x1080", session, now);
+  LiveWorkflow workflow(settings);
+  Hand hand(workflow);
+  begin(workflow, hand, 4);
+  ASSERT_EQ(workflow.view().engine_name().substr(0, 2), "gl") << workflow.view().fault;
+  const HostTime now = run_overlay(workflow);
+  ASSERT_TRUE(workflow.shown_at(now).overlaid) << workflow.shown_at(now).reason;
+  expect_looks("run-1920x1080", workflow, now);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <thread>
 
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "calibration/points/point_error.hpp"
 #include "host/operation/operation.hpp"
 #include "host/window/live_script.hpp"
@@ -21,38 +22,38 @@ using birdseye::testing::load;
 using birdseye::testing::operation_settings;
 using birdseye::testing::Scratch;
 
-TEST(LiveSession, GoesFromTheLinkToARegisteredPatient) {
+TEST(LiveWorkflow, GoesFromTheLinkToARegisteredPatient) {
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  load(session);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_FALSE(session.picture().setup().has_value());
+    EXPECT_FALSE(workflow.picture().setup().has_value());
     hand.rest_at(kFiducials[i], 80);
     hand.rest_at(kFiducials[i] + Eigen::Vector3d(0, 0, 40), 1);
-    EXPECT_EQ(session.touches().size(), i + 1);
+    EXPECT_EQ(workflow.view().touches.size(), i + 1);
   }
   // With three there is a fit, and it is shown; which is which is not yet sure enough to go on.
-  ASSERT_TRUE(session.fre_mm().has_value()) << session.registration_fault();
-  EXPECT_FALSE(session.note(LiveStep::fiducials).done);
+  ASSERT_TRUE(workflow.view().fre_mm.has_value()) << workflow.view().registration_fault;
+  EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).done);
   hand.rest_at(kFiducials[3], 80);
   hand.rest_at({0, 0, 200}, 1);
-  EXPECT_EQ(session.step(), LiveStep::views);
-  session.go_on();
-  session.go_on();
-  EXPECT_EQ(session.step(), LiveStep::check);
-  EXPECT_LT(*session.fre_mm(), 0.05);
-  ASSERT_TRUE(session.picture().setup().has_value());
-  const auto& found = session.picture().setup()->tracker_from_patient;
+  EXPECT_EQ(workflow.view().step, LiveStep::views);
+  workflow.go_on();
+  workflow.go_on();
+  EXPECT_EQ(workflow.view().step, LiveStep::check);
+  EXPECT_LT(*workflow.view().fre_mm, 0.05);
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  const auto& found = workflow.picture().setup()->tracker_from_patient;
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
   hand.rest_at(Eigen::Vector3d(30, 30, 22), 30);
-  const auto reading = session.check();
+  const auto reading = workflow.view().check;
   ASSERT_TRUE(reading.has_value());
   EXPECT_EQ(reading->nearest, "tumour");
   EXPECT_NEAR(reading->distance_mm, 2, 0.1);
-  session.go_on();
-  EXPECT_EQ(session.step(), LiveStep::run);
+  workflow.go_on();
+  EXPECT_EQ(workflow.view().step, LiveStep::run);
 }
 
 /// As kFiducials, in soft tissue.
@@ -76,34 +77,34 @@ std::string ct_with_markers(const Scratch& scratch) {
   return (scratch / "ct").string();
 }
 
-TEST(LiveSession, WhatIsTouchedBeforeTheMarkersAreFoundCounts) {
+TEST(LiveWorkflow, WhatIsTouchedBeforeTheMarkersAreFoundCounts) {
   const Scratch scratch;
   LiveSettings settings = operation_settings(scratch);
   settings.patient.fiducials.clear();
   settings.patient.ct = ct_with_markers(scratch);
-  LiveSession session(settings);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(settings);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
   hand.rest_at({0, 0, 200}, 1);
-  ASSERT_EQ(session.touches().size(), kFiducials.size());
-  EXPECT_FALSE(session.fre_mm().has_value());
-  load(session);
-  for (int i = 0; i < 1000 && !session.markers_in_patient_mm(); ++i) {
+  ASSERT_EQ(workflow.view().touches.size(), kFiducials.size());
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+  load(workflow);
+  for (int i = 0; i < 1000 && !workflow.view().markers_seen; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    session.tick();
+    workflow.tick();
   }
-  ASSERT_TRUE(session.markers_in_patient_mm().has_value());
-  EXPECT_EQ(session.markers_in_patient_mm()->size(), kFiducials.size());
-  ASSERT_TRUE(session.fre_mm().has_value()) << session.registration_fault();
-  EXPECT_LT(*session.fre_mm(), 0.3);
-  EXPECT_EQ(session.step(), LiveStep::views);
+  ASSERT_TRUE(workflow.view().markers_seen.has_value());
+  EXPECT_EQ(*workflow.view().markers_seen, kFiducials.size());
+  ASSERT_TRUE(workflow.view().fre_mm.has_value()) << workflow.view().registration_fault;
+  EXPECT_LT(*workflow.view().fre_mm, 0.3);
+  EXPECT_EQ(workflow.view().step, LiveStep::views);
 }
 
 /// The scope at its place, looking at the patient's point from so far.
-wire::VideoFrame looking_at(const LiveSession& session, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
+wire::VideoFrame looking_at(const LiveWorkflow& workflow, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
                             double sigma_mm) {
-  const Setup& setup = *session.picture().setup();
+  const Setup& setup = *workflow.picture().setup();
   const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
                                                        Eigen::Vector3d(0, 0, from_mm) - point_in_patient_mm);
   wire::VideoFrame frame;
@@ -118,26 +119,26 @@ wire::VideoFrame looking_at(const LiveSession& session, const Eigen::Vector3d& p
   return frame;
 }
 
-TEST(LiveSession, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
+TEST(LiveWorkflow, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  load(session);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (std::size_t i = 0; i < 4; ++i) hand.rest_at(kFiducials[i] + Eigen::Vector3d(0, 0, i % 2 == 0 ? 1 : -1), 80);
   hand.rest_at({0, 0, 200}, 1);
-  ASSERT_TRUE(session.picture().setup().has_value());
-  EXPECT_FALSE(session.target_mark().has_value()) << "of no frame";
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  EXPECT_FALSE(workflow.view().target.has_value()) << "of no frame";
   const Eigen::Vector3d tumour_mm(30, 30, 20);
-  session.take(looking_at(session, tumour_mm, 100, 0.2), HostTime{0}, ClockGap{});
-  session.picture().draw();
-  const auto mark = session.target_mark();
+  workflow.take(looking_at(workflow, tumour_mm, 100, 0.2), HostTime{0}, ClockGap{});
+  workflow.draw();
+  const auto mark = workflow.view().target;
   ASSERT_TRUE(mark.has_value());
-  const CameraModel& camera = session.picture().setup()->camera;
+  const CameraModel& camera = workflow.picture().setup()->camera;
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_FALSE(mark->motion_counted);
   // By hand: the fiducials, hand-eye's 0.5 mm of the record, across the line of sight, the pose's 0.2 mm an axis.
-  const auto localisation = calibration::localisation_error_of(*session.fre_mm(), 4);
+  const auto localisation = calibration::localisation_error_of(*workflow.view().fre_mm, 4);
   const double fiducials_mm = calibration::TargetError(kFiducials, localisation.upper95_mm).rms_mm(tumour_mm);
   const double rms_mm = std::sqrt(fiducials_mm * fiducials_mm + 1.5 * 0.25 + 3 * 0.04);
   EXPECT_NEAR(mark->radius_mm, rms_mm * std::sqrt(5.99 / 3), 1e-3);
@@ -149,7 +150,7 @@ Operation registered_operation(const LiveSettings& settings) {
   Operation kept;
   kept.ct_checksum = read_patient(settings.patient)->checksum;
   kept.made_utc = "2026-11-22T10:00:00Z";
-  kept.registered = {kTrackerFromPatient.inverse(), 0.3, kFiducials};
+  kept.registered = {kTrackerFromPatient, 0.3, kFiducials};
   return kept;
 }
 
@@ -159,7 +160,7 @@ LiveSettings resumed(const Scratch& scratch, const std::filesystem::path& from) 
   return out;
 }
 
-TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
+TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const Scratch scratch;
   const LiveSettings again = resumed(scratch, scratch.path());
   Operation kept = registered_operation(again);
@@ -168,48 +169,37 @@ TEST(LiveSession, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   field.size = {2, 2, 2};
   field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
   field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-  kept.deformation = {field, 0.7};
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7});
   ASSERT_TRUE(write_operation(scratch.path(), kept));
-  LiveSession session(again);
-  load(session);
-  ASSERT_EQ(session.fault(), "");
-  give_record(session);
-  session.primary();
-  ASSERT_TRUE(session.picture().setup().has_value());
-  session.take(looking_at(session, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
-  session.picture().draw();
-  const auto mark = session.target_mark();
+  LiveWorkflow workflow(again);
+  load(workflow);
+  ASSERT_EQ(workflow.view().fault, "");
+  give_record(workflow);
+  workflow.primary();
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  workflow.take(looking_at(workflow, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
+  workflow.draw();
+  const auto mark = workflow.view().target;
   ASSERT_TRUE(mark.has_value());
-  const CameraModel& camera = session.picture().setup()->camera;
+  const CameraModel& camera = workflow.picture().setup()->camera;
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_TRUE(mark->motion_counted);
   const double fiducials_mm =
       calibration::TargetError(kFiducials, calibration::localisation_error_of(0.3, 4).upper95_mm).rms_mm({30, 30, 20});
   EXPECT_NEAR(mark->radius_mm, std::sqrt((fiducials_mm * fiducials_mm + 1.5 * 0.25 + 0.7 * 0.7) * 5.99 / 3), 1e-3);
-  Hand hand(session);
+  Hand hand(workflow);
   hand.rest_at({34, 30, 21}, 30);
-  const auto reading = session.check();
+  const auto reading = workflow.view().check;
   ASSERT_TRUE(reading.has_value());
   EXPECT_EQ(reading->nearest, "tumour");
   EXPECT_NEAR(reading->distance_mm, 1, 0.1);
   // By another registration the deformation means nothing.
-  session.go_to(LiveStep::fiducials);
+  workflow.go_to(LiveStep::fiducials);
   for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
   hand.rest_at({0, 0, 200}, 1);
-  ASSERT_TRUE(session.picture().setup().has_value()) << session.registration_fault();
-  EXPECT_FALSE(session.deformation().has_value());
-  EXPECT_FALSE(session.note(LiveStep::deform).done);
-}
-
-TEST(LiveSession, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {
-  OverlayGate gate;
-  gate.set_calibration({.fre_mm = 0.5, .target_mm = 9});
-  PoseAnswer pose;
-  pose.kind = PoseKind::exact;
-  pose.tracker_from_sensor.emplace();
-  const auto decision = gate.decide({0}, pose);
-  EXPECT_EQ(decision.strength, 0);
-  EXPECT_NE(decision.reason.find("leave the target open by 9 mm"), std::string::npos) << decision.reason;
+  ASSERT_TRUE(workflow.picture().setup().has_value()) << workflow.view().registration_fault;
+  EXPECT_FALSE(workflow.view().deformed != nullptr);
+  EXPECT_FALSE(workflow.view().note(LiveStep::deform).done);
 }
 
 /// Four fiducials, and what was found of them is in out.
@@ -217,36 +207,36 @@ void register_into(const std::filesystem::path& out, const Scratch& scratch, boo
   LiveSettings kept = operation_settings(scratch);
   if (with_markers) kept.patient.ct = ct_with_markers(scratch);
   kept.out = out;
-  LiveSession session(kept);
-  load(session);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(kept);
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
   hand.rest_at({0, 0, 200}, 1);
-  ASSERT_TRUE(session.note(LiveStep::fiducials).done);
+  ASSERT_TRUE(workflow.view().note(LiveStep::fiducials).done);
 }
 
-TEST(LiveSession, IsTakenUpWhereAnotherWindowWasClosed) {
+TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
-  LiveSession session(resumed(scratch, scratch.path()));
-  load(session);
-  EXPECT_EQ(session.fault(), "");
-  EXPECT_TRUE(session.note(LiveStep::fiducials).done);
-  EXPECT_EQ(session.step(), LiveStep::check);  // not the run: the patient may have been moved
-  EXPECT_FALSE(session.picture().setup().has_value()) << "without the scope's record there is no overlay";
-  give_record(session);
-  EXPECT_FALSE(session.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
-  session.go_on();
-  EXPECT_FALSE(session.picture().setup().has_value()) << "to skip the look is not to have looked";
-  session.go_to(LiveStep::check);
-  session.primary();
-  ASSERT_TRUE(session.picture().setup().has_value());
-  const auto& found = session.picture().setup()->tracker_from_patient;
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+  EXPECT_EQ(workflow.view().step, LiveStep::check);  // not the run: the patient may have been moved
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "without the scope's record there is no overlay";
+  give_record(workflow);
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
+  workflow.go_on();
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "to skip the look is not to have looked";
+  workflow.go_to(LiveStep::check);
+  workflow.primary();
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  const auto& found = workflow.picture().setup()->tracker_from_patient;
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
 }
 
-TEST(LiveSession, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
+TEST(LiveWorkflow, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
   const Scratch scratch;
   register_into(scratch.path(), scratch, true);
   const std::string kept = birdseye::testing::contents_of(scratch / "operation.json");
@@ -254,170 +244,169 @@ TEST(LiveSession, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
   settings.out = scratch.path();
   settings.patient.ct = ct_with_markers(scratch);
   settings.patient.fiducials.clear();  // looked for, which takes its time
-  LiveSession session(settings);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(settings);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   hand.rest_at({0, 0, 40}, 80);  // by mistake
   hand.rest_at({0, 0, 200}, 1);
-  load(session);
+  load(workflow);
   hand.rest_at({0, 0, 80}, 80);
   hand.rest_at({0, 0, 200}, 1);
-  ASSERT_EQ(session.touches().size(), 2U);
+  ASSERT_EQ(workflow.view().touches.size(), 2U);
   EXPECT_EQ(birdseye::testing::contents_of(scratch / "operation.json"), kept);
-  for (int i = 0; i < 1000 && !session.markers_in_patient_mm(); ++i) {
+  for (int i = 0; i < 1000 && !workflow.view().markers_seen; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    session.tick();
+    workflow.tick();
   }
-  EXPECT_EQ(session.fault(), "");
-  EXPECT_TRUE(session.note(LiveStep::fiducials).done) << session.note(LiveStep::fiducials).line;
-  EXPECT_EQ(session.step(), LiveStep::check);
-  EXPECT_TRUE(session.touches().empty());
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done) << workflow.view().note(LiveStep::fiducials).line;
+  EXPECT_EQ(workflow.view().step, LiveStep::check);
+  EXPECT_TRUE(workflow.view().touches.empty());
 }
 
-TEST(LiveSession, AnotherPatientsRegistrationIsNotTakenUp) {
+TEST(LiveWorkflow, AnotherPatientsRegistrationIsNotTakenUp) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
   LiveSettings wrong = resumed(scratch, scratch.path());
   wrong.out = scratch.path();
   birdseye::testing::small_ct(scratch, 8);  // in the first one's place
-  LiveSession session(wrong);
-  load(session);
-  EXPECT_NE(session.fault().find("is of another CT"), std::string::npos) << session.fault();
-  EXPECT_FALSE(session.note(LiveStep::fiducials).done);
+  LiveWorkflow workflow(wrong);
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("is of another CT"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).done);
   // Nor is it lost by what is touched then.
   const std::string kept = birdseye::testing::contents_of(scratch / "patient_from_tracker.txt");
-  connect_and_calibrate(session);
-  Hand hand(session);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
   hand.rest_at({0, 0, 200}, 1);
-  EXPECT_TRUE(session.note(LiveStep::fiducials).done);
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
   EXPECT_EQ(birdseye::testing::contents_of(scratch / "patient_from_tracker.txt"), kept);
 }
 
 /// The scope's calibration in an operation that was kept, and the appliance's record, made before or after it.
-TEST(LiveSession, OfTwoCalibrationsTheNewerCounts) {
+TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
   const Scratch scratch;
   for (const bool record_is_newer : {false, true}) {
     const LiveSettings again = resumed(scratch, scratch.path());
     Operation kept = registered_operation(again);
-    Operation::Calibrated by_board;
-    by_board.camera = {768, 576, 500, 500, 384, 288};
-    by_board.made_utc = record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z";  // the record's is 09:30
-    kept.calibrated = by_board;
+    // The record's is 09:30.
+    kept.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}),
+                       record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z", true};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
-    LiveSession session(again);
-    load(session);
-    ASSERT_EQ(session.fault(), "");
-    give_record(session);
-    session.primary();
-    ASSERT_TRUE(session.picture().setup().has_value());
-    EXPECT_EQ(session.picture().setup()->camera.fx_px == 500, !record_is_newer);
+    LiveWorkflow workflow(again);
+    load(workflow);
+    ASSERT_EQ(workflow.view().fault, "");
+    give_record(workflow);
+    workflow.primary();
+    ASSERT_TRUE(workflow.picture().setup().has_value());
+    EXPECT_EQ(workflow.picture().setup()->camera.fx_px == 500, !record_is_newer);
   }
 }
 
-TEST(LiveSession, ATouchThatWasTakenBackIsNotTakenUp) {
+TEST(LiveWorkflow, ATouchThatWasTakenBackIsNotTakenUp) {
   const Scratch scratch;
   {
     LiveSettings kept = operation_settings(scratch);
     kept.out = scratch.path();
-    LiveSession session(kept);
-    load(session);
-    connect_and_calibrate(session);
-    Hand hand(session);
+    LiveWorkflow workflow(kept);
+    load(workflow);
+    connect_and_calibrate(workflow);
+    Hand hand(workflow);
     for (std::size_t i = 0; i < 3; ++i) hand.rest_at(kFiducials[i], 80);
     hand.rest_at({0, 0, 200}, 1);
-    ASSERT_TRUE(session.fre_mm().has_value());
-    session.undo_touch();
+    ASSERT_TRUE(workflow.view().fre_mm.has_value());
+    workflow.undo();
   }
-  LiveSession session(resumed(scratch, scratch.path()));
-  load(session);
-  EXPECT_EQ(session.fault(), "");
-  EXPECT_FALSE(session.fre_mm().has_value());
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
 }
 
-TEST(LiveSession, ADamagedOperationIsNamed) {
+TEST(LiveWorkflow, ADamagedOperationIsNamed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
   for (const char* const file : {"operation.json", "patient_from_tracker.txt"}) {
     const std::string whole = birdseye::testing::contents_of(scratch / file);
     (void)scratch.file(file, whole.substr(0, whole.size() / 3));
-    LiveSession session(resumed(scratch, scratch.path()));
-    load(session);
-    EXPECT_NE(session.fault().find(file), std::string::npos) << session.fault();
-    EXPECT_FALSE(session.fre_mm().has_value());
+    LiveWorkflow workflow(resumed(scratch, scratch.path()));
+    load(workflow);
+    EXPECT_NE(workflow.view().fault.find(file), std::string::npos) << workflow.view().fault;
+    EXPECT_FALSE(workflow.view().fre_mm.has_value());
     (void)scratch.file(file, whole);
   }
 }
 
-TEST(LiveSession, AServerThatIsNoApplianceIsReadyWhenItSendsVideoAndPoses) {
+TEST(LiveWorkflow, AServerThatIsNoApplianceIsReadyWhenItSendsVideoAndPoses) {
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  session.set_link(true, "connected");
-  EXPECT_FALSE(session.note(LiveStep::connect).done);
+  LiveWorkflow workflow(operation_settings(scratch));
+  workflow.set_link(true, "connected");
+  EXPECT_FALSE(workflow.view().note(LiveStep::connect).done);
   wire::VideoFrame frame;
   frame.width_px = frame.height_px = 1;
   frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(3);
-  session.take(wire::Status{false, "several devices send poses"}, HostTime{0}, std::nullopt);
-  session.take(frame, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
-  EXPECT_FALSE(session.note(LiveStep::connect).done);
-  EXPECT_EQ(session.note(LiveStep::connect).line, "several devices send poses");
-  EXPECT_EQ(session.step(), LiveStep::connect);
-  session.take(wire::Status{true, ""}, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
-  EXPECT_TRUE(session.note(LiveStep::connect).done);
-  EXPECT_EQ(session.step(), LiveStep::calibrate);
+  workflow.take(wire::Status{false, "several devices send poses"}, HostTime{0}, std::nullopt);
+  workflow.take(frame, HostTime{0}, std::nullopt);
+  workflow.set_link(true, "connected");
+  EXPECT_FALSE(workflow.view().note(LiveStep::connect).done);
+  EXPECT_EQ(workflow.view().note(LiveStep::connect).line, "several devices send poses");
+  EXPECT_EQ(workflow.view().step, LiveStep::connect);
+  workflow.take(wire::Status{true, ""}, HostTime{0}, std::nullopt);
+  workflow.set_link(true, "connected");
+  EXPECT_TRUE(workflow.view().note(LiveStep::connect).done);
+  EXPECT_EQ(workflow.view().step, LiveStep::calibrate);
   // What one server said is not held against the next.
-  session.take(wire::Status{false, "poses and no video"}, HostTime{0}, std::nullopt);
-  session.set_link(false, "gone");
-  session.set_link(true, "connected");
-  EXPECT_TRUE(session.note(LiveStep::connect).done);
+  workflow.take(wire::Status{false, "poses and no video"}, HostTime{0}, std::nullopt);
+  workflow.set_link(false, "gone");
+  workflow.set_link(true, "connected");
+  EXPECT_TRUE(workflow.view().note(LiveStep::connect).done);
 }
 
-TEST(LiveSession, AWrongTouchShowsAndIsTakenBack) {
+TEST(LiveWorkflow, AWrongTouchShowsAndIsTakenBack) {
   const Scratch scratch;
-  LiveSession session(operation_settings(scratch));
-  load(session);
-  connect_and_calibrate(session);
-  Hand hand(session);
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
   for (const Eigen::Vector3d& place : {kFiducials[0], kFiducials[1], Eigen::Vector3d(35, 60, 90)}) {
     hand.rest_at(place, 30);
-    session.touch();  // the pedal's way: at once
+    workflow.primary();  // the pedal's way: at once
   }
-  EXPECT_EQ(session.touches().size(), 3U);
-  EXPECT_TRUE(!session.registration_fault().empty() || *session.fre_mm() > 2);
-  session.undo_touch();
-  EXPECT_EQ(session.touches().size(), 2U);
-  EXPECT_FALSE(session.fre_mm().has_value());
-  EXPECT_FALSE(session.picture().setup().has_value());
+  EXPECT_EQ(workflow.view().touches.size(), 3U);
+  EXPECT_TRUE(!workflow.view().registration_fault.empty() || *workflow.view().fre_mm > 2);
+  workflow.undo();
+  EXPECT_EQ(workflow.view().touches.size(), 2U);
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+  EXPECT_FALSE(workflow.picture().setup().has_value());
 }
 
-TEST(LiveSession, SaysWhatIsWrongWithThePatientsFiles) {
+TEST(LiveWorkflow, SaysWhatIsWrongWithThePatientsFiles) {
   const Scratch scratch;
   LiveSettings wrong = operation_settings(scratch);
   wrong.patient.ct = scratch / "nothere";
-  LiveSession session(wrong);
-  for (int i = 0; i < 1000 && session.fault().empty(); ++i) {
+  LiveWorkflow workflow(wrong);
+  for (int i = 0; i < 1000 && workflow.view().fault.empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    session.tick();
+    workflow.tick();
   }
-  EXPECT_NE(session.fault().find("nothere"), std::string::npos);
+  EXPECT_NE(workflow.view().fault.find("nothere"), std::string::npos);
   LiveSettings unknown = operation_settings(scratch);
   unknown.transfer = "no such preset";
-  EXPECT_NE(LiveSession(unknown).fault().find("no such preset"), std::string::npos);
+  EXPECT_NE(LiveWorkflow(unknown).view().fault.find("no such preset"), std::string::npos);
 }
 
-TEST(LiveSession, ALostLinkIsSaidAndNothingOfItStays) {
-  LiveSession session{LiveSettings{}};
+TEST(LiveWorkflow, ALostLinkIsSaidAndNothingOfItStays) {
+  LiveWorkflow workflow{LiveSettings{}};
   wire::Health health;
   health.state = "ready";
-  session.take(health, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
-  EXPECT_TRUE(session.note(LiveStep::connect).done);
-  session.set_link(false, "127.0.0.1:18944: the appliance has gone");
-  EXPECT_FALSE(session.note(LiveStep::connect).done);
-  EXPECT_FALSE(session.health().has_value());
-  EXPECT_EQ(session.link_words(), "127.0.0.1:18944: the appliance has gone");
+  workflow.take(health, HostTime{0}, std::nullopt);
+  workflow.set_link(true, "connected");
+  EXPECT_TRUE(workflow.view().note(LiveStep::connect).done);
+  workflow.set_link(false, "127.0.0.1:18944: the appliance has gone");
+  EXPECT_FALSE(workflow.view().note(LiveStep::connect).done);
+  EXPECT_FALSE(workflow.view().link.health.has_value());
+  EXPECT_EQ(workflow.view().link.words, "127.0.0.1:18944: the appliance has gone");
 }
 
 TEST(LiveScript, IsFollowedLineByLine) {
@@ -425,13 +414,13 @@ TEST(LiveScript, IsFollowedLineByLine) {
   auto script =
       LiveScript::read(scratch.file("s.txt", "# first\nsleep 0.5\nkey space\n\nwait connect 2 # or not\nend\n"));
   ASSERT_TRUE(script) << script.error().what;
-  LiveSession session{LiveSettings{}};
-  EXPECT_TRUE(script->next(session, HostTime{0})->key.empty());
-  EXPECT_TRUE(script->next(session, HostTime{400 * kMs})->key.empty());
-  EXPECT_TRUE(script->next(session, HostTime{600 * kMs})->key.empty());  // the pause is over
-  EXPECT_EQ(script->next(session, HostTime{600 * kMs})->key, "space");
-  EXPECT_FALSE(script->next(session, HostTime{700 * kMs})->end);
-  const auto late = script->next(session, HostTime{2800 * kMs});
+  LiveWorkflow workflow{LiveSettings{}};
+  EXPECT_TRUE(script->next(workflow.view(), HostTime{0})->key.empty());
+  EXPECT_TRUE(script->next(workflow.view(), HostTime{400 * kMs})->key.empty());
+  EXPECT_TRUE(script->next(workflow.view(), HostTime{600 * kMs})->key.empty());  // the pause is over
+  EXPECT_EQ(script->next(workflow.view(), HostTime{600 * kMs})->key, "space");
+  EXPECT_FALSE(script->next(workflow.view(), HostTime{700 * kMs})->end);
+  const auto late = script->next(workflow.view(), HostTime{2800 * kMs});
   ASSERT_FALSE(late);
   EXPECT_NE(late.error().what.find("s.txt:5: connect was not done within 2 s"), std::string::npos) << late.error().what;
 }
@@ -440,20 +429,20 @@ TEST(LiveScript, PressesAKeyUntilAStepIsDone) {
   const Scratch scratch;
   auto script = LiveScript::read(scratch.file("s.txt", "press space 0.5 connect 2\nend\n"));
   ASSERT_TRUE(script) << script.error().what;
-  LiveSession session{LiveSettings{}};
-  const auto key_at = [&](std::int64_t ms) { return script->next(session, HostTime{ms * kMs})->key; };
+  LiveWorkflow workflow{LiveSettings{}};
+  const auto key_at = [&](std::int64_t ms) { return script->next(workflow.view(), HostTime{ms * kMs})->key; };
   EXPECT_EQ(key_at(0), "space");
   EXPECT_EQ(key_at(400), "");
   EXPECT_EQ(key_at(500), "space");
   EXPECT_EQ(key_at(1000), "space");
   auto late = *script;
-  EXPECT_FALSE(late.next(session, HostTime{2000 * kMs}));
+  EXPECT_FALSE(late.next(workflow.view(), HostTime{2000 * kMs}));
   wire::Health health;
   health.state = "ready";
-  session.take(health, HostTime{0}, std::nullopt);
-  session.set_link(true, "connected");
+  workflow.take(health, HostTime{0}, std::nullopt);
+  workflow.set_link(true, "connected");
   EXPECT_EQ(key_at(1600), "");
-  EXPECT_TRUE(script->next(session, HostTime{1601 * kMs})->end);
+  EXPECT_TRUE(script->next(workflow.view(), HostTime{1601 * kMs})->end);
 }
 
 TEST(LiveScript, NamesALineThatIsNone) {

@@ -1,0 +1,21 @@
+#include "host/operation/connection_step.hpp"
+
+#include <fmt/format.h>
+
+namespace birdseye::host {
+
+void ConnectionStep::set_link(bool connected, const std::string& words, bool video) {
+  link_.connected = connected;
+  link_.words = words;
+  if (!connected) {
+    link_.health.reset();
+    link_.appliance_says.clear();
+  }
+  const auto& health = link_.health;
+  note_.done = connected && (health ? health->state == "ready" : video && link_.appliance_says.empty());
+  note_.line = words;
+  if (connected && health && !note_.done) note_.line = fmt::format("the appliance is {}", health->state);
+  if (connected && !health && !link_.appliance_says.empty()) note_.line = link_.appliance_says;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "device/wire/messages.hpp"
+#include "host/operation/live_step.hpp"
+
+namespace birdseye::host {
+
+/// What is connected.
+struct LinkState {
+  bool connected = false;
+  std::string words;  ///< to what, or why not
+  std::string appliance_says;
+  std::optional<wire::Health> health;
+};
+
+/// The first step: done while the appliance is there and ready. What tells nothing of its health, as another server or
+/// its recording, is ready when it sends video and says nothing against it.
+class ConnectionStep {
+ public:
+  void take(const wire::Health& health) { link_.health = health; }
+  void take(const wire::Status& status) { link_.appliance_says = status.ok ? "" : status.text; }
+  /// The link came or went. video: a frame has come.
+  void set_link(bool connected, const std::string& words, bool video);
+
+  [[nodiscard]] const LinkState& link() const { return link_; }
+  [[nodiscard]] const StepNote& note() const { return note_; }
+
+ private:
+  LinkState link_;
+  StepNote note_;
+};
+
+}  // namespace birdseye::host

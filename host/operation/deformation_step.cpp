@@ -1,0 +1,128 @@
+#include "host/operation/deformation_step.hpp"
+
+#include <fmt/format.h>
+#include <tbb/task_arena.h>
+
+#include <mutex>
+#include <utility>
+
+#include "host/files/picture.hpp"
+#include "host/registration/similarity/overlap_mask.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr std::size_t kFewestViews = 2;
+
+Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::size_t number) {
+  VideoView view;
+  view.name = fmt::format("view {}", number);
+  view.camera = camera;
+  view.camera_from_patient = kept.camera_from_patient;
+  const wire::VideoFrame& frame = kept.frame;
+  const RgbView video{*frame.rgb, frame.width_px, frame.height_px};
+  view.grey = grey_of(video);
+  const std::vector<std::uint8_t> nothing_left_out(view.grey.size(), 0);
+  auto mask = overlap_mask(video, nothing_left_out);
+  if (!mask) return Error{mask.error().code, view.name + ": " + mask.error().what};
+  view.mask = *std::move(mask);
+  return view;
+}
+
+}  // namespace
+
+class DeformationStep::Trace {
+ public:
+  void add(double similarity) {
+    const std::lock_guard lock(mutex_);
+    similarity_.push_back(static_cast<float>(similarity));
+  }
+  [[nodiscard]] std::vector<float> similarity() const {
+    const std::lock_guard lock(mutex_);
+    return similarity_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<float> similarity_;
+};
+
+void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
+                            std::shared_ptr<const PatientPlan> patient, const TransferFunction& transfer) {
+  if (running()) return;
+  if (kept.size() < kFewestViews) {
+    note_.line = fmt::format("{} views are too few: keep {} or more, from different sides", kept.size(), kEnoughViews);
+    return;
+  }
+  std::vector<VideoView> views;
+  for (const KeptView& one : kept) {
+    auto view = view_of(one, camera, views.size() + 1);
+    if (!view) {
+      note_.line = view.error().what;
+      return;
+    }
+    views.push_back(*std::move(view));
+  }
+  note_ = {false, "matching"};
+  dropped_ = false;
+  trace_ = std::make_shared<Trace>();
+  matching_.start([views = std::move(views), patient = std::move(patient), transfer, trace = trace_](
+                      const std::stop_token& stop, const auto& say) {
+    ViewRegistrationSettings settings;
+    settings.control_points = {3, 3, 3};  // what some views of one side tell, in seconds
+    settings.progress = say;
+    settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
+    settings.watch.step = [&trace](const TracePoint& step) { trace->add(step.similarity); };
+    const Volume* const labels = patient->labels ? &*patient->labels : nullptr;
+    // On one core: the others have the live picture to draw.
+    tbb::task_arena one(1);
+    return one.execute([&] { return register_views(views, patient->ct, labels, patient->organ, transfer, settings); });
+  });
+}
+
+bool DeformationStep::tick() {
+  auto matched = matching_.take();
+  if (!matched || std::exchange(dropped_, false)) return false;
+  if (!*matched) {
+    note_ = {false, matched->error().what};
+    return false;
+  }
+  ViewRegistration& registration = **matched;
+  if (registration.worse_than_start) {
+    note_ = {false, "no deformation explains the views better than none: keep other views, or go on without"};
+    return false;
+  }
+  note_.done = true;
+  note_.line =
+      fmt::format("similarity {:.3f} to {:.3f} nats", registration.similarity_before, registration.similarity_after);
+  if (registration.uncertainty_mm)
+    note_.line += fmt::format("; the surface is known to {:.1f} mm", *registration.uncertainty_mm);
+  found_ =
+      std::make_shared<const DeformedOrgan>(DeformedOrgan{std::move(registration.field), registration.uncertainty_mm});
+  return true;
+}
+
+void DeformationStep::undo() {
+  found_.reset();
+  note_ = {false, "undone: the CT is shown as it was taken"};
+}
+
+bool DeformationStep::forget() {
+  dropped_ = running();
+  cancel();
+  (void)matching_.take();  // ended, and not looked at yet
+  note_ = {};
+  return std::exchange(found_, nullptr) != nullptr;
+}
+
+void DeformationStep::take_up(std::shared_ptr<const DeformedOrgan> kept, const std::string& line) {
+  found_ = std::move(kept);
+  note_ = {true, line};
+}
+
+DeformProgress DeformationStep::progress() const {
+  return {trace_ ? trace_->similarity() : std::vector<float>(), matching_.line()};
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/system/background.hpp"
+#include "host/operation/findings.hpp"
+#include "host/operation/live_step.hpp"
+#include "host/operation/patient.hpp"
+#include "host/operation/view_step.hpp"
+#include "host/registration/views/view_registration.hpp"
+#include "host/render/scene/transfer_function.hpp"
+
+namespace birdseye::host {
+
+/// A registration that runs on a thread of its own, as far as it is.
+struct DeformProgress {
+  std::vector<float> similarity;  ///< nats, of each step so far; the resolution changes on the way
+  std::string line;
+};
+
+/// Matches the CT with views. The thread that does it has copies of all it is given, and shares what is never changed.
+class DeformationStep {
+ public:
+  void begin(std::span<const KeptView> views, const CameraModel& camera, std::shared_ptr<const PatientPlan> patient,
+             const TransferFunction& transfer);
+  void cancel() { matching_.cancel(); }
+  /// True: another deformation was found.
+  bool tick();
+  void undo();
+  /// What was found, or is being found, is by a setup that is no more. True: there was a deformation.
+  bool forget();
+  /// An earlier window's.
+  void take_up(std::shared_ptr<const DeformedOrgan> kept, const std::string& line);
+
+  /// Null: the CT is shown as it was taken.
+  [[nodiscard]] const std::shared_ptr<const DeformedOrgan>& found() const { return found_; }
+  [[nodiscard]] bool running() const { return matching_.running(); }
+  [[nodiscard]] DeformProgress progress() const;
+  [[nodiscard]] const StepNote& note() const { return note_; }
+
+ private:
+  /// What the thread tells of its steps.
+  class Trace;
+
+  std::shared_ptr<const DeformedOrgan> found_;
+  StepNote note_;
+  bool dropped_ = false;  ///< what is being found is by a setup that is no more
+  std::shared_ptr<Trace> trace_;
+  Background<Result<ViewRegistration>> matching_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,58 @@
+#include "host/operation/fiducial_step.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr std::size_t kFewestFiducials = 3;
+
+}  // namespace
+
+bool FiducialStep::add(const Touch& touch, std::size_t wanted) {
+  if (wanted != 0 && touches_.size() >= wanted) return false;
+  touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
+  return true;
+}
+
+bool FiducialStep::undo() {
+  if (touches_.empty()) return false;
+  touches_.pop_back();
+  return true;
+}
+
+void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted) {
+  confirmed_ = true;
+  registered_.reset();
+  fault_.clear();
+  for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
+  note_ = {false, fmt::format("{} touched", touches_.size())};
+  if (!markers_in_patient_mm || touches_.size() < kFewestFiducials) return;
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(touches_.size());
+  for (const TouchedFiducial& touch : touches_) places.push_back(touch.tip_in_tracker_mm);
+  const auto found = register_by_touches(*markers_in_patient_mm, places);
+  if (!found) {
+    fault_ = found.error().what;
+    return;
+  }
+  for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
+  registered_ = found->registered;
+  note_.line = fmt::format("{} touched, FRE {:.2f} mm", touches_.size(), registered_->fre_mm);
+  note_.done = touches_.size() >= std::max(kFewestFiducials + 1, wanted);
+}
+
+bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const std::string& when) {
+  if (registered_) return false;
+  touches_.clear();
+  if (!kept) return true;
+  registered_ = kept;
+  confirmed_ = false;
+  note_ = {true, fmt::format("{}, FRE {:.2f} mm", when, kept->fre_mm)};
+  return true;
+}
+
+}  // namespace birdseye::host

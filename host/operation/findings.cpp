@@ -1,0 +1,26 @@
+#include "host/operation/findings.hpp"
+
+#include "host/registration/rigid/point_matching.hpp"
+
+namespace birdseye::host {
+
+Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,
+                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm) {
+  const auto found = match_and_fit(markers_in_patient_mm, touched_in_tracker_mm);
+  if (!found) return found.error();
+  TouchFit out;
+  out.registered.tracker_from_patient = found->fit.to_from.inverse();
+  out.registered.fre_mm = found->fit.fre_rms_mm;
+  for (const std::size_t marker : found->ct_of_touch)
+    out.registered.fiducials_in_patient_mm.push_back(markers_in_patient_mm[marker]);
+  out.residuals_mm = found->fit.residuals_mm;
+  return out;
+}
+
+TrustFigures trust_figures(const ScopeFigures& scope, const RegisteredPatient& registered,
+                           const Eigen::Vector3d& target_in_patient_mm) {
+  return {scope, registered.fre_mm,
+          registration_error_mm(registered.fre_mm, registered.fiducials_in_patient_mm, target_in_patient_mm)};
+}
+
+}  // namespace birdseye::host

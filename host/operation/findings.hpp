@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/deform/displacement_field.hpp"
+#include "host/overlay/scope_setup.hpp"
+#include "host/overlay/trust.hpp"
+
+/// What the steps of an operation find: values, which later steps are given, whoever found them.
+namespace birdseye::host {
+
+/// How the scope is calibrated.
+struct CalibratedScope {
+  ScopeSetup scope;
+  std::string made_utc;   ///< 2026-11-22T09:30:00Z
+  bool by_board = false;  ///< here, by the board; else by a record
+};
+
+/// How the patient is registered.
+struct RegisteredPatient {
+  Transform<Tracker, Patient> tracker_from_patient;
+  double fre_mm = 0;
+  std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
+};
+
+/// How the organ is deformed.
+struct DeformedOrgan {
+  DisplacementField field;               ///< patient LPS, mm
+  std::optional<double> uncertainty_mm;  ///< of the organ's surface
+};
+
+struct TouchFit {
+  RegisteredPatient registered;
+  std::vector<double> residuals_mm;  ///< of the touched points, in their order
+};
+/// By points that the pointer touched, of which nobody has said which is which. Refuses what match_and_fit refuses.
+Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,
+                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm);
+
+/// By what the gate judges an overlay of this scope and this registration. target_in_patient_mm: in the CT as it was
+/// taken.
+TrustFigures trust_figures(const ScopeFigures& scope, const RegisteredPatient& registered,
+                           const Eigen::Vector3d& target_in_patient_mm);
+
+}  // namespace birdseye::host

@@ -1,0 +1,235 @@
+#include "host/operation/live_workflow.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr const char* kUnregistered = "the patient is not registered yet";
+constexpr const char* kUnconfirmed =
+    "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space";
+constexpr const char* kCalibratedAnew = "the scope was calibrated anew: keep views again";
+
+}  // namespace
+
+LiveWorkflow::LiveWorkflow(LiveSettings settings)
+    : settings_(std::move(settings)),
+      patient_(settings_.transfer, settings_.engine),
+      keeper_(settings_.out, settings_.resume) {
+  if (!settings_.patient.ct.empty()) load(settings_.patient);
+}
+
+void LiveWorkflow::tick() {
+  const PatientStep::News news = patient_.tick();
+  if (news.engine) {
+    picture_.set_engine(nullptr);
+    if (patient_.engine() && deformation_.found()) patient_.engine()->deform(deformation_.found()->field);
+    picture_.set_engine(patient_.engine());
+  }
+  if (news.patient) {
+    ++shapes_;
+    resume_fault_.clear();
+    fit();
+    // What was touched meanwhile counts more than what is taken up, and is fitted first.
+    if (patient_.markers_in_patient_mm() || fiducials_.touches().empty()) take_up();
+  }
+  if (news.markers) {
+    if (!fiducials_.touches().empty()) fit();
+    take_up();
+  }
+  if (deformation_.tick()) {
+    show_shape();
+    keep();
+  }
+  if (!calibration_.tick()) return;
+  forget_views(kCalibratedAnew);
+  update_setup();
+  keep();
+  if (step_ != LiveStep::calibrate) return;
+  const bool all_touched = settings_.fiducials != 0 && fiducials_.note().done;
+  go_to(all_touched ? LiveStep::views : LiveStep::fiducials);
+}
+
+void LiveWorkflow::set_link(bool connected, const std::string& words) {
+  connection_.set_link(connected, words, picture_.frame().has_value());
+  if (connection_.note().done && step_ == LiveStep::connect) go_to(LiveStep::calibrate);
+}
+
+void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::Vector3d& tip_in_pointer_mm,
+                             std::size_t fiducials) {
+  settings_.pattern = pattern;
+  settings_.tip_in_pointer_mm = tip_in_pointer_mm;
+  settings_.fiducials = fiducials;
+}
+
+void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
+  if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
+    if (!frozen_) picture_.take(*frame, clock ? clock->host_from_device(frame->info.acquired) : now);
+  } else if (const auto* birds = std::get_if<wire::Birds>(&event)) {
+    take(*birds);
+  } else if (const auto* health = std::get_if<wire::Health>(&event)) {
+    connection_.take(*health);
+  } else if (const auto* status = std::get_if<wire::Status>(&event)) {
+    connection_.take(*status);
+  } else if (const auto* calibration = std::get_if<wire::Calibration>(&event)) {
+    take(*calibration);
+  } else if (const auto* pedal = std::get_if<wire::Pedal>(&event)) {
+    if (pedal->pressed) primary();
+  }
+  calibration_.push(event);
+}
+
+void LiveWorkflow::take(const wire::Birds& birds) {
+  const auto& setup = picture_.setup();
+  for (const wire::Bird& bird : birds.birds) {
+    if (bird.name != settings_.scope || !setup || !patient_.plan()) continue;
+    jitter_.push(birds.acquired,
+                 setup->camera_from_patient(bird.tracker_from_sensor) * target_in_patient_mm(*patient_.plan()));
+  }
+  if (!settings_.tip_in_pointer_mm) return;
+  const auto rested = pointer_.take(birds, settings_.pointer, *settings_.tip_in_pointer_mm);
+  // The hand need not wait for the arithmetic.
+  const bool touching = step_ == LiveStep::fiducials ||
+                        (step_ == LiveStep::calibrate && fiducials_.confirmed() && calibration_.working_out());
+  if (!rested || !touching || !fiducials_.add(*rested, settings_.fiducials)) return;
+  fit();
+  keep();
+}
+
+void LiveWorkflow::take(const wire::Calibration& calibration) {
+  if (!calibration.in_force) return calibration_.tell_none(calibration.why_not);
+  const auto record = calibration::parse_record(calibration.record);
+  if (!record) return;
+  if (record->tip && !settings_.tip_in_pointer_mm) settings_.tip_in_pointer_mm = record->tip->tip_in_sensor_mm;
+  const auto adopted = calibration_.adopt(*record);
+  if (adopted == CalibrationStep::Adopted::no) return;
+  if (adopted == CalibrationStep::Adopted::anew) forget_views(kCalibratedAnew);
+  update_setup();
+}
+
+void LiveWorkflow::fit() {
+  fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials);
+  forget_views("the fiducials were touched anew: keep views again");
+  update_setup();
+  if (fiducials_.note().done && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
+}
+
+/// Views are of the poses that they were kept with, and a deformation takes in what the registration was off by:
+/// another setup's is no better than none.
+void LiveWorkflow::forget_views(const std::string& why) {
+  if (views_.views().empty() && !deformation_.found() && !deformation_.running()) return;
+  views_.forget(why);
+  if (deformation_.forget()) show_shape();
+}
+
+void LiveWorkflow::show_shape() {
+  ++shapes_;
+  if (!patient_.engine()) return;
+  if (deformation_.found()) {
+    patient_.engine()->deform(deformation_.found()->field);
+  } else {
+    patient_.engine()->undeform();
+  }
+  picture_.redraw();
+}
+
+void LiveWorkflow::update_setup() {
+  jitter_ = {};
+  const auto& scope = calibration_.found();
+  const auto& registered = fiducials_.registered();
+  const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
+  if (!may) return picture_.set_setup(std::nullopt, {}, fiducials_.confirmed() ? kUnregistered : kUnconfirmed);
+  picture_.set_setup(scope->scope.registered(registered->tracker_from_patient),
+                     trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan())));
+}
+
+void LiveWorkflow::keep() {
+  if (!patient_.plan()) return;
+  Operation operation;
+  operation.ct_checksum = patient_.plan()->checksum;
+  if (const auto& scope = calibration_.found(); scope && scope->by_board) operation.calibrated = scope;
+  operation.registered = fiducials_.registered();
+  operation.deformed = deformation_.found();
+  keeper_.keep(std::move(operation));
+}
+
+void LiveWorkflow::take_up() {
+  const auto operation = keeper_.take_up(patient_.plan()->checksum);
+  if (!operation) {
+    resume_fault_ = operation.error().what;
+    return;
+  }
+  const auto& kept = *operation;
+  if (!kept) return;
+  const std::string when = "taken up from " + kept->made_utc;
+  // A record that the appliance sent meanwhile may be newer.
+  if (kept->calibrated) calibration_.take_up(*kept->calibrated, when);
+  if (fiducials_.take_up(kept->registered, when) && kept->deformed) {
+    deformation_.take_up(kept->deformed, when);
+    show_shape();
+  }
+  update_setup();
+  keep();
+  // Patient or transmitter may have been moved meanwhile: only a landmark tells.
+  if (!fiducials_.confirmed()) go_to(LiveStep::check);
+}
+
+void LiveWorkflow::go_to(LiveStep step) {
+  step_ = step;
+  if (step == LiveStep::calibrate && !calibration_.note().done) calibration_.begin(settings_.scope, settings_.pattern);
+  if (step == LiveStep::run) run_ = {true, "the overlay runs"};
+}
+
+void LiveWorkflow::go_on() {
+  if (step_ == LiveStep::run) return;
+  const bool may_be_skipped = step_ == LiveStep::views || step_ == LiveStep::deform || step_ == LiveStep::check;
+  if (!view().note(step_).done && (!may_be_skipped || deformation_.running())) return;
+  if (step_ == LiveStep::check) check_.done = true;
+  go_to(static_cast<LiveStep>(static_cast<int>(step_) + 1));
+}
+
+void LiveWorkflow::primary() {
+  const auto& setup = picture_.setup();
+  const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
+                     step_ == LiveStep::deform;
+  if (works && view().note(step_).done) return go_on();
+  switch (step_) {
+    case LiveStep::connect:
+      break;
+    case LiveStep::calibrate:
+      return calibration_.guiding() ? calibration_.end() : calibration_.begin(settings_.scope, settings_.pattern);
+    case LiveStep::fiducials:
+      if (const auto held = pointer_.held(); held && fiducials_.add(*held, settings_.fiducials)) {
+        fit();
+        keep();
+      }
+      break;
+    case LiveStep::views:
+      return views_.keep(picture_.frame(), picture_.camera_from_patient());
+    case LiveStep::deform:
+      if (deformation_.running()) return deformation_.cancel();
+      if (setup && patient_.plan() && patient_.transfer())
+        deformation_.begin(views_.views(), setup->camera, patient_.plan(), *patient_.transfer());
+      break;
+    case LiveStep::check:
+      fiducials_.confirm();
+      update_setup();
+      return go_on();
+    case LiveStep::run:
+      return freeze_or_let_go();
+  }
+}
+
+void LiveWorkflow::undo() {
+  if (step_ == LiveStep::fiducials && fiducials_.undo()) {
+    fit();
+    keep();
+  }
+  if (step_ == LiveStep::views) views_.undo();
+  if (step_ == LiveStep::deform && deformation_.found() && !deformation_.running()) {
+    deformation_.undo();
+    show_shape();
+    keep();
+  }
+}
+
+}  // namespace birdseye::host

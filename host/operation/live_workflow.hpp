@@ -1,0 +1,96 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "host/link/event_stream.hpp"
+#include "host/operation/calibration_step.hpp"
+#include "host/operation/connection_step.hpp"
+#include "host/operation/deformation_step.hpp"
+#include "host/operation/fiducial_step.hpp"
+#include "host/operation/operation_keeper.hpp"
+#include "host/operation/operation_view.hpp"
+#include "host/operation/patient_step.hpp"
+#include "host/operation/pointer_tip.hpp"
+#include "host/operation/view_step.hpp"
+#include "host/overlay/live_picture.hpp"
+#include "host/overlay/target_jitter.hpp"
+
+namespace birdseye::host {
+
+struct LiveSettings {
+  PatientFiles patient;
+  std::string transfer = "tumour-and-vessels", engine = "cpu";
+  std::string scope = "scope", pointer = "pointer";  ///< birds, by their names
+  std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
+  std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
+  std::size_t fiducials = 0;                         ///< how many to touch; 0: as many as are wanted
+  std::filesystem::path out;                         ///< where results go; empty: none are kept
+  std::filesystem::path resume;                      ///< out of an earlier window, to go on from; or empty
+};
+
+/// The order of the operation, from the first connection to the running overlay; knows nothing of windows. It gives the
+/// appliance's events and a person's keys to the step that they are for, and to each step what the others have found;
+/// the steps do the work, the long part on threads of their own, and know nothing of each other.
+class LiveWorkflow {
+ public:
+  /// Reads the patient, if there is one; what is wrong there is the view's fault.
+  explicit LiveWorkflow(LiveSettings settings);
+
+  void take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock);
+  /// Collects what threads have finished.
+  void tick();
+  /// The link to the appliance came or went.
+  void set_link(bool connected, const std::string& words);
+  /// What only a simulated cart can tell without being asked.
+  void set_sheet(const calibration::Pattern& pattern, const Eigen::Vector3d& tip_in_pointer_mm, std::size_t fiducials);
+  /// Reads another patient.
+  void load(const PatientFiles& files) { patient_.load(files); }
+
+  // What a person does.
+  void primary();  ///< the space bar and the pedal
+  void undo();     ///< the last thing of the present step
+  void go_on();    ///< to the next step, where this one is done
+  void go_to(LiveStep step);
+  void freeze_or_let_go() { frozen_ = !frozen_; }
+  void set_transfer(const TransferFunction& transfer) { patient_.set_transfer(transfer); }
+  void set_look(const OverlayLook& look) { picture_.set_look(look); }
+
+  /// Draws the newest frame, if that is still to be done.
+  void draw() { picture_.draw(); }
+  /// What of it may be shown at this moment.
+  ShownPicture shown_at(HostTime now) { return picture_.at(now); }
+  [[nodiscard]] const LivePicture& picture() const { return picture_; }
+  [[nodiscard]] OperationView view() const;
+
+ private:
+  void take(const wire::Birds& birds);
+  void take(const wire::Calibration& calibration);
+  void fit();
+  void forget_views(const std::string& why);
+  void show_shape();
+  void update_setup();
+  void take_up();
+  void keep();
+
+  LiveSettings settings_;
+  LiveStep step_ = LiveStep::connect;
+  bool frozen_ = false;
+  std::string resume_fault_;
+  std::uint64_t shapes_ = 0;
+
+  ConnectionStep connection_;
+  CalibrationStep calibration_;
+  PatientStep patient_;
+  PointerTip pointer_;
+  FiducialStep fiducials_;
+  ViewStep views_;
+  DeformationStep deformation_;
+  StepNote check_, run_;
+  OperationKeeper keeper_;
+  LivePicture picture_;
+  TargetJitter jitter_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,60 @@
+// What the steps know, told as values.
+#include "host/operation/live_workflow.hpp"
+
+namespace birdseye::host {
+
+OperationView LiveWorkflow::view() const {
+  OperationView out;
+  out.step = step_;
+  out.notes = {
+      connection_.note(), calibration_.note(), fiducials_.note(), views_.note(), deformation_.note(), check_, run_};
+  out.frozen = frozen_;
+  for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
+    if (out.fault.empty()) out.fault = *fault;
+  }
+  out.link = connection_.link();
+  out.board_named = settings_.pattern.has_value();
+  out.guiding = calibration_.guiding();
+  if (step_ == LiveStep::calibrate) {
+    out.guide = calibration_.guide();
+    out.guide_lines = calibration_.guide_lines();
+    out.calibration_verdict = calibration_.verdict();
+  }
+  out.fiducials_wanted = settings_.fiducials;
+  const auto& markers = patient_.markers_in_patient_mm();
+  if (markers) out.markers_seen = markers->size();
+  out.touches = fiducials_.touches();
+  const auto& registered = fiducials_.registered();
+  if (registered) out.fre_mm = registered->fre_mm;
+  out.registration_fault = fiducials_.fault();
+  out.unconfirmed = !fiducials_.confirmed();
+  out.deforming = deformation_.running();
+  if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
+  out.deformed = deformation_.found();
+  out.patient = patient_.plan();
+  out.patient_files = patient_.files();
+  out.engine_asked = settings_.engine;
+  out.engine = patient_.engine();
+  out.transfer = patient_.transfer();
+  out.drawn_by = patient_.drawn_by();
+  out.shapes = shapes_;
+  if (!out.patient) return out;
+  const DeformedOrgan* const deformed = out.deformed.get();
+  if (const auto tip_mm = pointer_.in_tracker_mm(); tip_mm && registered) {
+    out.check = check_by_landmarks(*tip_mm, *registered, *out.patient,
+                                   markers ? *markers : std::vector<Eigen::Vector3d>(), deformed);
+  }
+  const auto& setup = picture_.setup();
+  const auto& camera_from_patient = picture_.camera_from_patient();
+  if (!camera_from_patient) return out;
+  const Eigen::Vector3d target_mm = target_in_patient_mm(*out.patient);
+  if (step_ == LiveStep::views) out.view_advice = views_.advice(*camera_from_patient, target_mm);
+  if (!setup) return out;
+  out.target = target_mark({setup->camera, *camera_from_patient, as_shown_mm(target_mm, deformed),
+                            picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm(),
+                            deformed != nullptr ? deformed->uncertainty_mm : std::nullopt},
+                           picture_.figures());
+  return out;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/guide/hand_eye_guide.hpp"
+#include "host/operation/connection_step.hpp"
+#include "host/operation/deformation_step.hpp"
+#include "host/operation/fiducial_step.hpp"
+#include "host/operation/landmark_check.hpp"
+#include "host/operation/live_step.hpp"
+#include "host/operation/patient.hpp"
+#include "host/overlay/trust.hpp"
+#include "host/registration/views/view_advice.hpp"
+#include "host/render/engine.hpp"
+
+namespace birdseye::host {
+
+/// How the operation stands, for whoever shows it: values alone.
+struct OperationView {
+  LiveStep step = LiveStep::connect;
+  std::array<StepNote, kLiveSteps> notes;
+  bool frozen = false;
+  std::string fault;
+
+  LinkState link;
+
+  bool board_named = false;  ///< there is a board to calibrate with
+  bool guiding = false;
+  std::optional<GuideState> guide;  ///< in its step, while it guides
+  std::vector<std::string> guide_lines;
+  std::optional<Verdict> calibration_verdict;
+
+  std::size_t fiducials_wanted = 0;         ///< 0: as many as come
+  std::optional<std::size_t> markers_seen;  ///< fiducials in the CT; empty as long as they are looked for
+  std::vector<TouchedFiducial> touches;
+  std::optional<double> fre_mm;
+  std::string registration_fault;
+  bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
+
+  std::optional<ViewAdvice> view_advice;  ///< in its step, where an overlay is drawn
+
+  bool deforming = false;
+  DeformProgress deform_progress;  ///< in its step
+  std::shared_ptr<const DeformedOrgan> deformed;
+
+  std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
+
+  /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the
+  /// tracker's noise, and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
+  std::optional<TargetMark> target;
+
+  std::shared_ptr<const PatientPlan> patient;  ///< null: it is not read yet
+  PatientFiles patient_files;
+  std::string engine_asked;  ///< as it was named: "auto" too
+  std::shared_ptr<Engine> engine;
+  std::shared_ptr<const TransferFunction> transfer, drawn_by;  ///< that is asked for, and that the engine draws by
+  std::uint64_t shapes = 0;  ///< another number: another CT, or it is deformed in another way
+
+  [[nodiscard]] const StepNote& note(LiveStep which) const { return notes[static_cast<std::size_t>(which)]; }
+  [[nodiscard]] std::string engine_name() const { return engine ? engine->name() : ""; }
+};
+
+/// What the space bar and the pedal do in the present step.
+std::string primary_words(const OperationView& operation);
+
+}  // namespace birdseye::host

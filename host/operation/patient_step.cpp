@@ -1,0 +1,92 @@
+#include "host/operation/patient_step.hpp"
+
+#include "host/render/engine_thread.hpp"
+
+namespace birdseye::host {
+
+PatientStep::PatientStep(const std::string& transfer, std::string engine) : engine_name_(std::move(engine)) {
+  auto loaded = load_transfer_function(transfer);
+  if (loaded) {
+    transfer_ = std::make_shared<const TransferFunction>(*std::move(loaded));
+  } else {
+    fault_ = loaded.error().what;
+  }
+}
+
+/// On a thread of its own: the window's OpenGL stays the window's. The engine draws from the plan, and keeps it.
+Result<std::shared_ptr<Engine>> PatientStep::make(const std::string& name,
+                                                  const std::shared_ptr<const PatientPlan>& plan,
+                                                  const Transfer& transfer) {
+  if (!transfer) return Error{Errc::bad_value, "there is no transfer function to draw the CT by"};
+  auto made = make_on_own_thread([&] { return make_engine(name, plan->shown, *transfer); });
+  if (!made) return made.error();
+  return std::shared_ptr<Engine>(made->release(), [plan](Engine* engine) { delete engine; });
+}
+
+void PatientStep::load(const PatientFiles& files) {
+  files_ = files;
+  transfer_is_newer_ = false;
+  loading_.start([files, name = engine_name_, transfer = transfer_](const std::stop_token&, const auto& say) {
+    say("reading the CT");
+    auto read = read_patient(files);
+    if (!read) return Result<Loaded>(read.error());
+    auto plan = std::make_shared<const PatientPlan>(*std::move(read));
+    auto engine = make(name, plan, transfer);
+    return Result<Loaded>(Loaded{std::move(plan), std::move(engine), transfer});
+  });
+}
+
+PatientStep::News PatientStep::tick() {
+  News news;
+  if (auto loaded = loading_.take()) {
+    if (*loaded) {
+      engine_.reset();
+      plan_ = (*loaded)->plan;
+      if (transfer_) fault_.clear();
+      use(**loaded);
+      markers_ = plan_->fiducials_in_patient_mm;
+      news.patient = news.engine = true;
+      // The search may take seconds, and the CT can be shown meanwhile.
+      if (!markers_) {
+        finding_.start([plan = plan_](const std::stop_token& stop, const auto& /*say*/) {
+          return find_fiducials(plan->ct, stop);
+        });
+      }
+    } else {
+      fault_ = loaded->error().what;
+    }
+  }
+  if (auto found = finding_.take(); found && !markers_) {
+    markers_ = *std::move(found);
+    news.markers = true;
+  }
+  if (auto made = recolouring_.take(); made && made->plan == plan_) news.engine = use(*made) || news.engine;
+  recolour();
+  return news;
+}
+
+bool PatientStep::use(const Loaded& loaded) {
+  if (!transfer_) return false;  // which is said already
+  engine_fault_ = loaded.engine ? "" : loaded.engine.error().what;
+  if (!loaded.engine) return false;
+  engine_ = *loaded.engine;
+  drawn_by_ = loaded.transfer;
+  return true;
+}
+
+void PatientStep::set_transfer(const TransferFunction& transfer) {
+  transfer_ = std::make_shared<const TransferFunction>(transfer);
+  transfer_is_newer_ = true;
+}
+
+/// The picture keeps its old colours until there are new ones: it must not stand still.
+void PatientStep::recolour() {
+  if (!transfer_is_newer_ || !plan_ || recolouring_.running()) return;
+  transfer_is_newer_ = false;
+  recolouring_.start([plan = plan_, name = engine_name_, transfer = transfer_](const std::stop_token&, const auto&) {
+    auto engine = make(name, plan, transfer);
+    return Loaded{plan, std::move(engine), transfer};
+  });
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/system/background.hpp"
+#include "host/operation/patient.hpp"
+#include "host/render/engine.hpp"
+#include "host/render/scene/transfer_function.hpp"
+
+namespace birdseye::host {
+
+/// Reads the patient, finds the fiducials in the CT, and makes the engine that draws it: each on a thread of its own.
+class PatientStep {
+ public:
+  /// transfer: a preset or a file; engine: its name.
+  PatientStep(const std::string& transfer, std::string engine);
+
+  void load(const PatientFiles& files);
+  /// The picture has these colours once an engine is made that draws by them.
+  void set_transfer(const TransferFunction& transfer);
+
+  struct News {
+    bool patient = false;  ///< another: nothing of the one before holds
+    bool engine = false;   ///< another, or none any more
+    bool markers = false;  ///< a search has found the fiducials
+  };
+  /// Collects what the threads have finished.
+  News tick();
+
+  [[nodiscard]] const PatientFiles& files() const { return files_; }
+  [[nodiscard]] const std::shared_ptr<const PatientPlan>& plan() const { return plan_; }
+  /// The fiducials in the CT; empty as long as they are looked for.
+  [[nodiscard]] const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm() const { return markers_; }
+  /// Draws what is shown of the plan, which it holds. Null: there is none yet.
+  [[nodiscard]] const std::shared_ptr<Engine>& engine() const { return engine_; }
+  /// Null where the name that was given is none.
+  [[nodiscard]] const std::shared_ptr<const TransferFunction>& transfer() const { return transfer_; }
+  /// By which the engine draws: that before, as long as an engine for another is being made.
+  [[nodiscard]] const std::shared_ptr<const TransferFunction>& drawn_by() const { return drawn_by_; }
+  /// What is wrong with the files, and with the engine.
+  [[nodiscard]] const std::string& fault() const { return fault_; }
+  [[nodiscard]] const std::string& engine_fault() const { return engine_fault_; }
+
+ private:
+  using Transfer = std::shared_ptr<const TransferFunction>;
+  struct Loaded {
+    std::shared_ptr<const PatientPlan> plan;
+    Result<std::shared_ptr<Engine>> engine;
+    Transfer transfer;  ///< that the engine draws by
+  };
+  static Result<std::shared_ptr<Engine>> make(const std::string& name, const std::shared_ptr<const PatientPlan>& plan,
+                                              const Transfer& transfer);
+  bool use(const Loaded& loaded);
+  void recolour();
+
+  PatientFiles files_;
+  std::string engine_name_, fault_, engine_fault_;
+  Transfer transfer_, drawn_by_;
+  bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
+  std::shared_ptr<const PatientPlan> plan_;
+  std::optional<std::vector<Eigen::Vector3d>> markers_;
+  std::shared_ptr<Engine> engine_;
+  Background<Result<Loaded>> loading_;
+  Background<std::vector<Eigen::Vector3d>> finding_;
+  Background<Loaded> recolouring_;
+};
+
+}  // namespace birdseye::host

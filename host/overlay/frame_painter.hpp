@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "device/wire/messages.hpp"
+#include "host/overlay/gate.hpp"
+#include "host/overlay/scope_setup.hpp"
+#include "host/render/engine.hpp"
+
+namespace birdseye::host {
+
+/// How an overlay is drawn, as whoever looks at it chooses.
+struct OverlayLook {
+  RenderSettings render;
+  double opacity = 1;             ///< in [0, 1]
+  bool surface_in_front = false;  ///< the surface's edges and highlights stay before it, so that it reads as inside
+};
+
+/// A rendered overlay over a frame of its size, RGB, rows from the top. strength: as the gate decided, in [0, 1].
+std::vector<std::uint8_t> lay_over(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength,
+                                   const OverlayLook& look);
+
+/// Draws the CT over frames of video where their poses are to be believed: asks the gate, renders and lays over. The
+/// same frames in the same order give the same pictures to the bit.
+class FramePainter {
+ public:
+  FramePainter() = default;
+  explicit FramePainter(const OverlayGate::Settings& gate) : settings_(gate), gate_(gate) {}
+
+  /// Without a setup nothing is drawn. What was believed by the one before has nothing to fade from.
+  void set_setup(std::optional<Setup> setup, const TrustFigures& figures);
+  [[nodiscard]] const std::optional<Setup>& setup() const { return setup_; }
+  [[nodiscard]] const TrustFigures& figures() const { return figures_; }
+
+  /// Whether the frame may bear an overlay. Of every frame, in their order; a clock that goes back is another clock.
+  OverlayGate::Decision decide(const wire::VideoFrame& frame);
+  /// The frame is of the size that the camera was calibrated at; so it is where there is no setup.
+  [[nodiscard]] bool fits(const wire::VideoFrame& frame) const;
+
+  struct Painted {
+    Transform<Camera, Patient> camera_from_patient;
+    std::vector<std::uint8_t> rgb;  ///< of the frame's size, rows from the top
+  };
+  /// By the decision on this frame. Empty: nothing is drawn over it.
+  [[nodiscard]] std::optional<Painted> paint(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
+                                             Engine& engine, const OverlayLook& look) const;
+
+ private:
+  OverlayGate::Settings settings_;
+  OverlayGate gate_;
+  std::optional<Setup> setup_;
+  TrustFigures figures_;
+  std::optional<DeviceTime> newest_;
+};
+
+}  // namespace birdseye::host

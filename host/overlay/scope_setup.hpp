@@ -1,0 +1,66 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "host/overlay/trust.hpp"
+
+namespace birdseye::calibration {
+struct CalibrationRecord;
+struct HandEyeResult;
+}  // namespace birdseye::calibration
+
+namespace birdseye::host {
+
+class ScopeSetup;
+
+/// What calibration and registration found; with it a frame's pose gives where the CT lies before the camera. Made by
+/// ScopeSetup::registered alone.
+struct Setup {
+  CameraModel camera;
+  Transform<Camera, Sensor> camera_from_sensor;
+  Transform<Tracker, Patient> tracker_from_patient;
+
+  [[nodiscard]] Transform<Camera, Patient> camera_from_patient(
+      const Transform<Tracker, Sensor>& tracker_from_sensor) const {
+    return camera_from_sensor * tracker_from_sensor.inverse() * tracker_from_patient;
+  }
+
+ private:
+  friend class ScopeSetup;
+  Setup() = default;
+};
+
+/// How the scope is calibrated: its lens, where that sits on its sensor, and how well both are known. There are three
+/// ways to one and no other.
+class ScopeSetup {
+ public:
+  /// Of a rod that turns, as it is at its reference angle. Empty where the record has no lens or no hand-eye. stated:
+  /// figures that count in place of the record's.
+  static std::optional<ScopeSetup> of_record(const calibration::CalibrationRecord& record,
+                                             const ScopeFigures& stated = {});
+  /// found: solved. camera_rms_px: of the lens it was found with; empty: it is not known.
+  static ScopeSetup of_hand_eye(const CameraModel& camera, std::optional<double> camera_rms_px,
+                                const calibration::HandEyeResult& found);
+  /// A lens (OpenCV YAML) and a 4x4 matrix. stated: what somebody says of them, for the files hold no figures. An error
+  /// names the file.
+  static Result<ScopeSetup> of_files(const std::filesystem::path& camera,
+                                     const std::filesystem::path& camera_from_sensor, const ScopeFigures& stated);
+
+  [[nodiscard]] const CameraModel& camera() const { return camera_; }
+  [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
+  [[nodiscard]] const ScopeFigures& figures() const { return figures_; }
+  [[nodiscard]] Setup registered(const Transform<Tracker, Patient>& tracker_from_patient) const;
+
+ private:
+  ScopeSetup() = default;
+
+  CameraModel camera_;
+  Transform<Camera, Sensor> camera_from_sensor_;
+  ScopeFigures figures_;
+};
+
+}  // namespace birdseye::host

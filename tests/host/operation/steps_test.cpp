@@ -1,0 +1,277 @@
+// Each step of the operation alone: what it makes of the values that it is given.
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "host/operation/calibration_step.hpp"
+#include "host/operation/connection_step.hpp"
+#include "host/operation/deformation_step.hpp"
+#include "host/operation/fiducial_step.hpp"
+#include "host/operation/landmark_check.hpp"
+#include "host/operation/operation_keeper.hpp"
+#include "host/operation/pointer_tip.hpp"
+#include "host/operation/view_step.hpp"
+#include "tests/support/live_operation.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::example_record;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kMs;
+using birdseye::testing::kTrackerFromPatient;
+using birdseye::testing::Scratch;
+
+TEST(ConnectionStep, IsDoneWhileTheApplianceIsReady) {
+  ConnectionStep step;
+  step.set_link(true, "connected", false);
+  EXPECT_FALSE(step.note().done);
+  wire::Health health;
+  health.state = "starting";
+  step.take(health);
+  step.set_link(true, "connected", true);
+  EXPECT_FALSE(step.note().done);
+  EXPECT_EQ(step.note().line, "the appliance is starting");
+  health.state = "ready";
+  step.take(health);
+  step.set_link(true, "connected", false);
+  EXPECT_TRUE(step.note().done);
+  step.set_link(false, "gone", false);
+  EXPECT_FALSE(step.link().health.has_value());
+}
+
+TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
+  CalibrationStep step;
+  auto record = example_record(768, 576, {}, {});
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again) << "there was none before it";
+  EXPECT_EQ(step.found()->scope.figures().held_out_px, 1.75);
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
+  record.hand_eye->provenance.made_utc = "2026-11-22T09:40:00Z";
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::anew);
+  const CalibratedScope older{ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}), "2026-11-22T09:35:00Z"};
+  step.take_up(older, "taken up");
+  EXPECT_FALSE(step.found()->by_board);
+  CalibratedScope newer = older;
+  newer.made_utc = "2026-11-22T09:50:00Z";
+  step.take_up(newer, "taken up");
+  EXPECT_TRUE(step.found()->by_board);
+  EXPECT_EQ(step.note().line, "taken up");
+  EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::no);
+  record.lens.reset();
+  EXPECT_EQ(CalibrationStep().adopt(record), CalibrationStep::Adopted::no);
+}
+
+TEST(CalibrationStep, GuidesOnlyOverABoard) {
+  CalibrationStep step;
+  step.begin("scope", std::nullopt);
+  EXPECT_FALSE(step.guiding());
+  step.tell_none("the tracker is another");
+  EXPECT_EQ(step.note().line, "the tracker is another");
+  step.begin("scope", *calibration::parse_pattern("chessboard:14x9:3mm"));
+  EXPECT_TRUE(step.guiding());
+  step.end();
+  for (int i = 0; i < 1000 && step.guiding(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_FALSE(step.tick()) << "no station, no calibration";
+  }
+  EXPECT_FALSE(step.guiding());
+  EXPECT_FALSE(step.found().has_value());
+}
+
+Touch touch_at(const Eigen::Vector3d& in_patient_mm) {
+  return {kTrackerFromPatient * in_patient_mm, 0.1, 30};
+}
+
+TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
+  FiducialStep step;
+  for (const Eigen::Vector3d& fiducial : kFiducials) {
+    EXPECT_TRUE(step.add(touch_at(fiducial), 4));
+    step.fit(std::nullopt, 4);
+  }
+  EXPECT_FALSE(step.add(touch_at({}), 4)) << "all are touched";
+  EXPECT_FALSE(step.registered().has_value());
+  EXPECT_EQ(step.note().line, "4 touched");
+  step.fit(kFiducials, 4);
+  ASSERT_TRUE(step.registered().has_value()) << step.fault();
+  EXPECT_TRUE(step.note().done);
+  EXPECT_LT(*step.touches()[2].residual_mm, 1e-6);
+  EXPECT_TRUE(step.undo());
+  step.fit(kFiducials, 4);
+  EXPECT_TRUE(step.registered().has_value());
+  EXPECT_FALSE(step.note().done) << "three leave open which is which";
+}
+
+TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
+  const RegisteredPatient kept{kTrackerFromPatient, 0.3, kFiducials};
+  FiducialStep step;
+  EXPECT_TRUE(step.add(touch_at(kFiducials[0]), 0));
+  EXPECT_TRUE(step.take_up(kept, "taken up"));
+  EXPECT_TRUE(step.touches().empty());
+  EXPECT_FALSE(step.confirmed());
+  EXPECT_EQ(step.note().line, "taken up, FRE 0.30 mm");
+  step.confirm();
+  EXPECT_TRUE(step.confirmed());
+  FiducialStep fitted;
+  for (const Eigen::Vector3d& fiducial : kFiducials) fitted.add(touch_at(fiducial), 0);
+  fitted.fit(kFiducials, 0);
+  EXPECT_FALSE(fitted.take_up(kept, "taken up"));
+  EXPECT_TRUE(fitted.confirmed());
+}
+
+TEST(PointerTip, TellsARestWhenItEndsAndAtOnceWhereItIsHeld) {
+  PointerTip tip;
+  std::int64_t ms = 0;
+  const auto at = [&](double x_mm, const char* bird = "pointer") {
+    const Transform<Tracker, Sensor> pose(Eigen::Matrix3d::Identity(), Eigen::Vector3d(x_mm, 0, -150));
+    return tip.take({{(ms += 10) * kMs}, {{bird, pose}}}, "pointer", {0, 0, 150});
+  };
+  EXPECT_FALSE(at(500, "scope").has_value());
+  EXPECT_FALSE(tip.in_tracker_mm().has_value());
+  for (int i = 0; i < 30; ++i) EXPECT_FALSE(at(300 - 10 * i).has_value());
+  for (int i = 0; i < 80; ++i) EXPECT_FALSE(at(0).has_value());
+  ASSERT_TRUE(tip.held().has_value());
+  EXPECT_LT(tip.held()->tip_in_tracker_mm.norm(), 1e-9);
+  std::optional<Touch> rested;
+  for (int i = 1; i < 30 && !rested; ++i) rested = at(10 * i);
+  ASSERT_TRUE(rested.has_value());
+  EXPECT_LT(rested->tip_in_tracker_mm.norm(), 2.5);
+}
+
+std::optional<wire::VideoFrame> noise(unsigned seed) {
+  std::mt19937 random(seed);
+  auto rgb = std::make_shared<std::vector<std::uint8_t>>();
+  for (int i = 0; i < 3 * 64 * 48; ++i) rgb->push_back(static_cast<std::uint8_t>(60 + random() % 120));
+  wire::VideoFrame frame;
+  frame.width_px = 64;
+  frame.height_px = 48;
+  frame.rgb = rgb;
+  return frame;
+}
+
+const Transform<Camera, Patient> kCameraFromPatient(Eigen::Matrix3d::Identity(), {-12, -12, 60});
+
+TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
+  ViewStep step;
+  step.keep(noise(1), std::nullopt);
+  EXPECT_TRUE(step.views().empty());
+  EXPECT_EQ(step.note().line.substr(0, 9), "not kept:");
+  for (unsigned i = 0; i < 5; ++i) step.keep(noise(i), kCameraFromPatient);
+  EXPECT_TRUE(step.note().done);
+  step.undo();
+  EXPECT_FALSE(step.note().done);
+  EXPECT_EQ(step.note().line, "4 views kept");
+  step.forget("calibrated anew");
+  EXPECT_TRUE(step.views().empty());
+  EXPECT_EQ(step.note().line, "calibrated anew");
+}
+
+std::shared_ptr<const PatientPlan> ball() {
+  auto plan = std::make_shared<PatientPlan>();
+  Volume& ct = plan->ct;
+  ct.size = {24, 24, 24};
+  for (int k = 0; k < 24; ++k) {
+    for (int j = 0; j < 24; ++j) {
+      for (int i = 0; i < 24; ++i)
+        ct.hu.push_back((Eigen::Vector3d(i, j, k) - Eigen::Vector3d(12, 12, 12)).norm() < 8 ? 100 : -1000);
+    }
+  }
+  return plan;
+}
+
+/// The patient may be replaced while it runs: the thread keeps what it was given.
+TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
+  const TransferFunction transfer = *load_transfer_function("abdomen");
+  std::weak_ptr<const PatientPlan> watched;
+  DeformationStep step;
+  {
+    ViewStep views;
+    for (unsigned i = 0; i < 2; ++i) views.keep(noise(i), kCameraFromPatient);
+    const auto plan = ball();
+    watched = plan;
+    step.begin(views.views(), {64, 48, 60, 60, 32, 24}, plan, transfer);
+  }
+  EXPECT_EQ(step.note().line, "matching");
+  EXPECT_FALSE(step.forget()) << "there was none before";
+  EXPECT_EQ(step.note().line, "");
+  for (int i = 0; i < 2000 && step.running(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_FALSE(step.running());
+  EXPECT_FALSE(step.tick()) << "what is forgotten is not found";
+  EXPECT_EQ(step.found(), nullptr);
+  EXPECT_EQ(step.note().line, "");
+  step.begin({}, {}, ball(), transfer);
+  EXPECT_EQ(step.note().line, "0 views are too few: keep 5 or more, from different sides");
+}
+
+TEST(DeformationStep, WhatIsTakenUpCanBeUndone) {
+  DeformationStep step;
+  step.take_up(std::make_shared<const DeformedOrgan>(), "taken up");
+  EXPECT_TRUE(step.note().done);
+  step.undo();
+  EXPECT_EQ(step.found(), nullptr);
+  EXPECT_FALSE(step.note().done);
+  step.take_up(std::make_shared<const DeformedOrgan>(), "taken up");
+  EXPECT_TRUE(step.forget());
+  EXPECT_FALSE(step.forget());
+}
+
+TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
+  const Scratch scratch;
+  Operation one;
+  one.ct_checksum = "1";
+  one.registered = {kTrackerFromPatient, 0.3, kFiducials};
+  OperationKeeper(scratch.path(), {}).keep(one);
+  ASSERT_TRUE(has_operation(scratch.path()));
+  Operation other = one;
+  other.registered->fre_mm = 7;
+  OperationKeeper keeper(scratch.path(), scratch.path());
+  keeper.keep(other);
+  const auto kept = keeper.take_up("1");
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ((*kept)->registered->fre_mm, 0.3);
+  EXPECT_LT(((*kept)->registered->tracker_from_patient.translation() - kTrackerFromPatient.translation()).norm(), 1e-6);
+  EXPECT_FALSE((*keeper.take_up("1")).has_value()) << "once";
+  keeper.keep(other);
+  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
+  OperationKeeper wrong(scratch.path(), scratch.path());
+  EXPECT_FALSE(wrong.take_up("2"));
+  wrong.keep(one);
+  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
+}
+
+/// A figure that is not known is none in the files either.
+TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
+  const Scratch scratch;
+  Operation one;
+  one.ct_checksum = "1";
+  one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, {}), "2026-11-22T09:35:00Z",
+                    true};
+  OperationKeeper(scratch.path(), {}).keep(one);
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_FALSE(read->calibrated->scope.figures().camera_rms_px.has_value());
+  EXPECT_FALSE(read->calibrated->scope.figures().held_out_px.has_value());
+  EXPECT_TRUE(read->calibrated->scope.figures().held_out_mm.has_value());
+  EXPECT_TRUE(read->calibrated->by_board);
+}
+
+TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {
+  PatientPlan plan;
+  plan.landmarks = {{"tumour", {30, 30, 20}}};
+  const RegisteredPatient registered{kTrackerFromPatient, 0.3, kFiducials};
+  const auto at = [&](const Eigen::Vector3d& in_patient_mm, const DeformedOrgan* deformed) {
+    return check_by_landmarks(kTrackerFromPatient * in_patient_mm, registered, plan, kFiducials, deformed);
+  };
+  EXPECT_EQ(at({30, 30, 22}, nullptr).nearest, "tumour");
+  EXPECT_NEAR(at({30, 30, 22}, nullptr).distance_mm, 2, 1e-9);
+  EXPECT_EQ(at({59, 5, 0}, nullptr).nearest, "fiducial 2");
+  DeformedOrgan moved;
+  moved.field.size = {2, 2, 2};
+  moved.field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  moved.field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  EXPECT_NEAR(at({34, 30, 20}, &moved).distance_mm, 0, 1e-3);
+}
+
+}  // namespace
+}  // namespace birdseye::host
