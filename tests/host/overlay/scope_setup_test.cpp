@@ -57,8 +57,8 @@ TEST(ScopeSetup, OfFilesKnowsWhatIsStatedAndNamesWhatIsMissing) {
 TEST(ScopeSetup, RegisteredGivesWhereTheCtLiesBeforeTheCamera) {
   calibration::HandEyeResult found;
   found.camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 10});
-  const Setup setup = ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found)
-                          .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {100, 0, 0}));
+  const auto setup = ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found)
+                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {100, 0, 0}));
   const Transform<Tracker, Sensor> tracker_from_sensor(Eigen::Matrix3d::Identity(), {90, 0, -50});
   const Eigen::Vector3d in_camera_mm = setup.camera_from_patient(tracker_from_sensor) * Eigen::Vector3d(1, 2, 3);
   EXPECT_LT((in_camera_mm - Eigen::Vector3d(11, 2, 63)).norm(), 1e-12);
