@@ -11,7 +11,7 @@
 #include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
-#include "drivers/system/command_line.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/service_signals.hpp"
 #include "drivers/system/wait.hpp"
 
@@ -105,7 +105,7 @@ int main(int argc, char** argv) {
   app.add_option("--replay", recording, "an appliance recording, to be published in place of instruments")
       ->excludes(check)
       ->excludes(probe);
-  return run_program(app, argc, argv, [&] {
+  return run_program<CLI::ParseError>(app, argc, argv, [&] {
     if (check_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());

@@ -1,4 +1,4 @@
-#include "drivers/system/command_line.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 
 int main(int argc, char** argv) {
@@ -16,5 +16,5 @@ int main(int argc, char** argv) {
   add_render(app, status);
   add_replay(app, status);
   add_volume(app, status);
-  return birdseye::run_program(app, argc, argv, [&status] { return static_cast<int>(status.code); });
+  return birdseye::run_program<CLI::ParseError>(app, argc, argv, [&status] { return static_cast<int>(status.code); });
 }

@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "drivers/system/command_line.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "hw-sim/app/instruments.hpp"
 #include "hw-sim/case/registration_case.hpp"
@@ -108,5 +108,5 @@ int main(int argc, char** argv) {
     take(hw_sim::write_case(registration));
   });
 
-  return run_program(app, argc, argv, [&code] { return code; });
+  return run_program<CLI::ParseError>(app, argc, argv, [&code] { return code; });
 }

@@ -1,6 +1,6 @@
 #include <CLI/CLI.hpp>
 
-#include "drivers/system/command_line.hpp"
+#include "drivers/system/program.hpp"
 #include "hw-sim/app/instruments.hpp"
 
 int main(int argc, char** argv) {
@@ -15,5 +15,5 @@ int main(int argc, char** argv) {
   };
   hw_sim::add_minibird_command(app, take);
   hw_sim::add_camera_command(app, take);
-  return run_program(app, argc, argv, [&code] { return code; });
+  return run_program<CLI::ParseError>(app, argc, argv, [&code] { return code; });
 }
