@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calibration/base/median.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
@@ -55,9 +56,9 @@ std::optional<LocalMap> fit_local_map(const std::vector<GridPoint>& points, cons
     if (curved) design.row(i).tail<3>() << d.x() * d.x() / 2, d.x() * d.y(), d.y() * d.y() / 2;
     pixels.row(i) = point.px;
   }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(design);
-  if (solver.rank() < design.cols()) return std::nullopt;
-  const Eigen::MatrixXd solved = solver.solve(pixels);
+  const LeastSquares fit = solve_least_squares(design, pixels);
+  if (fit.rank < design.cols()) return std::nullopt;
+  const Eigen::MatrixXd& solved = fit.x;
   LocalMap map;
   map.a = solved.row(0);
   map.jacobian.col(0) = solved.row(1);

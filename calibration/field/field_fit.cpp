@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/base/units.hpp"
 #include "calibration/field/field_fit_parts.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/points/point_fit.hpp"
 
 namespace birdseye::calibration {
@@ -151,10 +151,7 @@ Vectors wanted_rotations(std::span<const FieldSample> samples, const std::vector
     if (!samples[i].true_rotation) return {};
     if (used[i]) sum += samples[i].true_rotation->transpose() * turn.transpose() * samples[i].measured.rotation();
   }
-  // The mean rotation: the nearest one to the sum.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  const Eigen::Matrix3d holder_from_sensor = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d holder_from_sensor = nearest_rotation(sum);
   Vectors out;
   for (const FieldSample& s : samples)
     out.push_back(rotation_log(turn * *s.true_rotation * holder_from_sensor * s.measured.rotation().transpose()));

@@ -1,11 +1,12 @@
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/field/field_fit.hpp"
 #include "calibration/field/field_fit_parts.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -25,18 +26,6 @@ constexpr double kMmPerRad = 200;   // 1.8 mm against 0.5 deg: what such a senso
 constexpr double kGaugeWeight = 10;
 constexpr std::size_t kMostFunctions = 64;  // six parameters each
 constexpr int kSteps = 3;
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-}
 
 /// The body as it is: sensor b in a's frame.
 struct Body {
@@ -222,7 +211,7 @@ double direction_spread(const Pairs& data) {
     const Eigen::Vector3d along = (pair.b.translation() - pair.a.translation()).normalized();
     scatter += along * along.transpose() / static_cast<double>(data.pairs.size());
   }
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  return symmetric_eigenvalues(scatter)[0];
 }
 
 Vectors before(const Pairs& data, const Body& body) {

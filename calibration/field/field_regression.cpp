@@ -1,6 +1,7 @@
 #include "calibration/field/field_regression.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

@@ -1,5 +1,7 @@
 #include "calibration/geometry/rod.hpp"
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye {
 
 namespace {

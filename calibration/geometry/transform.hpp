@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye {
 
 /// Frame tags (design: docs/manual/frames.md). They exist only in types.
@@ -60,12 +62,5 @@ class Transform {
   Eigen::Matrix3d rotation_;
   Eigen::Vector3d translation_;
 };
-
-/// Rotation vector (axis * angle, rad) -> rotation matrix.
-Eigen::Matrix3d rotation_exp(const Eigen::Vector3d& rotation_vector_rad);
-/// Rotation matrix -> rotation vector, angle in [0, pi].
-Eigen::Vector3d rotation_log(const Eigen::Matrix3d& rotation);
-/// The angle between two rotations, rad, in [0, pi].
-double rotation_angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);
 
 }  // namespace birdseye

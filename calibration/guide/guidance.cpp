@@ -10,6 +10,7 @@
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/lens_fold.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/guide/guidance_words.hpp"
 
 namespace birdseye::calibration {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 

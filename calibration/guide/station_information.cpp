@@ -1,27 +1,21 @@
 #include "calibration/guide/station_information.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <utility>
+
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
 namespace {
 
-using Matrix6 = StationInformation::Matrix6;
-
 // Before any station: nothing is known of the directions, and a scope and a table are of the order of half a metre.
 constexpr double kPriorAngle_rad = 1, kPriorHandEye_mm = 300, kPriorBoard_mm = 1000;
 
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 template <typename To, typename From>
-Matrix6 adjoint(const Transform<To, From>& t) {
-  Matrix6 m = Matrix6::Zero();
+Matrix6d adjoint(const Transform<To, From>& t) {
+  Matrix6d m = Matrix6d::Zero();
   m.topLeftCorner<3, 3>() = m.bottomRightCorner<3, 3>() = t.rotation();
   m.bottomLeftCorner<3, 3>() = cross_matrix(t.translation()) * t.rotation();
   return m;
@@ -48,7 +42,7 @@ StationInformation::StationInformation(const CameraModel& camera, std::vector<Ei
   Eigen::Matrix<double, 6, 1> tracker;
   tracker.head<3>().setConstant(noise.angle_sigma_rad * noise.angle_sigma_rad);
   tracker.tail<3>().setConstant(noise.position_sigma_mm * noise.position_sigma_mm);
-  const Matrix6 into_camera = adjoint(camera_from_sensor);
+  const Matrix6d into_camera = adjoint(camera_from_sensor);
   tracker_covariance_ = into_camera * tracker.asDiagonal() * into_camera.transpose();
   scale_.head<3>().setConstant(working_mm);
   scale_.tail<3>().setOnes();
@@ -61,8 +55,8 @@ StationInformation::StationInformation(const CameraModel& camera, std::vector<Ei
   solve();
 }
 
-Matrix6 StationInformation::covariance_of(const Transform<Camera, Marker>& camera_from_marker) const {
-  Matrix6 corners = Matrix6::Identity() * 1e-9;  // of a board that is not in the picture nothing follows
+Matrix6d StationInformation::covariance_of(const Transform<Camera, Marker>& camera_from_marker) const {
+  Matrix6d corners = Matrix6d::Identity() * 1e-9;  // of a board that is not in the picture nothing follows
   for (const Eigen::Vector3d& point : board_points_mm_) {
     const Eigen::Vector3d p = camera_from_marker * point;
     ProjectionJacobians by;
@@ -72,20 +66,17 @@ Matrix6 StationInformation::covariance_of(const Transform<Camera, Marker>& camer
     row << -by.by_point * cross_matrix(p), by.by_point;
     corners.noalias() += corner_weight_ * row.transpose() * row;
   }
-  return tracker_covariance_ + corners.ldlt().solve(Matrix6::Identity());
+  return tracker_covariance_ + inverse_symmetric(corners);
 }
 
 void StationInformation::add(const Transform<Camera, Marker>& camera_from_marker) {
   Eigen::Matrix<double, 6, 12> by_unknowns;
-  by_unknowns << Matrix6::Identity(), adjoint(camera_from_marker);
-  information_ += by_unknowns.transpose() * covariance_of(camera_from_marker).ldlt().solve(by_unknowns);
+  by_unknowns << Matrix6d::Identity(), adjoint(camera_from_marker);
+  information_ += by_unknowns.transpose() * solve_symmetric(covariance_of(camera_from_marker), Matrix6Xd(by_unknowns));
 }
 
 void StationInformation::solve() {
-  // Angles and millimetres differ by orders of magnitude: brought to one scale before they are inverted.
-  const Eigen::Matrix<double, 12, 1> unit = information_.diagonal().cwiseSqrt().cwiseInverse();
-  const Matrix12 scaled = unit.asDiagonal() * information_ * unit.asDiagonal();
-  covariance_ = unit.asDiagonal() * scaled.ldlt().solve(Matrix12::Identity()) * unit.asDiagonal();
+  covariance_ = inverse_information(information_);
 }
 
 double StationInformation::expected_error_mm() const {
@@ -95,11 +86,11 @@ double StationInformation::expected_error_mm() const {
 double StationInformation::expected_error_mm(const Transform<Camera, Marker>& one_more) const {
   // The measurement's update of a covariance, of which only the hand-eye's diagonal is wanted.
   Eigen::Matrix<double, 6, 12> by_unknowns;
-  by_unknowns << Matrix6::Identity(), adjoint(one_more);
+  by_unknowns << Matrix6d::Identity(), adjoint(one_more);
   const Eigen::Matrix<double, 6, 12> told = by_unknowns * covariance_;
-  const Matrix6 spread = told * by_unknowns.transpose() + covariance_of(one_more);
-  const Matrix6 hand_eye = told.leftCols<6>() * scale_.asDiagonal();
-  const double less = hand_eye.cwiseProduct(spread.ldlt().solve(hand_eye)).sum();
+  const Matrix6d spread = told * by_unknowns.transpose() + covariance_of(one_more);
+  const Matrix6d hand_eye = told.leftCols<6>() * scale_.asDiagonal();
+  const double less = hand_eye.cwiseProduct(solve_symmetric(spread, Matrix6Xd(hand_eye))).sum();
   const double now = expected_error_mm();
   return std::sqrt(std::max(0.0, now * now - less));
 }
@@ -119,9 +110,7 @@ Transform<Camera, Sensor> rough_hand_eye(std::span<const Transform<Tracker, Sens
       turns += sine_axis(camera.rotation()) * sine_axis(sensor.rotation()).transpose();
     }
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  const Eigen::Matrix3d rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Eigen::Matrix3d rotation = nearest_rotation(turns);
   constexpr double kLittle = 1e-3;  // against 2 - 2 cos(angle) of the turns
   Eigen::Matrix3d normal = kLittle * Eigen::Matrix3d::Identity();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -133,7 +122,7 @@ Transform<Camera, Sensor> rough_hand_eye(std::span<const Transform<Tracker, Sens
       right += open.transpose() * (rotation * sensor.translation() - camera.translation());
     }
   }
-  return {rotation, Eigen::Vector3d(normal.ldlt().solve(right))};
+  return {rotation, Eigen::Vector3d(solve_symmetric(normal, right))};
 }
 
 }  // namespace birdseye::calibration

@@ -6,6 +6,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {
@@ -27,7 +28,6 @@ struct StationNoise {
 /// Ad_X cov(s) Ad_X^T + cov(c), where cov(c) is that of a pose fitted to the corners.
 class StationInformation {
  public:
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
   using Matrix12 = Eigen::Matrix<double, 12, 12>;
 
   /// board_points_mm: in the frame Marker, about where the corners are; only those in the picture count. working_mm:
@@ -45,11 +45,11 @@ class StationInformation {
   [[nodiscard]] double expected_error_mm(const Transform<Camera, Marker>& one_more) const;
 
  private:
-  [[nodiscard]] Matrix6 covariance_of(const Transform<Camera, Marker>& camera_from_marker) const;
+  [[nodiscard]] Matrix6d covariance_of(const Transform<Camera, Marker>& camera_from_marker) const;
 
   CameraModel camera_;
   std::vector<Eigen::Vector3d> board_points_mm_;
-  Matrix6 tracker_covariance_;  ///< in the camera frame
+  Matrix6d tracker_covariance_;  ///< in the camera frame
   double corner_weight_;
   Eigen::Matrix<double, 6, 1> scale_;  ///< of the hand-eye's components to mm
   Matrix12 information_, covariance_;

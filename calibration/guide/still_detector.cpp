@@ -1,19 +1,10 @@
 #include "calibration/guide/still_detector.hpp"
 
-#include <Eigen/SVD>
 #include <vector>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
-
-namespace {
-
-/// The rotation nearest to the mean of the matrices.
-Eigen::Matrix3d mean_rotation(const Eigen::Matrix3d& sum) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * svd.matrixV().transpose();
-}
-
-}  // namespace
 
 void StillDetector::push(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   if (!tracker_from_sensor.matrix().allFinite()) return;
@@ -36,7 +27,7 @@ bool StillDetector::still_at(DeviceTime time) const {
   }
   if (count[0] < 2 || count[1] < 2) return false;
   return (place[0] / count[0] - place[1] / count[1]).norm() < settings_.still_mm &&
-         rotation_angle_between(mean_rotation(turn[0]), mean_rotation(turn[1])) < settings_.still_rad;
+         rotation_angle_between(nearest_rotation(turn[0]), nearest_rotation(turn[1])) < settings_.still_rad;
 }
 
 std::optional<Rest> StillDetector::rest_between(DeviceTime first, DeviceTime last) const {
@@ -52,7 +43,7 @@ std::optional<Rest> StillDetector::rest_between(DeviceTime first, DeviceTime las
   }
   if (used.size() < kFewest) return std::nullopt;
   place /= static_cast<double>(used.size());
-  Rest rest{{mean_rotation(turn), place}, used.size()};
+  Rest rest{{nearest_rotation(turn), place}, used.size()};
   for (const Sample* s : used) {
     rest.position_squares_mm2 += (s->pose.translation() - place).squaredNorm() / 3;
     const double angle = rotation_angle_between(rest.tracker_from_sensor.rotation(), s->pose.rotation());

@@ -4,6 +4,8 @@
 #include <limits>
 #include <numbers>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

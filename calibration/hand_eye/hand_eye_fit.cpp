@@ -1,27 +1,25 @@
 #include "calibration/hand_eye/hand_eye_fit.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/base/median.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
 namespace {
 
-using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic>;
-
 struct Linear {
   Vector6d residual;
-  Jacobian by_parameter;
+  Matrix6Xd by_parameter;
   Matrix6d covariance;
 };
 
 Linear linearise(const SummedStation& station, const ChainState& state, const TrackerNoise& noise,
                  const ChainFreedom& freedom) {
   const ChainResidual r = chain_residual(station.chain, station.camera_from_marker, state);
-  Linear out{r.value, Jacobian(6, freedom.parameters()),
+  Linear out{r.value, Matrix6Xd(6, freedom.parameters()),
              chain_covariance(station.chain, noise) +
                  r.by_camera_from_marker * station.view_covariance * r.by_camera_from_marker.transpose()};
   out.by_parameter.leftCols<6>() = r.by_hand_eye;
@@ -64,10 +62,10 @@ ChainNormal normal_at(std::span<const SummedStation> stations, const ChainState&
   ChainNormal out{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), 0};
   for (const SummedStation& station : stations) {
     const Linear at = linearise(station, state, noise, freedom);
-    const Matrix6d weight = at.covariance.ldlt().solve(Matrix6d::Identity());
+    const Matrix6d weight = inverse_symmetric(at.covariance);
     const double squared = at.residual.dot(weight * at.residual);
     const double down = robust ? (kRobustFreedom + 6) / (kRobustFreedom + squared) : 1;
-    const Jacobian weighted = down * weight * at.by_parameter;
+    const Matrix6Xd weighted = down * weight * at.by_parameter;
     out.information.noalias() += at.by_parameter.transpose() * weighted;
     out.gradient.noalias() += weighted.transpose() * at.residual;
     out.cost += robust ? robust_cost(squared) : 0.5 * squared;
@@ -76,18 +74,10 @@ ChainNormal normal_at(std::span<const SummedStation> stations, const ChainState&
   return out;
 }
 
-/// Solves by way of unit diagonal: the parameters are of different kinds.
-Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& information) {
-  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  return scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols())) *
-         scale.asDiagonal();
-}
-
 Eigen::VectorXd solve_damped(const ChainNormal& normal, double damping) {
   Eigen::MatrixXd information = normal.information;
   information.diagonal() *= 1 + damping;
-  return -inverse_of(information) * normal.gradient;
+  return -inverse_information(information) * normal.gradient;
 }
 
 /// Position's sigma over the angle's: 206 mm of the miniBIRD (1.8 mm, 0.5 deg), some 150 mm of optical trackers
@@ -149,7 +139,7 @@ ChainFit fit_chain(std::span<const SummedStation> stations, const ChainState& st
     }
     if (i + 1 == kIterations) out.converged = out.converged || stalled;
   }
-  out.covariance = inverse_of(normal.information);
+  out.covariance = inverse_information(normal.information);
   for (const SummedStation& s : stations)
     out.residuals.push_back(chain_residual(s.chain, s.camera_from_marker, out.state).value);
   return out;
@@ -179,8 +169,8 @@ TrackerNoise estimate_noise(std::span<const SummedStation> stations, ChainFit& f
     double position_trace = 0, angle_trace = 0, position_squares = 0, angle_squares = 0;
     for (const SummedStation& station : stations) {
       const Linear at = linearise(station, fit.state, noise, freedom);
-      const Matrix6d weight = at.covariance.ldlt().solve(Matrix6d::Identity());
-      const Jacobian weighted = weight * at.by_parameter;
+      const Matrix6d weight = inverse_symmetric(at.covariance);
+      const Matrix6Xd weighted = weight * at.by_parameter;
       const Matrix6d left = weight - weighted * fit.covariance * weighted.transpose();
       const Vector6d r = weight * at.residual;
       const Matrix6d position = position_noise_shape(station.chain);
@@ -221,7 +211,7 @@ std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::si
   Eigen::MatrixXd covariance;
   for (int i = 0; i < kSteps; ++i) {
     const ChainNormal normal = chain_normal(others, out.state, noise, freedom, robust);
-    covariance = inverse_of(normal.information);
+    covariance = inverse_information(normal.information);
     const Eigen::VectorXd step = -covariance * normal.gradient;
     if (!step.allFinite()) return std::nullopt;
     out.state = stepped(out.state, step, freedom);
@@ -229,7 +219,7 @@ std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::si
   const Linear left_out = linearise(stations[which], out.state, noise, freedom);
   const Matrix6d predicted =
       left_out.covariance + left_out.by_parameter * covariance * left_out.by_parameter.transpose();
-  out.distance_squared = left_out.residual.dot(predicted.ldlt().solve(left_out.residual));
+  out.distance_squared = left_out.residual.dot(solve_symmetric(predicted, left_out.residual));
   if (!(out.distance_squared >= 0)) return std::nullopt;
   return out;
 }

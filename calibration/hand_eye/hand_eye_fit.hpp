@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/hand_eye/tracked_chain.hpp"
 
 namespace birdseye::calibration {

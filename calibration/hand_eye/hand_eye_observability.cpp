@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/hand_eye_start.hpp"
 
 namespace birdseye::calibration {
@@ -45,15 +46,15 @@ struct Axes {
 
 /// scatter: mean of turn * turn^T. The greatest first, each pointing along its greatest part.
 Axes principal(const Eigen::Matrix3d& scatter) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
+  const SymmetricEigen<3> scattered = symmetric_eigen(scatter);
   Axes out;
   for (int i = 0; i < 3; ++i) {
-    Eigen::Vector3d axis = solver.eigenvectors().col(2 - i);
+    Eigen::Vector3d axis = scattered.vectors.col(2 - i);
     Eigen::Index greatest = 0;
     axis.cwiseAbs().maxCoeff(&greatest);
     if (axis[greatest] < 0) axis = -axis;
     out.directions.col(i) = axis;
-    out.turns_deg[i] = std::sqrt(std::max(0.0, solver.eigenvalues()[2 - i])) * kDegPerRad;
+    out.turns_deg[i] = std::sqrt(std::max(0.0, scattered.values[2 - i])) * kDegPerRad;
   }
   return out;
 }

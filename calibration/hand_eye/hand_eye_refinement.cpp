@@ -1,10 +1,18 @@
 #include "calibration/hand_eye/hand_eye_refinement.hpp"
 
-#include <ceres/ceres.h>
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+#include <ceres/ordered_groups.h>
+#include <ceres/problem.h>
+#include <ceres/product_manifold.h>
+#include <ceres/sized_cost_function.h>
+#include <ceres/solver.h>
 
-#include <Eigen/Dense>
 #include <array>
 #include <memory>
+
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -73,10 +81,8 @@ class CornerCost : public ceres::SizedCostFunction<2, 7> {
 /// One tracked pose, by the board's pose in the camera, hand-eye, body_from_marker and the time offset.
 class TrackedCost : public ceres::SizedCostFunction<6, 7, 7, 7, 1> {
  public:
-  TrackedCost(const TrackedChain& chain, const TrackerNoise& noise) : chain_(chain) {
-    const Matrix6d covariance = chain_covariance(chain, noise);
-    whiten_ = Matrix6d(covariance.llt().matrixL()).triangularView<Eigen::Lower>().solve(Matrix6d::Identity());
-  }
+  TrackedCost(const TrackedChain& chain, const TrackerNoise& noise)
+      : chain_(chain), whiten_(whitening(chain_covariance(chain, noise))) {}
 
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     ChainState state;
@@ -121,7 +127,7 @@ std::optional<StationNormal> normal_of(const CornerStation& station, const Trans
   Eigen::MatrixXd by_shared(6, freedom.parameters());
   by_shared.leftCols<12>() << r.by_hand_eye, r.by_body_from_marker;
   if (freedom.time_offset) by_shared.col(12) = r.by_time_offset;
-  const Matrix6d weight = chain_covariance(station.chain, noise).ldlt().solve(Matrix6d::Identity());
+  const Matrix6d weight = inverse_symmetric(chain_covariance(station.chain, noise));
   const double per_px = 1 / (sigma_px * sigma_px);
   const Matrix6d weighted = weight * r.by_camera_from_marker;
   return StationNormal{per_px * corners->information + r.by_camera_from_marker.transpose() * weighted,
@@ -140,21 +146,18 @@ std::optional<double> step_all(std::span<const CornerStation> stations, HandEyeR
   for (std::size_t i = 0; i < stations.size(); ++i) {
     auto normal = normal_of(stations[i], at.camera_from_marker[i], at.state, noise, sigma_px, freedom);
     if (!normal) return std::nullopt;
-    const Eigen::LDLT<Matrix6d> own(normal->cc);
-    reduced += normal->aa - normal->ac * own.solve(Eigen::MatrixXd(normal->ac.transpose()));
-    gradient += normal->a - normal->ac * own.solve(normal->c);
+    reduced += normal->aa - normal->ac * solve_symmetric(normal->cc, Matrix6Xd(normal->ac.transpose()));
+    gradient += normal->a - normal->ac * solve_symmetric(normal->cc, normal->c);
     normals.push_back(*std::move(normal));
   }
-  const Eigen::VectorXd scale = reduced.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced * scale.asDiagonal();
-  at.covariance = scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(size, size)) * scale.asDiagonal();
+  at.covariance = inverse_information(reduced);
   const Eigen::VectorXd step = -at.covariance * gradient;
   if (!step.allFinite()) return std::nullopt;
   at.state.camera_from_sensor = moved(at.state.camera_from_sensor, step.head<6>());
   at.state.body_from_marker = moved(at.state.body_from_marker, step.segment<6>(6));
   if (freedom.time_offset) at.state.time_offset_s += step[12];
   for (std::size_t i = 0; i < normals.size(); ++i) {
-    const Vector6d own = -normals[i].cc.ldlt().solve(normals[i].c + normals[i].ac.transpose() * step);
+    const Vector6d own = -solve_symmetric(normals[i].cc, Vector6d(normals[i].c + normals[i].ac.transpose() * step));
     at.camera_from_marker[i] = moved(at.camera_from_marker[i], own);
   }
   return step.dot(reduced * step);

@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <opencv2/core/eigen.hpp>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -31,12 +33,6 @@ std::vector<SummedStation> thinned(std::span<const SummedStation> stations) {
   std::vector<SummedStation> out;
   for (std::size_t i = 0; i < count; ++i) out.push_back(stations[i * stations.size() / count]);
   return out;
-}
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
 struct OpenCvPoses {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/hand_eye_observability.hpp"
 
 namespace birdseye::calibration {

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 

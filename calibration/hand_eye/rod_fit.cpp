@@ -1,10 +1,11 @@
 #include "calibration/hand_eye/rod_fit.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -17,12 +18,6 @@ Transform<Camera, Sensor> turned_back(const RodStation& s, double picture_turn) 
   const Transform<Camera, Camera> back(rotation_exp(Eigen::Vector3d(0, 0, -picture_turn * s.theta_rad)),
                                        Eigen::Vector3d(0, 0, 0));
   return back * s.camera_from_sensor;
-}
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& sum) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() > 0 ? 1 : -1);
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
 }
 
 /// The middle of rotations and places of the camera in the sensor's frame.
@@ -60,7 +55,7 @@ RodFit fit_with(std::span<const RodStation> stations, double picture_turn) {
   out.scope.axis_in_sensor = axis.normalized();
   // Along the axis the point is free: nearest to the sensor's origin.
   normal += normal.trace() * out.scope.axis_in_sensor * out.scope.axis_in_sensor.transpose();
-  out.scope.axis_point_in_sensor_mm = normal.ldlt().solve(right);
+  out.scope.axis_point_in_sensor_mm = solve_symmetric(normal, right);
   std::vector<Transform<Camera, Sensor>> zeros;
   for (const RodStation& s : stations) zeros.push_back(at_zero(out.scope, s.camera_from_sensor, s.theta_rad));
   out.scope.camera_from_sensor_at_zero = mean_of(zeros);

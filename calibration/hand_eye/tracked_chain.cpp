@@ -2,19 +2,11 @@
 
 #include <cmath>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
-
-/// d log(exp(d) exp(r)) / dd at d = 0: the inverse of SO(3)'s left Jacobian.
-Eigen::Matrix3d log_by_left_step(const Eigen::Vector3d& r) {
-  const double angle = r.norm();
-  const Eigen::Matrix3d x = cross_matrix(r);
-  // Near zero the closed form loses its digits to cancellation; its series has 1/12 + angle^2 / 720.
-  const double second = angle < 1e-3 ? 1.0 / 12 + angle * angle / 720
-                                     : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
-  return Eigen::Matrix3d::Identity() - 0.5 * x + second * x * x;
-}
 
 template <typename From>
 Transform<Tracker, From> at(const Transform<Tracker, From>& pose, const Motion& motion, double offset_s) {
@@ -24,12 +16,6 @@ Transform<Tracker, From> at(const Transform<Tracker, From>& pose, const Motion& 
 }
 
 }  // namespace
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d out;
-  out << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return out;
-}
 
 ChainResidual chain_residual(const TrackedChain& chain, const Transform<Camera, Marker>& camera_from_marker,
                              const ChainState& state) {
@@ -48,7 +34,7 @@ ChainResidual chain_residual(const TrackedChain& chain, const Transform<Camera, 
   const Eigen::Vector3d sensor_from_board_mm = state.camera_from_sensor.translation() - seen.translation();
   const Eigen::Vector3d sensor_in_marker_mm = seen.rotation().transpose() * sensor_from_board_mm;
   const Eigen::Matrix3d& b = body.rotation();
-  const Eigen::Matrix3d log_step = log_by_left_step(turn);
+  const Eigen::Matrix3d log_step = inverse_left_jacobian(turn);
   const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
   out.by_hand_eye << log_step * k, zero, zero, k;
   out.by_body_from_marker << log_step * b, zero,  //
@@ -59,7 +45,7 @@ ChainResidual chain_residual(const TrackedChain& chain, const Transform<Camera, 
   const Eigen::Vector3d& body_turn = chain.body_motion.angular_velocity_rad_s;
   // The measured turn enters on the other side of the logarithm: its left Jacobian there is that of minus the turn.
   out.by_time_offset << log_step * body_turn -
-                            log_by_left_step(Eigen::Vector3d(-turn)) * chain.sensor_motion.angular_velocity_rad_s,
+                            inverse_left_jacobian(Eigen::Vector3d(-turn)) * chain.sensor_motion.angular_velocity_rad_s,
       chain.body_motion.velocity_mm_s + body_turn.cross(predicted.translation() - body.translation()) -
           chain.sensor_motion.velocity_mm_s;
   return out;

@@ -2,15 +2,14 @@
 
 #include <Eigen/Core>
 
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {
 
 struct TrackedBody;  ///< frame of what carries the board, as the tracker knows it; the tracker's own for a board at
                      ///< rest
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// How a tracked body moved while its pose was taken, in the tracker's frame.
 struct Motion {
@@ -62,8 +61,6 @@ Transform<Camera, Marker> tracked_view(const TrackedChain& chain, const ChainSta
 Matrix6d position_noise_shape(const TrackedChain& chain);
 Matrix6d angle_noise_shape(const TrackedChain& chain);
 Matrix6d chain_covariance(const TrackedChain& chain, const TrackerNoise& noise);
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
 
 template <typename To, typename From>
 Transform<To, From> moved(const Transform<To, From>& pose, const Vector6d& step) {

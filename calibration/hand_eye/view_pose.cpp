@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -36,10 +38,7 @@ Extent extent_of(const std::vector<Eigen::Vector3d>& points) {
   for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly)
-                                     .eigenvalues()
-                                     .cwiseMax(0)
-                                     .cwiseSqrt();
+  const Eigen::Vector3d spread = symmetric_eigenvalues(scatter).cwiseMax(0).cwiseSqrt();
   return {spread[1] / spread[2], spread[0] / spread[2]};
 }
 
@@ -103,7 +102,7 @@ Result<ViewPose> refine_view_pose(const std::vector<SeenCorners>& corners, const
   for (int i = 0; i < 60; ++i) {
     Matrix6d normal = sum->information;
     normal.diagonal() *= 1 + damping;
-    const Vector6d step = -normal.ldlt().solve(sum->gradient);
+    const Vector6d step = -solve_symmetric(normal, sum->gradient);
     if (!step.allFinite()) return Error{Errc::degenerate, "its corners do not determine the board's pose"};
     const auto tried = moved(pose, step);
     const auto there = sum_corners(corners, tried, sigma_px);

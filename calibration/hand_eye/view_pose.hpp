@@ -6,6 +6,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/detect/pattern_view.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "calibration/hand_eye/tracked_chain.hpp"
 

@@ -1,13 +1,11 @@
 #include "calibration/latency/latency_models.hpp"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "calibration/geometry/transform.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -26,9 +24,7 @@ RotationTiming::RotationTiming(const MotionSpline& a, MotionSamples b, const Eig
     sum += sample.base_from_body.toRotationMatrix() *
            (a_.rotation_at(sample.time_s - offset_s).toRotationMatrix() * a_from_b_).transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d handed(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
-  turn_of_bases_ = svd.matrixU() * handed.asDiagonal() * svd.matrixV().transpose();
+  turn_of_bases_ = nearest_rotation(sum);
 }
 
 TimingModel::Linearised RotationTiming::linearise(double offset_s, double drift) const {
@@ -66,7 +62,7 @@ ImageTiming::ImageTiming(const MotionSpline& a, std::vector<ImageMotion> b, doub
   }
   sum_up(steps, 1);
   sum_up(seen, 1);
-  map_ = steps.completeOrthogonalDecomposition().solve(seen).transpose();
+  map_ = solve_least_norm(steps, seen).transpose();
 }
 
 ImageTiming::Step ImageTiming::step(const ImageMotion& of, double offset_s, double drift) const {

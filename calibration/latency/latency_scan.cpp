@@ -1,11 +1,11 @@
 #include "calibration/latency/latency_scan.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -72,12 +72,11 @@ std::optional<Meeting> meet(const RateGrid& a, const RateSignal& b, double lag_s
 /// Kabsch: the rotation that brings a's rates nearest to b's, and how much of them it explains.
 double rotation_correlation(const Meeting& meeting, Eigen::Matrix3d* turn) {
   const Eigen::Matrix3d cross = meeting.b.transpose() * meeting.a;
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  if (turn != nullptr) *turn = svd.matrixU() * Eigen::Vector3d(1, 1, handed).asDiagonal() * svd.matrixV().transpose();
-  const Eigen::Vector3d& s = svd.singularValues();
+  double likeness = 0;
+  const Eigen::Matrix3d nearest = nearest_rotation(cross, &likeness);
+  if (turn != nullptr) *turn = nearest;
   const double size = meeting.a.norm() * meeting.b.norm();
-  return size > 0 ? std::max(0.0, (s[0] + s[1] + handed * s[2]) / size) : 0;
+  return size > 0 ? std::max(0.0, likeness / size) : 0;
 }
 
 double linear_correlation(const Meeting& meeting) {
@@ -88,7 +87,7 @@ double linear_correlation(const Meeting& meeting) {
   }
   constexpr double kRidge = 1e-6;  // a body that turns about one axis only leaves others open
   const Eigen::MatrixXd normal = a.transpose() * a + kRidge * Eigen::MatrixXd::Identity(a.cols(), a.cols());
-  const Eigen::MatrixXd left = meeting.b - a * normal.ldlt().solve(a.transpose() * meeting.b);
+  const Eigen::MatrixXd left = meeting.b - a * solve_symmetric(normal, Eigen::MatrixXd(a.transpose() * meeting.b));
   const double all = meeting.b.squaredNorm();
   if (!(all > 0)) return 0;
   // What so many free numbers explain of anything is taken off, as the adjusted coefficient of determination does.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calibration/base/median.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {

@@ -7,6 +7,7 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {

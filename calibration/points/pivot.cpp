@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,6 +9,7 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
@@ -73,11 +73,11 @@ Linear solve(const Poses& poses, const Indices& used, std::size_t divots) {
     out.normal += swing.transpose() * swing;
     right -= swing.transpose() * (pose.translation() - out.means.translation[poses[i].divot]);
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(out.normal);
+  const SymmetricEigen<3> eigen = symmetric_eigen(out.normal);
   for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d direction = eigen.eigenvectors().col(k);
-    if (eigen.eigenvalues()[k] > kOpen * static_cast<double>(used.size()))
-      out.inverse += direction * direction.transpose() / eigen.eigenvalues()[k];
+    const Eigen::Vector3d direction = eigen.vectors.col(k);
+    if (eigen.values[k] > kOpen * static_cast<double>(used.size()))
+      out.inverse += direction * direction.transpose() / eigen.values[k];
   }
   out.tip = out.inverse * right;
   return out;
@@ -225,7 +225,7 @@ Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, 
         (1 - 1 / linear.means.count[divot]) * Eigen::Matrix3d::Identity() - swing * linear.inverse * swing.transpose();
     const Eigen::Vector3d residual = pose * linear.tip - linear.pivot(divot);
     // A pose that alone tells some part of the tip has no residual there.
-    const Eigen::Vector3d score = swing.transpose() * unseen.completeOrthogonalDecomposition().solve(residual);
+    const Eigen::Vector3d score = swing.transpose() * solve_least_norm(unseen, residual);
     scores += score * score.transpose();
   }
   return linear.inverse * scores * linear.inverse / kVarianceWithin;
@@ -268,12 +268,12 @@ PivotTilt tilt_of(const Poses& poses, const Indices& used, const Linear& linear)
     }
   }
   tilt.widest_deg = std::acos(std::clamp(least_cosine, -1.0, 1.0)) * kDegPerRad;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(linear.normal);
-  tilt.weakest_in_sensor = eigen.eigenvectors().col(0);
+  const SymmetricEigen<3> eigen = symmetric_eigen(linear.normal);
+  tilt.weakest_in_sensor = eigen.vectors.col(0);
   Eigen::Index largest = 0;
   tilt.weakest_in_sensor.cwiseAbs().maxCoeff(&largest);
   if (tilt.weakest_in_sensor[largest] < 0) tilt.weakest_in_sensor = -tilt.weakest_in_sensor;
-  const double swing = std::sqrt(std::max(0.0, eigen.eigenvalues()[0]) / static_cast<double>(used.size()));
+  const double swing = std::sqrt(std::max(0.0, eigen.values[0]) / static_cast<double>(used.size()));
   tilt.weakest_swing_deg = std::asin(std::min(1.0, swing)) * kDegPerRad;
   return tilt;
 }
@@ -364,8 +364,7 @@ Result<Pivot> solve_pivot(std::span<const PivotPose> given) {
   const Linear linear = solve(poses, used, divots);
   out.robust = fit_of(poses, used, linear);
   out.tip_covariance_mm2 = covariance_of(poses, used, linear);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(out.tip_covariance_mm2, Eigen::EigenvaluesOnly);
-  out.tip_sigma_mm = std::sqrt(std::max(0.0, eigen.eigenvalues()[2]));
+  out.tip_sigma_mm = std::sqrt(std::max(0.0, symmetric_eigenvalues(out.tip_covariance_mm2)[2]));
   out.tilt = tilt_of(poses, used, linear);
   out.held_out_mm = held_out_of(poses, used, linear);
   std::vector<Eigen::Vector3d> offsets;

@@ -1,8 +1,9 @@
 #include "calibration/points/point_error.hpp"
 
-#include <Eigen/Dense>
 #include <cmath>
 #include <unsupported/Eigen/SpecialFunctions>
+
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
@@ -47,10 +48,10 @@ TargetError::TargetError(std::span<const Eigen::Vector3d> points_mm, double loca
   for (const Eigen::Vector3d& p : points_mm) centroid_mm_ += p / n;
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points_mm) scatter += (p - centroid_mm_) * (p - centroid_mm_).transpose() / n;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter);
-  axes_ = solver.eigenvectors();
+  const SymmetricEigen<3> scattered = symmetric_eigen(scatter);
+  axes_ = scattered.vectors;
   // Along an axis the scatter is its eigenvalue; about it, the sum of the other two.
-  inverse_f2_ = (solver.eigenvalues().sum() - solver.eigenvalues().array()).inverse();
+  inverse_f2_ = (scattered.values.sum() - scattered.values.array()).inverse();
   least_square_mm2_ = localisation_rms_mm * localisation_rms_mm / n;
 }
 

@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration::detail {
 
@@ -20,8 +21,7 @@ Eigen::Vector3d mean_of(std::span<const Eigen::Vector3d> points) {
 bool on_a_line(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& mean) {
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(scatter, Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d& values = solver.eigenvalues();  // ascending
+  const Eigen::Vector3d values = symmetric_eigenvalues(scatter);
   return !(values[1] > kThinnest * kThinnest * values[2]);
 }
 
@@ -50,10 +50,8 @@ Result<RigidFit> fit_rigid(std::span<const Eigen::Vector3d> to_mm, std::span<con
   for (std::size_t i = 0; i < to_mm.size(); ++i) {
     covariance += (to_mm[i] - to_mean) * (from_mm[i] - from_mean).transpose();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1);
   RigidFit fit;
-  fit.rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  fit.rotation = nearest_rotation(covariance);
   fit.translation_mm = to_mean - fit.rotation * from_mean;
   return fit;
 }

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
@@ -28,9 +28,9 @@ Axis solve(const Rotations& rotations, const Indices& used) {
   for (const std::size_t i : used) mean += rotations[i];
   mean /= static_cast<double>(used.size());
   for (const std::size_t i : used) swings += (rotations[i] - mean).transpose() * (rotations[i] - mean);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(swings / static_cast<double>(used.size()));
-  const Eigen::Vector3d axis = eigen.eigenvectors().col(0);
-  return {axis, (mean * axis).normalized(), eigen.eigenvalues().cwiseMax(0)};
+  const auto eigen = symmetric_eigen(Eigen::Matrix3d(swings / static_cast<double>(used.size())));
+  const Eigen::Vector3d axis = eigen.vectors.col(0);
+  return {axis, (mean * axis).normalized(), eigen.values.cwiseMax(0)};
 }
 
 std::vector<double> residuals_of(const Rotations& rotations, const Axis& axis) {

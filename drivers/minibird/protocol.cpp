@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::drivers::minibird {
 
@@ -80,8 +81,7 @@ Result<Eigen::Matrix3d> rotation_from_matrix_words(std::span<const std::int16_t>
   if (off > 0.01 || r.determinant() < 0) {
     return Error{Errc::bad_value, "miniBIRD: a matrix that is no rotation; the sensor may be saturated or too close"};
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose());
+  return nearest_rotation(r);
 }
 
 Result<Eigen::Matrix3d> rotation_from_quaternion_words(std::span<const std::int16_t> words) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "host/calibrate/residual_picture.hpp"
 #include "host/calibrate/station_picture.hpp"
 #include "host/report/bar_chart.hpp"

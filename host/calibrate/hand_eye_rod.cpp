@@ -9,6 +9,7 @@
 #include <set>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::hw_sim {

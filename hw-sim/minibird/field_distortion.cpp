@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "hw-sim/base/hashed.hpp"
 

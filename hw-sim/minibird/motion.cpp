@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::hw_sim {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/minibird/byte_faults.hpp"

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::hw_sim {

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/look_at.hpp"
 #include "hw-sim/phantom/implants.hpp"

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/points/point_error.hpp"
 
 namespace birdseye::host {

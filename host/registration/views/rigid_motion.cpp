@@ -3,30 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::host {
-
-namespace {
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d m;
-  m << 0, -w.z(), w.y(),  //
-      w.z(), 0, -w.x(),   //
-      -w.y(), w.x(), 0;
-  return m;
-}
-
-/// exp(w + d) = exp(w) exp(right_jacobian(w) d) to first order.
-Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& w) {
-  const double angle2 = w.squaredNorm(), angle = std::sqrt(angle2);
-  // By series near zero, where the quotients lose their digits.
-  constexpr double kSmall = 1e-3;
-  const double a = angle < kSmall ? 0.5 - angle2 / 24 : (1 - std::cos(angle)) / angle2;
-  const double b = angle < kSmall ? 1.0 / 6 - angle2 / 120 : (angle - std::sin(angle)) / (angle2 * angle);
-  const Eigen::Matrix3d cross = cross_matrix(w);
-  return Eigen::Matrix3d::Identity() - a * cross + b * cross * cross;
-}
-
-}  // namespace
 
 RigidMotion::RigidMotion(const Tissue& tissue) : patient_from_grid_(tissue.patient_from_grid) {
   double mass = 0, second = 0;
