@@ -1,21 +1,19 @@
 #include "calibration/camera/camera_bundle.hpp"
 
-#include <ceres/ceres.h>
+#include <ceres/cost_function.h>
 
-#include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 
+#include "calibration/camera/bundle_solver.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 using RowMajor9 = Eigen::Matrix<double, 2, CameraModel::kParameters, Eigen::RowMajor>;
 using RowMajor6 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
@@ -87,15 +85,6 @@ bool any_used(const BundleView& view) {
 
 }  // namespace
 
-Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
-  const double angle2 = w.squaredNorm(), angle = std::sqrt(angle2);
-  const Eigen::Matrix3d k = cross_matrix(w);
-  constexpr double kSmall = 1e-4;  // below it the series is exact to rounding
-  const double a = angle < kSmall ? 0.5 - angle2 / 24 : (1 - std::cos(angle)) / angle2;
-  const double b = angle < kSmall ? 1.0 / 6 - angle2 / 120 : (angle - std::sin(angle)) / (angle2 * angle);
-  return Eigen::Matrix3d::Identity() + a * k + b * k * k;
-}
-
 CameraVector parameters_of(const CameraModel& c) {
   CameraVector p;
   p << c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3;
@@ -135,25 +124,8 @@ BundleSummary refine_bundle(CameraModel& camera, std::span<BundleView> views,
     ordering->AddElementToGroup(poses[v].data(), 0);
   }
   ordering->AddElementToGroup(lens.data(), 1);
-  std::vector<int> fixed;
-  for (int i = 0; i < CameraModel::kParameters; ++i) {
-    if (!solved[static_cast<std::size_t>(i)]) fixed.push_back(i);
-  }
-  if (!fixed.empty()) problem.SetManifold(lens.data(), new ceres::SubsetManifold(CameraModel::kParameters, fixed));
-
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_SCHUR;
-  options.linear_solver_ordering = ordering;
-  options.max_num_iterations = settings.most_steps;
-  options.function_tolerance = settings.tolerance;
-  options.gradient_tolerance = 1e-12;
-  options.parameter_tolerance = 1e-14;
-  // Damping of a billionth keeps Cholesky's factors of what views leave open, and costs no digit of what they do not.
-  options.max_trust_region_radius = 1e9;
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary solved_as;
-  ceres::Solve(options, &problem, &solved_as);
+  hold_unsolved(problem, lens.data(), solved);
+  const ceres::Solver::Summary solved_as = solve_bundle(problem, ordering, settings);
 
   BundleSummary summary;
   summary.converged = solved_as.termination_type == ceres::CONVERGENCE;
@@ -183,8 +155,8 @@ std::vector<Eigen::Vector2d> residuals_px(const CameraModel& camera, const Bundl
 namespace {
 
 struct PoseNormal {
-  Eigen::Matrix<double, 6, 6> matrix = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> vector = Eigen::Matrix<double, 6, 1>::Zero();
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d vector = Vector6d::Zero();
   double cost = 0;
 };
 
@@ -217,9 +189,9 @@ Transform<Camera, Marker> fit_pose(const CameraModel& camera, const BundleView& 
   PoseNormal normal = normal_of(camera, view, at);
   double damping = 1e-6;
   for (int step = 0; step < kMostSteps && damping < 1e6; ++step) {
-    Eigen::Matrix<double, 6, 6> damped = normal.matrix;
+    Matrix6d damped = normal.matrix;
     damped.diagonal() *= 1 + damping;
-    const Eigen::Matrix<double, 6, 1> move = damped.ldlt().solve(normal.vector);
+    const Vector6d move = solve_symmetric(damped, normal.vector);
     const Transform<Camera, Marker> next(Eigen::Matrix3d(rotation_exp(Eigen::Vector3d(move.head<3>())) * at.rotation()),
                                          Eigen::Vector3d(at.translation() + move.tail<3>()));
     const PoseNormal there = normal_of(camera, view, next);
@@ -241,7 +213,7 @@ CameraMatrix lens_information(const CameraModel& camera, std::span<const BundleV
   ProjectionJacobians by;
   for (const BundleView& view : views) {
     Eigen::Matrix<double, 9, 6> cross = Eigen::Matrix<double, 9, 6>::Zero();
-    Eigen::Matrix<double, 6, 6> of_pose = Eigen::Matrix<double, 6, 6>::Zero();
+    Matrix6d of_pose = Matrix6d::Zero();
     for (std::size_t i = 0; i < view.points_mm.size(); ++i) {
       const Eigen::Vector3d turned = view.camera_from_marker.rotation() * view.points_mm[i];
       if (!(view.weights[i] > 0) || !project(camera, turned + view.camera_from_marker.translation(), &by)) continue;
@@ -250,7 +222,7 @@ CameraMatrix lens_information(const CameraModel& camera, std::span<const BundleV
       cross.noalias() += view.weights[i] * by.by_parameter.transpose() * d;
       of_pose.noalias() += view.weights[i] * d.transpose() * d;
     }
-    if (any_used(view)) information -= cross * of_pose.ldlt().solve(cross.transpose());
+    if (any_used(view)) information -= cross * solve_symmetric(of_pose, Matrix6Xd(cross.transpose()));
   }
   return information;
 }

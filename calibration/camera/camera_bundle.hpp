@@ -49,10 +49,6 @@ CameraMatrix lens_information(const CameraModel& camera, std::span<const BundleV
 Eigen::Matrix<double, 2, 6> pixel_by_pose(const Eigen::Matrix<double, 2, 3>& pixel_by_point,
                                           const Eigen::Vector3d& turned_point_mm);
 
-/// The left Jacobian of SO(3): exp(w + dw) = exp(J dw) exp(w) to first order (T. Barfoot, State Estimation for
-/// Robotics, 2017, eq. 7.77b).
-Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& rotation_vector_rad);
-
 CameraVector parameters_of(const CameraModel& camera);
 void set_parameters(CameraModel& camera, const double* parameters);
 

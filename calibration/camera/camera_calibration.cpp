@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,6 +12,7 @@
 #include "calibration/camera/camera_figures.hpp"
 #include "calibration/camera/camera_outliers.hpp"
 #include "calibration/camera/camera_views.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 
 namespace birdseye::calibration {
 
@@ -160,15 +160,15 @@ void add_covariance(const ModelFit& fit, CameraCalibration& out) {
   const Eigen::MatrixXd information = lens_information(fit.camera, fit.views)(solved, solved);
   // In units in which each parameter alone is known equally well, so that the eigenvalues can be compared.
   const Eigen::VectorXd unit = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * information * unit.asDiagonal());
+  const auto eigen = symmetric_eigen(Eigen::MatrixXd(unit.asDiagonal() * information * unit.asDiagonal()));
   constexpr double kOpen = 1e-11;
-  if (!(eigen.eigenvalues()[0] > kOpen)) {
+  if (!(eigen.values[0] > kOpen)) {
     Eigen::Index worst = 0;
-    eigen.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
+    eigen.vectors.col(0).cwiseAbs().maxCoeff(&worst);
     out.undetermined = kCameraParameterNames[static_cast<std::size_t>(solved[static_cast<std::size_t>(worst)])];
   }
-  const Eigen::VectorXd inverse = eigen.eigenvalues().cwiseMax(kOpen).cwiseInverse();
-  const Eigen::MatrixXd root = unit.asDiagonal() * eigen.eigenvectors();
+  const Eigen::VectorXd inverse = eigen.values.cwiseMax(kOpen).cwiseInverse();
+  const Eigen::MatrixXd root = unit.asDiagonal() * eigen.vectors;
   out.covariance(solved, solved) =
       out.noise_sigma_px * out.noise_sigma_px * (root * inverse.asDiagonal() * root.transpose());
 }

@@ -9,6 +9,8 @@
 #include <numeric>
 #include <opencv2/calib3d.hpp>
 
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::calibration {
 
 namespace {

@@ -1,9 +1,13 @@
 #include "calibration/camera/stereo_bundle.hpp"
 
-#include <ceres/ceres.h>
+#include <ceres/cost_function.h>
 
-#include <Eigen/Dense>
+#include <algorithm>
 #include <memory>
+
+#include "calibration/camera/bundle_solver.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/geometry/rotations.hpp"
 
 namespace birdseye::calibration {
 
@@ -94,14 +98,6 @@ Transform<To, From> moved(const Transform<To, From>& start, const std::array<dou
   return Transform<To, From>(Eigen::Quaterniond(rotation), Eigen::Vector3d(by[3], by[4], by[5]));
 }
 
-void fix_unsolved(ceres::Problem& problem, double* lens, const std::array<bool, kLens>& solved) {
-  std::vector<int> fixed;
-  for (int i = 0; i < kLens; ++i) {
-    if (!solved[static_cast<std::size_t>(i)]) fixed.push_back(i);
-  }
-  if (!fixed.empty()) problem.SetManifold(lens, new ceres::SubsetManifold(kLens, fixed));
-}
-
 }  // namespace
 
 void refine_stereo(StereoBundle& bundle, const BundleSettings& settings) {
@@ -117,20 +113,9 @@ void refine_stereo(StereoBundle& bundle, const BundleSettings& settings) {
     ordering->AddElementToGroup(poses[p].data(), 0);
   }
   for (double* block : {left.data(), right.data(), relation.data()}) ordering->AddElementToGroup(block, 1);
-  fix_unsolved(problem, left.data(), bundle.left_solved);
-  fix_unsolved(problem, right.data(), bundle.right_solved);
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_SCHUR;
-  options.linear_solver_ordering = ordering;
-  options.max_num_iterations = settings.most_steps;
-  options.function_tolerance = settings.tolerance;
-  options.parameter_tolerance = 1e-14;
-  options.gradient_tolerance = 1e-12;
-  options.max_trust_region_radius = 1e9;  // as refine_bundle's
-  options.num_threads = 1;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
+  hold_unsolved(problem, left.data(), bundle.left_solved);
+  hold_unsolved(problem, right.data(), bundle.right_solved);
+  solve_bundle(problem, ordering, settings);
   bundle.right_from_left = moved(bundle.right_from_left, relation);
   for (std::size_t p = 0; p < poses.size(); ++p) {
     Transform<Camera, Marker>& pose = bundle.pairs[p].left.camera_from_marker;
@@ -163,7 +148,7 @@ Eigen::Matrix<double, 6, 6> relation_cofactor(const StereoBundle& bundle) {
     shared << by[0], by[1], by[2];
     const Eigen::MatrixXd cross = shared.transpose() * by[3];
     const Eigen::MatrixXd of_pose = by[3].transpose() * by[3];
-    information += shared.transpose() * shared - cross * of_pose.ldlt().solve(cross.transpose());
+    information += shared.transpose() * shared - cross * solve_symmetric(of_pose, Eigen::MatrixXd(cross.transpose()));
   }
   std::vector<int> solved;
   for (int i = 0; i < kShared; ++i) {
@@ -173,9 +158,7 @@ Eigen::Matrix<double, 6, 6> relation_cofactor(const StereoBundle& bundle) {
   const Eigen::MatrixXd active = information(solved, solved);
   const Eigen::VectorXd unit = active.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = unit.asDiagonal() * active * unit.asDiagonal();
-  const auto size = static_cast<Eigen::Index>(solved.size());
-  const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
-  return (unit.asDiagonal() * inverse * unit.asDiagonal()).bottomRightCorner<6, 6>();
+  return (unit.asDiagonal() * inverse_symmetric(scaled) * unit.asDiagonal()).bottomRightCorner<6, 6>();
 }
 
 std::vector<Eigen::Vector2d> right_residuals_px(const StereoBundle& bundle, const BundlePair& pair) {
