@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "calibration/geometry/rotations.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/case/registration_case.hpp"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "calibration/base/units.hpp"
-#include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/view_pose.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/files/picture.hpp"
