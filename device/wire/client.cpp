@@ -13,7 +13,7 @@ namespace birdseye::wire {
 namespace {
 
 constexpr Duration kFirstWord = Duration::from_ms(250);
-constexpr Duration kSilence = Duration::from_ms(1000);
+constexpr Duration kPosesAskedAfter = Duration::from_ms(1000);
 
 }  // namespace
 
@@ -136,7 +136,7 @@ void Client::judge(const Header& header) {
 void Client::ask() {
   const Duration silent = host_now() - connected_;
   if (appliance_ || (!foreign_ && silent > kFirstWord)) ask_the_time();
-  if (appliance_ || asked_for_poses_ || (!foreign_ && silent < kSilence)) return;
+  if (appliance_ || asked_for_poses_ || (!foreign_ && silent < kPosesAskedAfter)) return;
   asked_for_poses_ = true;
   (void)send(pack_tracking_request(), host_now());
 }

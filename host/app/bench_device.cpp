@@ -26,7 +26,7 @@ namespace {
 using Clock = wire::Client::Clock;
 using std::chrono::seconds;
 
-struct Options {
+struct BenchDeviceOptions {
   std::filesystem::path json;
   double seconds = 60;
   int clients = 2;
@@ -180,7 +180,7 @@ std::uint64_t holes(const std::vector<Listener::Heard>& frames) {
 }
 
 /// Tracker at its highest rate and 1080p60 to several clients.
-Result<void> measure_load(const Options& options, const std::filesystem::path& folder, nlohmann::json& out) {
+Result<void> measure_load(const BenchDeviceOptions& options, const std::filesystem::path& folder, nlohmann::json& out) {
   DeviceRigSettings settings;
   settings.folder = folder / "load";
   auto session = Session::start(settings, options.clients, true);
@@ -240,7 +240,7 @@ Result<void> measure_load(const Options& options, const std::filesystem::path& f
 
 /// How far the pose that a frame came with is, in time, from the frame: the simulated sensor goes round a circle, so a
 /// pose tells when it was.
-Result<void> measure_time(const Options& options, const std::filesystem::path& folder, nlohmann::json& out) {
+Result<void> measure_time(const BenchDeviceOptions& options, const std::filesystem::path& folder, nlohmann::json& out) {
   DeviceRigSettings settings;
   settings.folder = folder / "time";
   settings.tracker_rate_hz = 103.3;
@@ -329,7 +329,7 @@ Result<void> measure_recovery(const std::filesystem::path& folder, nlohmann::jso
   return {};
 }
 
-Result<void> bench_device(const Options& options) {
+Result<void> bench_device(const BenchDeviceOptions& options) {
   note_interrupts();
   const auto folder = std::filesystem::temp_directory_path() / fmt::format("birdseye-bench-device-{}", ::getpid());
   nlohmann::json out;
@@ -350,7 +350,7 @@ Result<void> bench_device(const Options& options) {
 }  // namespace
 
 void add_bench_device(CLI::App& bench, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchDeviceOptions>();
   CLI::App& device = *bench.add_subcommand("device", "birdseyed on simulated instruments: load, times, recovery");
   device.add_option("--json", options->json, "write the figures to this file");
   device.add_option("--seconds", options->seconds, "of the load (default 60)")->check(CLI::Range(10.0, 86'400.0));

@@ -17,7 +17,7 @@ namespace birdseye::host {
 
 namespace {
 
-struct Options {
+struct BenchRegisterOptions {
   std::filesystem::path json, study;
   std::vector<std::string> sweeps = StudyOptions{}.sweeps;
   std::optional<int> trials;
@@ -60,7 +60,7 @@ void print(const nlohmann::json& row) {
   std::fflush(stdout);
 }
 
-Result<ExitCode> bench_register(const Options& options) {
+Result<ExitCode> bench_register(const BenchRegisterOptions& options) {
   constexpr int kQuick = 5, kTrials = 50;
   const int trials = options.quick ? kQuick : options.trials.value_or(kTrials);
   nlohmann::json rows = nlohmann::json::array();
@@ -101,7 +101,7 @@ Result<ExitCode> bench_register(const Options& options) {
   return report_of(rows)["verdict"] == "pass" ? ExitCode::success : ExitCode::verdict_fail;
 }
 
-Result<void> study(const Options& options) {
+Result<void> study(const BenchRegisterOptions& options) {
   std::error_code error;
   std::filesystem::create_directories(options.study, error);
   if (error) {
@@ -116,7 +116,7 @@ Result<void> study(const Options& options) {
 }  // namespace
 
 void add_bench_register(CLI::App& bench, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchRegisterOptions>();
   CLI::App& command =
       *bench.add_subcommand("register", "the paper's Figure 6 on simulated video, its optimisers and ours");
   command.add_option("--json", options->json, "write the table to this file");

@@ -28,7 +28,7 @@ constexpr double kStep_mm = 1;
 constexpr int kWidth_px = 768, kHeight_px = 576;
 constexpr int kStride = 12;  // of the pixels that are compared with the reference
 
-struct Options {
+struct BenchRenderOptions {
   std::filesystem::path json, pictures, scene;
   std::vector<std::string> engines{"cpu"};
   int frames = 15;
@@ -103,8 +103,8 @@ struct Case {
 };
 
 /// One engine at one level, with pruning or without.
-Result<nlohmann::json> bench_engine(const Case& c, const Options& options, const Volume& volume, Engine& engine,
-                                    const Level& level, bool pruned) {
+Result<nlohmann::json> bench_engine(const Case& c, const BenchRenderOptions& options, const Volume& volume,
+                                    Engine& engine, const Level& level, bool pruned) {
   const CameraModel camera = bench_camera(kWidth_px, kHeight_px);
   RenderSettings settings;
   settings.step_mm = c.step_mm;
@@ -163,7 +163,7 @@ Level make_level(const Case& c, const Volume& volume, int number) {
 }
 
 /// The phantom cut open, as the manual shows it.
-Result<void> draw_level(const Options& options, const Case& c, Engine& engine, const Level& level) {
+Result<void> draw_level(const BenchRenderOptions& options, const Case& c, Engine& engine, const Level& level) {
   RenderSettings settings;
   settings.step_mm = 0.5 * c.step_mm;
   settings.clip = ClipPlane{Eigen::Vector3d(-1, 0, 0), -150};
@@ -203,7 +203,7 @@ Result<void> write_scene(const std::filesystem::path& folder, const Case& c, con
   return write_files({{folder / "volume.mha", mha}, {folder / "scene.json", text_of(scene)}});
 }
 
-Result<void> bench_case(const Case& c, const Options& options, nlohmann::json& rows) {
+Result<void> bench_case(const Case& c, const BenchRenderOptions& options, nlohmann::json& rows) {
   const Volume volume = bench_phantom(c.phantom, c.size);
   if (!options.scene.empty() && c.phantom == "liver" && c.size[2] == 64) {
     if (auto written = write_scene(options.scene, c, volume); !written) return written;
@@ -225,7 +225,7 @@ Result<void> bench_case(const Case& c, const Options& options, nlohmann::json& r
   return {};
 }
 
-Result<ExitCode> bench_render(const Options& options) {
+Result<ExitCode> bench_render(const BenchRenderOptions& options) {
   for (const std::filesystem::path& folder : {options.scene, options.pictures}) {
     std::error_code error;
     if (!folder.empty()) std::filesystem::create_directories(folder, error);
@@ -272,7 +272,7 @@ Result<ExitCode> bench_render(const Options& options) {
 }  // namespace
 
 void add_bench(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchRenderOptions>();
   CLI::App& bench = *app.add_subcommand("bench", "measure speed on this machine");
   bench.require_subcommand(1);
   add_bench_device(bench, status);

@@ -20,9 +20,9 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr int kWidth_px = 768, kHeight_px = 576, kBins = 64;
+constexpr int kPictureWidth_px = 768, kPictureHeight_px = 576, kBins = 64;
 
-struct Options {
+struct BenchSimilarityOptions {
   std::filesystem::path json;
   int rounds = 15;
 };
@@ -32,9 +32,9 @@ std::vector<std::uint8_t> bench_picture(int number) {
   std::mt19937 random(static_cast<unsigned>(number));
   std::uniform_real_distribution<double> noise(-12, 12);
   std::vector<std::uint8_t> grey;
-  grey.reserve(std::size_t{kWidth_px} * kHeight_px);
-  for (int y = 0; y < kHeight_px; ++y) {
-    for (int x = 0; x < kWidth_px; ++x) {
+  grey.reserve(std::size_t{kPictureWidth_px} * kPictureHeight_px);
+  for (int y = 0; y < kPictureHeight_px; ++y) {
+    for (int x = 0; x < kPictureWidth_px; ++x) {
       const double r = std::hypot((x - 384 - 3 * number) / 300.0, (y - 288) / 220.0);
       const double texture = 40 * std::sin(0.04 * x + 0.1 * number) * std::cos(0.05 * y);
       const double value = r < 1 ? 60 + 90 * (1 - r * r) + texture + noise(random) : 0;
@@ -47,7 +47,7 @@ std::vector<std::uint8_t> bench_picture(int number) {
 /// The peer: OpenCV's histogram, and equation 4 as it stands.
 double opencv_mutual_information(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
   const auto picture = [](const std::vector<std::uint8_t>& grey) {
-    return cv::Mat(kHeight_px, kWidth_px, CV_8U, const_cast<std::uint8_t*>(grey.data()));
+    return cv::Mat(kPictureHeight_px, kPictureWidth_px, CV_8U, const_cast<std::uint8_t*>(grey.data()));
   };
   const cv::Mat pictures[] = {picture(a), picture(b)};
   const int channels[] = {0, 1}, sizes[] = {kBins, kBins};
@@ -89,10 +89,10 @@ struct Timer {
   }
 };
 
-Result<ExitCode> bench_similarity(const Options& options) {
+Result<ExitCode> bench_similarity(const BenchSimilarityOptions& options) {
   const std::vector<std::uint8_t> video = bench_picture(0), synthetic = bench_picture(1);
   const std::vector<std::uint8_t> everywhere(video.size(), 1);
-  const Reference reference{kWidth_px, kHeight_px, video, everywhere};
+  const Reference reference{kPictureWidth_px, kPictureHeight_px, video, everywhere};
   std::vector<double> grey, gradient(video.size());
   for (const std::uint8_t g : synthetic) grey.push_back(g == 0 ? -0.25 : g / 255.0);
 
@@ -118,7 +118,7 @@ Result<ExitCode> bench_similarity(const Options& options) {
   for (const auto& [name, timer] : timers) {
     const bool is_parzen = name.starts_with("parzen");
     nlohmann::json row = {{"measure", name},
-                          {"viewport", fmt::format("{}x{}", kWidth_px, kHeight_px)},
+                          {"viewport", fmt::format("{}x{}", kPictureWidth_px, kPictureHeight_px)},
                           {"value", timer.value},
                           {"value_ms_median", timer.best_ms}};
     if (name != "ncc" && name != "gradient")
@@ -147,7 +147,7 @@ Result<ExitCode> bench_similarity(const Options& options) {
 }  // namespace
 
 void add_bench_similarity(CLI::App& bench, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchSimilarityOptions>();
   CLI::App& similarity = *bench.add_subcommand("similarity", "measures of how alike two pictures are, and OpenCV's");
   similarity.add_option("--json", options->json, "write the table to this file");
   similarity.add_option("--rounds", options->rounds, "rounds of 41 calls, of which the fastest counts (default 15)")

@@ -18,7 +18,7 @@ namespace {
 
 using calibration::FieldFit;
 
-struct Options {
+struct CalibrateFieldOptions {
   std::filesystem::path grid, poses;
   std::vector<std::filesystem::path> pair;
   std::string grid_spec, kind = "auto";
@@ -33,7 +33,7 @@ struct Fitted {
   std::string made_from;
 };
 
-Result<Fitted> fit_pairs(const Options& options, const std::optional<calibration::FieldBasis>& basis) {
+Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
   auto pairs = read_field_pairs(options.pair[0], options.pair[1]);
   if (!pairs) return pairs.error();
   auto fit = calibration::fit_field_from_pairs(pairs->pairs, {basis, options.distance_mm});
@@ -42,7 +42,7 @@ Result<Fitted> fit_pairs(const Options& options, const std::optional<calibration
                 fmt::format("{} pairs of poses of two sensors on one body", pairs->pairs.size())};
 }
 
-Result<Fitted> fit_places(const Options& options, const std::optional<calibration::FieldBasis>& basis) {
+Result<Fitted> fit_places(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
   const auto read = [&]() -> Result<FieldSamples> {
     if (!options.grid.empty()) return read_field_grid(options.grid, options.held_alike);
     const auto spec = parse_grid_spec(options.grid_spec);
@@ -60,7 +60,7 @@ Result<Fitted> fit_places(const Options& options, const std::optional<calibratio
                 fmt::format("{} places of a board", samples->samples.size())};
 }
 
-Result<Fitted> fit(const Options& options) {
+Result<Fitted> fit(const CalibrateFieldOptions& options) {
   const int inputs = (options.grid.empty() ? 0 : 1) + (options.poses.empty() ? 0 : 1) + (options.pair.empty() ? 0 : 1);
   if (inputs != 1)
     return Error{Errc::bad_value, "calibrate field: give one of --grid, --poses with --grid-spec, and --pair"};
@@ -139,7 +139,7 @@ HtmlPage page_of(const Fitted& fitted) {
   return page;
 }
 
-void run(const Options& options, CommandStatus& status) {
+void run(const CalibrateFieldOptions& options, CommandStatus& status) {
   const auto fitted = fit(options);
   if (!fitted) return status.refuse(fitted.error());
   const Verdict verdict = verdict_of(fitted->fit);
@@ -155,7 +155,7 @@ void run(const Options& options, CommandStatus& status) {
 }  // namespace
 
 void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateFieldOptions>();
   CLI::App* field =
       calibrate.add_subcommand("field", "map how metal bends the tracker's field, and check it day by day");
   field->add_option("--grid", options->grid, "a table true_x,true_y,true_z,x,y,z[,qx,qy,qz,qw], mm (CSV)")

@@ -20,13 +20,13 @@ namespace {
 using calibration::CheckedPlace;
 using calibration::FieldCheck;
 
-struct Options {
+struct CalibrateFieldCheckOptions {
   std::filesystem::path plate, measured, history, field;
   std::string when;
   ResultPaths results;
 };
 
-Result<std::vector<CheckedPlace>> places_of(const Options& options) {
+Result<std::vector<CheckedPlace>> places_of(const CalibrateFieldCheckOptions& options) {
   const auto plate = read_places(options.plate);
   if (!plate) return plate.error();
   auto measured = read_places(options.measured);
@@ -95,7 +95,7 @@ HtmlPage page_of(const FieldCheck& check, const std::vector<CheckedPlace>& place
   return page;
 }
 
-void run(const Options& options, CommandStatus& status) {
+void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   auto history = read_history(options.history);
   if (!history) return status.refuse(history.error());
   const auto places = places_of(options);
@@ -115,7 +115,7 @@ void run(const Options& options, CommandStatus& status) {
 }  // namespace
 
 CLI::App* add_calibrate_field_check(CLI::App& field, CommandStatus& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateFieldCheckOptions>();
   CLI::App* check = field.add_subcommand("check", "a plate's places, touched each day, against those of other days");
   check->add_option("--plate", options->plate, "the places as they are: name,x,y,z, mm (CSV)")
       ->required()

@@ -18,7 +18,7 @@ namespace birdseye::host {
 
 namespace {
 
-struct Options {
+struct CalibrateHandEyeOptions {
   HandEyeFiles files;
   std::filesystem::path rod_angles;
   bool live = false;
@@ -42,7 +42,7 @@ Result<void> check_right(const HandEyeFiles& files) {
                "are then calibrated from the pictures"};
 }
 
-Result<void> check(const Options& options) {
+Result<void> check(const CalibrateHandEyeOptions& options) {
   const HandEyeFiles& files = options.files;
   const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.eye_poses.empty() ? 0 : 1);
   if (sources != 1) return Error{Errc::bad_value, "give one of --images (with --board), --eye-poses and --live"};
@@ -59,7 +59,7 @@ Result<void> check(const Options& options) {
 }
 
 /// A hand-eye goes into a record beside the lens it was made with, and no other.
-Result<void> check_record(const Options& options) {
+Result<void> check_record(const CalibrateHandEyeOptions& options) {
   const auto& path = options.results.record;
   std::error_code ignored;
   const bool there = std::filesystem::exists(path, ignored);
@@ -80,7 +80,7 @@ Result<void> check_record(const Options& options) {
                            path.string(), options.files.camera.string())};
 }
 
-Result<HandEyeRecording> record_live(const Options& options) {
+Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
   LivePlan plan = options.plan;
   auto pattern = calibration::parse_pattern(options.files.board);
   if (!pattern) return pattern.error();
@@ -109,14 +109,14 @@ Result<HandEyeRecording> record_live(const Options& options) {
 }
 
 /// What is found from a recording, and what to think of it.
-struct Found {
+struct HandEyeFound {
   calibration::HandEyeResult result;
   std::optional<RodCalibration> rod;
   Verdict verdict;
 };
 
 /// With a rod, recording keeps the stations of its reference angle, of which the result is.
-Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Found& out) {
+Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, HandEyeFound& out) {
   auto rod = calibrate_rod(recording, angles);
   if (!rod) return rod.error();
   recording.input.stations = rod->at_reference().stations;
@@ -129,8 +129,9 @@ Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Fou
   return {};
 }
 
-Result<Found> solve(const Options& options, const RodAngles& angles, HandEyeRecording& recording) {
-  Found out;
+Result<HandEyeFound> solve(const CalibrateHandEyeOptions& options, const RodAngles& angles,
+                           HandEyeRecording& recording) {
+  HandEyeFound out;
   if (recording.input.stations.empty() || (options.files.eye_poses.empty() && !recording.input.camera)) {
     out.verdict = recording.camera_verdict;
     if (out.verdict.grade != Grade::fail)
@@ -154,7 +155,8 @@ Result<Found> solve(const Options& options, const RodAngles& angles, HandEyeReco
 }
 
 /// Hand-eye, and the lens it was found with where that is new.
-RecordEntry entry_of(const Options& options, const HandEyeRecording& recording, const Found& found) {
+RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording,
+                     const HandEyeFound& found) {
   const std::string what =
       options.files.board.empty() ? options.files.eye_poses.filename().string() : options.files.board;
   return {fmt::format("{}, {} stations", what, recording.input.stations.size()),
@@ -175,7 +177,8 @@ RecordEntry entry_of(const Options& options, const HandEyeRecording& recording, 
           }};
 }
 
-void finish(const Options& options, const HandEyeRecording& recording, const Found& found, CommandStatus& status) {
+void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording, const HandEyeFound& found,
+            CommandStatus& status) {
   const calibration::HandEyeResult& result = found.result;
   for (const std::string& note : recording.notes) fmt::print("{}\n", note);
   if (recording.stream_correlation > 0 && result.solved) {
@@ -193,7 +196,7 @@ void finish(const Options& options, const HandEyeRecording& recording, const Fou
                      std::move(json), std::move(page), found.verdict, status, entry_of(options, recording, found));
 }
 
-void run(Options& options, CommandStatus& status) {
+void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
   HandEyeFiles& files = options.files;
   files.mm_per_unit = options.unit == "m" ? 1000 : 1;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
@@ -221,7 +224,7 @@ void run(Options& options, CommandStatus& status) {
 }  // namespace
 
 void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateHandEyeOptions>();
   HandEyeFiles& files = options->files;
   CLI::App* command = calibrate.add_subcommand("hand-eye", "where the camera sits on its sensor");
   command->add_option("--board", files.board, "pattern in the pictures, as chessboard:14x10:3mm")->type_name("SPEC");

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using calibration::Latency;
 
-struct Options {
+struct CalibrateLatencyOptions {
   fs::path recording, poses, eye_poses;
   std::string server, transform, eye_transform, unit = "mm";
   std::optional<double> delay_ms;
@@ -30,7 +30,7 @@ struct Options {
   ResultPaths paths;
 };
 
-struct Found {
+struct LatencyFound {
   Latency latency;
   StreamNames names;
   std::string advice;
@@ -58,7 +58,7 @@ std::string advice_of(const Latency& latency, const std::optional<double>& delay
                             late ? "lower" : "raise");
 }
 
-Result<Found> of_appliance(const Options& options, Progress& progress) {
+Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progress& progress) {
   Result<LatencyStreams> streams = Error{};
   if (!options.recording.empty()) {
     LatencySource all = options.source;
@@ -77,7 +77,7 @@ Result<Found> of_appliance(const Options& options, Progress& progress) {
   auto latency = calibration::find_latency(std::span<const calibration::TimedMotionPose>(streams->tracker),
                                            std::span<const calibration::ImageMotion>(streams->video), options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: the tracker, b: the video)"};
-  Found found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}};
+  LatencyFound found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}};
   found.advice = advice_of(found.latency, options.delay_ms);
   found.more = {{"method", "picture motion"},
                 {"bird", streams->bird},
@@ -104,7 +104,7 @@ Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& p
   return rows;
 }
 
-Result<Found> of_files(const Options& options, Verdict& odd) {
+Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& odd) {
   const double mm_per_unit = options.unit == "m" ? 1000 : 1;
   const auto a = read_rotations(options.poses, options.transform, mm_per_unit, odd);
   if (!a) return a.error();
@@ -112,7 +112,7 @@ Result<Found> of_files(const Options& options, Verdict& odd) {
   if (!b) return b.error();
   auto latency = calibration::find_latency(*a, *b, options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
-  Found found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}};
+  LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}};
   found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",
                              options.eye_poses.filename().string(), std::abs(found.latency.offset_ms),
                              found.latency.offset_ms > 0 ? "late" : "early", options.poses.filename().string(),
@@ -128,13 +128,13 @@ std::string out_text(const Latency& latency) {
       latency.drift_ci95_ppm[0], latency.drift_ci95_ppm[1]);
 }
 
-std::string made_from(const Options& options) {
+std::string made_from(const CalibrateLatencyOptions& options) {
   if (!options.recording.empty()) return options.recording.filename().string();
   if (!options.server.empty()) return options.server;
   return fmt::format("{} and {}", options.poses.filename().string(), options.eye_poses.filename().string());
 }
 
-void run(const Options& options, CommandStatus& status) {
+void run(const CalibrateLatencyOptions& options, CommandStatus& status) {
   Progress progress;
   Verdict odd;
   const bool files = !options.poses.empty();
@@ -177,7 +177,7 @@ void run(const Options& options, CommandStatus& status) {
 }  // namespace
 
 void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateLatencyOptions>();
   CLI::App& command = *calibrate.add_subcommand(
       "latency", "how late the video's times are against the tracker's, from motion that both see");
   command.add_option("--server", options->server, "an appliance that runs: record from it now")->type_name("HOST:PORT");

@@ -16,7 +16,7 @@ using calibration::CalibrationRecord;
 using calibration::Identity;
 using calibration::Provenance;
 
-struct Options {
+struct CalibrateRecordOptions {
   std::filesystem::path record;
   std::string scope, bind;
 };
@@ -70,7 +70,7 @@ void show(const CalibrationRecord& record) {
   }
 }
 
-Result<void> run(const Options& options) {
+Result<void> run(const CalibrateRecordOptions& options) {
   auto record = read_record(options.record);
   if (!record) return record.error();
   if (!options.bind.empty()) {
@@ -88,7 +88,7 @@ Result<void> run(const Options& options) {
 
 void add_calibrate_record(CLI::App& calibrate, CommandStatus& status) {
   CLI::App* command = calibrate.add_subcommand("record", "shows a scope's calibration record, names it, binds it");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateRecordOptions>();
   command->add_option("record", options->record, "the calibration record")->type_name("FILE")->required();
   command->add_option("--scope", options->scope, "the scope's name or serial number, to be written into it");
   command->add_option("--bind", options->bind, "an appliance whose tracker and camera it holds for")

@@ -24,7 +24,7 @@ using calibration::PivotPose;
 using calibration::SpinAxis;
 using nlohmann::json;
 
-struct Options {
+struct CalibrateTipOptions {
   std::filesystem::path poses, spin;
   std::string transform, reference, phases, unit = "mm";
   std::string server, bird = "pointer";
@@ -33,7 +33,7 @@ struct Options {
 };
 
 /// What was read: poses and set.poses go together.
-struct Input {
+struct TipInput {
   PoseSet set;
   std::vector<PivotPose> poses;
   std::size_t divots = 1;
@@ -42,19 +42,19 @@ struct Input {
 };
 
 /// What was found out; where there is no pivot the verdict says why.
-struct Outcome {
+struct TipOutcome {
   std::optional<Pivot> pivot;
   std::optional<SpinAxis> axis;
   Verdict verdict;
 };
 
-Result<PoseSet> read_set(const Options& options, const std::filesystem::path& path) {
+Result<PoseSet> read_set(const CalibrateTipOptions& options, const std::filesystem::path& path) {
   const double mm_per_unit = options.unit == "m" ? 1000 : 1;
   return options.reference.empty() ? read_pose_set(path, options.transform, mm_per_unit)
                                    : read_relative_pose_set(path, options.transform, options.reference, mm_per_unit);
 }
 
-Result<Input> read_input(const Options& options) {
+Result<TipInput> read_input(const CalibrateTipOptions& options) {
   if (options.poses.empty() == options.server.empty())
     return Error{Errc::bad_value, "calibrate tip: give one of --poses and --server"};
   if (!options.server.empty()) {
@@ -65,7 +65,7 @@ Result<Input> read_input(const Options& options) {
   auto set = options.poses.empty() ? collect_poses(options.server, options.bird, options.seconds, progress)
                                    : read_set(options, options.poses);
   if (!set) return set.error();
-  Input input;
+  TipInput input;
   input.set = *std::move(set);
   input.source = options.poses.empty() ? options.server : options.poses.filename().string();
   if (!options.phases.empty()) {
@@ -104,8 +104,8 @@ void add_verdict(Verdict& to, const Verdict& more) {
   for (const std::string& step : more.next_steps) to.add(Grade::pass, {}, step);
 }
 
-Result<Outcome> compute(const Input& input) {
-  Outcome out;
+Result<TipOutcome> compute(const TipInput& input) {
+  TipOutcome out;
   if (auto pivot = calibration::solve_pivot(input.poses); pivot) {
     out.pivot = *std::move(pivot);
     out.verdict = calibration::judge_pivot(*out.pivot);
@@ -160,7 +160,7 @@ json json_of(const calibration::PivotFit& fit) {
           {"component_rms_mm", fit.component_rms_mm}};
 }
 
-void add_pivot(const Pivot& pivot, const Input& input, json& out) {
+void add_pivot(const Pivot& pivot, const TipInput& input, json& out) {
   out.update(json_of(pivot.robust));
   out["algebraic"] = json_of(pivot.algebraic);
   out["outliers"] = names_of(pivot.outliers, input.set.poses);
@@ -181,7 +181,7 @@ void add_pivot(const Pivot& pivot, const Input& input, json& out) {
   }
 }
 
-json json_of(const Outcome& found, const Input& input) {
+json json_of(const TipOutcome& found, const TipInput& input) {
   json out{{"poses", input.poses.size()}, {"rejected", rejected_json(input.set)}, {"notes", input.set.notes}};
   if (found.pivot) add_pivot(*found.pivot, input, out);
   if (found.axis) {
@@ -196,7 +196,7 @@ json json_of(const Outcome& found, const Input& input) {
 }
 
 /// Three numbers that read_points takes, and in remarks what they rest on.
-std::string tip_text(const Outcome& found) {
+std::string tip_text(const TipOutcome& found) {
   if (!found.pivot) return {};
   const Eigen::Vector3d& tip = found.pivot->robust.tip_in_sensor_mm;
   std::string text = fmt::format(
@@ -223,7 +223,7 @@ std::vector<std::vector<std::string>> figures_table(const Pivot& pivot) {
           row("all poses, algebraic", pivot.algebraic)};
 }
 
-std::vector<std::vector<std::string>> odd_poses_table(const Outcome& found, const Input& input) {
+std::vector<std::vector<std::string>> odd_poses_table(const TipOutcome& found, const TipInput& input) {
   constexpr std::size_t kRows = 100;
   std::vector<std::vector<std::string>> rows{{"pose", "distance from the pivot, mm", ""}};
   for (const std::size_t i : found.pivot ? found.pivot->outliers : std::vector<std::size_t>{})
@@ -240,7 +240,7 @@ std::vector<std::vector<std::string>> odd_poses_table(const Outcome& found, cons
   return rows;
 }
 
-HtmlPage page_of(const Outcome& found, const Input& input) {
+HtmlPage page_of(const TipOutcome& found, const TipInput& input) {
   HtmlPage page("Pointer tip");
   for (const std::string& note : input.set.notes) page.paragraph(note);
   if (found.pivot) {
@@ -272,7 +272,7 @@ HtmlPage page_of(const Outcome& found, const Input& input) {
   return page;
 }
 
-void print(const Outcome& found, const Input& input) {
+void print(const TipOutcome& found, const TipInput& input) {
   constexpr std::size_t kNamed = 12;
   const auto shorten = [](std::vector<std::string> names) {
     const std::size_t count = names.size();
@@ -296,7 +296,7 @@ void print(const Outcome& found, const Input& input) {
 }
 
 /// What a record keeps of it.
-RecordEntry entry_of(const Outcome& found, const Input& input) {
+RecordEntry entry_of(const TipOutcome& found, const TipInput& input) {
   const std::string made_from =
       fmt::format("{} poses of {} in {} divot(s)", input.set.poses.size(), input.source, input.divots);
   return {made_from, [&found](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
@@ -309,7 +309,7 @@ RecordEntry entry_of(const Outcome& found, const Input& input) {
 }  // namespace
 
 void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<CalibrateTipOptions>();
   CLI::App& tip = *calibrate.add_subcommand("tip", "where a pointer's tip is on its sensor, by a pivot");
   tip.add_option("--poses", options->poses,
                  "poses while the tip stands in a divot: a folder of 4x4 matrices, a CSV or a PLUS sequence");

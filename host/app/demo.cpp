@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kMostFramesWaiting = 256;
+constexpr std::size_t kMostDemoFramesWaiting = 256;
 
 /// Compares every overlaid frame with the truth, marks the kept pictures and writes them.
 Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan) {
@@ -92,12 +92,12 @@ void judge(DemoFigures& figures) {
   }
 }
 
-struct Options {
+struct DemoOptions {
   SimulatedCartSettings cart;
   std::string noise = "typical";
 };
 
-Result<ExitCode> demo(const Options& options) {
+Result<ExitCode> demo(const DemoOptions& options) {
   Progress progress;
   SimulatedCartSettings settings = options.cart;
   if (options.noise == "none") settings.position_noise_mm = settings.angle_noise_deg = 0;
@@ -121,7 +121,7 @@ Result<ExitCode> demo(const Options& options) {
   if (!cart) return cart.error();
   auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Clock::now() + std::chrono::seconds(20));
   if (!client) return client.error();
-  EventStream stream(*std::move(client), kMostFramesWaiting);
+  EventStream stream(*std::move(client), kMostDemoFramesWaiting);
   const auto plan = read_plan(out / "phantom", (*cart)->sheet().fiducials);
   if (!plan) return plan.error();
   const auto board = calibration::parse_pattern((*cart)->sheet().board);
@@ -158,7 +158,7 @@ Result<ExitCode> demo(const Options& options) {
 }  // namespace
 
 void add_demo(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DemoOptions>();
   SimulatedCartSettings& cart = options->cart;
   cart.folder = "out/demo";
   CLI::App& command = *app.add_subcommand("demo", "the whole cart, simulated: calibrate, register, overlay, report");

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportOptions {
   fs::path registration, views, deformation, model_pose, volume, out, json;
   std::string frame = "tracker";
 };
@@ -33,7 +33,7 @@ struct Registered {
   std::optional<Volume> volume;
 };
 
-Result<Registered> read_registered(Options options) {
+Result<Registered> read_registered(ExportOptions options) {
   Registered read;
   std::error_code ignored;
   if (!options.views.empty()) {
@@ -72,7 +72,7 @@ Result<Registered> read_registered(Options options) {
 }
 
 /// ct_from_seen: of the frame that was asked for.
-Result<RestMap> map_of(const Options& options, const Registered& registered) {
+Result<RestMap> map_of(const ExportOptions& options, const Registered& registered) {
   RestMap map;
   const Transform<Patient, Patient> ct_from_patient = registered.patient_from_model.inverse();
   if (options.frame == "patient") {
@@ -129,7 +129,7 @@ Result<double> worst_difference(const fs::path& path, const Registered& register
   return worst_mm;
 }
 
-Result<ExitCode> run(const Options& options) {
+Result<ExitCode> run(const ExportOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   if (options.registration.empty() && options.views.empty() && options.deformation.empty()) {
     return Error{Errc::bad_value,
@@ -192,7 +192,7 @@ Result<ExitCode> run(const Options& options) {
 }  // namespace
 
 void add_export(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportOptions>();
   CLI::App& command =
       *app.add_subcommand("export", "the registered, deformed CT for 3D Slicer and other programs on ITK");
   command.add_option("--registration", options->registration, "patient_from_tracker, of register fiducials");

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct LiveOptions {
   std::string server, board;
   wire::ForeignSettings foreign;
   bool simulate = false;
@@ -76,7 +76,7 @@ Result<void> refuse_operation_in(const LiveSettings& live) {
                            live.out.string())};
 }
 
-Result<void> prepare(Options& options) {
+Result<void> prepare(LiveOptions& options) {
   const int sources = static_cast<int>(options.simulate) + static_cast<int>(!options.server.empty()) +
                       static_cast<int>(!options.recording.empty());
   if (sources != 1) return Error{Errc::bad_value, "give one of --server HOST:PORT, --recording PATH and --simulate"};
@@ -142,7 +142,7 @@ nlohmann::json json_of(const LiveFigures& figures, const OperationView& operatio
 }
 
 /// Against the truth of a simulated cart, as far as an overlay was drawn.
-Result<void> judge(const Options& options, const LiveApp& app, nlohmann::json& json, Verdict& verdict) {
+Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::json& json, Verdict& verdict) {
   const OperationView operation = app.operation();
   const auto& setup = app.setup();
   if (!setup || !operation.patient || operation.patient->landmarks.empty()) {
@@ -177,7 +177,7 @@ Result<void> judge(const Options& options, const LiveApp& app, nlohmann::json& j
   return {};
 }
 
-Result<ExitCode> run(Options& options) {
+Result<ExitCode> run(LiveOptions& options) {
   const HostTime asked{
       std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
           .count()};
@@ -234,7 +234,7 @@ Result<ExitCode> run(Options& options) {
 }  // namespace
 
 void add_live(CLI::App& app, CommandStatus& status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LiveOptions>();
   options->cart.deformation_mm = 8;
   options->cart.dwell_s = 0.7;
   options->cart.pause_s = 8;

@@ -23,12 +23,12 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 // Two seconds of 60 Hz for a disk that halts, of which the oldest go first.
-constexpr std::size_t kMostFramesWaiting = 120;
+constexpr std::size_t kMostRecordFramesWaiting = 120;
 constexpr auto kSilence = std::chrono::seconds(15);
 /// What the last lines and the sheet need, and other programs.
 constexpr std::uintmax_t kSpareBytes = std::uintmax_t{32} << 20U;
 
-struct Options {
+struct RecordOptions {
   std::string server, video = "raw";
   wire::ForeignSettings foreign;
   fs::path out, json;
@@ -43,7 +43,7 @@ struct Ending {
 };
 
 /// Until there is a reason to end.
-Ending record(EventStream& stream, RecordingWriter& writer, const Options& options, Progress& progress) {
+Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions& options, Progress& progress) {
   auto heard = Clock::now();
   while (!interrupted()) {
     const RecordingFigures& figures = writer.figures();
@@ -93,7 +93,7 @@ nlohmann::json json_of(const RecordingFigures& figures, const Verdict& verdict) 
       {"verdict", name_of(verdict.grade)},    {"reasons", verdict.reasons}};
 }
 
-Result<ExitCode> run(const Options& options) {
+Result<ExitCode> run(const RecordOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
@@ -109,7 +109,7 @@ Result<ExitCode> run(const Options& options) {
   Ending ending;
   std::string peer;
   {
-    EventStream stream(*std::move(client), kMostFramesWaiting);
+    EventStream stream(*std::move(client), kMostRecordFramesWaiting);
     ending = record(stream, **writer, options, progress);
     peer = stream.peer_words();
   }
@@ -128,7 +128,7 @@ Result<ExitCode> run(const Options& options) {
 }  // namespace
 
 void add_record(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RecordOptions>();
   CLI::App& command = *app.add_subcommand("record", "keep video and poses for Slicer, PLUS and birdseye replay");
   command.add_option("--server", options->server, "the appliance or another OpenIGTLink server, HOST:PORT")->required();
   add_foreign_options(command, options->foreign);

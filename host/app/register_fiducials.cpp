@@ -25,14 +25,14 @@ namespace {
 using calibration::OddPointsVerdict;
 using Points = std::vector<Eigen::Vector3d>;
 
-struct Options {
+struct RegisterFiducialsOptions {
   std::filesystem::path ct, tracker, targets, volume, surface, surface_points, out, map, json;
   std::optional<double> localisation_mm;
   bool match = false;
 };
 
 /// What was read and asked for.
-struct Input {
+struct FiducialInput {
   Points ct_mm, touched_mm, targets_mm, surface_points_mm;  ///< ct_mm: in the order of touched_mm once matched
   std::optional<Volume> volume;
   std::optional<Surface> surface;
@@ -40,7 +40,7 @@ struct Input {
 };
 
 /// All that was found out.
-struct Outcome {
+struct FiducialOutcome {
   calibration::PointFit<Patient, Tracker> fit;
   calibration::LocalisationError localisation;
   calibration::OddPoints odd;
@@ -52,11 +52,11 @@ struct Outcome {
   }
 };
 
-Result<Input> read_input(const Options& options) {
+Result<FiducialInput> read_input(const RegisterFiducialsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the file to write"};
   if (options.localisation_mm && !(*options.localisation_mm > 0 && *options.localisation_mm < 100))
     return Error{Errc::bad_value, "--fle: is no length in mm over 0"};
-  Input input;
+  FiducialInput input;
   for (const auto& [path, points] : {std::pair{&options.ct, &input.ct_mm},
                                      {&options.tracker, &input.touched_mm},
                                      {&options.targets, &input.targets_mm},
@@ -79,7 +79,7 @@ Result<Input> read_input(const Options& options) {
   return input;
 }
 
-Result<calibration::PointFit<Patient, Tracker>> fit(const Options& options, Input& input) {
+Result<calibration::PointFit<Patient, Tracker>> fit(const RegisterFiducialsOptions& options, FiducialInput& input) {
   const auto named = [&](const Error& error) {
     return Error{error.code, fmt::format("{}, {}: {}", options.ct.string(), options.tracker.string(), error.what)};
   };
@@ -98,8 +98,8 @@ Result<calibration::PointFit<Patient, Tracker>> fit(const Options& options, Inpu
   return std::move(matched->fit);
 }
 
-Result<Outcome> compute(const Options& options, Input& input) {
-  Outcome out;
+Result<FiducialOutcome> compute(const RegisterFiducialsOptions& options, FiducialInput& input) {
+  FiducialOutcome out;
   auto fitted = fit(options, input);
   if (!fitted) return fitted.error();
   out.fit = *std::move(fitted);
@@ -121,7 +121,7 @@ Result<Outcome> compute(const Options& options, Input& input) {
   return out;
 }
 
-Verdict judge(const Outcome& out) {
+Verdict judge(const FiducialOutcome& out) {
   Verdict verdict;
   // What a fiducial registration error means for a skin-marker registration of the liver.
   verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, 5,
@@ -142,7 +142,7 @@ nlohmann::json rows_of(const Eigen::Matrix4d& m) {
   return rows;
 }
 
-nlohmann::json json_of(const Input& input, const Outcome& out, const Verdict& verdict) {
+nlohmann::json json_of(const FiducialInput& input, const FiducialOutcome& out, const Verdict& verdict) {
   nlohmann::json json;
   json["fre_rms_mm"] = out.fit.fre_rms_mm;
   json["residuals_mm"] = out.fit.residuals_mm;
@@ -183,7 +183,7 @@ nlohmann::json json_of(const Input& input, const Outcome& out, const Verdict& ve
   return json;
 }
 
-void print(const Input& input, const Outcome& out, const Verdict& verdict) {
+void print(const FiducialInput& input, const FiducialOutcome& out, const Verdict& verdict) {
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
     fmt::print("fiducial {:2}", i + 1);
     if (!input.ct_of_touch.empty()) fmt::print(" is CT marker {:2}", input.ct_of_touch[i] + 1);
@@ -204,7 +204,7 @@ void print(const Input& input, const Outcome& out, const Verdict& verdict) {
   fmt::print("verdict: {}\n", name_of(verdict.grade));
 }
 
-Result<ExitCode> register_fiducials(const Options& options) {
+Result<ExitCode> register_fiducials(const RegisterFiducialsOptions& options) {
   auto input = read_input(options);
   if (!input) return input.error();
   const auto out = compute(options, *input);
@@ -230,7 +230,7 @@ Result<ExitCode> register_fiducials(const Options& options) {
 }  // namespace
 
 void add_register(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RegisterFiducialsOptions>();
   CLI::App& reg = *app.add_subcommand("register", "bring a CT and the patient together");
   reg.require_subcommand(1);
   add_register_views(reg, status);

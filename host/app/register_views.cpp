@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct RegisterViewsOptions {
   fs::path file, out, json;
 };
 
@@ -193,7 +193,7 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
-Result<ExitCode> run(const Options& options) {
+Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   auto read = read_case(options.file);
   if (!read) return read.error();
@@ -241,7 +241,7 @@ Result<ExitCode> run(const Options& options) {
 }  // namespace
 
 void add_register_views(CLI::App& reg, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RegisterViewsOptions>();
   CLI::App& views = *reg.add_subcommand("views", "by deformation, to several views of a laparoscope");
   views.add_option("--case", options->file, "the case: volume, model and views, a TOML file")->required();
   views.add_option("--out", options->out, "folder for the field, pictures and report")->required();

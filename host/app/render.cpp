@@ -25,7 +25,7 @@ namespace {
 /// As the lens took it; straight, the centre to scale; straight, the whole picture.
 constexpr const char* kDisplays[] = {"distorted", "undistorted", "undistorted-whole"};
 
-struct Options {
+struct RenderOptions {
   std::filesystem::path volume, labels, camera, pose, path, deformation, over, out, movie, json;
   std::vector<int> keep;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
@@ -37,7 +37,7 @@ struct Options {
 };
 
 /// Where it is seen from, and through what.
-Result<void> look(RenderScene& scene, const Options& options) {
+Result<void> look(RenderScene& scene, const RenderOptions& options) {
   const bool posed = !options.pose.empty() || !options.path.empty();
   if (options.camera.empty() && !posed) return look_from_the_front(scene, options.size, options.clip);
   if (options.camera.empty() || !posed) {
@@ -84,7 +84,7 @@ void straighten(RenderScene& scene, const std::string& display) {
   scene.camera = straight;
 }
 
-Result<RenderScene> scene_of(const Options& options) {
+Result<RenderScene> scene_of(const RenderOptions& options) {
   RenderScene scene;
   auto volume = read_shown(options.volume, options.labels, options.keep);
   if (!volume) return volume.error();
@@ -126,7 +126,7 @@ std::string transparent_png_of(ImageRgba image) {
   return png_of(RgbaView{image.rgba, image.width_px, image.height_px});
 }
 
-Result<void> write_still(const Options& options, const RenderScene& scene, Engine& engine) {
+Result<void> write_still(const RenderOptions& options, const RenderScene& scene, Engine& engine) {
   const auto began = std::chrono::steady_clock::now();
   const ImageRgba image = overlay_of(engine, scene, scene.camera_from_patient, scene.settings);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
@@ -165,7 +165,7 @@ Result<void> write_still(const Options& options, const RenderScene& scene, Engin
   return {};
 }
 
-Result<void> render(const Options& options) {
+Result<void> render(const RenderOptions& options) {
   if (options.out.empty() && !options.window) {
     return Error{Errc::bad_value, "--out: is empty; name the PNG to write, or give --window"};
   }
@@ -197,7 +197,7 @@ Result<void> render(const Options& options) {
 }  // namespace
 
 void add_render(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<RenderOptions>();
   CLI::App& command = *app.add_subcommand("render", "render a CT to a PNG");
   command.add_option("--volume", options->volume, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
   CLI::Option* const camera = command.add_option("--camera", options->camera,

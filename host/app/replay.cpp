@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct ReplayOptions {
   ReplayInputs inputs;
   fs::path volume, labels, deformation, out, json;
   std::vector<int> keep;
@@ -60,7 +60,7 @@ std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& d
 /// Draws every frame, and writes some.
 class Player {
  public:
-  Player(const Options& options, const Setup& setup, const TrustFigures& figures, Engine& engine)
+  Player(const ReplayOptions& options, const Setup& setup, const TrustFigures& figures, Engine& engine)
       : options_(options), engine_(engine) {
     look_.render.step_mm = options.step_mm;
     painter_.set_setup(setup, figures);
@@ -97,7 +97,7 @@ class Player {
   Replayed done;
 
  private:
-  const Options& options_;
+  const ReplayOptions& options_;
   Engine& engine_;
   OverlayLook look_;
   FramePainter painter_;
@@ -155,7 +155,7 @@ Result<void> play(RecordingReader& reader, Player& player, Progress& progress) {
   }
 }
 
-Result<ExitCode> run(const Options& options) {
+Result<ExitCode> run(const ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
   if (!reader) return reader.error();
@@ -228,7 +228,7 @@ void add_inputs(CLI::App& command, ReplayInputs& inputs) {
 }  // namespace
 
 void add_replay(CLI::App& app, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReplayOptions>();
   CLI::App& command = *app.add_subcommand("replay", "draw the CT over a recording, the same to the bit each time");
   add_inputs(command, options->inputs);
   command.add_option("--volume", options->volume, "the CT")->required();

@@ -11,13 +11,13 @@ namespace birdseye::host {
 
 namespace {
 
-struct Options {
+struct VolumeFromSurfaceOptions {
   std::filesystem::path surface, out;
   SlabSettings slab;
   std::vector<double> seen_from{0, 0, 0};
 };
 
-Result<void> volume_from_surface(const Options& options) {
+Result<void> volume_from_surface(const VolumeFromSurfaceOptions& options) {
   const auto surface = read_surface(options.surface);
   if (!surface) return surface.error();
   SlabSettings settings = options.slab;
@@ -39,7 +39,7 @@ Result<void> volume_from_surface(const Options& options) {
 }  // namespace
 
 void add_volume_from_surface(CLI::App& volume, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VolumeFromSurfaceOptions>();
   CLI::App& command = *volume.add_subcommand("from-surface", "a slab of tissue behind a surface, where there is no CT");
   command.add_option("surface", options->surface, "STL, PLY, OBJ or VTK, patient LPS mm; open or closed")->required();
   command.add_option("--spacing-mm", options->slab.spacing_mm, "of the voxels (default: 0.5)");

@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Options {
+struct VolumeMarkersOptions {
   std::filesystem::path path, out, picture, json;
   MarkerKind kind = MarkerKind::ball;
   double diameter_mm = 0, hole_mm = 0, height_mm = 0;
@@ -87,7 +87,7 @@ nlohmann::json json_of(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-Result<ExitCode> volume_markers(const Options& options) {
+Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the file to write"};
   const MarkerShape shape{options.kind, options.diameter_mm, options.hole_mm, options.height_mm};
   if (auto sound = check(shape); !sound) return Error{sound.error().code, "--shape: " + sound.error().what};
@@ -139,7 +139,7 @@ Result<ExitCode> volume_markers(const Options& options) {
 }  // namespace
 
 void add_volume_markers(CLI::App& volume, CommandStatus& status) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<VolumeMarkersOptions>();
   CLI::App& markers = *volume.add_subcommand("markers", "the centres of fiducial markers in a CT");
   markers.add_option("path", options->path, "the CT")->required();
   const std::map<std::string, MarkerKind> kinds{

@@ -81,7 +81,7 @@ void fit_axis(RodCalibration& rod) {
   }
 }
 
-nlohmann::json json_of(const Eigen::Vector3d& v) {
+nlohmann::json xyz_json(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -169,8 +169,8 @@ nlohmann::json rod_json(const RodCalibration& rod) {
   nlohmann::json out{{"reference_angle_deg", rod.at_reference().angle_deg}, {"angles", nlohmann::json::array()}};
   for (const RodGroup& group : rod.groups) out["angles"].push_back(group_json(group));
   if (!rod.scope) return out;
-  out.update({{"axis_in_sensor", json_of(rod.scope->axis_in_sensor)},
-              {"axis_point_in_sensor_mm", json_of(rod.scope->axis_point_in_sensor_mm)},
+  out.update({{"axis_in_sensor", xyz_json(rod.scope->axis_in_sensor)},
+              {"axis_point_in_sensor_mm", xyz_json(rod.scope->axis_point_in_sensor_mm)},
               {"picture_turn", rod.scope->picture_turn}});
   return out;
 }

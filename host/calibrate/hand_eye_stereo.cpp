@@ -15,7 +15,7 @@ using calibration::HandEyeStation;
 using calibration::PatternView;
 using calibration::StereoLens;
 
-Result<StereoLens> read_lens(const HandEyeFiles& files, const PictureViews& pictures) {
+Result<StereoLens> read_stereo_lens(const HandEyeFiles& files, const PictureViews& pictures) {
   auto camera = read_camera(files.right_camera);
   if (!camera) return camera.error();
   if (camera->width_px != pictures.width_px || camera->height_px != pictures.height_px)
@@ -51,7 +51,7 @@ Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const calib
   }
   if (const auto paired = pair_by_name(left, out.views); !paired) return paired.error();
   if (files.right_camera.empty() || pictures->width_px == 0) return out;
-  auto lens = read_lens(files, *pictures);
+  auto lens = read_stereo_lens(files, *pictures);
   if (!lens) return lens.error();
   out.lens = *std::move(lens);
   return out;

@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr Duration kSilence = Duration::from_ms(6000);
+constexpr Duration kStationSilence = Duration::from_ms(6000);
 constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
 
 /// Whether frames and the scope's poses come, and what the appliance says of it if not.
@@ -34,12 +34,12 @@ class Silence {
   }
 
   [[nodiscard]] Result<void> check() const {
-    const std::int64_t seconds = kSilence.ns / 1'000'000'000;
-    if (host_now() - heard_ > kSilence) {
+    const std::int64_t seconds = kStationSilence.ns / 1'000'000'000;
+    if (host_now() - heard_ > kStationSilence) {
       return Error{Errc::timeout, fmt::format("{}: no frame has come for {} s{}{}", plan_.server, seconds,
                                               status_.empty() ? "" : ": ", status_)};
     }
-    if (host_now() - posed_ > kSilence) {
+    if (host_now() - posed_ > kStationSilence) {
       return Error{Errc::timeout, fmt::format("{}: no pose of \"{}\" has come for {} s{}{}", plan_.server,
                                               plan_.guide.bird, seconds, others_.empty() ? "" : "; there is " + others_,
                                               status_.empty() ? "" : "; it says: " + status_)};

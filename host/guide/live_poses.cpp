@@ -14,7 +14,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr Duration kSilence = Duration::from_ms(5000);
+constexpr Duration kPoseSilence = Duration::from_ms(5000);
 constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
 
 }  // namespace
@@ -22,7 +22,7 @@ constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption 
 Result<PoseSet> collect_poses(const std::string& server, const std::string& bird, double seconds, Progress& progress) {
   auto client = connect_appliance(server);
   if (!client) return client.error();
-  if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(kSilence)); !done)
+  if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(kPoseSilence)); !done)
     return done.error();
   note_interrupts();
   PoseSet set;
@@ -35,9 +35,9 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
   for (double since_s = 0; since_s < seconds && !interrupted();) {
     const auto event = (*client)->next(Deadline::after(kLook));
     if (!event) return event.error();
-    if (host_now() - heard > kSilence) {
+    if (host_now() - heard > kPoseSilence) {
       return Error{Errc::timeout,
-                   fmt::format("{}: no pose of \"{}\" for {} s{}{}", server, bird, kSilence.ns / 1'000'000'000,
+                   fmt::format("{}: no pose of \"{}\" for {} s{}{}", server, bird, kPoseSilence.ns / 1'000'000'000,
                                others.empty() ? "" : fmt::format("; it tells of {}", fmt::join(others, ", ")),
                                status.empty() ? "" : "; it says: " + status)};
     }

@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr Duration kPatience = Duration::from_ms(10'000);
+constexpr Duration kHardwarePatience = Duration::from_ms(10'000);
 
 /// Why not all that are named run; empty when they do, and then their identities are in told.
 std::string gather(const wire::Health& health, const std::vector<std::string>& names, Hardware& told) {
@@ -35,7 +35,7 @@ std::string gather(const wire::Health& health, const std::vector<std::string>& n
 Result<Hardware> ask_hardware(const std::string& address, const std::vector<std::string>& names) {
   auto client = connect_appliance(address);
   if (!client) return client.error();
-  const Deadline deadline = Deadline::after(kPatience);
+  const Deadline deadline = Deadline::after(kHardwarePatience);
   if (auto done = (*client)->subscribe({.frames = false, .tracking = false}, deadline); !done) return done.error();
   std::string missing = "it has said nothing of its instruments";
   for (;;) {

@@ -9,7 +9,7 @@ namespace birdseye::host {
 namespace {
 
 constexpr int kUsualPort = 18944;
-constexpr Duration kPatience = Duration::from_ms(8000);
+constexpr Duration kLinkPatience = Duration::from_ms(8000);
 
 }  // namespace
 
@@ -26,7 +26,7 @@ Result<std::unique_ptr<wire::Client>> connect_appliance(const std::string& addre
   const std::string host = address.substr(0, colon);
   if (host.empty())
     return Error{Errc::bad_value, fmt::format("\"{}\" is no address of an appliance: give HOST:PORT", address)};
-  auto client = wire::Client::connect(host, port, Deadline::after(kPatience), foreign);
+  auto client = wire::Client::connect(host, port, Deadline::after(kLinkPatience), foreign);
   if (!client) {
     return Error{
         client.error().code,
