@@ -36,8 +36,8 @@ Eigen::Isometry3d pose_at(double x_mm, double angle_rad = 0.3) {
 }
 
 /// A feed, and a server whose milliseconds are those of the test.
-struct Link {
-  explicit Link(ForeignSettings settings = {}) : feed(std::move(settings), host(0)) {}
+struct FeedLink {
+  explicit FeedLink(ForeignSettings settings = {}) : feed(std::move(settings), host(0)) {}
   static HostTime host(std::int64_t ms) { return {kHostNs + ms * kMs}; }
   static Envelope at(std::int64_t ms, unsigned version = 1) { return {kServerNs + ms * kMs, version}; }
   static std::int64_t ms_of(DeviceTime time) { return (time.ns - kServerNs) / kMs; }
@@ -77,7 +77,7 @@ double distance_mm(const PoseAnswer& pose, const Eigen::Isometry3d& expected) {
 }
 
 TEST(ForeignFeed, APoseIsInterpolatedAtThePicturesTimeOnTheServersClock) {
-  Link link;
+  FeedLink link;
   for (int i = 0; i <= 3; ++i) link.transform("ProbeToTracker", 20 * i, pose_at(10.0 * i));
   link.image(70);  // moves 10 mm in 20 ms, and the measurement after it is not there yet
   EXPECT_TRUE(link.of<VideoFrame>(73).empty());
@@ -86,7 +86,7 @@ TEST(ForeignFeed, APoseIsInterpolatedAtThePicturesTimeOnTheServersClock) {
   const auto frames = link.of<VideoFrame>(83);
   ASSERT_EQ(frames.size(), 1U);
   const FrameInfo& info = frames[0].info;
-  EXPECT_EQ(Link::ms_of(info.acquired), 70);
+  EXPECT_EQ(FeedLink::ms_of(info.acquired), 70);
   EXPECT_EQ(info.pose.kind, PoseKind::interpolated);
   EXPECT_LT(distance_mm(info.pose, pose_at(35)), 1e-3);
   EXPECT_NEAR(info.pose.speed_mm_s, 500, 1);
@@ -94,11 +94,11 @@ TEST(ForeignFeed, APoseIsInterpolatedAtThePicturesTimeOnTheServersClock) {
 }
 
 TEST(ForeignFeed, ATransformOfThePicturesOwnStampIsItsPoseThoughItComesAfter) {
-  Link link;  // as PLUS sends them
+  FeedLink link;  // as PLUS sends them
   for (int i = 0; i < 5; ++i) {
     link.image(50 * i);
     EXPECT_TRUE(link.of<VideoFrame>(50 * i + 2).empty());
-    link.push(transform_message("ProbeToTracker", Link::at(50 * i), pose_at(i)), 50 * i + 1);
+    link.push(transform_message("ProbeToTracker", FeedLink::at(50 * i), pose_at(i)), 50 * i + 1);
     const auto frames = link.of<VideoFrame>(50 * i + 3);
     ASSERT_EQ(frames.size(), 1U);
     EXPECT_EQ(frames[0].info.sequence, static_cast<std::uint64_t>(i));
@@ -108,7 +108,7 @@ TEST(ForeignFeed, ATransformOfThePicturesOwnStampIsItsPoseThoughItComesAfter) {
 }
 
 TEST(ForeignFeed, APictureWaitsForPosesNoLongerThanItMay) {
-  Link link;
+  FeedLink link;
   link.transform("ProbeToTracker", 0, pose_at(0));
   link.transform("ProbeToTracker", 20, pose_at(10));
   link.image(30);
@@ -127,8 +127,8 @@ TEST(ForeignFeed, APictureWaitsForPosesNoLongerThanItMay) {
 TEST(ForeignFeed, PicturesOfEitherHeaderGreyOrColouredComeAsTheyWereSent) {
   for (const unsigned version : {1U, 2U}) {
     for (const int components : {1, 3}) {
-      Link link;
-      link.push(image_message("Endo", Link::at(0, version), {.components = components, .first = 9}), 0);
+      FeedLink link;
+      link.push(image_message("Endo", FeedLink::at(0, version), {.components = components, .first = 9}), 0);
       const auto frames = link.of<VideoFrame>(50);
       ASSERT_EQ(frames.size(), 1U) << version << components;
       EXPECT_EQ(frames[0].width_px, 4);
@@ -158,14 +158,14 @@ TEST(ForeignFeed, PosesOfAllTypesAreTheSame) {
   quaternion(position, true);
   quaternion(short_position, false);
   const auto wrapped = [](const char* type, const char* device, unsigned version, const Bytes& content) {
-    return testing::foreign_message(type, device, Link::at(0, version), content);
+    return testing::foreign_message(type, device, FeedLink::at(0, version), content);
   };
   for (const unsigned version : {1U, 2U}) {
     for (const Bytes& message :
          {wrapped("TDATA", "Tracker", version, tdata), wrapped("QTDATA", "T", version, qtdata),
           wrapped("POSITION", "Stylus", version, position), wrapped("QTRANS", "Stylus", version, short_position),
-          transform_message("Stylus", Link::at(0, version), pose)}) {
-      Link link({.scope_device = "another"});
+          transform_message("Stylus", FeedLink::at(0, version), pose)}) {
+      FeedLink link({.scope_device = "another"});
       link.push(message, 0);
       const auto birds = link.of<Birds>(5);
       ASSERT_EQ(birds.size(), 1U) << message[2] << version;
@@ -184,7 +184,7 @@ TEST(ForeignFeed, WhatIsNoPoseIsNone) {
   Eigen::Isometry3d nothing = pose_at(1);
   nothing.translation().x() = std::nan("");
   for (const Eigen::Isometry3d& no_pose : {scaled, mirrored, nothing, Eigen::Isometry3d::Identity()}) {
-    Link link;
+    FeedLink link;
     link.transform("ProbeToTracker", 0, no_pose);
     link.image(0);
     for (const Event& event : link.events(50)) {
@@ -196,17 +196,18 @@ TEST(ForeignFeed, WhatIsNoPoseIsNone) {
 }
 
 TEST(ForeignFeed, DamagedMessagesArePassedOverAndCounted) {
-  Link link;
-  Bytes wrong = transform_message("ProbeToTracker", Link::at(0), pose_at(1));
+  FeedLink link;
+  Bytes wrong = transform_message("ProbeToTracker", FeedLink::at(0), pose_at(1));
   wrong.back() ^= 0x40U;
   link.push(wrong, 0);
   EXPECT_THAT(link.feed.words(), AllOf(HasSubstr("1 damaged"), HasSubstr("\"ProbeToTracker\" has a wrong checksum")));
   // Bodies shorter than what they say of themselves, their checksums right.
   const auto cut = [](const char* type, const Bytes& whole, std::size_t by) {
-    return testing::foreign_message(type, "X", Link::at(0),
+    return testing::foreign_message(type, "X", FeedLink::at(0),
                                     Bytes(whole.begin() + kHeaderBytes, whole.end() - static_cast<std::ptrdiff_t>(by)));
   };
-  const Bytes image = image_message("X", Link::at(0), {}), pose = transform_message("X", Link::at(0), pose_at(1));
+  const Bytes image = image_message("X", FeedLink::at(0), {}),
+              pose = transform_message("X", FeedLink::at(0), pose_at(1));
   link.push(cut("IMAGE", image, 1), 0);
   EXPECT_THAT(link.feed.words(), AllOf(HasSubstr("2 damaged"), HasSubstr("IMAGE \"X\" is cut short")));
   link.push(cut("IMAGE", image, 40), 0);
@@ -214,7 +215,7 @@ TEST(ForeignFeed, DamagedMessagesArePassedOverAndCounted) {
   link.push(cut("TDATA", pose, 0), 0);
   link.push(cut("QTDATA", pose, 0), 0);
   link.push(cut("POSITION", pose, 0), 0);
-  Bytes lies = transform_message("X", Link::at(0, 2), pose_at(1));
+  Bytes lies = transform_message("X", FeedLink::at(0, 2), pose_at(1));
   lies[kHeaderBytes + 3] = 0xFF;  // of its meta data's index
   link.push(testing::foreign_message("TRANSFORM", "X", {0, 1}, {}), 0);
   lies = testing::foreign_message("TRANSFORM", "X", {0, 1}, Bytes(lies.begin() + kHeaderBytes, lies.end()));
@@ -243,9 +244,9 @@ TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
       {{{"StylusToTrackerStatus", "INVALID"}}, true},
   };
   for (const auto& [meta_data, valid] : cases) {
-    Link link;
+    FeedLink link;
     for (int i = 0; i < 5; ++i) {
-      Envelope envelope = Link::at(20 * i, 2);
+      Envelope envelope = FeedLink::at(20 * i, 2);
       envelope.meta_data = meta_data;
       link.push(transform_message("ProbeToTracker", envelope, pose_at(i)), 20 * i);
     }
@@ -255,7 +256,7 @@ TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
     EXPECT_EQ(frames[0].info.pose.tracker_from_sensor.has_value(), valid) << ::testing::PrintToString(meta_data);
   }
   // Of a list each element is judged by itself.
-  Link link(ForeignSettings{.scope_device = "Probe"});
+  FeedLink link(ForeignSettings{.scope_device = "Probe"});
   for (int i = 0; i < 5; ++i) {
     Bytes list;
     for (const char* name : {"Probe", "Stylus"}) {
@@ -263,7 +264,7 @@ TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
       put_text(list, "", 2);
       put_matrix(list, pose_at(i));
     }
-    Envelope envelope = Link::at(20 * i, 2);
+    Envelope envelope = FeedLink::at(20 * i, 2);
     envelope.meta_data = {{"ProbeStatus", "MISSING"}, {"StylusStatus", "OK"}};
     link.push(testing::foreign_message("TDATA", "Tracker", envelope, list), 20 * i);
   }
@@ -274,7 +275,7 @@ TEST(ForeignFeed, WhatTheMetaDataCallInvalidIsNoPose) {
 }
 
 TEST(ForeignFeed, MetaDataThatLieAreDamage) {
-  const Bytes whole = transform_message("ProbeToTracker", Link::at(0, 2), pose_at(1));
+  const Bytes whole = transform_message("ProbeToTracker", FeedLink::at(0, 2), pose_at(1));
   const Bytes body(whole.begin() + kHeaderBytes, whole.end());
   // The index: how many, and of the one entry the lengths of key and value.
   for (const auto& [byte, value] : {std::pair{60, 2}, {61, 2}, {62, 1}, {63, 9}, {66, 1}, {69, 3}}) {
@@ -282,14 +283,14 @@ TEST(ForeignFeed, MetaDataThatLieAreDamage) {
     lies[static_cast<std::size_t>(byte)] = static_cast<std::uint8_t>(value);
     Bytes message = testing::foreign_message("TRANSFORM", "ProbeToTracker", {kServerNs, 1}, lies);
     message[1] = 2;
-    Link link;
+    FeedLink link;
     link.push(message, 0);
     EXPECT_THAT(link.feed.words(), HasSubstr("1 damaged")) << byte;
   }
 }
 
 TEST(ForeignFeed, APoseThatRepeatsItselfForASecondIsNoMeasurement) {
-  Link link;
+  FeedLink link;
   std::vector<VideoFrame> frames;
   for (int ms = 0; ms <= 2600; ms += 20) {
     // It moves, stands for 1.4 s, moves again.
@@ -300,7 +301,7 @@ TEST(ForeignFeed, APoseThatRepeatsItselfForASecondIsNoMeasurement) {
   }
   ASSERT_GT(frames.size(), 20U);
   for (const VideoFrame& frame : frames) {
-    const auto ms = Link::ms_of(frame.info.acquired);
+    const auto ms = FeedLink::ms_of(frame.info.acquired);
     EXPECT_EQ(frame.info.pose.tracker_from_sensor.has_value(), ms <= 1600 || ms >= 2000) << ms;
     if (ms <= 1600 || ms >= 2000) continue;
     EXPECT_THAT(frame.info.pose.reason, HasSubstr("\"ProbeToTracker\" stands still to the last digit"));
@@ -309,17 +310,17 @@ TEST(ForeignFeed, APoseThatRepeatsItselfForASecondIsNoMeasurement) {
 
 TEST(ForeignFeed, DamageAnywhereCrashesNothing) {
   std::mt19937 rng(11);
-  const std::vector<Bytes> whole{image_message("Endo", Link::at(0, 2), {}),
-                                 transform_message("ProbeToTracker", Link::at(0, 2), pose_at(1)),
-                                 image_message("Endo", Link::at(0), {.components = 1})};
-  Link link;
+  const std::vector<Bytes> whole{image_message("Endo", FeedLink::at(0, 2), {}),
+                                 transform_message("ProbeToTracker", FeedLink::at(0, 2), pose_at(1)),
+                                 image_message("Endo", FeedLink::at(0), {.components = 1})};
+  FeedLink link;
   for (int i = 0; i < 20'000; ++i) {
     const Bytes& from = whole[static_cast<std::size_t>(i) % whole.size()];
     Bytes content(from.begin() + kHeaderBytes, from.end());
     for (int hits = 0; hits < 3; ++hits) content[rng() % std::min<std::size_t>(content.size(), 90)] = rng() & 0xFFU;
     content.resize(rng() % 4 == 0 ? rng() % content.size() : content.size());
     Bytes message = testing::foreign_message(std::string_view(reinterpret_cast<const char*>(&from[2])), "Endo",
-                                             Link::at(i), content);
+                                             FeedLink::at(i), content);
     message[1] = from[1];
     link.push(message, i);
     (void)link.events(i);
@@ -328,23 +329,23 @@ TEST(ForeignFeed, DamageAnywhereCrashesNothing) {
 }
 
 TEST(ForeignFeed, VoxelsOf16BitsAreAClearError) {
-  Link link;
+  FeedLink link;
   link.transform("ProbeToTracker", 0, pose_at(1));
-  link.push(image_message("CT_or_US", Link::at(0), {.components = 1, .scalar_type = 5, .scalar_bytes = 2}), 0);
+  link.push(image_message("CT_or_US", FeedLink::at(0), {.components = 1, .scalar_type = 5, .scalar_bytes = 2}), 0);
   auto told = link.of<Status>(10);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_FALSE(told[0].ok);
   EXPECT_EQ(told[0].text,
             "IMAGE \"CT_or_US\" has 16-bit voxels of 1 component, and 8-bit grey or RGB is read here: have the server "
             "send that");
-  link.push(image_message("CT_or_US", Link::at(20), {}), 20);
+  link.push(image_message("CT_or_US", FeedLink::at(20), {}), 20);
   told = link.of<Status>(30);
   ASSERT_EQ(told.size(), 1U) << "it is told that all is well again";
   EXPECT_TRUE(told[0].ok);
 }
 
 TEST(ForeignFeed, PicturesMayChangeTheirSize) {
-  Link link;
+  FeedLink link;
   link.transform("ProbeToTracker", 0, pose_at(1));
   link.image(0, {.width = 8, .height = 6});
   link.image(10, {.width = 5, .height = 7, .components = 1});
@@ -358,14 +359,14 @@ TEST(ForeignFeed, PicturesMayChangeTheirSize) {
 }
 
 TEST(ForeignFeed, OfSeveralDevicesTheScopesMustBeNamed) {
-  const auto both = [](Link& link) {
+  const auto both = [](FeedLink& link) {
     for (int i = 0; i < 2; ++i) {
       link.transform("StylusToTracker", 10 * i, pose_at(500));
       link.transform("ProbeToTracker", 10 * i, pose_at(1));
     }
     link.image(10);
   };
-  Link unnamed;
+  FeedLink unnamed;
   both(unnamed);
   std::vector<std::string> told;
   for (const Event& event : unnamed.events(50)) {
@@ -379,7 +380,7 @@ TEST(ForeignFeed, OfSeveralDevicesTheScopesMustBeNamed) {
       told, ::testing::Each(AllOf(HasSubstr("\"ProbeToTracker\", \"StylusToTracker\""), HasSubstr("--scope-device"))));
   EXPECT_EQ(told.size(), 2U);
 
-  Link named({.scope_device = "ProbeToTracker"});
+  FeedLink named({.scope_device = "ProbeToTracker"});
   both(named);
   std::set<std::string> birds;
   for (const Event& event : named.events(50)) {
@@ -391,7 +392,7 @@ TEST(ForeignFeed, OfSeveralDevicesTheScopesMustBeNamed) {
   }
   EXPECT_THAT(birds, ::testing::ElementsAre("StylusToTracker", "scope"));
 
-  Link wrong({.scope_device = "Probe"});
+  FeedLink wrong({.scope_device = "Probe"});
   both(wrong);
   const auto status = wrong.of<Status>(50);
   ASSERT_EQ(status.size(), 1U);
@@ -399,7 +400,7 @@ TEST(ForeignFeed, OfSeveralDevicesTheScopesMustBeNamed) {
 }
 
 TEST(ForeignFeed, AnotherDevicesPosesNeverPassForTheScopes) {
-  Link link({.scope_device = "ProbeToTracker"});
+  FeedLink link({.scope_device = "ProbeToTracker"});
   link.transform("scope", 0, pose_at(900));
   link.transform("ProbeToTracker", 0, pose_at(1));
   link.transform("TrackerToProbe", 0, pose_at(-1));
@@ -411,7 +412,7 @@ TEST(ForeignFeed, AnotherDevicesPosesNeverPassForTheScopes) {
 }
 
 TEST(ForeignFeed, ThePointersPosesAreNeverTheScopes) {
-  Link link({.not_scope = "StylusToTracker"});
+  FeedLink link({.not_scope = "StylusToTracker"});
   for (int i = 0; i < 2; ++i) link.transform("StylusToTracker", 10 * i, pose_at(500));
   link.image(10);
   bool told = false;
@@ -433,22 +434,22 @@ TEST(ForeignFeed, ThePointersPosesAreNeverTheScopes) {
 }
 
 TEST(ForeignFeed, OfSeveralVideosTheScopesMustBeNamed) {
-  Link link;
+  FeedLink link;
   link.image(0);
-  link.push(image_message("Ultrasound", Link::at(5), {}), 5);
+  link.push(image_message("Ultrasound", FeedLink::at(5), {}), 5);
   const auto told = link.of<Status>(50);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_THAT(told[0].text, AllOf(HasSubstr("\"Endo\", \"Ultrasound\""), HasSubstr("--video-device")));
-  Link named({.video_device = "Ultrasound"});
+  FeedLink named({.video_device = "Ultrasound"});
   named.image(0);
-  named.push(image_message("Ultrasound", Link::at(5), {.width = 7}), 5);
+  named.push(image_message("Ultrasound", FeedLink::at(5), {.width = 7}), 5);
   const auto frames = named.of<VideoFrame>(50);
   ASSERT_EQ(frames.size(), 1U);
   EXPECT_EQ(frames[0].width_px, 7);
 }
 
 TEST(ForeignFeed, WithoutTimesThereIsVideoAndNoPose) {
-  Link link;
+  FeedLink link;
   link.push(transform_message("ProbeToTracker", {}, pose_at(1)), 0);
   link.push(image_message("Endo", {}, {}), 3);
   bool framed = false;
@@ -464,12 +465,12 @@ TEST(ForeignFeed, WithoutTimesThereIsVideoAndNoPose) {
     EXPECT_EQ(frame->info.acquired_sigma, Duration::from_ms(50));
     const auto related = link.feed.host_from_device(frame->info.acquired);
     ASSERT_TRUE(related);
-    EXPECT_EQ(related->time, Link::host(3) + Duration{kWayNs}) << "when it came";
+    EXPECT_EQ(related->time, FeedLink::host(3) + Duration{kWayNs}) << "when it came";
     EXPECT_GE(related->sigma, Duration::from_ms(50));
   }
   EXPECT_TRUE(framed);
   // Pictures with times and poses without are no better.
-  Link half;
+  FeedLink half;
   half.push(transform_message("ProbeToTracker", {}, pose_at(1)), 0);
   half.image(0);
   const auto frames = half.of<VideoFrame>(10);
@@ -478,14 +479,14 @@ TEST(ForeignFeed, WithoutTimesThereIsVideoAndNoPose) {
 }
 
 TEST(ForeignFeed, ItIsToldWhatDoesNotCome) {
-  Link video;
+  FeedLink video;
   video.image(0);
   EXPECT_TRUE(video.of<Status>(100).empty()) << "poses may come yet";
   video.image(2500);
   auto told = video.of<Status>(2510);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_THAT(told[0].text, HasSubstr("video and no poses"));
-  Link poses;
+  FeedLink poses;
   for (int i = 0; i < 26; ++i) poses.transform("ProbeToTracker", 100 * i, pose_at(i));
   told = poses.of<Status>(2510);
   ASSERT_EQ(told.size(), 1U);
@@ -503,11 +504,11 @@ TEST(ForeignFeed, ItIsToldWhatDoesNotCome) {
 }
 
 TEST(ForeignFeed, OtherTypesAreNamedOnce) {
-  Link link;
+  FeedLink link;
   for (int i = 0; i < 3; ++i) {
     for (const char* type : {"POLYDATA", "STATUS", "VIDEO", "STRING"})
-      link.push(testing::foreign_message(type, "Any", Link::at(i), {1, 2, 3}), i);
-    link.push(image_message("CT", Link::at(i), {.slices = 4, .components = 1}), i);
+      link.push(testing::foreign_message(type, "Any", FeedLink::at(i), {1, 2, 3}), i);
+    link.push(image_message("CT", FeedLink::at(i), {.slices = 4, .components = 1}), i);
   }
   EXPECT_TRUE(link.events(10).empty());
   EXPECT_EQ(link.feed.words(),
@@ -516,15 +517,15 @@ TEST(ForeignFeed, OtherTypesAreNamedOnce) {
 }
 
 TEST(ForeignFeed, AClockThatIsMovedBackStartsAnew) {
-  Link link;
+  FeedLink link;
   for (int i = 0; i < 50; ++i) link.transform("ProbeToTracker", 20 * i, pose_at(i));
   (void)link.events(1000);
   // The server plays its recording again: an hour earlier by its stamps.
   constexpr std::int64_t kHourMs = 3'600'000;
   bool told = false;
   for (int i = 50; i < 300; ++i) {
-    link.push(transform_message("ProbeToTracker", Link::at(20 * i - kHourMs), pose_at(i)), 20 * i);
-    link.push(image_message("Endo", Link::at(20 * i - kHourMs), {}), 20 * i);
+    link.push(transform_message("ProbeToTracker", FeedLink::at(20 * i - kHourMs), pose_at(i)), 20 * i);
+    link.push(image_message("Endo", FeedLink::at(20 * i - kHourMs), {}), 20 * i);
     for (const Event& event : link.events(20 * i + 5)) {
       told = told || std::holds_alternative<ClockChange>(event);
       if (const auto* frame = std::get_if<VideoFrame>(&event); frame != nullptr && i > 51) {
@@ -533,8 +534,8 @@ TEST(ForeignFeed, AClockThatIsMovedBackStartsAnew) {
     }
   }
   EXPECT_TRUE(told);
-  const auto related = link.feed.host_from_device({Link::at(6000 - kHourMs).stamp_ns});
-  EXPECT_NEAR(Duration{related->time.ns - Link::host(6000).ns}.seconds() * 1e3, 2 - 20, 2);
+  const auto related = link.feed.host_from_device({FeedLink::at(6000 - kHourMs).stamp_ns});
+  EXPECT_NEAR(Duration{related->time.ns - FeedLink::host(6000).ns}.seconds() * 1e3, 2 - 20, 2);
 }
 
 }  // namespace

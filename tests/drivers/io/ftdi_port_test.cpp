@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Duration kLong = Duration::from_ms(20'000);  // for what must come; no test waits for it to pass
+constexpr Duration kUsbPatience = Duration::from_ms(20'000);  // for what must come; no test waits for it to pass
 
 std::unique_ptr<FtdiPort> open(const std::shared_ptr<FakeFt232r>& chip, const FtdiSettings& settings = {}) {
   auto port = FtdiPort::open(FakeFt232r::plug(chip), settings);
@@ -27,7 +27,7 @@ std::unique_ptr<FtdiPort> open(const std::shared_ptr<FakeFt232r>& chip, const Ft
 
 Bytes read_some(FtdiPort& port) {
   Bytes chunk(1024);
-  const auto got = port.read(chunk, device_now() + kLong);
+  const auto got = port.read(chunk, device_now() + kUsbPatience);
   EXPECT_TRUE(got) << (got ? "" : got.error().what);
   chunk.resize(got ? *got : 0);
   return chunk;
@@ -110,7 +110,7 @@ TEST(FtdiPort, RefusesAChipItDoesNotKnowAndARateOutOfReach) {
 TEST(FtdiPort, CarriesAShortExchange) {
   const auto chip = std::make_shared<FakeFt232r>();
   const auto port = open(chip);
-  ASSERT_TRUE(port->write(Bytes{0x4F, 0x00}, device_now() + kLong));
+  ASSERT_TRUE(port->write(Bytes{0x4F, 0x00}, device_now() + kUsbPatience));
   EXPECT_EQ(chip->written(), (Bytes{0x4F, 0x00}));
   chip->deliver({0x31, 0x60}, {10});
   chip->deliver({0x31, 0x60, 0x08}, {20});
@@ -191,9 +191,9 @@ TEST(FtdiPort, UnpluggingGivesWhatHadComeAndThenTheLoss) {
   sleep_for(Duration::from_ms(20));  // so that the loss is known before the bytes are asked for
   EXPECT_EQ(read_some(*port), (Bytes{0x11, 0x22}));
   Bytes chunk(64);
-  EXPECT_EQ(port->read(chunk, device_now() + kLong).error().code, Errc::disconnected);
-  EXPECT_EQ(port->read(chunk, device_now() + kLong).error().code, Errc::disconnected);  // and it stays lost
-  EXPECT_EQ(port->write(Bytes{1}, device_now() + kLong).error().code, Errc::disconnected);
+  EXPECT_EQ(port->read(chunk, device_now() + kUsbPatience).error().code, Errc::disconnected);
+  EXPECT_EQ(port->read(chunk, device_now() + kUsbPatience).error().code, Errc::disconnected);  // and it stays lost
+  EXPECT_EQ(port->write(Bytes{1}, device_now() + kUsbPatience).error().code, Errc::disconnected);
   EXPECT_FALSE(port->set_rts(true));
 }
 
@@ -205,7 +205,7 @@ TEST(FtdiPort, UnpluggingWakesAReaderThatWaits) {
     chip->unplug();
   });
   Bytes chunk(64);
-  const DeviceTime deadline = device_now() + kLong;
+  const DeviceTime deadline = device_now() + kUsbPatience;
   EXPECT_EQ(port->read(chunk, deadline).error().code, Errc::disconnected);
   EXPECT_LT(device_now(), deadline);
 }
@@ -221,7 +221,7 @@ TEST(FtdiPort, PluggedInAgainIsANewLine) {
   auto port = open(first);
   first->unplug();
   Bytes chunk(64);
-  EXPECT_FALSE(port->read(chunk, device_now() + kLong));
+  EXPECT_FALSE(port->read(chunk, device_now() + kUsbPatience));
   port.reset();
   const auto second = std::make_shared<FakeFt232r>();
   port = open(second);
@@ -235,7 +235,7 @@ TEST(FtdiPort, WritesInPortionsAndGivesUpAtTheDeadline) {
   const auto port = open(chip);
   chip->takes = 3;
   const Bytes command{1, 2, 3, 4, 5, 6, 7};
-  ASSERT_TRUE(port->write(command, device_now() + kLong));
+  ASSERT_TRUE(port->write(command, device_now() + kUsbPatience));
   EXPECT_EQ(chip->written(), command);
   chip->takes = 0;
   EXPECT_EQ(port->write(command, device_now() + Duration::from_ms(5)).error().code, Errc::timeout);

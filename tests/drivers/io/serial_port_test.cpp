@@ -22,7 +22,7 @@ namespace {
 using ::testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Duration kLong = Duration::from_ms(20'000);
+constexpr Duration kSerialPatience = Duration::from_ms(20'000);
 
 /// The instrument's end of a pseudo-terminal, and the path of the other. The real line discipline is between them.
 struct Terminal {
@@ -43,7 +43,7 @@ struct Terminal {
 
 Bytes read_count(SerialPort& port, std::size_t count) {
   Bytes all, chunk(4096);
-  const DeviceTime deadline = device_now() + kLong;
+  const DeviceTime deadline = device_now() + kSerialPatience;
   while (all.size() < count) {
     const auto got = port.read(chunk, deadline);
     if (!got || *got == 0) break;
@@ -63,7 +63,7 @@ TEST(SerialPort, CarriesEveryByteBothWays) {
   terminal.send(sent);
   EXPECT_EQ(read_count(**port, sent.size()), sent);  // FF came doubled, and FF 00 was no mark
   EXPECT_EQ((*port)->line_errors(), 0U);
-  ASSERT_TRUE((*port)->write(sent, device_now() + kLong));
+  ASSERT_TRUE((*port)->write(sent, device_now() + kSerialPatience));
   Bytes back(sent.size());
   std::size_t have = 0;
   while (have < back.size()) {
@@ -93,10 +93,10 @@ TEST(SerialPort, AHangUpWakesAReaderThatWaits) {
     terminal.reset();
   });
   Bytes chunk(64);
-  const DeviceTime deadline = device_now() + kLong;
+  const DeviceTime deadline = device_now() + kSerialPatience;
   EXPECT_EQ((*port)->read(chunk, deadline).error().code, Errc::disconnected);
   EXPECT_LT(device_now(), deadline);
-  EXPECT_EQ((*port)->write(chunk, device_now() + kLong).error().code, Errc::disconnected);
+  EXPECT_EQ((*port)->write(chunk, device_now() + kSerialPatience).error().code, Errc::disconnected);
 }
 
 TEST(SerialPort, APeerThatTakesNothingIsATimeout) {
@@ -112,7 +112,7 @@ TEST(SerialPort, DiscardsWhatHasCome) {
   ASSERT_TRUE(port);
   terminal.send({1, 2, 3, 4});
   Bytes one(1);
-  ASSERT_EQ(*(*port)->read(one, device_now() + kLong), 1U);
+  ASSERT_EQ(*(*port)->read(one, device_now() + kSerialPatience), 1U);
   (*port)->discard_input();
   terminal.send({9});
   EXPECT_EQ(read_count(**port, 1), Bytes{9});

@@ -38,13 +38,13 @@ std::vector<double> numbers_of(const fs::path& path) {
   return out;
 }
 
-Eigen::Matrix4d matrix_of(const fs::path& path) {
+Eigen::Matrix4d pose_matrix_of(const fs::path& path) {
   const auto n = numbers_of(path);
   EXPECT_EQ(n.size(), 16U) << path;
   return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n.data());
 }
 
-void write_matrix(const fs::path& path, const Eigen::Matrix4d& m) {
+void write_pose_matrix(const fs::path& path, const Eigen::Matrix4d& m) {
   std::ofstream out(path);
   out.precision(17);
   out << m << "\n";
@@ -138,8 +138,8 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
   for (const std::string side : {"left", "right"}) {
     const CameraModel camera = write_camera(data, side, folder / (side + ".yaml"));
     Eigen::Matrix4d pose = left_from_patient.matrix();
-    if (side == "right") pose = matrix_of(data / "calib.l2r.txt") * pose;
-    write_matrix(folder / (side + ".txt"), pose);
+    if (side == "right") pose = pose_matrix_of(data / "calib.l2r.txt") * pose;
+    write_pose_matrix(folder / (side + ".txt"), pose);
     constexpr int kMargin_px = 30;
     cv::imwrite((folder / (side + "_mask.png")).string(),
                 mask_of(*surface, camera, Transform<Camera, Patient>::from_matrix(pose),
@@ -150,7 +150,7 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
          << side << ".txt\"\nmask = \"" << side << "_mask.png\"\n";
   }
   file.close();
-  write_matrix(folder / "true_pose.txt", left_from_patient.inverse().matrix());
+  write_pose_matrix(folder / "true_pose.txt", left_from_patient.inverse().matrix());
   const auto result = run("birdseye", "register views --case " + (folder / "case.toml").string() + " --out " +
                                           (folder / "out").string() + " --json " + (folder / "r.json").string());
   EXPECT_NE(result.code, 2) << result.output;
@@ -161,7 +161,7 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
   out.before = distance_of(*surface, given, [&](const Eigen::Vector3d& p) { return left_from_patient * p; });
   const auto field = read_field(folder / "out/field.mha");
   EXPECT_TRUE(field);
-  const auto patient_from_model = Transform<Patient, Patient>::from_matrix(matrix_of(folder / "out/pose.txt"));
+  const auto patient_from_model = Transform<Patient, Patient>::from_matrix(pose_matrix_of(folder / "out/pose.txt"));
   out.after = distance_of(*surface, given, [&](const Eigen::Vector3d& rest) {
     Eigen::Vector3d now = rest;
     for (int step = 0; step < 50; ++step) now += 0.7 * (rest - field->displacement(now) - now);
@@ -182,7 +182,7 @@ TEST(RealStereo, TheLensesAreInvertedWhereTheOrganIsSeen) {
   for (const std::string side : {"left", "right"}) {
     const CameraModel camera = write_camera(folder, side, scratch / "camera.yaml");
     const auto camera_from_left = Transform<Camera, Patient>::from_matrix(
-        side == "left" ? Eigen::Matrix4d(Eigen::Matrix4d::Identity()) : matrix_of(folder / "calib.l2r.txt"));
+        side == "left" ? Eigen::Matrix4d(Eigen::Matrix4d::Identity()) : pose_matrix_of(folder / "calib.l2r.txt"));
     cv::Mat organ = mask_of(*surface, camera, camera_from_left, folder / (kPrefix + ("MASK_" + side) + ".png"), 0);
     constexpr int kAbout_px = 25;
     cv::dilate(organ, organ, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kAbout_px + 1, 2 * kAbout_px + 1}));

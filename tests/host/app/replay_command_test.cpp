@@ -20,7 +20,7 @@ using testing::run;
 using testing::Scratch;
 using testing::small_ct;
 
-constexpr const char* kIdentity = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+constexpr const char* kIdentityPose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
 constexpr const char* kCamera =
     "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: "
     "d\n   data: [ 60., 0., 32., 0., 60., 24., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   "
@@ -74,14 +74,14 @@ std::map<std::string, std::string> contents(const fs::path& folder) {
 
 std::string inputs(const Scratch& scratch, const std::string& ct) {
   return "replay " + (scratch / "r").string() + " --volume " + ct + " --transfer abdomen --camera " +
-         scratch.file("camera.yaml", kCamera) + " --camera-from-sensor " + scratch.file("hand_eye.txt", kIdentity);
+         scratch.file("camera.yaml", kCamera) + " --camera-from-sensor " + scratch.file("hand_eye.txt", kIdentityPose);
 }
 
 TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
   const Scratch scratch;
   record(scratch / "r");
   const std::string arguments = inputs(scratch, small_ct(scratch)) + " --registration " +
-                                scratch.file("reg.txt", kIdentity) + " --every 4 --out ";
+                                scratch.file("reg.txt", kIdentityPose) + " --every 4 --out ";
   for (const char* name : {"a", "b"}) {
     const auto result = run("birdseye", arguments + (scratch / name).string());
     ASSERT_EQ(result.code, 0) << result.output;
@@ -130,12 +130,12 @@ TEST(ReplayCommand, WhatCannotBeReplayedIsRefused) {
   record(scratch / "r");
   const std::string ct = small_ct(scratch), all = inputs(scratch, ct);
   const std::string out = " --out " + (scratch / "o").string();
-  const std::string registration = " --registration " + scratch.file("reg.txt", kIdentity);
+  const std::string registration = " --registration " + scratch.file("reg.txt", kIdentityPose);
   const auto refused = [&](const std::string& arguments, const std::vector<std::string>& words) {
     expect_refused("birdseye", arguments + out, words, scratch / "o");
   };
   refused(all, {"give one registration"});
-  refused(all + registration + " --tracker-from-patient " + scratch.file("t.txt", kIdentity),
+  refused(all + registration + " --tracker-from-patient " + scratch.file("t.txt", kIdentityPose),
           {"give one registration"});
   refused("replay " + (scratch / "r").string() + " --volume " + ct + registration, {"no calibration was in force"});
   refused("replay " + (scratch / "none").string() + " --volume " + ct + registration, {"none", "no such recording"});

@@ -7,7 +7,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr DeviceTime kStart{1'000'000'000};
+constexpr DeviceTime kUsbStart{1'000'000'000};
 
 void put(Bytes& bytes, std::uint64_t value, int size) {
   for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>((value >> (8 * i)) & 0xFFU));
@@ -53,16 +53,16 @@ class Plugged : public ::testing::Test {
  protected:
   Plugged() {
     (void)usb.output();
-    EXPECT_TRUE(usb.receive(hello(kQemu, "qemu"), kStart));
+    EXPECT_TRUE(usb.receive(hello(kQemu, "qemu"), kUsbStart));
     (void)usb.output();
-    EXPECT_TRUE(chip.control({0x40, 3, 0x1A, 0, 0}, kStart));
-    EXPECT_TRUE(chip.control({0x40, 9, 1, 0, 0}, kStart));
+    EXPECT_TRUE(chip.control({0x40, 3, 0x1A, 0, 0}, kUsbStart));
+    EXPECT_TRUE(chip.control({0x40, 9, 1, 0, 0}, kUsbStart));
   }
-  Bytes answer(const Bytes& bytes, DeviceTime now = kStart) {
+  Bytes answer(const Bytes& bytes, DeviceTime now = kUsbStart) {
     EXPECT_TRUE(usb.receive(bytes, now));
     return usb.output();
   }
-  static DeviceTime at(std::int64_t ms) { return kStart + Duration::from_ms(ms); }
+  static DeviceTime at(std::int64_t ms) { return kUsbStart + Duration::from_ms(ms); }
 
   Ft232r chip{Ft232rSettings{}};
   UsbRedir usb{chip};
@@ -73,7 +73,7 @@ TEST(UsbRedir, GreetsFirstAndDescribesTheChipOnceQemuHas) {
   UsbRedir usb(chip);
   EXPECT_EQ(usb.output(), hello(0x72, "birdseye-sim ft232r"));
   EXPECT_FALSE(usb.plugged());
-  ASSERT_TRUE(usb.receive(hello(kQemu, "qemu usb-redir guest 7.2.0"), kStart));
+  ASSERT_TRUE(usb.receive(hello(kQemu, "qemu usb-redir guest 7.2.0"), kUsbStart));
   EXPECT_TRUE(usb.plugged());
 
   Bytes interfaces(4 + 4 * 32, 0);
@@ -92,7 +92,7 @@ TEST(UsbRedir, GreetsFirstAndDescribesTheChipOnceQemuHas) {
 TEST(UsbRedir, RefusesWhatIsNoQemu) {
   const auto refused = [](const Bytes& bytes) {
     Ft232r chip({});
-    return !UsbRedir(chip).receive(bytes, kStart);
+    return !UsbRedir(chip).receive(bytes, kUsbStart);
   };
   EXPECT_TRUE(refused(hello(0x02, "qemu of long ago")));
   EXPECT_TRUE(refused(packet(100, 1, Bytes(10))));
@@ -135,8 +135,8 @@ TEST_F(Plugged, AnswersAReadAtTheTick) {
 TEST_F(Plugged, ALongReadGathersFullPacketsUpToAShortOne) {
   Bytes sent(100);
   for (std::size_t i = 0; i < sent.size(); ++i) sent[i] = static_cast<std::uint8_t>(i);
-  chip.receive(sent, kStart);
-  EXPECT_TRUE(chip.control({0x40, 9, 20, 0, 0}, kStart));
+  chip.receive(sent, kUsbStart);
+  EXPECT_TRUE(chip.control({0x40, 9, 20, 0, 0}, kUsbStart));
   EXPECT_TRUE(answer(packet(101, 8, bulk_head(0x81, 0, 512))).empty());
   usb.pump(at(6));
   EXPECT_TRUE(usb.output().empty()) << "one full packet so far";
@@ -151,8 +151,8 @@ TEST_F(Plugged, ALongReadGathersFullPacketsUpToAShortOne) {
 }
 
 TEST_F(Plugged, AReadOfOnePacketIsFullWithIt) {
-  chip.receive(Bytes(62, 0x11), kStart);
-  EXPECT_TRUE(chip.control({0x40, 9, 20, 0, 0}, kStart));
+  chip.receive(Bytes(62, 0x11), kUsbStart);
+  EXPECT_TRUE(chip.control({0x40, 9, 20, 0, 0}, kUsbStart));
   EXPECT_EQ(answer(packet(101, 9, bulk_head(0x81, 0, 64)), at(6)),
             packet(101, 9, join({bulk_head(0x81, 0, 64), {0x01, 0x60}, Bytes(62, 0x11)})));
 }

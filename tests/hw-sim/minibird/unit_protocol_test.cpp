@@ -47,7 +47,7 @@ Unit of_revision(std::uint8_t minor) {
 }
 
 /// The word that a record has at a place, by the rule of the reference and nothing of ours.
-int word_at(const Bytes& record, std::size_t index) {
+int signed_word_at(const Bytes& record, std::size_t index) {
   const unsigned word = (record[2 * index] & 0x7FU) << 2U | (record[2 * index + 1] & 0x7FU) << 9U;
   return static_cast<std::int16_t>(word);
 }
@@ -119,7 +119,7 @@ TEST(Protocol, T23AngleAlignMakesAMismountedSensorReadZero) {
     send(unit, {0x57, 0x42});
     const Bytes record = unit.measure(std::vector{pose_of(10, 0, 0, 5, 10, 15)});
     ASSERT_EQ(record.size(), 6U);
-    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(word_at(record, i), 0, 8) << i;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(signed_word_at(record, i), 0, 8) << i;
   }
 }
 
@@ -132,14 +132,14 @@ TEST(Protocol, T24ReferenceFrameTurnsTheAxesAndPositionsOnlyWhenTold) {
     // A sensor turned as the new axes are reads zero in them; its position is still told in the transmitter's.
     const BirdPose pose = pose_of(9, 0, 0, 90, 0, -45);
     const Bytes record = unit.measure(std::vector{pose});
-    EXPECT_EQ(word_at(record, 0), 8192);
-    for (std::size_t i = 1; i < 6; ++i) EXPECT_NEAR(word_at(record, i), 0, 8) << i;
+    EXPECT_EQ(signed_word_at(record, 0), 8192);
+    for (std::size_t i = 1; i < 6; ++i) EXPECT_NEAR(signed_word_at(record, i), 0, 8) << i;
     send(unit, {0x50, 0x11, 0x01, 0x42});
     const Bytes turned = unit.measure(std::vector{pose});
     // Transmitter x in the new axes: Rx(-45)^T Rz(90)^T (1, 0, 0) = Rx(45) (0, -1, 0) = (0, -0.7071, -0.7071).
-    EXPECT_NEAR(word_at(turned, 0), 0, 8);
-    EXPECT_NEAR(word_at(turned, 1), -5793, 8);
-    EXPECT_NEAR(word_at(turned, 2), -5793, 8);
+    EXPECT_NEAR(signed_word_at(turned, 0), 0, 8);
+    EXPECT_NEAR(signed_word_at(turned, 1), -5793, 8);
+    EXPECT_NEAR(signed_word_at(turned, 2), -5793, 8);
   }
 }
 

@@ -14,8 +14,8 @@ namespace {
 using testing::number_in_picture;
 constexpr std::int64_t kZeroNs = 5'000'000'000;
 
-Fault fault(FaultKind kind, double at_s, std::optional<double> for_s = std::nullopt,
-            std::map<std::string, double, std::less<>> values = {}) {
+Fault video_fault(FaultKind kind, double at_s, std::optional<double> for_s = std::nullopt,
+                  std::map<std::string, double, std::less<>> values = {}) {
   return {kind, at_s, for_s, std::move(values)};
 }
 
@@ -117,25 +117,25 @@ TEST(CameraFaults, EachShowsInItsFrames) {
     EXPECT_FALSE(frames[150].lost || frames[150].half_size || frames[150].garbage_bytes > 0 || frames[150].part < 1);
     return std::vector<FramePlan>(frames.begin() + 61, frames.begin() + 119);
   };
-  for (const FramePlan& plan : during(fault(FaultKind::silence, 1, 1))) EXPECT_TRUE(plan.lost);
-  for (const FramePlan& plan : during(fault(FaultKind::duplicate_frames, 1, 1, {{"chance", 1}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::silence, 1, 1))) EXPECT_TRUE(plan.lost);
+  for (const FramePlan& plan : during(video_fault(FaultKind::duplicate_frames, 1, 1, {{"chance", 1}}))) {
     EXPECT_EQ(plan.copies, 2);
   }
-  for (const FramePlan& plan : during(fault(FaultKind::late_frames, 1, 1, {{"ms", 30}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::late_frames, 1, 1, {{"ms", 30}}))) {
     EXPECT_EQ(plan.due_ns - plan.exposed_ns, 42'000'000);
   }
-  for (const FramePlan& plan : during(fault(FaultKind::garbage, 1, 1, {{"chance", 1}, {"bytes", 7}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::garbage, 1, 1, {{"chance", 1}, {"bytes", 7}}))) {
     EXPECT_EQ(plan.garbage_bytes, 7U);
   }
-  for (const FramePlan& plan : during(fault(FaultKind::size_change, 1, 1))) EXPECT_TRUE(plan.half_size);
-  for (const FramePlan& plan : during(fault(FaultKind::torn_frame, 1, 1, {{"chance", 1}, {"part", 0.25}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::size_change, 1, 1))) EXPECT_TRUE(plan.half_size);
+  for (const FramePlan& plan : during(video_fault(FaultKind::torn_frame, 1, 1, {{"chance", 1}, {"part", 0.25}}))) {
     EXPECT_EQ(plan.part, 0.25);
   }
-  for (const FramePlan& plan : during(fault(FaultKind::clock_step, 1, 1, {{"ms", -15}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::clock_step, 1, 1, {{"ms", -15}}))) {
     EXPECT_EQ(plan.stamp_ns - plan.exposed_ns, -15'000'000);
   }
   int lost = 0;
-  for (const FramePlan& plan : during(fault(FaultKind::drop_frames, 1, 1, {{"chance", 0.5}}))) {
+  for (const FramePlan& plan : during(video_fault(FaultKind::drop_frames, 1, 1, {{"chance", 0.5}}))) {
     lost += plan.lost ? 1 : 0;
     EXPECT_EQ(plan.sequence, plan.number);
   }
@@ -144,7 +144,7 @@ TEST(CameraFaults, EachShowsInItsFrames) {
 
 TEST(CameraFaults, AGapIsInTheCountAndNotInTheFrames) {
   CameraTiming timing;
-  timing.faults = {fault(FaultKind::sequence_gap, 1, std::nullopt, {{"chance", 0.1}, {"frames", 5}})};
+  timing.faults = {video_fault(FaultKind::sequence_gap, 1, std::nullopt, {{"chance", 0.1}, {"frames", 5}})};
   const auto frames = frames_of(timing, 120);
   for (const FramePlan& plan : frames) {
     EXPECT_FALSE(plan.lost);
@@ -154,7 +154,8 @@ TEST(CameraFaults, AGapIsInTheCountAndNotInTheFrames) {
 
 TEST(CameraFaults, WhatAFrameSuffersDoesNotDependOnWhenItIsAskedFor) {
   CameraTiming timing;
-  timing.faults = {fault(FaultKind::drop_frames, 1, 1, {{"chance", 0.5}}), fault(FaultKind::unplug, 1, 0.5)};
+  timing.faults = {video_fault(FaultKind::drop_frames, 1, 1, {{"chance", 0.5}}),
+                   video_fault(FaultKind::unplug, 1, 0.5)};
   const auto frames = frames_of(timing, 200);
   CameraScript late(timing, kZeroNs);
   late.watched(kZeroNs);
@@ -166,7 +167,7 @@ TEST(CameraFaults, WhatAFrameSuffersDoesNotDependOnWhenItIsAskedFor) {
 
 TEST(CameraFaults, NothingBeginsUntilSomebodyWatches) {
   CameraTiming timing;
-  timing.faults = {fault(FaultKind::silence, 0, 1)};
+  timing.faults = {video_fault(FaultKind::silence, 0, 1)};
   CameraScript script(timing, kZeroNs);
   for (int i = 0; i < 120; ++i) EXPECT_FALSE(script.next().lost);
   script.watched(kZeroNs + 2'000'000'000);

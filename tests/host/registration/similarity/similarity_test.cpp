@@ -16,17 +16,17 @@ namespace {
 using ::testing::HasSubstr;
 using Grey = std::vector<std::uint8_t>;
 
-constexpr int kWidth = 157, kHeight = 91;  // not a whole number of blocks
-constexpr std::size_t kPixels = std::size_t{kWidth} * kHeight;
+constexpr int kPictureWidth = 157, kPictureHeight = 91;  // not a whole number of blocks
+constexpr std::size_t kPicturePixels = std::size_t{kPictureWidth} * kPictureHeight;
 
 std::size_t index(int x, int y) {
-  return static_cast<std::size_t>(y) * kWidth + static_cast<std::size_t>(x);
+  return static_cast<std::size_t>(y) * kPictureWidth + static_cast<std::size_t>(x);
 }
 
 Grey noise(unsigned seed, int levels = 256) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> any(0, levels - 1);
-  Grey grey(kPixels);
+  Grey grey(kPicturePixels);
   for (auto& g : grey) g = static_cast<std::uint8_t>(any(random));
   return grey;
 }
@@ -34,8 +34,8 @@ Grey noise(unsigned seed, int levels = 256) {
 /// Waves; alike for shifts that are.
 Grey waves(double shift_px) {
   Grey grey;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kPictureHeight; ++y) {
+    for (int x = 0; x < kPictureWidth; ++x) {
       grey.push_back(static_cast<std::uint8_t>(
           std::lround(127 + 70 * std::sin(0.11 * (x - shift_px)) + 50 * std::cos(0.13 * y + 0.03 * (x - shift_px)))));
     }
@@ -44,7 +44,7 @@ Grey waves(double shift_px) {
 }
 
 Grey everywhere() {
-  return Grey(kPixels, 1);
+  return Grey(kPicturePixels, 1);
 }
 
 /// A third of the pixels, in no order.
@@ -55,7 +55,7 @@ Grey somewhere() {
 }
 
 double value(const std::string& name, const Grey& a, const Grey& b, const Grey& overlap, int bins = 64) {
-  const auto measure = make_similarity(name, {kWidth, kHeight, a, overlap}, bins);
+  const auto measure = make_similarity(name, {kPictureWidth, kPictureHeight, a, overlap}, bins);
   EXPECT_TRUE(measure) << name;
   return measure ? (*measure)->value(b) : NAN;
 }
@@ -107,7 +107,7 @@ TEST(Similarity, AgreesWithAPlainComputation) {
       }
     }
     std::vector<double> x, y;
-    for (std::size_t i = 0; i < kPixels; ++i) {
+    for (std::size_t i = 0; i < kPicturePixels; ++i) {
       if (overlap[i] == 0) continue;
       x.push_back(a[i]);
       y.push_back(b[i]);
@@ -123,8 +123,8 @@ TEST(Similarity, GradientCorrelationLooksOnlyAtNeighboursInTheOverlap) {
     for (int x = 50; x < 90; ++x) overlap[index(x, y)] = 0;
   }
   std::array<std::vector<double>, 2> of_a, of_b;
-  for (int y = 1; y + 1 < kHeight; ++y) {
-    for (int x = 1; x + 1 < kWidth; ++x) {
+  for (int y = 1; y + 1 < kPictureHeight; ++y) {
+    for (int x = 1; x + 1 < kPictureWidth; ++x) {
       bool inside = true;
       std::array<double, 2> in_a{}, in_b{};
       for (int j = -1; j <= 1; ++j) {
@@ -146,7 +146,7 @@ TEST(Similarity, GradientCorrelationLooksOnlyAtNeighboursInTheOverlap) {
   const double expected = (plain_correlation(of_a[0], of_b[0]) + plain_correlation(of_a[1], of_b[1])) / 2;
   EXPECT_NEAR(value("gradient", a, b, overlap), expected, 1e-11);
   Grey other = b;
-  for (std::size_t i = 0; i < kPixels; ++i) other[i] = overlap[i] == 0 ? 255 : b[i];
+  for (std::size_t i = 0; i < kPicturePixels; ++i) other[i] = overlap[i] == 0 ? 255 : b[i];
   EXPECT_EQ(value("gradient", a, other, overlap), value("gradient", a, b, overlap));
 }
 
@@ -196,13 +196,13 @@ TEST(Similarity, OfIndependentNoiseIsItsBias) {
     const double freedom = (bins - 1.0) * (bins - 1.0);
     const double mi = value("mi", noise(1), noise(2), everywhere(), bins);
     EXPECT_GE(mi, 0);
-    EXPECT_NEAR(2 * kPixels * mi, freedom, 5 * std::sqrt(2 * freedom)) << bins;
+    EXPECT_NEAR(2 * kPicturePixels * mi, freedom, 5 * std::sqrt(2 * freedom)) << bins;
   }
-  EXPECT_NEAR(value("ncc", noise(1), noise(2), everywhere()), 0, 5 / std::sqrt(kPixels));
+  EXPECT_NEAR(value("ncc", noise(1), noise(2), everywhere()), 0, 5 / std::sqrt(kPicturePixels));
 }
 
 TEST(Similarity, OfAConstantPictureIsNothing) {
-  const Grey a = waves(0), constant(kPixels, 90);
+  const Grey a = waves(0), constant(kPicturePixels, 90);
   EXPECT_NEAR(value("mi", a, constant, everywhere()), 0, 1e-12);
   EXPECT_NEAR(value("nmi", a, constant, everywhere()), 1, 1e-12);
   EXPECT_EQ(value("ncc", a, constant, everywhere()), 0);
@@ -233,19 +233,20 @@ TEST(Similarity, RefusesWhatCannotBeCompared) {
     EXPECT_FALSE(measure);
     return measure ? Error{} : measure.error();
   };
-  EXPECT_THAT(refusal("sad", {kWidth, kHeight, a, all}).what, HasSubstr("mi, nmi, ncc, gradient"));
-  EXPECT_THAT(refusal("mi", {kWidth, kHeight, a, all}, 1).what, HasSubstr("2 to 128"));
-  EXPECT_THAT(refusal("mi", {kWidth, kHeight, a, std::span(all).first(100)}).what, HasSubstr("overlap mask: 100"));
-  EXPECT_THAT(refusal("mi", {kWidth, kHeight + 1, a, all}).what, HasSubstr("reference picture"));
-  const Grey none(kPixels, 0), constant(kPixels, 80);
-  EXPECT_EQ(refusal("mi", {kWidth, kHeight, a, none}).code, Errc::degenerate);
-  EXPECT_EQ(refusal("ncc", {kWidth, kHeight, constant, all}).code, Errc::degenerate);
+  EXPECT_THAT(refusal("sad", {kPictureWidth, kPictureHeight, a, all}).what, HasSubstr("mi, nmi, ncc, gradient"));
+  EXPECT_THAT(refusal("mi", {kPictureWidth, kPictureHeight, a, all}, 1).what, HasSubstr("2 to 128"));
+  EXPECT_THAT(refusal("mi", {kPictureWidth, kPictureHeight, a, std::span(all).first(100)}).what,
+              HasSubstr("overlap mask: 100"));
+  EXPECT_THAT(refusal("mi", {kPictureWidth, kPictureHeight + 1, a, all}).what, HasSubstr("reference picture"));
+  const Grey none(kPicturePixels, 0), constant(kPicturePixels, 80);
+  EXPECT_EQ(refusal("mi", {kPictureWidth, kPictureHeight, a, none}).code, Errc::degenerate);
+  EXPECT_EQ(refusal("ncc", {kPictureWidth, kPictureHeight, constant, all}).code, Errc::degenerate);
   Grey nearly = constant;
   nearly[7] = 81;  // in the same of 64 bins
-  EXPECT_EQ(refusal("mi", {kWidth, kHeight, nearly, all}).code, Errc::degenerate);
+  EXPECT_EQ(refusal("mi", {kPictureWidth, kPictureHeight, nearly, all}).code, Errc::degenerate);
   Grey dots = all;  // no pixel has all its neighbours
-  for (std::size_t i = 0; i < kPixels; i += 2) dots[i] = 0;
-  EXPECT_EQ(refusal("gradient", {kWidth, kHeight, a, dots}).code, Errc::degenerate);
+  for (std::size_t i = 0; i < kPicturePixels; i += 2) dots[i] = 0;
+  EXPECT_EQ(refusal("gradient", {kPictureWidth, kPictureHeight, a, dots}).code, Errc::degenerate);
 }
 
 }  // namespace

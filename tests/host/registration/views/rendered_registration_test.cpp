@@ -11,7 +11,7 @@ namespace birdseye::host {
 namespace {
 
 /// An organ with a bump, in air.
-Volume organ() {
+Volume rendered_organ() {
   Volume v;
   v.size = {60, 54, 40};
   v.spacing_mm = {2, 2, 2.5};
@@ -30,7 +30,7 @@ Volume organ() {
   return v;
 }
 
-TransferFunction plain() {
+TransferFunction plain_transfer() {
   return TransferFunction({{-200, {1, 1, 1}, 0}, {0, {1, 1, 1}, 1}});
 }
 
@@ -87,7 +87,7 @@ struct Kind {
 class RegisterRendered : public ::testing::TestWithParam<Kind> {};
 
 TEST_P(RegisterRendered, FindsADeformation) {
-  const Volume volume = organ();
+  const Volume volume = rendered_organ();
   const DisplacementField truth = moved_by({40, -35, 30}, volume);
   const DisplacementField none = moved_by({0, 0, 0}, volume);
   RenderedRegistrationSettings settings;
@@ -95,7 +95,7 @@ TEST_P(RegisterRendered, FindsADeformation) {
   settings.vertices = GetParam().vertices;
   settings.level = settings.vertices ? 1 : 4;
   settings.most_evaluations = 100;
-  const auto found = register_rendered(views_of(volume, truth), volume, nullptr, {}, plain(), settings);
+  const auto found = register_rendered(views_of(volume, truth), volume, nullptr, {}, plain_transfer(), settings);
   ASSERT_TRUE(found) << found.error().what;
   EXPECT_GT(mean_distance_mm(none, truth), 4);
   // A single vertex bends its neighbourhood otherwise than a control point does.
@@ -114,14 +114,14 @@ INSTANTIATE_TEST_SUITE_P(Kinds, RegisterRendered,
                                            Kind{DirectOptimiser::simplex, true}));
 
 TEST(RegisterRendered, StaysWhereNothingIsBetter) {
-  const Volume volume = organ();
+  const Volume volume = rendered_organ();
   const DisplacementField truth = moved_by({40, -35, 30}, volume);
   RenderedRegistrationSettings settings;
   settings.initial = truth;
   settings.level = 4;
   settings.most_evaluations = 4;
   settings.first_step_mm = 200;  // which folds
-  const auto found = register_rendered(views_of(volume, truth), volume, nullptr, {}, plain(), settings);
+  const auto found = register_rendered(views_of(volume, truth), volume, nullptr, {}, plain_transfer(), settings);
   ASSERT_TRUE(found) << found.error().what;
   EXPECT_TRUE(found->worse_than_start);
   EXPECT_LT(mean_distance_mm(found->field, truth), 0.1);
@@ -131,22 +131,22 @@ TEST(RegisterRendered, StaysWhereNothingIsBetter) {
 }
 
 TEST(RegisterRendered, RefusesWhatCannotBeUsed) {
-  const Volume volume = organ();
+  const Volume volume = rendered_organ();
   std::vector<VideoView> views = views_of(volume, moved_by({0, 0, 0}, volume));
   RenderedRegistrationSettings settings;
-  EXPECT_FALSE(register_rendered({}, volume, nullptr, {}, plain(), settings));
+  EXPECT_FALSE(register_rendered({}, volume, nullptr, {}, plain_transfer(), settings));
   settings.similarity = "taste";
-  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain(), settings));
+  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain_transfer(), settings));
   settings.similarity = "mi";
   settings.level = 9;
-  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain(), settings));
+  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain_transfer(), settings));
   settings.level = 3;
   settings.initial = moved_by({2000, 0, 0}, volume);
-  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain(), settings));
+  EXPECT_FALSE(register_rendered(views, volume, nullptr, {}, plain_transfer(), settings));
   settings.initial.reset();
   views[1].name = "away.png";
   views[1].camera_from_patient = {rotation_exp(Eigen::Vector3d(0, 3, 0)), Eigen::Vector3d(0, 0, -300)};
-  const auto found = register_rendered(views, volume, nullptr, {}, plain(), settings);
+  const auto found = register_rendered(views, volume, nullptr, {}, plain_transfer(), settings);
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().what.find("away.png"), std::string::npos) << found.error().what;
 }
@@ -170,9 +170,9 @@ TEST(DirectionSet, ClimbsARoundedRidge) {
 
 /// Pictures of one deformation do not depend on what was drawn before it.
 TEST(RenderedViews, AreTheSameToTheBitEveryTime) {
-  const Volume volume = organ();
+  const Volume volume = rendered_organ();
   const DisplacementField a = moved_by({40, -35, 30}, volume), b = moved_by({-20, 10, 5}, volume);
-  const auto tissue = tissue_of(volume, nullptr, {}, plain(), 2);
+  const auto tissue = tissue_of(volume, nullptr, {}, plain_transfer(), 2);
   ASSERT_TRUE(tissue);
   auto views = RenderedViews::make(views_of(volume, a), *tissue, "mi");
   ASSERT_TRUE(views);
