@@ -83,7 +83,7 @@ std::pair<std::string, std::vector<std::string>> judge(const FoundMarkers& found
   return {found.doubtful.empty() ? "pass" : "marginal", reasons};
 }
 
-nlohmann::json json_of(const Vector3d& v) {
+nlohmann::json place_json(const Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -104,15 +104,15 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
   for (const MarkerFit& m : found.markers) {
     const Vector3d& c = m.centre_in_patient_mm;
     points += fmt::format("{:.4f} {:.4f} {:.4f}\n", c.x(), c.y(), c.z());
-    json["markers"].push_back({{"centre_mm", json_of(c)},
+    json["markers"].push_back({{"centre_mm", place_json(c)},
                                {"diameter_mm", m.scale * shape.diameter_mm},
                                {"hu", m.hu},
                                {"contrast_hu", m.contrast_hu},
                                {"explained", m.explained}});
-    if (shape.kind != MarkerKind::ball) json["markers"].back()["axis"] = json_of(m.axis);
+    if (shape.kind != MarkerKind::ball) json["markers"].back()["axis"] = place_json(m.axis);
   }
   for (const DoubtfulMarker& d : found.doubtful)
-    json["doubtful"].push_back({{"centre_mm", json_of(d.centre_in_patient_mm)}, {"reason", d.reason}});
+    json["doubtful"].push_back({{"centre_mm", place_json(d.centre_in_patient_mm)}, {"reason", d.reason}});
   json["passed_over"] = found.passed_over;
   json["verdict"] = verdict;
   json["reasons"] = reasons;

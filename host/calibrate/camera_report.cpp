@@ -28,7 +28,7 @@ CameraVector parameters_of(const CameraModel& c) {
   return out;
 }
 
-std::vector<std::vector<double>> rows_of(const Eigen::MatrixXd& matrix) {
+std::vector<std::vector<double>> matrix_rows(const Eigen::MatrixXd& matrix) {
   std::vector<std::vector<double>> out;
   for (const auto& row : matrix.rowwise()) out.emplace_back(row.begin(), row.end());
   return out;
@@ -120,7 +120,7 @@ nlohmann::json camera_json(const CameraCalibration& c) {
                      {"distortion", {m.k1, m.k2, m.p1, m.p2, m.k3}},
                      {"sigma", named(c.sigma())},
                      {"sigma_between_views", named(c.sigma_between_views)},
-                     {"covariance", rows_of(c.covariance)},
+                     {"covariance", matrix_rows(c.covariance)},
                      {"rms_px", c.rms_px},
                      {"held_out_px", c.held_out_px},
                      {"held_out_mm", c.held_out_mm},
@@ -160,8 +160,8 @@ nlohmann::json camera_json(const CameraCalibration& c) {
 
 nlohmann::json stereo_json(const StereoCalibration& c) {
   const Eigen::Matrix<double, 6, 1> sigma = c.covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  return {{"right_from_left", rows_of(c.right_from_left.matrix())},
-          {"covariance", rows_of(c.covariance)},
+  return {{"right_from_left", matrix_rows(c.right_from_left.matrix())},
+          {"covariance", matrix_rows(c.covariance)},
           {"sigma_turn_deg", {sigma[0] * kDegPerRad, sigma[1] * kDegPerRad, sigma[2] * kDegPerRad}},
           {"sigma_shift_mm", {sigma[3], sigma[4], sigma[5]}},
           {"baseline_mm", c.baseline_mm},

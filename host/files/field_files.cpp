@@ -26,7 +26,7 @@ struct Table {
   std::vector<std::pair<int, Row>> rows;  ///< with their lines
 };
 
-Row split(const std::string& line) {
+Row row_of(const std::string& line) {
   Row fields(1);
   for (const char c : line) {
     if (c == ',' || c == ';' || c == '\t') {
@@ -48,9 +48,9 @@ Result<Table> read_table(const fs::path& path, const Row& needed) {
   for (int number = 1; std::getline(in, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
     if (table.columns.empty()) {
-      table.columns = split(line);
+      table.columns = row_of(line);
     } else {
-      table.rows.emplace_back(number, split(line));
+      table.rows.emplace_back(number, row_of(line));
     }
   }
   for (const std::string& name : needed) {

@@ -7,13 +7,11 @@
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "hw-sim/minibird/unit_errors.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
-
-constexpr std::uint8_t kErrorInvalidCommand = 6, kErrorNotMaster = 7, kErrorNotInitialised = 9, kErrorNoResponse = 13,
-                       kErrorTransmitter = 29;
 
 std::int16_t word_at(std::span<const std::uint8_t> bytes, std::size_t index) {
   return static_cast<std::int16_t>(bytes[2 * index] + 256U * bytes[2 * index + 1]);

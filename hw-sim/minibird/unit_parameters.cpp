@@ -1,12 +1,12 @@
 #include <algorithm>
 
 #include "hw-sim/minibird/unit.hpp"
+#include "hw-sim/minibird/unit_errors.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
 
-constexpr std::uint8_t kErrorInvalidCommand = 6, kErrorNotMaster = 7, kErrorNoResponse = 13;
 constexpr std::size_t kMostErrors = 8;
 constexpr double kLowestRateHz = 14, kHighestRateHz = 144;
 
