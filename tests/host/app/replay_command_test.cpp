@@ -21,7 +21,7 @@ using testing::Scratch;
 using testing::small_ct;
 
 constexpr const char* kIdentityPose = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
-constexpr const char* kCamera =
+constexpr const char* kReplayCamera =
     "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: "
     "d\n   data: [ 60., 0., 32., 0., 60., 24., 0., 0., 1. ]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   "
     "cols: 5\n   dt: d\n   data: [ -0.1, 0., 0., 0., 0. ]\n";
@@ -74,7 +74,8 @@ std::map<std::string, std::string> contents(const fs::path& folder) {
 
 std::string inputs(const Scratch& scratch, const std::string& ct) {
   return "replay " + (scratch / "r").string() + " --volume " + ct + " --transfer abdomen --camera " +
-         scratch.file("camera.yaml", kCamera) + " --camera-from-sensor " + scratch.file("hand_eye.txt", kIdentityPose);
+         scratch.file("camera.yaml", kReplayCamera) + " --camera-from-sensor " +
+         scratch.file("hand_eye.txt", kIdentityPose);
 }
 
 TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
