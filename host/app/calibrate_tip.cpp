@@ -22,7 +22,6 @@ namespace {
 using calibration::Pivot;
 using calibration::PivotPose;
 using calibration::SpinAxis;
-using nlohmann::json;
 
 struct CalibrateTipOptions {
   std::filesystem::path poses, spin;
@@ -126,25 +125,25 @@ Result<TipOutcome> compute(const TipInput& input) {
   return out;
 }
 
-json json_of(const Eigen::Vector3d& v) {
+nlohmann::json json_of(const Eigen::Vector3d& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-json json_of(const std::vector<Eigen::Vector3d>& points) {
-  json out = json::array();
+nlohmann::json json_of(const std::vector<Eigen::Vector3d>& points) {
+  nlohmann::json out = nlohmann::json::array();
   for (const Eigen::Vector3d& point : points) out.push_back(json_of(point));
   return out;
 }
 
-json names_of(const std::vector<std::size_t>& indices, const std::vector<TimedPose>& poses) {
-  json out = json::array();
+nlohmann::json names_of(const std::vector<std::size_t>& indices, const std::vector<TimedPose>& poses) {
+  nlohmann::json out = nlohmann::json::array();
   for (const std::size_t i : indices) out.push_back(poses[i].name);
   return out;
 }
 
 /// "frame 8: INVALID" as name and reason.
-json rejected_json(const PoseSet& set) {
-  json out = json::array();
+nlohmann::json rejected_json(const PoseSet& set) {
+  nlohmann::json out = nlohmann::json::array();
   for (const std::string& text : set.rejected) {
     const auto colon = std::min(text.size(), text.find(": "));
     out.push_back({{"name", text.substr(0, colon)}, {"reason", text.substr(std::min(text.size(), colon + 2))}});
@@ -152,7 +151,7 @@ json rejected_json(const PoseSet& set) {
   return out;
 }
 
-json json_of(const calibration::PivotFit& fit) {
+nlohmann::json json_of(const calibration::PivotFit& fit) {
   return {{"tip_in_sensor_mm", json_of(fit.tip_in_sensor_mm)},
           {"pivot_in_tracker_mm", json_of(fit.pivots_in_tracker_mm[0])},
           {"pivots_in_tracker_mm", json_of(fit.pivots_in_tracker_mm)},
@@ -160,11 +159,11 @@ json json_of(const calibration::PivotFit& fit) {
           {"component_rms_mm", fit.component_rms_mm}};
 }
 
-void add_pivot(const Pivot& pivot, const TipInput& input, json& out) {
+void add_pivot(const Pivot& pivot, const TipInput& input, nlohmann::json& out) {
   out.update(json_of(pivot.robust));
   out["algebraic"] = json_of(pivot.algebraic);
   out["outliers"] = names_of(pivot.outliers, input.set.poses);
-  json covariance = json::array();
+  nlohmann::json covariance = nlohmann::json::array();
   for (int i = 0; i < 3; ++i) covariance.push_back(json_of(Eigen::Vector3d(pivot.tip_covariance_mm2.row(i))));
   out["sigma"] = {{"tip_mm", json_of(Eigen::Vector3d(pivot.tip_covariance_mm2.diagonal().cwiseMax(0).cwiseSqrt()))},
                   {"worst_mm", pivot.tip_sigma_mm},
@@ -174,15 +173,15 @@ void add_pivot(const Pivot& pivot, const TipInput& input, json& out) {
   out["weakest"] = {{"direction_in_sensor", json_of(pivot.tilt.weakest_in_sensor)},
                     {"swing_deg", pivot.tilt.weakest_swing_deg}};
   out["slid"] = {{"mm", pivot.slid_mm}, {"sigma_mm", pivot.slid_sigma_mm}, {"divot", pivot.slid_divot + 1}};
-  out["residuals"] = json::array();
+  out["residuals"] = nlohmann::json::array();
   for (std::size_t i = 0; i < input.poses.size(); ++i) {
     out["residuals"].push_back(
         {{"name", input.set.poses[i].name}, {"divot", input.poses[i].divot + 1}, {"mm", pivot.residuals_mm[i]}});
   }
 }
 
-json json_of(const TipOutcome& found, const TipInput& input) {
-  json out{{"poses", input.poses.size()}, {"rejected", rejected_json(input.set)}, {"notes", input.set.notes}};
+nlohmann::json json_of(const TipOutcome& found, const TipInput& input) {
+  nlohmann::json out{{"poses", input.poses.size()}, {"rejected", rejected_json(input.set)}, {"notes", input.set.notes}};
   if (found.pivot) add_pivot(*found.pivot, input, out);
   if (found.axis) {
     out["axis"] = {{"axis_in_sensor", json_of(found.axis->axis_in_sensor)},
@@ -209,13 +208,13 @@ std::string tip_text(const TipOutcome& found) {
                             axis.x(), axis.y(), axis.z(), found.axis->sigma_deg);
 }
 
-std::string text_of(const Eigen::Vector3d& v, int digits = 2) {
+std::string xyz_text(const Eigen::Vector3d& v, int digits = 2) {
   return fmt::format("({1:.{0}f}, {2:.{0}f}, {3:.{0}f})", digits, v.x(), v.y(), v.z());
 }
 
 std::vector<std::vector<std::string>> figures_table(const Pivot& pivot) {
   const auto row = [](const std::string& name, const calibration::PivotFit& fit) {
-    return std::vector<std::string>{name, text_of(fit.tip_in_sensor_mm), text_of(fit.pivots_in_tracker_mm[0]),
+    return std::vector<std::string>{name, xyz_text(fit.tip_in_sensor_mm), xyz_text(fit.pivots_in_tracker_mm[0]),
                                     fmt::format("{:.3f}", fit.rms_mm), fmt::format("{:.3f}", fit.component_rms_mm)};
   };
   return {{"", "tip in the sensor's frame, mm", "pivot (the first), mm", "rms, mm", "rms of a coordinate, mm"},
@@ -262,7 +261,7 @@ HtmlPage page_of(const TipOutcome& found, const TipInput& input) {
     page.paragraph(
         fmt::format("Axis of the spin in the sensor's frame {}, standard error {:.2f} degrees, by {} poses "
                     "turned through {:.0f} degrees.",
-                    text_of(found.axis->axis_in_sensor, 4), found.axis->sigma_deg, found.axis->residuals_deg.size(),
+                    xyz_text(found.axis->axis_in_sensor, 4), found.axis->sigma_deg, found.axis->residuals_deg.size(),
                     found.axis->turned_deg));
   }
   if (const auto rows = odd_poses_table(found, input); rows.size() > 1) {
@@ -284,7 +283,7 @@ void print(const TipOutcome& found, const TipInput& input) {
   for (const std::string& note : input.set.notes) fmt::print("{}\n", note);
   if (found.pivot) {
     const Pivot& p = *found.pivot;
-    fmt::print("tip in the sensor's frame {} mm, standard error {:.3f} mm\n", text_of(p.robust.tip_in_sensor_mm, 3),
+    fmt::print("tip in the sensor's frame {} mm, standard error {:.3f} mm\n", xyz_text(p.robust.tip_in_sensor_mm, 3),
                p.tip_sigma_mm);
     if (!p.outliers.empty()) {
       std::vector<std::string> names;
@@ -292,7 +291,7 @@ void print(const TipOutcome& found, const TipInput& input) {
       fmt::print("{} of {} poses are outliers: {}\n", names.size(), input.poses.size(), shorten(names));
     }
   }
-  if (found.axis) fmt::print("axis in the sensor's frame {}\n", text_of(found.axis->axis_in_sensor, 4));
+  if (found.axis) fmt::print("axis in the sensor's frame {}\n", xyz_text(found.axis->axis_in_sensor, 4));
 }
 
 /// What a record keeps of it.
