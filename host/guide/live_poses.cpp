@@ -15,7 +15,7 @@ namespace birdseye::host {
 namespace {
 
 constexpr Duration kPoseSilence = Duration::from_ms(5000);
-constexpr Duration kLook = Duration::from_ms(200);  // how soon an interruption is seen
+constexpr Duration kPoseLook = Duration::from_ms(200);  // how soon an interruption is seen
 
 }  // namespace
 
@@ -33,7 +33,7 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
   std::optional<DeviceTime> first;
   HostTime heard = host_now();
   for (double since_s = 0; since_s < seconds && !interrupted();) {
-    const auto event = (*client)->next(Deadline::after(kLook));
+    const auto event = (*client)->next(Deadline::after(kPoseLook));
     if (!event) return event.error();
     if (host_now() - heard > kPoseSilence) {
       return Error{Errc::timeout,

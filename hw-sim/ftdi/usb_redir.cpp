@@ -15,7 +15,7 @@ enum Type : std::uint32_t {
   kHello = 0,
   kDeviceConnect = 1,
   kDeviceDisconnect = 2,
-  kReset = 3,
+  kRedirReset = 3,
   kInterfaceInfo = 4,
   kEndpointInfo = 5,
   kSetConfiguration = 6,
@@ -100,7 +100,7 @@ Result<void> UsbRedir::handle(std::uint32_t type, std::uint64_t id, std::span<co
   switch (type) {
     case kHello:
       return greet(body, now);
-    case kReset:
+    case kRedirReset:
       reads_.clear();
       writes_.clear();
       configuration_ = 0;
