@@ -151,9 +151,10 @@ Result<void> write_still(const RenderOptions& options, const RenderScene& scene,
   // Lens and pose are somebody's files.
   const double strength = decide_still(vouched_for({})).strength;
   const OverlayLook look{scene.settings, options.opacity, options.surface_in_front};
-  const std::string png = options.over.empty() ? transparent_png_of(image)
-                                               : png_of(RgbView{lay_over(scene.behind.rgb, image, strength, look),
-                                                                image.width_px, image.height_px});
+  const std::string png =
+      options.over.empty()
+          ? transparent_png_of(image)
+          : png_of(RgbView{lay_over(scene.behind.rgb, image, strength, look), image.width_px, image.height_px});
   if (!options.movie.empty()) {
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }

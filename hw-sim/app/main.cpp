@@ -1,8 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "drivers/system/program.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/program.hpp"
 #include "hw-sim/app/instruments.hpp"
 #include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
