@@ -16,8 +16,6 @@ namespace birdseye::wire {
 /// first messages tell which.
 class Client {
  public:
-  using Clock = std::chrono::steady_clock;  // of callers that still ask the standard library for the time
-
   /// Tries until the deadline: an appliance that is starting is not an error yet.
   static Result<std::unique_ptr<Client>> connect(const std::string& host, int port, Deadline deadline,
                                                  ForeignSettings foreign = {});

@@ -11,10 +11,6 @@
 
 namespace birdseye::wire {
 
-inline DeviceTime monotonic_now() {
-  return device_now();
-}
-
 /// From the last byte in to the last byte handed to the operating system.
 struct Latencies {
   LatencyLog tracker;  ///< of clients that take no frames

@@ -11,8 +11,6 @@ struct timex;
 
 namespace birdseye::wire {
 
-using birdseye::wall_minus_monotonic;
-
 /// What adjtimex(2) filled in, and what it returned.
 ClockDiscipline decode_discipline(const timex& reading, int state);
 

@@ -33,6 +33,10 @@ std::string utc_now() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time_t{read_ns(CLOCK_REALTIME) / 1'000'000'000}));
 }
 
+std::string local_time_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M}", fmt::localtime(std::time_t{read_ns(CLOCK_REALTIME) / 1'000'000'000}));
+}
+
 Deadline Deadline::after(Duration span) {
   return device_now() + span;
 }

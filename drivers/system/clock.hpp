@@ -19,6 +19,8 @@ HostTime host_now();
 Duration wall_minus_monotonic();
 /// The time of day, UTC, as "2026-11-22T22:51:36Z".
 std::string utc_now();
+/// The time of day where this machine is, as "2026-11-22T23:51".
+std::string local_time_now();
 
 /// The moment at which a wait ends, on this machine's clock. Every wait takes this one type, for the same waits serve
 /// appliance and host: the former gives a DeviceTime, the latter a HostTime. Neither comes out again, so a time of one

@@ -12,7 +12,10 @@
 #include <set>
 
 #include "calibration/base/median.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/thread.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/app/commands.hpp"
 #include "host/bench/bench_device_rig.hpp"
 #include "host/bench/bench_machine.hpp"
@@ -23,31 +26,28 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = wire::Client::Clock;
-using std::chrono::seconds;
-
 struct BenchDeviceOptions {
   std::filesystem::path json;
   double seconds = 60;
   int clients = 2;
 };
 
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
+double seconds_since(HostTime begin) {
+  return (host_now() - begin).seconds();
 }
 
 /// Everything one client is told until it is stopped, on a thread of its own; frames without their pixels.
 class Listener {
  public:
   explicit Listener(std::unique_ptr<wire::Client> client) : client_(std::move(client)) {
-    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+    thread_ = OwnedThread([this](const std::stop_token& stop) { run(stop); });
   }
   ~Listener() { stop(); }
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
   void stop() {
     thread_.request_stop();
-    if (thread_.joinable()) thread_.join();
+    thread_.join();
   }
   /// Whether a frame with a pose has come by now.
   [[nodiscard]] bool posed() const { return posed_; }
@@ -66,13 +66,13 @@ class Listener {
  private:
   void run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
-      auto event = client_->next(Clock::now() + std::chrono::milliseconds(100));
+      auto event = client_->next(Deadline::after(Duration::from_ms(100)));
       if (!event) {
         ended = event.error();
         return;
       }
       if (!*event) continue;
-      const DeviceTime now{Clock::now().time_since_epoch().count()};
+      const DeviceTime now = device_now();  // the appliance runs on this machine
       if (auto* frame = std::get_if<wire::VideoFrame>(&**event)) {
         frames.push_back({std::move(frame->info), now});
         posed_ = posed_ || frames.back().info.pose.tracker_from_sensor.has_value();
@@ -86,28 +86,29 @@ class Listener {
   }
   std::unique_ptr<wire::Client> client_;
   std::atomic<bool> posed_ = false;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
 /// clients that take everything; then, where they are wanted, one that takes poses alone.
 Result<std::vector<std::unique_ptr<Listener>>> listen(const DeviceRig& rig, int clients, bool poses_alone) {
   std::vector<std::unique_ptr<Listener>> listeners;
   for (int i = 0; i < clients; ++i) {
-    auto client = wire::Client::connect("127.0.0.1", rig.port(), Clock::now() + seconds(15));
+    auto client = wire::Client::connect("127.0.0.1", rig.port(), Deadline::after(Duration::from_seconds(15)));
     if (!client) return client.error();
     listeners.push_back(std::make_unique<Listener>(*std::move(client)));
   }
   if (poses_alone) {
-    auto client = wire::Client::connect("127.0.0.1", rig.port(), Clock::now() + seconds(15));
+    auto client = wire::Client::connect("127.0.0.1", rig.port(), Deadline::after(Duration::from_seconds(15)));
     if (!client) return client.error();
-    if (auto told = (*client)->subscribe({.frames = false, .tracking = true}, Clock::now() + seconds(1)); !told)
+    if (auto told =
+            (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(Duration::from_seconds(1)));
+        !told)
       return told.error();
     listeners.push_back(std::make_unique<Listener>(*std::move(client)));
   }
-  for (const auto deadline = Clock::now() + seconds(30); !listeners.front()->posed();) {
-    if (Clock::now() > deadline)
-      return Error{Errc::timeout, "no frame with a pose came within 30 s; see birdseyed.log"};
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  for (const auto deadline = Deadline::after(Duration::from_seconds(30)); !listeners.front()->posed();) {
+    if (deadline.passed()) return Error{Errc::timeout, "no frame with a pose came within 30 s; see birdseyed.log"};
+    sleep_for(Duration::from_ms(20));
   }
   return listeners;
 }
@@ -126,8 +127,7 @@ struct Session {
 };
 
 void sleep_unless_interrupted(double s) {
-  for (const auto begin = Clock::now(); seconds_since(begin) < s && !interrupted();)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  for (const HostTime begin = host_now(); seconds_since(begin) < s && !interrupted();) sleep_for(Duration::from_ms(50));
 }
 
 double thread_cpu_s() {
@@ -160,7 +160,7 @@ double copy_s_per_frame(std::size_t bytes, int outputs) {
         at += static_cast<std::size_t>(got);
       }
     };
-    std::jthread other([&] {
+    OwnedThread other([&](const std::stop_token&) {
       for (int i = 0; i < kFrames; ++i) direction == 0 ? send_all(pair[1], theirs) : receive_all(pair[1], theirs);
     });
     const double before_s = thread_cpu_s();
@@ -189,7 +189,7 @@ Result<void> measure_load(const BenchDeviceOptions& options, const std::filesyst
   const auto wakes = TwoWakes::start();
   if (!wakes) return wakes.error();
   sleep_unless_interrupted(2);
-  const auto begin = Clock::now();
+  const HostTime begin = host_now();
   const double cpu_before_s = rig.cpu_s(), memory_before_mb = rig.resident_mb();
   double most_mb = memory_before_mb;
   while (seconds_since(begin) < options.seconds && !interrupted()) {

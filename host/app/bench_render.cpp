@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <ctime>
 #include <filesystem>
 #include <functional>
@@ -12,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/median.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/bench/bench_machine.hpp"
 #include "host/bench/bench_phantom.hpp"
@@ -53,9 +53,9 @@ Timing time_frames(int frames, const std::function<void(double azimuth_deg)>& fr
   std::vector<double> wall_ms, cpu_ms;
   for (int i = 0; i < frames; ++i) {
     const double cpu = cpu_seconds();
-    const auto began = std::chrono::steady_clock::now();
+    const HostTime began = host_now();
     frame(360.0 * i / frames);
-    wall_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count());
+    wall_ms.push_back((host_now() - began).seconds() * 1e3);
     cpu_ms.push_back(1e3 * (cpu_seconds() - cpu));
   }
   return {median_of(wall_ms), median_of(cpu_ms)};

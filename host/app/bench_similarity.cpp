@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -10,6 +9,7 @@
 #include <random>
 
 #include "calibration/base/median.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/bench/bench_machine.hpp"
 #include "host/files/write_files.hpp"
@@ -80,9 +80,9 @@ struct Timer {
     value = work();  // wakes the threads
     std::vector<double> times_ms;
     for (int i = 0; i < kCalls; ++i) {
-      const auto began = std::chrono::steady_clock::now();
+      const HostTime began = host_now();
       value = work();
-      times_ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count());
+      times_ms.push_back((host_now() - began).seconds() * 1e3);
     }
     const double ms = median_of(std::move(times_ms));
     best_ms = best_ms > 0 ? std::min(best_ms, ms) : ms;

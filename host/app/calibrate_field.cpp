@@ -1,11 +1,10 @@
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/calibrate_field_check.hpp"
 #include "host/app/results.hpp"
@@ -145,8 +144,7 @@ void run(const CalibrateFieldOptions& options, CommandStatus& status) {
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
-  const calibration::FieldMapNotes notes{fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))),
-                                         "birdseye " BIRDSEYE_VERSION, fitted->made_from, verdict.grade,
+  const calibration::FieldMapNotes notes{utc_now(), "birdseye " BIRDSEYE_VERSION, fitted->made_from, verdict.grade,
                                          fitted->fit.held_out_mm};
   finish_calibration(options.results, field_map_text(fitted->fit.map, notes), json_of(*fitted), page_of(*fitted),
                      verdict, status);

@@ -1,13 +1,12 @@
 #include "host/app/calibrate_field_check.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/field_pictures.hpp"
 #include "host/files/field_files.hpp"
@@ -100,8 +99,7 @@ void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   if (!history) return status.refuse(history.error());
   const auto places = places_of(options);
   if (!places) return status.refuse(places.error());
-  const std::string when =
-      options.when.empty() ? fmt::format("{:%Y-%m-%dT%H:%M}", fmt::localtime(std::time(nullptr))) : options.when;
+  const std::string when = options.when.empty() ? local_time_now() : options.when;
   const auto check = calibration::check_field(when, *places);
   if (!check) return status.refuse({check.error().code, options.measured.string() + ": " + check.error().what});
   history->push_back(*check);

@@ -3,10 +3,9 @@
 #include <CLI/CLI.hpp>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/program.hpp"
 
 namespace birdseye::host {
-
-enum class ExitCode : int { success = 0, unusable_input = 2, verdict_fail = 3 };
 
 /// What the command that ran came to. A command's callback sets it; main() prints the error and returns the code.
 struct CommandStatus {

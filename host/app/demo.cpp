@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/app/commands.hpp"
 #include "host/demo/demo_session.hpp"
@@ -19,7 +20,6 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostDemoFramesWaiting = 256;
 
@@ -119,7 +119,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   progress("starting tracker, camera and appliance");
   const auto cart = SimulatedCart::start(settings);
   if (!cart) return cart.error();
-  auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Clock::now() + std::chrono::seconds(20));
+  auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
   if (!client) return client.error();
   EventStream stream(*std::move(client), kMostDemoFramesWaiting);
   const auto plan = read_plan(out / "phantom", (*cart)->sheet().fiducials);
@@ -136,7 +136,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   session.figures.position_noise_mm = settings.position_noise_mm;
   session.figures.angle_noise_deg = settings.angle_noise_deg;
   if (auto ran = session.run(stream); !ran) return ran.error();
-  if (auto ended = (*cart)->finish(Clock::now() + std::chrono::seconds(10)); !ended) return ended.error();
+  if (auto ended = (*cart)->finish(Deadline::after(Duration::from_ms(10'000))); !ended) return ended.error();
   if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
   if (auto filmed = session.finish(); !filmed) return filmed.error();
   if (auto compared = compare(out, session, *plan); !compared) return compared.error();

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/foreign_options.hpp"
 #include "host/demo/demo_report.hpp"
@@ -178,9 +178,7 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
 }
 
 Result<ExitCode> run(LiveOptions& options) {
-  const HostTime asked{
-      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
-          .count()};
+  const HostTime asked = host_now();
   if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<LiveScript> script;
   if (!options.script.empty()) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/verdict.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -20,11 +21,10 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 // Two seconds of 60 Hz for a disk that halts, of which the oldest go first.
 constexpr std::size_t kMostRecordFramesWaiting = 120;
-constexpr auto kSilence = std::chrono::seconds(15);
+constexpr Duration kSilence = Duration::from_ms(15'000);
 /// What the last lines and the sheet need, and other programs.
 constexpr std::uintmax_t kSpareBytes = std::uintmax_t{32} << 20U;
 
@@ -44,21 +44,21 @@ struct Ending {
 
 /// Until there is a reason to end.
 Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions& options, Progress& progress) {
-  auto heard = Clock::now();
+  HostTime heard = host_now();
   while (!interrupted()) {
     const RecordingFigures& figures = writer.figures();
     if (options.seconds > 0 && figures.seconds() >= options.seconds)
       return {fmt::format("{:g} s are over", options.seconds), true};
-    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    auto event = stream.next(Deadline::after(Duration::from_ms(200)));
     if (!event) return {event.error().what};
     if (!*event) {
-      if (Clock::now() - heard > kSilence)
-        return {fmt::format("{} sent neither frames nor poses for {} s; do its instruments run?", options.server,
-                            kSilence / std::chrono::seconds(1))};
+      if (host_now() - heard > kSilence)
+        return {fmt::format("{} sent neither frames nor poses for {:g} s; do its instruments run?", options.server,
+                            kSilence.seconds())};
       continue;
     }
     const bool frame = std::holds_alternative<wire::VideoFrame>(**event);
-    if (frame || std::holds_alternative<wire::Birds>(**event)) heard = Clock::now();
+    if (frame || std::holds_alternative<wire::Birds>(**event)) heard = host_now();
     std::error_code unknown;
     if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
       return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};

@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
@@ -127,9 +127,9 @@ std::string transparent_png_of(ImageRgba image) {
 }
 
 Result<void> write_still(const RenderOptions& options, const RenderScene& scene, Engine& engine) {
-  const auto began = std::chrono::steady_clock::now();
+  const HostTime began = host_now();
   const ImageRgba image = overlay_of(engine, scene, scene.camera_from_patient, scene.settings);
-  const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began).count();
+  const double ms = (host_now() - began).seconds() * 1e3;
   if (const std::string fault = engine.fault(); !fault.empty()) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", engine.name(), fault)};
   }

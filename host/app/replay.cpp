@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/verdict.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -26,8 +27,6 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
 struct ReplayOptions {
   ReplayInputs inputs;
   fs::path volume, labels, deformation, out, json;
@@ -144,7 +143,7 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
 Result<void> play(RecordingReader& reader, Player& player, Progress& progress) {
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
-    const auto event = reader.next(Clock::now() + std::chrono::seconds(30));
+    const auto event = reader.next(Deadline::after(Duration::from_ms(30'000)));
     if (!event && event.error().code == Errc::disconnected) return {};
     if (!event) return event.error();
     if (!*event) continue;

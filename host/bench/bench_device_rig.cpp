@@ -7,14 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "drivers/system/clock.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "host/files/write_files.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 Result<InstrumentTruth> read_truth(const std::filesystem::path& path) {
   std::ifstream in(path);
@@ -40,7 +39,7 @@ Result<void> DeviceRig::start_instrument(const std::string& name, std::vector<st
   auto child =
       ChildProcess::start(arguments, settings_.folder / (name + ".log"), ChildProcess::Pipe::stdout_from_child);
   if (!child) return std::move(child).error();
-  const auto line = child->read_line(Clock::now() + std::chrono::seconds(20));
+  const auto line = child->read_line(Deadline::after(Duration::from_ms(20'000)));
   if (!line) return line.error();
   if (!*line) return Error{Errc::timeout, fmt::format("birdseye-sim {}: not ready within 20 s", name)};
   instruments_.push_back(std::make_unique<ChildProcess>(std::move(*child)));
@@ -85,15 +84,15 @@ Result<std::unique_ptr<DeviceRig>> DeviceRig::start(const DeviceRigSettings& set
 }
 
 DeviceRig::~DeviceRig() {
-  for (std::jthread& listener : listeners_) listener.request_stop();
-  for (std::jthread& listener : listeners_) listener.join();
+  for (OwnedThread& listener : listeners_) listener.request_stop();
+  for (OwnedThread& listener : listeners_) listener.join();
   if (appliance_) appliance_->stop();
   for (auto& instrument : instruments_) instrument->stop();
 }
 
 void DeviceRig::listen(ChildProcess& child, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    const auto line = child.read_line(Clock::now() + std::chrono::milliseconds(100));
+    const auto line = child.read_line(Deadline::after(Duration::from_ms(100)));
     if (!line) return;
     if (!*line) continue;
     const nlohmann::json json = nlohmann::json::parse(**line, nullptr, false);

@@ -13,6 +13,7 @@
 #include "device/wire/client.hpp"
 #include "drivers/system/child_process.hpp"
 #include "drivers/system/local_programs.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::host {
 
@@ -70,7 +71,7 @@ class DeviceRig {
   std::unique_ptr<ChildProcess> appliance_;
   mutable std::mutex mutex_;
   std::vector<FaultEvent> faults_;
-  std::vector<std::jthread> listeners_;
+  std::vector<OwnedThread> listeners_;
 };
 
 }  // namespace birdseye::host

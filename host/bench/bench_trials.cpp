@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -12,6 +11,7 @@
 
 #include "calibration/base/median.hpp"
 #include "drivers/system/child_process.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/bench/bench_machine.hpp"
 #include "host/case/registration_error.hpp"
 #include "host/case/run_registration.hpp"
@@ -82,8 +82,8 @@ Result<RegistrationCase> simulate(const SimulatedCase& wanted) {
   if (wanted.plain_background) command.emplace_back("--plain-background");
   auto child = ChildProcess::start(command, log);
   if (!child) return child.error();
-  constexpr std::chrono::minutes kPatience{2};
-  if (child->wait(std::chrono::steady_clock::now() + kPatience) != 0) {
+  constexpr Duration kPatience = Duration::from_ms(120'000);
+  if (child->wait(Deadline::after(kPatience)) != 0) {
     std::ifstream in(log);
     std::string line;
     std::getline(in, line);
@@ -99,12 +99,12 @@ Result<Trial> try_once(const RegistrationCase& c, const Method& method) {
   own.optimiser = method.optimiser;
   own.similarity = method.similarity;
   own.most_evaluations = method.most_evaluations;
-  const auto began = std::chrono::steady_clock::now();
+  const HostTime began = host_now();
   const std::clock_t processor_began = std::clock();
   const auto found = run_registration(own, *transfer, false, [](const std::string&) {});
   if (!found) return found.error();
   Trial trial;
-  trial.time_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  trial.time_s = (host_now() - began).seconds();
   trial.processor_s = static_cast<double>(std::clock() - processor_began) / CLOCKS_PER_SEC;
   trial.evaluations = found->evaluations + found->gradient_evaluations;
   if (!c.truth) return Error{Errc::bad_value, "the case has no [truth] control_points; make it by birdseye-sim case"};

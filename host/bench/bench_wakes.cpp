@@ -1,17 +1,16 @@
 #include "host/bench/bench_wakes.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 
 namespace birdseye::host {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr int kRate_hz = 144;
 
@@ -31,23 +30,23 @@ Result<std::unique_ptr<TwoWakes>> TwoWakes::start() {
 TwoWakes::TwoWakes(const std::array<int, 4>& ends) : ends_(ends) {
   // A stamp travels; the end of the first thread closes the pipes one after the other, which ends the others.
   threads_.emplace_back([this](const std::stop_token& stop) {
-    for (auto next = Clock::now(); !stop.stop_requested();) {
-      next += std::chrono::nanoseconds(1'000'000'000 / kRate_hz);
-      std::this_thread::sleep_until(next);
-      const std::int64_t now = Clock::now().time_since_epoch().count();
+    for (HostTime next = host_now(); !stop.stop_requested();) {
+      next = next + Duration{1'000'000'000 / kRate_hz};
+      sleep_until(next);
+      const std::int64_t now = host_now().ns;
       if (::write(ends_[1], &now, sizeof now) != sizeof now) break;
     }
     ::close(ends_[1]);
   });
-  threads_.emplace_back([this] {
+  threads_.emplace_back([this](const std::stop_token&) {
     for (std::int64_t stamp = 0; ::read(ends_[0], &stamp, sizeof stamp) == sizeof stamp;) {
       if (::write(ends_[3], &stamp, sizeof stamp) != sizeof stamp) break;
     }
     ::close(ends_[3]);
   });
-  threads_.emplace_back([this] {
+  threads_.emplace_back([this](const std::stop_token&) {
     for (std::int64_t stamp = 0; ::read(ends_[2], &stamp, sizeof stamp) == sizeof stamp;)
-      ms_.push_back(static_cast<double>(Clock::now().time_since_epoch().count() - stamp) * 1e-6);
+      ms_.push_back(static_cast<double>(host_now().ns - stamp) * 1e-6);
   });
 }
 
@@ -58,9 +57,9 @@ TwoWakes::~TwoWakes() {
 }
 
 std::vector<double> TwoWakes::stop() {
-  for (std::jthread& thread : threads_) {
+  for (OwnedThread& thread : threads_) {
     thread.request_stop();
-    if (thread.joinable()) thread.join();
+    thread.join();
   }
   std::vector<double> p99_ms;
   for (auto second = ms_.begin(); ms_.end() - second >= kRate_hz; second += kRate_hz) {

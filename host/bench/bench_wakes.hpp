@@ -2,10 +2,10 @@
 
 #include <array>
 #include <memory>
-#include <thread>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::host {
 
@@ -24,7 +24,7 @@ class TwoWakes {
   explicit TwoWakes(const std::array<int, 4>& ends);
   std::array<int, 4> ends_;  ///< two pipes, reading ends first
   std::vector<double> ms_;
-  std::vector<std::jthread> threads_;
+  std::vector<OwnedThread> threads_;
 };
 
 }  // namespace birdseye::host

@@ -5,6 +5,7 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/camera/camera_calibration.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/operation/findings.hpp"
 #include "host/volume/import.hpp"
@@ -14,8 +15,6 @@
 namespace birdseye::host {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // The labels of the simulator's segmentation that the overlay shows.
 constexpr int kPortal = 2, kHepatic = 3, kTumour = 4;
@@ -158,32 +157,31 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
 }
 
 Result<void> DemoSession::run(EventStream& stream) {
-  constexpr auto kPatience = std::chrono::seconds(15);
-  auto heard = Clock::now();
+  constexpr Duration kPatience = Duration::from_ms(15'000);
+  HostTime heard = host_now();
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
     if (const std::string failure = cart_.failure(); !failure.empty()) return Error{Errc::disconnected, failure};
-    auto event = stream.next(Clock::now() + std::chrono::milliseconds(200));
+    auto event = stream.next(Deadline::after(Duration::from_ms(200)));
     if (!event) return event.error();
     if (!*event) {
       const auto stages = cart_.stages();
       // Nothing waits, the script has ended, and the last frames have had time to come.
-      if (!stages.empty() && stages.back().name == "end" && Clock::now() - heard > std::chrono::milliseconds(500))
-        return {};
-      if (Clock::now() - heard > kPatience)
+      if (!stages.empty() && stages.back().name == "end" && host_now() - heard > Duration::from_ms(500)) return {};
+      if (host_now() - heard > kPatience)
         return Error{Errc::timeout, "the appliance has sent nothing for 15 s; see birdseyed.log"};
       continue;
     }
     Result<void> taken;
     if (const auto* frame = std::get_if<wire::VideoFrame>(&**event)) {
       taken = take(*frame);
-      heard = Clock::now();
+      heard = host_now();
     } else if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
       taken = take(*birds);
       // After the script's end the tracker goes on a little; the last frames may still be on their way.
       const auto stages = cart_.stages();
       const bool ended = !stages.empty() && stages.back().name == "end" && stages.back().begins < birds->acquired;
-      if (ended && Clock::now() - heard > std::chrono::milliseconds(400)) return {};
+      if (ended && host_now() - heard > Duration::from_ms(400)) return {};
     }
     if (!taken) return taken;
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "drivers/system/clock.hpp"
 #include "host/operation/operation.hpp"
 
 namespace birdseye::host {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/link/appliance_link.hpp"
 #include "host/recording/recording_reader.hpp"
 
@@ -11,10 +13,8 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = wire::Client::Clock;
-
 constexpr std::size_t kMostFramesWaiting = 12;  // half a second: older frames are of no use to a picture that is live
-constexpr auto kConnectAgain = std::chrono::seconds(1);
+constexpr Duration kConnectAgain = Duration::from_ms(1000);
 
 }  // namespace
 
@@ -41,7 +41,7 @@ std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings setti
     say("starting tracker, camera and appliance");
     auto cart = SimulatedCart::start(settings);
     if (!cart) return cart.error();
-    auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Clock::now() + std::chrono::seconds(20));
+    auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
     if (!client) return client.error();
     return Link{*std::move(cart), *std::move(client)};
   };
@@ -51,7 +51,7 @@ std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings setti
 void LiveSource::take_link(Result<Link> link) {
   if (!link) {
     words_ = link.error().what;
-    again_ = Clock::now() + kConnectAgain;
+    again_ = host_now() + kConnectAgain;
     given_up_ = name_ == "the simulated cart";  // what could not be started once is not tried for ever
     return;
   }
@@ -75,10 +75,10 @@ Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesyst
   return source;
 }
 
-std::optional<wire::Event> LiveSource::next(Clock::time_point deadline) {
+std::optional<wire::Event> LiveSource::next(Deadline deadline) {
   if (!events_) link_again();
   if (!events_) {
-    std::this_thread::sleep_until(deadline);
+    sleep_until(deadline);
     return std::nullopt;
   }
   auto event = events_->next(deadline);
@@ -87,7 +87,7 @@ std::optional<wire::Event> LiveSource::next(Clock::time_point deadline) {
   events_.reset();
   stream_ = nullptr;
   recording_ = nullptr;
-  again_ = Clock::now() + kConnectAgain;
+  again_ = host_now() + kConnectAgain;
   given_up_ = cart_ != nullptr || !live_;
   return std::nullopt;
 }
@@ -95,7 +95,7 @@ std::optional<wire::Event> LiveSource::next(Clock::time_point deadline) {
 void LiveSource::link_again() {
   if (auto link = connecting_.take()) take_link(*std::move(link));
   if (events_ || given_up_) return;
-  if (!connecting_.running() && Clock::now() >= again_) connecting_.start(connect_);
+  if (!connecting_.running() && host_now() >= again_) connecting_.start(connect_);
   if (connecting_.running() && !connecting_.line().empty()) words_ = connecting_.line();
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "drivers/system/background.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/link/event_stream.hpp"
 #include "host/simulated/simulated_cart.hpp"
 
@@ -26,7 +27,7 @@ class LiveSource {
   static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path, double speed = 1);
 
   /// The next event, waiting for it until the deadline.
-  std::optional<wire::Event> next(wire::Client::Clock::time_point deadline);
+  std::optional<wire::Event> next(Deadline deadline);
   [[nodiscard]] bool connected() const { return events_ != nullptr; }
   /// False for a recording, which nobody must take for the present.
   [[nodiscard]] bool live() const { return live_; }
@@ -51,7 +52,7 @@ class LiveSource {
   std::string name_, words_;
   Connect::Work connect_;
   Connect connecting_;
-  wire::Client::Clock::time_point again_{};
+  HostTime again_;
   bool given_up_ = false;
   std::unique_ptr<SimulatedCart> cart_;
   std::unique_ptr<EventSource> events_;

@@ -1,9 +1,7 @@
 #include "host/operation/operation.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -59,10 +57,6 @@ std::string ct_checksum(const Volume& ct) {
   const Eigen::Matrix4d place = ct.patient_from_voxel.matrix();
   crc = wire::checksum(bytes_of(place.data(), 16), crc);
   return fmt::format("{:016x}", crc);
-}
-
-std::string utc_now() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 Result<void> write_operation(const fs::path& folder, const Operation& operation) {

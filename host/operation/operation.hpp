@@ -23,9 +23,6 @@ struct Operation {
 /// Of the voxels and where they lie.
 std::string ct_checksum(const Volume& ct);
 
-/// The time of day: 2026-11-22T09:30:00Z.
-std::string utc_now();
-
 /// operation.json, and beside it camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and field.mha, as far as
 /// there are such.
 Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation);

@@ -1,4 +1,5 @@
 #include "host/operation/operation_keeper.hpp"
+#include "drivers/system/clock.hpp"
 
 #include <fmt/format.h>
 

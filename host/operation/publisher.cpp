@@ -29,11 +29,11 @@ wire::Packet packet_of(const Volume& volume, DeviceTime time) {
 
 /// The time of day, which is what other programs stamp by.
 DeviceTime time_of_day(HostTime time) {
-  return DeviceTime{time.ns} + wire::wall_minus_monotonic();
+  return DeviceTime{time.ns} + wall_minus_monotonic();
 }
 
 DeviceTime now() {
-  return time_of_day({wire::monotonic_now().ns});
+  return time_of_day(host_now());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "calibration/record/calibration_record.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/files/record_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/operation/patient.hpp"
@@ -14,8 +15,6 @@ namespace birdseye::host {
 namespace {
 
 using calibration::CalibrationRecord;
-using Clock = std::chrono::steady_clock;
-
 /// Calls take with every event but the pixels.
 template <typename Take>
 Result<void> look_through(const ReplayInputs& inputs, const Take& take) {
@@ -23,7 +22,7 @@ Result<void> look_through(const ReplayInputs& inputs, const Take& take) {
       RecordingReader::open(inputs.recording, {.speed = 0, .transform = inputs.transform, .pictures = false});
   if (!reader) return reader.error();
   for (;;) {
-    const auto event = (*reader)->next(Clock::now());
+    const auto event = (*reader)->next(host_now());
     if (!event && event.error().code == Errc::disconnected) return {};
     if (!event) return event.error();
     if (*event) take(**event);

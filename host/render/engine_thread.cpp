@@ -1,11 +1,12 @@
 #include "host/render/engine_thread.hpp"
 
-#include <condition_variable>
 #include <exception>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
+
+#include "drivers/system/condition.hpp"
+#include "drivers/system/thread.hpp"
 
 namespace birdseye::host {
 
@@ -21,7 +22,7 @@ class Worker {
     std::unique_lock lock(mutex_);
     todo_ = &what;
     changed_.notify_all();
-    changed_.wait(lock, [this] { return todo_ == nullptr; });
+    changed_.wait(lock, std::stop_token(), [this] { return todo_ == nullptr; });
     if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   }
 
@@ -40,10 +41,10 @@ class Worker {
   }
 
   std::mutex asking_, mutex_;
-  std::condition_variable_any changed_;
+  Condition changed_;
   const std::function<void()>* todo_ = nullptr;
   std::exception_ptr thrown_;
-  std::jthread thread_;
+  OwnedThread thread_;
 };
 
 class EngineThread final : public Engine {

@@ -11,14 +11,14 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <mutex>
+
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 std::shared_mutex& copying() {
   static std::shared_mutex mutex;
@@ -55,8 +55,7 @@ std::shared_mutex& copying() {
 /// The other end of the pipe. Ends the copy with itself.
 class Copy {
  public:
-  Copy(pid_t process, int fd, Duration within)
-      : process_(process), fd_(fd), deadline_(Clock::now() + std::chrono::nanoseconds(within.ns)) {}
+  Copy(pid_t process, int fd, Duration within) : process_(process), fd_(fd), deadline_(Deadline::after(within)) {}
   ~Copy() {
     ::close(fd_);
     ::kill(process_, SIGKILL);
@@ -70,10 +69,7 @@ class Copy {
   bool receive(void* to, std::size_t size) const {
     auto* bytes = static_cast<char*>(to);
     while (size > 0) {
-      const auto left_ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - Clock::now()).count();
-      if (left_ms <= 0) return false;
-      pollfd entry{fd_, POLLIN, 0};
-      if (::poll(&entry, 1, static_cast<int>(std::min<std::int64_t>(left_ms, 1000))) <= 0) continue;
+      if (wait_ready(fd_, POLLIN, deadline_) == 0) return false;
       const ssize_t got = ::read(fd_, bytes, size);
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) return false;
@@ -86,7 +82,7 @@ class Copy {
  private:
   pid_t process_;
   int fd_;
-  Clock::time_point deadline_;
+  Deadline deadline_;
 };
 
 }  // namespace

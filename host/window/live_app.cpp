@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "calibration/detect/pattern.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/write_files.hpp"
@@ -16,15 +15,9 @@ namespace birdseye::host {
 
 namespace {
 
-using Clock = wire::Client::Clock;
-
 // Between pictures it is looked as often as this whether one has grown stale.
-constexpr auto kTick = std::chrono::milliseconds(12);
+constexpr Duration kTick = Duration::from_ms(12);
 constexpr Duration kRedraw = Duration::from_ms(50);  // for hands and figures, where there is no new frame
-
-HostTime now() {
-  return HostTime{std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count()};
-}
 
 constexpr double kStepMm = 1.2;  // what two cores draw in time
 
@@ -48,7 +41,7 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
 
 Result<void> LiveApp::run(HostTime asked) {
   note_interrupts();
-  const HostTime began = now();
+  const HostTime began = host_now();
   asked_ = asked;
   const Picture cover = stall_picture(window_->scale());
   window_->cover_when_still(side_px(window_->scale()), cover.rgb, cover.width_px, cover.height_px);
@@ -70,7 +63,7 @@ Result<void> LiveApp::run(HostTime asked) {
       return Error{Errc::io, "window: " + window_->fault() + "; the driver of the graphics card is at fault"};
     const auto ended = follow_script();
     if (!ended) return ended.error();
-    figures_.seconds = Duration{now().ns - began.ns}.seconds();
+    figures_.seconds = Duration{host_now().ns - began.ns}.seconds();
     figures_.stood_still = window_->stood_still();
     if (*ended) break;
   }
@@ -79,12 +72,12 @@ Result<void> LiveApp::run(HostTime asked) {
 }
 
 void LiveApp::take_events() {
-  const auto deadline = Clock::now() + kTick;
+  const HostTime deadline = host_now() + kTick;
   bool frame = false;
   // Waits for a frame, then takes what has come besides: the newest frame is what is drawn.
-  while (auto event = source_->next(frame ? Clock::now() : deadline)) {
+  while (auto event = source_->next(frame ? host_now() : deadline)) {
     frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
-    workflow_.take(*event, now(), source_->host_from_device());
+    workflow_.take(*event, host_now(), source_->host_from_device());
   }
 }
 
@@ -99,20 +92,21 @@ void LiveApp::note_simulator() {
 }
 
 void LiveApp::note_patient() {
-  if (operation_.markers_seen && !figures_.fiducials_s) figures_.fiducials_s = Duration{now().ns - asked_.ns}.seconds();
+  if (operation_.markers_seen && !figures_.fiducials_s)
+    figures_.fiducials_s = Duration{host_now().ns - asked_.ns}.seconds();
   if (operation_.patient == nullptr || histogram_) return;
   histogram_.emplace(operation_.patient->shown);
   facts_.histogram = &*histogram_;
   inset_.emplace(operation_.patient->shown);
   if (operation_.transfer) editor_.set_points(operation_.transfer->points());
-  figures_.ct_s = Duration{now().ns - asked_.ns}.seconds();
+  figures_.ct_s = Duration{host_now().ns - asked_.ns}.seconds();
 }
 
 /// Some times a second, between frames: it is no part of what must be live.
 void LiveApp::draw_inset() {
   constexpr Duration kEvery = Duration::from_ms(250);
-  if (!inset_ || !operation_.engine || Duration{now().ns - inset_drawn_.ns} < kEvery) return;
-  inset_drawn_ = now();
+  if (!inset_ || !operation_.engine || Duration{host_now().ns - inset_drawn_.ns} < kEvery) return;
+  inset_drawn_ = host_now();
   const Picture picture = inset_->draw(*operation_.engine, workflow_.picture().camera_from_patient());
   window_->set_picture(LiveWindow::Slot::inset, picture.rgb, picture.width_px, picture.height_px);
 }
@@ -120,7 +114,7 @@ void LiveApp::draw_inset() {
 void LiveApp::draw() {
   const LivePicture& picture = workflow_.picture();
   workflow_.draw();
-  const HostTime began = now();
+  const HostTime began = host_now();
   // Judged as of when it will be seen: drawing the window takes its time too.
   ShownPicture shown = workflow_.shown_at(began + to_draw_);
   const bool news = shown.changes != drawn_changes_ || !shot_.empty();
@@ -130,15 +124,15 @@ void LiveApp::draw() {
   const PanelWishes wishes = draw_window(shown);
   figures_.picture_says = shown.reason;
   if (!shot_.empty()) snapshot(shot_, shown);
-  if (shown.overlaid && !workflow_.shown_at(now()).overlaid) {
+  if (shown.overlaid && !workflow_.shown_at(host_now()).overlaid) {
     // It took longer than it was thought to: what has grown stale on the way is not shown.
-    shown = workflow_.shown_at(now());
+    shown = workflow_.shown_at(host_now());
     draw_window(shown, true);
   }
   LiveWindow::Believed until;  // what is frozen or has stopped says so itself
-  if (shown.believe_until && !operation_.frozen) until.emplace(std::chrono::nanoseconds(shown.believe_until->ns));
+  if (!operation_.frozen) until = shown.believe_until;
   window_->swap(until);
-  const HostTime swapped = now();
+  const HostTime swapped = host_now();
   if (!figures_.window_s) figures_.window_s = Duration{swapped.ns - asked_.ns}.seconds();
   to_draw_ = Duration{swapped.ns - began.ns};
   // Of video that has stopped the age grows: it is said once.
@@ -228,7 +222,7 @@ void LiveApp::grant(const PanelWishes& asked) {
 Result<bool> LiveApp::follow_script() {
   // One after the other, as a hand would.
   if (!script_ || key_waits_ || !shot_.empty() || saving_.running()) return false;
-  const auto act = script_->next(workflow_.view(), now());
+  const auto act = script_->next(workflow_.view(), host_now());
   if (!act) return act.error();
   if (!act->key.empty()) {
     add_key(act->key, facts_, scripted_);

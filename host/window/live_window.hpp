@@ -41,7 +41,7 @@ class LiveWindow final : public GlContext {
   /// Draws all panels into the back of the window, and waits until that is done; swap() shows it.
   void end_frame();
   /// Of what is shown; empty: for ever.
-  using Believed = std::optional<StallCover::Clock::time_point>;
+  using Believed = std::optional<HostTime>;
   /// What is still on the screen then is covered, as cover_when_still() says.
   void swap(Believed believe_until = std::nullopt);
   /// rgb: what covers the window right of left_px then. Without an X server nothing ever does.

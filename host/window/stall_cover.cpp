@@ -80,13 +80,13 @@ StallCover::~StallCover() {
   xcb_disconnect(server_);
 }
 
-void StallCover::believe_until(std::optional<Clock::time_point> until) {
+void StallCover::believe_until(std::optional<HostTime> until) {
   if (until) believe_no_longer_than(*until);
   const std::lock_guard lock(mutex_);
   until_ = until;  // what is later needs no waking: the thread looks again when the earlier has passed
 }
 
-void StallCover::believe_no_longer_than(Clock::time_point until) {
+void StallCover::believe_no_longer_than(HostTime until) {
   const std::lock_guard lock(mutex_);
   if (until_ && *until_ <= until) return;
   until_ = until;
@@ -116,11 +116,11 @@ void StallCover::watch(const std::stop_token& stop) {
   ::pthread_setschedparam(::pthread_self(), SCHED_RR, &least);
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    const std::optional<Clock::time_point> until = until_;
+    const std::optional<HostTime> until = until_;
     if (covering_ || !until) {
       earlier_.wait(lock, stop, [&] { return !covering_ && until_; });
-    } else if (Clock::now() < *until) {
-      earlier_.wait_until(lock, stop, *until, [&] { return until_ && *until_ < *until; });
+    } else if (host_now() < *until) {
+      earlier_.wait(lock, stop, *until, [&] { return until_ && *until_ < *until; });
     } else {
       // What the server sends to everybody would gather for ever.
       while (xcb_generic_event_t* const event = xcb_poll_for_event(server_)) std::free(event);

@@ -1,13 +1,15 @@
 #pragma once
 
-#include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
+
+#include "drivers/system/clock.hpp"
+#include "drivers/system/condition.hpp"
+#include "drivers/system/thread.hpp"
 
 struct xcb_connection_t;
 
@@ -18,8 +20,6 @@ namespace birdseye::host {
 /// that hangs keeps it from covering. A machine that stands still as a whole is beyond it.
 class StallCover {
  public:
-  using Clock = std::chrono::steady_clock;
-
   /// window: its number at the server of this DISPLAY. left_px: columns that are never covered. rgb: what it shows,
   /// rows from the top, side by side and below each other. Null where there is no such server or window.
   static std::unique_ptr<StallCover> over(std::uint32_t window, int left_px, std::span<const std::uint8_t> rgb,
@@ -29,9 +29,9 @@ class StallCover {
   StallCover& operator=(const StallCover&) = delete;
 
   /// What is on the screen is to be believed until then; empty: for ever.
-  void believe_until(std::optional<Clock::time_point> until);
+  void believe_until(std::optional<HostTime> until);
   /// Leaves the time that holds where it is the earlier.
-  void believe_no_longer_than(Clock::time_point until);
+  void believe_no_longer_than(HostTime until);
   /// Before something new is shown: takes it away, and returns once it is gone. What it showed stays on the screen
   /// until then.
   void lift();
@@ -45,11 +45,11 @@ class StallCover {
   xcb_connection_t* server_;
   std::uint32_t cover_;
   mutable std::mutex mutex_;
-  std::condition_variable_any earlier_;
-  std::optional<Clock::time_point> until_;
+  Condition earlier_;
+  std::optional<HostTime> until_;
   bool covering_ = false;
   int covered_ = 0;
-  std::jthread watching_;
+  OwnedThread watching_;
 };
 
 }  // namespace birdseye::host

@@ -270,7 +270,7 @@ TEST(Recorder, BeginsAFileOfItsOwnEachTime) {
 }
 
 TEST(Appliance, RunsWithoutARecordingAndSaysSo) {
-  using Clock = wire::Client::Clock;
+  using Clock = std::chrono::steady_clock;
   Config config;
   config.tracker.line.device = "unix:/nowhere/tracker";
   config.camera.source = "unix:/nowhere/camera";

@@ -13,7 +13,7 @@
 namespace birdseye::wire {
 namespace {
 
-using Clock = Client::Clock;
+using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::ForeignServer;

@@ -60,7 +60,7 @@ void show(Publisher& publisher, const std::shared_ptr<const PatientPlan>& patien
 }
 
 PublishedFrame frame() {
-  return {HostTime{wire::monotonic_now().ns}, kTrackerFromPatient, kCameraFromPatient};
+  return {host_now(), kTrackerFromPatient, kCameraFromPatient};
 }
 
 TEST(Publisher, TheCtLiesInSlicersWorldWhereItLiesInThePatient) {
