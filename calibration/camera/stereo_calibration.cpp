@@ -183,9 +183,9 @@ Result<StereoCalibration> calibrate_stereo(std::span<const PatternView> left_vie
                                               left_views.size(), right_views.size())};
   }
   auto left = calibrate_camera(left_views, left_size_px.x(), left_size_px.y(), settings);
-  if (!left) return Error{left.error().code, "left camera: " + left.error().what};
+  if (!left) return left.error().with_context("left camera");
   auto right = calibrate_camera(right_views, right_size_px.x(), right_size_px.y(), settings);
-  if (!right) return Error{right.error().code, "right camera: " + right.error().what};
+  if (!right) return right.error().with_context("right camera");
   StereoCalibration out;
   out.left = *std::move(left);
   out.right = *std::move(right);

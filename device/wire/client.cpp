@@ -113,7 +113,7 @@ Result<std::optional<std::span<const std::uint8_t>>> Client::next_message(Deadli
   if (!whole) return whole.error();
   if (!*whole) return Message();
   const auto body = body_bytes(std::span(buffer_).first(kHeaderBytes));
-  if (!body) return Error{body.error().code, fmt::format("{}: {}", name_, body.error().what)};
+  if (!body) return body.error().with_context(name_);
   const std::size_t size = kHeaderBytes + *body;
   whole = fill(size, deadline);
   if (!whole) return whole.error();
@@ -148,7 +148,7 @@ Result<void> Client::drain() {
     if (!message) return message.error();
     if (!*message) return {};
     const auto header = read_header(**message, kLargestBody);
-    if (!header) return Error{header.error().code, fmt::format("{}: {}", name_, header.error().what)};
+    if (!header) return header.error().with_context(name_);
     foreign_->push(*header, (*message)->subspan(kHeaderBytes), host_now());
   }
   return {};
@@ -174,14 +174,14 @@ Result<std::optional<Event>> Client::next(Deadline deadline) {
       continue;
     }
     const auto header = read_header(**message, kLargestBody);
-    if (!header) return Error{header.error().code, fmt::format("{}: {}", name_, header.error().what)};
+    if (!header) return header.error().with_context(name_);
     judge(*header);
     if (foreign_) {
       foreign_->push(*header, (*message)->subspan(kHeaderBytes), host_now());
       continue;
     }
     auto told = unpacker_.push(**message);
-    if (!told) return Error{told.error().code, fmt::format("{}: {}", name_, told.error().what)};
+    if (!told) return told.error().with_context(name_);
     if (*told && std::holds_alternative<ClockPong>(**told)) {
       take(std::get<ClockPong>(**told));
       told->reset();

@@ -63,7 +63,7 @@ Result<void> FtdiPort::purge_both() {
 Result<void> FtdiPort::set_up() {
   const std::uint16_t port = ftdi::port_index(chip_);
   const auto baud = ftdi::set_baud(settings_.baud, chip_);
-  if (!baud) return Error{baud.error().code, fmt::format("{}: {}", name(), baud.error().what)};
+  if (!baud) return baud.error().with_context(name());
   actual_baud_ = baud->actual;
   // RTS first: it holds the instrument in reset. The reset has dropped it already, and later chips may differ.
   for (const SetupPacket& request :

@@ -36,7 +36,7 @@ Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::option
   auto pairs = read_field_pairs(options.pair[0], options.pair[1]);
   if (!pairs) return pairs.error();
   auto fit = calibration::fit_field_from_pairs(pairs->pairs, {basis, options.distance_mm});
-  if (!fit) return Error{fit.error().code, options.pair[0].string() + ": " + fit.error().what};
+  if (!fit) return fit.error().with_context(options.pair[0].string());
   return Fitted{*std::move(fit), std::move(pairs->rejected),
                 fmt::format("{} pairs of poses of two sensors on one body", pairs->pairs.size())};
 }
@@ -53,7 +53,7 @@ Result<Fitted> fit_places(const CalibrateFieldOptions& options, const std::optio
   auto fit = calibration::fit_field(samples->samples, {basis});
   if (!fit) {
     const auto& path = options.grid.empty() ? options.poses : options.grid;
-    return Error{fit.error().code, path.string() + ": " + fit.error().what};
+    return fit.error().with_context(path.string());
   }
   return Fitted{*std::move(fit), std::move(samples->rejected),
                 fmt::format("{} places of a board", samples->samples.size())};

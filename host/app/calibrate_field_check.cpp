@@ -101,7 +101,7 @@ void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   if (!places) return status.refuse(places.error());
   const std::string when = options.when.empty() ? local_time_now() : options.when;
   const auto check = calibration::check_field(when, *places);
-  if (!check) return status.refuse({check.error().code, options.measured.string() + ": " + check.error().what});
+  if (!check) return status.refuse(check.error().with_context(options.measured.string()));
   history->push_back(*check);
   // A bad day belongs into the history like any other; the file is replaced as a whole.
   if (const auto written = write_file(options.history, history_text(*history)); !written)

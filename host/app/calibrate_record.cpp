@@ -25,8 +25,7 @@ struct CalibrateRecordOptions {
 Result<void> bind_to(const std::string& address, CalibrationRecord& record) {
   auto told = ask_hardware(address, {"tracker", "camera"});
   if (!told) return told.error();
-  if (auto fits = check_hardware(record, *told); !fits)
-    return Error{fits.error().code, fmt::format("{}: {}", address, fits.error().what)};
+  if (auto fits = check_hardware(record, *told); !fits) return fits.error().with_context(address);
   record.tracker = (*told)["tracker"];
   record.camera = (*told)["camera"];
   return {};

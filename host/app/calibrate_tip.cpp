@@ -71,7 +71,7 @@ Result<TipInput> read_input(const CalibrateTipOptions& options) {
     const auto phases = parse_phases(options.phases);
     if (!phases) return phases.error();
     auto divots = divots_of(*phases, input.set);
-    if (!divots) return Error{divots.error().code, options.poses.string() + ": " + divots.error().what};
+    if (!divots) return divots.error().with_context(options.poses.string());
     std::vector<TimedPose> kept;
     for (std::size_t i = 0; i < divots->size(); ++i) {
       if (!(*divots)[i]) continue;

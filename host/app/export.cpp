@@ -66,7 +66,7 @@ Result<Registered> read_registered(ExportOptions options) {
   }
   if (read.field && read.volume) {
     if (auto covers = check_covers(*read.field, *read.volume); !covers)
-      return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
+      return covers.error().with_context(options.deformation.string());
   }
   return read;
 }

@@ -114,8 +114,7 @@ Result<FiducialOutcome> compute(const RegisterFiducialsOptions& options, Fiducia
     auto refined = refine_on_surface(
         *input.surface, input.surface_points_mm,
         {out.fit.to_from, input.touched_mm, out.localisation.rms_mm, out.localisation.degrees_of_freedom});
-    if (!refined)
-      return Error{refined.error().code, fmt::format("{}: {}", options.surface_points.string(), refined.error().what)};
+    if (!refined) return refined.error().with_context(options.surface_points.string());
     out.refinement = *std::move(refined);
   }
   return out;

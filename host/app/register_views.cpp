@@ -203,7 +203,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
 
   Progress progress;
   const auto found = run_registration(c, *transfer, true, [&progress](const std::string& line) { progress(line); });
-  if (!found) return Error{found.error().code, fmt::format("{}: {}", options.file.string(), found.error().what)};
+  if (!found) return found.error().with_context(options.file.string());
   const double time_s = progress.seconds();
 
   nlohmann::json json = json_of(c, *found, time_s);

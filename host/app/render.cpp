@@ -110,7 +110,7 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   auto field = read_field(options.deformation);
   if (!field) return field.error();
   if (auto covers = check_covers(*field, scene.volume); !covers)
-    return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
+    return covers.error().with_context(options.deformation.string());
   scene.deformation = *std::move(field);
   return scene;
 }

@@ -171,7 +171,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
     const auto field = read_field(options.deformation);
     if (!field) return field.error();
     if (auto covers = check_covers(*field, *volume); !covers)
-      return Error{covers.error().code, fmt::format("{}: {}", options.deformation.string(), covers.error().what)};
+      return covers.error().with_context(options.deformation.string());
     (*engine)->deform(*field);
   }
   std::error_code error;

@@ -60,7 +60,7 @@ Result<void> volume_segment(const SegmentOptions& options) {
   if (!options.seed.empty())
     settings.seed_in_patient_mm = Eigen::Vector3d(options.seed[0], options.seed[1], options.seed[2]);
   const auto labels = segment(*ct, settings);
-  if (!labels) return Error{labels.error().code, fmt::format("{}: {}", options.path.string(), labels.error().what)};
+  if (!labels) return labels.error().with_context(options.path.string());
   if (auto written = write_labels(options.out, *labels); !written) return written;
   const auto voxels = std::count(labels->hu.begin(), labels->hu.end(), std::int16_t{1});
   fmt::print("{}: {} voxels, {:.1f} ml\n", options.out.string(), voxels,

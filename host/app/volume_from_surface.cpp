@@ -23,7 +23,7 @@ Result<void> volume_from_surface(const VolumeFromSurfaceOptions& options) {
   SlabSettings settings = options.slab;
   settings.seen_from_mm = {options.seen_from[0], options.seen_from[1], options.seen_from[2]};
   const auto volume = slab_behind(*surface, settings);
-  if (!volume) return Error{volume.error().code, fmt::format("{}: {}", options.surface.string(), volume.error().what)};
+  if (!volume) return volume.error().with_context(options.surface.string());
   ImageFile image;
   image.size = volume->size;
   image.spacing_mm = volume->spacing_mm;

@@ -90,7 +90,7 @@ nlohmann::json place_json(const Vector3d& v) {
 Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name the file to write"};
   const MarkerShape shape{options.kind, options.diameter_mm, options.hole_mm, options.height_mm};
-  if (auto sound = check(shape); !sound) return Error{sound.error().code, "--shape: " + sound.error().what};
+  if (auto sound = check(shape); !sound) return sound.error().with_context("--shape");
   const auto ct = import_volume(options.path);
   if (!ct) return ct.error();
   MarkerSearch search{shape, std::nullopt};

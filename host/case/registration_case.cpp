@@ -241,7 +241,7 @@ Result<void> read_view(const Table& table, const fs::path& folder, RegistrationC
   Picture picture{bgr.cols, bgr.rows, {}};
   picture.rgb.assign(rgb.datastart, rgb.dataend);
   auto overlap = overlap_mask(picture.view(), left_out);
-  if (!overlap) return Error{overlap.error().code, fmt::format("{}: {}", image->string(), overlap.error().what)};
+  if (!overlap) return overlap.error().with_context(image->string());
   view.mask = *std::move(overlap);
   constexpr double kLeast_percent = 1;
   const auto counts = view.mask.size() - static_cast<std::size_t>(std::count(view.mask.begin(), view.mask.end(), 0));

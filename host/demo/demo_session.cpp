@@ -93,14 +93,14 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   views.reserve(seen_.stations.size());
   for (const calibration::HandEyeStation& station : seen_.stations) views.push_back(station.view);
   const auto lens = calibration::calibrate_camera(views, size.width_px, size.height_px);
-  if (!lens) return Error{lens.error().code, "camera calibration: " + lens.error().what};
+  if (!lens) return lens.error().with_context("camera calibration");
   seen_.camera = lens->camera;
   const auto hand_eye = calibration::calibrate_hand_eye(seen_);
-  if (!hand_eye) return Error{hand_eye.error().code, "hand-eye calibration: " + hand_eye.error().what};
+  if (!hand_eye) return hand_eye.error().with_context("hand-eye calibration");
   if (const Verdict verdict = calibration::judge(*hand_eye); verdict.grade == Grade::fail)
     return Error{Errc::degenerate, fmt::format("hand-eye calibration: {}", fmt::join(verdict.reasons, "; "))};
   const auto fit = register_by_touches(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
-  if (!fit) return Error{fit.error().code, "registration: " + fit.error().what};
+  if (!fit) return fit.error().with_context("registration");
   figures.camera_rms_px = lens->rms_px;
   figures.hand_eye_rms_px = hand_eye->tracked_px;
   figures.board_views = static_cast<int>(seen_.stations.size());

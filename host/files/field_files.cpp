@@ -206,7 +206,7 @@ Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
   if (!file.is_open() || file.bad())
     return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
   auto map = calibration::parse_field_map(text.str());
-  if (!map) return Error{map.error().code, path.string() + ": " + map.error().what};
+  if (!map) return map.error().with_context(path.string());
   return map;
 }
 

@@ -91,7 +91,7 @@ Result<std::vector<std::uint8_t>> FilmReader::read(std::size_t index) {
   std::vector<std::uint8_t> rgb(frame_bytes_);
   for (; next_ <= index; ++next_) {
     const auto got = decoder_.read(rgb.data(), rgb.size(), Deadline::after(kEncoderPatience));
-    if (!got) return Error{got.error().code, fmt::format("{}: {}", path_.string(), got.error().what)};
+    if (!got) return got.error().with_context(path_.string());
     if (*got < rgb.size()) {
       return Error{Errc::bad_format,
                    fmt::format("{}: has no frame {}: {} frames are whole", path_.string(), index, next_)};

@@ -17,7 +17,7 @@ Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& 
   std::ostringstream text;
   text << file.rdbuf();
   auto record = calibration::parse_record(text.str());
-  if (!record) return Error{record.error().code, path.string() + ": " + record.error().what};
+  if (!record) return record.error().with_context(path.string());
   return record;
 }
 

@@ -183,7 +183,7 @@ Result<CameraModel> read_camera(const fs::path& path) {
   double* const terms[] = {&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
   for (int i = 0; i < static_cast<int>(distortion.total()); ++i) *terms[i] = distortion.at<double>(i);
   if (auto sound = check(camera); !sound) {
-    return Error{sound.error().code, fmt::format("{}: {}", path.string(), sound.error().what)};
+    return sound.error().with_context(path.string());
   }
   return camera;
 }

@@ -73,8 +73,7 @@ Result<void> check_bound_record(const std::filesystem::path& record, const std::
   if (read->tracker.empty() && read->camera.empty()) return {};
   const auto told = ask_hardware(address, names);
   if (!told) return told.error();
-  if (auto fits = check_hardware(*read, *told); !fits)
-    return Error{fits.error().code, fmt::format("{}: {}", record.string(), fits.error().what)};
+  if (auto fits = check_hardware(*read, *told); !fits) return fits.error().with_context(record.string());
   return {};
 }
 

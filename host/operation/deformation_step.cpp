@@ -25,7 +25,7 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
   view.grey = grey_of(video);
   const std::vector<std::uint8_t> nothing_left_out(view.grey.size(), 0);
   auto mask = overlap_mask(video, nothing_left_out);
-  if (!mask) return Error{mask.error().code, view.name + ": " + mask.error().what};
+  if (!mask) return mask.error().with_context(view.name);
   view.mask = *std::move(mask);
   return view;
 }

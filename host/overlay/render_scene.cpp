@@ -36,7 +36,7 @@ Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesy
   const auto label_of = import_labels(labels, *ct);
   if (!label_of) return label_of.error();
   auto kept = keep_labels(*ct, *label_of, keep);
-  if (!kept) return Error{kept.error().code, fmt::format("{}: {}", labels.string(), kept.error().what)};
+  if (!kept) return kept.error().with_context(labels.string());
   return kept;
 }
 

@@ -96,7 +96,7 @@ Result<Subject> liver_subject(const std::filesystem::path& ct, const std::filesy
   }
   crop(*body, surface);
   auto subject = subject_of(std::move(*body), std::move(surface), seed);
-  if (!subject) return Error{subject.error().code, fmt::format("{}: {}", ct.string(), subject.error().what)};
+  if (!subject) return subject.error().with_context(ct.string());
   return subject;
 }
 

@@ -86,7 +86,7 @@ Result<void> write_phantom(const PhantomSettings& settings) {
   if (!body) return body.error();
   const Result<Implants> implants = choose_implants(*body, settings.seed);
   if (!implants) {
-    return Error{implants.error().code, fmt::format("{}: {}", settings.ct.string(), implants.error().what)};
+    return implants.error().with_context(settings.ct.string());
   }
   const std::vector<std::uint8_t> labels = implant(*body, *implants, settings.seed);
 

@@ -16,7 +16,7 @@ Result<MultiView> MultiView::make(const std::vector<VideoView>& views, const Tis
     const std::vector<std::uint8_t> all(synthetic.video().size(), 1);
     auto measure =
         ParzenMutualInformation::make({static_cast<int>(all.size()), all.empty() ? 0 : 1, synthetic.video(), all});
-    if (!measure) return Error{measure.error().code, view.name + ": " + measure.error().what};
+    if (!measure) return measure.error().with_context(view.name);
     made.measures_.push_back(*std::move(measure));
   }
   made.per_view_.resize(views.size());

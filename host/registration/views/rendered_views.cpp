@@ -77,7 +77,7 @@ Result<RenderedViews> RenderedViews::make(const std::vector<VideoView>& views, c
   made.caster_ = std::make_unique<RayCaster>(*made.shell_, opaque());
   for (const VideoView& view : views) {
     auto measure = make_similarity(similarity, {view.camera.width_px, view.camera.height_px, view.grey, view.mask});
-    if (!measure) return Error{measure.error().code, view.name + ": " + measure.error().what};
+    if (!measure) return measure.error().with_context(view.name);
     const auto same = std::find_if(made.views_.begin(), made.views_.end(),
                                    [&](const View& other) { return other.rays->camera() == view.camera; });
     auto rays = same != made.views_.end() ? same->rays : std::make_shared<const LensRays>(view.camera);
