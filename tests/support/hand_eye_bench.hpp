@@ -5,6 +5,7 @@
 #include <string>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "tests/support/lens.hpp"
 
@@ -117,13 +118,13 @@ struct HandEyeBench {
   template <typename From>
   Transform<Tracker, From> before(const Transform<Tracker, From>& pose, const calibration::Motion& motion,
                                   const HandEyeScene& scene) {
-    calibration::Vector6d step;
+    Vector6d step;
     step << -scene.time_offset_s * motion.angular_velocity_rad_s, -scene.time_offset_s * motion.velocity_mm_s;
     return calibration::moved(pose, step);
   }
   template <typename From>
   Transform<Tracker, From> noisy(const Transform<Tracker, From>& pose, const HandEyeScene& scene) {
-    calibration::Vector6d step;
+    Vector6d step;
     step << scene.angle_deg * kRadPerDeg * normal3(), scene.length * scene.position_mm * normal3();
     return calibration::moved(pose, step);
   }

@@ -308,10 +308,10 @@ TEST(MiniBirdTrouble, ASaturatedSensorIsToldAndTheStreamGoesOn) {
   ASSERT_EQ(diagnosis->errors.size(), 1U);
   EXPECT_EQ(diagnosis->errors[0].code, 32);
   EXPECT_TRUE(unit->streaming);
-  const auto chunk = (*bird)->read(now() + Duration::from_ms(100));
+  const auto chunk = (*bird)->read(device_now() + Duration::from_ms(100));
   ASSERT_TRUE(chunk && *chunk);
   EXPECT_TRUE((*chunk)->after_restart);
-  EXPECT_FALSE((*(*bird)->read(now() + Duration::from_ms(100)))->after_restart);
+  EXPECT_FALSE((*(*bird)->read(device_now() + Duration::from_ms(100)))->after_restart);
 }
 
 TEST(MiniBirdTrouble, AUnitThatHasLostItsSettingsNeedsAStart) {
@@ -346,16 +346,16 @@ TEST(MiniBirdTrouble, SleepsAndWakes) {
   ASSERT_TRUE(bird) << bird.error().what;
   ASSERT_TRUE((*bird)->sleep());
   EXPECT_TRUE(unit->asleep);
-  EXPECT_FALSE(*(*bird)->read(now() + Duration::from_ms(5)));
+  EXPECT_FALSE(*(*bird)->read(device_now() + Duration::from_ms(5)));
   ASSERT_TRUE((*bird)->wake());
   EXPECT_FALSE(unit->asleep);
-  EXPECT_TRUE((*(*bird)->read(now() + Duration::from_ms(100)))->after_restart);
+  EXPECT_TRUE((*(*bird)->read(device_now() + Duration::from_ms(100)))->after_restart);
 }
 
 TEST(MiniBirdTrouble, DamageOnTheLineIsToldWithTheNextBytes) {
   const auto [unit, bird] = start([](ScriptedUnit&) {});
   ASSERT_TRUE(bird) << bird.error().what;
-  const auto after_error = [&b = *bird] { return (*b->read(now() + Duration::from_ms(100)))->after_line_error; };
+  const auto after_error = [&b = *bird] { return (*b->read(device_now() + Duration::from_ms(100)))->after_line_error; };
   EXPECT_FALSE(after_error());
   ++unit->damaged;
   EXPECT_TRUE(after_error());

@@ -90,7 +90,7 @@ TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
     EXPECT_TRUE(step.add(touch_at(fiducial), 4));
     step.fit(std::nullopt, 4);
   }
-  EXPECT_FALSE(step.add(touch_at({}), 4)) << "all are touched";
+  EXPECT_FALSE(step.add(touch_at(Eigen::Vector3d::Zero()), 4)) << "all are touched";
   EXPECT_FALSE(step.registered().has_value());
   EXPECT_EQ(step.note().line, "4 touched");
   step.fit(kFiducials, 4);

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/live_panels.hpp"
@@ -336,7 +337,7 @@ TEST_F(LiveWindowTest, WhatStaysOnTheScreenTooLongIsCovered) {
   look(23, 23);  // what is not to be believed at all is not covered: it says so itself
   EXPECT_EQ(window.stood_still(), 0);
   for (int times = 1; times <= 3; ++times) {
-    draw(std::chrono::steady_clock::now() + std::chrono::milliseconds(100));
+    draw(host_now() + Duration::from_ms(100));
     // This thread stands still, and a screen shows for ever what was drawn last.
     std::this_thread::sleep_for(std::chrono::milliseconds(600));
     EXPECT_EQ(window.stood_still(), times);
