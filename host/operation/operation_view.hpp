@@ -23,14 +23,16 @@ namespace birdseye::host {
 /// How the operation stands, for whoever shows it: values alone.
 struct OperationView {
   LiveStep step = LiveStep::connect;
-  std::array<StepNote, kLiveSteps> notes;
   bool frozen = false;
+  bool board_named = false;  ///< there is a board to calibrate with
+  bool guiding = false;
+  bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
+  bool deforming = false;
+  std::array<StepNote, kLiveSteps> notes;
   std::string fault;
 
   LinkState link;
 
-  bool board_named = false;  ///< there is a board to calibrate with
-  bool guiding = false;
   std::optional<GuideState> guide;  ///< in its step, while it guides
   std::vector<std::string> guide_lines;
   std::optional<Verdict> calibration_verdict;
@@ -40,11 +42,9 @@ struct OperationView {
   std::vector<TouchedFiducial> touches;
   std::optional<double> fre_mm;
   std::string registration_fault;
-  bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
 
   std::optional<ViewAdvice> view_advice;  ///< in its step, where an overlay is drawn
 
-  bool deforming = false;
   DeformProgress deform_progress;  ///< in its step
   std::shared_ptr<const DeformedOrgan> deformed;
 
