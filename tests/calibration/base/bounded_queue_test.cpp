@@ -44,7 +44,7 @@ TEST(BoundedQueue, DropsTheOldestOfItsLaneOrRefusesAndCountsIt) {
 
 TEST(BoundedQueue, WithoutRoomLosesAllAndCountsAll) {
   BoundedQueue<int, 2> queue({{{0, WhenFull::drop_oldest}, {0, WhenFull::refuse}}});
-  for (const std::size_t lane : {0, 1}) EXPECT_FALSE(queue.push(lane, 7));
+  for (const std::size_t lane : {0U, 1U}) EXPECT_FALSE(queue.push(lane, 7));
   EXPECT_THAT(drain(queue), IsEmpty());
   EXPECT_EQ(queue.dropped(0) + queue.dropped(1), 2U);
 }
