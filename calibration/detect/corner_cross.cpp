@@ -12,7 +12,7 @@ namespace birdseye::calibration {
 
 namespace {
 
-constexpr double kSmoothing_px = 0.8;  // enough against noise and the pixels' steps
+constexpr double kCrossSmoothing_px = 0.8;  // enough against noise and the pixels' steps
 constexpr int kMostRounds = 25;
 constexpr double kSettled_px = 0.002;
 constexpr double kLeastGrey = 6;         // a difference below this is noise
@@ -84,7 +84,7 @@ SmoothPicture::SmoothPicture(const GreyView& picture)
       grey_(static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px)) {
   const cv::Mat from(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat to(height_px_, width_px_, CV_8UC1, grey_.data());
-  cv::GaussianBlur(from, to, cv::Size(0, 0), kSmoothing_px);
+  cv::GaussianBlur(from, to, cv::Size(0, 0), kCrossSmoothing_px);
 }
 
 GreyView SmoothPicture::view() const {

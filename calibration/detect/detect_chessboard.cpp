@@ -13,10 +13,10 @@ namespace birdseye::calibration {
 
 namespace {
 
-constexpr CrossReach kReach{0.42, 0.25};
+constexpr CrossReach kCornerReach{0.42, 0.25};
 constexpr double kThorough_px = 640;  // the width to which a picture is reduced for a search that takes seconds ..
 constexpr double kWords_px = 480;     // .. and for one of which only words come
-constexpr double kMostCovered = 0.1;  // of the corners; more, and what covers them may have moved others
+constexpr double kMostCornersCovered = 0.1;  // of the corners; more, and what covers them may have moved others
 
 /// Of a row's first corner.
 std::size_t index_of(int row, int columns) {
@@ -136,10 +136,10 @@ FoundPattern find_chessboard(const Pattern& pattern, const GreyView& picture, Se
     const auto map = fit_local_map(rough, point.place, 2, false);
     if (!map) continue;
     Cross cross{point.px, map->jacobian, dark == ((point.place.x() + point.place.y()) % 2 == 0)};
-    const auto refined = refine_cross(smooth.view(), cross, kReach);
+    const auto refined = refine_cross(smooth.view(), cross, kCornerReach);
     if (!refined) continue;
     cross.centre_px = *refined;
-    const CrossLook look = look_at_cross(smooth.view(), cross, kReach);
+    const CrossLook look = look_at_cross(smooth.view(), cross, kCornerReach);
     if (!look.is_cross) continue;
     points.push_back({point.id, point.place, *refined});
     contrasts.push_back(look.contrast);
@@ -152,7 +152,7 @@ FoundPattern find_chessboard(const Pattern& pattern, const GreyView& picture, Se
     found.points_px.push_back(point.px);
   }
   const std::size_t lost = rough.size() - points.size();
-  if (static_cast<double>(lost) > kMostCovered * static_cast<double>(rough.size()))
+  if (static_cast<double>(lost) > kMostCornersCovered * static_cast<double>(rough.size()))
     found.failure = fmt::format("{} of {} corners are covered or washed out", lost, rough.size());
   return found;
 }

@@ -18,14 +18,13 @@ namespace {
 constexpr std::array<int, 3> kWindows = {10, 24, 4};  // of the threshold: the picture's shorter side over these
 constexpr std::size_t kLeastDots = 9;                 // the smallest grid there is
 constexpr double kLarger = 1.2;                       // times the usual diameter; a measured one is some hundredths off
-constexpr double kCovered = 0.88;        // times the usual diameter: part of the dot is hidden, its centroid moved
-constexpr int kAround = 3;               // steps; what is near a dot is what it is larger than
-constexpr int kLeastLarger = 3;          // two leave the side from which a grid is seen open
-constexpr int kMargin = 2;               // one dot misjudged must not decide between two ways to number a grid
-constexpr int kStrayRows = 2;            // beside the grid: what stands in line with its dots by chance
-constexpr double kMostStrays = 0.02;     // of the dots
-constexpr double kMostCovered = 0.1;     // of a plain grid's dots
-constexpr double kMostMisjudged = 0.34;  // of the larger dots that agree: one of three
+constexpr double kCovered = 0.88;         // times the usual diameter: part of the dot is hidden, its centroid moved
+constexpr int kAround = 3;                // steps; what is near a dot is what it is larger than
+constexpr int kMargin = 2;                // one dot misjudged must not decide between two ways to number a grid
+constexpr int kStrayRows = 2;             // beside the grid: what stands in line with its dots by chance
+constexpr double kMostStrays = 0.02;      // of the dots
+constexpr double kMostDotsCovered = 0.1;  // of a plain grid's dots
+constexpr double kMostMisjudged = 0.34;   // of the larger dots that agree: one of three
 
 constexpr const char* kNoGrid = "no dot grid is found";
 
@@ -137,7 +136,7 @@ std::string why_not_numbered(const Pattern& pattern, const std::vector<Dot>& dot
       return fmt::format("{} dots in rows and columns do not fit a grid of {}x{}: is it another pattern?", seen,
                          pattern.columns, pattern.rows);
     }
-    if (!same_but_for_turns(pattern, all) || seen - all[0].strays < (1 - kMostCovered) * of_pattern) {
+    if (!same_but_for_turns(pattern, all) || seen - all[0].strays < (1 - kMostDotsCovered) * of_pattern) {
       return fmt::format("part of the grid, {} of {} dots, and no larger dots to number it: it must be seen whole",
                          seen - all[0].strays, of_pattern);
     }
@@ -145,10 +144,10 @@ std::string why_not_numbered(const Pattern& pattern, const std::vector<Dot>& dot
   }
   const auto larger = std::count_if(dots.begin(), dots.end(), [](const Dot& d) { return d.larger.value_or(false); });
   if (all[0].strays > kMostStrays * seen + kStrayRows ||
-      (larger >= kLeastLarger && all[0].misjudged > kMostMisjudged * all[0].larger)) {
+      (larger >= Pattern::kLeastLargerDots && all[0].misjudged > kMostMisjudged * all[0].larger)) {
     return "the larger dots do not stand where the pattern has them: is it another pattern?";
   }
-  if (!same_but_for_turns(pattern, all) || all[0].larger < kLeastLarger) {
+  if (!same_but_for_turns(pattern, all) || all[0].larger < Pattern::kLeastLargerDots) {
     return fmt::format("part of the grid, and too few larger dots to number it: {} dots, {} of them larger", seen,
                        larger);
   }

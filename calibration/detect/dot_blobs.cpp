@@ -12,7 +12,7 @@ namespace birdseye::calibration {
 
 namespace {
 
-constexpr double kLeastContrast = 8;      // grey levels from the window's mean to the threshold, twice
+constexpr double kLeastDotContrast = 8;   // grey levels from the window's mean to the threshold, twice
 constexpr double kLeastArea_px2 = 12;     // below, a spot is too few pixels for a centroid to a tenth of one
 constexpr double kMostOfPicture = 0.02;   // no dot of a grid is larger
 constexpr double kMostElongated = 4;      // long over short axis; a tilt of 75 degrees
@@ -132,7 +132,7 @@ std::optional<DotBlob> weigh(const GreyView& picture, const cv::Mat& labels, con
   // The middle of the dot: the upper quarter of the depths, for the rim is not yet all dark.
   const auto upper = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() * 3 / 4);
   std::nth_element(depths.begin(), upper, depths.end());
-  if (*upper < kLeastContrast || sum <= 0) return std::nullopt;
+  if (*upper < kLeastDotContrast || sum <= 0) return std::nullopt;
   const DotBlob blob{spot.centre + first / sum, spot.spread, sum / *upper, *upper};
   if ((blob.centroid_px - spot.centre).norm() > 1) return std::nullopt;  // what is near pulls at it
   return blob;
@@ -145,7 +145,7 @@ std::vector<DotBlob> find_dot_blobs(const GreyView& picture, bool dark, int wind
   cv::GaussianBlur(mat_of(picture), smooth, cv::Size(0, 0), 0.8);
   cv::Mat mask;
   cv::adaptiveThreshold(smooth, mask, 255, cv::ADAPTIVE_THRESH_MEAN_C, dark ? cv::THRESH_BINARY_INV : cv::THRESH_BINARY,
-                        window_px | 1, dark ? kLeastContrast / 2 : -kLeastContrast / 2);
+                        window_px | 1, dark ? kLeastDotContrast / 2 : -kLeastDotContrast / 2);
   cv::Mat labels, boxes, centres;
   const int count = cv::connectedComponentsWithStats(mask, labels, boxes, centres, 4, CV_32S);
   const double most = kMostOfPicture * picture.width_px * picture.height_px;
@@ -189,7 +189,7 @@ std::vector<EdgeWidth> dot_edges(const GreyView& picture, const DotBlob& blob) {
       before = last;
       last = grey;
     }
-    if (steepest > 0 && high - low > kLeastContrast) edges.push_back({normal, (high - low) / steepest});
+    if (steepest > 0 && high - low > kLeastDotContrast) edges.push_back({normal, (high - low) / steepest});
   }
   return edges;
 }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kMostSeeds = 24;
 constexpr double kOffStep = 0.3;         // of the shorter step: from dot to dot even a near, tilted grid changes less
-constexpr int kReach = 2;                // steps to either side
+constexpr int kMapReach = 2;             // steps to either side
 constexpr double kLeastOff_px = 0.7;     // noise and blur move no dot as far
 constexpr double kOffMap = 0.03;         // of a step: what a map of second order leaves of perspective
 constexpr double kOffNeighbours = 0.15;  // of a step: at a corner the neighbours, all to one side, foretell no better
@@ -122,9 +122,9 @@ class Growth {
 
 /// With curvature also at a grid's corners, where a map that reaches two steps has none.
 std::optional<LocalMap> local_map(const std::vector<GridPoint>& points, const Eigen::Vector2i& place) {
-  auto map = fit_local_map(points, place, kReach, false);
+  auto map = fit_local_map(points, place, kMapReach, false);
   if (map && !(map->hxx.isZero(0) && map->hxy.isZero(0) && map->hyy.isZero(0))) return map;
-  return fit_local_map(points, place, kReach + 1, false);
+  return fit_local_map(points, place, kMapReach + 1, false);
 }
 
 /// Takes out, worst first, spots that their neighbours' map, fitted with them, does not meet: half covered dots and
@@ -148,7 +148,7 @@ void drop_odd_spots(std::vector<GridPoint>& points) {
     points.erase(points.begin() + at);
     excess.erase(worst);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if ((points[i].place - gone).cwiseAbs().maxCoeff() <= kReach + 1) excess[i] = judge(points[i]);
+      if ((points[i].place - gone).cwiseAbs().maxCoeff() <= kMapReach + 1) excess[i] = judge(points[i]);
     }
   }
 }

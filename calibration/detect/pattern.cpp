@@ -17,10 +17,9 @@ namespace {
 
 using std::string_view;
 
-constexpr int kMostCount = 200;          // more than this along a side no camera resolves
-constexpr double kLeastMm = 0.05;        // a printed spacing is neither below this ..
-constexpr double kMostMm = 1000;         // .. nor above this: a wrong unit
-constexpr std::size_t kLeastLarger = 3;  // two leave the side from which a grid is seen open
+constexpr int kMostCount = 200;    // more than this along a side no camera resolves
+constexpr double kLeastMm = 0.05;  // a printed spacing is neither below this ..
+constexpr double kMostMm = 1000;   // .. nor above this: a wrong unit
 
 constexpr const char* kExamples =
     "give chessboard:14x10:3mm (inner corners), charuco:19x26:5mm:4mm:DICT_4X4_250[:legacy] (squares), dots:11x9:4mm, "
@@ -165,8 +164,8 @@ Result<Pattern> read_dots(Pattern pattern, const std::vector<string_view>& parts
   }
   auto& ids = pattern.larger_dots;
   std::sort(ids.begin(), ids.end());
-  if (std::adjacent_find(ids.begin(), ids.end()) != ids.end() || ids.size() < kLeastLarger)
-    return wrong(pattern.spec, fmt::format("{} or more different dots must be larger", kLeastLarger));
+  if (std::adjacent_find(ids.begin(), ids.end()) != ids.end() || ids.size() < Pattern::kLeastLargerDots)
+    return wrong(pattern.spec, fmt::format("{} or more different dots must be larger", Pattern::kLeastLargerDots));
   return pattern;
 }
 

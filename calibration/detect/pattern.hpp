@@ -13,6 +13,8 @@ enum class PatternKind { chessboard, charuco, dots };
 /// A flat calibration pattern and the numbers of its points. Lengths in mm; frame Marker: x along the columns, y along
 /// the rows, both as one reads the pattern from its front (x right, y down), z = 0 on it and positive behind it.
 struct Pattern {
+  static constexpr int kLeastLargerDots = 3;  ///< two leave the side from which a grid is seen open
+
   PatternKind kind = PatternKind::chessboard;
   std::string spec;              ///< what it was read from, for messages
   int columns = 0, rows = 0;     ///< chessboard: inner corners; charuco: squares; dots: dots

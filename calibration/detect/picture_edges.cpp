@@ -11,7 +11,7 @@ namespace birdseye::calibration {
 
 namespace {
 
-constexpr double kSmoothing_px = 1.5;  // so that noise makes no edges
+constexpr double kEdgeSmoothing_px = 1.5;  // so that noise makes no edges
 constexpr int kTile_px = 16;
 constexpr int kBorder_px = 3;
 constexpr double kLeastSlope = 0.8;  // grey levels a pixel; below lies noise
@@ -128,7 +128,7 @@ std::vector<EdgeWidth> edges_of_picture(const GreyView& picture) {
   const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat smooth;
   grey.convertTo(smooth, CV_32F);
-  cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kSmoothing_px);
+  cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kEdgeSmoothing_px);
   std::vector<EdgeWidth> edges;
   for (int top = 0; top < smooth.rows; top += kTile_px) {
     for (int left = 0; left < smooth.cols; left += kTile_px) {
@@ -140,7 +140,7 @@ std::vector<EdgeWidth> edges_of_picture(const GreyView& picture) {
           rise_along(smooth, slope.at, normal, 1, steepness) + rise_along(smooth, slope.at, -normal, -1, steepness);
       if (rise < kLeastRise) continue;
       const double width_px = rise / steepness;
-      const double smoothing_px = kGaussianWidth * kSmoothing_px;
+      const double smoothing_px = kGaussianWidth * kEdgeSmoothing_px;
       edges.push_back({normal, std::sqrt(std::max(1.0, width_px * width_px - smoothing_px * smoothing_px))});
     }
   }
@@ -158,7 +158,7 @@ double local_contrast(const GreyView& picture) {
   constexpr int kStep_px = 8;
   const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat smooth;
-  cv::GaussianBlur(grey, smooth, cv::Size(0, 0), kSmoothing_px);
+  cv::GaussianBlur(grey, smooth, cv::Size(0, 0), kEdgeSmoothing_px);
   const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {kWindow_px, kWindow_px});
   cv::Mat contrast;
   cv::morphologyEx(smooth, contrast, cv::MORPH_GRADIENT, window);

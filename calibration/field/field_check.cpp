@@ -18,7 +18,7 @@ constexpr double kMovingRange = 1.128;    // the mean range of two values, in si
 // A pointer is put into a divot no better than this: smaller sigmas of a few lucky days would cry wolf.
 constexpr double kLeastSigmaMm = 0.05, kLeastSigmaPercent = 0.02;
 // Whatever the history says: an overlay is off by at least as much.
-constexpr double kPassMm = 1.5, kMarginalMm = 3.0;
+constexpr double kPlatePassMm = 1.5, kPlateMarginalMm = 3.0;
 constexpr std::size_t kRun = 8;
 constexpr double kOnTheLine = 1e-6;  // what rounding makes of a value that is the mean is on neither side of it
 constexpr const char* kLook =
@@ -120,7 +120,7 @@ std::optional<ControlChart> control_chart(std::span<const FieldCheck> history) {
   // A day that failed is not what is usual: it would widen the limits for good.
   std::vector<FieldCheck> sound;
   std::copy_if(history.begin(), history.end(), std::back_inserter(sound),
-               [](const FieldCheck& day) { return day.rms_mm <= kMarginalMm; });
+               [](const FieldCheck& day) { return day.rms_mm <= kPlateMarginalMm; });
   if (sound.size() < static_cast<std::size_t>(kLearningDays)) return std::nullopt;
   return ControlChart{limits_of(column(sound, &FieldCheck::rms_mm), kLeastSigmaMm),
                       limits_of(column(sound, &FieldCheck::scale_percent), kLeastSigmaPercent)};
@@ -133,7 +133,7 @@ Verdict verdict_of(std::span<const FieldCheck> history) {
     return verdict;
   }
   const FieldCheck& today = history.back();
-  verdict.judge("error of the plate's places", today.rms_mm, "mm", kPassMm, kMarginalMm,
+  verdict.judge("error of the plate's places", today.rms_mm, "mm", kPlatePassMm, kPlateMarginalMm,
                 fmt::format("touch {} again; if it stays, {}", today.worst_place, kLook));
   const auto chart = control_chart(history.first(history.size() - 1));
   if (!chart) {

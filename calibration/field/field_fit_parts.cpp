@@ -109,7 +109,7 @@ double mapped_part(const std::vector<double>& sigmas_mm) {
 namespace {
 
 // The error of the best published corrections of such trackers, and what an overlay may still be off by at all.
-constexpr double kPassMm = 1.0, kMarginalMm = 2.5;
+constexpr double kMapPassMm = 1.0, kMapMarginalMm = 2.5;
 // Pairs carry the noise of two sensors that move, and of their orientations.
 constexpr double kPairPassMm = 2.0, kPairMarginalMm = 4.0;
 constexpr double kWorstFactor = 5;   // of the RMS; beyond it one region is not described by the map
@@ -138,7 +138,8 @@ Verdict verdict_of(const FieldFit& fit) {
   Verdict verdict;
   verdict.judge(
       fit.from_pairs ? "held-out change of the body's length and direction" : "held-out error after correction",
-      fit.held_out_mm, "mm", fit.from_pairs ? kPairPassMm : kPassMm, fit.from_pairs ? kPairMarginalMm : kMarginalMm,
+      fit.held_out_mm, "mm", fit.from_pairs ? kPairPassMm : kMapPassMm,
+      fit.from_pairs ? kPairMarginalMm : kMapMarginalMm,
       "average each place for longer, measure more places where the report's arrows are long, and move what "
       "metal can be moved away from the transmitter");
   if (fit.held_out_worst_mm > kWorstFactor * fit.held_out_mm) {

@@ -33,9 +33,9 @@ constexpr double kWorthlessScale = 0.2;
 /// Nearer than this, by the picture, nothing new is seen: a shift of the board as a part of its distance, a turn.
 constexpr double kSameShift = 1e-3;
 constexpr double kSameTurnDeg = 0.05;
-constexpr std::size_t kFewest = 3;
+constexpr std::size_t kFewestStations = 3;
 
-Eigen::Matrix3d body_from_sensor(const SummedStation& s) {
+Eigen::Matrix3d body_from_sensor_rotation(const SummedStation& s) {
   return s.chain.tracker_from_body.rotation().transpose() * s.chain.tracker_from_sensor.rotation();
 }
 
@@ -65,7 +65,7 @@ void find_axes(std::span<const SummedStation> stations, HandEyeObservability& ou
   for (std::size_t i = 0; i < stations.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
       const Eigen::Vector3d sensor =
-          rotation_log(body_from_sensor(stations[i]).transpose() * body_from_sensor(stations[k]));
+          rotation_log(body_from_sensor_rotation(stations[i]).transpose() * body_from_sensor_rotation(stations[k]));
       const Eigen::Vector3d camera = rotation_log(stations[i].camera_from_marker.rotation() *
                                                   stations[k].camera_from_marker.rotation().transpose());
       of_sensor += sensor * sensor.transpose();
@@ -128,7 +128,8 @@ double shifted_mismatch_deg(const std::vector<const SummedStation*>& in_order, i
   for (int i = 0; i < count; ++i) {
     for (int k = 0; k < i; ++k) {
       if (k + shift < 0 || i + shift < 0 || k + shift >= count || i + shift >= count) continue;
-      const double tracker = rotation_angle_between(body_from_sensor(at(i + shift)), body_from_sensor(at(k + shift)));
+      const double tracker =
+          rotation_angle_between(body_from_sensor_rotation(at(i + shift)), body_from_sensor_rotation(at(k + shift)));
       const double picture = rotation_angle_between(at(i).camera_from_marker.rotation().transpose(),
                                                     at(k).camera_from_marker.rotation().transpose());
       out.push_back(std::abs(tracker - picture) * kDegPerRad);
@@ -169,7 +170,7 @@ double rotation_misfit_deg(std::span<const SummedStation> stations) {
   for (const SummedStation& s : stations) {
     const Eigen::Matrix3d predicted =
         body_from_marker * s.camera_from_marker.rotation().transpose() * hand_eye.rotation();
-    out.push_back(rotation_angle_between(predicted, body_from_sensor(s)) * kDegPerRad);
+    out.push_back(rotation_angle_between(predicted, body_from_sensor_rotation(s)) * kDegPerRad);
   }
   return median_of(out);
 }
@@ -255,10 +256,10 @@ void judge_scale(const StationsInOrder& in, const std::optional<TrackerNoise>& s
 HandEyeObservability observe_hand_eye(const StationsInOrder& in, const std::optional<TrackerNoise>& noise) {
   HandEyeObservability found;
   found.stations = in.stations.size();
-  if (in.stations.size() < kFewest) {
-    found.findings.push_back({Grade::fail,
-                              fmt::format("{} stations with board and pose, of at least {}", found.stations, kFewest),
-                              "take more stations: ten or more, turned about different axes"});
+  if (in.stations.size() < kFewestStations) {
+    found.findings.push_back(
+        {Grade::fail, fmt::format("{} stations with board and pose, of at least {}", found.stations, kFewestStations),
+         "take more stations: ten or more, turned about different axes"});
     if (in.stations.size() == 2) find_axes(in.stations, found);
     return found;
   }

@@ -25,7 +25,7 @@ constexpr std::size_t kFewestSpeeds = 50;
 /// Stations are so far apart, in angle or place, and not more than that many.
 constexpr double kStationTurn = 3 * kRadPerDeg;
 constexpr double kStationShiftMm = 10;
-constexpr std::size_t kMostStations = 400;
+constexpr std::size_t kMostStreamStations = 400;
 
 double time_of(const StampedSensor& s) {
   return s.time_s;
@@ -134,7 +134,7 @@ std::vector<HandEyeStation> stations_of(std::span<const StampedSensor> sensor, s
     s.sensor_motion = motion_at(sensor, time_s);
     out.push_back(std::move(s));
   }
-  const std::size_t count = std::min(out.size(), kMostStations);
+  const std::size_t count = std::min(out.size(), kMostStreamStations);
   for (std::size_t i = 0; i < count; ++i) std::swap(out[i], out[i * out.size() / count]);
   out.resize(count);
   return out;

@@ -16,7 +16,7 @@ namespace {
 using Rotations = std::vector<Eigen::Matrix3d>;
 using Indices = std::vector<std::size_t>;
 
-constexpr std::size_t kLeastPoses = 4;
+constexpr std::size_t kLeastSpinPoses = 4;
 
 struct Axis {
   Eigen::Vector3d in_sensor, in_tracker;
@@ -72,9 +72,9 @@ double turned_deg(const Rotations& rotations, const Indices& used, const Axis& a
 
 Result<SpinAxis> solve_spin_axis(std::span<const Transform<Tracker, Sensor>> tracker_from_sensor,
                                  const Eigen::Vector3d& towards) {
-  if (tracker_from_sensor.size() < kLeastPoses) {
+  if (tracker_from_sensor.size() < kLeastSpinPoses) {
     return Error{Errc::degenerate, fmt::format("{} poses of the spun pointer: its axis needs at least {}",
-                                               tracker_from_sensor.size(), kLeastPoses)};
+                                               tracker_from_sensor.size(), kLeastSpinPoses)};
   }
   Rotations rotations;
   for (const auto& pose : tracker_from_sensor) {
@@ -87,7 +87,7 @@ Result<SpinAxis> solve_spin_axis(std::span<const Transform<Tracker, Sensor>> tra
   Axis axis = solve(rotations, used);
   for (int round = 0; round < 20; ++round) {
     Indices inliers = inliers_of(residuals_of(rotations, axis));
-    if (inliers == used || inliers.size() < kLeastPoses) break;
+    if (inliers == used || inliers.size() < kLeastSpinPoses) break;
     used = std::move(inliers);
     axis = solve(rotations, used);
   }

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "birdseye calibration record";
+constexpr const char* kRecordFormat = "birdseye calibration record";
 
 template <typename Matrix>
 Json rows_of(const Matrix& matrix) {
@@ -213,7 +213,7 @@ bool CalibrationRecord::set_lens(LensEntry entry) {
 }
 
 std::string record_text(const CalibrationRecord& record) {
-  Json json{{"format", kFormat}, {"version", CalibrationRecord::kVersion}, {"scope", record.scope}};
+  Json json{{"format", kRecordFormat}, {"version", CalibrationRecord::kVersion}, {"scope", record.scope}};
   json["hardware"] = {{"tracker", record.tracker}, {"camera", record.camera}};
   if (record.lens) json["lens"] = json_of(*record.lens);
   if (record.hand_eye) json["hand_eye"] = json_of(*record.hand_eye);
@@ -225,7 +225,7 @@ std::string record_text(const CalibrationRecord& record) {
 
 Result<CalibrationRecord> parse_record(const std::string& text) {
   const Json json = Json::parse(text, nullptr, false);
-  if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kFormat)
+  if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kRecordFormat)
     return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
   if (json.value("version", Json()) != CalibrationRecord::kVersion) {
     return Error{Errc::bad_format, fmt::format("is a calibration record of version {}; this program reads version {}",

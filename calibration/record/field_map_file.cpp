@@ -12,7 +12,7 @@ namespace birdseye::calibration {
 
 namespace {
 
-constexpr const char* kFormat = "birdseye field map";
+constexpr const char* kFieldMapFormat = "birdseye field map";
 constexpr int kVersion = 1;
 
 std::optional<Grade> grade_of(const std::string& name) {
@@ -43,14 +43,10 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
 }  // namespace
 
 std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
-  nlohmann::json json{{"format", kFormat},
-                      {"version", kVersion},
-                      {"made_utc", notes.made_utc},
-                      {"software", notes.software},
-                      {"made_from", notes.made_from},
-                      {"verdict", name_of(notes.grade)},
-                      {"held_out_mm", notes.held_out_mm},
-                      {"map", map.data()}};
+  nlohmann::json json{{"format", kFieldMapFormat},        {"version", kVersion},
+                      {"made_utc", notes.made_utc},       {"software", notes.software},
+                      {"made_from", notes.made_from},     {"verdict", name_of(notes.grade)},
+                      {"held_out_mm", notes.held_out_mm}, {"map", map.data()}};
   json["checksum"] = checksum_of(json);
   return json.dump(1) + "\n";
 }
@@ -58,7 +54,8 @@ std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
 Result<FieldMapFile> parse_field_map(const std::string& text) {
   try {
     nlohmann::json json = nlohmann::json::parse(text);
-    if (!json.is_object() || json.value("format", "") != kFormat) return no_map("it does not say that it is one");
+    if (!json.is_object() || json.value("format", "") != kFieldMapFormat)
+      return no_map("it does not say that it is one");
     if (json.at("version").get<int>() != kVersion)
       return no_map(fmt::format("or of a version other than {}", kVersion));
     const auto checksum = json.at("checksum").get<std::string>();

@@ -9,7 +9,7 @@ namespace birdseye::host {
 namespace {
 
 // Grey levels of contrast nearby: what noise and the lamp's fall have, and how steeply what is above counts.
-constexpr int kNoise = 6, kGain = 7, kMost = 170;
+constexpr int kNoise = 6, kGain = 7, kMostCue = 170;
 constexpr int kHighlight = 225, kOfHighlight = 210;
 
 }  // namespace
@@ -30,7 +30,7 @@ std::vector<std::uint8_t> surface_cues(std::span<const std::uint8_t> video, int 
   std::array<std::uint8_t, 256> of_contrast{};
   for (int contrast = 0; contrast < 256; ++contrast)
     of_contrast[static_cast<std::size_t>(contrast)] =
-        static_cast<std::uint8_t>(std::clamp((contrast - kNoise) * kGain, 0, kMost));
+        static_cast<std::uint8_t>(std::clamp((contrast - kNoise) * kGain, 0, kMostCue));
   for (int y = 0; y < height_px; ++y) {
     const auto* const here = fine.ptr<std::uint8_t>(y);
     const auto* const darkest = low.ptr<std::uint8_t>(y);

@@ -8,7 +8,7 @@ namespace birdseye::host {
 namespace {
 
 constexpr Duration kGap = Duration::from_ms(130);
-constexpr std::size_t kFewest = 10, kMost = 64;
+constexpr std::size_t kFewestPoses = 10, kMostPoses = 64;
 
 }  // namespace
 
@@ -21,12 +21,12 @@ void TargetJitter::push(DeviceTime acquired, const Eigen::Vector3d& target_in_ca
   const double u = (t1 - t0).seconds() / (acquired - t0).seconds();
   const Eigen::Vector3d off = middle - (1 - u) * before - u * target_in_camera_mm;
   squares_mm2_.push_back(off.squaredNorm() / (1 + (1 - u) * (1 - u) + u * u));  // the variances of all three add up
-  if (squares_mm2_.size() > kMost) squares_mm2_.pop_front();
+  if (squares_mm2_.size() > kMostPoses) squares_mm2_.pop_front();
   newest_.pop_front();
 }
 
 std::optional<double> TargetJitter::rms_mm() const {
-  if (squares_mm2_.size() < kFewest) return std::nullopt;
+  if (squares_mm2_.size() < kFewestPoses) return std::nullopt;
   return std::sqrt(std::accumulate(squares_mm2_.begin(), squares_mm2_.end(), 0.0) /
                    static_cast<double>(squares_mm2_.size()));
 }

@@ -12,7 +12,7 @@ constexpr double kPeriod_s = 1.0 / 60;
 constexpr double kExposure_s = 0.008;
 constexpr double kDelay_s = 0.041;  // from the middle of the exposure: two periods and a half
 
-DeviceTime at(double seconds) {
+DeviceTime at_seconds(double seconds) {
   return {1'000'000'000'000 + std::llround(seconds * 1e9)};
 }
 
@@ -31,14 +31,14 @@ struct Camera {
       const double middle_s = n * kPeriod_s;
       drivers::Frame frame;
       frame.sequence = static_cast<std::uint64_t>(n);
-      frame.arrived = at(middle_s + kDelay_s + late(rng));
+      frame.arrived = at_seconds(middle_s + kDelay_s + late(rng));
       if (stamp_error_s) {
-        frame.acquired = at(middle_s + *stamp_error_s);
+        frame.acquired = at_seconds(middle_s + *stamp_error_s);
         frame.acquired_sigma = Duration::from_ms(3);
         frame.acquired_known = true;
       }
-      for (; at(edges * kPeriod_s - kExposure_s / 2) < frame.arrived; ++edges)
-        clock.take({drivers::GpioInput::strobe, true, at(edges * kPeriod_s - kExposure_s / 2)});
+      for (; at_seconds(edges * kPeriod_s - kExposure_s / 2) < frame.arrived; ++edges)
+        clock.take({drivers::GpioInput::strobe, true, at_seconds(edges * kPeriod_s - kExposure_s / 2)});
       const auto time = clock.time_of(frame);
       if (!time.certain) {
         ++refused;
@@ -46,7 +46,7 @@ struct Camera {
         continue;
       }
       ++(time.sigma < Duration::from_ms(1) && time.sigma < kWakeSigma ? paired : by_arrival);
-      worst_s = std::max(worst_s, std::abs((time.acquired - at(middle_s)).seconds()));
+      worst_s = std::max(worst_s, std::abs((time.acquired - at_seconds(middle_s)).seconds()));
     }
   }
 };

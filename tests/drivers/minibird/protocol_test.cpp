@@ -12,7 +12,7 @@
 namespace birdseye::drivers::minibird {
 namespace {
 
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 using Words = std::vector<std::int16_t>;
 
 struct Vector {
@@ -224,9 +224,9 @@ TEST(Reply, FlockOfT26) {
 }
 
 TEST(Reply, ErrorTexts) {
-  EXPECT_THAT(error_text(32), testing::HasSubstr("saturated"));
-  EXPECT_THAT(error_text(13), testing::HasSubstr("no response"));
-  EXPECT_THAT(error_text(200), testing::HasSubstr("200"));
+  EXPECT_THAT(error_text(32), ::testing::HasSubstr("saturated"));
+  EXPECT_THAT(error_text(13), ::testing::HasSubstr("no response"));
+  EXPECT_THAT(error_text(200), ::testing::HasSubstr("200"));
 }
 
 TEST(Reply, LengthsOfExamineReplies) {

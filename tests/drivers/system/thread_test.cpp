@@ -15,13 +15,13 @@ namespace {
 
 using Queue = BlockingQueue<int, 1>;
 
-constexpr Duration kShort = Duration::from_ms(5), kLong = Duration::from_ms(60'000);
+constexpr Duration kShortThread = Duration::from_ms(5), kLongThread = Duration::from_ms(60'000);
 
 TEST(OwnedThread, IsAskedToStopAndWaitedForWhenItsOwnerGoes) {
   std::atomic<bool> ended = false;
   {
     const OwnedThread thread([&](const std::stop_token& stop) {
-      while (!stop.stop_requested()) sleep_for(kLong, stop);
+      while (!stop.stop_requested()) sleep_for(kLongThread, stop);
       ended = true;
     });
   }
@@ -36,7 +36,7 @@ TEST(Condition, HoldsOnceItIsToldAndNotByTheDeadlineElse) {
   OwnedThread teller;
   {
     std::unique_lock lock(mutex);
-    const Deadline soon = Deadline::after(kShort);
+    const Deadline soon = Deadline::after(kShortThread);
     EXPECT_FALSE(changed.wait(lock, soon, [&] { return done; }));
     EXPECT_TRUE(soon.passed());
     teller = OwnedThread([&](const std::stop_token&) {
@@ -44,7 +44,7 @@ TEST(Condition, HoldsOnceItIsToldAndNotByTheDeadlineElse) {
       done = true;
       changed.notify_all();
     });
-    EXPECT_TRUE(changed.wait(lock, Deadline::after(kLong), [&] { return done; }));
+    EXPECT_TRUE(changed.wait(lock, Deadline::after(kLongThread), [&] { return done; }));
     EXPECT_TRUE(changed.wait(lock, device_now(), [&] { return done; }));  // what holds holds, however late it is
   }
 }
@@ -56,36 +56,37 @@ TEST(Condition, AStopEndsTheWait) {
   OwnedThread stopper([&](const std::stop_token&) { stop.request_stop(); });
   std::unique_lock lock(mutex);
   EXPECT_FALSE(changed.wait(lock, stop.get_token(), [] { return false; }));
-  EXPECT_FALSE(changed.wait(lock, stop.get_token(), Deadline::after(kLong), [] { return false; }));
+  EXPECT_FALSE(changed.wait(lock, stop.get_token(), Deadline::after(kLongThread), [] { return false; }));
 }
 
 TEST(GivenBy, GivesWhatComesInTimeAndThrowsAwayWhatIsLate) {
-  EXPECT_EQ(given_by<int>(Deadline::after(kLong), [] { return 42; }), 42);
-  const auto owned = given_by<std::unique_ptr<int>>(Deadline::after(kLong), [] { return std::make_unique<int>(7); });
+  EXPECT_EQ(given_by<int>(Deadline::after(kLongThread), [] { return 42; }), 42);
+  const auto owned =
+      given_by<std::unique_ptr<int>>(Deadline::after(kLongThread), [] { return std::make_unique<int>(7); });
   ASSERT_TRUE(owned && *owned);
   EXPECT_EQ(**owned, 7);
 
   // The work owns the queue with the test: it may outlive either.
   const auto go = std::make_shared<Queue>(Queue::Lanes{{{1}}});
   const auto gone = std::make_shared<Queue>(Queue::Lanes{{{1}}});
-  EXPECT_FALSE(given_by<int>(Deadline::after(kShort), [go, gone] {
-    go->pop(Deadline::after(kLong));
+  EXPECT_FALSE(given_by<int>(Deadline::after(kShortThread), [go, gone] {
+    go->pop(Deadline::after(kLongThread));
     gone->push(0, 1);
     return 1;
   }));
   go->push(0, 0);
-  EXPECT_TRUE(gone->pop(Deadline::after(kLong)));
+  EXPECT_TRUE(gone->pop(Deadline::after(kLongThread)));
 }
 
 TEST(BlockingQueue, ClosedGivesWhatWaitsAndThenNothingAtOnce) {
   Queue queue(Queue::Lanes{{{4}}});
-  EXPECT_FALSE(queue.pop(Deadline::after(kShort)));
+  EXPECT_FALSE(queue.pop(Deadline::after(kShortThread)));
   queue.push(0, 1);
   queue.close();
   EXPECT_FALSE(queue.finished());
-  EXPECT_EQ(queue.pop(Deadline::after(kLong)), 1);
+  EXPECT_EQ(queue.pop(Deadline::after(kLongThread)), 1);
   EXPECT_TRUE(queue.finished());
-  const Deadline long_after = Deadline::after(kLong);
+  const Deadline long_after = Deadline::after(kLongThread);
   EXPECT_FALSE(queue.pop(long_after));
   EXPECT_FALSE(queue.pop(std::stop_token()));
   EXPECT_FALSE(long_after.passed());
@@ -95,9 +96,9 @@ TEST(BlockingQueue, AStopEndsTheWaitAndAPushToo) {
   Queue queue(Queue::Lanes{{{4}}});
   std::stop_source stop;
   OwnedThread stopper([&](const std::stop_token&) { stop.request_stop(); });
-  EXPECT_FALSE(queue.pop(Deadline::after(kLong), stop.get_token()));
+  EXPECT_FALSE(queue.pop(Deadline::after(kLongThread), stop.get_token()));
   OwnedThread pusher([&](const std::stop_token&) { queue.push(0, 3); });
-  EXPECT_EQ(queue.pop(Deadline::after(kLong)), 3);
+  EXPECT_EQ(queue.pop(Deadline::after(kLongThread)), 3);
 }
 
 TEST(BlockingQueue, OfManyWhoPushNothingIsLostUncountedAndEachKeepsItsOrder) {
@@ -117,7 +118,7 @@ TEST(BlockingQueue, OfManyWhoPushNothingIsLostUncountedAndEachKeepsItsOrder) {
   std::array<int, kPushers> newest{-1, -1, -1, -1};
   std::uint64_t taken = 0;
   while (!queue.finished()) {
-    const auto value = queue.pop(Deadline::after(kLong));
+    const auto value = queue.pop(Deadline::after(kLongThread));
     if (!value) continue;
     int& last = newest[static_cast<std::size_t>(value->first)];
     EXPECT_GT(value->second, last);

@@ -11,7 +11,7 @@
 namespace birdseye {
 namespace {
 
-constexpr Duration kShort = Duration::from_ms(5), kLong = Duration::from_ms(60'000);
+constexpr Duration kShortWait = Duration::from_ms(5), kLongWait = Duration::from_ms(60'000);
 
 struct Pipe {
   Pipe() {
@@ -25,27 +25,27 @@ struct Pipe {
 };
 
 TEST(Wait, SleepsUntilTheMomentAndNoLessThanTheSpan) {
-  const DeviceTime end = device_now() + kShort;
+  const DeviceTime end = device_now() + kShortWait;
   sleep_until(end);
   EXPECT_GE(device_now(), end);
   const DeviceTime began = device_now();
-  sleep_for(kShort);
-  EXPECT_GE(device_now(), began + kShort);
+  sleep_for(kShortWait);
+  EXPECT_GE(device_now(), began + kShortWait);
   sleep_until(DeviceTime{-1});
 }
 
 TEST(Wait, AStopEndsASleepAndTheSpanEndsItElse) {
   std::stop_source stop;
-  EXPECT_TRUE(sleep_for(kShort, stop.get_token()));
+  EXPECT_TRUE(sleep_for(kShortWait, stop.get_token()));
   OwnedThread stopper([&](const std::stop_token&) { stop.request_stop(); });
-  const Deadline long_after = Deadline::after(kLong);
-  EXPECT_FALSE(sleep_for(kLong, stop.get_token()));
+  const Deadline long_after = Deadline::after(kLongWait);
+  EXPECT_FALSE(sleep_for(kLongWait, stop.get_token()));
   EXPECT_FALSE(long_after.passed());
 }
 
 TEST(Wait, AnEmptyPipeIsNotReadableAndAFullOneIs) {
   const Pipe pipe;
-  const Deadline soon = Deadline::after(kShort);
+  const Deadline soon = Deadline::after(kShortWait);
   EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, soon), 0);
   EXPECT_TRUE(soon.passed());
   EXPECT_EQ(wait_ready(pipe.in.get(), POLLOUT, device_now()), POLLOUT);
@@ -56,15 +56,15 @@ TEST(Wait, AnEmptyPipeIsNotReadableAndAFullOneIs) {
 TEST(Wait, AWriterThatHasGoneIsTold) {
   Pipe pipe;
   OwnedThread closer([&](const std::stop_token&) { pipe.in = UniqueFd(); });
-  EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, Deadline::after(kLong)), POLLHUP);
+  EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, Deadline::after(kLongWait)), POLLHUP);
 }
 
 TEST(Wait, OfSeveralTheReadyOnesAreToldAndNobodyIsNeverReady) {
   const Pipe silent, speaking;
   std::array<pollfd, 3> entries{{{silent.out.get(), POLLIN, 0}, {-1, POLLIN, 0}, {speaking.out.get(), POLLIN, 0}}};
-  EXPECT_FALSE(wait_ready(entries, Deadline::after(kShort)));
+  EXPECT_FALSE(wait_ready(entries, Deadline::after(kShortWait)));
   OwnedThread speaker([&](const std::stop_token&) { speaking.fill(); });
-  EXPECT_TRUE(wait_ready(entries, Deadline::after(kLong)));
+  EXPECT_TRUE(wait_ready(entries, Deadline::after(kLongWait)));
   EXPECT_EQ(entries[0].revents, 0);
   EXPECT_EQ(entries[1].revents, 0);
   EXPECT_EQ(entries[2].revents, POLLIN);

@@ -16,9 +16,9 @@ using std::chrono::milliseconds;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-const Transform<Tracker, Patient> kTrackerFromPatient(
+const Transform<Tracker, Patient> kPublishedTrackerFromPatient(
     Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix(), {300, 20, -40});
-const Transform<Camera, Patient> kCameraFromPatient(
+const Transform<Camera, Patient> kPublishedCameraFromPatient(
     Eigen::AngleAxisd(-1.1, Eigen::Vector3d(3, 1, 1).normalized()).toRotationMatrix(), {-5, 8, 120});
 
 /// Oblique axes, unlike sizes and spacings, so that no mistake of order hides.
@@ -60,7 +60,7 @@ void show(Publisher& publisher, const std::shared_ptr<const PatientPlan>& patien
 }
 
 PublishedFrame frame() {
-  return {host_now(), kTrackerFromPatient, kCameraFromPatient};
+  return {host_now(), kPublishedTrackerFromPatient, kPublishedCameraFromPatient};
 }
 
 TEST(Publisher, TheCtLiesInSlicersWorldWhereItLiesInThePatient) {
@@ -96,8 +96,8 @@ TEST(Publisher, TransformsTakeSlicersPatientToTrackerAndCamera) {
   const auto by = [&](const char* name) {
     return Eigen::Vector3d((slicer.transforms[name] * ras.homogeneous()).hnormalized());
   };
-  EXPECT_LT((by("PatientToTracker") - kTrackerFromPatient * lps).norm(), 1e-3);
-  EXPECT_LT((by("PatientToCamera") - kCameraFromPatient * lps).norm(), 1e-3);
+  EXPECT_LT((by("PatientToTracker") - kPublishedTrackerFromPatient * lps).norm(), 1e-3);
+  EXPECT_LT((by("PatientToCamera") - kPublishedCameraFromPatient * lps).norm(), 1e-3);
 }
 
 TEST(Publisher, NoPoseGoesOutWhereNoOverlayIsDrawn) {

@@ -22,16 +22,16 @@ using birdseye::testing::kTrackerFromPatient;
 using birdseye::testing::operation_settings;
 using birdseye::testing::Scratch;
 
-constexpr int kWidth = 768, kHeight = 576;
+constexpr int kVideoWidth = 768, kVideoHeight = 576;
 
 /// In a few levels of each colour, which PNG packs well. Tissue as a lamp at the lens lights it: bright in the middle,
 /// with some folds.
 std::shared_ptr<const std::vector<std::uint8_t>> tissue_rgb() {
   auto rgb = std::make_shared<std::vector<std::uint8_t>>();
-  rgb->reserve(std::size_t{3} * kWidth * kHeight);
-  for (int v = 0; v < kHeight; ++v) {
-    for (int u = 0; u < kWidth; ++u) {
-      const double x = (u - kWidth / 2.0) / kHeight, y = (v - kHeight / 2.0) / kHeight;
+  rgb->reserve(std::size_t{3} * kVideoWidth * kVideoHeight);
+  for (int v = 0; v < kVideoHeight; ++v) {
+    for (int u = 0; u < kVideoWidth; ++u) {
+      const double x = (u - kVideoWidth / 2.0) / kVideoHeight, y = (v - kVideoHeight / 2.0) / kVideoHeight;
       const double light = std::exp(-2.2 * (x * x + y * y)) * (1 + 0.12 * std::sin(23 * x + 9 * std::sin(7 * y)));
       for (const double part : {190.0, 92.0, 84.0})
         rgb->push_back(static_cast<std::uint8_t>(static_cast<int>(part * light / 12) * 12));
@@ -43,8 +43,8 @@ std::shared_ptr<const std::vector<std::uint8_t>> tissue_rgb() {
 wire::VideoFrame tissue(std::uint64_t number, const PoseAnswer& pose) {
   static const auto rgb = tissue_rgb();
   wire::VideoFrame frame;
-  frame.width_px = kWidth;
-  frame.height_px = kHeight;
+  frame.width_px = kVideoWidth;
+  frame.height_px = kVideoHeight;
   frame.rgb = rgb;
   frame.info.sequence = number;
   frame.info.acquired = DeviceTime{static_cast<std::int64_t>(number) * 40'000'000};
@@ -53,8 +53,8 @@ wire::VideoFrame tissue(std::uint64_t number, const PoseAnswer& pose) {
 }
 
 calibration::CalibrationRecord record() {
-  auto out = birdseye::testing::example_record(kWidth, kHeight, {}, {});
-  out.lens->camera = {kWidth, kHeight, 620, 620, 384, 288, -0.2, 0.05, 0, 0, 0};
+  auto out = birdseye::testing::example_record(kVideoWidth, kVideoHeight, {}, {});
+  out.lens->camera = {kVideoWidth, kVideoHeight, 620, 620, 384, 288, -0.2, 0.05, 0, 0, 0};
   out.lens->rms_px = 0.3;
   out.hand_eye->held_out_px = 1;
   return out;
