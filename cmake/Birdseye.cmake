@@ -1,5 +1,6 @@
 # birdseye_library(name SOURCES ... PUBLIC libs... PRIVATE libs...), birdseye_executable(...), birdseye_test(...):
-# our own targets, with the warnings and sanitizers that all of them share. Libraries are static.
+# our own targets, with the warnings and sanitizers that all of them share. Libraries are static. The release preset
+# compiles a target's files in batches, in which a name stands for one thing (docs/decisions/0031-files-in-batches.md).
 
 # The target all_verify_interface_header_sets compiles each header of a library alone, with what the library links PUBLIC.
 set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
