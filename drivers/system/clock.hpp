@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <compare>
 #include <cstdint>
 #include <string>
@@ -29,9 +28,6 @@ class Deadline {
  public:
   Deadline(DeviceTime time) : ns_(time.ns) {}
   Deadline(HostTime time) : ns_(time.ns) {}
-  // For callers that still ask the standard library for the time.
-  Deadline(std::chrono::steady_clock::time_point time)
-      : ns_(std::chrono::nanoseconds(time.time_since_epoch()).count()) {}
   static Deadline after(Duration span);
 
   [[nodiscard]] bool passed() const { return left().ns == 0; }

@@ -8,6 +8,7 @@
 
 #include "device/wire/client.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/system/clock.hpp"
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 #include "tests/support/child.hpp"
 #include "tests/support/command.hpp"
@@ -110,7 +111,7 @@ TEST(Appliance, TellsTheServiceManagerAndTakesAReloadWhileClientsStay) {
   }();
   const std::string path = scratch.file("c.toml", config((scratch / "tty").string(), camera, port) + record);
   testing::Child daemon({"env", manager.variable(), BIRDSEYE_BIN "/birdseyed", "--config", path});
-  const auto deadline = testing::Child::Clock::now() + std::chrono::seconds(30);
+  const auto deadline = Deadline::after(Duration::from_ms(30'000));
   EXPECT_NE(manager.told("READY=1"), "");
   EXPECT_NE(manager.told("WATCHDOG=1"), "");
   auto client = wire::Client::connect("127.0.0.1", port, deadline);

@@ -8,17 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "drivers/system/clock.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::testing {
 
 namespace {
 
-using Clock = Child::Clock;
-using std::chrono::milliseconds;
-using std::chrono::seconds;
-
-constexpr seconds kStartsWithin{20};
+constexpr Duration kStartsWithin = Duration::from_ms(20'000);
 
 std::vector<std::string> simulator(const std::string& words) {
   std::vector<std::string> all;
@@ -47,7 +44,7 @@ void add_faults(const std::string& output, std::vector<FaultSpan>& spans) {
 }  // namespace
 
 std::int64_t monotonic_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
+  return device_now().ns;
 }
 
 FaultRig::FaultRig(Settings settings) : settings_(std::move(settings)) {
@@ -70,10 +67,10 @@ FaultRig::FaultRig(Settings settings) : settings_(std::move(settings)) {
 
 void FaultRig::connect() {
   const std::string before_port = "publishing on 127.0.0.1 port ";
-  if (!birdseyed_->says({before_port}, Clock::now() + kStartsWithin)) return fail("birdseyed: " + log());
+  if (!birdseyed_->says({before_port}, Deadline::after(kStartsWithin))) return fail("birdseyed: " + log());
   const std::string& said = birdseyed_->output();
   port_ = std::atoi(said.c_str() + said.find(before_port) + before_port.size());
-  auto client = wire::Client::connect("127.0.0.1", port_, Clock::now() + kStartsWithin);
+  auto client = wire::Client::connect("127.0.0.1", port_, Deadline::after(kStartsWithin));
   if (!client) return fail(client.error().what);
   client_ = *std::move(client);
 }
@@ -93,7 +90,8 @@ void FaultRig::start_tracker() {
       fmt::format("minibird --tty {0}/tty --boot-ms 100 --position-noise-mm {1} --angle-noise-deg {2} --faults "
                   "{0}/tracker.toml --truth {0}/truth.json",
                   folder, kNoiseMm, kNoiseDeg)));
-  if (!tracker_->says({"ready"}, Clock::now() + kStartsWithin)) fail("the tracker's simulator: " + tracker_->output());
+  if (!tracker_->says({"ready"}, Deadline::after(kStartsWithin)))
+    fail("the tracker's simulator: " + tracker_->output());
 }
 
 void FaultRig::start_camera() {
@@ -102,13 +100,13 @@ void FaultRig::start_camera() {
       fmt::format("camera --socket {0}/camera --size {1} --rate {2} --format {3} --faults {0}/camera.toml --truth "
                   "{0}/camera.json",
                   settings_.folder.string(), settings_.size, kFrameRateHz, settings_.format)));
-  if (!camera_->says({"ready"}, Clock::now() + kStartsWithin)) fail("the camera's simulator: " + camera_->output());
+  if (!camera_->says({"ready"}, Deadline::after(kStartsWithin))) fail("the camera's simulator: " + camera_->output());
 }
 
 bool FaultRig::listen(double seconds, const std::function<bool()>& until) {
-  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  while (failure_.empty() && Clock::now() < end) {
-    auto event = client_->next(std::min(end, Clock::now() + milliseconds(100)));
+  const auto end = Deadline::after(Duration::from_seconds(seconds));
+  while (failure_.empty() && !end.passed()) {
+    auto event = client_->next(std::min(end, Deadline::after(Duration::from_ms(100))));
     if (!event) {
       fail(event.error().what + "; birdseyed: " + log());
       break;

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/clock.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "tests/support/cart_script.hpp"
@@ -41,7 +42,7 @@ Played play(const fs::path& path) {
   auto reader = host::RecordingReader::open(path, {});
   EXPECT_TRUE(reader) << reader.error().what;
   while (reader) {
-    const auto event = (*reader)->next(std::chrono::steady_clock::now() + std::chrono::seconds(20));
+    const auto event = (*reader)->next(Deadline::after(Duration::from_ms(20'000)));
     if (!event) {
       played.ending = event.error().what;
       EXPECT_EQ(event.error().code, Errc::disconnected) << played.ending;

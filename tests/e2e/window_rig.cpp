@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
@@ -90,17 +91,17 @@ int free_port() {
   return ntohs(address.sin_port);
 }
 
-bool listens(int port, Child::Clock::time_point deadline) {
+bool listens(int port, Deadline deadline) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   address.sin_port = htons(static_cast<std::uint16_t>(port));
-  for (bool there = false; Child::Clock::now() < deadline;) {
+  for (bool there = false; !deadline.passed();) {
     const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
     there = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
     ::close(fd);
     if (there) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    sleep_for(Duration::from_ms(50));
   }
   return false;
 }
@@ -165,7 +166,7 @@ void CoreWatch::watch(int core, const std::stop_token& stop) {
   ::pthread_setaffinity_np(::pthread_self(), sizeof only, &only);
   while (!stop.stop_requested()) {
     const std::int64_t before_ns = monotonic_ns();
-    std::this_thread::sleep_for(std::chrono::nanoseconds(kNapNs));
+    sleep_for(Duration{kNapNs});
     const std::int64_t now_ns = monotonic_ns();
     if (now_ns - before_ns < kLateNs) continue;
     const std::lock_guard lock(mutex_);
@@ -210,7 +211,7 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
   for (std::string word; in >> word;) words.push_back(word);
   first_frame_ns_ = appliance_->first_frame_ns();
   window_ = std::make_unique<Child>(words);
-  EXPECT_TRUE(listens(port, Child::Clock::now() + std::chrono::seconds(20))) << failure();
+  EXPECT_TRUE(listens(port, Deadline::after(Duration::from_ms(20'000)))) << failure();
   hearing_ = std::make_unique<Hearing>(port);
 }
 
@@ -263,7 +264,7 @@ void WindowRig::watch(double seconds) {
   const std::int64_t end_ns = monotonic_ns() + static_cast<std::int64_t>(seconds * 1e9);
   while (monotonic_ns() < end_ns) {
     glances_.push_back(look());
-    std::this_thread::sleep_for(std::chrono::milliseconds(8));
+    sleep_for(Duration::from_ms(8));
   }
 }
 
@@ -271,7 +272,7 @@ bool WindowRig::shows_overlay_within(double seconds) {
   const std::int64_t end_ns = monotonic_ns() + static_cast<std::int64_t>(seconds * 1e9);
   while (monotonic_ns() < end_ns) {
     if (look().overlaid_px > 0) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    sleep_for(Duration::from_ms(50));
   }
   return false;
 }
@@ -297,7 +298,7 @@ std::string WindowRig::failure() {
 
 int WindowRig::end() {
   window_->signal(SIGINT);
-  return window_->exit_code(Child::Clock::now() + std::chrono::seconds(20));
+  return window_->exit_code(Deadline::after(Duration::from_ms(20'000)));
 }
 
 }  // namespace birdseye::testing

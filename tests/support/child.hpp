@@ -8,17 +8,16 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <string>
 #include <vector>
+
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::testing {
 
 /// A program of somebody else's, what it says collected while it runs. Killed when this goes.
 class Child {
  public:
-  using Clock = std::chrono::steady_clock;
-
   explicit Child(const std::vector<std::string>& words) {
     std::array<int, 2> ends{-1, -1};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) return;
@@ -50,14 +49,14 @@ class Child {
   [[nodiscard]] const std::string& output() const { return output_; }
 
   /// Takes what it says until that holds all of `words`; false at the deadline, or when it ends without them.
-  bool says(const std::vector<std::string>& words, Clock::time_point deadline) {
+  bool says(const std::vector<std::string>& words, Deadline deadline) {
     while (!holds(words)) {
       if (!read_more(deadline)) return holds(words);
     }
     return true;
   }
   /// Takes the rest; its exit code, or -1 if it has not ended at the deadline or ended by a signal.
-  int exit_code(Clock::time_point deadline) {
+  int exit_code(Deadline deadline) {
     while (read_more(deadline)) {
     }
     for (int status = 0; pid_ > 0; ::usleep(2'000)) {
@@ -66,22 +65,22 @@ class Child {
         pid_ = -1;
         return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
       }
-      if (Clock::now() >= deadline) break;
+      if (deadline.passed()) break;
     }
     return -1;
   }
   /// Takes what it has said already, without waiting for more.
   void catch_up() {
     pollfd entry{output_fd_, POLLIN, 0};
-    while (::poll(&entry, 1, 0) > 0 && read_more(Clock::now() + std::chrono::seconds(1))) {
+    while (::poll(&entry, 1, 0) > 0 && read_more(Deadline::after(Duration::from_ms(1000)))) {
     }
   }
   void signal(int number) const {
     if (pid_ > 0) ::kill(pid_, number);
   }
   /// Takes what comes until nothing came for that long: it has digested what it was sent.
-  void until_quiet(std::chrono::milliseconds quiet) {
-    while (read_more(Clock::now() + quiet)) {
+  void until_quiet(Duration quiet) {
+    while (read_more(Deadline::after(quiet))) {
     }
   }
 
@@ -92,10 +91,8 @@ class Child {
     }
     return true;
   }
-  bool read_more(Clock::time_point deadline) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
-    pollfd entry{output_fd_, POLLIN, 0};
-    if (left <= 0 || ::poll(&entry, 1, static_cast<int>(left)) <= 0) return false;
+  bool read_more(Deadline deadline) {
+    if (deadline.passed() || wait_ready(output_fd_, POLLIN, deadline) == 0) return false;
     std::array<char, 4096> chunk;
     const ssize_t got = ::read(output_fd_, chunk.data(), chunk.size());
     if (got > 0) output_.append(chunk.data(), static_cast<std::size_t>(got));

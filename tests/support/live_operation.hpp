@@ -2,11 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <fstream>
-#include <thread>
 #include <vector>
 
+#include "drivers/system/wait.hpp"
 #include "host/operation/live_workflow.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
@@ -41,7 +40,7 @@ inline LiveSettings operation_settings(const Scratch& scratch) {
 /// Waits for the CT, which another thread reads.
 inline void load(LiveWorkflow& workflow) {
   for (int i = 0; i < 1000 && workflow.view().patient == nullptr && workflow.view().fault.empty(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    sleep_for(Duration::from_ms(10));
     workflow.tick();
   }
   ASSERT_NE(workflow.view().patient, nullptr) << workflow.view().fault;

@@ -4,11 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <thread>
+
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::vm {
-
-using namespace std::chrono_literals;
 
 Cart::Cart(Machine& machine, const std::string& name, const std::string& config) : machine_(machine), name_(name) {
   // Not on the guest's view of the tree, which need not show what changes out here.
@@ -24,9 +23,9 @@ Cart::~Cart() {
   machine_.must("stop " + name_);
 }
 
-std::optional<wire::Event> Cart::any(Clock::time_point deadline) {
+std::optional<wire::Event> Cart::any(Deadline deadline) {
   // The port is open out here long before anybody listens in there, so a connection that ends at once says nothing.
-  while (Clock::now() < deadline) {
+  while (!deadline.passed()) {
     if (!client_) {
       if (auto client = wire::Client::connect("127.0.0.1", machine_.port(), deadline)) client_ = *std::move(client);
     }
@@ -35,7 +34,7 @@ std::optional<wire::Event> Cart::any(Clock::time_point deadline) {
     if (event) return *std::move(event);
     client_.reset();
     parted_ = event.error().what;
-    std::this_thread::sleep_for(100ms);
+    sleep_for(Duration::from_ms(100));
   }
   return std::nullopt;
 }
@@ -48,7 +47,7 @@ void Cart::complain(const std::string& what) {
 
 void Cart::lock_camera(bool on) {
   ASSERT_TRUE(client_);
-  const auto asked = client_->lock_camera(on, Clock::now() + std::chrono::seconds(5));
+  const auto asked = client_->lock_camera(on, Deadline::after(Duration::from_ms(5000)));
   EXPECT_TRUE(asked) << asked.error().what;
 }
 

@@ -22,9 +22,8 @@ class Cart {
 
   /// The next event, from now on, of which `wanted` is true. Empty, and the test fails, when `patience` ends first.
   template <typename Kind, typename Wanted>
-  std::optional<Kind> next(const std::string& what, Wanted&& wanted,
-                           std::chrono::seconds patience = std::chrono::seconds(15)) {
-    const auto deadline = gone_ ? Clock::now() : Clock::now() + patience;
+  std::optional<Kind> next(const std::string& what, Wanted&& wanted, Duration patience = Duration::from_ms(15'000)) {
+    const auto deadline = Deadline::after(gone_ ? Duration{} : patience);
     while (auto event = any(deadline)) {
       if (const Kind* const kind = std::get_if<Kind>(&*event); kind != nullptr && wanted(*kind)) return *kind;
     }
@@ -45,7 +44,7 @@ class Cart {
   }
 
  private:
-  std::optional<wire::Event> any(Clock::time_point deadline);
+  std::optional<wire::Event> any(Deadline deadline);
   void complain(const std::string& what);
 
   Machine& machine_;

@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -11,15 +10,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <thread>
+
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::vm {
 
-using namespace std::chrono_literals;
-
 namespace {
 
-constexpr auto kBootPatience = 60s;
+constexpr Duration kBootPatience = Duration::from_ms(60'000);
 
 int free_port() {
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -77,10 +75,9 @@ Machine::Machine(const std::filesystem::path& out) : out_(out), port_(free_port(
   std::filesystem::remove_all(out_);
   std::filesystem::create_directories(out_);
   qemu_ = std::make_unique<Process>(qemu_command(out_, port_), out_ / "qemu.log");
-  const auto deadline = Clock::now() + kBootPatience;
-  while ((control_ = connect_to(out_ / "control.sock")) < 0 && Clock::now() < deadline &&
-         qemu_->wait(Clock::now()) < 0) {
-    std::this_thread::sleep_for(20ms);
+  const auto deadline = Deadline::after(kBootPatience);
+  while ((control_ = connect_to(out_ / "control.sock")) < 0 && !deadline.passed() && qemu_->wait(device_now()) < 0) {
+    sleep_for(Duration::from_ms(20));
   }
   // An emulated processor stops now and then for longer than the chip's own fifo lasts.
   adapter_ = std::make_unique<Process>(
@@ -97,15 +94,14 @@ Machine::~Machine() {
   if (control_ < 0) return;
   const std::string off = "off\n";
   (void)!::write(control_, off.data(), off.size());
-  EXPECT_EQ(qemu_->wait(Clock::now() + 20s), 0) << "the virtual machine does not switch off; see " << out_;
+  EXPECT_EQ(qemu_->wait(Deadline::after(Duration::from_ms(20'000))), 0)
+      << "the virtual machine does not switch off; see " << out_;
   ::close(control_);
 }
 
-bool Machine::read_until(std::size_t size, Clock::time_point deadline) {
+bool Machine::read_until(std::size_t size, Deadline deadline) {
   while (buffer_.size() < size) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-    pollfd entry{control_, POLLIN, 0};
-    if (left.count() <= 0 || ::poll(&entry, 1, static_cast<int>(left.count())) <= 0) return false;
+    if (deadline.passed() || wait_ready(control_, POLLIN, deadline) == 0) return false;
     std::array<char, 4096> chunk;
     const ssize_t got = ::read(control_, chunk.data(), chunk.size());
     if (got <= 0) return false;
@@ -114,7 +110,7 @@ bool Machine::read_until(std::size_t size, Clock::time_point deadline) {
   return true;
 }
 
-std::string Machine::read_line(Clock::time_point deadline) {
+std::string Machine::read_line(Deadline deadline) {
   std::size_t end = 0;
   while ((end = buffer_.find('\n')) == std::string::npos) {
     if (!read_until(buffer_.size() + 1, deadline)) return {};
@@ -124,11 +120,11 @@ std::string Machine::read_line(Clock::time_point deadline) {
   return line;
 }
 
-Answer Machine::run(const std::string& command, std::chrono::seconds patience) {
+Answer Machine::run(const std::string& command, Duration patience) {
   if (!up()) return {};
   const std::string line = command + "\n";
   (void)!::write(control_, line.data(), line.size());
-  const auto deadline = Clock::now() + patience;
+  const auto deadline = Deadline::after(patience);
   Answer answer;
   std::size_t size = 0;
   if (std::sscanf(read_line(deadline).c_str(), "%d %zu", &answer.code, &size) != 2 || !read_until(size, deadline)) {
@@ -142,7 +138,7 @@ Answer Machine::run(const std::string& command, std::chrono::seconds patience) {
   return answer;
 }
 
-std::string Machine::must(const std::string& command, std::chrono::seconds patience) {
+std::string Machine::must(const std::string& command, Duration patience) {
   const Answer answer = run(command, patience);
   EXPECT_EQ(answer.code, 0) << command << "\n" << answer.output;
   return answer.output;

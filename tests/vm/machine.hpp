@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -25,9 +24,9 @@ class Machine {
 
   [[nodiscard]] bool up() const { return control_ >= 0; }
   /// Runs a line of shell in the guest, in the tree, with hw-sim/vm/guest.sh at hand.
-  Answer run(const std::string& command, std::chrono::seconds patience = std::chrono::seconds(20));
+  Answer run(const std::string& command, Duration patience = Duration::from_ms(20'000));
   /// The same; a code other than 0 fails the test.
-  std::string must(const std::string& command, std::chrono::seconds patience = std::chrono::seconds(20));
+  std::string must(const std::string& command, Duration patience = Duration::from_ms(20'000));
 
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }
   /// On 127.0.0.1, forwarded to kGuestPort of the guest.
@@ -38,8 +37,8 @@ class Machine {
   static constexpr const char* kAdapterSerial = "CART0001";
 
  private:
-  bool read_until(std::size_t size, Clock::time_point deadline);
-  std::string read_line(Clock::time_point deadline);
+  bool read_until(std::size_t size, Deadline deadline);
+  std::string read_line(Deadline deadline);
 
   std::filesystem::path out_;
   int port_ = 0;

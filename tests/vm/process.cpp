@@ -1,18 +1,16 @@
 #include "tests/vm/process.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
-#include <thread>
+
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::vm {
-
-using namespace std::chrono_literals;
 
 Process::Process(const std::vector<std::string>& command, const std::filesystem::path& log) {
   std::array<int, 2> to{}, from{};
@@ -40,9 +38,9 @@ Process::Process(const std::vector<std::string>& command, const std::filesystem:
 Process::~Process() {
   if (pid_ > 0 && code_ < 0) {
     ::kill(pid_, SIGTERM);
-    if (wait(Clock::now() + 5s) < 0) {
+    if (wait(Deadline::after(Duration::from_ms(5000))) < 0) {
       ::kill(pid_, SIGKILL);
-      (void)wait(Clock::now() + 5s);
+      (void)wait(Deadline::after(Duration::from_ms(5000)));
     }
   }
   if (in_ >= 0) ::close(in_);
@@ -54,32 +52,30 @@ void Process::send(const std::string& line) const {
   (void)!::write(in_, bytes.data(), bytes.size());
 }
 
-std::string Process::wait_for(const std::string& text, Clock::time_point deadline) {
+std::string Process::wait_for(const std::string& text, Deadline deadline) {
   for (;;) {
     for (std::size_t end = 0; (end = text_.find('\n')) != std::string::npos;) {
       const std::string line = text_.substr(0, end);
       text_.erase(0, end + 1);
       if (line.find(text) != std::string::npos) return line;
     }
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
-    pollfd entry{out_, POLLIN, 0};
-    if (left.count() <= 0 || ::poll(&entry, 1, static_cast<int>(left.count())) < 0) return {};
+    if (deadline.passed() || wait_ready(out_, POLLIN, deadline) == 0) return {};
     std::array<char, 4096> chunk;
-    const ssize_t got = entry.revents != 0 ? ::read(out_, chunk.data(), chunk.size()) : 0;
+    const ssize_t got = ::read(out_, chunk.data(), chunk.size());
     if (got <= 0) return {};
     text_.append(chunk.data(), static_cast<std::size_t>(got));
   }
 }
 
-int Process::wait(Clock::time_point deadline) {
+int Process::wait(Deadline deadline) {
   while (code_ < 0) {
     int status = 0;
     if (::waitpid(pid_, &status, WNOHANG) == pid_) {
       code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    } else if (Clock::now() > deadline) {
+    } else if (deadline.passed()) {
       return -1;
     } else {
-      std::this_thread::sleep_for(10ms);
+      sleep_for(Duration::from_ms(10));
     }
   }
   return code_;

@@ -2,14 +2,13 @@
 
 #include <sys/types.h>
 
-#include <chrono>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-namespace birdseye::vm {
+#include "drivers/system/clock.hpp"
 
-using Clock = std::chrono::steady_clock;
+namespace birdseye::vm {
 
 /// A program of its own that takes lines and gives lines. Ends with this object, or with this program however that
 /// ends.
@@ -23,9 +22,9 @@ class Process {
 
   void send(const std::string& line) const;
   /// Reads lines until one holds `text`, which it returns; empty when the deadline or the end comes first.
-  std::string wait_for(const std::string& text, Clock::time_point deadline);
+  std::string wait_for(const std::string& text, Deadline deadline);
   /// The exit code, waiting for it until the deadline; -1 then.
-  int wait(Clock::time_point deadline);
+  int wait(Deadline deadline);
 
  private:
   pid_t pid_ = -1;

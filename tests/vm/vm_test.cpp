@@ -15,7 +15,6 @@
 namespace birdseye::vm {
 namespace {
 
-using namespace std::chrono_literals;
 using wire::Birds;
 using wire::Status;
 using wire::VideoFrame;
@@ -109,8 +108,8 @@ TEST_F(ThroughKernelTty, TheGuestIsWhatATechnicianWouldFind) {
 
 TEST_F(ThroughKernelTty, OpeningThePortResetsTheTracker) {
   // What ftdi_sio does, and why the driver configures the unit at every start.
-  EXPECT_FALSE(g_machine->adapter().wait_for(R"("rts":true)", Clock::now() + 5s).empty());
-  EXPECT_FALSE(g_machine->adapter().wait_for(R"("rts":false)", Clock::now() + 5s).empty());
+  EXPECT_FALSE(g_machine->adapter().wait_for(R"("rts":true)", Deadline::after(Duration::from_ms(5000))).empty());
+  EXPECT_FALSE(g_machine->adapter().wait_for(R"("rts":false)", Deadline::after(Duration::from_ms(5000))).empty());
 }
 
 TEST_F(ThroughKernelTty, PosesComeWithTheirTime) {

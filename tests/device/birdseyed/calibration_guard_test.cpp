@@ -6,6 +6,7 @@
 #include "device/wire/client.hpp"
 #include "device/wire/server.hpp"
 #include "device/wire/unpacker.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/example_record.hpp"
 
 namespace birdseye::device {
@@ -101,8 +102,8 @@ TEST(CalibrationGuard, AClientThatComesLaterIsTold) {
   auto server = wire::Server::listen("127.0.0.1", 0);
   ASSERT_TRUE(server);
   (*server)->publish(wire::pack(wire::Calibration{true, "", record()}, {5}));
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // distributed to nobody
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  sleep_for(Duration::from_ms(50));  // distributed to nobody
+  const auto deadline = Deadline::after(Duration::from_ms(5000));
   auto client = wire::Client::connect("127.0.0.1", (*server)->port(), deadline);
   ASSERT_TRUE(client);
   for (;;) {

@@ -270,7 +270,6 @@ TEST(Recorder, BeginsAFileOfItsOwnEachTime) {
 }
 
 TEST(Appliance, RunsWithoutARecordingAndSaysSo) {
-  using Clock = std::chrono::steady_clock;
   Config config;
   config.tracker.line.device = "unix:/nowhere/tracker";
   config.camera.source = "unix:/nowhere/camera";
@@ -279,7 +278,7 @@ TEST(Appliance, RunsWithoutARecordingAndSaysSo) {
   const auto appliance = Appliance::start(config, *server);
   ASSERT_TRUE(appliance) << appliance.error().what;
   EXPECT_NE((*appliance)->summary().find("not recording: /proc/no-such-place"), std::string::npos);
-  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
   const auto client = *wire::Client::connect("127.0.0.1", server->port(), deadline);
   std::string recording;
   while (recording.empty()) {

@@ -8,22 +8,20 @@
 #include <array>
 
 #include "device/wire/client.hpp"
+#include "drivers/system/clock.hpp"
 #include "tests/support/foreign_server.hpp"
 
 namespace birdseye::wire {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-using std::chrono::seconds;
 using testing::ForeignServer;
 using ::testing::HasSubstr;
 
 /// Frames until there are so many, or there are none for too long.
 std::vector<VideoFrame> frames_from(Client& client, std::size_t count) {
   std::vector<VideoFrame> frames;
-  const auto deadline = Clock::now() + seconds(20);
-  while (frames.size() < count && Clock::now() < deadline) {
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
+  while (frames.size() < count && !deadline.passed()) {
     const auto event = client.next(deadline);
     if (!event) break;
     if (const auto* frame = *event ? std::get_if<VideoFrame>(&**event) : nullptr) frames.push_back(*frame);
@@ -33,7 +31,7 @@ std::vector<VideoFrame> frames_from(Client& client, std::size_t count) {
 
 TEST(ForeignServer, ItsVideoHasThePosesOfItsStamps) {
   ForeignServer server;
-  const auto client = *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5));
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)));
   const auto frames = frames_from(*client, 30);
   ASSERT_EQ(frames.size(), 30U);
   int exact = 0;
@@ -50,8 +48,7 @@ TEST(ForeignServer, ItsVideoHasThePosesOfItsStamps) {
   // Nothing asks it for the time; it is on this machine, so that the time of day relates its stamps.
   const auto related = client->host_from_device(frames.back().info.acquired);
   ASSERT_TRUE(related);
-  const auto wall = std::chrono::system_clock::now().time_since_epoch() - Clock::now().time_since_epoch();
-  const std::int64_t truth_ns = frames.back().info.acquired.ns - std::chrono::nanoseconds(wall).count();
+  const std::int64_t truth_ns = frames.back().info.acquired.ns - wall_minus_monotonic().ns;
   const Duration error{related->time.ns - truth_ns};
   EXPECT_LE(error, Duration::from_ms(0)) << "a frame is never taken for newer than it is";
   EXPECT_GE(error, Duration::from_ms(-60));
@@ -72,8 +69,8 @@ TEST(ForeignServer, ASilentOneIsAskedWithinOneLongWait) {
   ASSERT_EQ(::bind(listening, reinterpret_cast<sockaddr*>(&address), size), 0);
   ASSERT_EQ(::listen(listening, 1), 0);
   ASSERT_EQ(::getsockname(listening, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  const auto client = *Client::connect("127.0.0.1", ntohs(address.sin_port), Clock::now() + seconds(5));
-  const auto event = client->next(Clock::now() + milliseconds(2500));
+  const auto client = *Client::connect("127.0.0.1", ntohs(address.sin_port), Deadline::after(Duration::from_ms(5000)));
+  const auto event = client->next(Deadline::after(Duration::from_ms(2500)));
   ASSERT_TRUE(event) << event.error().what;
   EXPECT_FALSE(*event);
   const int peer = ::accept(listening, nullptr, nullptr);
@@ -90,8 +87,8 @@ TEST(ForeignServer, ASilentOneIsAskedWithinOneLongWait) {
 
 TEST(ForeignServer, TheScopeIsChosenByName) {
   ForeignServer server(true);
-  const auto client =
-      *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5), {"StylusToTracker", "", "scope"});
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)),
+                                       {"StylusToTracker", "", "scope"});
   const auto frames = frames_from(*client, 5);
   ASSERT_EQ(frames.size(), 5U);
   const double at_s = static_cast<double>(frames.back().info.acquired.ns) * 1e-9;
@@ -103,13 +100,13 @@ TEST(ForeignServer, TheScopeIsChosenByName) {
 
 TEST(ForeignServer, OneThatEndsInTheMiddleOfAMessageHasGone) {
   ForeignServer server;
-  const auto client = *Client::connect("127.0.0.1", server.port(), Clock::now() + seconds(5));
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)));
   ASSERT_EQ(frames_from(*client, 2).size(), 2U);
   server.cut_off();
-  const auto deadline = Clock::now() + seconds(10);
+  const auto deadline = Deadline::after(Duration::from_ms(10'000));
   for (;;) {
     const auto event = client->next(deadline);
-    ASSERT_LT(Clock::now(), deadline);
+    ASSERT_FALSE(deadline.passed());
     if (event) continue;
     EXPECT_EQ(event.error().code, Errc::disconnected);
     EXPECT_THAT(event.error().what, HasSubstr("the server has gone"));

@@ -4,22 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
-#include <thread>
 
 #include "device/wire/client.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/child.hpp"
 
 namespace birdseye::wire {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-using std::chrono::seconds;
 using testing::Child;
 using ::testing::HasSubstr;
 
@@ -67,8 +63,8 @@ Eigen::Matrix4d matrix_in(const std::string& output, int n) {
 }
 
 void wait_for_client(const Server& server) {
-  const auto deadline = Clock::now() + seconds(20);
-  while (server.clients() == 0 && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(2));
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
+  while (server.clients() == 0 && !deadline.passed()) sleep_for(Duration::from_ms(2));
   ASSERT_GT(server.clients(), 0U);
 }
 
@@ -82,9 +78,10 @@ TEST(OpenIgtLinkPeer, AReceiverReadsPosesFramesStatusAndStrings) {
   server->publish(pack(frame(320, 200)));
   server->publish(pack(Status{false, "the tracker has gone"}, {1}));
   server->publish(pack(health, {1'234'567'890'000}));
-  EXPECT_TRUE(client.says({"TDATA", "IMAGE", "the tracker has gone", "103.25"}, Clock::now() + seconds(20)));
+  EXPECT_TRUE(
+      client.says({"TDATA", "IMAGE", "the tracker has gone", "103.25"}, Deadline::after(Duration::from_ms(20'000))));
   server.reset();  // it writes its matrices out when it ends
-  EXPECT_EQ(client.exit_code(Clock::now() + seconds(20)), 0);
+  EXPECT_EQ(client.exit_code(Deadline::after(Duration::from_ms(20'000))), 0);
 
   const std::string& said = client.output();
   SCOPED_TRACE(said);
@@ -107,15 +104,15 @@ TEST(OpenIgtLinkPeer, ATrackingClientStartsReadsAndStops) {
   // It asks for poses at 50 Hz and, after ten messages of whatever kind, for no more; between them come kinds that it
   // does not know, a frame among them.
   server->publish(pack(frame(64, 48)));
-  const auto deadline = Clock::now() + seconds(20);
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
   const std::vector<std::string> both{"Receiving TDATA data type.", "STP_TDATA"};
-  while (!client.says(both, Clock::now() + milliseconds(25)) && Clock::now() < deadline) {
+  while (!client.says(both, Deadline::after(Duration::from_ms(25))) && !deadline.passed()) {
     server->publish(pack(birds()));
     server->publish(pack(Status{true, ""}, {1}));
   }
-  client.until_quiet(milliseconds(300));
+  client.until_quiet(Duration::from_ms(300));
   server.reset();
-  EXPECT_EQ(client.exit_code(Clock::now() + seconds(20)), 0);
+  EXPECT_EQ(client.exit_code(Deadline::after(Duration::from_ms(20'000))), 0);
 
   const std::string& said = client.output();
   SCOPED_TRACE(said);
@@ -133,18 +130,18 @@ TEST(OpenIgtLinkPeer, ThoseThatOnlySpeakAreHeardOutAndHarmNobody) {
   auto server = *Server::listen("127.0.0.1", 0);
   Child tracker(peer("TrackerClient", server->port(), {"200"}));
   Child status(peer("StatusClient", server->port()));
-  const auto deadline = Clock::now() + seconds(20);
-  while (server->clients() < 2 && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(2));
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
+  while (server->clients() < 2 && !deadline.passed()) sleep_for(Duration::from_ms(2));
   ASSERT_EQ(server->clients(), 2U);
   const auto ours = Client::connect("127.0.0.1", server->port(), deadline);
   ASSERT_TRUE(ours);
-  while (server->clients() < 3 && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(2));
+  while (server->clients() < 3 && !deadline.passed()) sleep_for(Duration::from_ms(2));
   for (int i = 0; i < 20; ++i) {
     server->publish(pack(birds()));
     const auto event = (*ours)->next(deadline);
     ASSERT_TRUE(event && *event);
     EXPECT_EQ(std::get<Birds>(**event).birds.size(), 2U);
-    std::this_thread::sleep_for(milliseconds(10));
+    sleep_for(Duration::from_ms(10));
   }
 }
 

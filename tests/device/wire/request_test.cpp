@@ -5,21 +5,16 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <random>
-#include <thread>
 
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/request.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/system/wait.hpp"
 
 namespace birdseye::wire {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-using std::chrono::seconds;
 
 template <typename M>
 std::vector<std::uint8_t> packed(M& message) {
@@ -114,14 +109,14 @@ class RawClient {
 };
 
 void wait_for_clients(const Server& server, std::size_t count) {
-  const auto deadline = Clock::now() + seconds(5);
-  while (server.clients() != count && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(1));
+  const auto deadline = Deadline::after(Duration::from_ms(5000));
+  while (server.clients() != count && !deadline.passed()) sleep_for(Duration::from_ms(1));
   EXPECT_EQ(server.clients(), count);
 }
 
 TEST(Server, GarbageIsRefusedAndCountedAndTheOthersGoOn) {
   const auto server = *Server::listen("127.0.0.1", 0);
-  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  const auto good = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
   const RawClient hostile(server->port());
   wait_for_clients(*server, 2);
   hostile.send(std::vector<std::uint8_t>(500, 0xFF));
@@ -129,7 +124,7 @@ TEST(Server, GarbageIsRefusedAndCountedAndTheOthersGoOn) {
   wait_for_clients(*server, 1);
   EXPECT_EQ(server->take_counters().requests_refused, 1U);
   server->publish(pack(Status{true, "still here"}, {1}));
-  const auto event = good->next(Clock::now() + seconds(5));
+  const auto event = good->next(Deadline::after(Duration::from_ms(5000)));
   ASSERT_TRUE(event && *event);
   EXPECT_EQ(std::get<Status>(**event).text, "still here");
 }
@@ -137,9 +132,9 @@ TEST(Server, GarbageIsRefusedAndCountedAndTheOthersGoOn) {
 TEST(Server, AClientThatComesIsToldHowThingsAre) {
   const auto server = *Server::listen("127.0.0.1", 0);
   server->publish(pack(Status{false, "no camera"}, {1}));
-  std::this_thread::sleep_for(milliseconds(20));
-  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  EXPECT_EQ(std::get<Status>(**client->next(Clock::now() + seconds(5))).text, "no camera");
+  sleep_for(Duration::from_ms(20));
+  const auto client = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  EXPECT_EQ(std::get<Status>(**client->next(Deadline::after(Duration::from_ms(5000)))).text, "no camera");
 }
 
 TEST(Server, TrackingMayBeAskedForAndStopped) {
@@ -161,8 +156,8 @@ TEST(Server, TrackingMayBeAskedForAndStopped) {
 
 TEST(Server, ASubscriptionLeavesFramesAway) {
   const auto server = *Server::listen("127.0.0.1", 0);
-  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  ASSERT_TRUE(client->subscribe({.frames = false, .tracking = true}, Clock::now() + seconds(1)));
+  const auto client = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  ASSERT_TRUE(client->subscribe({.frames = false, .tracking = true}, Deadline::after(Duration::from_ms(1000))));
   VideoFrame frame;
   frame.width_px = 4;
   frame.height_px = 2;
@@ -174,7 +169,7 @@ TEST(Server, ASubscriptionLeavesFramesAway) {
     server->publish(pack(Status{true, std::to_string(i)}, {1}));
     ++quiet;
     for (;;) {
-      const auto event = client->next(Clock::now() + seconds(5));
+      const auto event = client->next(Deadline::after(Duration::from_ms(5000)));
       ASSERT_TRUE(event && *event);
       if (std::holds_alternative<Status>(**event)) break;
       ++frames;
@@ -186,10 +181,10 @@ TEST(Server, ASubscriptionLeavesFramesAway) {
 
 TEST(Client, RelatesTheAppliancesClockToItsOwn) {
   const auto server = *Server::listen("127.0.0.1", 0);
-  const auto client = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  const auto client = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
   EXPECT_FALSE(client->host_from_device(device_now()));
   while (!client->host_from_device(device_now())) {
-    const auto event = client->next(Clock::now() + milliseconds(20));
+    const auto event = client->next(Deadline::after(Duration::from_ms(20)));
     ASSERT_TRUE(event) << event.error().what;
   }
   // Both ends are this machine's clock: what the exchange says must be within what it claims.
@@ -203,7 +198,7 @@ TEST(Client, RelatesTheAppliancesClockToItsOwn) {
   health.clock = {true, true, true, 20'000, 1'000, 1'700'000'000'000'050'000, "there"};
   server->publish(pack(health, {1}));
   for (bool told = false; !told;) {
-    const auto event = client->next(Clock::now() + seconds(5));
+    const auto event = client->next(Deadline::after(Duration::from_ms(5000)));
     ASSERT_TRUE(event && *event);
     told = std::holds_alternative<Health>(**event);
   }
@@ -213,32 +208,32 @@ TEST(Client, RelatesTheAppliancesClockToItsOwn) {
 TEST(Client, HoldsTheCamerasControlsForAsLongAsItIsThere) {
   const auto server = *Server::listen("127.0.0.1", 0);
   const auto comes_to = [&](bool locked) {
-    for (const auto deadline = Clock::now() + seconds(10); server->camera_locked() != locked;) {
-      if (Clock::now() > deadline) return false;
-      std::this_thread::sleep_for(milliseconds(2));
+    for (const auto deadline = Deadline::after(Duration::from_ms(10'000)); server->camera_locked() != locked;) {
+      if (deadline.passed()) return false;
+      sleep_for(Duration::from_ms(2));
     }
     return true;
   };
-  auto one = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  auto other = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  auto one = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  auto other = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
   EXPECT_FALSE(server->camera_locked());
-  ASSERT_TRUE(one->lock_camera(true, Clock::now() + seconds(1)));
-  ASSERT_TRUE(other->lock_camera(true, Clock::now() + seconds(1)));
+  ASSERT_TRUE(one->lock_camera(true, Deadline::after(Duration::from_ms(1000))));
+  ASSERT_TRUE(other->lock_camera(true, Deadline::after(Duration::from_ms(1000))));
   EXPECT_TRUE(comes_to(true));
   one.reset();
-  while (server->clients() > 1) std::this_thread::sleep_for(milliseconds(2));
+  while (server->clients() > 1) sleep_for(Duration::from_ms(2));
   EXPECT_TRUE(server->camera_locked());
-  ASSERT_TRUE(other->lock_camera(false, Clock::now() + seconds(1)));
+  ASSERT_TRUE(other->lock_camera(false, Deadline::after(Duration::from_ms(1000))));
   EXPECT_TRUE(comes_to(false));
-  ASSERT_TRUE(other->lock_camera(true, Clock::now() + seconds(1)));
+  ASSERT_TRUE(other->lock_camera(true, Deadline::after(Duration::from_ms(1000))));
   EXPECT_TRUE(comes_to(true));
   other.reset();
   EXPECT_TRUE(comes_to(false));
 
-  auto listener = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  while (server->clients() == 0) std::this_thread::sleep_for(milliseconds(2));
+  auto listener = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  while (server->clients() == 0) sleep_for(Duration::from_ms(2));
   server->publish(pack(CameraControls{true, {"gain 3"}, {"focus: the camera has none"}}, {1}));
-  const auto event = listener->next(Clock::now() + seconds(5));
+  const auto event = listener->next(Deadline::after(Duration::from_ms(5000)));
   ASSERT_TRUE(event && *event);
   const auto& controls = std::get<CameraControls>(**event);
   EXPECT_TRUE(controls.locked);

@@ -4,13 +4,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <random>
-#include <thread>
 
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/wire_messages.hpp"
 
 namespace birdseye::wire {
@@ -19,9 +18,6 @@ namespace {
 using birdseye::testing::made_plausible;
 using birdseye::testing::messages_of;
 using Bytes = std::vector<std::uint8_t>;
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
-using std::chrono::seconds;
 
 constexpr std::size_t kTypeAt = 2, kDeviceAt = 14;
 
@@ -191,8 +187,8 @@ class Raw {
   [[nodiscard]] Raw accepted() const { return Raw(::accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC)); }
   void send(const Bytes& bytes) const { (void)!::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT); }
   /// Waits for the first byte of something.
-  [[nodiscard]] bool hears(milliseconds most) const { return peek(most) > 0; }
-  [[nodiscard]] bool ends(milliseconds most) const { return peek(most) == 0; }
+  [[nodiscard]] bool hears(Duration most) const { return peek(most) > 0; }
+  [[nodiscard]] bool ends(Duration most) const { return peek(most) == 0; }
   Raw(Raw&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
   Raw& operator=(Raw&&) = delete;
   ~Raw() {
@@ -201,8 +197,8 @@ class Raw {
 
  private:
   explicit Raw(int fd) : fd_(fd) {}
-  [[nodiscard]] ssize_t peek(milliseconds most) const {
-    const timeval limit{most.count() / 1000, most.count() % 1000 * 1000};
+  [[nodiscard]] ssize_t peek(Duration most) const {
+    const timeval limit{most.ns / 1'000'000'000, most.ns % 1'000'000'000 / 1000};
     ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     std::uint8_t byte = 0;
     return ::recv(fd_, &byte, 1, MSG_PEEK);
@@ -223,7 +219,7 @@ TEST(WireHostile, AClientRefusesABadServerAndDoesNotHang) {
   int port = 0;
   const Raw listener = Raw::listening(port);
   for (int i = 0; i < 200; ++i) {
-    const auto client = Client::connect("127.0.0.1", port, Clock::now() + seconds(5));
+    const auto client = Client::connect("127.0.0.1", port, Deadline::after(Duration::from_ms(5000)));
     ASSERT_TRUE(client);
     {
       const Raw server = listener.accepted();
@@ -233,7 +229,7 @@ TEST(WireHostile, AClientRefusesABadServerAndDoesNotHang) {
     int events = 0;
     for (;; ++events) {
       ASSERT_LT(events, 10);
-      const auto event = (*client)->next(Clock::now() + seconds(20));
+      const auto event = (*client)->next(Deadline::after(Duration::from_ms(20'000)));
       if (!event) break;
       ASSERT_TRUE(*event);
       expect_sane(**event);
@@ -243,7 +239,7 @@ TEST(WireHostile, AClientRefusesABadServerAndDoesNotHang) {
 
 TEST(WireHostile, AServerOutlivesBadClientsAndServesTheGoodOne) {
   const auto server = *Server::listen("127.0.0.1", 0);
-  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
+  const auto good = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
   std::mt19937 random(17);
   std::vector<Bytes> each = one_of_each();
   // What asks: names that a server may know, with bodies that they should not have.
@@ -265,11 +261,11 @@ TEST(WireHostile, AServerOutlivesBadClientsAndServesTheGoodOne) {
     if (i % 10 != 0) continue;
     // The good one is told something new each time; what else came to it is passed over.
     const std::string text = "round " + std::to_string(i);
-    const auto deadline = Clock::now() + seconds(20);
+    const auto deadline = Deadline::after(Duration::from_ms(20'000));
     bool heard = false;
-    while (!heard && Clock::now() < deadline) {
+    while (!heard && !deadline.passed()) {
       server->publish(pack(Status{true, text}, {i}));
-      const auto event = good->next(Clock::now() + milliseconds(100));
+      const auto event = good->next(Deadline::after(Duration::from_ms(100)));
       ASSERT_TRUE(event) << event.error().what;
       if (!*event) continue;
       const auto* status = std::get_if<Status>(&**event);
@@ -307,10 +303,10 @@ class Video {
 
 /// A client that the server knows of already.
 Raw taken_by(const Server& server, int receive_buffer_bytes = 0) {
-  const auto deadline = Clock::now() + seconds(20);
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
   const auto before = server.clients();
   Raw raw = Raw::connected_to(server.port(), receive_buffer_bytes);
-  while (server.clients() == before && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(1));
+  while (server.clients() == before && !deadline.passed()) sleep_for(Duration::from_ms(1));
   return raw;
 }
 
@@ -319,9 +315,9 @@ std::vector<Raw> silent_clients(Server& server, Video& video, int count) {
   std::vector<Raw> silent;
   for (int i = 0; i < count; ++i) {
     silent.push_back(taken_by(server, 4096));
-    const auto deadline = Clock::now() + seconds(20);
+    const auto deadline = Deadline::after(Duration::from_ms(20'000));
     server.publish(video.next());
-    while (!silent.back().hears(milliseconds(200)) && Clock::now() < deadline) server.publish(video.next());
+    while (!silent.back().hears(Duration::from_ms(200)) && !deadline.passed()) server.publish(video.next());
     for (int n = 0; n < 5; ++n) server.publish(video.next());
   }
   return silent;
@@ -331,20 +327,20 @@ constexpr std::size_t kMostHeld = 96U << 20U;
 
 /// The bound holds when what was published has been distributed, of which the newest is a part.
 void expect_bounded(const Video& video) {
-  const auto deadline = Clock::now() + seconds(20);
-  while (video.bytes_held() > kMostHeld && Clock::now() < deadline) std::this_thread::sleep_for(milliseconds(2));
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
+  while (video.bytes_held() > kMostHeld && !deadline.passed()) sleep_for(Duration::from_ms(2));
   EXPECT_LE(video.bytes_held(), kMostHeld);
 }
 
 TEST(WireHostile, SilentClientsHoldNoMoreThanTheBoundOverAll) {
   const auto server = *Server::listen("127.0.0.1", 0);
   Video video(1920, 1080);
-  const auto began = Clock::now();
+  const DeviceTime began = device_now();
   const std::vector<Raw> silent = silent_clients(*server, video, 16);
   expect_bounded(video);
   const auto counters = server->take_counters();
   // A frame that has begun each, and few others; on a machine that takes longer, silence itself has sent some away.
-  if (Clock::now() - began < seconds(9)) {
+  if (device_now() - began < Duration::from_ms(9000)) {
     EXPECT_GE(counters.clients, 13U);
   }
   EXPECT_GT(counters.messages_shed, 0U);
@@ -359,12 +355,12 @@ TEST(WireHostile, TheLongestSilentGoesWhereBegunFramesAloneAreTooMany) {
   EXPECT_GE(counters.clients_shed, 1U);
   EXPECT_GE(counters.clients, 2U);  // all of them would go after ten seconds
   // Who reads is served all the same.
-  const auto good = *Client::connect("127.0.0.1", server->port(), Clock::now() + seconds(5));
-  const auto deadline = Clock::now() + seconds(30);
+  const auto good = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  const auto deadline = Deadline::after(Duration::from_ms(30'000));
   int frames = 0;
-  while (frames < 3 && Clock::now() < deadline) {
+  while (frames < 3 && !deadline.passed()) {
     server->publish(video.next());
-    const auto event = good->next(Clock::now() + milliseconds(500));
+    const auto event = good->next(Deadline::after(Duration::from_ms(500)));
     ASSERT_TRUE(event) << event.error().what;
     if (*event && std::holds_alternative<VideoFrame>(**event)) ++frames;
   }
@@ -378,7 +374,7 @@ TEST(WireHostile, WhoFindsNoRoomIsRefusedAndCounted) {
   clients.reserve(17);
   for (int i = 0; i < 16; ++i) clients.push_back(taken_by(*server));
   clients.push_back(Raw::connected_to(server->port()));
-  EXPECT_TRUE(clients.back().ends(seconds(20)));
+  EXPECT_TRUE(clients.back().ends(Duration::from_ms(20'000)));
   EXPECT_EQ(server->take_counters().clients, 16U);
   EXPECT_EQ(server->take_counters().clients_shed, 1U);
 }

@@ -3,23 +3,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/json.hpp"
 #include "device/wire/server.hpp"
 #include "device/wire/tcp_link.hpp"
+#include "drivers/system/wait.hpp"
 #include "tests/support/wire_messages.hpp"
 
 namespace birdseye::wire {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using birdseye::testing::made_plausible;
 using birdseye::testing::messages_of;
-using std::chrono::seconds;
 
 VideoFrame frame(std::uint64_t sequence, int width = 32, int height = 20) {
   VideoFrame f;
@@ -49,8 +46,8 @@ struct Ends {
 Ends connected() {
   Ends ends;
   ends.server = *Server::listen("127.0.0.1", 0);
-  ends.client = *Client::connect("127.0.0.1", ends.server->port(), Clock::now() + seconds(5));
-  while (ends.server->clients() == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ends.client = *Client::connect("127.0.0.1", ends.server->port(), Deadline::after(Duration::from_ms(5000)));
+  while (ends.server->clients() == 0) sleep_for(Duration::from_ms(1));
   return ends;
 }
 
@@ -58,7 +55,7 @@ TEST(Wire, AFrameComesAsItWasSent) {
   const Ends ends = connected();
   const VideoFrame sent = frame(42);
   ends.server->publish(pack(sent));
-  const auto event = ends.client->next(Clock::now() + seconds(5));
+  const auto event = ends.client->next(Deadline::after(Duration::from_ms(5000)));
   ASSERT_TRUE(event && *event);
   const auto& got = std::get<VideoFrame>(**event);
   EXPECT_EQ(got.info.sequence, 42U);
@@ -76,7 +73,7 @@ TEST(Wire, ARefusedPoseStaysRefused) {
   sent.info.pose = {};
   sent.info.pose.reason = "the newest pose is 300 ms old";
   ends.server->publish(pack(sent));
-  const auto event = ends.client->next(Clock::now() + seconds(5));
+  const auto event = ends.client->next(Deadline::after(Duration::from_ms(5000)));
   ASSERT_TRUE(event && *event);
   const PoseAnswer& pose = std::get<VideoFrame>(**event).info.pose;
   EXPECT_EQ(pose.kind, PoseKind::refused);
@@ -93,21 +90,21 @@ TEST(Wire, BirdsStatusAndHealth) {
   health.tracker_rate_hz = 103.25;
   health.phase_errors = 2;
   ends.server->publish(pack(health, {1}));
-  const auto birds = std::get<Birds>(**ends.client->next(Clock::now() + seconds(5)));
+  const auto birds = std::get<Birds>(**ends.client->next(Deadline::after(Duration::from_ms(5000))));
   EXPECT_EQ(birds.acquired.ns, 5'000'000'123);
   ASSERT_EQ(birds.birds.size(), 2U);
   EXPECT_EQ(birds.birds[1].name, "pointer");
   EXPECT_LT((birds.birds[0].tracker_from_sensor.matrix() - pose.matrix()).norm(), 1e-6);  // single precision
-  const auto status = std::get<Status>(**ends.client->next(Clock::now() + seconds(5)));
+  const auto status = std::get<Status>(**ends.client->next(Deadline::after(Duration::from_ms(5000))));
   EXPECT_FALSE(status.ok);
   EXPECT_EQ(status.text, "the tracker has gone");
-  EXPECT_EQ(std::get<Health>(**ends.client->next(Clock::now() + seconds(5))).phase_errors, 2U);
+  EXPECT_EQ(std::get<Health>(**ends.client->next(Deadline::after(Duration::from_ms(5000)))).phase_errors, 2U);
 }
 
 TEST(Wire, AMeasurementWithoutAnyPoseComesEmpty) {
   const Ends ends = connected();
   ends.server->publish(pack(Birds{{7'000'000'000}, {}}));
-  const auto event = ends.client->next(Clock::now() + seconds(5));
+  const auto event = ends.client->next(Deadline::after(Duration::from_ms(5000)));
   ASSERT_TRUE(event) << event.error().what;
   const auto birds = std::get<Birds>(**event);
   EXPECT_EQ(birds.acquired.ns, 7'000'000'000);
@@ -120,7 +117,7 @@ TEST(Wire, AClientThatDoesNotReadLosesWholeFramesOnly) {
   std::uint64_t last = 0;
   int frames = 0;
   for (;;) {
-    const auto event = ends.client->next(Clock::now() + std::chrono::milliseconds(500));
+    const auto event = ends.client->next(Deadline::after(Duration::from_ms(500)));
     ASSERT_TRUE(event) << event.error().what;
     if (!*event) break;
     const auto& got = std::get<VideoFrame>(**event);
@@ -269,7 +266,7 @@ TEST(Wire, WhatAnOlderApplianceDoesNotCountIsNought) {
 TEST(Wire, TheEndOfTheServerIsSeen) {
   Ends ends = connected();
   ends.server.reset();
-  EXPECT_EQ(ends.client->next(Clock::now() + seconds(5)).error().code, Errc::disconnected);
+  EXPECT_EQ(ends.client->next(Deadline::after(Duration::from_ms(5000))).error().code, Errc::disconnected);
 }
 
 TEST(Wire, APortInUseIsNamed) {
@@ -281,7 +278,7 @@ TEST(Wire, APortInUseIsNamed) {
 }
 
 TEST(Wire, NobodyThereIsAnErrorAtTheDeadline) {
-  const auto client = Client::connect("127.0.0.1", 1, Clock::now() + std::chrono::milliseconds(100));
+  const auto client = Client::connect("127.0.0.1", 1, Deadline::after(Duration::from_ms(100)));
   ASSERT_FALSE(client);
   EXPECT_NE(client.error().what.find("127.0.0.1:1"), std::string::npos);
 }

@@ -1,10 +1,9 @@
 // The workflow of the live window without a window: fed with events as an appliance sends them.
 #include <gtest/gtest.h>
 
-#include <thread>
-
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "calibration/points/point_error.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "host/window/live_script.hpp"
 #include "tests/support/live_operation.hpp"
@@ -91,7 +90,7 @@ TEST(LiveWorkflow, WhatIsTouchedBeforeTheMarkersAreFoundCounts) {
   EXPECT_FALSE(workflow.view().fre_mm.has_value());
   load(workflow);
   for (int i = 0; i < 1000 && !workflow.view().markers_seen; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    sleep_for(Duration::from_ms(10));
     workflow.tick();
   }
   ASSERT_TRUE(workflow.view().markers_seen.has_value());
@@ -255,7 +254,7 @@ TEST(LiveWorkflow, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
   ASSERT_EQ(workflow.view().touches.size(), 2U);
   EXPECT_EQ(birdseye::testing::contents_of(scratch / "operation.json"), kept);
   for (int i = 0; i < 1000 && !workflow.view().markers_seen; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    sleep_for(Duration::from_ms(10));
     workflow.tick();
   }
   EXPECT_EQ(workflow.view().fault, "");
@@ -387,7 +386,7 @@ TEST(LiveWorkflow, SaysWhatIsWrongWithThePatientsFiles) {
   wrong.patient.ct = scratch / "nothere";
   LiveWorkflow workflow(wrong);
   for (int i = 0; i < 1000 && workflow.view().fault.empty(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    sleep_for(Duration::from_ms(10));
     workflow.tick();
   }
   EXPECT_NE(workflow.view().fault.find("nothere"), std::string::npos);

@@ -4,15 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <thread>
+
+#include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "tests/support/slicer.hpp"
 
 namespace birdseye::host {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using birdseye::testing::Slicer;
-using std::chrono::milliseconds;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -47,12 +49,12 @@ DisplacementField shift(const Volume& ct) {
 void show(Publisher& publisher, const std::shared_ptr<const PatientPlan>& patient, const DisplacementField* field,
           std::uint64_t version, Slicer& until) {
   const int before = until.counts["IMAGE"];
-  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
   bool came = false;
   std::jthread feeding([&](const std::stop_token& stop) {
-    while (!stop.stop_requested() && Clock::now() < deadline) {
+    while (!stop.stop_requested() && !deadline.passed()) {
       publisher.show(patient, field, version);
-      std::this_thread::sleep_for(milliseconds(5));
+      sleep_for(Duration::from_ms(5));
     }
   });
   came = until.receive("IMAGE", before + 1);
@@ -80,16 +82,13 @@ TEST(Publisher, TheCtLiesInSlicersWorldWhereItLiesInThePatient) {
 TEST(Publisher, TransformsTakeSlicersPatientToTrackerAndCamera) {
   auto publisher = *Publisher::listen("0");
   Slicer slicer(publisher->port());
-  const auto wall_s = [] {
-    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  };
   publisher->tell("");
   ASSERT_TRUE(slicer.receive("STATUS", 1)) << "it is told when it is let in";
   for (int i = 1; i <= 20; ++i) {
     publisher->show(frame());
     ASSERT_TRUE(slicer.receive("TRANSFORM", 2 * i));
   }
-  EXPECT_NEAR(slicer.stamp_s, wall_s(), 1);
+  EXPECT_NEAR(slicer.stamp_s, (host_now() + wall_minus_monotonic() - HostTime{}).seconds(), 1);
   ASSERT_TRUE(slicer.transforms.contains("PatientToTracker") && slicer.transforms.contains("PatientToCamera"));
   const Eigen::Vector3d lps(12, -7, 150);
   const Eigen::Vector3d ras(-12, 7, 150);

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
-#include <thread>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/operation/calibration_step.hpp"
 #include "host/operation/connection_step.hpp"
 #include "host/operation/deformation_step.hpp"
@@ -73,7 +73,7 @@ TEST(CalibrationStep, GuidesOnlyOverABoard) {
   EXPECT_TRUE(step.guiding());
   step.end();
   for (int i = 0; i < 1000 && step.guiding(); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    sleep_for(Duration::from_ms(10));
     EXPECT_FALSE(step.tick()) << "no station, no calibration";
   }
   EXPECT_FALSE(step.guiding());
@@ -195,7 +195,7 @@ TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
   EXPECT_EQ(step.note().line, "matching");
   EXPECT_FALSE(step.forget()) << "there was none before";
   EXPECT_EQ(step.note().line, "");
-  for (int i = 0; i < 2000 && step.running(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (int i = 0; i < 2000 && step.running(); ++i) sleep_for(Duration::from_ms(10));
   ASSERT_FALSE(step.running());
   EXPECT_FALSE(step.tick()) << "what is forgotten is not found";
   EXPECT_EQ(step.found(), nullptr);

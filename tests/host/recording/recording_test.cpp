@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "drivers/system/clock.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
 #include "tests/support/scratch.hpp"
@@ -12,7 +13,6 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 using testing::contents_of;
 using testing::Scratch;
 
@@ -98,7 +98,7 @@ Played play(const fs::path& path, const RecordingReader::Settings& settings = {}
     return played;
   }
   for (;;) {
-    auto event = (*reader)->next(Clock::now() + std::chrono::seconds(5));
+    auto event = (*reader)->next(Deadline::after(Duration::from_ms(5000)));
     if (!event) {
       played.ending = event.error();
       played.notes = (*reader)->notes();
@@ -264,7 +264,7 @@ TEST(Recording, AtItsPaceAnEventWaitsForItsTime) {
   record(scratch / "r", session(50));  // two seconds
   const auto reader = RecordingReader::open(scratch / "r", {.speed = 1e-3});
   ASSERT_TRUE(reader);
-  const auto now = Clock::now();
+  const auto now = host_now();
   int events = 0;
   for (int i = 0; i < 100; ++i) {
     const auto event = (*reader)->next(now);

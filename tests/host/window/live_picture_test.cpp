@@ -5,6 +5,7 @@
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/live_panels.hpp"
@@ -333,13 +334,13 @@ TEST_F(LiveWindowTest, WhatStaysOnTheScreenTooLongIsCovered) {
     EXPECT_NEAR(red_at(kSide - 1, 10), side, 2);
   };
   draw(std::nullopt);
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  sleep_for(Duration::from_ms(300));
   look(23, 23);  // what is not to be believed at all is not covered: it says so itself
   EXPECT_EQ(window.stood_still(), 0);
   for (int times = 1; times <= 3; ++times) {
     draw(host_now() + Duration::from_ms(100));
     // This thread stands still, and a screen shows for ever what was drawn last.
-    std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    sleep_for(Duration::from_ms(600));
     EXPECT_EQ(window.stood_still(), times);
     look(200, 23);
     draw(std::nullopt);
