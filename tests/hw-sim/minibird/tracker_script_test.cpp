@@ -7,6 +7,7 @@
 
 #include "calibration/base/units.hpp"
 #include "hw-sim/minibird/motion.hpp"
+#include "tests/hw-sim/minibird/unit_bytes.hpp"
 
 namespace birdseye::hw_sim {
 namespace {
@@ -48,14 +49,9 @@ class Bench {
 
 const Bytes kStream{0x5A, 0x46, 0x40};  // position/matrix, run, stream
 
-/// As the reference has it, and by nothing of ours.
-double word_at(const Bytes& record, std::size_t index) {
-  const unsigned word = (record[2 * index] & 0x7FU) << 2U | (record[2 * index + 1] & 0x7FU) << 9U;
-  return static_cast<std::int16_t>(word);
-}
 Eigen::Vector3d position_of(const Bytes& record) {
   constexpr double kMm = 914.4 / 32768;
-  return {kMm * word_at(record, 0), kMm * word_at(record, 1), kMm * word_at(record, 2)};
+  return {kMm * signed_word_at(record, 0), kMm * signed_word_at(record, 1), kMm * signed_word_at(record, 2)};
 }
 
 /// When a record says that it was measured, s after the start and modulo the circle's 2 s.
@@ -82,7 +78,7 @@ TEST(TrackerScript, RecordsSayWhereTheBirdWasAndComeByTheDelayAndTheWire) {
     EXPECT_NEAR((position_of(delivery.bytes) - Eigen::Vector3d(400, 0, 0)).norm(), 200, 0.2);
     // 24 bytes of 10 bits at 115200 baud are 2.083 ms; the position's counts tell the time to 0.2 ms.
     EXPECT_NEAR(latency_ms(delivery), 7.5 + 2.083, 0.4);
-    const double turn = std::atan2(word_at(delivery.bytes, 6), word_at(delivery.bytes, 3));  // R21, R11
+    const double turn = std::atan2(signed_word_at(delivery.bytes, 6), signed_word_at(delivery.bytes, 3));  // R21, R11
     EXPECT_NEAR(std::remainder(turn - std::numbers::pi * time_told(delivery.bytes), 2 * std::numbers::pi), 0, 0.002);
   }
 }
@@ -366,7 +362,7 @@ TEST(TrackerFaults, OrientationGoesAndASaturatedSensorSaysSo) {
     const Parts zero = parts_of(fault(kind, 1, 0.5));
     expect_heals(zero);
     for (const Delivery& delivery : zero.during) {
-      for (std::size_t i = 3; i < 12; ++i) EXPECT_EQ(word_at(delivery.bytes, i), 0);
+      for (std::size_t i = 3; i < 12; ++i) EXPECT_EQ(signed_word_at(delivery.bytes, i), 0);
     }
   }
   TrackerSettings settings;

@@ -5,6 +5,7 @@
 
 #include "calibration/base/units.hpp"
 #include "hw-sim/minibird/unit.hpp"
+#include "tests/hw-sim/minibird/unit_bytes.hpp"
 
 namespace birdseye::hw_sim {
 namespace {
@@ -12,15 +13,6 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 const Bytes kT05{0xE3, 0x11, 0x55, 0x76, 0x2A, 0x05, 0x00, 0x10, 0x2A, 0x75, 0x00, 0x20};
-
-Bytes send(Unit& unit, const Bytes& bytes) {
-  Bytes reply;
-  for (const std::uint8_t byte : bytes) {
-    const Bytes part = unit.receive(byte);
-    reply.insert(reply.end(), part.begin(), part.end());
-  }
-  return reply;
-}
 
 BirdPose pose_of(double x_in, double y_in, double z_in, double azimuth, double elevation, double roll) {
   const Eigen::Matrix3d rotation = (Eigen::AngleAxisd(azimuth * kRadPerDeg, Eigen::Vector3d::UnitZ()) *
@@ -44,12 +36,6 @@ Unit of_revision(std::uint8_t minor) {
   UnitSettings settings;
   settings.revision_minor = minor;
   return Unit(settings);
-}
-
-/// The word that a record has at a place, by the rule of the reference and nothing of ours.
-int signed_word_at(const Bytes& record, std::size_t index) {
-  const unsigned word = (record[2 * index] & 0x7FU) << 2U | (record[2 * index + 1] & 0x7FU) << 9U;
-  return static_cast<std::int16_t>(word);
 }
 
 TEST(Protocol, T13PointInPositionAngles) {

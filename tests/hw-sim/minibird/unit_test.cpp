@@ -7,20 +7,12 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "tests/hw-sim/minibird/unit_bytes.hpp"
 
 namespace birdseye::hw_sim {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
-
-Bytes send(Unit& unit, const Bytes& bytes) {
-  Bytes reply;
-  for (const std::uint8_t byte : bytes) {
-    const Bytes part = unit.receive(byte);
-    reply.insert(reply.end(), part.begin(), part.end());
-  }
-  return reply;
-}
 
 /// R = Rz(azimuth) Ry(elevation) Rx(roll), degrees.
 Eigen::Matrix3d pose_of_angles(double azimuth, double elevation, double roll) {
