@@ -159,4 +159,9 @@ CameraModel barrel_camera() {
   return camera;
 }
 
+const BoardPainter& barrel_painter() {
+  static const BoardPainter one(barrel_camera());
+  return one;
+}
+
 }  // namespace birdseye::testing

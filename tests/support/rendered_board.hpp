@@ -58,5 +58,7 @@ Transform<Camera, Marker> held(const calibration::Pattern& pattern, const Eigen:
 
 /// A wide lens of the laparoscope's kind.
 CameraModel barrel_camera();
+/// Pictures as it takes them.
+const BoardPainter& barrel_painter();
 
 }  // namespace birdseye::testing

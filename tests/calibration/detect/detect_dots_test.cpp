@@ -13,9 +13,12 @@
 
 #include "calibration/detect/detect.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "tests/support/grey_view.hpp"
 
 namespace birdseye::calibration {
 namespace {
+
+using testing::view_of;
 
 constexpr const char* kSymmetric = "dots:11x9:4mm";
 constexpr const char* kAsymmetric = "dots:4x11:5mm:asymmetric";
@@ -31,10 +34,6 @@ const CameraModel kCamera{.width_px = 800,
                           .k2 = 0.08,
                           .p1 = 0.001,
                           .p2 = -0.0008};
-
-GreyView view_of(const cv::Mat& grey) {
-  return {{grey.data, grey.total()}, grey.cols, grey.rows};
-}
 
 /// How a grid is drawn and seen.
 struct Scene {

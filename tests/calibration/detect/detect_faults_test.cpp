@@ -4,27 +4,19 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/detect/detect.hpp"
+#include "tests/support/grey_view.hpp"
 #include "tests/support/rendered_board.hpp"
 
 namespace birdseye::calibration {
 namespace {
 
-using testing::barrel_camera;
-using testing::BoardPainter;
+using testing::barrel_painter;
 using testing::held;
 using testing::Shot;
+using testing::view_of;
 
 constexpr const char* kChessboard = "chessboard:11x8:6mm";
 constexpr const char* kCharuco = "charuco:11x8:6mm:4.5mm:DICT_4X4_50";
-
-const BoardPainter& painter() {
-  static const BoardPainter one(barrel_camera());
-  return one;
-}
-
-GreyView view_of(const cv::Mat& grey) {
-  return {{grey.data, grey.total()}, grey.cols, grey.rows};
-}
 
 Pattern pattern_of(const char* spec) {
   return *parse_pattern(spec);
@@ -32,7 +24,7 @@ Pattern pattern_of(const char* spec) {
 
 cv::Mat picture_of(const char* spec, const Shot& shot = {}, const Eigen::Vector3d& middle_mm = {0, 0, 105}) {
   const Pattern pattern = pattern_of(spec);
-  return painter().paint(pattern, held(pattern, middle_mm, 15, 50, 8), shot);
+  return barrel_painter().paint(pattern, held(pattern, middle_mm, 15, 50, 8), shot);
 }
 
 /// OpenCV searches a large picture for ten seconds before it gives up.

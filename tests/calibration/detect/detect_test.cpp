@@ -9,13 +9,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "tests/support/data.hpp"
+#include "tests/support/grey_view.hpp"
 
 namespace birdseye::calibration {
 namespace {
 
-GreyView view_of(const cv::Mat& grey) {
-  return {{grey.data, grey.total()}, grey.cols, grey.rows};
-}
+using testing::view_of;
 
 TEST(Pattern, ReadsItsSpecsAndRefusesNonsense) {
   EXPECT_TRUE(parse_pattern("chessboard:14x10:0.3cm")->half_turn_ambiguous);

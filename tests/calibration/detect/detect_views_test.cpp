@@ -7,28 +7,21 @@
 #include <set>
 
 #include "calibration/detect/detect.hpp"
+#include "tests/support/grey_view.hpp"
 #include "tests/support/rendered_board.hpp"
 
 namespace birdseye::calibration {
 namespace {
 
 using testing::barrel_camera;
+using testing::barrel_painter;
 using testing::BoardArt;
-using testing::BoardPainter;
 using testing::held;
 using testing::Shot;
+using testing::view_of;
 
 constexpr double kRms_px = 0.1;
 constexpr double kMost_px = 0.4;
-
-const BoardPainter& painter() {
-  static const BoardPainter one(barrel_camera());
-  return one;
-}
-
-GreyView view_of(const cv::Mat& grey) {
-  return {{grey.data, grey.total()}, grey.cols, grey.rows};
-}
 
 struct Errors {
   double rms_px = 0, most_px = 0;
@@ -71,7 +64,7 @@ void expect_accurate(const std::string& spec, double least_share) {
     const auto pose = held(*pattern, hold.middle_mm, hold.tilt_deg, hold.axis_deg, hold.turn_deg);
     Shot shot;
     shot.seed = static_cast<unsigned>(i);
-    const Detection seen = detect(*pattern, view_of(painter().paint(*pattern, pose, shot)), "x");
+    const Detection seen = detect(*pattern, view_of(barrel_painter().paint(*pattern, pose, shot)), "x");
     EXPECT_TRUE(seen.view) << seen.rejected;
     if (!seen.view) continue;
     EXPECT_EQ(seen.view->name, "x");
@@ -105,8 +98,8 @@ TEST(DetectViews, OddRowsAreTheSameBoardInBothLayouts) {
   const auto now = parse_pattern("charuco:8x9:5mm:4mm:DICT_5X5_50");
   const auto then = parse_pattern("charuco:8x9:5mm:4mm:DICT_5X5_50:legacy");
   const auto pose = held(*now, {0, 0, 100}, 30, 45, 20);
-  const cv::Mat picture = painter().paint(*now, pose);
-  EXPECT_EQ(cv::norm(picture, painter().paint(*then, pose)), 0);
+  const cv::Mat picture = barrel_painter().paint(*now, pose);
+  EXPECT_EQ(cv::norm(picture, barrel_painter().paint(*then, pose)), 0);
   const Detection first = detect(*now, view_of(picture), "");
   const Detection second = detect(*then, view_of(picture), "");
   ASSERT_TRUE(first.view && second.view);
@@ -142,7 +135,7 @@ TEST(DetectViews, UpsideDownTheBoardsThatTellItKeepTheirNumbers) {
     EXPECT_FALSE(pattern->half_turn_ambiguous);
     for (const double turn_deg : {0.0, 180.0}) {
       const auto pose = held(*pattern, {0, 0, 105}, 20, 30, turn_deg);
-      const Detection seen = detect(*pattern, view_of(painter().paint(*pattern, pose)), "");
+      const Detection seen = detect(*pattern, view_of(barrel_painter().paint(*pattern, pose)), "");
       ASSERT_TRUE(seen.view) << spec << seen.rejected;
       const bool upright = seen.view->points_px.front().y() < seen.view->points_px.back().y();
       EXPECT_EQ(upright, turn_deg == 0);
@@ -156,7 +149,7 @@ TEST(DetectViews, AmbiguousBoardIsCountedUpright) {
   ASSERT_TRUE(pattern->half_turn_ambiguous);
   for (const double turn_deg : {10.0, 190.0}) {
     const auto pose = held(*pattern, {0, 0, 105}, 20, 30, turn_deg);
-    const Detection seen = detect(*pattern, view_of(painter().paint(*pattern, pose)), "");
+    const Detection seen = detect(*pattern, view_of(barrel_painter().paint(*pattern, pose)), "");
     ASSERT_TRUE(seen.view) << seen.rejected;
     const auto told = held(*pattern, {0, 0, 105}, 20, 30, 10);
     EXPECT_LT(errors_of(*seen.view, *pattern, told).most_px, kMost_px) << turn_deg;
@@ -167,7 +160,7 @@ TEST(DetectViews, PartOfACharucoBoardIsEnough) {
   const auto pattern = parse_pattern("charuco:20x14:6mm:4.5mm:DICT_4X4_250");
   ASSERT_TRUE(pattern);
   const auto pose = held(*pattern, {20, 15, 80}, 30, 70, 25);  // most of it lies outside
-  const Detection seen = detect(*pattern, view_of(painter().paint(*pattern, pose)), "");
+  const Detection seen = detect(*pattern, view_of(barrel_painter().paint(*pattern, pose)), "");
   ASSERT_TRUE(seen.view) << seen.rejected;
   EXPECT_GT(seen.points_seen, 30);
   EXPECT_LT(seen.points_seen, 0.9 * seen.points_of_pattern);
