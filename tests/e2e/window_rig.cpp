@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "host/volume/import.hpp"
@@ -77,18 +78,6 @@ void write_registered(const std::filesystem::path& folder, const std::string& ct
   std::filesystem::create_directories(folder);
   const auto written = host::write_operation(folder, operation);
   ASSERT_TRUE(written) << written.error().what;
-}
-
-int free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  EXPECT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&address), size), 0);
-  EXPECT_EQ(::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  ::close(fd);
-  return ntohs(address.sin_port);
 }
 
 bool listens(int port, Deadline deadline) {
@@ -201,7 +190,7 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
                        {"hu": 0, "rgb": [1, 0, 1], "extinction_per_mm": 5}]})");
   const std::string script =
       scratch.file("script.txt", "wait connect 30\nsleep 3\nkey 6\nkey space\nwait run 5\nsleep 3600\nend\n");
-  const int port = free_port();
+  const int port = *free_port();
   std::vector<std::string> words;
   std::istringstream in(fmt::format(
       "{} {}/birdseye live --server 127.0.0.1:{} --ct {} --fiducials {} --fiducial-count 4 --transfer {} --resume {} "

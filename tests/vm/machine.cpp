@@ -1,6 +1,5 @@
 #include "tests/vm/machine.hpp"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -11,6 +10,7 @@
 #include <array>
 #include <cstdio>
 
+#include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
 
 namespace birdseye::vm {
@@ -18,18 +18,6 @@ namespace birdseye::vm {
 namespace {
 
 constexpr Duration kBootPatience = Duration::from_ms(60'000);
-
-int free_port() {
-  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  const bool bound = ::bind(fd, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
-                     ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) == 0;
-  ::close(fd);
-  return bound ? ntohs(address.sin_port) : 0;
-}
 
 /// -1 while nobody listens.
 int connect_to(const std::filesystem::path& path) {
@@ -71,7 +59,7 @@ std::vector<std::string> qemu_command(const std::filesystem::path& out, int port
 
 }  // namespace
 
-Machine::Machine(const std::filesystem::path& out) : out_(out), port_(free_port()) {
+Machine::Machine(const std::filesystem::path& out) : out_(out), port_(*free_port()) {
   std::filesystem::remove_all(out_);
   std::filesystem::create_directories(out_);
   qemu_ = std::make_unique<Process>(qemu_command(out_, port_), out_ / "qemu.log");
