@@ -6,19 +6,14 @@
 
 #include "calibration/points/point_fit.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/points_file.hpp"
 
 namespace birdseye::calibration {
 namespace {
 
-using Points = std::vector<Eigen::Vector3d>;
+using testing::read_points;
 
-Points read_points(const std::filesystem::path& path) {
-  std::ifstream in(path);
-  Points points;
-  Eigen::Vector3d p;
-  while (in >> p.x() >> p.y() >> p.z()) points.push_back(p);
-  return points;
-}
+using Points = std::vector<Eigen::Vector3d>;
 
 TEST(PointFit, RecoversARigidMoveAndItsLeaveOneOutIsNotItsResidual) {
   const Points from{{0, 0, 0}, {100, 0, 0}, {0, 80, 0}, {20, 30, 60}, {-40, 10, 90}};

@@ -12,20 +12,15 @@
 #include "host/registration/rigid/surface.hpp"
 #include "host/registration/rigid/surface_refinement.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/points_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
 namespace {
 
-using Points = std::vector<Eigen::Vector3d>;
+using testing::read_points;
 
-Points read_points(const std::filesystem::path& path) {
-  std::ifstream in(path);
-  Points points;
-  Eigen::Vector3d p;
-  while (in >> p.x() >> p.y() >> p.z()) points.push_back(p);
-  return points;
-}
+using Points = std::vector<Eigen::Vector3d>;
 
 /// A lumpy body, 240 x 160 x 200 mm: no move but rest leaves it where it is.
 Eigen::Vector3d on_body(double azimuth, double height) {
