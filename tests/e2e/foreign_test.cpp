@@ -8,6 +8,7 @@
 #include "tests/support/command.hpp"
 #include "tests/support/display.hpp"
 #include "tests/support/foreign_server.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 
 using testing::ForeignServer;
 using ::testing::HasSubstr;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 
@@ -27,7 +29,7 @@ TEST(ForeignCommands, RecordKeepsItsVideoAndPoses) {
                                           " --json " + (scratch / "r.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
   EXPECT_THAT(result.output, HasSubstr("no appliance of Birdseye; passed over: STRING"));
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_EQ(json["verdict"], "pass") << json;
   EXPECT_GT(json["frames"].get<int>(), 0);
   EXPECT_GT(json["poses"]["scope"].get<int>(), 10);
@@ -53,7 +55,7 @@ TEST(ForeignCommands, LiveGoesOnOnlyOnceTheScopeIsNamed) {
                                         "--scope-device which are the scope's"));
   const auto named = run("birdseye", common + " --scope-device ProbeToTracker", display.env());
   ASSERT_EQ(named.code, 0) << named.output;
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "live.json"));
+  const nlohmann::json json = read_json(scratch / "live.json");
   EXPECT_GT(json["frames"].get<int>(), 10);
 }
 

@@ -1,13 +1,13 @@
 // `calibrate latency` over the simulated cart, and from files, from the outside.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/latency_streams.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -16,12 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
-
-nlohmann::json read(const fs::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
 
 /// t,x,y,z,qx,qy,qz,qw
 std::string csv_of(const calibration::simulated::Rotations& rows) {
@@ -48,7 +45,7 @@ TEST(LatencyCommand, OfTwoFilesOfPosesAndWhatItRefuses) {
                               (scratch / "l.html").string() + " --out " + (scratch / "l.toml").string();
   const auto found = run("birdseye", "calibrate latency --poses " + a + " --eye-poses " + b + results);
   ASSERT_EQ(found.code, 0) << found.output;
-  const nlohmann::json json = read(scratch / "l.json");
+  const nlohmann::json json = read_json(scratch / "l.json");
   EXPECT_EQ(json["verdict"], "pass");
   EXPECT_NEAR(json["offset_ms"].get<double>(), 40, 1);
   EXPECT_LE(json["offset_ci95_ms"][0].get<double>(), 40);
@@ -67,7 +64,7 @@ TEST(LatencyCommand, OfTwoFilesOfPosesAndWhatItRefuses) {
   EXPECT_EQ(failed.code, 3);
   EXPECT_NE(failed.output.find("the eye poses hardly moves"), std::string::npos) << failed.output;
   EXPECT_NE(failed.output.find("to and fro"), std::string::npos) << failed.output;
-  EXPECT_TRUE(read(scratch / "l.json")["offset_ms"].is_null());
+  EXPECT_TRUE(read_json(scratch / "l.json")["offset_ms"].is_null());
   EXPECT_FALSE(fs::exists(scratch / "l.toml"));
 
   StreamSettings later = eye;
@@ -106,7 +103,7 @@ TEST(LatencyCommand, OfTheSimulatedCart) {
                                            .camera = "delay_ms = 0\n"},
                                           kMeasure);
   ASSERT_EQ(found.code, 0) << found.output;
-  const nlohmann::json json = read(scratch / "l.json");
+  const nlohmann::json json = read_json(scratch / "l.json");
   // What a program needs to be woken is part of what birdseyed sees as delay: some 0.1 ms.
   EXPECT_NEAR(json["offset_ms"].get<double>(), 83, 1);
   EXPECT_LE(json["offset_ci95_ms"][0].get<double>(), 83.2);

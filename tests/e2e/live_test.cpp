@@ -1,17 +1,18 @@
 // `birdseye live` over the simulated cart, from the first connection to the registered overlay, by a script alone.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/command.hpp"
 #include "tests/support/display.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
 namespace {
 
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 
@@ -33,7 +34,7 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
                               (scratch / "live.json").string(),
                           display.env());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "live.json"));
+  const nlohmann::json json = read_json(scratch / "live.json");
   EXPECT_NE(json["verdict"], "fail") << json;
   // The liver has moved by 8 mm since the CT; five views of one side of it bring the tumour most of the way back.
   const auto before_mm = json["target_error_before_deforming_mm_p50"].get<double>();
@@ -52,7 +53,7 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
   nlohmann::json sheet;
   for (int i = 1; i <= 6 && folder.empty(); ++i) {
     const std::string one = out + "/snapshot-00" + std::to_string(i);
-    sheet = nlohmann::json::parse(std::ifstream(one + "/snapshot.json"));
+    sheet = read_json(one + "/snapshot.json");
     if (sheet["overlaid"].get<bool>()) folder = one;
   }
   ASSERT_FALSE(folder.empty()) << "none of six snapshots bears an overlay: " << sheet;

@@ -1,7 +1,6 @@
 // `birdseye record` of the simulated cart, from the outside.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/clock.hpp"
@@ -9,14 +8,15 @@
 #include "host/recording/recording_reader.hpp"
 #include "tests/support/cart_script.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::contents_of;
 using testing::expect_refused;
+using testing::read_json;
 using testing::Scratch;
 
 /// Records three times at once: for four seconds, until Ctrl-C, until the appliance goes.
@@ -66,7 +66,7 @@ TEST(RecordCommand, OfTheSimulatedCart) {
                            "the appliance has gone"})
     EXPECT_NE(found.output.find(line), std::string::npos) << line << "\n" << found.output;
 
-  const auto json = nlohmann::json::parse(contents_of(scratch / "timed.json"));
+  const auto json = read_json(scratch / "timed.json");
   EXPECT_GE(json["seconds"], 3.9);
   EXPECT_GT(json["frames"], 50);
   EXPECT_GT(json["measurements"], 200);
@@ -74,7 +74,7 @@ TEST(RecordCommand, OfTheSimulatedCart) {
   EXPECT_EQ(timed.frames, json["frames"].get<std::size_t>()) << timed.ending;
   EXPECT_EQ(timed.birds, json["measurements"].get<std::size_t>());
   EXPECT_GT(timed.posed, timed.frames / 2);
-  const auto sheet = nlohmann::json::parse(contents_of(scratch / "timed/recording.json"));
+  const auto sheet = read_json(scratch / "timed/recording.json");
   EXPECT_EQ(sheet["why"], "4 s are over");
   EXPECT_EQ(sheet["instruments"][0]["identity"]["bird1_unit_serial"], "1001") << sheet["instruments"];
   // What calibrations read, and Slicer and PLUS open.
@@ -88,7 +88,7 @@ TEST(RecordCommand, OfTheSimulatedCart) {
   for (const char* name : {"film", "gone"}) {
     const Played played = play(scratch / name);
     EXPECT_GE(played.frames, timed.frames) << name << played.ending;
-    EXPECT_EQ(nlohmann::json::parse(contents_of(scratch / name / "recording.json"))["frames"], played.frames);
+    EXPECT_EQ(read_json(scratch / name / "recording.json")["frames"], played.frames);
   }
 }
 

@@ -9,6 +9,7 @@
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/drawn_scope.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -18,13 +19,10 @@ namespace fs = std::filesystem;
 using testing::BoardScene;
 using testing::expect_refused;
 using testing::hd_lens;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_lens;
-
-nlohmann::json read_camera_json(const fs::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
 
 /// Views as a folder of points.
 std::string write_points(const Scratch& scratch, const std::string& name,
@@ -57,7 +55,7 @@ TEST(CalibrateCameraCommand, WritesCameraFiguresAndPage) {
                           (scratch / "c.yaml").string() + " --json " + (scratch / "c.json").string() + " --report " +
                           (scratch / "c.html").string());
   ASSERT_EQ(done.code, 0) << done.output;
-  const nlohmann::json json = read_camera_json(scratch / "c.json");
+  const nlohmann::json json = read_json(scratch / "c.json");
   EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
   EXPECT_EQ(json["model"], "radial1");
   EXPECT_EQ(json["image_width_px"], 1920);
@@ -86,7 +84,7 @@ TEST(CalibrateCameraCommand, ThePublishedWebcam) {
   const auto done = run("birdseye", "calibrate camera --points " + (*data / "camera_chessboard_webcam").string() +
                                         " --model radial3_tangential2 --plain --json " + (scratch / "c.json").string());
   ASSERT_EQ(done.code, 0) << done.output;
-  const nlohmann::json json = read_camera_json(scratch / "c.json");
+  const nlohmann::json json = read_json(scratch / "c.json");
   EXPECT_LE(json["rms_px"].get<double>(), 1.4114);
   EXPECT_EQ(json["image_height_px"], 480);  // from the pictures beside the points
   EXPECT_NEAR(json["camera_matrix"][1][1].get<double>(), 606.134214, 1e-5);
@@ -109,7 +107,7 @@ TEST(CalibrateCameraCommand, TwoCameras) {
                              (scratch / "rl.txt").string() + " --json " + (scratch / "c.json").string();
   const auto done = run("birdseye", common + " --right-points " + write_points(scratch, "right", right));
   ASSERT_EQ(done.code, 0) << done.output;
-  const nlohmann::json json = read_camera_json(scratch / "c.json");
+  const nlohmann::json json = read_json(scratch / "c.json");
   EXPECT_NEAR(json["stereo"]["baseline_mm"].get<double>(), right_from_left.translation().norm(), 0.1);
   EXPECT_NEAR(json["stereo"]["right_from_left"][0][3].get<double>(), -4.4, 0.1);
   EXPECT_LT(json["stereo"]["epipolar_rms_px"].get<double>(), 0.4);
@@ -137,7 +135,7 @@ TEST(CalibrateCameraCommand, LeftAndRightPicturesPairByName) {
                               (scratch / "c.json").string();
   const auto done = run("birdseye", command);
   ASSERT_EQ(done.code, 0) << done.output;
-  const nlohmann::json json = read_camera_json(scratch / "c.json");
+  const nlohmann::json json = read_json(scratch / "c.json");
   EXPECT_EQ(json["stereo"]["pairs_used"], 9);
   EXPECT_NEAR(json["stereo"]["baseline_mm"].get<double>(), right_from_left.translation().norm(), 0.15);
   ASSERT_EQ(json["views_rejected"].size(), 1U);
@@ -156,7 +154,7 @@ TEST(CalibrateCameraCommand, WhatIsReadableAndNotWorthALensFails) {
       run("birdseye", "calibrate camera --size 1920x1080 --points " + write_points(scratch, "p", views) + " --out " +
                           (scratch / "c.yaml").string() + " --json " + (scratch / "c.json").string());
   EXPECT_EQ(done.code, 3) << done.output;
-  const nlohmann::json json = read_camera_json(scratch / "c.json");
+  const nlohmann::json json = read_json(scratch / "c.json");
   EXPECT_EQ(json["verdict"], "fail");
   EXPECT_NE(json["reasons"][0].get<std::string>().find("2 usable views"), std::string::npos);
   EXPECT_FALSE(json["next_steps"].empty());

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "calibration/geometry/rod.hpp"
@@ -11,6 +10,7 @@
 #include "tests/support/data.hpp"
 #include "tests/support/drawn_scope.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -21,13 +21,10 @@ using testing::BoardPainter;
 using testing::DrawnScope;
 using testing::expect_refused;
 using ::testing::HasSubstr;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_lens;
-
-nlohmann::json read(const std::filesystem::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
 
 template <typename To, typename From>
 void expect_near(const nlohmann::json& rows, const Transform<To, From>& truth, double mm, double deg) {
@@ -83,7 +80,7 @@ TEST(CalibrateHandEyeCommand, ASecondCameraIsUsedWithItsLens) {
   const DrawnStereo drawn;
   const auto done = run("birdseye", drawn.pictures + drawn.lenses("relation.txt") + drawn.results);
   ASSERT_EQ(done.code, 0) << done.output;
-  const auto json = read(drawn.scratch / "x.json");
+  const auto json = read_json(drawn.scratch / "x.json");
   expect_near(json["camera_from_sensor"], kCameraFromSensor, 0.5, 0.1);
   expect_near(json["right"]["camera_from_sensor"], kRightFromLeft * kCameraFromSensor, 0.5, 0.1);
   EXPECT_NEAR(json["right"]["baseline_mm"].get<double>(), kRightFromLeft.translation().norm(), 1e-9);
@@ -98,7 +95,7 @@ TEST(CalibrateHandEyeCommand, BothLensesMayComeFromThePicturesThemselves) {
   const DrawnStereo drawn;
   const auto done = run("birdseye", drawn.pictures + drawn.results);
   ASSERT_EQ(done.code, 0) << done.output;
-  const auto json = read(drawn.scratch / "x.json");
+  const auto json = read_json(drawn.scratch / "x.json");
   expect_near(json["camera_from_sensor"], kCameraFromSensor, 2, 0.4);
   EXPECT_NEAR(json["right"]["baseline_mm"].get<double>(), kRightFromLeft.translation().norm(), 0.2);
 }
@@ -174,7 +171,7 @@ TEST(CalibrateHandEyeCommand, ARodTurnedByKnownAnglesGivesItsAxis) {
   const auto done = run("birdseye", drawn.command + drawn.angles(20, 110) + " --record " + record + " --report " +
                                         (drawn.scratch / "x.html").string());
   ASSERT_EQ(done.code, 0) << done.output;
-  const auto json = read(drawn.scratch / "x.json");
+  const auto json = read_json(drawn.scratch / "x.json");
   EXPECT_EQ(json["rod"]["reference_angle_deg"], 20);
   EXPECT_EQ(json["rod"]["picture_turn"], 1);
   EXPECT_EQ(json["rod"]["angles"].size(), 2U);
@@ -219,7 +216,7 @@ TEST(CalibrateHandEyeCommand, PairsTwoStreamsOfPoses) {
                           stem + "target_ir.csv --out " + (scratch / "x.txt").string() + " --json " +
                           (scratch / "x.json").string() + " --report " + (scratch / "x.html").string());
   ASSERT_EQ(done.code, 0) << done.output;
-  const auto json = nlohmann::json::parse(std::ifstream(scratch / "x.json"));
+  const auto json = read_json(scratch / "x.json");
   EXPECT_NEAR(json["clock_offset_ms"].get<double>(), -15, 3);
   EXPECT_EQ(json["camera_from_sensor"].size(), 4U);
   EXPECT_GT(std::filesystem::file_size(scratch / "x.html"), 10'000U);

@@ -8,6 +8,7 @@
 
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/simulated_pointer.hpp"
 
@@ -18,12 +19,9 @@ namespace fs = std::filesystem;
 using calibration::PivotPose;
 using calibration::SimulatedPointer;
 using testing::contents_of;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
-
-nlohmann::json read_tip_json(const fs::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
 
 Eigen::Vector3d vector_of(const nlohmann::json& json) {
   const auto v = json.get<std::vector<double>>();
@@ -58,7 +56,7 @@ TEST(CalibrateTip, FindsTheTipAndNamesWhatIsWrong) {
   const std::string text = csv_of(poses) + "100,-3.697314E28,0,0,0,0,0,1\n101,missing\n102,nan,0,0,0,0,0,1\n";
   const auto result = run("birdseye", command(scratch, scratch.file("p.csv", text)));
   ASSERT_EQ(result.code, 0) << result.output;
-  const auto json = read_tip_json(scratch / "tip.json");
+  const auto json = read_json(scratch / "tip.json");
   EXPECT_EQ(json["verdict"], "pass") << result.output;
   EXPECT_LT((vector_of(json["tip_in_sensor_mm"]) - pointer.tip_mm).norm(), 0.5);
   EXPECT_LT((vector_of(json["pivot_in_tracker_mm"]) - pointer.pivot_mm).norm(), 0.5);
@@ -97,11 +95,11 @@ TEST(CalibrateTip, MetresAndAnotherOrderGiveTheSameTip) {
   SimulatedPointer pointer{.position_noise_mm = 0.2};
   auto poses = pointer.poses(60);
   ASSERT_EQ(run("birdseye", command(scratch, scratch.file("p.csv", csv_of(poses)))).code, 0);
-  const auto tip = vector_of(read_tip_json(scratch / "tip.json")["tip_in_sensor_mm"]);
+  const auto tip = vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]);
   std::shuffle(poses.begin(), poses.end(), pointer.random);
   const std::string metres = scratch.file("m.csv", csv_of(poses, 1e-3));
   ASSERT_EQ(run("birdseye", command(scratch, metres) + " --unit m").code, 0);
-  EXPECT_LT((vector_of(read_tip_json(scratch / "tip.json")["tip_in_sensor_mm"]) - tip).norm(), 1e-9);
+  EXPECT_LT((vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]) - tip).norm(), 1e-9);
   fs::remove(scratch / "tip.txt");
   const auto unscaled = run("birdseye", command(scratch, metres));
   EXPECT_EQ(unscaled.code, 3) << unscaled.output;
@@ -123,7 +121,7 @@ TEST(CalibrateTip, ASpinGivesTheShaft) {
   const std::string common = command(scratch, pivot) + " --spin ";
   const auto result = run("birdseye", common + scratch.file("s.csv", csv_of(spun)));
   ASSERT_EQ(result.code, 0) << result.output;
-  const auto found = read_tip_json(scratch / "tip.json")["axis"];
+  const auto found = read_json(scratch / "tip.json")["axis"];
   EXPECT_LT(std::acos(vector_of(found["axis_in_sensor"]).dot(axis)) * kDegPerRad,
             std::max(0.3, 4 * found["sigma_deg"].get<double>()));
   EXPECT_NE(contents_of(scratch / "tip.txt").find("# its shaft"), std::string::npos);
@@ -145,7 +143,7 @@ TEST(CalibrateTip, PosesNotWorthATipFailWithAJson) {
     const auto result = run("birdseye", command(scratch, scratch.file("p.csv", csv_of(poses))));
     EXPECT_EQ(result.code, 3) << result.output;
     EXPECT_NE(result.output.find(words), std::string::npos) << result.output;
-    EXPECT_EQ(read_tip_json(scratch / "tip.json")["verdict"], "fail");
+    EXPECT_EQ(read_json(scratch / "tip.json")["verdict"], "fail");
     EXPECT_NE(contents_of(scratch / "tip.html").find("class='verdict fail'"), std::string::npos);
     EXPECT_FALSE(fs::exists(scratch / "tip.txt"));
   }
@@ -175,7 +173,7 @@ TEST(CalibrateTip, RealRecordingsHaveTheirPublishedAnswers) {
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
   const Scratch scratch;
   ASSERT_EQ(run("birdseye", command(scratch, (*data / "pivot_optical_pointer").string())).code, 0);
-  const auto optical = read_tip_json(scratch / "tip.json");
+  const auto optical = read_json(scratch / "tip.json");
   EXPECT_LT((vector_of(optical["algebraic"]["tip_in_sensor_mm"]) - Eigen::Vector3d(-14.473, 394.634, -7.407))
                 .cwiseAbs()
                 .maxCoeff(),
@@ -191,7 +189,7 @@ TEST(CalibrateTip, RealRecordingsHaveTheirPublishedAnswers) {
                       " --transform StylusToTracker --reference ReferenceToTracker"
                       " --phases 77-162,172-253,275-352,361-456,530-612,624-715,725-819,831-929");
   ASSERT_EQ(joint.code, 0) << joint.output;
-  const auto em = read_tip_json(scratch / "tip.json");
+  const auto em = read_json(scratch / "tip.json");
   EXPECT_LT(
       (vector_of(em["algebraic"]["tip_in_sensor_mm"]) - Eigen::Vector3d(109.62, 6.56, 2.78)).cwiseAbs().maxCoeff(),
       0.006);
@@ -201,7 +199,7 @@ TEST(CalibrateTip, RealRecordingsHaveTheirPublishedAnswers) {
   const auto probe = run("birdseye", command(scratch, (sequences / "TransformInterpolationTest.igs.mha").string()) +
                                          " --transform ProbeToTracker");
   EXPECT_EQ(probe.code, 3) << probe.output;
-  const auto named = read_tip_json(scratch / "tip.json");
+  const auto named = read_json(scratch / "tip.json");
   ASSERT_EQ(named["rejected"].size(), 1U);
   EXPECT_EQ(named["rejected"][0]["name"], "frame 7");
   EXPECT_EQ(named["rejected"][0]["reason"], "INVALID");

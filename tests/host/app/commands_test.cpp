@@ -7,6 +7,7 @@
 
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -15,6 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_ct;
@@ -26,7 +28,7 @@ TEST(Commands, VolumeInfoWritesItsFigures) {
   const std::string json_path = (scratch / "info.json").string();
   const auto result = run("birdseye", "volume info " + small_ct(scratch) + " --json " + json_path);
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(json_path));
+  const nlohmann::json json = read_json(json_path);
   EXPECT_EQ(json["size"], nlohmann::json({20, 20, 20}));
   EXPECT_EQ(json["hu_min"], -1000);
   EXPECT_EQ(json["hu_max"], 200);
@@ -56,7 +58,7 @@ TEST(Commands, RegisterFiducialsOnThePelvisPhantom) {
         run("birdseye", "register fiducials --ct " + (folder / ct).string() + " --tracker " + tracker + " --out " +
                             (scratch / "m.txt").string() + " --json " + (scratch / "m.json").string());
     ASSERT_EQ(result.code, 0) << result.output;
-    const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "m.json"));
+    const nlohmann::json json = read_json(scratch / "m.json");
     EXPECT_NEAR(json["fre_rms_mm"].get<double>(), fre, 5e-5);
     EXPECT_EQ(json["residuals_mm"].size(), 4U);
     EXPECT_EQ(json["leave_one_out_mm"].size(), 4U);
@@ -119,7 +121,7 @@ TEST(Commands, BenchRenderWritesItsTable) {
   const auto result = run("birdseye", "bench render --phantom liver --level 0 --level 2 --frames 3 --json " +
                                           (scratch / "b.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "b.json"));
+  const nlohmann::json json = read_json(scratch / "b.json");
   ASSERT_EQ(json["rows"].size(), 8U);  // two depths, two levels, with and without pruning
   for (const auto& row : json["rows"]) {
     EXPECT_EQ(row["viewport"], "768x576");
@@ -136,7 +138,7 @@ TEST(Commands, BenchSimilarityAgreesWithOpenCv) {
   const Scratch scratch;
   const auto result = run("birdseye", "bench similarity --rounds 1 --json " + (scratch / "s.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "s.json"));
+  const nlohmann::json json = read_json(scratch / "s.json");
   ASSERT_EQ(json["rows"].size(), 7U);
   for (const auto& row : json["rows"]) {
     EXPECT_EQ(row["viewport"], "768x576");

@@ -6,6 +6,7 @@
 #include "host/deform/transform_file.hpp"
 #include "host/volume/import.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -14,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using host::DisplacementField;
-using testing::contents_of;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_ct;
@@ -44,7 +45,7 @@ TEST(ExportCommand, ALandmarkLandsWhereTheRegistrationHasIt) {
                                           scratch.file("fiducials.txt", kPatientFromTracker) + " --volume " + ct +
                                           " --out " + (scratch / "out").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const auto json = nlohmann::json::parse(contents_of(scratch / "out/export.json"));
+  const auto json = read_json(scratch / "out/export.json");
   EXPECT_EQ(json["verdict"], "pass");
   EXPECT_LT(json["difference_mm_max"], 1e-3);
   // A landmark of the model at the field's middle: it was 4 mm to the left at rest, the organ is then moved by

@@ -8,6 +8,7 @@
 
 #include "calibration/record/field_map_file.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/simulated_field.hpp"
 
@@ -16,12 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
-
-nlohmann::json read_field_json(const fs::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
 
 std::string pose_row(const Transform<Tracker, Sensor>& pose) {
   const Eigen::Quaterniond q = pose.quaternion();
@@ -51,7 +49,7 @@ TEST(FieldCommand, FromTheTableToTheAppliance) {
       run("birdseye", "calibrate field --grid " + scratch.file("grid.csv", table) + " --held-alike --out " + out +
                           " --json " + (scratch / "r.json").string() + " --report " + (scratch / "r.html").string());
   ASSERT_EQ(made.code, 0) << made.output;
-  const nlohmann::json r = read_field_json(scratch / "r.json");
+  const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["verdict"], "pass") << r["reasons"];
   EXPECT_LT(r["held_out_mm"].get<double>(), 0.8);
   EXPECT_GT(r["before_mm"].get<double>(), 2);
@@ -86,7 +84,7 @@ TEST(FieldCommand, PosesInTheOrderOfTheNodes) {
                              (scratch / "r.json").string() + " --grid-spec ";
   const auto made = run("birdseye", common + "6x6x5:100x96x100mm");
   ASSERT_EQ(made.code, 0) << made.output;
-  const nlohmann::json r = read_field_json(scratch / "r.json");
+  const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["kind"], "polynomial");
   EXPECT_LT(r["held_out_mm"].get<double>(), 0.8);
   EXPECT_EQ(r["measurements"], 179);
@@ -115,7 +113,7 @@ TEST(FieldCommand, TwoSensorsOnABar) {
   const auto made =
       run("birdseye", common + scratch.file("b.csv", b) + " --distance 120 --out " + (scratch / "field.json").string());
   ASSERT_EQ(made.code, 0) << made.output;
-  const nlohmann::json r = read_field_json(scratch / "r.json");
+  const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_NE(r["verdict"], "fail") << r["reasons"];
   EXPECT_EQ(r["measurements"], 399);
   EXPECT_NEAR(r["sensor_distance_mm"].get<double>(), 120, 0.5);
@@ -132,8 +130,8 @@ TEST(FieldCommand, WhatIsNotWorthAMapIsNotWritten) {
                                         (scratch / "field.json").string() + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(made.code, 3) << made.output;
   EXPECT_FALSE(fs::exists(scratch / "field.json"));
-  EXPECT_EQ(read_field_json(scratch / "r.json")["verdict"], "fail");
-  EXPECT_FALSE(read_field_json(scratch / "r.json")["next_steps"].empty());
+  EXPECT_EQ(read_json(scratch / "r.json")["verdict"], "fail");
+  EXPECT_FALSE(read_json(scratch / "r.json")["next_steps"].empty());
 }
 
 TEST(FieldCommand, InputThatCannotBeUsedIsRefused) {
@@ -177,7 +175,7 @@ TEST(FieldCheckCommand, DayByDayUntilMetalComes) {
   }
   const auto bent = run("birdseye", common + scratch.file("m.csv", places_csv(3.5, 99)) + " --when 'a,day'");
   EXPECT_EQ(bent.code, 3) << bent.output;
-  const nlohmann::json r = read_field_json(scratch / "r.json");
+  const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["verdict"], "fail");
   EXPECT_EQ(r["days"], 11);
   EXPECT_EQ(r["worst"], "d6");

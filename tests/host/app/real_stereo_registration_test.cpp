@@ -16,6 +16,7 @@
 #include "host/registration/rigid/surface.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/matrix_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -24,6 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::run;
 using testing::Scratch;
+using testing::write_matrix;
 
 constexpr const char* kPrefix = "Stereo_SD_d_complete_22_";
 
@@ -42,12 +44,6 @@ Eigen::Matrix4d pose_matrix_of(const fs::path& path) {
   const auto n = numbers_of(path);
   EXPECT_EQ(n.size(), 16U) << path;
   return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(n.data());
-}
-
-void write_pose_matrix(const fs::path& path, const Eigen::Matrix4d& m) {
-  std::ofstream out(path);
-  out.precision(17);
-  out << m << "\n";
 }
 
 /// The lens of a side, and its file for the command.
@@ -139,7 +135,7 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
     const CameraModel camera = write_camera(data, side, folder / (side + ".yaml"));
     Eigen::Matrix4d pose = left_from_patient.matrix();
     if (side == "right") pose = pose_matrix_of(data / "calib.l2r.txt") * pose;
-    write_pose_matrix(folder / (side + ".txt"), pose);
+    write_matrix(folder / (side + ".txt"), pose);
     constexpr int kMargin_px = 30;
     cv::imwrite((folder / (side + "_mask.png")).string(),
                 mask_of(*surface, camera, Transform<Camera, Patient>::from_matrix(pose),
@@ -150,7 +146,7 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
          << side << ".txt\"\nmask = \"" << side << "_mask.png\"\n";
   }
   file.close();
-  write_pose_matrix(folder / "true_pose.txt", left_from_patient.inverse().matrix());
+  write_matrix(folder / "true_pose.txt", left_from_patient.inverse().matrix());
   const auto result = run("birdseye", "register views --case " + (folder / "case.toml").string() + " --out " +
                                           (folder / "out").string() + " --json " + (folder / "r.json").string());
   EXPECT_NE(result.code, 2) << result.output;

@@ -9,6 +9,8 @@
 
 #include "calibration/geometry/transform.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
+#include "tests/support/matrix_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -16,8 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::contents_of;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
+using testing::write_matrix;
 
 Eigen::Matrix4d matrix_of(const fs::path& path) {
   std::istringstream in(std::regex_replace(contents_of(path), std::regex("#.*"), ""));
@@ -25,12 +29,6 @@ Eigen::Matrix4d matrix_of(const fs::path& path) {
   for (int i = 0; i < 16; ++i) in >> m(i / 4, i % 4);
   EXPECT_TRUE(in) << path;
   return m;
-}
-
-void write_matrix(const fs::path& path, const Eigen::Matrix4d& m) {
-  std::ofstream out(path);
-  out.precision(17);
-  out << m << "\n";
 }
 
 Eigen::Vector3d of_length(double length, std::mt19937& rng) {
@@ -71,7 +69,7 @@ nlohmann::json registered(const Scratch& scratch, const std::string& deformation
   const auto result = run("birdseye", "register views --case " + (folder / "case.toml").string() + " --out " +
                                           (scratch / "out").string() + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 0) << result.output;
-  nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
+  nlohmann::json json = read_json(scratch / "r.json");
   // The file says the same as the report, and the field remains one of the deformation alone.
   const Eigen::Matrix4d written = matrix_of(scratch / "out/pose.txt");
   for (std::size_t i = 0; i < 16; ++i)

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -14,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::contents_of;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 
@@ -45,7 +47,7 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
   const auto result =
       run("birdseye", arguments(folder / "case.toml", scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_GT(json["tre_before_mm_mean"], 3);
   EXPECT_LT(json["tre_after_mm_mean"], 1);
   EXPECT_LT(json["tre_after_mm_max"], 2);
@@ -74,7 +76,7 @@ TEST(RegisterViewsCommand, FindsItByValuesAlone) {
                             "optimiser = \"simplex\"\nmost_evaluations = 60\nsimilarity = \"nmi\"");
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_NE(result.code, 2) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_EQ(json["optimiser"], "simplex");
   EXPECT_EQ(json["similarity"], "nmi");
   EXPECT_EQ(json["gradient_evaluations"], 0);
@@ -88,7 +90,7 @@ TEST(RegisterViewsCommand, StartsFromAField) {
       changed(scratch, "optimiser = \"gradient\"", "optimiser = \"gradient\"\ninitial = \"truth/field.mha\"");
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_NE(result.code, 2) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_LT(json["tre_before_mm_mean"], 0.1);
   EXPECT_LT(json["tre_after_mm_mean"], 1);
 }
@@ -140,7 +142,7 @@ TEST(RegisterViewsCommand, SaysWhenAllViewsAreFromOnePlace) {
   }
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const nlohmann::json json = nlohmann::json::parse(contents_of(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_EQ(json["verdict"], "marginal");
   EXPECT_NE(json["reasons"][0].get<std::string>().find("degrees apart"), std::string::npos) << json["reasons"];
 }

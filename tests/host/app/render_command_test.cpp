@@ -11,6 +11,7 @@
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/display.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -22,6 +23,7 @@ using host::DisplacementField;
 using testing::contents_of;
 using testing::Display;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_ct;
@@ -184,7 +186,7 @@ TEST(RenderCommand, DrawsThroughALens) {
                           (scratch / "r.json").string());
   ASSERT_EQ(with_lens.code, 0) << with_lens.output;
   // A ball of 12 mm seen from 80 mm with 60 px focal length: a disc of about 9 px radius in 64 x 48.
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "r.json"));
+  const nlohmann::json json = read_json(scratch / "r.json");
   EXPECT_NEAR(json["coverage"].get<double>(), 3.1416 * 9.2 * 9.2 / (64 * 48), 0.025);
   const auto front =
       run("birdseye", "render --volume " + ct + " --size 80x60 --out " + (scratch / "front.png").string());
@@ -298,7 +300,7 @@ TEST(RenderCommand, ShowsTheRealAbdomen) {
         run("birdseye", "render --volume " + (*data / "ct_abdomen" / name).string() + " --size 300x300 --out " +
                             (scratch / "a.png").string() + " --json " + (scratch / "a.json").string());
     ASSERT_EQ(result.code, 0) << result.output;
-    const nlohmann::json json = nlohmann::json::parse(std::ifstream(scratch / "a.json"));
+    const nlohmann::json json = read_json(scratch / "a.json");
     EXPECT_GT(json["coverage"].get<double>(), least) << name;
     EXPECT_LT(json["coverage"].get<double>(), most) << name;
   }

@@ -2,12 +2,12 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "host/overlay/undistortion.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_ct;
@@ -72,7 +73,7 @@ TEST(RenderDisplay, TheStraightPictureIsTheBentOneStraightened) {
       }
       EXPECT_LT(sum / static_cast<double>(drawn.size()), 1.5) << engine << " " << display;
       EXPECT_GT(unlike_bent / static_cast<double>(drawn.size()), 6) << engine << " " << display;
-      const nlohmann::json json = nlohmann::json::parse(std::ifstream(json_path));
+      const nlohmann::json json = read_json(json_path);
       EXPECT_EQ(json["display"], display);
       EXPECT_NEAR(json["camera_matrix"][0][0].get<double>(), straighten.to().fx_px, 1e-9);
       EXPECT_NEAR(json["camera_matrix"][1][2].get<double>(), straighten.to().cy_px, 1e-9);

@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "host/recording/recording_writer.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::contents_of;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 using testing::small_ct;
@@ -116,7 +117,7 @@ TEST(ReplayCommand, RegistersAnewByTheTouchesInTheRecording) {
                                           scratch.file("ct.txt", "5 50 0\n5 0 0\n15 0 70\n35 0 0\n") + " --tip " +
                                           scratch.file("tip.txt", "0 0 0\n") + " --out " + (scratch / "o").string());
   ASSERT_EQ(result.code, 0) << result.output;
-  const auto json = nlohmann::json::parse(contents_of(scratch / "o/replay.json"));
+  const auto json = read_json(scratch / "o/replay.json");
   EXPECT_EQ(json["touches"], 4);
   EXPECT_LT(json["fre_mm"], 0.5);
   std::istringstream pose(contents_of(scratch / "o/patient_from_tracker.txt"));

@@ -9,12 +9,14 @@
 #include "hw-sim/phantom/phantom.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 
@@ -39,10 +41,6 @@ Points touched(const Points& points) {
   return out;
 }
 
-nlohmann::json read_rigid_json(const fs::path& path) {
-  return nlohmann::json::parse(std::ifstream(path));
-}
-
 const Points kMarkers{{-152, -50, 40}, {-78, -101, 106}, {-15, -113, 132},
                       {70, -105, 86},  {-99, -95, -38},  {34, -114, -56}};
 
@@ -59,7 +57,7 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
       run("birdseye", "volume markers " + ct + " --shape ball --diameter 8 --out " + points + " --picture " +
                           (scratch / "m.png").string() + " --json " + (scratch / "m.json").string());
   ASSERT_EQ(found.code, 0) << found.output;
-  const nlohmann::json markers = read_rigid_json(scratch / "m.json");
+  const nlohmann::json markers = read_json(scratch / "m.json");
   EXPECT_EQ(markers["verdict"], "pass");
   ASSERT_EQ(markers["markers"].size(), truth->fiducials_mm.size());
   for (const Eigen::Vector3d& fiducial : truth->fiducials_mm) {
@@ -81,7 +79,7 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
                              (scratch / "r.json").string();
   const auto registered = run("birdseye", common);
   ASSERT_EQ(registered.code, 0) << registered.output;
-  const nlohmann::json r = read_rigid_json(scratch / "r.json");
+  const nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["verdict"], "pass") << r["reasons"];
   EXPECT_EQ(r["ct_of_touch"].size(), 5U);
   EXPECT_LT(r["fre_rms_mm"].get<double>(), 0.6);
@@ -104,13 +102,13 @@ TEST(RigidCommands, ABlunderIsNamedAndASharperErrorPredictedWhereItIsKnown) {
                              scratch.file("g.txt", "-50 -20 10\n") + " --out " + (scratch / "p.txt").string() +
                              " --json " + (scratch / "r.json").string();
   ASSERT_EQ(run("birdseye", common).code, 0);
-  nlohmann::json r = read_rigid_json(scratch / "r.json");
+  nlohmann::json r = read_json(scratch / "r.json");
   EXPECT_EQ(r["verdict"], "marginal");
   ASSERT_EQ(r["outliers"].size(), 1U) << r["reasons"];
   EXPECT_EQ(r["outliers"][0]["name"], "fiducial 5");
   EXPECT_NE(r["outliers"][0]["reason"].get<std::string>().find("from where the others put it"), std::string::npos);
   ASSERT_EQ(run("birdseye", common + " --fle 0.7").code, 0);
-  EXPECT_EQ(read_rigid_json(scratch / "r.json")["fle_rms_mm"], 0.7);
+  EXPECT_EQ(read_json(scratch / "r.json")["fle_rms_mm"], 0.7);
   // A target far from markers that are badly touched.
   const auto far = run("birdseye", common + " --fle 14");
   EXPECT_EQ(far.code, 3);
@@ -129,7 +127,7 @@ TEST(RigidCommands, PelvisPhantomsSurfaceIsRefusedUnlessItsErrorIsKnownToBeLarge
   const std::string common = fiducials + " --surface " + (folder / "pelvis_cropped_decimated.vtk").string() +
                              " --surface-points " + (folder / "Tracker_Surface_Scan.txt").string();
   ASSERT_EQ(run("birdseye", common).code, 0);
-  const nlohmann::json refused = read_rigid_json(scratch / "r.json");
+  const nlohmann::json refused = read_json(scratch / "r.json");
   EXPECT_EQ(refused["verdict"], "marginal");
   EXPECT_EQ(refused["surface"]["accepted"], false);
   EXPECT_NEAR(refused["surface"]["moved_mm"].get<double>(), 8.57, 0.02);
@@ -140,7 +138,7 @@ TEST(RigidCommands, PelvisPhantomsSurfaceIsRefusedUnlessItsErrorIsKnownToBeLarge
     EXPECT_NEAR(refused["patient_from_tracker"][i / 4][i % 4].get<double>(), expected, 1e-6);
   }
   ASSERT_EQ(run("birdseye", common + " --fle 8").code, 0);
-  const nlohmann::json accepted = read_rigid_json(scratch / "r.json");
+  const nlohmann::json accepted = read_json(scratch / "r.json");
   EXPECT_EQ(accepted["surface"]["accepted"], true);
   EXPECT_EQ(accepted["patient_from_tracker"], accepted["surface"]["patient_from_tracker"]);
   EXPECT_LT(accepted["surface"]["rms_after_mm"].get<double>(), 0.4);
@@ -159,7 +157,7 @@ TEST(RigidCommands, ARealAbdomenWithoutMarkersHasNone) {
         run("birdseye", "volume markers " + (*data / "ct_abdomen/example_ct.nii.gz").string() + " --shape " + shape +
                             " --out " + (scratch / "m.txt").string() + " --json " + (scratch / "m.json").string());
     EXPECT_EQ(result.code, 3) << result.output;
-    EXPECT_EQ(read_rigid_json(scratch / "m.json")["markers"].size(), 0U) << shape << result.output;
+    EXPECT_EQ(read_json(scratch / "m.json")["markers"].size(), 0U) << shape << result.output;
   }
 }
 

@@ -7,6 +7,7 @@
 #include "drivers/system/clock.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -14,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::contents_of;
+using testing::read_json;
 using testing::Scratch;
 
 wire::VideoFrame frame(int n, int width_px, int height_px) {
@@ -132,7 +134,7 @@ TEST(Recording, ItsSheetSaysWhatIsInIt) {
     return f != nullptr && f->info.sequence == 103;
   });
   record(scratch / "r", events);
-  const auto sheet = nlohmann::json::parse(contents_of(scratch / "r/recording.json"));
+  const auto sheet = read_json(scratch / "r/recording.json");
   EXPECT_EQ(sheet["ended"], true);
   EXPECT_EQ(sheet["why"], "the test is over");
   EXPECT_EQ(sheet["frames"], 5);

@@ -7,13 +7,14 @@
 #include <sstream>
 
 #include "tests/support/command.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
 namespace {
 
-using testing::contents_of;
 using testing::expect_refused;
+using testing::read_json;
 using testing::run;
 using testing::Scratch;
 
@@ -68,7 +69,7 @@ TEST(Programs, TruthIsWrittenBeforeReadyIsSaid) {
                                               " --drift-ppm 100 --truth " + truth + " --seconds 0.05");
   ASSERT_EQ(result.code, 0) << result.output;
   EXPECT_EQ(nlohmann::json::parse(result.output)["event"], "ready");
-  const auto json = nlohmann::json::parse(contents_of(truth));
+  const auto json = read_json(truth);
   EXPECT_NEAR(json["rate_hz"].get<double>(), 103.3 * 1.0001, 1e-9);
   EXPECT_EQ(json["radius_mm"], 200);
   EXPECT_EQ(json["period_s"], 2);
@@ -84,7 +85,7 @@ TEST(Programs, ACameraSaysWhereItIsAndWhatItSent) {
   ASSERT_EQ(result.code, 0) << result.output;
   EXPECT_NE(result.output.find("\"ready\""), std::string::npos);
   EXPECT_NE(result.output.find("\"frames_sent\":0"), std::string::npos) << result.output;
-  EXPECT_NEAR(nlohmann::json::parse(contents_of(truth))["rate_hz"].get<double>(), 60 * (1 - 50e-6), 1e-9);
+  EXPECT_NEAR(read_json(truth)["rate_hz"].get<double>(), 60 * (1 - 50e-6), 1e-9);
 }
 
 TEST(Programs, WrongOptionsAreNamed) {

@@ -18,6 +18,7 @@
 #include "hw-sim/case/landmarks.hpp"
 #include "hw-sim/case/subject.hpp"
 #include "hw-sim/case/tissue_map.hpp"
+#include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
@@ -26,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 using testing::contents_of;
+using testing::read_json;
 using testing::Scratch;
 
 CaseSettings small_case(const fs::path& folder) {
@@ -120,7 +122,7 @@ TEST(Case, TheFieldTakesTheDeformedLandmarksToRest) {
     EXPECT_GE(vessels, 10);
     EXPECT_EQ(tumours, 1);
     EXPECT_GT(furthest_mm, 3);
-    EXPECT_GT(nlohmann::json::parse(contents_of(scratch / phantom / "truth" / "truth.json")).at("min_jacobian"), 0.3);
+    EXPECT_GT(read_json(scratch / phantom / "truth" / "truth.json").at("min_jacobian"), 0.3);
   }
 }
 
