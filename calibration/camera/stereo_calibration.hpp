@@ -2,10 +2,6 @@
 
 #include "calibration/camera/camera_calibration.hpp"
 
-namespace birdseye {
-struct RightCamera;  ///< the other camera of a stereo scope, as Camera, which is the left one
-}  // namespace birdseye
-
 namespace birdseye::calibration {
 
 struct StereoCalibration {

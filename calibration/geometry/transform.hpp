@@ -8,14 +8,14 @@
 namespace birdseye {
 
 /// Frame tags (design: docs/manual/frames.md). They exist only in types.
-struct Patient;  ///< DICOM LPS, mm
-struct Voxel;    ///< voxel indices; voxel centres at integers
-struct Tracker;  ///< the transmitter, mm
-struct Sensor;   ///< the bird on the scope, mm
-struct Camera;   ///< OpenCV: x right, y down, z forward, mm
-struct Tip;      ///< the tip of a pointer, mm
-struct Marker;   ///< a calibration board, mm
-struct Pointer;  ///< the bird on the pointer, mm
+struct Patient;      ///< DICOM LPS, mm
+struct Tracker;      ///< the transmitter, mm
+struct Sensor;       ///< the bird on the scope, mm
+struct Pointer;      ///< the bird on the pointer, mm
+struct Camera;       ///< OpenCV: x right, y down, z forward, mm; the left one of a stereo scope
+struct RightCamera;  ///< the other camera of a stereo scope, as Camera
+struct Marker;       ///< a calibration board, mm
+struct TrackedBody;  ///< what carries the board, as the tracker knows it; the tracker's own for a board at rest
 
 /// A rigid transform that takes points of frame From to frame To. Names cancel like fractions:
 /// camera_from_sensor * sensor_from_tracker is a camera_from_tracker, and a wrong chain does not compile.

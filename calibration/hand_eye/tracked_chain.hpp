@@ -8,9 +8,6 @@
 
 namespace birdseye::calibration {
 
-struct TrackedBody;  ///< frame of what carries the board, as the tracker knows it; the tracker's own for a board at
-                     ///< rest
-
 /// How a tracked body moved while its pose was taken, in the tracker's frame.
 struct Motion {
   Eigen::Vector3d velocity_mm_s = Eigen::Vector3d::Zero();

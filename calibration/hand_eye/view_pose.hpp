@@ -10,10 +10,6 @@
 #include "calibration/geometry/transform.hpp"
 #include "calibration/hand_eye/tracked_chain.hpp"
 
-namespace birdseye {
-struct RightCamera;  ///< the other camera of a stereo scope, as Camera, which is the left one
-}  // namespace birdseye
-
 namespace birdseye::calibration {
 
 /// The second lens of a stereo scope.

@@ -66,7 +66,7 @@ Result<void> add_poses(const HandEyeFiles& files, std::vector<HandEyeStation>& s
     stations[i].tracker_from_sensor = pose->second.tracker_from_sensor;
     if (!files.board_poses.empty())
       stations[i].tracker_from_body =
-          Transform<Tracker, calibration::TrackedBody>::from_matrix(body->second.tracker_from_sensor.matrix());
+          Transform<Tracker, TrackedBody>::from_matrix(body->second.tracker_from_sensor.matrix());
     kept.push_back(std::move(stations[i]));
   }
   stations = std::move(kept);

@@ -37,8 +37,8 @@ struct HandEyeBench {
                           Eigen::Vector3d(mm * Eigen::Vector3d(6, -14, -300))};
     const Transform<Tracker, Marker> tracker_from_marker(rotation_exp(Eigen::Vector3d(0.1, 0.1, 0.6)),
                                                          Eigen::Vector3d(mm * Eigen::Vector3d(330, -150, 140)));
-    const Transform<calibration::TrackedBody, Marker> body_from_marker(
-        rotation_exp(Eigen::Vector3d(-0.7, 0.4, 2)), Eigen::Vector3d(mm * Eigen::Vector3d(40, 60, -25)));
+    const Transform<TrackedBody, Marker> body_from_marker(rotation_exp(Eigen::Vector3d(-0.7, 0.4, 2)),
+                                                          Eigen::Vector3d(mm * Eigen::Vector3d(40, 60, -25)));
     const CameraModel lens = wide_lens();
     if (!scene.poses_only) input.camera = lens;
     if (scene.stereo) {

@@ -39,7 +39,6 @@ void expect_near(const nlohmann::json& rows, const Transform<To, From>& truth, d
 }
 
 /// Of a stereo scope.
-struct RightCamera;
 const Transform<Camera, Sensor> kCameraFromSensor(rotation_exp({0.2, -1.5, 0.1}), {6, -14, -300});
 const Transform<RightCamera, Camera> kRightFromLeft(rotation_exp({0.01, -0.03, 0.002}), {-4.4, 0.1, 0.05});
 
