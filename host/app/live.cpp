@@ -12,6 +12,7 @@
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/operation.hpp"
+#include "host/simulated/simulated_patient.hpp"
 #include "host/window/live_app.hpp"
 
 namespace birdseye::host {
@@ -33,15 +34,14 @@ struct LiveOptions {
   std::string size = "1280x720", video = "512x384", publish;
 };
 
-/// What the simulated patient's CT is shown and checked by: vessels and tumour of its segmentation.
+/// What the simulated patient's CT is shown and checked by.
 PatientFiles simulated_patient(const fs::path& folder) {
-  constexpr int kLiver = 1, kPortal = 2, kHepatic = 3, kTumour = 4;
   PatientFiles files;
   files.ct = folder / "phantom" / "ct";
   files.labels = folder / "phantom" / "segmentation.nii.gz";
-  files.shown = {kPortal, kHepatic, kTumour};
-  files.targets = {kTumour};
-  files.organ = {kLiver, kPortal, kHepatic, kTumour};
+  files.shown.assign(SimulatedLabels::kShown.begin(), SimulatedLabels::kShown.end());
+  files.targets = {SimulatedLabels::kTumour};
+  files.organ.assign(SimulatedLabels::kOrgan.begin(), SimulatedLabels::kOrgan.end());
   return files;
 }
 

@@ -8,6 +8,7 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/operation/findings.hpp"
+#include "host/simulated/simulated_patient.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
@@ -16,8 +17,6 @@ namespace birdseye::host {
 
 namespace {
 
-// The labels of the simulator's segmentation that the overlay shows.
-constexpr int kPortal = 2, kHepatic = 3, kTumour = 4;
 constexpr int kKeepEvery = 20;  // of the overlaid frames, for the pictures of the report
 
 }  // namespace
@@ -28,11 +27,10 @@ Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials) {
   const auto labels = import_labels(patient / "segmentation.nii.gz", *ct);
   if (!labels) return labels.error();
   Plan plan;
-  const int shown[] = {kPortal, kHepatic, kTumour};
-  auto kept = keep_labels(*ct, *labels, shown);
+  auto kept = keep_labels(*ct, *labels, SimulatedLabels::kShown);
   if (!kept) return kept.error();
   plan.shown = *std::move(kept);
-  const auto centre = label_centroid_mm(*labels, kTumour);
+  const auto centre = label_centroid_mm(*labels, SimulatedLabels::kTumour);
   if (!centre) return centre.error();
   plan.tumour_centre_in_patient_mm = *centre;
   for (const MarkerFit& marker : find_markers(*ct).markers)
