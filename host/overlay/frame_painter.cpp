@@ -8,7 +8,7 @@ namespace birdseye::host {
 std::vector<std::uint8_t> lay_over(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength,
                                    const OverlayLook& look) {
   std::vector<std::uint8_t> in_front;
-  if (look.surface_in_front) in_front = surface_cues(video, overlay.width_px, overlay.height_px);
+  if (look.surface_in_front) in_front = surface_cues({video, overlay.width_px, overlay.height_px});
   return composite(video, overlay, strength * look.opacity, in_front);
 }
 

@@ -14,16 +14,16 @@ constexpr int kHighlight = 225, kOfHighlight = 210;
 
 }  // namespace
 
-std::vector<std::uint8_t> surface_cues(std::span<const std::uint8_t> video, int width_px, int height_px) {
-  std::vector<std::uint8_t> out(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
-  if (video.size() != 3 * out.size()) return {};
+std::vector<std::uint8_t> surface_cues(const RgbView& video) {
+  if (!video.whole()) return {};
+  std::vector<std::uint8_t> out(video.area_px());
   // OpenCV's matrices of borrowed pixels are not const; nothing writes to this one.
-  const cv::Mat rgb(height_px, width_px, CV_8UC3, const_cast<std::uint8_t*>(video.data()));
+  const cv::Mat rgb(video.height_px, video.width_px, CV_8UC3, const_cast<std::uint8_t*>(video.pixels.data()));
   cv::Mat grey, fine, low, high;
   cv::cvtColor(rgb, grey, cv::COLOR_RGB2GRAY);
   cv::boxFilter(grey, fine, -1, {3, 3});
   // The steps from the darkest to the brightest nearby: at an edge they are the largest.
-  const int reach = std::max(3, height_px / 115) | 1;
+  const int reach = std::max(3, video.height_px / 115) | 1;
   const cv::Mat nearby = cv::getStructuringElement(cv::MORPH_RECT, {reach, reach});
   cv::erode(fine, low, nearby);
   cv::dilate(fine, high, nearby);
@@ -31,12 +31,12 @@ std::vector<std::uint8_t> surface_cues(std::span<const std::uint8_t> video, int 
   for (int contrast = 0; contrast < 256; ++contrast)
     of_contrast[static_cast<std::size_t>(contrast)] =
         static_cast<std::uint8_t>(std::clamp((contrast - kNoise) * kGain, 0, kMostCue));
-  for (int y = 0; y < height_px; ++y) {
+  for (int y = 0; y < video.height_px; ++y) {
     const auto* const here = fine.ptr<std::uint8_t>(y);
     const auto* const darkest = low.ptr<std::uint8_t>(y);
     const auto* const brightest = high.ptr<std::uint8_t>(y);
-    std::uint8_t* const to = &out[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px)];
-    for (int x = 0; x < width_px; ++x) {
+    std::uint8_t* const to = &out[static_cast<std::size_t>(y) * static_cast<std::size_t>(video.width_px)];
+    for (int x = 0; x < video.width_px; ++x) {
       const auto contrast = static_cast<std::size_t>(brightest[x] - darkest[x]);
       to[x] = here[x] >= kHighlight ? std::uint8_t{kOfHighlight} : of_contrast[contrast];
     }

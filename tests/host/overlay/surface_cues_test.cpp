@@ -9,12 +9,13 @@ namespace {
 
 constexpr int kWidth = 120, kHeight = 90;
 
-std::vector<std::uint8_t> grey(const std::function<int(int, int)>& level) {
+/// The cues of a grey picture.
+std::vector<std::uint8_t> cues_of(const std::function<int(int, int)>& level) {
   std::vector<std::uint8_t> rgb;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) rgb.insert(rgb.end(), 3, static_cast<std::uint8_t>(level(x, y)));
   }
-  return rgb;
+  return surface_cues({rgb, kWidth, kHeight});
 }
 
 std::uint8_t at(const std::vector<std::uint8_t>& cues, int x, int y) {
@@ -22,18 +23,16 @@ std::uint8_t at(const std::vector<std::uint8_t>& cues, int x, int y) {
 }
 
 TEST(SurfaceCues, OfAnEvenSurfaceAreNone) {
-  for (const std::uint8_t cue : surface_cues(grey([](int, int) { return 120; }), kWidth, kHeight)) EXPECT_EQ(cue, 0);
+  for (const std::uint8_t cue : cues_of([](int, int) { return 120; })) EXPECT_EQ(cue, 0);
   // Nor of the lamp's slow fall towards the rim.
-  for (const std::uint8_t cue : surface_cues(grey([](int x, int) { return 60 + x; }), kWidth, kHeight))
-    EXPECT_EQ(cue, 0);
+  for (const std::uint8_t cue : cues_of([](int x, int) { return 60 + x; })) EXPECT_EQ(cue, 0);
 }
 
 TEST(SurfaceCues, StandAtEdgesAndHighlights) {
-  const auto cues = surface_cues(grey([](int x, int y) {
-                                   if (x > 80 && y > 60) return 250;
-                                   return x < 40 ? 90 : 150;
-                                 }),
-                                 kWidth, kHeight);
+  const auto cues = cues_of([](int x, int y) {
+    if (x > 80 && y > 60) return 250;
+    return x < 40 ? 90 : 150;
+  });
   EXPECT_GT(at(cues, 40, 20), 100) << "an edge";
   EXPECT_EQ(at(cues, 20, 20), 0);
   EXPECT_EQ(at(cues, 60, 20), 0);
@@ -41,7 +40,7 @@ TEST(SurfaceCues, StandAtEdgesAndHighlights) {
 }
 
 TEST(SurfaceCues, OfAPictureOfAnotherSizeAreNone) {
-  EXPECT_TRUE(surface_cues(std::vector<std::uint8_t>(30), kWidth, kHeight).empty());
+  EXPECT_TRUE(surface_cues({std::vector<std::uint8_t>(30), kWidth, kHeight}).empty());
 }
 
 }  // namespace
