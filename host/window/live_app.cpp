@@ -44,7 +44,7 @@ Result<void> LiveApp::run(HostTime asked) {
   const HostTime began = host_now();
   asked_ = asked;
   const Picture cover = stall_picture(window_->scale());
-  window_->cover_when_still(side_px(window_->scale()), cover.rgb, cover.width_px, cover.height_px);
+  window_->cover_when_still(side_px(window_->scale()), {cover.rgb, cover.width_px, cover.height_px});
   while (!window_->closed() && !interrupted()) {
     take_events();
     if (auto said = saving_.take()) facts_.said = *std::move(said);
@@ -108,7 +108,7 @@ void LiveApp::draw_inset() {
   if (!inset_ || !operation_.engine || Duration{host_now().ns - inset_drawn_.ns} < kEvery) return;
   inset_drawn_ = host_now();
   const Picture picture = inset_->draw(*operation_.engine, workflow_.picture().camera_from_patient());
-  window_->set_picture(LiveWindow::Slot::inset, picture.rgb, picture.width_px, picture.height_px);
+  window_->set_picture(LiveWindow::Slot::inset, {picture.rgb, picture.width_px, picture.height_px});
 }
 
 void LiveApp::draw() {
@@ -173,7 +173,7 @@ void LiveApp::publish(const ShownPicture& shown) {
 
 PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
   if (shown.any && shown.changes != drawn_changes_) {
-    window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
+    window_->set_picture(LiveWindow::Slot::video, {*shown.rgb, shown.width_px, shown.height_px});
     drawn_changes_ = shown.changes;
   }
   window_->begin_frame(again);

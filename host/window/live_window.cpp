@@ -114,10 +114,10 @@ void LiveWindow::swap(Believed believe_until) {
   if (cover_) cover_->believe_until(believe_until);
 }
 
-void LiveWindow::cover_when_still(int left_px, std::span<const std::uint8_t> rgb, int width_px, int height_px) {
+void LiveWindow::cover_when_still(int left_px, const RgbView& picture) {
   if (glfwGetX11Window == nullptr) return;
   const auto window = static_cast<std::uint32_t>(glfwGetX11Window(window_));
-  cover_ = StallCover::over(window, left_px, rgb, width_px, height_px);
+  cover_ = StallCover::over(window, left_px, picture);
 }
 
 bool LiveWindow::closed() const {
@@ -145,22 +145,21 @@ std::vector<std::string> LiveWindow::keys() const {
   return pressed;
 }
 
-void LiveWindow::set_picture(Slot slot, std::span<const std::uint8_t> rgb, int width_px, int height_px) {
-  if (width_px < 1 || height_px < 1 ||
-      rgb.size() != 3 * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px))
-    return;
+void LiveWindow::set_picture(Slot slot, const RgbView& picture) {
+  if (picture.width_px < 1 || picture.height_px < 1 || !picture.whole()) return;
   Texture& texture = textures_[static_cast<std::size_t>(slot)];
-  if (width_px != texture.width_px || height_px != texture.height_px) {
+  if (picture.width_px != texture.width_px || picture.height_px != texture.height_px) {
     glDeleteTextures(1, &texture.name);
     glCreateTextures(GL_TEXTURE_2D, 1, &texture.name);
-    glTextureStorage2D(texture.name, 1, GL_RGBA8, width_px, height_px);
+    glTextureStorage2D(texture.name, 1, GL_RGBA8, picture.width_px, picture.height_px);
     glTextureParameteri(texture.name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     glTextureParameteri(texture.name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    texture.width_px = width_px;
-    texture.height_px = height_px;
+    texture.width_px = picture.width_px;
+    texture.height_px = picture.height_px;
   }
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTextureSubImage2D(texture.name, 0, 0, 0, width_px, height_px, GL_RGB, GL_UNSIGNED_BYTE, rgb.data());
+  glTextureSubImage2D(texture.name, 0, 0, 0, picture.width_px, picture.height_px, GL_RGB, GL_UNSIGNED_BYTE,
+                      picture.pixels.data());
 }
 
 LiveWindow::Shot LiveWindow::shot() const {

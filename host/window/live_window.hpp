@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
+#include "calibration/base/image_view.hpp"
 #include "calibration/base/result.hpp"
 #include "host/render/gl/gl_context.hpp"
 #include "host/render/scene/scene.hpp"
@@ -44,8 +44,8 @@ class LiveWindow final : public GlContext {
   using Believed = std::optional<HostTime>;
   /// What is still on the screen then is covered, as cover_when_still() says.
   void swap(Believed believe_until = std::nullopt);
-  /// rgb: what covers the window right of left_px then. Without an X server nothing ever does.
-  void cover_when_still(int left_px, std::span<const std::uint8_t> rgb, int width_px, int height_px);
+  /// picture: what covers the window right of left_px then. Without an X server nothing ever does.
+  void cover_when_still(int left_px, const RgbView& picture);
   /// How often it stood still.
   [[nodiscard]] int stood_still() const { return cover_ ? cover_->covered() : 0; }
   [[nodiscard]] bool closed() const;
@@ -53,9 +53,9 @@ class LiveWindow final : public GlContext {
   /// small letters and digits.
   [[nodiscard]] std::vector<std::string> keys() const;
 
-  /// rgb: rows from the top, of any size from call to call.
+  /// Of any size from call to call. One that is not whole is left out.
   enum class Slot { video, inset };
-  void set_picture(Slot slot, std::span<const std::uint8_t> rgb, int width_px, int height_px);
+  void set_picture(Slot slot, const RgbView& picture);
   /// The picture's texture for ImGui::Image; 0 before the first.
   [[nodiscard]] std::uintptr_t picture(Slot slot) const { return textures_[static_cast<std::size_t>(slot)].name; }
   /// Of text and panels, against a screen of usual density.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <span>
 #include <vector>
 
 namespace birdseye::host {
@@ -43,8 +44,7 @@ void put_picture(xcb_connection_t* server, xcb_pixmap_t pixmap, std::uint8_t dep
 
 }  // namespace
 
-std::unique_ptr<StallCover> StallCover::over(std::uint32_t window, int left_px, std::span<const std::uint8_t> rgb,
-                                             int width_px, int height_px) {
+std::unique_ptr<StallCover> StallCover::over(std::uint32_t window, int left_px, const RgbView& picture) {
   xcb_connection_t* const server = xcb_connect(nullptr, nullptr);
   const auto give_up = [server] {
     xcb_disconnect(server);
@@ -55,9 +55,9 @@ std::unique_ptr<StallCover> StallCover::over(std::uint32_t window, int left_px, 
                                               &std::free);
   if (!shape || (shape->depth != 24 && shape->depth != 32)) return give_up();
   const xcb_pixmap_t pixmap = xcb_generate_id(server);
-  xcb_create_pixmap(server, shape->depth, pixmap, window, static_cast<std::uint16_t>(width_px),
-                    static_cast<std::uint16_t>(height_px));
-  put_picture(server, pixmap, shape->depth, bgrx_of(rgb), width_px, height_px);
+  xcb_create_pixmap(server, shape->depth, pixmap, window, static_cast<std::uint16_t>(picture.width_px),
+                    static_cast<std::uint16_t>(picture.height_px));
+  put_picture(server, pixmap, shape->depth, bgrx_of(picture.pixels), picture.width_px, picture.height_px);
   const xcb_window_t cover = xcb_generate_id(server);
   constexpr std::uint16_t kLarge = 16384;  // whatever size the window will have: the server cuts it off
   const std::array<std::uint32_t, 1> values{pixmap};

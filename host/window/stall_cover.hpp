@@ -4,9 +4,9 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
 #include <thread>
 
+#include "calibration/base/image_view.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/condition.hpp"
 #include "drivers/system/thread.hpp"
@@ -20,10 +20,9 @@ namespace birdseye::host {
 /// that hangs keeps it from covering. A machine that stands still as a whole is beyond it.
 class StallCover {
  public:
-  /// window: its number at the server of this DISPLAY. left_px: columns that are never covered. rgb: what it shows,
-  /// rows from the top, side by side and below each other. Null where there is no such server or window.
-  static std::unique_ptr<StallCover> over(std::uint32_t window, int left_px, std::span<const std::uint8_t> rgb,
-                                          int width_px, int height_px);
+  /// window: its number at the server of this DISPLAY. left_px: columns that are never covered. picture: what it shows,
+  /// side by side and below each other. Null where there is no such server or window.
+  static std::unique_ptr<StallCover> over(std::uint32_t window, int left_px, const RgbView& picture);
   ~StallCover();
   StallCover(const StallCover&) = delete;
   StallCover& operator=(const StallCover&) = delete;

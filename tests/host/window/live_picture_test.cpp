@@ -274,7 +274,7 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
     play(picture, one.fault, [&](std::int64_t ms, const ShownPicture& shown) {
       if (ms % 50 != 0) return;  // a window that is drawn twenty times a second
       if (shown.any && shown.changes != changes)
-        (*window)->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
+        (*window)->set_picture(LiveWindow::Slot::video, {*shown.rgb, shown.width_px, shown.height_px});
       changes = shown.changes;
       (*window)->begin_frame();
       draw_panels(**window, operation, shown, facts, editor);
@@ -320,7 +320,7 @@ TEST_F(LiveWindowTest, WhatStaysOnTheScreenTooLongIsCovered) {
   auto opened = LiveWindow::open(settings);
   ASSERT_TRUE(opened) << opened.error().what;
   LiveWindow& window = **opened;
-  window.cover_when_still(kSide, std::vector<std::uint8_t>{200, 10, 20}, 1, 1);
+  window.cover_when_still(kSide, {std::vector<std::uint8_t>{200, 10, 20}, 1, 1});
   birdseye::testing::Screen screen(display_->name());
   const auto draw = [&](LiveWindow::Believed until) {
     window.begin_frame();

@@ -95,14 +95,14 @@ class LiveWindowPictures : public ::testing::Test {
   /// Draws it until its panels have found their places, and compares.
   void expect_looks(const std::string& name, LiveWorkflow& workflow, std::optional<HostTime> now) {
     const ShownPicture shown = now ? workflow.shown_at(*now) : ShownPicture{};
-    if (shown.any) window_->set_picture(LiveWindow::Slot::video, *shown.rgb, shown.width_px, shown.height_px);
+    if (shown.any) window_->set_picture(LiveWindow::Slot::video, {*shown.rgb, shown.width_px, shown.height_px});
     if (workflow.view().patient != nullptr && workflow.view().engine != nullptr) {
       histogram_ = HuHistogram(workflow.view().patient->shown);
       facts_.histogram = &histogram_;
       editor_.set_points(workflow.view().transfer->points());
       const Picture inset = InsetView(workflow.view().patient->shown)
                                 .draw(*workflow.view().engine, workflow.picture().camera_from_patient());
-      window_->set_picture(LiveWindow::Slot::inset, inset.rgb, inset.width_px, inset.height_px);
+      window_->set_picture(LiveWindow::Slot::inset, {inset.rgb, inset.width_px, inset.height_px});
     }
     for (int i = 0; i < 3; ++i) {
       window_->begin_frame();
