@@ -10,7 +10,7 @@
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/tip_phases.hpp"
-#include "host/calibrate/tip_report.hpp"
+#include "host/calibrate/tip_pictures.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/guide/live_poses.hpp"
 #include "host/link/appliance_hardware.hpp"

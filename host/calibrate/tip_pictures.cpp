@@ -1,4 +1,4 @@
-#include "host/calibrate/tip_report.hpp"
+#include "host/calibrate/tip_pictures.hpp"
 
 #include <fmt/format.h>
 
