@@ -1,0 +1,63 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
+#include "calibration/points/odd_points.hpp"
+#include "calibration/points/point_error.hpp"
+#include "calibration/points/point_fit.hpp"
+#include "host/registration/rigid/surface.hpp"
+#include "host/registration/rigid/surface_refinement.hpp"
+#include "host/report/target_error_map.hpp"
+#include "host/volume/volume.hpp"
+
+namespace birdseye::host {
+
+/// Where the markers lie, and what else is said of them.
+struct FiducialFiles {
+  std::filesystem::path ct, tracker;                               ///< the markers, and the same as touched
+  std::filesystem::path targets, volume, surface, surface_points;  ///< empty: none
+  std::optional<double> localisation_mm;  ///< how well a marker is found and touched, rms; none: from the residuals
+  bool match = false;                     ///< touched in any order, of markers that may be more
+};
+
+/// What was read and asked for.
+struct FiducialInput {
+  std::vector<Eigen::Vector3d> ct_mm;  ///< in the order of touched_mm once matched
+  std::vector<Eigen::Vector3d> touched_mm, targets_mm, surface_points_mm;
+  std::optional<Volume> volume;
+  std::optional<Surface> surface;
+  std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order holds
+};
+
+/// All that was found out.
+struct FiducialsFound {
+  calibration::PointFit<Patient, Tracker> fit;
+  calibration::LocalisationError localisation;
+  calibration::OddPoints odd;
+  std::vector<double> tre_mm;
+  std::optional<TargetErrorRange> range;
+  std::optional<SurfaceRefinement> refinement;
+  [[nodiscard]] const Transform<Patient, Tracker>& patient_from_tracker() const {
+    return refinement ? refinement->patient_from_tracker : fit.to_from;
+  }
+};
+
+Result<FiducialInput> read_fiducials(const FiducialFiles& files);
+
+/// Brings CT and tracker together by the markers, then by the surface if there is one. Brings ct_mm of the input into
+/// the order of the touches.
+Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialInput& input);
+
+Verdict judge_fiducials(const FiducialsFound& found);
+nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& found, const Verdict& verdict);
+/// The predicted error in slices, PNG.
+std::string fiducials_map(const FiducialInput& input, const FiducialsFound& found);
+
+}  // namespace birdseye::host
