@@ -10,6 +10,7 @@
 #include "host/calibrate/hand_eye_files.hpp"
 #include "host/calibrate/hand_eye_report.hpp"
 #include "host/calibrate/hand_eye_rod.hpp"
+#include "host/calibrate/hand_eye_solution.hpp"
 #include "host/files/text_files.hpp"
 #include "host/guide/live_hand_eye.hpp"
 #include "host/link/appliance_hardware.hpp"
@@ -108,52 +109,6 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
   return out;
 }
 
-/// What is found from a recording, and what to think of it.
-struct HandEyeFound {
-  calibration::HandEyeResult result;
-  std::optional<RodCalibration> rod;
-  Verdict verdict;
-};
-
-/// With a rod, recording keeps the stations of its reference angle, of which the result is.
-Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, HandEyeFound& out) {
-  auto rod = calibrate_rod(recording, angles);
-  if (!rod) return rod.error();
-  recording.input.stations = rod->at_reference().stations;
-  out.result = rod->at_reference().result;
-  out.verdict = rod->at_reference().verdict;
-  judge_rod(*rod, out.verdict);
-  recording.notes.push_back(
-      fmt::format("camera_from_sensor holds with the rod at {:g} degrees", rod->at_reference().angle_deg));
-  out.rod = *std::move(rod);
-  return {};
-}
-
-Result<HandEyeFound> solve(const CalibrateHandEyeOptions& options, const RodAngles& angles,
-                           HandEyeRecording& recording) {
-  HandEyeFound out;
-  if (recording.input.stations.empty() || (options.files.eye_poses.empty() && !recording.input.camera)) {
-    out.verdict = recording.camera_verdict;
-    if (out.verdict.grade != Grade::fail)
-      out.verdict.add(Grade::fail, "no picture shows the board together with a pose",
-                      "see that --board names the pattern in the pictures");
-    return out;
-  }
-  if (!angles.empty()) {
-    if (const auto solved = solve_rod(angles, recording, out); !solved) return solved.error();
-  } else {
-    auto solved = calibration::calibrate_hand_eye(recording.input);
-    if (!solved) return solved.error();
-    out.result = *std::move(solved);
-    out.verdict = calibration::judge(out.result);
-  }
-  if (const Grade lens = recording.camera_verdict.grade; lens != Grade::pass) {
-    out.verdict.add(lens, fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens)),
-                    "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");
-  }
-  return out;
-}
-
 /// Hand-eye, and the lens it was found with where that is new.
 RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording,
                      const HandEyeFound& found) {
@@ -216,7 +171,7 @@ void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
   if (options.position_sigma_mm > 0)
     recording->input.tracker_noise =
         calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
-  const auto found = solve(options, angles, *recording);
+  const auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
   finish(options, *recording, *found, status);
 }
