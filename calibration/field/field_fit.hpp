@@ -84,25 +84,6 @@ struct FieldFit {
 /// differ (a factor beyond 0.8..1.25).
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
 
-/// Two sensors on one rigid body at the same moment.
-struct FieldPair {
-  std::string name;
-  Transform<Tracker, Sensor> a, b;
-};
-
-struct FieldPairSettings {
-  std::optional<FieldBasis> basis;
-  std::optional<double> distance_mm;  ///< between the sensors, where it is known
-};
-
-/// The map that makes the body rigid: with p and R corrected, R_a^T (p_b - p_a) and R_a^T R_b are the same in all
-/// pairs. That leaves open a rigid motion of everything, so the map is asked to have none over the samples. It leaves
-/// the scale open too, unless the distance is known. Solved by Gauss-Newton over both maps and the sensors' distance;
-/// an orientation counts as much as 200 mm/rad would make of it. Held-out errors are those of p_b - p_a. At most 1500
-/// pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors closer than 30 mm, and volumes thinner than 100
-/// mm.
-Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const FieldPairSettings& settings = {});
-
 /// What a map is good for, from its own figures.
 Verdict verdict_of(const FieldFit& fit);
 

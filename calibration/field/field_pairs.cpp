@@ -1,9 +1,10 @@
+#include "calibration/field/field_pairs.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/field/field_fit.hpp"
 #include "calibration/field/field_fit_parts.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"

@@ -7,6 +7,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/field/field_check.hpp"
 #include "calibration/field/field_fit.hpp"
+#include "calibration/field/field_pairs.hpp"
 #include "calibration/record/field_map_file.hpp"
 
 namespace birdseye::host {

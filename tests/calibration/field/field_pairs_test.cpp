@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "calibration/field/field_fit.hpp"
+#include "calibration/field/field_pairs.hpp"
 #include "tests/support/simulated_field.hpp"
 
 namespace birdseye::calibration {
