@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -22,6 +23,10 @@ struct ChainFreedom {
   bool time_offset = false;
   bool board_scale = false;
   [[nodiscard]] int parameters() const { return 12 + (time_offset ? 1 : 0) + (board_scale ? 1 : 0); }
+  /// Degrees of freedom that the residuals of so many stations have left.
+  [[nodiscard]] double of_residuals(std::size_t stations) const {
+    return 6 * static_cast<double>(stations) - parameters();
+  }
 };
 
 struct ChainFit {

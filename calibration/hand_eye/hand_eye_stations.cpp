@@ -214,6 +214,13 @@ void drop_repeats(const HandEyeInput& in, HandEyeStations& out) {
 
 }  // namespace
 
+std::vector<SummedStation> summed_of(const std::vector<PreparedStation>& stations) {
+  std::vector<SummedStation> summed;
+  summed.reserve(stations.size());
+  for (const PreparedStation& s : stations) summed.push_back(s.summed);
+  return summed;
+}
+
 Result<void> check_stations(const HandEyeInput& in) {
   if (in.stations.empty()) return Error{Errc::bad_value, "no stations: give pictures of the board with tracked poses"};
   const HandEyeStation& first = in.stations.front();

@@ -17,6 +17,8 @@ struct PreparedStation {
   double view_rms_px = 0;
 };
 
+std::vector<SummedStation> summed_of(const std::vector<PreparedStation>& stations);
+
 /// The stations that can be used, sorted by what they hold, so that nothing depends on the order in which they came.
 struct HandEyeStations {
   std::vector<PreparedStation> used;

@@ -1,0 +1,130 @@
+#include "calibration/hand_eye/hand_eye_robust_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "calibration/hand_eye/hand_eye_start.hpp"
+#include "calibration/hand_eye/tracked_errors.hpp"
+
+namespace birdseye::calibration {
+
+namespace {
+
+/// One station in so many may be taken for an outlier by chance.
+constexpr double kOutlierChance = 1e-4;
+constexpr std::size_t kFewest = 3;
+
+class RobustFitter {
+ public:
+  RobustFitter(const HandEyeInput& in, const ChainFreedom& freedom, HandEyeStations& stations, HandEyeResult& out)
+      : in_(in), freedom_(freedom), stations_(stations), out_(out) {
+    found_.summed = summed_of(stations_.used);
+  }
+
+  /// Fits with the outliers that it finds put aside, twice: the first may have hidden others, and closed forms do not
+  /// bear them.
+  bool fit_all() {
+    for (int round = 0; round < 2; ++round) {
+      const ChainState start = best_start();
+      if (out_.start.empty()) return false;
+      for (const PreparedStation& p : stations_.used)
+        found_.fit.residuals.push_back(chain_residual(p.summed.chain, p.summed.camera_from_marker, start).value);
+      found_.fit.state = start;
+      for (int i = 0; i < 5; ++i) {
+        found_.noise = in_.tracker_noise.value_or(TrackerNoise{});
+        const TrackerNoise median = median_noise(found_.fit.residuals, freedom_);
+        found_.noise.position_sigma_mm = std::max(found_.noise.position_sigma_mm, median.position_sigma_mm);
+        found_.noise.angle_sigma_rad = std::max(found_.noise.angle_sigma_rad, median.angle_sigma_rad);
+        found_.fit = fit_chain(found_.summed, found_.fit.state, found_.noise, freedom_, true);
+        if (!found_.fit.converged) return false;
+      }
+      if (!drop_outliers()) break;
+      found_.fit.residuals.clear();
+    }
+    if (in_.tracker_noise) {
+      found_.noise = *in_.tracker_noise;
+      found_.fit = fit_chain(found_.summed, found_.fit.state, found_.noise, freedom_, false);
+    } else {
+      found_.noise = estimate_noise(found_.summed, found_.fit, found_.noise, freedom_);
+      out_.noise_estimated = true;
+    }
+    out_.tracker_noise = found_.noise;
+    return found_.fit.converged;
+  }
+
+  [[nodiscard]] RobustFit take() { return std::move(found_); }
+
+ private:
+  /// Stations with a reason leave.
+  void keep_only(const std::vector<std::string>& reasons) {
+    std::vector<PreparedStation> kept;
+    for (std::size_t i = 0; i < reasons.size(); ++i) {
+      if (reasons[i].empty()) {
+        kept.push_back(stations_.used[i]);
+      } else {
+        found_.outliers.push_back(stations_.used[i]);
+        out_.stations[stations_.used[i].index].why_not = "outlier: " + reasons[i];
+      }
+    }
+    stations_.used = std::move(kept);
+    found_.summed = summed_of(stations_.used);
+  }
+
+  ChainState best_start() {
+    out_.starts = closed_forms(found_.summed);
+    ChainState best;
+    double least = std::numeric_limits<double>::infinity();
+    for (HandEyeStart& start : out_.starts) {
+      if (!start.failed.empty()) continue;
+      ChainState state;
+      state.camera_from_sensor = start.camera_from_sensor;
+      state.body_from_marker = body_from_marker_of(found_.summed, start.camera_from_sensor);
+      start.score = tracked_score(stations_, in_.camera, state);
+      if (start.score < least) {
+        least = start.score;
+        best = state;
+        out_.start = start.method;
+      }
+    }
+    return best;
+  }
+
+  bool drop_outliers() {
+    const double limit = distance_limit(kOutlierChance, freedom_.of_residuals(found_.summed.size()));
+    std::vector<std::string> reasons(stations_.used.size());
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < stations_.used.size(); ++i) {
+      const auto held = hold_out(found_.summed, i, found_.fit, found_.noise, freedom_, true);
+      if (!held || held->distance_squared <= limit) continue;
+      HandEyeStationFit& row = out_.stations[stations_.used[i].index];
+      row.distance_squared = held->distance_squared;
+      reasons[i] = fmt::format("off by {:.1f} sigmas", std::sqrt(held->distance_squared / 6));
+      ++found;
+    }
+    if (found == 0 || stations_.used.size() - found < kFewest + 1) return false;
+    keep_only(reasons);
+    return true;
+  }
+
+  const HandEyeInput& in_;
+  const ChainFreedom& freedom_;
+  HandEyeStations& stations_;
+  HandEyeResult& out_;
+  RobustFit found_;
+};
+
+}  // namespace
+
+std::optional<RobustFit> fit_robustly(const HandEyeInput& in, const ChainFreedom& freedom, HandEyeStations& stations,
+                                      HandEyeResult& out) {
+  RobustFitter fitter(in, freedom, stations, out);
+  if (!fitter.fit_all()) return std::nullopt;
+  return fitter.take();
+}
+
+}  // namespace birdseye::calibration
