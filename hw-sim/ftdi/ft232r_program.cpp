@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <nlohmann/json.hpp>
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/unique_fd.hpp"

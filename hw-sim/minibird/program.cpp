@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 #include "hw-sim/faults/announce.hpp"

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "calibration/base/result.hpp"
