@@ -1,8 +1,55 @@
 #include "device/wire/json.hpp"
 
+#include <nlohmann/json.hpp>
+
 namespace birdseye::wire {
 
 using nlohmann::json;
+
+namespace {
+
+/// Gives every member, with its key, to `each`.
+template <typename AnyInstrument, typename Each>
+void each_of_instrument(AnyInstrument& instrument, const Each& each) {
+  each("name", instrument.name);
+  each("state", instrument.state);
+  each("text", instrument.text);
+  each("times_lost", instrument.times_lost);
+  each("identity", instrument.identity);
+}
+
+template <typename AnyHealth, typename Each>
+void each_of_health(AnyHealth& health, const Each& each) {
+  each("state", health.state);
+  each("instruments", health.instruments);
+  each("tracker_rate_hz", health.tracker_rate_hz);
+  each("frame_rate_hz", health.frame_rate_hz);
+  each("measurements", health.measurements);
+  each("measurements_lost", health.measurements_lost);
+  each("phase_errors", health.phase_errors);
+  each("senseless_records", health.senseless_records);
+  each("doubted", health.doubted);
+  each("line_errors", health.line_errors);
+  each("clock_events", health.clock_events);
+  each("frames", health.frames);
+  each("frames_dropped", health.frames_dropped);
+  each("frames_repeated", health.frames_repeated);
+  each("messages_shed", health.messages_shed);
+  each("clients", health.clients);
+  each("clients_shed", health.clients_shed);
+  each("requests_refused", health.requests_refused);
+  each("events_dropped", health.events_dropped);
+  each("tracker_drift_ppm", health.tracker_drift_ppm);
+  each("camera_drift_ppm", health.camera_drift_ppm);
+  each("tracker_time_sigma_ms", health.tracker_time_sigma_ms);
+  each("latency_ms_p99_tracker", health.latency_ms_p99_tracker);
+  each("latency_ms_p99_tracker_beside_frames", health.latency_ms_p99_tracker_beside_frames);
+  each("latency_ms_p99_frame", health.latency_ms_p99_frame);
+  each("clock", health.clock);
+  each("recording", health.recording);
+}
+
+}  // namespace
 
 void to_json(json& out, const FrameInfo& info) {
   json pose{{"kind", to_string(info.pose.kind)},
@@ -84,6 +131,13 @@ void from_json(const json& in, Pedal& pedal) {
   in.at("at_ns").get_to(pedal.at.ns);
 }
 
+void to_json(json& out, const ClockPing& ping) {
+  out = {{"host_sent_ns", ping.host_sent_ns}};
+}
+void from_json(const json& in, ClockPing& ping) {
+  in.at("host_sent_ns").get_to(ping.host_sent_ns);
+}
+
 void to_json(json& out, const ClockPong& pong) {
   out = {
       {"host_sent_ns", pong.host_sent_ns}, {"device_received_ns", pong.received.ns}, {"device_sent_ns", pong.sent.ns}};
@@ -92,6 +146,74 @@ void from_json(const json& in, ClockPong& pong) {
   in.at("host_sent_ns").get_to(pong.host_sent_ns);
   in.at("device_received_ns").get_to(pong.received.ns);
   in.at("device_sent_ns").get_to(pong.sent.ns);
+}
+
+void to_json(json& out, const Subscription& subscription) {
+  out = {{"frames", subscription.frames}, {"tracking", subscription.tracking}};
+}
+void from_json(const json& in, Subscription& subscription) {
+  in.at("frames").get_to(subscription.frames);
+  in.at("tracking").get_to(subscription.tracking);
+}
+
+void to_json(json& out, const CameraLock& lock) {
+  out = {{"on", lock.on}};
+}
+void from_json(const json& in, CameraLock& lock) {
+  in.at("on").get_to(lock.on);
+}
+
+void to_json(json& out, const CameraControls& controls) {
+  out = {{"locked", controls.locked}, {"done", controls.done}, {"refused", controls.refused}};
+}
+void from_json(const json& in, CameraControls& controls) {
+  in.at("locked").get_to(controls.locked);
+  in.at("done").get_to(controls.done);
+  in.at("refused").get_to(controls.refused);
+}
+
+void to_json(json& out, const Calibration& calibration) {
+  out = {{"in_force", calibration.in_force}, {"why_not", calibration.why_not}, {"record", calibration.record}};
+}
+void from_json(const json& in, Calibration& calibration) {
+  in.at("in_force").get_to(calibration.in_force);
+  in.at("why_not").get_to(calibration.why_not);
+  in.at("record").get_to(calibration.record);
+}
+
+void to_json(json& out, const WallClock& clock) {
+  out = {{"known", clock.known},
+         {"synchronised", clock.synchronised},
+         {"tai_known", clock.tai_known},
+         {"max_error_ns", clock.max_error_ns},
+         {"est_error_ns", clock.est_error_ns},
+         {"wall_minus_monotonic_ns", clock.wall_minus_monotonic_ns},
+         {"source", clock.source}};
+}
+void from_json(const json& in, WallClock& clock) {
+  in.at("known").get_to(clock.known);
+  in.at("synchronised").get_to(clock.synchronised);
+  in.at("tai_known").get_to(clock.tai_known);
+  in.at("max_error_ns").get_to(clock.max_error_ns);
+  in.at("est_error_ns").get_to(clock.est_error_ns);
+  in.at("wall_minus_monotonic_ns").get_to(clock.wall_minus_monotonic_ns);
+  in.at("source").get_to(clock.source);
+}
+
+void to_json(json& out, const InstrumentHealth& instrument) {
+  each_of_instrument(instrument, [&](const char* key, const auto& value) { out[key] = value; });
+}
+void from_json(const json& in, InstrumentHealth& instrument) {
+  instrument = InstrumentHealth();
+  each_of_instrument(instrument, [&](const char* key, auto& value) { value = in.value(key, value); });
+}
+
+void to_json(json& out, const Health& health) {
+  each_of_health(health, [&](const char* key, const auto& value) { out[key] = value; });
+}
+void from_json(const json& in, Health& health) {
+  health = Health();
+  each_of_health(health, [&](const char* key, auto& value) { value = in.value(key, value); });
 }
 
 }  // namespace birdseye::wire

@@ -9,6 +9,7 @@
 #include <igtl_util.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "device/wire/igtl_bytes.hpp"

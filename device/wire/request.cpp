@@ -1,5 +1,7 @@
 #include "device/wire/request.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/json.hpp"
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "device/wire/json.hpp"
 
 namespace birdseye::host {

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "device/wire/client.hpp"
 #include "device/wire/igtl_bytes.hpp"
