@@ -1,85 +1,21 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
-#include "calibration/record/field_map_json.hpp"
 #include "device/birdseyed/core.hpp"
 
 /// What an appliance recording keeps as JSON: how a tracker's bytes are to be read, and the core's settings.
-namespace birdseye {
-
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Duration, ns)
-inline void to_json(nlohmann::json& json, const PoseHistory::Settings& settings) {
-  json = {{"capacity", settings.capacity},
-          {"max_gap", settings.max_gap},
-          {"max_prediction", settings.max_prediction},
-          {"max_time_sigma", settings.max_time_sigma},
-          {"acceleration_mm_s2", settings.acceleration_mm_s2},
-          {"smoothing", settings.smoothing}};
-}
-inline void from_json(const nlohmann::json& json, PoseHistory::Settings& settings) {
-  json.at("capacity").get_to(settings.capacity);
-  json.at("max_gap").get_to(settings.max_gap);
-  json.at("max_prediction").get_to(settings.max_prediction);
-  json.at("max_time_sigma").get_to(settings.max_time_sigma);
-  json.at("acceleration_mm_s2").get_to(settings.acceleration_mm_s2);
-  json.at("smoothing").get_to(settings.smoothing);
-}
-
-}  // namespace birdseye
-
 namespace birdseye::drivers::minibird {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Plausibility, most_speed_mm_s, most_turn_deg_s, most_acceleration_mm_s2, slack_mm,
-                                   slack_deg, step_confirms, start_confirms, gap, frozen_after, frozen_moved_mm,
-                                   hemisphere_border_mm, flip_memory)
-inline void to_json(nlohmann::json& json, const BirdLayout& bird) {
-  const Eigen::Vector3d& into = bird.into_hemisphere;
-  json = {{"format", static_cast<int>(bird.format)},
-          {"mm_per_count", bird.mm_per_count},
-          {"into_hemisphere", {into.x(), into.y(), into.z()}}};
-}
-inline void from_json(const nlohmann::json& json, BirdLayout& bird) {
-  const int format = json.at("format").get<int>();
-  bird.format = static_cast<RecordFormat>(format > 0 && format < 256 ? format : 0);  // 0 is none: fault_of() tells
-  json.at("mm_per_count").get_to(bird.mm_per_count);
-  for (int i = 0; i < 3; ++i) bird.into_hemisphere[i] = json.at("into_hemisphere").at(static_cast<std::size_t>(i));
-}
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(StreamLayout, birds, group_mode, button_byte, rate_hz, baud, delay, plausibility)
+void to_json(nlohmann::json& json, const StreamLayout& layout);
+void from_json(const nlohmann::json& json, StreamLayout& layout);
 
 }  // namespace birdseye::drivers::minibird
 
 namespace birdseye::device {
 
-inline void to_json(nlohmann::json& json, const FrameClock::Settings& settings) {
-  json = {{"rate_hz", settings.rate_hz}, {"exposure", settings.exposure}, {"strobe", settings.strobe}};
-  if (settings.delay) json["delay"] = *settings.delay;
-}
-inline void from_json(const nlohmann::json& json, FrameClock::Settings& settings) {
-  json.at("rate_hz").get_to(settings.rate_hz);
-  json.at("exposure").get_to(settings.exposure);
-  json.at("strobe").get_to(settings.strobe);
-  if (json.contains("delay")) settings.delay = json.at("delay").get<Duration>();
-}
-inline void to_json(nlohmann::json& json, const CoreSettings& settings) {
-  json = {{"bird_names", settings.bird_names},
-          {"pose", settings.pose},
-          {"pose_wait", settings.pose_wait},
-          {"frame_clock", settings.frame_clock},
-          {"calibration", settings.calibration}};
-  if (settings.field) json["field"] = settings.field->data();
-}
+void to_json(nlohmann::json& json, const CoreSettings& settings);
 /// Throws where the field map makes no sense: going on without it would publish other poses.
-inline void from_json(const nlohmann::json& json, CoreSettings& settings) {
-  json.at("bird_names").get_to(settings.bird_names);
-  json.at("pose").get_to(settings.pose);
-  json.at("pose_wait").get_to(settings.pose_wait);
-  json.at("frame_clock").get_to(settings.frame_clock);
-  json.at("calibration").get_to(settings.calibration);
-  if (!json.contains("field")) return;
-  auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());
-  if (!map) throw std::invalid_argument(map.error().what);
-  settings.field = *std::move(map);
-}
+void from_json(const nlohmann::json& json, CoreSettings& settings);
 
 }  // namespace birdseye::device
