@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <fstream>
 #include <optional>
-#include <sstream>
 
 #include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/config_section.hpp"
@@ -266,41 +265,28 @@ Result<std::string> read_text(const std::filesystem::path& path) {
 Result<Config> read_config(const std::filesystem::path& path) {
   auto text = read_text(path);
   if (!text) return text.error();
-  try {
-    std::istringstream stream(*text);
-    const toml::value root = toml::parse(stream, path.string());
-    ConfigFaults faults(path);
-    for (const auto& [name, value] : root.as_table()) {
-      const bool known = std::any_of(std::begin(kSections), std::end(kSections),
-                                     [&key = name](const auto& section) { return key == section.first; });
-      if (!known || !value.is_table()) {
-        faults.add(
-            static_cast<std::int64_t>(value.location().line()),
-            fmt::format(
-                "{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record], [calibration]",
-                name));
-      }
+  const auto file = ConfigFile::parse(*text, path);
+  if (!file) return file.error();
+  ConfigFaults faults(path);
+  for (const ConfigFile::Entry& entry : file->entries()) {
+    const bool known = std::any_of(std::begin(kSections), std::end(kSections),
+                                   [&](const auto& section) { return entry.name == section.first; });
+    if (!known || !entry.is_table) {
+      faults.add(entry.line,
+                 fmt::format("{}: unknown section; known are [tracker], [camera], [gpio], [wire], [pose], [record], "
+                             "[calibration]",
+                             entry.name));
     }
-    Config config;
-    for (const auto& [name, read] : kSections) {
-      const auto found = root.as_table().find(name);
-      const bool table = found != root.as_table().end() && found->second.is_table();
-      ConfigSection section(faults, name, table ? &found->second : nullptr);
-      read(section, config);
-      section.finish();
-    }
-    if (faults.count() > 0) return Error{Errc::bad_value, faults.text()};
-    config.text = *std::move(text);
-    return config;
-  } catch (const toml::syntax_error& problem) {
-    // The first line of toml11's message says what; the rest draws the place.
-    const std::string what = problem.what();
-    return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML (texts need quotes): {}", path.string(),
-                                               problem.location().line(), what.substr(0, what.find('\n')))};
-  } catch (const std::exception& problem) {
-    const std::string what = problem.what();
-    return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), what.substr(0, what.find('\n')))};
   }
+  Config config;
+  for (const auto& [name, read] : kSections) {
+    ConfigSection section = file->section(faults, name);
+    read(section, config);
+    section.finish();
+  }
+  if (faults.count() > 0) return Error{Errc::bad_value, faults.text()};
+  config.text = *std::move(text);
+  return config;
 }
 
 }  // namespace birdseye::device

@@ -3,7 +3,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <exception>
+#include <sstream>
+#include <toml.hpp>
+
 namespace birdseye::device {
+
+struct ConfigValue : toml::value {
+  explicit ConfigValue(const toml::value& value) : toml::value(value) {}
+};
 
 namespace {
 
@@ -24,12 +33,12 @@ std::string ConfigFaults::text() const {
   return all;
 }
 
-ConfigSection::ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table)
-    : faults_(&faults), name_(std::move(name)), table_(table) {}
+ConfigSection::ConfigSection(ConfigFaults& faults, std::string name, std::shared_ptr<const ConfigValue> table)
+    : faults_(&faults), name_(std::move(name)), table_(std::move(table)) {}
 
-const toml::value* ConfigSection::find(const char* key, bool required) {
+std::shared_ptr<const ConfigValue> ConfigSection::find(const char* key, bool required) {
   known_.insert(key);
-  if (has(key)) return &table_->as_table().at(key);
+  if (has(key)) return std::make_shared<ConfigValue>(table_->as_table().at(key));
   if (required) fail(key, "is missing");
   return nullptr;
 }
@@ -50,14 +59,14 @@ void ConfigSection::fail(const char* key, const std::string& why) {
 }
 
 void ConfigSection::text(const char* key, std::string& value, bool required) {
-  const toml::value* const found = find(key, required);
+  const auto found = find(key, required);
   if (found == nullptr) return;
   if (!found->is_string()) return fail(key, "needs text in quotes");
   value = found->as_string().str;
 }
 
 void ConfigSection::number(const char* key, std::optional<double>& value, double low, double high) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   if (found == nullptr) return;
   if (!found->is_floating() && !found->is_integer()) return fail(key, "needs a number");
   value = found->is_floating() ? found->as_floating() : static_cast<double>(found->as_integer());
@@ -71,7 +80,7 @@ void ConfigSection::number(const char* key, double& value, double low, double hi
 }
 
 void ConfigSection::integer(const char* key, std::optional<int>& value, int low, int high) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   if (found == nullptr) return;
   if (!found->is_integer()) return fail(key, "needs a whole number");
   if (found->as_integer() < low || found->as_integer() > high)
@@ -86,7 +95,7 @@ void ConfigSection::integer(const char* key, int& value, int low, int high) {
 }
 
 void ConfigSection::flag(const char* key, bool& value) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   if (found == nullptr) return;
   if (!found->is_boolean()) return fail(key, "needs true or false");
   value = found->as_boolean();
@@ -105,7 +114,7 @@ void ConfigSection::milliseconds(const char* key, Duration& value, double high_m
 }
 
 void ConfigSection::texts(const char* key, std::vector<std::string>& values) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   if (found == nullptr) return;
   if (!found->is_array()) return fail(key, "needs a list of names");
   values.clear();
@@ -116,7 +125,7 @@ void ConfigSection::texts(const char* key, std::vector<std::string>& values) {
 }
 
 std::vector<double> ConfigSection::numbers(const char* key, std::size_t count, double low, double high) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   if (found == nullptr) return {};
   std::vector<double> values;
   if (found->is_array()) {
@@ -135,7 +144,7 @@ std::vector<double> ConfigSection::numbers(const char* key, std::size_t count, d
 }
 
 std::vector<ConfigSection> ConfigSection::tables(const char* key) {
-  const toml::value* const found = find(key);
+  const auto found = find(key);
   std::vector<ConfigSection> sections;
   if (found == nullptr) return sections;
   const bool tables = found->is_array() && std::all_of(found->as_array().begin(), found->as_array().end(),
@@ -144,7 +153,8 @@ std::vector<ConfigSection> ConfigSection::tables(const char* key) {
     fail(key, fmt::format("is given as [[{}.{}]]", name_, key));
     return sections;
   }
-  for (const toml::value& item : found->as_array()) sections.emplace_back(*faults_, name_ + "." + key, &item);
+  for (const toml::value& item : found->as_array())
+    sections.emplace_back(*faults_, name_ + "." + key, std::make_shared<ConfigValue>(item));
   return sections;
 }
 
@@ -153,6 +163,33 @@ void ConfigSection::finish() {
   for (const auto& [key, value] : table_->as_table()) {
     if (known_.count(key) == 0) fail(key.c_str(), fmt::format("unknown key; known are {}", fmt::join(known_, ", ")));
   }
+}
+
+Result<ConfigFile> ConfigFile::parse(const std::string& text, const std::filesystem::path& path) {
+  try {
+    std::istringstream stream(text);
+    return ConfigFile(std::make_shared<ConfigValue>(toml::parse(stream, path.string())));
+  } catch (const toml::syntax_error& problem) {
+    // The first line of toml11's message says what; the rest draws the place.
+    const std::string what = problem.what();
+    return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML (texts need quotes): {}", path.string(),
+                                               problem.location().line(), what.substr(0, what.find('\n')))};
+  } catch (const std::exception& problem) {
+    const std::string what = problem.what();
+    return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), what.substr(0, what.find('\n')))};
+  }
+}
+
+std::vector<ConfigFile::Entry> ConfigFile::entries() const {
+  std::vector<Entry> entries;
+  for (const auto& [name, value] : root_->as_table()) entries.push_back({name, line_of(value), value.is_table()});
+  return entries;
+}
+
+ConfigSection ConfigFile::section(ConfigFaults& faults, const std::string& name) const {
+  const auto found = root_->as_table().find(name);
+  const bool table = found != root_->as_table().end() && found->second.is_table();
+  return {faults, name, table ? std::make_shared<ConfigValue>(found->second) : nullptr};
 }
 
 }  // namespace birdseye::device

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
-#include <toml.hpp>
+#include <utility>
 #include <vector>
 
+#include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
 
 namespace birdseye::device {
@@ -26,12 +29,15 @@ class ConfigFaults {
   std::multimap<std::int64_t, std::string> faults_;
 };
 
+/// A value as the reader of TOML has it.
+struct ConfigValue;
+
 /// One table of a configuration file. A value that is absent leaves what was there; one of the wrong type or out of its
 /// range is a fault. Every key that is asked for is noted, so that finish() can name the others.
 class ConfigSection {
  public:
   /// table: null where the file has no such section.
-  ConfigSection(ConfigFaults& faults, std::string name, const toml::value* table);
+  ConfigSection(ConfigFaults& faults, std::string name, std::shared_ptr<const ConfigValue> table);
 
   void text(const char* key, std::string& value, bool required = false);
   void number(const char* key, double& value, double low, double high);
@@ -58,12 +64,33 @@ class ConfigSection {
   void finish();
 
  private:
-  const toml::value* find(const char* key, bool required = false);
+  std::shared_ptr<const ConfigValue> find(const char* key, bool required = false);
 
   ConfigFaults* faults_;
   std::string name_;
-  const toml::value* table_;
+  std::shared_ptr<const ConfigValue> table_;
   std::set<std::string> known_, failed_;
+};
+
+/// A configuration file as a whole.
+class ConfigFile {
+ public:
+  /// Refuses what is not TOML.
+  static Result<ConfigFile> parse(const std::string& text, const std::filesystem::path& path);
+
+  /// What stands at the top of the file: sections, if all is well.
+  struct Entry {
+    std::string name;
+    std::int64_t line = 0;
+    bool is_table = false;
+  };
+  [[nodiscard]] std::vector<Entry> entries() const;
+  [[nodiscard]] ConfigSection section(ConfigFaults& faults, const std::string& name) const;
+
+ private:
+  explicit ConfigFile(std::shared_ptr<const ConfigValue> root) : root_(std::move(root)) {}
+
+  std::shared_ptr<const ConfigValue> root_;
 };
 
 }  // namespace birdseye::device
