@@ -1,4 +1,4 @@
-#include "host/bench/bench_register.hpp"
+#include "host/bench/register_study.hpp"
 
 #include <fmt/format.h>
 

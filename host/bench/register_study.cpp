@@ -7,8 +7,8 @@
 
 #include "drivers/system/progress.hpp"
 #include "host/bench/bench_machine.hpp"
-#include "host/bench/bench_register.hpp"
 #include "host/bench/bench_trials.hpp"
+#include "host/bench/register_study.hpp"
 #include "host/files/write_files.hpp"
 #include "host/registration/views/patch_field.hpp"
 #include "host/registration/views/rendered_views.hpp"
