@@ -89,6 +89,8 @@ void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {
     const std::lock_guard lock(mutex_);
     state_ = guide.state();
   }
+  if (const auto frames = events_.dropped(kFrames), poses = events_.dropped(kPoses); frames + poses > 0)
+    tell(fmt::format("this machine fell behind, so {} frames and {} poses were left out", frames, poses));
   if (!fault) {
     const std::lock_guard lock(mutex_);
     state_.collecting = false;

@@ -38,6 +38,8 @@ class EventStream : public EventSource {
   /// Frames that were dropped, for nobody took them in time; and what else was.
   [[nodiscard]] std::uint64_t frames_dropped() const { return events_.dropped(kFrames); }
   [[nodiscard]] std::uint64_t others_dropped() const { return events_.dropped(kPoses) + events_.dropped(kOthers); }
+  /// The same in words; empty where nothing was dropped.
+  [[nodiscard]] std::string dropped_words() const;
 
  private:
   enum Lane : std::size_t { kFrames, kPoses, kOthers, kLanes };

@@ -104,10 +104,12 @@ std::string LiveSource::words() const {
   return (peer.empty() ? words_ : words_ + ": " + peer) + notes();
 }
 
-/// What is amiss with the recording, as far as it was read.
+/// What was dropped, or is amiss with the recording as far as it was read.
 std::string LiveSource::notes() const {
   constexpr std::size_t kMost = 3;
   std::string out;
+  if (const std::string dropped = stream_ != nullptr ? stream_->dropped_words() : ""; !dropped.empty())
+    out = "; " + dropped;
   if (recording_ == nullptr) return out;
   const std::vector<std::string>& notes = recording_->notes();
   for (std::size_t i = 0; i < std::min(notes.size(), kMost); ++i) out += "; " + notes[i];
