@@ -117,7 +117,7 @@ TEST(OddPoints, ASoundSetIsNotAccusedAndABlunderIsFound) {
     for (const std::size_t n : {5U, 6U, 8U}) {
       for (const bool given : {false, true}) {
         const Rates r = rates(n, fle_mm, given ? std::optional(fle_mm) : std::nullopt);
-        SCOPED_TRACE(testing::Message() << n << " points, " << fle_mm << " mm, " << (given ? "given" : "estimated"));
+        SCOPED_TRACE(::testing::Message() << n << " points, " << fle_mm << " mm, " << (given ? "given" : "estimated"));
         EXPECT_LE(r.accused, 0.01 + 0.0067);  // 1 %, and three sigma of 2000 trials
         // Five points leave six degrees of freedom to estimate 1 mm from: then 10 mm are not always beyond chance.
         const bool hard = n == 5 && fle_mm == 1.0 && !given;
