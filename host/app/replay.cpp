@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <signal.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -13,12 +12,10 @@
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
-#include "host/files/film.hpp"
-#include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/replay_player.hpp"
 #include "host/operation/replay_setup.hpp"
-#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/recording/recording_reader.hpp"
 
@@ -34,73 +31,6 @@ struct ReplayOptions {
   std::string transfer = "tumour-and-vessels", engine = "cpu";
   double step_mm = 1.2, film_hz = 0;
   int every = 10;
-};
-
-struct Replayed {
-  std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
-  std::map<std::string, std::size_t> reasons;
-  std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
-  std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
-};
-
-std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
-                   const std::optional<FramePainter::Painted>& painted) {
-  std::string reason = decision.reason;
-  std::replace(reason.begin(), reason.end(), ',', ';');
-  std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
-                                to_string(frame.info.pose.kind), decision.strength, reason);
-  if (painted) {
-    const Eigen::Matrix4d m = painted->camera_from_patient.matrix();
-    for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));
-  }
-  return row + "\n";
-}
-
-/// Draws every frame, and writes some.
-class Player {
- public:
-  Player(const ReplayOptions& options, const Setup& setup, const TrustFigures& figures, Engine& engine)
-      : options_(options), engine_(engine) {
-    look_.render.step_mm = options.step_mm;
-    painter_.set_setup(setup, figures);
-  }
-
-  Result<void> take(const wire::VideoFrame& frame) {
-    ++done.frames;
-    if (!painter_.fits(frame)) {
-      ++done.other_size;
-      return {};
-    }
-    const OverlayGate::Decision decision = painter_.decide(frame);
-    const auto painted = painter_.paint(frame, decision, engine_, look_);
-    const std::vector<std::uint8_t>& rgb = painted ? painted->rgb : *frame.rgb;
-    if (painted) ++done.overlaid;
-    if (decision.strength >= 1) ++done.whole;
-    if (!decision.reason.empty()) ++done.reasons[decision.reason];
-    done.checksum = static_cast<std::uint32_t>(::crc32(done.checksum, rgb.data(), static_cast<uInt>(rgb.size())));
-    done.table += row_of(frame, decision, painted);
-    if ((done.frames - 1) % static_cast<std::size_t>(options_.every) == 0) {
-      const fs::path file = options_.out / fmt::format("overlay-{:06}.png", frame.info.sequence);
-      if (auto put = write_file(file, png_of(RgbView{rgb, frame.width_px, frame.height_px})); !put) return put;
-    }
-    if (options_.film_hz <= 0) return {};
-    if (!film_) {
-      auto film = Film::open(options_.out / "overlay.mp4", frame.width_px, frame.height_px, options_.film_hz);
-      if (!film) return film.error();
-      film_ = *std::move(film);
-    }
-    return film_->add(rgb);
-  }
-  Result<void> finish() { return film_ ? film_->finish() : Result<void>(); }
-
-  Replayed done;
-
- private:
-  const ReplayOptions& options_;
-  Engine& engine_;
-  OverlayLook look_;
-  FramePainter painter_;
-  std::optional<Film> film_;
 };
 
 Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayTrust& trust) {
@@ -140,7 +70,7 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
 }
 
 /// All of the recording through the overlay.
-Result<void> play(RecordingReader& reader, Player& player, Progress& progress) {
+Result<void> play(RecordingReader& reader, ReplayPlayer& player, Progress& progress) {
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
     const auto event = reader.next(Deadline::after(Duration::from_ms(30'000)));
@@ -150,7 +80,7 @@ Result<void> play(RecordingReader& reader, Player& player, Progress& progress) {
     const auto* frame = std::get_if<wire::VideoFrame>(&**event);
     if (frame == nullptr) continue;
     if (auto taken = player.take(*frame); !taken) return taken;
-    if (player.done.frames % 20 == 0) progress(fmt::format("{} frames", player.done.frames));
+    if (player.done().frames % 20 == 0) progress(fmt::format("{} frames", player.done().frames));
   }
 }
 
@@ -182,23 +112,24 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  Player player(options, setup->setup(), trust.figures, **engine);
+  ReplayPlayer player({options.out, options.every, options.film_hz, options.step_mm}, setup->setup(), trust.figures,
+                      **engine);
   if (auto played = play(**reader, player, progress); !played) return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
-  const Verdict verdict = judge(player.done, **reader, trust);
-  const std::string json = text_of(json_of(player.done, *setup, trust.figures, (*engine)->name(), verdict));
+  const Verdict verdict = judge(player.done(), **reader, trust);
+  const std::string json = text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), verdict));
   const std::string registration = pose_text(setup->setup().tracker_from_patient.inverse().matrix());
-  if (auto written = write_files({{options.out / "frames.csv", player.done.table},
+  if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},
                                   {options.out / "replay.json", json},
                                   {options.json, json}});
       !written) {
     return written.error();
   }
-  progress.keep(fmt::format("{} frames, {} with an overlay, pictures {:08x}: {}", player.done.frames,
-                            player.done.overlaid, player.done.checksum, name_of(verdict.grade)));
+  progress.keep(fmt::format("{} frames, {} with an overlay, pictures {:08x}: {}", player.done().frames,
+                            player.done().overlaid, player.done().checksum, name_of(verdict.grade)));
   for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "device/wire/messages.hpp"
+#include "host/files/film.hpp"
+#include "host/overlay/frame_painter.hpp"
+
+namespace birdseye::host {
+
+/// Where replayed frames go, and how finely they are drawn.
+struct ReplayOutput {
+  std::filesystem::path folder;
+  int every = 10;      ///< of the frames, one in so many is written as a picture
+  double film_hz = 0;  ///< 0: no film
+  double step_mm = 1.2;
+};
+
+/// What became of the frames so far.
+struct Replayed {
+  std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
+  std::map<std::string, std::size_t> reasons;
+  std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
+  std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
+};
+
+/// Draws every frame of a recording, writes some as pictures and, where asked, all as a film.
+class ReplayPlayer {
+ public:
+  ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine);
+
+  /// Fails where a picture or the film cannot be written.
+  Result<void> take(const wire::VideoFrame& frame);
+  /// Ends the film.
+  Result<void> finish();
+
+  [[nodiscard]] const Replayed& done() const { return done_; }
+
+ private:
+  ReplayOutput output_;
+  Engine& engine_;
+  OverlayLook look_;
+  FramePainter painter_;
+  std::optional<Film> film_;
+  Replayed done_;
+};
+
+}  // namespace birdseye::host
