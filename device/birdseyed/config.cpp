@@ -205,25 +205,29 @@ std::optional<std::string> text_of_file(const std::filesystem::path& path, std::
 constexpr std::size_t kMostFieldBytes = 4U << 20U;
 constexpr std::size_t kMostRecordBytes = 60'000;  // one message of the wire carries it
 
-void read_calibration(ConfigSection& section, Config& config) {
-  std::string field, path;
-  section.text("field", field);
-  if (!field.empty()) {
-    const auto map_text = text_of_file(field, kMostFieldBytes);
-    if (!map_text)
-      return section.fail("field", field + ": cannot be read; see whether it is there, its owner and mode");
-    auto parsed = calibration::parse_field_map(*map_text);
-    if (!parsed) return section.fail("field", field + ": " + parsed.error().what);
-    config.core.field = std::move(parsed->map);
-  }
-  section.text("record", path);
-  if (path.empty()) return;
+void read_field_map(const std::string& path, ConfigSection& section, Config& config) {
+  const auto text = text_of_file(path, kMostFieldBytes);
+  if (!text) return section.fail("field", path + ": cannot be read; see whether it is there, its owner and mode");
+  auto parsed = calibration::parse_field_map(*text);
+  if (!parsed) return section.fail("field", path + ": " + parsed.error().what);
+  config.core.field = std::move(parsed->map);
+}
+
+void read_calibration_record(const std::string& path, ConfigSection& section, Config& config) {
   const auto text = text_of_file(path, kMostRecordBytes);
   if (!text) return section.fail("record", path + ": cannot be read; see whether it is there, its owner and mode");
   if (text->size() > kMostRecordBytes) return section.fail("record", path + ": is no calibration record");
   if (const auto record = calibration::parse_record(*text); !record)
     return section.fail("record", path + ": " + record.error().what);
   config.core.calibration = *text;
+}
+
+void read_calibration(ConfigSection& section, Config& config) {
+  std::string field, record;
+  section.text("field", field);
+  section.text("record", record);
+  if (!field.empty()) read_field_map(field, section, config);
+  if (!record.empty()) read_calibration_record(record, section, config);
 }
 
 constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] = {{"tracker", read_tracker},

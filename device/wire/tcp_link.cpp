@@ -140,8 +140,7 @@ Result<std::unique_ptr<Link>> connect_tcp(const std::string& host, int port, Dea
   for (;;) {
     if (UniqueFd fd = try_connect(*found, deadline)) return link_over(std::move(fd));
     if (deadline.passed()) {
-      return Error{Errc::not_found,
-                   fmt::format("{}:{}: no appliance answers; is birdseyed running there?", host, port)};
+      return Error{Errc::not_found, fmt::format("{}:{}: nothing answers", host, port)};
     }
     sleep_for(kConnectAgain);
   }

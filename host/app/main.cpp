@@ -4,6 +4,7 @@
 int main(int argc, char** argv) {
   using namespace birdseye::host;
   CLI::App app{"birdseye: a registered, deformable CT over live laparoscopic video", "birdseye"};
+  app.set_version_flag("--version", "birdseye " BIRDSEYE_VERSION);
   app.require_subcommand(1);
   CommandStatus status;
   add_bench(app, status);

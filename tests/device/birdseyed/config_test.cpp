@@ -56,6 +56,16 @@ TEST(Config, TakesOnlyAWholeCalibrationRecord) {
   std::filesystem::remove(path);
 }
 
+TEST(Config, AFieldMapThatIsNotThereHidesNoMistakeInTheRecord) {
+  const auto config =
+      read(kSound + std::string("[calibration]\nfield = \"/none/f.json\"\nrecord = \"/none/r.json\"\n"));
+  ASSERT_FALSE(config);
+  const std::string& what = config.error().what;
+  EXPECT_NE(what.find("[calibration] field: /none/f.json: cannot be read"), std::string::npos) << what;
+  EXPECT_NE(what.find("[calibration] record: /none/r.json: cannot be read"), std::string::npos) << what;
+  EXPECT_EQ(what.find("unknown key"), std::string::npos) << what;
+}
+
 TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
   const auto config = read(kSound);
   ASSERT_TRUE(config) << config.error().what;
