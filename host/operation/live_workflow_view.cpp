@@ -45,7 +45,7 @@ OperationView LiveWorkflow::view() const {
                                    markers ? *markers : std::vector<Eigen::Vector3d>(), deformed);
   }
   const auto& setup = picture_.setup();
-  const auto& camera_from_patient = picture_.camera_from_patient();
+  const auto camera_from_patient = picture_.camera_from_patient();
   if (!camera_from_patient) return out;
   const Eigen::Vector3d target_mm = target_in_patient_mm(*out.patient);
   if (step_ == LiveStep::views) out.view_advice = views_.advice(*camera_from_patient, target_mm);

@@ -32,12 +32,19 @@ bool FramePainter::fits(const wire::VideoFrame& frame) const {
   return !setup_ || (frame.width_px == setup_->camera.width_px && frame.height_px == setup_->camera.height_px);
 }
 
+std::optional<Transform<Camera, Patient>> FramePainter::camera_from_patient(
+    const wire::VideoFrame& frame, const OverlayGate::Decision& decision) const {
+  if (!setup_ || !fits(frame) || !decision.tracker_from_sensor || decision.strength <= 0) return std::nullopt;
+  return setup_->camera_from_patient(*decision.tracker_from_sensor);
+}
+
 std::optional<FramePainter::Painted> FramePainter::paint(const wire::VideoFrame& frame,
                                                          const OverlayGate::Decision& decision, Engine& engine,
                                                          const OverlayLook& look) const {
-  if (!setup_ || !fits(frame) || !decision.tracker_from_sensor || decision.strength <= 0) return std::nullopt;
+  const auto from = camera_from_patient(frame, decision);
+  if (!from) return std::nullopt;
   Painted out;
-  out.camera_from_patient = setup_->camera_from_patient(*decision.tracker_from_sensor);
+  out.camera_from_patient = *from;
   const ImageRgba overlay = engine.render(setup_->camera, out.camera_from_patient, look.render);
   out.rgb = lay_over(*frame.rgb, overlay, decision.strength, look);
   return out;

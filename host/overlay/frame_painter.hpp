@@ -40,6 +40,10 @@ class FramePainter {
   /// The frame is of the size that the camera was calibrated at; so it is where there is no setup.
   [[nodiscard]] bool fits(const wire::VideoFrame& frame) const;
 
+  /// Where the frame's overlay is drawn from, by the decision on this frame. Empty: nothing is drawn over it.
+  [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient(
+      const wire::VideoFrame& frame, const OverlayGate::Decision& decision) const;
+
   struct Painted {
     Transform<Camera, Patient> camera_from_patient;
     std::vector<std::uint8_t> rgb;  ///< of the frame's size, rows from the top

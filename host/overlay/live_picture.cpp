@@ -21,6 +21,8 @@ std::vector<std::uint8_t> greyed(const std::vector<std::uint8_t>& rgb) {
 void LivePicture::set_setup(std::optional<Setup> setup, const TrustFigures& figures, const std::string& why_none) {
   painter_.set_setup(std::move(setup), figures);
   why_no_setup_ = why_none;
+  // What the setup before allowed is not allowed by this one.
+  decision_ = frame_ ? painter_.decide(*frame_) : OverlayGate::Decision();
   overlaid_.clear();
   kind_ = -1;
 }
@@ -38,13 +40,14 @@ void LivePicture::draw() {
   dirty_ = false;
   overlaid_.clear();
   stopped_.clear();
-  camera_from_patient_.reset();
   kind_ = -1;
   if (engine_ == nullptr) return;
   auto painted = painter_.paint(*frame_, decision_, *engine_, look_);
-  if (!painted) return;
-  camera_from_patient_ = painted->camera_from_patient;
-  overlaid_ = std::move(painted->rgb);
+  if (painted) overlaid_ = std::move(painted->rgb);
+}
+
+std::optional<Transform<Camera, Patient>> LivePicture::camera_from_patient() const {
+  return frame_ && engine_ ? painter_.camera_from_patient(*frame_, decision_) : std::nullopt;
 }
 
 ShownPicture LivePicture::at(HostTime now) {

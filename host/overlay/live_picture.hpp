@@ -28,7 +28,7 @@ struct ShownPicture {
   std::optional<HostTime> believe_until;
 };
 
-/// The picture and its safety (design, section 7): each frame is overlaid with the pose that came with it, if the gate
+/// The picture and its safety: each frame is overlaid with the pose that came with it, if the gate
 /// lets it; and whatever is shown loses its overlay when it is older than a moment, so that nothing stale is taken for
 /// the truth. Times are given, never read: tests play them.
 class LivePicture {
@@ -74,10 +74,8 @@ class LivePicture {
   [[nodiscard]] const std::optional<wire::VideoFrame>& frame() const { return frame_; }
   [[nodiscard]] HostTime exposed() const { return exposed_; }
   [[nodiscard]] std::uint64_t frames_skipped() const { return skipped_; }
-  /// Where the newest frame's overlay was drawn from.
-  [[nodiscard]] const std::optional<Transform<Camera, Patient>>& camera_from_patient() const {
-    return camera_from_patient_;
-  }
+  /// Where the newest frame's overlay is drawn from; empty where nothing is drawn over it.
+  [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient() const;
 
  private:
   Settings settings_;
@@ -88,7 +86,6 @@ class LivePicture {
   std::optional<wire::VideoFrame> frame_;
   HostTime exposed_;
   OverlayGate::Decision decision_;
-  std::optional<Transform<Camera, Patient>> camera_from_patient_;
   std::vector<std::uint8_t> overlaid_, stopped_;
   std::uint64_t changes_ = 0, skipped_ = 0;
   bool dirty_ = false;

@@ -200,6 +200,37 @@ TEST(LivePicture, NothingIsDrawnByAFigureThatNobodyKnows) {
   EXPECT_EQ(shown.reason, "how well the camera is calibrated is not known");
 }
 
+TEST(LivePicture, AFrameIsJudgedByTheSetupThatDrawsIt) {
+  LivePicture picture;
+  picture.set_engine(std::make_shared<Magenta>());
+  picture.set_setup(setup(), kGood);
+  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.set_setup(setup(), {});  // between the frame's coming and its drawing
+  picture.draw();
+  const ShownPicture shown = picture.at(HostTime{10 * kMs});
+  EXPECT_FALSE(shown.overlaid);
+  EXPECT_EQ(magenta_in(*shown.rgb), 0);
+  EXPECT_EQ(shown.reason, "how well the camera is calibrated is not known");
+  EXPECT_FALSE(picture.camera_from_patient());
+}
+
+TEST(LivePicture, APoseIsTheNewestFramesAlsoBeforeThatIsDrawn) {
+  LivePicture picture;
+  picture.set_engine(std::make_shared<Magenta>());
+  picture.set_setup(setup(), kGood);
+  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.draw();
+  PoseAnswer moved = good_pose();
+  moved.tracker_from_sensor = Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), {7, 0, 0});
+  picture.take(frame_at(40, moved), HostTime{40 * kMs});
+  ASSERT_TRUE(picture.camera_from_patient());
+  EXPECT_NEAR(picture.camera_from_patient()->translation().x(), -7, 1e-12);
+  PoseAnswer refused;
+  refused.reason = "the tracker is silent";
+  picture.take(frame_at(80, refused), HostTime{80 * kMs});
+  EXPECT_FALSE(picture.camera_from_patient());
+}
+
 TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
   LivePicture picture;
   auto frame = frame_at(0, {});
