@@ -60,12 +60,12 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
                          {"reasons_of_frames", done.reasons},
                          {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
                          {"engine", engine},
-                         {"camera_rms_px", *figures.scope.camera_rms_px},
-                         {"tracked_rms_px", *figures.scope.held_out_px},
                          {"fre_mm", *figures.fre_mm},
                          {"touches", setup.touches},
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
+  if (figures.scope.camera_rms_px) json["camera_rms_px"] = *figures.scope.camera_rms_px;
+  if (figures.scope.held_out_px) json["tracked_rms_px"] = *figures.scope.held_out_px;
   return json;
 }
 

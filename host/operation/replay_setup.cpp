@@ -154,7 +154,7 @@ Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
   if (!record) return record.error();
   auto scope = scope_of(inputs, *record);
   if (!scope) return scope.error();
-  ReplaySetup out{*std::move(scope), {}, {}, {}, inputs.fre_mm, 0};
+  ReplaySetup out{*std::move(scope), {}, {}, {}, inputs.fre_mm, 0, !inputs.camera.empty()};
   if (auto taken = take_registration(inputs, *record, out); !taken) return taken.error();
   return out;
 }
@@ -170,8 +170,12 @@ ReplayTrust trust_of(const ReplaySetup& setup, const Volume& ct) {
   const auto note = [&out](const char* name, const std::optional<double>& figure) {
     if (!figure) out.vouched_for.emplace_back(name);
   };
-  note("camera_rms_px", known.scope.camera_rms_px);
-  note("tracked_rms_px", known.scope.held_out_px);
+  if (setup.scope_from_files) {
+    note("camera_rms_px", known.scope.camera_rms_px);
+    note("tracked_rms_px", known.scope.held_out_px);
+  } else {
+    out.figures.scope = known.scope;
+  }
   note("fre_mm", known.fre_mm);
   note("target_mm", known.target_mm);
   return out;

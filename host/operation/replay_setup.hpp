@@ -32,6 +32,7 @@ struct ReplaySetup {
   Transform<Patient, Patient> patient_from_model;  ///< identity without a pose of `register views`
   std::optional<double> fre_mm;                    ///< of the touches, or as it is stated
   std::size_t touches = 0;
+  bool scope_from_files = false;  ///< lens and hand-eye, in place of a calibration record, which states its figures
 
   [[nodiscard]] Setup setup() const { return scope.registered(tracker_from_patient * patient_from_model); }
 };
@@ -41,7 +42,7 @@ struct ReplaySetup {
 Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs);
 
 /// By what the gate judges the replay, and which figures nothing says: files hold none, and whoever gives them answers
-/// for them.
+/// for them. Nobody answers for what a calibration record does not state.
 struct ReplayTrust {
   TrustFigures figures;
   std::vector<std::string> vouched_for;

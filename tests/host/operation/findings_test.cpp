@@ -54,7 +54,7 @@ TEST(ReplayTrust, OfTouchesIsWhatALiveOperationWouldJudgeBy) {
 }
 
 TEST(ReplayTrust, OfFilesNamesEachFigureThatNothingSays) {
-  ReplaySetup setup{scope(std::nullopt, 0), kTrackerFromPatient, {}, {}, std::nullopt, 0};
+  ReplaySetup setup{scope(std::nullopt, 0), kTrackerFromPatient, {}, {}, std::nullopt, 0, true};
   EXPECT_EQ(trust_of(setup, ct()).vouched_for,
             (std::vector<std::string>{"camera_rms_px", "tracked_rms_px", "fre_mm", "target_mm"}));
   setup.scope = scope(0.3, 2);
@@ -62,6 +62,13 @@ TEST(ReplayTrust, OfFilesNamesEachFigureThatNothingSays) {
   const ReplayTrust trust = trust_of(setup, ct());
   EXPECT_EQ(trust.vouched_for, std::vector<std::string>{"target_mm"});
   EXPECT_EQ(trust.figures.fre_mm, 9) << "what is stated stays";
+}
+
+TEST(ReplayTrust, NobodyAnswersForWhatARecordDoesNotState) {
+  const ReplaySetup setup{scope(std::nullopt, 0), kTrackerFromPatient, {}, {}, 0.4, 0, false};
+  const ReplayTrust trust = trust_of(setup, ct());
+  EXPECT_EQ(trust.vouched_for, std::vector<std::string>{"target_mm"});
+  EXPECT_FALSE(trust.figures.scope.camera_rms_px);
 }
 
 TEST(Target, IsTheFirstLandmarkElseTheMiddleOfTheCt) {
