@@ -16,6 +16,7 @@
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
+#include "host/window/show_scene.hpp"
 #include "host/window/window.hpp"
 
 namespace birdseye::host {

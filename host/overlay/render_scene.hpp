@@ -19,8 +19,6 @@
 
 namespace birdseye::host {
 
-class Window;
-
 /// What `birdseye render` draws, once all is read.
 struct RenderScene {
   Volume volume;
@@ -57,10 +55,5 @@ Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, P
 /// With a path the camera goes along it, from the first pose in the first frame to the last in the last. Without, and
 /// with a deformation: it grows from nothing and goes back. Without both the camera swings about the volume's middle.
 Result<void> film_scene(const std::filesystem::path& path, const RenderScene& scene, Engine& engine);
-
-/// Shows the scene in a window until the user closes it, or after so many pictures where that is not 0. The mouse turns
-/// the volume about its middle and the wheel comes nearer; keys: R back to the start, C the cut, D the deformation,
-/// Esc. What the window showed last.
-Result<Picture> show_scene(Window& window, const RenderScene& scene, Engine& engine, int most_pictures);
 
 }  // namespace birdseye::host

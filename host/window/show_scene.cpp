@@ -1,10 +1,10 @@
+#include "host/window/show_scene.hpp"
+
 #include <fmt/format.h>
 
 #include "drivers/system/interrupt.hpp"
 #include "host/overlay/compositor.hpp"
-#include "host/overlay/render_scene.hpp"
 #include "host/window/orbit.hpp"
-#include "host/window/window.hpp"
 
 namespace birdseye::host {
 
