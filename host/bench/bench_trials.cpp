@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include "drivers/system/child_process.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/bench/bench_machine.hpp"
+#include "host/bench/processor_time.hpp"
 #include "host/case/registration_error.hpp"
 #include "host/case/run_registration.hpp"
 
@@ -100,12 +100,12 @@ Result<Trial> try_once(const RegistrationCase& c, const Method& method) {
   own.similarity = method.similarity;
   own.most_evaluations = method.most_evaluations;
   const HostTime began = host_now();
-  const std::clock_t processor_began = std::clock();
+  const double processor_began_s = process_cpu_s();
   const auto found = run_registration(own, *transfer, false, [](const std::string&) {});
   if (!found) return found.error();
   Trial trial;
   trial.time_s = (host_now() - began).seconds();
-  trial.processor_s = static_cast<double>(std::clock() - processor_began) / CLOCKS_PER_SEC;
+  trial.processor_s = process_cpu_s() - processor_began_s;
   trial.evaluations = found->evaluations + found->gradient_evaluations;
   if (!c.truth) return Error{Errc::bad_value, "the case has no [truth] control_points; make it by birdseye-sim case"};
   trial.epsilon_before = epsilon(*c.truth, nullptr);
