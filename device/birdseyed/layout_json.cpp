@@ -8,22 +8,8 @@
 namespace birdseye {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Duration, ns)
-static void to_json(nlohmann::json& json, const PoseHistory::Settings& settings) {
-  json = {{"capacity", settings.capacity},
-          {"max_gap", settings.max_gap},
-          {"max_prediction", settings.max_prediction},
-          {"max_time_sigma", settings.max_time_sigma},
-          {"acceleration_mm_s2", settings.acceleration_mm_s2},
-          {"smoothing", settings.smoothing}};
-}
-static void from_json(const nlohmann::json& json, PoseHistory::Settings& settings) {
-  json.at("capacity").get_to(settings.capacity);
-  json.at("max_gap").get_to(settings.max_gap);
-  json.at("max_prediction").get_to(settings.max_prediction);
-  json.at("max_time_sigma").get_to(settings.max_time_sigma);
-  json.at("acceleration_mm_s2").get_to(settings.acceleration_mm_s2);
-  json.at("smoothing").get_to(settings.smoothing);
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PoseHistory::Settings, capacity, max_gap, max_prediction, max_time_sigma,
+                                   acceleration_mm_s2, smoothing)
 
 }  // namespace birdseye
 
