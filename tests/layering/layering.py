@@ -6,60 +6,31 @@ usage: layering.py [ROOT]           tells what breaks a rule, one a line with th
 """
 import configparser
 import fnmatch
+import functools
 import pathlib
 import posixpath
 import re
 import sys
 
-TOPS = ("calibration", "drivers", "device", "host", "hw-sim", "tests")
-CODE = (".hpp", ".cpp", ".h", ".hh", ".hxx", ".inl", ".ipp", ".c", ".cc", ".cxx")
-HEADERS = (".hpp", ".h", ".hh", ".hxx", ".inl", ".ipp")
+sys.dont_write_bytecode = True
+from build_files import OPTIONS, Build
+from source_files import HEADERS, Words, project_folder, read_units
+
 RULES = {  # every name that a complaint can have, beside the sections of words and headers in rules.ini
-    "include": "an include that the table does not allow",
-    "link": "a link that the table does not allow",
+    "include": "an include, or a declaration of a type, that the table does not allow",
+    "link": "a link, or a file built, that the table does not allow",
     "unlinked": "an include without the link that it needs, or with a PRIVATE one in a header",
     "unneeded link": "a link that no include needs, or PUBLIC where no header needs it",
     "unneeded edge": "an edge of the table that no include needs",
     "order": "an edge that points up in the table, or folders added to the build in another order",
     "unknown folder": "a folder that the table does not know, or that is no more",
+    "unknown header": "an include that is neither a file of ours that is read nor any that rules.ini knows",
     "target name": "a library that is not called after its folder",
-    "spelling": "an include that does not name its file from the root of the tree",
+    "spelling": "an include that does not name its file from the root of the tree, or code that could hide one or a word",
+    "build": "what a folder's CMakeLists.txt says in a way that is not understood here",
+    "atomic wait": "a wait for an atomic's value, which has no deadline",
     "unneeded exception": "an exception in rules.ini that nothing needs any more",
 }
-
-# Comments go; strings are kept apart, because an include's name is one and a word in a message is no use of it.
-TOKEN = re.compile(
-    r'//[^\n]*|/\*.*?\*/|R"([^(\s]*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<![0-9A-Fa-f])\'(?:\\.|[^\'\\\n])*\'', re.S)
-INCLUDE = re.compile(r'^[ \t]*#[ \t]*(?:include|include_next|import)\b[ \t]*(.*)$', re.M)
-
-
-class Unit:
-    """One file: what it includes, by line, and its text without comments and strings."""
-
-    def __init__(self, root, path):
-        self.path = path
-        self.folder = path.rpartition("/")[0]
-        text = (root / path).read_text()
-        self.includes = []  # (line, name, quoted); the name is None where a macro stands for it
-        bare = TOKEN.sub(lambda m: m[0] if m[0][0] == '"' else blank(m[0]), text)
-        for found in INCLUDE.finditer(bare):
-            line = bare.count("\n", 0, found.start()) + 1
-            name = re.match(r'"([^"]+)"|<([^>]+)>', found[1])
-            self.includes.append((line, name and (name[1] or name[2]), bool(name and name[1])))
-        self.code = TOKEN.sub(lambda m: blank(m[0]), text).split("\n")
-
-
-def blank(text):
-    return "\n" * text.count("\n") or " "
-
-
-def project_folder(name):
-    return name.rpartition("/")[0] if name and name.partition("/")[0] in TOPS else None
-
-
-def read_units(root):
-    paths = (p for top in TOPS for p in sorted((root / top).rglob("*")) if p.suffix in CODE)
-    return {u.path: u for u in (Unit(root, p.relative_to(root).as_posix()) for p in paths)}
 
 
 class Rules:
@@ -69,6 +40,8 @@ class Rules:
         ini.read_string(path.read_text(), str(path))
         self.edges = {folder: allowed.split() for folder, allowed in ini["edges"].items()}
         self.packages = {package: headers.split() for package, headers in ini["packages"].items()}
+        self.outside = " ".join(ini["headers of the language and the system"].values()).split()
+        self.not_read = set(ini["build files that are not read"])
         self.linked_for_more = {k: v.split() for k, v in ini["linked for more than includes"].items()}
         self.sections = {name: {k: v.split() for k, v in ini[name].items() if k != "because"}
                          for name in ini.sections() if re.match(r"(words|headers): ", name)}
@@ -84,61 +57,17 @@ class Rules:
         return folder == other or row is not None and any(
             other == edge or edge.endswith("/*") and (other + "/").startswith(edge[:-1]) for edge in self.edges[row])
 
+    @functools.cache
     def package(self, include):
         return next((p for p, headers in self.packages.items() if any(fnmatch.fnmatchcase(include, h) for h in headers)), None)
 
 
-class Target:
-    """A library, program or test of the build, with the folder whose CMakeLists.txt makes it."""
-
-    def __init__(self, name, folder, kind):
-        self.name, self.folder, self.kind = name, folder, kind
-        self.sources, self.not_alone = [], []  # files, by their paths from the root
-        self.links = {}  # name: PUBLIC or PRIVATE
-
-
-def read_build(root):
-    """All targets, and the folders in the order in which they are added, of every CMakeLists.txt from the root's on."""
-    targets, order = {}, []
-
-    def read(folder):
-        text = re.sub(r"#[^\n]*", "", (root / folder / "CMakeLists.txt").read_text())
-        here = folder.as_posix()
-        for command, words in re.findall(r"(\w+)\s*\(([^()]*)\)", text):
-            words = re.findall(r'"[^"]*"|\S+', words)
-            if command == "add_subdirectory":
-                order.append((folder / words[0]).as_posix())
-                read(folder / words[0])
-            elif command in ("birdseye_library", "birdseye_executable", "birdseye_test", "add_library", "add_executable"):
-                kind = "library" if command in ("birdseye_library", "add_library") else "program"
-                target = targets.setdefault(words[0], Target(words[0], here, kind))
-                part = "SOURCES"
-                for word in words[1:]:
-                    if re.fullmatch("[A-Z_]+", word):
-                        part = word
-                    elif part in ("SOURCES", "NOT_ALONE") and word.endswith(CODE):
-                        path = word.replace("${CMAKE_SOURCE_DIR}/", "") if "$" in word else f"{here}/{word}"
-                        (target.sources if part == "SOURCES" else target.not_alone).append(posixpath.normpath(path))
-                    elif part in ("PUBLIC", "PRIVATE"):
-                        target.links[word] = part
-            elif command == "target_link_libraries":
-                part = "PRIVATE"
-                for word in words[1:]:
-                    if word in ("PUBLIC", "PRIVATE", "INTERFACE"):
-                        part = "PRIVATE" if word == "PRIVATE" else "PUBLIC"
-                    else:
-                        targets.setdefault(words[0], Target(words[0], here, "program")).links[word] = part
-
-    read(pathlib.Path("."))
-    return targets, order
-
-
 class Check:
     def __init__(self, root):
-        self.root = root
         self.rules = Rules(root / "tests/layering/rules.ini")
         self.units = read_units(root)
-        self.targets, self.added = read_build(root)
+        self.build = Build(root, self.rules.not_read)
+        self.targets, self.added = self.build.targets, self.build.added
         self.not_alone = {path for t in self.targets.values() for path in t.not_alone}
         self.library_of = {t.folder: t for t in self.targets.values() if t.kind == "library" and t.folder != "."}
         self.told = []
@@ -159,6 +88,10 @@ class Check:
     def run(self):
         self.check_table()
         self.check_includes()
+        self.check_types()
+        self.check_spelling()
+        self.check_atomics()
+        self.check_build()
         self.check_targets()
         for name, section in self.rules.sections.items():
             self.check_section(name, section)
@@ -194,10 +127,56 @@ class Check:
             for line, name, quoted in unit.includes:
                 place = f"{unit.path}:{line}"
                 other = project_folder(name)
-                if name is None or quoted and other is None or ".." in name.split("/"):
+                if name is None or quoted and other is None or name != posixpath.normpath(name) or name[0] == "/":
                     self.tell("spelling", place, f'includes {name or "by a macro"}: write "folder/file.hpp", from the root')
                 elif other and not self.rules.allows(unit.folder, other):
                     self.tell("include", place, f"includes {name}, which {unit.folder} may not")
+                elif other and name not in self.units:
+                    self.tell("unknown header", place, f"includes {name}, which is not there, or not called as code is")
+                elif not other and not self.rules.package(name) and not matches(name, self.rules.outside):
+                    self.tell("unknown header", place, f"includes <{name}>, of which rules.ini knows no package")
+
+    def check_types(self):
+        """A type of another folder is that folder's also where it is only declared."""
+        folders = {}
+        for unit in self.units.values():
+            for name in unit.defined if not unit.folder.startswith("tests") else ():
+                folders.setdefault(name, set()).add(unit.folder)
+        for unit in self.units.values():
+            for line, name in unit.declared:
+                if name in folders and not any(self.rules.allows(unit.folder, folder) for folder in folders[name]):
+                    self.tell("include", f"{unit.path}:{line}",
+                              f"declares {name}, of {min(folders[name])}, which {unit.folder} may not")
+
+    def check_spelling(self):
+        """A namespace whose name some rule's words have is always named."""
+        words = [w for section in self.rules.sections.values() for w in section.get("words", [])]
+        spaces = "|".join(sorted({w.split("::")[0] for w in words if "::" in w} - {""}))
+        hidden = spaces and re.compile(rf"\b(?:using\s+namespace|namespace\s+\w+\s*=)\s+(?:::\s*)?(?:{spaces})\s*;")
+        for unit in self.units.values():
+            for line, what in unit.odd:
+                self.tell("spelling", f"{unit.path}:{line}", f"has {what}: write it plainly")
+            for found in hidden.finditer(unit.code) if hidden else ():
+                self.tell("spelling", f"{unit.path}:{unit.line(found)}", f"has {found[0]} Name it where it is used")
+
+    def check_atomics(self):
+        """Nothing but its name tells whether what is waited for is an atomic: so the name of one is of none else's."""
+        declared = re.compile(r"\batomic(?:_\w+)?\s*(?:<[^;{}()]*>)?[\s&*]+(?=\w)([^;(){}]*)")
+        names = {name for u in self.units.values() if "atomic" in u.code for m in declared.finditer(u.code)
+                 for name in re.findall(r"(?:^|,)\s*(\w+)", m[1])}
+        waits = re.compile(r"\b(\w+)(?:\[[^]]*\])*\s*(?:\.|->)\s*wait\s*\(")
+        for unit in self.units.values():
+            if unit.folder != "drivers/system" and not unit.folder.startswith("tests"):
+                for found in waits.finditer(unit.code):
+                    if found[1] in names:
+                        place = f"{unit.path}:{unit.line(found)}"
+                        self.tell("atomic wait", place, f"waits for {found[1]}: use drivers/system's Condition")
+
+    def check_build(self):
+        for place, what in self.build.told:
+            self.tell("build", place, what)
+        for path in sorted(self.rules.not_read - self.build.passed_over):
+            self.tell("unneeded exception", "tests/layering/rules.ini", f"{path}: no CMakeLists.txt of a folder includes it")
 
     def needs(self, path, seen):
         """The targets and packages that a file's includes ask for: also through headers of its own folder, of no target, and
@@ -227,8 +206,7 @@ class Check:
                 expected = "birdseye_" + re.sub(r"^hw-sim/", "sim/", target.folder).replace("/", "_")
                 if target.name != expected:
                     self.tell("target name", place, f"{target.name} should be called {expected}")
-            if not target.sources or any(s not in self.units for s in target.sources):
-                continue  # of another project's sources
+            self.check_sources(target, place)
             public, private = set(), set()
             if target.kind == "library":
                 seen = set()
@@ -251,7 +229,9 @@ class Check:
                     self.tell("unlinked", place, f"{target.name} links {name} PRIVATE, and headers of its folder include it")
             for name, kind in target.links.items():
                 other = self.targets.get(name)
-                if other and other.folder != "." and other.kind == "library" and not self.rules.allows(target.folder, other.folder):
+                if name not in known | {OPTIONS}:
+                    self.tell("build", place, f"{target.name} links {name}, which is neither a folder's library nor in [packages]")
+                elif other and other.folder != "." and not self.rules.allows(target.folder, other.folder):
                     self.tell("link", place, f"{target.name} links {name}, which {target.folder} may not")
                 elif name not in known or name in more:
                     continue
@@ -263,21 +243,25 @@ class Check:
                 if name not in target.links or name in public | private:
                     self.tell("unneeded exception", "tests/layering/rules.ini", f"{target.name} = {name}")
 
+    def check_sources(self, target, place):
+        for source in target.sources + target.not_alone:
+            folder = posixpath.dirname(source)
+            if source not in self.units:
+                self.tell("build", place, f"{target.name} is built of {source}, which is no file of the tree that is read")
+            elif folder != target.folder and not (target.folder.startswith("tests") and (
+                    folder.startswith(target.folder + "/") or self.rules.allows(target.folder, folder))):
+                self.tell("link", place, f"{target.name} is built of {source}, which {target.folder} may not")
+
     def check_section(self, name, section):
         rule = name.partition(": ")[2]
-        patterns = [(word, word_pattern(word)) for word in section.get("words", [])]
-        headers = section.get("headers", [])
+        words, headers = Words(section.get("words", [])), section.get("headers", [])
         exceptions = section.get("but not in", []) + section.get("not yet in", [])
         excepted = set()
         for unit in self.units.values():
-            if not any(fnmatch.fnmatchcase(unit.path, p) for p in section["in"]):
+            if not matches(unit.path, section["in"]):
                 continue
-            found = []
-            for line, include, _ in unit.includes:
-                if include and any(fnmatch.fnmatchcase(include, h) for h in headers):
-                    found.append((line, f"<{include}>"))
-            for word, pattern in patterns:
-                found += [(i + 1, word) for i, text in enumerate(unit.code) if pattern.search(text)]
+            found = [(line, f"<{include}>") for line, include, _ in unit.includes if include and matches(include, headers)]
+            found += words.find(unit)
             place = [p for p in exceptions if fnmatch.fnmatchcase(unit.path, p)]
             if found and place:
                 excepted.update(place)
@@ -289,11 +273,8 @@ class Check:
                 self.tell("unneeded exception", "tests/layering/rules.ini", f"[{name}] {path}: nothing there breaks the rule")
 
 
-def word_pattern(word):
-    """The word as code would have it: not as the end of a longer name, and not as its beginning unless it ends in _."""
-    before = r"(?<![\w])" if re.match(r"[\w:]", word) else ""
-    after = r"(?![\w])" if re.search(r"[^\W_]$", word) else ""
-    return re.compile(before + re.escape(word) + after)
+def matches(name, patterns):
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def main(arguments):
