@@ -29,7 +29,7 @@ Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan
   if (!truth) return truth.error();
   std::map<std::uint64_t, std::pair<Eigen::Vector2d, Eigen::Vector2d>> places;
   for (const OverlaidFrame& frame : session.overlaid) {
-    const auto found = overlay_error(*truth, frame.sequence, session.setup->camera, frame.camera_from_patient,
+    const auto found = overlay_error(*truth, frame.sequence, session.setup->camera(), frame.camera_from_patient,
                                      plan.tumour_centre_in_patient_mm);
     if (!found) {
       return Error{Errc::bad_format, fmt::format("{}: lacks frame {}, which was overlaid; run the demo again",
@@ -141,9 +141,9 @@ Result<ExitCode> demo(const DemoOptions& options) {
   if (auto filmed = session.finish(); !filmed) return filmed.error();
   if (auto compared = compare(out, session, *plan); !compared) return compared.error();
   const Setup& setup = *session.setup;
-  if (auto written = write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient.matrix())},
-                                  {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor.matrix())},
-                                  {out / "camera.yaml", camera_text(setup.camera)}});
+  if (auto written = write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient().matrix())},
+                                  {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor().matrix())},
+                                  {out / "camera.yaml", camera_text(setup.camera())}});
       !written) {
     return written.error();
   }

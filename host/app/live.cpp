@@ -154,7 +154,7 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
     return as_shown_mm(tumour_mm, shape == operation.shapes ? operation.deformed.get() : nullptr);
   };
   const auto by_shape =
-      logged_target_errors(options.live.out, options.live.out / "truth", setup->camera, tumour_as_shown_mm);
+      logged_target_errors(options.live.out, options.live.out / "truth", setup->camera(), tumour_as_shown_mm);
   if (!by_shape) return by_shape.error();
   // What is on the screen at the end is judged.
   const auto last = by_shape->find(operation.shapes);

@@ -18,7 +18,7 @@
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
-#include "host/overlay/compositor.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/labels.hpp"
 
@@ -160,7 +160,8 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
   return json;
 }
 
-/// Overlays of every view before and after, and where its grey and the synthetic picture's differ.
+/// Overlays of every view before and after, and where its grey and the synthetic picture's differ. Lenses and poses are
+/// the case's files.
 Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const TransferFunction& transfer,
                                           const ViewRegistration& found) {
   std::optional<Volume> kept;
@@ -172,6 +173,8 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   auto engine = make_engine("cpu", kept ? *kept : c.ct, transfer);
   if (!engine) return engine.error();
   std::vector<FileText> files;
+  OverlayLook look;
+  look.opacity = 0.7;
   for (const bool after : {false, true}) {
     if (after) (*engine)->deform(found.field);
     if (!after && c.initial) (*engine)->deform(*c.initial);
@@ -179,15 +182,14 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
       const VideoView& view = c.views[n];
       const Transform<Camera, Patient> camera_from_model =
           after ? view.camera_from_patient * found.patient_from_model : view.camera_from_patient;
-      const ImageRgba overlay = (*engine)->render(view.camera, camera_from_model, {});
-      constexpr double kStrength = 0.7;
-      const auto mixed = composite(c.pictures[n].rgb, overlay, kStrength);
+      const Still still{c.pictures[n].rgb, view.camera, camera_from_model};
+      const PaintedStill painted = paint_still(still, **engine, look, vouched_for({}));
       const char* const when = after ? "after" : "before";
-      files.push_back(
-          {fmt::format("view{}_{}.png", n, when), png_of(RgbView{mixed, view.camera.width_px, view.camera.height_px})});
+      files.push_back({fmt::format("view{}_{}.png", n, when),
+                       png_of(RgbView{painted.rgb, view.camera.width_px, view.camera.height_px})});
       files.push_back(
           {fmt::format("view{}_difference_{}.png", n, when),
-           png_of(RgbView{difference_picture(view, overlay), view.camera.width_px, view.camera.height_px})});
+           png_of(RgbView{difference_picture(view, painted.volume), view.camera.width_px, view.camera.height_px})});
     }
   }
   return files;

@@ -7,12 +7,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
-#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
@@ -128,9 +126,10 @@ std::string transparent_png_of(ImageRgba image) {
 }
 
 Result<void> write_still(const RenderOptions& options, const RenderScene& scene, Engine& engine) {
-  const HostTime began = host_now();
-  const ImageRgba image = overlay_of(engine, scene, scene.camera_from_patient, scene.settings);
-  const double ms = (host_now() - began).seconds() * 1e3;
+  const OverlayLook look{scene.settings, options.opacity, options.surface_in_front};
+  const PaintedStill painted = draw(engine, scene, scene.camera_from_patient, look);
+  const ImageRgba& image = painted.volume;
+  const double ms = painted.rendered_in.seconds() * 1e3;
   if (const std::string fault = engine.fault(); !fault.empty()) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", engine.name(), fault)};
   }
@@ -149,13 +148,8 @@ Result<void> write_still(const RenderOptions& options, const RenderScene& scene,
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
       {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
-  // Lens and pose are somebody's files.
-  const double strength = decide_still(vouched_for({})).strength;
-  const OverlayLook look{scene.settings, options.opacity, options.surface_in_front};
   const std::string png =
-      options.over.empty()
-          ? transparent_png_of(image)
-          : png_of(RgbView{lay_over(scene.behind.rgb, image, strength, look), image.width_px, image.height_px});
+      options.over.empty() ? transparent_png_of(image) : png_of(RgbView{painted.rgb, image.width_px, image.height_px});
   if (!options.movie.empty()) {
     if (auto filmed = film_scene(options.movie, scene, engine); !filmed) return filmed;
   }

@@ -120,7 +120,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (auto finished = player.finish(); !finished) return finished.error();
   const Verdict verdict = judge(player.done(), **reader, trust);
   const std::string json = text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), verdict));
-  const std::string registration = pose_text(setup->setup().tracker_from_patient.inverse().matrix());
+  const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},
                                   {options.out / "replay.json", json},

@@ -208,7 +208,7 @@ void LiveWorkflow::primary() {
     case LiveStep::deform:
       if (deformation_.running()) return deformation_.cancel();
       if (setup && patient_.plan() && patient_.transfer())
-        deformation_.begin(views_.views(), setup->camera, patient_.plan(), *patient_.transfer());
+        deformation_.begin(views_.views(), setup->camera(), patient_.plan(), *patient_.transfer());
       break;
     case LiveStep::check:
       fiducials_.confirm();

@@ -50,7 +50,7 @@ OperationView LiveWorkflow::view() const {
   const Eigen::Vector3d target_mm = target_in_patient_mm(*out.patient);
   if (step_ == LiveStep::views) out.view_advice = views_.advice(*camera_from_patient, target_mm);
   if (!setup) return out;
-  out.target = target_mark({setup->camera, *camera_from_patient, as_shown_mm(target_mm, deformed),
+  out.target = target_mark({setup->camera(), *camera_from_patient, as_shown_mm(target_mm, deformed),
                             picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm(),
                             deformed != nullptr ? deformed->uncertainty_mm : std::nullopt},
                            picture_.figures());

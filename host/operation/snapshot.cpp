@@ -66,7 +66,7 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
                        {"strength", shown.strength},      {"reason", shown.reason}};
   if (snapshot.fre_mm) sheet["fre_mm"] = *snapshot.fre_mm;
   if (shown.overlaid && snapshot.setup && snapshot.camera_from_patient && snapshot.transfer) {
-    files.push_back({folder / "camera.yaml", camera_text(snapshot.setup->camera)});
+    files.push_back({folder / "camera.yaml", camera_text(snapshot.setup->camera())});
     files.push_back({folder / "camera_from_patient.txt", pose_text(snapshot.camera_from_patient->matrix())});
     files.push_back({folder / "transfer.json", transfer_text(*snapshot.transfer)});
     sheet["drawn_again_by"] = render_arguments(folder, snapshot);

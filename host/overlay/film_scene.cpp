@@ -17,6 +17,8 @@ Result<void> film_scene(const std::filesystem::path& path, const RenderScene& sc
   auto film = Film::open(path, scene.camera.width_px, scene.camera.height_px, kRate_hz);
   if (!film) return film.error();
   const Eigen::Vector3d middle = middle_of(scene.volume);
+  OverlayLook look;
+  look.render = scene.settings;
   Progress progress;
   for (int frame = 0; frame < frames; ++frame) {
     if (frame % 10 == 0) progress(fmt::format("frame {} of {}", frame, frames));
@@ -36,7 +38,7 @@ Result<void> film_scene(const std::filesystem::path& path, const RenderScene& sc
       camera_from_patient =
           scene.camera_from_patient * Transform<Patient, Patient>(turn, Eigen::Vector3d(middle - turn * middle));
     }
-    if (auto added = film->add(draw(engine, scene, camera_from_patient, scene.settings).rgb); !added) return added;
+    if (auto added = film->add(draw(engine, scene, camera_from_patient, look).rgb); !added) return added;
   }
   progress.keep(path.string());
   return film->finish();

@@ -8,6 +8,7 @@
 #include "device/wire/messages.hpp"
 #include "host/overlay/gate.hpp"
 #include "host/overlay/scope_setup.hpp"
+#include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 
 namespace birdseye::host {
@@ -19,9 +20,22 @@ struct OverlayLook {
   bool surface_in_front = false;  ///< the surface's edges and highlights stay before it, so that it reads as inside
 };
 
-/// A rendered overlay over a frame of its size, RGB, rows from the top. strength: as the gate decided, in [0, 1].
-std::vector<std::uint8_t> lay_over(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength,
-                                   const OverlayLook& look);
+/// A picture of which somebody gives lens and pose.
+struct Still {
+  std::span<const std::uint8_t> video;  ///< of the camera's size, RGB, rows from the top; of another size it stays bare
+  CameraModel camera;
+  Transform<Camera, Patient> camera_from_patient;
+  /// By which it was made of what the lens took; what that lens did not see stays bare.
+  const FrameUndistorter* straightened_by = nullptr;
+};
+struct PaintedStill {
+  ImageRgba volume;               ///< alone, transparent where nothing of it is drawn
+  std::vector<std::uint8_t> rgb;  ///< the video, and the volume over it as far as the gate allows
+  Duration rendered_in;           ///< what the engine took
+};
+/// Draws the CT over a still as FramePainter does over a frame: the gate decides by the figures. Files hold none: who
+/// gives them answers by vouched_for().
+PaintedStill paint_still(const Still& still, Engine& engine, const OverlayLook& look, const TrustFigures& figures);
 
 /// Draws the CT over frames of video where their poses are to be believed: asks the gate, renders and lays over. The
 /// same frames in the same order give the same pictures to the bit.

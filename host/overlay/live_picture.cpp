@@ -70,7 +70,7 @@ ShownPicture LivePicture::at(HostTime now) {
     out.reason = fresh.why_too_old;
   } else if (!painter_.fits(*frame_)) {
     out.reason = fmt::format("the video is {} x {} and the camera was calibrated at {} x {}", frame_->width_px,
-                             frame_->height_px, setup()->camera.width_px, setup()->camera.height_px);
+                             frame_->height_px, setup()->camera().width_px, setup()->camera().height_px);
   } else {
     out.reason = decision_.reason;
     out.overlaid = !overlaid_.empty();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "host/overlay/frame_painter.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
@@ -76,18 +75,11 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
   return {};
 }
 
-ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
-                     const RenderSettings& settings) {
-  ImageRgba image = engine.render(scene.camera, camera_from_patient, settings);
-  if (scene.straighten) scene.straighten->hide_unseen(image);
-  return image;
-}
-
-Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
-             const RenderSettings& settings) {
-  const ImageRgba image = overlay_of(engine, scene, camera_from_patient, settings);
-  return {image.width_px, image.height_px,
-          lay_over(scene.behind.rgb, image, decide_still(vouched_for({})).strength, {})};
+PaintedStill draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                  const OverlayLook& look) {
+  const Still still{scene.behind.rgb, scene.camera, camera_from_patient,
+                    scene.straighten ? &*scene.straighten : nullptr};
+  return paint_still(still, engine, look, vouched_for({}));
 }
 
 }  // namespace birdseye::host

@@ -13,6 +13,7 @@
 #include "calibration/geometry/transform.hpp"
 #include "host/deform/displacement_field.hpp"
 #include "host/files/picture.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "host/volume/volume.hpp"
@@ -44,13 +45,9 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
 /// The middle of the volume's box, patient frame.
 Eigen::Vector3d middle_of(const Volume& volume);
 
-/// The scene from here, with settings of its own, where the lens of the video sees anything.
-ImageRgba overlay_of(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
-                     const RenderSettings& settings);
-
-/// That over what is behind it.
-Picture draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
-             const RenderSettings& settings);
+/// The scene from here over what is behind it, with a look of its own. Lens and pose are somebody's files.
+PaintedStill draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
+                  const OverlayLook& look);
 
 /// With a path the camera goes along it, from the first pose in the first frame to the last in the last. Without, and
 /// with a deformation: it grows from nothing and goes back. Without both the camera swings about the volume's middle.

@@ -51,11 +51,7 @@ Result<ScopeSetup> ScopeSetup::of_files(const std::filesystem::path& camera,
 }
 
 Setup ScopeSetup::registered(const Transform<Tracker, Patient>& tracker_from_patient) const {
-  Setup out;
-  out.camera = camera_;
-  out.camera_from_sensor = camera_from_sensor_;
-  out.tracker_from_patient = tracker_from_patient;
-  return out;
+  return {camera_, camera_from_sensor_, tracker_from_patient};
 }
 
 }  // namespace birdseye::host

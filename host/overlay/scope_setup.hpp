@@ -18,20 +18,26 @@ namespace birdseye::host {
 class ScopeSetup;
 
 /// What calibration and registration found; with it a frame's pose gives where the CT lies before the camera. Made by
-/// ScopeSetup::registered alone.
-struct Setup {
-  CameraModel camera;
-  Transform<Camera, Sensor> camera_from_sensor;
-  Transform<Tracker, Patient> tracker_from_patient;
-
+/// ScopeSetup::registered alone, and not changed after.
+class Setup {
+ public:
+  [[nodiscard]] const CameraModel& camera() const { return camera_; }
+  [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
+  [[nodiscard]] const Transform<Tracker, Patient>& tracker_from_patient() const { return tracker_from_patient_; }
   [[nodiscard]] Transform<Camera, Patient> camera_from_patient(
       const Transform<Tracker, Sensor>& tracker_from_sensor) const {
-    return camera_from_sensor * tracker_from_sensor.inverse() * tracker_from_patient;
+    return camera_from_sensor_ * tracker_from_sensor.inverse() * tracker_from_patient_;
   }
 
  private:
   friend class ScopeSetup;
-  Setup() = default;
+  Setup(const CameraModel& camera, const Transform<Camera, Sensor>& camera_from_sensor,
+        const Transform<Tracker, Patient>& tracker_from_patient)
+      : camera_(camera), camera_from_sensor_(camera_from_sensor), tracker_from_patient_(tracker_from_patient) {}
+
+  CameraModel camera_;
+  Transform<Camera, Sensor> camera_from_sensor_;
+  Transform<Tracker, Patient> tracker_from_patient_;
 };
 
 /// How the scope is calibrated: its lens, where that sits on its sensor, and how well both are known. There are three

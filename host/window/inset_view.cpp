@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "host/overlay/compositor.hpp"
+#include "host/render/scene/scene.hpp"
 
 namespace birdseye::host {
 
@@ -38,8 +38,8 @@ InsetView::InsetView(const Volume& volume) {
 Picture InsetView::draw(Engine& engine, const std::optional<Transform<Camera, Patient>>& camera_from_patient) const {
   RenderSettings settings;
   settings.step_mm = 2;
-  const std::vector<std::uint8_t> dark(std::size_t{3} * kWidthPx * kHeightPx, 18);
-  Picture picture{kWidthPx, kHeightPx, composite(dark, engine.render(camera_, outside_from_patient_, settings), 1)};
+  constexpr std::uint8_t kDark = 18;
+  Picture picture{kWidthPx, kHeightPx, on_grey(engine.render(camera_, outside_from_patient_, settings), kDark)};
   if (!camera_from_patient) return picture;
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient->inverse();
   cv::Mat canvas(kHeightPx, kWidthPx, CV_8UC3, picture.rgb.data());

@@ -166,7 +166,7 @@ void LiveApp::publish(const ShownPicture& shown) {
   const LivePicture& picture = workflow_.picture();
   PublishedFrame frame;
   frame.exposed = picture.exposed();
-  if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient;
+  if (picture.setup()) frame.tracker_from_patient = picture.setup()->tracker_from_patient();
   frame.camera_from_patient = picture.camera_from_patient();
   publisher_->show(frame);
 }

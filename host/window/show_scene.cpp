@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/system/interrupt.hpp"
-#include "host/overlay/compositor.hpp"
+#include "host/render/scene/scene.hpp"
 #include "host/window/orbit.hpp"
 
 namespace birdseye::host {
@@ -12,12 +12,13 @@ Result<Picture> show_scene(Window& window, const RenderScene& scene, Engine& eng
   note_interrupts();
   const Eigen::Vector3d middle = middle_of(scene.volume);
   Transform<Camera, Patient> camera_from_patient = scene.camera_from_patient;
-  RenderSettings settings = scene.settings;
+  OverlayLook look;
+  look.render = scene.settings;
   bool deformed = scene.deformation.has_value();
   bool changed = true;
   for (int pictures = 0; !window.closed() && !interrupted();) {
     if (changed || most_pictures > 0) {
-      window.show(draw(engine, scene, camera_from_patient, settings).rgb);
+      window.show(draw(engine, scene, camera_from_patient, look).rgb);
       if (!window.fault().empty()) return Error{Errc::io, "window: " + window.fault() + "; use --engine cpu"};
       if (++pictures == most_pictures) break;
     }
@@ -27,7 +28,7 @@ Result<Picture> show_scene(Window& window, const RenderScene& scene, Engine& eng
     if (input.wheel != 0) camera_from_patient = approached(camera_from_patient, middle, input.wheel);
     for (const char key : input.keys) {
       if (key == 'R') camera_from_patient = scene.camera_from_patient;
-      if (key == 'C') settings.clip = settings.clip ? std::nullopt : scene.settings.clip;
+      if (key == 'C') look.render.clip = look.render.clip ? std::nullopt : scene.settings.clip;
       if (key == 'D' && scene.deformation) {
         deformed = !deformed;
         deformed ? engine.deform(*scene.deformation) : engine.undeform();
@@ -36,9 +37,7 @@ Result<Picture> show_scene(Window& window, const RenderScene& scene, Engine& eng
   }
   const ImageRgba last = window.read_back();
   if (!window.fault().empty()) return Error{Errc::io, "window: " + window.fault() + "; use --engine cpu"};
-  Picture picture{last.width_px, last.height_px, {}};
-  picture.rgb = composite(std::vector<std::uint8_t>(last.rgba.size() / 4 * 3), last, 1);
-  return picture;
+  return Picture{last.width_px, last.height_px, on_grey(last, 0)};
 }
 
 }  // namespace birdseye::host

@@ -28,4 +28,7 @@ struct ImageRgba {
   std::vector<std::uint8_t> rgba;
 };
 
+/// The picture alone before a plain grey: RGB, rows from the top.
+std::vector<std::uint8_t> on_grey(const ImageRgba& image, std::uint8_t grey);
+
 }  // namespace birdseye::host

@@ -44,7 +44,7 @@ TEST(LiveWorkflow, GoesFromTheLinkToARegisteredPatient) {
   EXPECT_EQ(workflow.view().step, LiveStep::check);
   EXPECT_LT(*workflow.view().fre_mm, 0.05);
   ASSERT_TRUE(workflow.picture().setup().has_value());
-  const auto& found = workflow.picture().setup()->tracker_from_patient;
+  const auto& found = workflow.picture().setup()->tracker_from_patient();
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
   hand.rest_at(Eigen::Vector3d(30, 30, 22), 30);
   const auto reading = workflow.view().check;
@@ -107,14 +107,14 @@ wire::VideoFrame looking_at(const LiveWorkflow& workflow, const Eigen::Vector3d&
   const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
                                                        Eigen::Vector3d(0, 0, from_mm) - point_in_patient_mm);
   wire::VideoFrame frame;
-  frame.width_px = setup.camera.width_px;
-  frame.height_px = setup.camera.height_px;
+  frame.width_px = setup.camera().width_px;
+  frame.height_px = setup.camera().height_px;
   frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
   frame.info.acquired = DeviceTime{40 * kMs};
   frame.info.pose.kind = PoseKind::exact;
   frame.info.pose.position_sigma_mm = sigma_mm;
   frame.info.pose.tracker_from_sensor =
-      setup.tracker_from_patient * camera_from_patient.inverse() * setup.camera_from_sensor;
+      setup.tracker_from_patient() * camera_from_patient.inverse() * setup.camera_from_sensor();
   return frame;
 }
 
@@ -133,7 +133,7 @@ TEST(LiveWorkflow, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
   workflow.draw();
   const auto mark = workflow.view().target;
   ASSERT_TRUE(mark.has_value());
-  const CameraModel& camera = workflow.picture().setup()->camera;
+  const CameraModel& camera = workflow.picture().setup()->camera();
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_FALSE(mark->motion_counted);
   // By hand: the fiducials, hand-eye's 0.5 mm of the record, across the line of sight, the pose's 0.2 mm an axis.
@@ -180,7 +180,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   workflow.draw();
   const auto mark = workflow.view().target;
   ASSERT_TRUE(mark.has_value());
-  const CameraModel& camera = workflow.picture().setup()->camera;
+  const CameraModel& camera = workflow.picture().setup()->camera();
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_TRUE(mark->motion_counted);
   const double fiducials_mm =
@@ -231,7 +231,7 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   workflow.go_to(LiveStep::check);
   workflow.primary();
   ASSERT_TRUE(workflow.picture().setup().has_value());
-  const auto& found = workflow.picture().setup()->tracker_from_patient;
+  const auto& found = workflow.picture().setup()->tracker_from_patient();
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
 }
 
@@ -299,7 +299,7 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
     give_record(workflow);
     workflow.primary();
     ASSERT_TRUE(workflow.picture().setup().has_value());
-    EXPECT_EQ(workflow.picture().setup()->camera.fx_px == 500, !record_is_newer);
+    EXPECT_EQ(workflow.picture().setup()->camera().fx_px == 500, !record_is_newer);
   }
 }
 

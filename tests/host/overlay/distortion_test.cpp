@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/overlay/compositor.hpp"
+#include "host/overlay/frame_painter.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 #include "tests/support/strong_lens.hpp"
@@ -143,20 +143,22 @@ TEST(Distortion, StraightenedOverlayAgreesWithOverlayOnStraightenedFrame) {
   const Landmarks made = landmarks();
   const CameraModel lens = strong_lens();
   const std::vector<std::uint8_t> frame = smooth_frame(lens);
-  RenderSettings settings;
-  settings.step_mm = 0.4;
+  OverlayLook look;
+  look.render.step_mm = 0.4;
   for (const Kept kept : {Kept::centre_scale, Kept::every_pixel}) {
     const FrameUndistorter straighten(lens, pinhole_for(lens, kept));
     const std::vector<std::uint8_t> straight = straighten.apply(frame);
     for (const std::string& name : engines()) {
       const auto engine = make_engine(name, made.volume, solid());
       ASSERT_TRUE(engine) << engine.error().what;
-      const auto bent_then_straightened =
-          straighten.apply(composite(frame, (*engine)->render(lens, before(100), settings), 1));
-      ImageRgba overlay = (*engine)->render(straighten.to(), before(100), settings);
-      straighten.hide_unseen(overlay);
-      const auto drawn_straight = composite(straight, overlay, 1);
-      const auto drawn_bent = composite(straight, (*engine)->render(lens, before(100), settings), 1);
+      const auto paint = [&engine = **engine, &look](const Still& still) {
+        return paint_still(still, engine, look, vouched_for({}));
+      };
+      const auto bent_then_straightened = straighten.apply(paint({frame, lens, before(100)}).rgb);
+      const PaintedStill painted_straight = paint({straight, straighten.to(), before(100), &straighten});
+      const ImageRgba& overlay = painted_straight.volume;
+      const std::vector<std::uint8_t>& drawn_straight = painted_straight.rgb;
+      const auto drawn_bent = paint({straight, lens, before(100)}).rgb;
       double sum = 0, wrong_lens = 0;
       std::size_t count = 0;
       for (std::size_t i = 0; i < drawn_straight.size(); ++i) {

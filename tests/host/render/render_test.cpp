@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "host/overlay/compositor.hpp"
 #include "host/render/cpu/ray_caster.hpp"
 #include "host/render/reference/reference_renderer.hpp"
 #include "tests/support/render_scene.hpp"
@@ -241,17 +240,9 @@ TEST(TransferFunction, ReadsPresetsAndNamesWhatItDoesNotKnow) {
   EXPECT_TRUE(soft().any_seen(-1024, -399));
 }
 
-TEST(Compositor, LeavesTheVideoWhereThereIsNoOverlayAndBlendsWhereThereIs) {
-  const std::vector<std::uint8_t> video{10, 20, 30, 200, 100, 50, 7, 8, 9};
-  const ImageRgba overlay{3, 1, {0, 0, 0, 0, 64, 0, 0, 128, 255, 255, 255, 255}};
-  const auto full = composite(video, overlay, 1);
-  // What lies in front hides what is drawn: all of it, or none.
-  EXPECT_EQ(composite(video, overlay, 1, std::vector<std::uint8_t>(video.size() / 3, 255)), video);
-  EXPECT_EQ(composite(video, overlay, 1, std::vector<std::uint8_t>(video.size() / 3, 0)), full);
-  EXPECT_EQ(full, (std::vector<std::uint8_t>{10, 20, 30, 164, 50, 25, 255, 255, 255}));
-  EXPECT_EQ(composite(video, overlay, 0), video);
-  const ImageRgba other{2, 1, {255, 255, 255, 255, 255, 255, 255, 255}};
-  EXPECT_EQ(composite(video, other, 1), video);
+TEST(OnGrey, IsTheGreyWhereNothingIsDrawnAndBlendsWhereSomethingIs) {
+  const ImageRgba image{4, 1, {0, 0, 0, 0, 64, 0, 0, 128, 255, 255, 255, 255, 10, 20, 30, 255}};
+  EXPECT_EQ(on_grey(image, 50), (std::vector<std::uint8_t>{50, 50, 50, 89, 25, 25, 255, 255, 255, 10, 20, 30}));
 }
 
 }  // namespace
