@@ -65,7 +65,7 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
   if (figures.scope.camera_rms_px) json["camera_rms_px"] = *figures.scope.camera_rms_px;
-  if (figures.scope.held_out_px) json["tracked_rms_px"] = *figures.scope.held_out_px;
+  if (figures.scope.held_out_px) json["held_out_px"] = *figures.scope.held_out_px;
   return json;
 }
 

@@ -59,7 +59,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"fre_mm", f.fre_mm},
       {"fiducial_residuals_mm", f.fiducial_residuals_mm},
       {"camera_rms_px", f.camera_rms_px},
-      {"hand_eye_rms_px", f.hand_eye_rms_px},
+      {"held_out_px", f.held_out_px},
       {"board_views", f.board_views},
       {"tracker_rate_hz", f.tracker_rate_hz},
       {"position_noise_mm", f.position_noise_mm},
@@ -79,7 +79,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
   row("fiducial registration error (RMS)", fmt::format("{:.2f} mm", f.fre_mm));
   row("residual per fiducial", fmt::format("{:.2f} mm", fmt::join(f.fiducial_residuals_mm, ", ")));
   row("camera calibration (RMS)", fmt::format("{:.2f} px, {} views", f.camera_rms_px, f.board_views));
-  row("tracked reprojection after hand-eye (RMS)", fmt::format("{:.2f} px", f.hand_eye_rms_px));
+  row("hand-eye, held out (RMS)", fmt::format("{:.2f} px", f.held_out_px));
   row("tracker rate", fmt::format("{:.1f} Hz", f.tracker_rate_hz));
   row("tracker noise, each axis", fmt::format("{} mm, {} deg", f.position_noise_mm, f.angle_noise_deg));
   row("frames / dropped / without overlay",

@@ -23,7 +23,7 @@ struct DemoFigures {
   std::vector<double> fiducial_residuals_mm;
   double fre_mm = 0;
   double camera_rms_px = 0;
-  double hand_eye_rms_px = 0;
+  double held_out_px = 0;  ///< of hand-eye, as the gate judges it
   int board_views = 0;
   double tracker_rate_hz = 0;
   int frames = 0;

@@ -100,7 +100,7 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   const auto fit = register_by_touches(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
   if (!fit) return fit.error().with_context("registration");
   figures.camera_rms_px = lens->rms_px;
-  figures.hand_eye_rms_px = hand_eye->tracked_px;
+  figures.held_out_px = hand_eye->held_out_px;
   figures.board_views = static_cast<int>(seen_.stations.size());
   figures.fre_mm = fit->registered.fre_mm;
   figures.fiducial_residuals_mm = fit->residuals_mm;
@@ -113,8 +113,8 @@ Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   engine_ = *std::move(engine);
   look_.render.step_mm = 1.2;
   painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, plan_.tumour_centre_in_patient_mm));
-  progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye {:.2f} px, registration {:.2f} mm", lens->rms_px,
-                             figures.board_views, figures.hand_eye_rms_px, fit->registered.fre_mm));
+  progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye held out {:.2f} px, registration {:.2f} mm",
+                             lens->rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
   return {};
 }
 

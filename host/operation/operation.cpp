@@ -31,11 +31,12 @@ std::optional<double> figure_of(const nlohmann::json& figures, const char* name)
   return figures.contains(name) ? std::optional(figures.at(name).get<double>()) : std::nullopt;
 }
 
-/// tracked_rms_px is what the file calls the held-out error.
+/// A file of 0.1.0 has tracked_rms_px in place of held_out_px: what the fit leaves, which is not the error held out.
+/// That one is then not known.
 Result<CalibratedScope> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
   auto scope = ScopeSetup::of_files(
       folder / kCamera, folder / kHandEye,
-      {figure_of(figures, "camera_rms_px"), figure_of(figures, "tracked_rms_px"), figure_of(figures, "hand_eye_mm")});
+      {figure_of(figures, "camera_rms_px"), figure_of(figures, "held_out_px"), figure_of(figures, "hand_eye_mm")});
   if (!scope) return scope.error();
   return CalibratedScope{*std::move(scope), figures.at("made_utc").get<std::string>(), true};
 }
@@ -44,7 +45,7 @@ nlohmann::json figures_of(const CalibratedScope& found) {
   nlohmann::json out{{"made_utc", found.made_utc}};
   const ScopeFigures& figures = found.scope.figures();
   if (figures.camera_rms_px) out["camera_rms_px"] = *figures.camera_rms_px;
-  if (figures.held_out_px) out["tracked_rms_px"] = *figures.held_out_px;
+  if (figures.held_out_px) out["held_out_px"] = *figures.held_out_px;
   if (figures.held_out_mm) out["hand_eye_mm"] = *figures.held_out_mm;
   return out;
 }

@@ -172,7 +172,7 @@ ReplayTrust trust_of(const ReplaySetup& setup, const Volume& ct) {
   };
   if (setup.scope_from_files) {
     note("camera_rms_px", known.scope.camera_rms_px);
-    note("tracked_rms_px", known.scope.held_out_px);
+    note("held_out_px", known.scope.held_out_px);
   } else {
     out.figures.scope = known.scope;
   }

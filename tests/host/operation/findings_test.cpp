@@ -56,7 +56,7 @@ TEST(ReplayTrust, OfTouchesIsWhatALiveOperationWouldJudgeBy) {
 TEST(ReplayTrust, OfFilesNamesEachFigureThatNothingSays) {
   ReplaySetup setup{scope(std::nullopt, 0), kTrackerFromPatient, {}, {}, std::nullopt, 0, true};
   EXPECT_EQ(trust_of(setup, ct()).vouched_for,
-            (std::vector<std::string>{"camera_rms_px", "tracked_rms_px", "fre_mm", "target_mm"}));
+            (std::vector<std::string>{"camera_rms_px", "held_out_px", "fre_mm", "target_mm"}));
   setup.scope = scope(0.3, 2);
   setup.fre_mm = 9;
   const ReplayTrust trust = trust_of(setup, ct());

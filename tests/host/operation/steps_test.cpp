@@ -256,6 +256,31 @@ TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
   EXPECT_TRUE(read->calibrated->by_board);
 }
 
+/// 0.1.0 kept what the fit leaves, which says less than the error held out: it does not stand in for that.
+TEST(OperationKeeper, AFileOf010OpensAndItsResidualIsNoHeldOutError) {
+  const Scratch scratch;
+  calibration::HandEyeResult found;
+  found.held_out_px = 3;
+  found.held_out_mm = 0.6;
+  Operation one;
+  one.ct_checksum = "1";
+  one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), "2026-11-22T09:35:00Z", true};
+  ASSERT_TRUE(write_operation(scratch.path(), one));
+  auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->calibrated->scope.figures().held_out_px, 3);
+  (void)scratch.file("operation.json",
+                     R"({"made_utc": "2026-11-22T10:00:00Z", "ct_checksum": "1", "deformed": false,
+                         "calibrated": {"made_utc": "2026-11-22T09:35:00Z", "camera_rms_px": 0.3,
+                                        "tracked_rms_px": 1.2, "hand_eye_mm": 0.6}})");
+  read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  const ScopeFigures& figures = read->calibrated->scope.figures();
+  EXPECT_EQ(figures.camera_rms_px, 0.3);
+  EXPECT_FALSE(figures.held_out_px.has_value());
+  EXPECT_EQ(figures.held_out_mm, 0.6);
+}
+
 TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {
   PatientPlan plan;
   plan.landmarks = {{"tumour", {30, 30, 20}}};
