@@ -3,9 +3,29 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace birdseye {
+
+namespace {
+
+/// A figure beside its limit, each in words. A limit below 0.01 shows two digits of its own, and a figure above a limit
+/// another number than that.
+struct Compared {
+  std::string value, limit;
+};
+Compared compared(double value, double limit) {
+  constexpr int kMostDigits = 9;
+  int digits = 2;
+  if (limit > 0 && limit < 0.01) digits = std::min(kMostDigits, 1 - static_cast<int>(std::floor(std::log10(limit))));
+  for (;; ++digits) {
+    Compared out{fmt::format("{:.{}f}", value, digits), fmt::format("{:.{}f}", limit, digits)};
+    if (!(value > limit) || out.value != out.limit || digits >= kMostDigits) return out;
+  }
+}
+
+}  // namespace
 
 const char* name_of(Grade grade) {
   switch (grade) {
@@ -29,13 +49,11 @@ void Verdict::add(Grade found, std::string reason, std::string next_step) {
 void Verdict::judge(const std::string& figure, double value, const std::string& unit, double pass_up_to,
                     double marginal_up_to, const std::string& next_step) {
   // Written so that a figure that is no number fails.
-  if (value <= pass_up_to) {
-    add(Grade::pass, fmt::format("{} {:.2f} {}, of at most {:.2f}", figure, value, unit, pass_up_to));
-  } else if (value <= marginal_up_to) {
-    add(Grade::marginal, fmt::format("{} {:.2f} {}, more than {:.2f}", figure, value, unit, pass_up_to), next_step);
-  } else {
-    add(Grade::fail, fmt::format("{} {:.2f} {}, more than {:.2f}", figure, value, unit, marginal_up_to), next_step);
-  }
+  const Grade found = value <= pass_up_to ? Grade::pass : value <= marginal_up_to ? Grade::marginal : Grade::fail;
+  const Compared said = compared(value, found == Grade::fail ? marginal_up_to : pass_up_to);
+  const char* const than = found == Grade::pass ? "of at most" : "more than";
+  add(found, fmt::format("{} {} {}, {} {}", figure, said.value, unit, than, said.limit),
+      found == Grade::pass ? std::string() : next_step);
 }
 
 }  // namespace birdseye
