@@ -116,6 +116,8 @@ Result<void> prepare(LiveOptions& options) {
     return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
   } else if (std::error_code ignored; !fs::exists(options.live.patient.ct, ignored)) {
     return Error{Errc::not_found, fmt::format("--ct {}: no such file or folder", options.live.patient.ct.string())};
+  } else if (auto named = check_labels_named(options.live.patient); !named) {
+    return named;
   }
   return {};
 }
@@ -266,7 +268,9 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--ct", patient.ct, "the patient's CT")->type_name("PATH");
   command->add_option("--labels", patient.labels, "its segmentation")->type_name("FILE");
   command->add_option("--show", patient.shown, "labels to show; without them, all of the CT")->delimiter(',');
-  command->add_option("--organ", patient.organ, "labels of the organ that the video shows, to match it with")
+  command
+      ->add_option("--organ", patient.organ,
+                   "labels of the organ that the video shows, to match it with; needed with --labels")
       ->delimiter(',');
   command->add_option("--targets", patient.targets, "labels whose middles are landmarks to check by")->delimiter(',');
   command->add_option("--fiducials", patient.fiducials, "the fiducials' places in the CT; without it, they are found")

@@ -1,6 +1,9 @@
 #include "host/operation/patient.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
 
 #include "host/files/field_files.hpp"
 #include "host/files/text_files.hpp"
@@ -26,6 +29,13 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan) {
     if (!centre) return centre.error();
     plan.landmarks.push_back({fmt::format("middle of label {}", target), *centre});
   }
+  const auto of_organ = [&files](std::int16_t label) {
+    return std::find(files.organ.begin(), files.organ.end(), label) != files.organ.end();
+  };
+  if (std::none_of(labels->hu.begin(), labels->hu.end(), of_organ)) {
+    return Error{Errc::not_found, fmt::format("{}: holds none of the labels of --organ, {}; give those of the organ",
+                                              files.labels.string(), fmt::join(files.organ, ", "))};
+  }
   plan.labels = *labels;
   plan.organ = files.organ;
   return {};
@@ -41,14 +51,24 @@ Eigen::Vector3d target_in_patient_mm(const PatientPlan& plan) {
   return plan.landmarks.empty() ? middle_of_ct(plan.ct) : plan.landmarks.front().place_mm;
 }
 
+Result<void> check_labels_named(const PatientFiles& files) {
+  if (files.labels.empty() && !(files.shown.empty() && files.targets.empty() && files.organ.empty()))
+    return Error{Errc::bad_value, "labels are named and no file of labels is given: give --labels"};
+  if (!files.labels.empty() && files.organ.empty()) {
+    return Error{Errc::bad_value, fmt::format("--labels {}: which of them are the organ that the video shows? Give "
+                                              "--organ, as --organ 1,2,3",
+                                              files.labels.string())};
+  }
+  return {};
+}
+
 Result<PatientPlan> read_patient(const PatientFiles& files) {
+  if (auto named = check_labels_named(files); !named) return named.error();
   PatientPlan plan;
   auto ct = import_volume(files.ct);
   if (!ct) return ct.error();
   plan.ct = *std::move(ct);
   plan.checksum = ct_checksum(plan.ct);
-  if (files.labels.empty() && !(files.shown.empty() && files.targets.empty()))
-    return Error{Errc::bad_value, "labels are named and no file of labels is given: give --labels"};
   if (!files.labels.empty()) {
     if (auto read = read_labels(files, plan); !read) return read.error();
   }

@@ -22,7 +22,7 @@ struct PatientFiles {
   std::filesystem::path ct, labels;
   std::vector<int> shown;           ///< the labels to show; empty: all of the CT
   std::vector<int> targets;         ///< labels whose middles are landmarks to check by
-  std::vector<int> organ;           ///< labels of the organ that the video shows; empty: all of the CT
+  std::vector<int> organ;           ///< labels of the organ that the video shows; without labels: all of the CT
   std::filesystem::path fiducials;  ///< points of the CT; empty: found in it
   std::filesystem::path landmarks;  ///< a table name, x, y, z; or empty
 };
@@ -41,6 +41,9 @@ Eigen::Vector3d middle_of_ct(const Volume& ct);
 /// The first landmark, else the CT's middle; in the CT as it was taken.
 Eigen::Vector3d target_in_patient_mm(const PatientPlan& plan);
 
+/// Refuses labels that are named without a file of labels, and a file of labels without those of the organ: nobody else
+/// knows which they are.
+Result<void> check_labels_named(const PatientFiles& files);
 /// An error names the file. Where no fiducials are given, they are left to find_fiducials.
 Result<PatientPlan> read_patient(const PatientFiles& files);
 /// The markers that the CT shows, the brightest first.

@@ -73,6 +73,9 @@ TEST(Live, SaysWhatIsMissing) {
   testing::expect_refused("birdseye", "live", {"--server HOST:PORT, --recording PATH and --simulate"});
   testing::expect_refused("birdseye", "live --server 127.0.0.1:1", {"--ct is missing"});
   testing::expect_refused("birdseye", "live --server 127.0.0.1:1 --ct /no/such/ct", {"--ct /no/such/ct: no such file"});
+  const std::string ct = "live --server 127.0.0.1:1 --ct " + scratch.path().string();
+  testing::expect_refused("birdseye", ct + " --labels liver.nii.gz --show 2,3", {"--labels liver.nii.gz", "--organ"});
+  testing::expect_refused("birdseye", ct + " --organ 1", {"give --labels"});
   (void)scratch.file("operation.json", "{}");
   testing::expect_refused("birdseye", "live --simulate --out " + scratch.path().string(),
                           {"holds an operation already", "--resume"});

@@ -1,0 +1,63 @@
+// What is read of the patient before the operation, and what of it is refused.
+#include "host/operation/patient.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host/volume/import.hpp"
+#include "host/volume/segmentation.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/small_ct.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::Scratch;
+using birdseye::testing::small_ct;
+
+/// A small CT, and the ball in it as label 5.
+PatientFiles ball(const Scratch& scratch) {
+  PatientFiles files;
+  files.ct = small_ct(scratch);
+  files.labels = scratch / "labels.nii.gz";
+  Volume labels = *import_volume(files.ct);
+  for (std::int16_t& value : labels.hu) value = value > 0 ? 5 : 0;
+  EXPECT_TRUE(write_labels(files.labels, labels));
+  return files;
+}
+
+TEST(Patient, LabelsNeedThoseOfTheOrgan) {
+  const Scratch scratch;
+  PatientFiles files = ball(scratch);
+  files.shown = {5};
+  const auto unsaid = read_patient(files);
+  ASSERT_FALSE(unsaid);
+  EXPECT_NE(unsaid.error().what.find("--organ"), std::string::npos) << unsaid.error().what;
+  files.organ = {1, 2};
+  const auto absent = read_patient(files);
+  ASSERT_FALSE(absent);
+  EXPECT_NE(absent.error().what.find("labels.nii.gz"), std::string::npos) << absent.error().what;
+  EXPECT_NE(absent.error().what.find("--organ, 1, 2"), std::string::npos) << absent.error().what;
+  files.organ = {1, 5};
+  const auto read = read_patient(files);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->organ, files.organ) << "a liver without a tumour is one all the same";
+  EXPECT_TRUE(read->labels.has_value());
+}
+
+TEST(Patient, LabelsThatAreNamedNeedTheirFile) {
+  const Scratch scratch;
+  PatientFiles files;
+  files.ct = small_ct(scratch);
+  EXPECT_TRUE(read_patient(files)) << "without labels, all of the CT is the organ";
+  for (std::vector<int> PatientFiles::*const named :
+       {&PatientFiles::shown, &PatientFiles::targets, &PatientFiles::organ}) {
+    PatientFiles one = files;
+    one.*named = {1};
+    const auto refused = read_patient(one);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().what.find("give --labels"), std::string::npos) << refused.error().what;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::host
