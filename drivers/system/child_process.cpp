@@ -9,6 +9,7 @@
 
 #include <cerrno>
 
+#include "drivers/system/reap.hpp"
 #include "drivers/system/wait.hpp"
 
 extern char** environ;
@@ -17,7 +18,6 @@ namespace birdseye {
 
 namespace {
 
-constexpr Duration kLook = Duration::from_ms(5);      // how soon its end is seen
 constexpr Duration kGrace = Duration::from_ms(2000);  // to end by itself, once it is asked to
 
 }  // namespace
@@ -141,15 +141,11 @@ Result<void> ChildProcess::write(const void* bytes, std::size_t size, Deadline d
 }
 
 std::optional<int> ChildProcess::wait(Deadline deadline) {
-  while (pid_ > 0) {
-    int status = 0;
-    if (::waitpid(pid_, &status, WNOHANG) == pid_) {
-      exit_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-      pid_ = -1;
-      break;
-    }
-    if (deadline.passed()) return std::nullopt;
-    sleep_for(kLook);
+  if (pid_ > 0) {
+    const auto status = reap(pid_, deadline);
+    if (!status) return std::nullopt;
+    exit_code_ = WIFEXITED(*status) ? WEXITSTATUS(*status) : 128 + WTERMSIG(*status);
+    pid_ = -1;
   }
   return exit_code_;
 }

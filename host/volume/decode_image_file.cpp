@@ -17,8 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/system/process_copy.hpp"
 #include "host/volume/decode.hpp"
-#include "host/volume/isolated.hpp"
 #include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {

@@ -147,9 +147,18 @@ Result<ImageFile> read_image(const fs::path& path, int components) {
     }
   };
   try {
-    if (auto ran = run_isolated(work, take, kLongest); !ran) return ran.error();
-    if (!read)
-      return refused(Errc::bad_format, reading, "is cut short, damaged, or too large to decode; copy it again");
+    const auto ran = run_isolated(work, take, kLongest);
+    if (!read) {
+      if (!ran && ran.error().code == Errc::io) return refused(Errc::io, path, ran.error().what);
+      if (!ran && ran.error().code == Errc::timeout) {
+        return refused(Errc::timeout, reading,
+                       fmt::format("its decoder {} after {:.0f} s; copy it again, to a disk of this machine",
+                                   ran.error().what, kLongest.seconds()));
+      }
+      return refused(Errc::bad_format, reading,
+                     fmt::format("is cut short, damaged, or too large to decode{}; copy it again",
+                                 ran ? "" : fmt::format(" (its decoder {})", ran.error().what)));
+    }
     if (!*read) return read->error();
     if (auto sound = check_geometry(path, **read); !sound) return sound.error();
     return *std::move(*read);

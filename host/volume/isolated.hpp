@@ -4,34 +4,26 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <shared_mutex>
 #include <vector>
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "drivers/system/process_copy.hpp"
 
 namespace birdseye::host {
 
 /// Sends bytes to the process that asked for the work.
-using Send = std::function<void(const void* data, std::size_t size)>;
+using Send = ProcessCopy::Send;
 /// Takes the next bytes that the work sends. False where they do not come: the work has ended, by a signal perhaps, or
 /// is late.
 using Receive = std::function<bool(void* to, std::size_t size)>;
 
-/// While such an object lives, no copy of this process is made. Hold one while a thread works with a library that
-/// decoders use too: a copy would inherit that library's locks as they are, and no thread that releases them.
-class CopiesHeldOff {
- public:
-  CopiesHeldOff();
-
- private:
-  std::shared_lock<std::shared_mutex> held_;
-};
-
-/// Runs `work` in a copy of this process, and at the same time `take` in this process. The copy's output goes nowhere,
-/// and its death does not end this process. For decoders of files from elsewhere: Debian's GDCM meets damage with an
-/// assertion, which no catch can hold (docs/decisions/0012-isolated-import.md). What take receives is not to be
-/// trusted. work must not use threads of this process. The copy is killed at the deadline, or when take returns.
+/// Runs `work` in a copy of this process, and at the same time `take` in this process (ProcessCopy). For decoders of
+/// files from elsewhere: Debian's GDCM meets damage with an assertion, which no catch can hold
+/// (docs/decisions/0012-isolated-import.md). What take receives is not to be trusted. Whatever else uses those
+/// decoders' libraries holds copies off meanwhile (CopiesHeldOff). The copy is killed at the deadline, or when take
+/// returns. Errors: no process is free; and, where take asked for more than came, how the copy ended: Errc::timeout or
+/// Errc::disconnected, in words that go on from "its decoder".
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
                           Duration within);
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/volume/isolated.hpp"
+#include "drivers/system/process_copy.hpp"
 
 namespace birdseye::host {
 

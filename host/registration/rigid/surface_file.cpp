@@ -105,17 +105,24 @@ Result<Surface> read_surface(const fs::path& path) {
         surface.triangles = taken<std::array<std::uint32_t, 3>>(receive);
       },
       kLongest);
-  if (!ran) return ran.error();
-  const bool sound = !surface.triangles.empty() &&
+  if (!ran && ran.error().code == Errc::io) return ran.error().with_context(path.string());
+  if (!ran && ran.error().code == Errc::timeout) {
+    return Error{Errc::timeout,
+                 fmt::format("{}: its decoder {} after {:.0f} s; export it again, with fewer triangles, to a disk of "
+                             "this machine",
+                             path.string(), ran.error().what, kLongest.seconds())};
+  }
+  const bool sound = ran && !surface.triangles.empty() &&
                      std::all_of(surface.vertices_mm.begin(), surface.vertices_mm.end(),
                                  [](const Eigen::Vector3f& p) { return p.allFinite(); }) &&
                      std::all_of(surface.triangles.begin(), surface.triangles.end(), [&](const auto& t) {
                        return *std::max_element(t.begin(), t.end()) < surface.vertices_mm.size();
                      });
   if (!sound) {
-    return Error{Errc::bad_format, fmt::format("{}: holds no triangles that can be read; export it as PLY, STL, OBJ or "
-                                               "VTK polygons",
-                                               path.string())};
+    const std::string how = ran ? "" : fmt::format(" (its decoder {})", ran.error().what);
+    return Error{Errc::bad_format, fmt::format("{}: holds no triangles that can be read{}; export it as PLY, STL, OBJ "
+                                               "or VTK polygons",
+                                               path.string(), how)};
   }
   return surface;
 }

@@ -1,0 +1,132 @@
+#include "drivers/system/process_copy.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+
+#include "drivers/system/reap.hpp"
+#include "drivers/system/wait.hpp"
+
+namespace birdseye {
+
+namespace {
+
+constexpr Duration kGrace = Duration::from_ms(2000);  // for the system to end what was killed, or has closed its pipe
+
+std::shared_mutex& copying() {
+  static std::shared_mutex mutex;
+  return mutex;
+}
+
+/// The copy's part: never returns.
+[[noreturn]] void run_copy(int fd, pid_t parent, const std::function<void(const ProcessCopy::Send&)>& work) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);  // it has ended already, which no signal tells any more
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  if (const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {
+    ::dup2(nowhere, STDOUT_FILENO);
+    ::dup2(nowhere, STDERR_FILENO);
+  }
+  // What work throws must not unwind into the copied stack: the objects on it are not ours to end.
+  try {
+    work([fd](const void* data, std::size_t size) {
+      const auto* bytes = static_cast<const char*>(data);
+      while (size > 0) {
+        const ssize_t put = ::write(fd, bytes, size);
+        if (put < 0 && errno == EINTR) continue;
+        if (put <= 0) ::_exit(1);
+        bytes += put;
+        size -= static_cast<std::size_t>(put);
+      }
+    });
+  } catch (...) {
+    ::_exit(1);
+  }
+  ::_exit(0);
+}
+
+}  // namespace
+
+CopiesHeldOff::CopiesHeldOff() : held_(copying()) {}
+
+Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& work) {
+  std::array<int, 2> fds{-1, -1};
+  if (::pipe2(fds.data(), O_CLOEXEC) != 0) {
+    return Error{Errc::io,
+                 fmt::format("no pipe to a process of its own: {}; close other programs", std::strerror(errno))};
+  }
+  UniqueFd ours(fds[0]), theirs(fds[1]);
+  constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
+  (void)::fcntl(ours.get(), F_SETPIPE_SZ, kPipeBytes);
+  (void)::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
+  const pid_t parent = ::getpid();
+  const pid_t child = [] {
+    const std::unique_lock alone(copying());
+    return ::fork();
+  }();
+  if (child < 0) {
+    return Error{Errc::io, fmt::format("no process of its own: {}; close other programs", std::strerror(errno))};
+  }
+  if (child == 0) {
+    ours = UniqueFd();
+    run_copy(theirs.get(), parent, work);
+  }
+  return ProcessCopy(child, std::move(ours));
+}
+
+ProcessCopy::~ProcessCopy() {
+  kill();
+}
+
+/// Its status; empty where it was none any more, or where the system does not end it in time: it then stays until this
+/// process ends.
+std::optional<int> ProcessCopy::kill() {
+  if (process_ <= 0) return std::nullopt;
+  ::kill(process_, SIGKILL);
+  return reap(std::exchange(process_, -1), Deadline::after(kGrace));
+}
+
+/// How it ended, once its pipe is closed.
+Error ProcessCopy::ended() {
+  auto status = process_ > 0 ? reap(process_, Deadline::after(kGrace)) : std::nullopt;
+  if (!status) {
+    kill();
+    return {Errc::disconnected, "ended before it had sent all"};
+  }
+  process_ = -1;
+  if (WIFSIGNALED(*status)) {
+    const int signal = WTERMSIG(*status);
+    return {Errc::disconnected, fmt::format("ended by signal {} ({})", signal, ::strsignal(signal))};
+  }
+  if (WEXITSTATUS(*status) != 0) return {Errc::disconnected, "gave up"};
+  return {Errc::disconnected, "ended before it had sent all"};
+}
+
+Result<void> ProcessCopy::receive(void* to, std::size_t size, Deadline deadline) {
+  auto* bytes = static_cast<char*>(to);
+  while (size > 0) {
+    // Looked at first: of a copy that sends without end, something is always ready.
+    if (deadline.passed() || wait_ready(fd_.get(), POLLIN, deadline) == 0) {
+      kill();
+      return Error{Errc::timeout, "was not done in time, and was ended"};
+    }
+    const ssize_t got = ::read(fd_.get(), bytes, size);
+    if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (got <= 0) return ended();
+    bytes += got;
+    size -= static_cast<std::size_t>(got);
+  }
+  return {};
+}
+
+}  // namespace birdseye

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <shared_mutex>
+#include <utility>
+
+#include "calibration/base/result.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/unique_fd.hpp"
+
+namespace birdseye {
+
+/// While such an object lives, no copy of this process is made. Hold one while a thread works with a library that
+/// copies use too: a copy would inherit that library's locks as they are, and no thread that releases them.
+class CopiesHeldOff {
+ public:
+  CopiesHeldOff();
+
+ private:
+  std::shared_lock<std::shared_mutex> held_;
+};
+
+/// A copy of this process that does one piece of work and sends what comes of it through a pipe. Its output goes
+/// nowhere, its death does not end this process, and it does not outlive the thread that made it. It is killed when
+/// this goes out of scope.
+class ProcessCopy {
+ public:
+  /// Sends bytes to the process that asked for the work.
+  using Send = std::function<void(const void* data, std::size_t size)>;
+
+  /// work: must not use threads of this process, and what it throws ends the copy.
+  static Result<ProcessCopy> start(const std::function<void(const Send&)>& work);
+  ProcessCopy(ProcessCopy&& other) noexcept : process_(std::exchange(other.process_, -1)), fd_(std::move(other.fd_)) {}
+  ProcessCopy& operator=(ProcessCopy&&) = delete;
+  ~ProcessCopy();
+
+  /// The next `size` bytes that the work sends. Errc::timeout: they had not come by the deadline, and the copy has been
+  /// killed. Errc::disconnected: it ended before, and how (the signal, by number and name).
+  Result<void> receive(void* to, std::size_t size, Deadline deadline);
+  [[nodiscard]] pid_t pid() const { return process_; }
+
+ private:
+  ProcessCopy(pid_t process, UniqueFd fd) : process_(process), fd_(std::move(fd)) {}
+  std::optional<int> kill();
+  Error ended();
+
+  pid_t process_;
+  UniqueFd fd_;
+};
+
+}  // namespace birdseye
