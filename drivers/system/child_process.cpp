@@ -9,6 +9,7 @@
 
 #include <cerrno>
 
+#include "drivers/system/pipe.hpp"
 #include "drivers/system/reap.hpp"
 #include "drivers/system/wait.hpp"
 
@@ -24,11 +25,15 @@ constexpr Duration kGrace = Duration::from_ms(2000);  // to end by itself, once 
 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, const std::filesystem::path& log,
                                          Pipe pipe, Signals signals) {
-  int fds[2] = {-1, -1};
-  if (pipe != Pipe::none && ::pipe2(fds, O_CLOEXEC) != 0) return Error{Errc::io, "pipe: no descriptors left"};
+  birdseye::Pipe ends;
+  if (pipe != Pipe::none) {
+    auto opened = birdseye::Pipe::open();
+    if (!opened) return std::move(opened).error();
+    ends = *std::move(opened);
+  }
   const bool child_writes = pipe == Pipe::stdout_from_child;
-  UniqueFd ours(fds[child_writes ? 0 : 1]);
-  const UniqueFd theirs(fds[child_writes ? 1 : 0]);
+  UniqueFd ours = std::move(child_writes ? ends.out : ends.in);
+  const UniqueFd theirs = std::move(child_writes ? ends.in : ends.out);
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);

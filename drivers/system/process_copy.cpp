@@ -8,11 +8,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <mutex>
 
+#include "drivers/system/pipe.hpp"
 #include "drivers/system/reap.hpp"
 #include "drivers/system/wait.hpp"
 
@@ -20,7 +20,7 @@ namespace birdseye {
 
 namespace {
 
-constexpr Duration kGrace = Duration::from_ms(2000);  // for the system to end what was killed, or has closed its pipe
+constexpr Duration kEnds = Duration::from_ms(2000);  // for the system to end what was killed, or has closed its pipe
 
 std::shared_mutex& copying() {
   static std::shared_mutex mutex;
@@ -60,15 +60,11 @@ std::shared_mutex& copying() {
 CopiesHeldOff::CopiesHeldOff() : held_(copying()) {}
 
 Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& work) {
-  std::array<int, 2> fds{-1, -1};
-  if (::pipe2(fds.data(), O_CLOEXEC) != 0) {
-    return Error{Errc::io,
-                 fmt::format("no pipe to a process of its own: {}; close other programs", std::strerror(errno))};
-  }
-  UniqueFd ours(fds[0]), theirs(fds[1]);
+  auto pipe = Pipe::open();
+  if (!pipe) return std::move(pipe).error();
   constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
-  (void)::fcntl(ours.get(), F_SETPIPE_SZ, kPipeBytes);
-  (void)::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
+  (void)::fcntl(pipe->out.get(), F_SETPIPE_SZ, kPipeBytes);
+  (void)::fcntl(pipe->out.get(), F_SETFL, O_NONBLOCK);
   const pid_t parent = ::getpid();
   const pid_t child = [] {
     const std::unique_lock alone(copying());
@@ -78,10 +74,10 @@ Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& w
     return Error{Errc::io, fmt::format("no process of its own: {}; close other programs", std::strerror(errno))};
   }
   if (child == 0) {
-    ours = UniqueFd();
-    run_copy(theirs.get(), parent, work);
+    pipe->out = UniqueFd();
+    run_copy(pipe->in.get(), parent, work);
   }
-  return ProcessCopy(child, std::move(ours));
+  return ProcessCopy(child, std::move(pipe->out));
 }
 
 ProcessCopy::~ProcessCopy() {
@@ -93,12 +89,12 @@ ProcessCopy::~ProcessCopy() {
 std::optional<int> ProcessCopy::kill() {
   if (process_ <= 0) return std::nullopt;
   ::kill(process_, SIGKILL);
-  return reap(std::exchange(process_, -1), Deadline::after(kGrace));
+  return reap(std::exchange(process_, -1), Deadline::after(kEnds));
 }
 
 /// How it ended, once its pipe is closed.
 Error ProcessCopy::ended() {
-  auto status = process_ > 0 ? reap(process_, Deadline::after(kGrace)) : std::nullopt;
+  auto status = process_ > 0 ? reap(process_, Deadline::after(kEnds)) : std::nullopt;
   if (!status) {
     kill();
     return {Errc::disconnected, "ended before it had sent all"};

@@ -31,6 +31,9 @@ class OwnedThread {
   std::jthread thread_;
 };
 
+/// Puts the calling thread before all that are not real-time. False without the right to it: nothing has changed then.
+bool schedule_this_thread_real_time();
+
 /// What work gives, or nothing where it has not by the deadline: it then goes on in a thread of its own, and what it
 /// gives is thrown away. So work must own all that it uses.
 template <typename T, typename Work>

@@ -2,11 +2,11 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 
-#include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 namespace birdseye::host {
 
@@ -17,43 +17,38 @@ constexpr int kRate_hz = 144;
 }  // namespace
 
 Result<std::unique_ptr<TwoWakes>> TwoWakes::start() {
-  std::array<int, 4> ends{};
-  if (::pipe2(&ends[0], O_CLOEXEC) != 0) return Error{Errc::unreadable, "no pipe can be opened"};
-  if (::pipe2(&ends[2], O_CLOEXEC) != 0) {
-    ::close(ends[0]);
-    ::close(ends[1]);
-    return Error{Errc::unreadable, "no pipe can be opened"};
-  }
-  return std::unique_ptr<TwoWakes>(new TwoWakes(ends));
+  auto first = Pipe::open(), second = Pipe::open();
+  if (!first) return std::move(first).error();
+  if (!second) return std::move(second).error();
+  return std::unique_ptr<TwoWakes>(new TwoWakes(*std::move(first), *std::move(second)));
 }
 
-TwoWakes::TwoWakes(const std::array<int, 4>& ends) : ends_(ends) {
-  // A stamp travels; the end of the first thread closes the pipes one after the other, which ends the others.
+TwoWakes::TwoWakes(Pipe first, Pipe second) : first_(std::move(first)), second_(std::move(second)) {
+  // A stamp travels; the end of the first thread closes the pipes one after the other, which ends the others: they
+  // need no deadline, and what they measure is the wake alone.
   threads_.emplace_back([this](const std::stop_token& stop) {
     for (HostTime next = host_now(); !stop.stop_requested();) {
       next = next + Duration{1'000'000'000 / kRate_hz};
       sleep_until(next);
       const std::int64_t now = host_now().ns;
-      if (::write(ends_[1], &now, sizeof now) != sizeof now) break;
+      if (::write(first_.in.get(), &now, sizeof now) != sizeof now) break;
     }
-    ::close(ends_[1]);
+    first_.in = UniqueFd();
   });
   threads_.emplace_back([this](const std::stop_token&) {
-    for (std::int64_t stamp = 0; ::read(ends_[0], &stamp, sizeof stamp) == sizeof stamp;) {
-      if (::write(ends_[3], &stamp, sizeof stamp) != sizeof stamp) break;
+    for (std::int64_t stamp = 0; ::read(first_.out.get(), &stamp, sizeof stamp) == sizeof stamp;) {
+      if (::write(second_.in.get(), &stamp, sizeof stamp) != sizeof stamp) break;
     }
-    ::close(ends_[3]);
+    second_.in = UniqueFd();
   });
   threads_.emplace_back([this](const std::stop_token&) {
-    for (std::int64_t stamp = 0; ::read(ends_[2], &stamp, sizeof stamp) == sizeof stamp;)
+    for (std::int64_t stamp = 0; ::read(second_.out.get(), &stamp, sizeof stamp) == sizeof stamp;)
       ms_.push_back(static_cast<double>(host_now().ns - stamp) * 1e-6);
   });
 }
 
 TwoWakes::~TwoWakes() {
   stop();
-  ::close(ends_[0]);
-  ::close(ends_[2]);
 }
 
 std::vector<double> TwoWakes::stop() {

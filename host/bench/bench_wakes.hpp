@@ -1,10 +1,10 @@
 #pragma once
 
-#include <array>
 #include <memory>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/pipe.hpp"
 #include "drivers/system/thread.hpp"
 
 namespace birdseye::host {
@@ -21,8 +21,8 @@ class TwoWakes {
   std::vector<double> stop();
 
  private:
-  explicit TwoWakes(const std::array<int, 4>& ends);
-  std::array<int, 4> ends_;  ///< two pipes, reading ends first
+  TwoWakes(Pipe first, Pipe second);
+  Pipe first_, second_;
   std::vector<double> ms_;
   std::vector<OwnedThread> threads_;
 };

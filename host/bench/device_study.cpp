@@ -75,8 +75,9 @@ Result<void> measure_load(const DeviceStudyOptions& options, const std::filesyst
   }
   if (p99_tracker.empty()) return Error{Errc::timeout, "no report of health came; give --seconds of 10 or more"};
   const wire::Health& last = first.healths.back();
-  const double copy_percent =
-      100 * settings.video_rate_hz * copy_s_per_frame(std::size_t{1920} * 1080 * 3, options.clients);
+  const auto copy_s = copy_s_per_frame(std::size_t{1920} * 1080 * 3, options.clients);
+  if (!copy_s) return copy_s.error();
+  const double copy_percent = 100 * settings.video_rate_hz * *copy_s;
   out["tracker_hz"] = last.tracker_rate_hz;
   out["frame_hz"] = last.frame_rate_hz;
   out["records_lost"] = last.measurements_lost + last.senseless_records + last.phase_errors;

@@ -1,48 +1,82 @@
 #include "host/bench/pixel_copy.hpp"
 
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "drivers/system/thread.hpp"
+#include "drivers/system/unique_fd.hpp"
 #include "host/bench/processor_time.hpp"
 
 namespace birdseye::host {
 
-double copy_s_per_frame(std::size_t bytes, int outputs) {
-  constexpr int kFrames = 40;
-  std::vector<std::uint8_t> from(bytes, 7), into(bytes);
+namespace {
+
+constexpr int kFrames = 40;
+
+/// One end of a socket, over which whole frames go. Where they cannot, the other end is told, so that neither waits for
+/// ever for the other.
+class FrameEnd {
+ public:
+  explicit FrameEnd(int fd) : fd_(fd) {}
+
+  bool send(const std::vector<std::uint8_t>& frame) const {
+    constexpr std::size_t kMost = 256U << 10U;
+    return all(frame.size(), [&](std::size_t at) {
+      return ::send(fd_.get(), frame.data() + at, std::min(frame.size() - at, kMost), MSG_NOSIGNAL);
+    });
+  }
+  bool receive(std::vector<std::uint8_t>& frame) const {
+    return all(frame.size(),
+               [&](std::size_t at) { return ::recv(fd_.get(), frame.data() + at, frame.size() - at, 0); });
+  }
+
+ private:
+  template <typename Move>
+  bool all(std::size_t size, Move move) const {
+    for (std::size_t at = 0; at < size;) {
+      const ssize_t moved = move(at);
+      if (moved < 0 && errno == EINTR) continue;
+      if (moved <= 0) {
+        ::shutdown(fd_.get(), SHUT_RDWR);
+        return false;
+      }
+      at += static_cast<std::size_t>(moved);
+    }
+    return true;
+  }
+
+  UniqueFd fd_;
+};
+
+}  // namespace
+
+Result<double> copy_s_per_frame(std::size_t bytes, int outputs) {
+  const std::vector<std::uint8_t> from(bytes, 7), theirs(bytes, 3);
+  std::vector<std::uint8_t> into(bytes), there(bytes);
   double spent_s = 0;
   for (int direction = 0; direction <= outputs; ++direction) {
-    int pair[2];
-    if (::socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0) return 0;
-    std::vector<std::uint8_t> theirs(bytes, 3);
-    const auto send_all = [&](int fd, const std::vector<std::uint8_t>& data) {
-      for (std::size_t at = 0; at < data.size();) {
-        const ssize_t put = ::send(fd, data.data() + at, std::min<std::size_t>(data.size() - at, 256U << 10U), 0);
-        if (put <= 0) return;
-        at += static_cast<std::size_t>(put);
-      }
+    std::array<int, 2> pair{-1, -1};
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0)
+      return Error{Errc::io, "no sockets are free to measure the copying of pixels; close other programs"};
+    const FrameEnd ours(pair[0]), other_end(pair[1]);
+    const auto moved = [&](const FrameEnd& end, bool receive, const auto& out, auto& in) {
+      bool whole = true;
+      for (int i = 0; i < kFrames && whole; ++i) whole = receive ? end.receive(in) : end.send(out);
+      return whole;
     };
-    const auto receive_all = [&](int fd, std::vector<std::uint8_t>& data) {
-      for (std::size_t at = 0; at < data.size();) {
-        const ssize_t got = ::recv(fd, data.data() + at, data.size() - at, 0);
-        if (got <= 0) return;
-        at += static_cast<std::size_t>(got);
-      }
-    };
-    OwnedThread other([&](const std::stop_token&) {
-      for (int i = 0; i < kFrames; ++i) direction == 0 ? send_all(pair[1], theirs) : receive_all(pair[1], theirs);
-    });
+    const bool receiving = direction == 0;
+    OwnedThread other([&](const std::stop_token&) { (void)moved(other_end, !receiving, theirs, there); });
     const double before_s = thread_cpu_s();
-    for (int i = 0; i < kFrames; ++i) direction == 0 ? receive_all(pair[0], into) : send_all(pair[0], from);
+    const bool whole = moved(ours, receiving, from, into);
     spent_s += (thread_cpu_s() - before_s) / kFrames;
     other.join();
-    ::close(pair[0]);
-    ::close(pair[1]);
+    if (!whole) return Error{Errc::io, "pixels cannot be copied over a socket of this machine; nothing was measured"};
   }
   return spent_s;
 }

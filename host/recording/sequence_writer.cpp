@@ -26,21 +26,14 @@ Error cannot(const fs::path& path, int fault) {
 }  // namespace
 
 Result<OutputFile> OutputFile::create(const fs::path& path) {
-  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return cannot(path, errno);
-  return OutputFile(fd, path);
-}
-
-OutputFile::OutputFile(OutputFile&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), path_(std::move(other.path_)) {}
-
-OutputFile::~OutputFile() {
-  if (fd_ >= 0) ::close(fd_);
+  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (!fd) return cannot(path, errno);
+  return OutputFile(std::move(fd), path);
 }
 
 Result<void> OutputFile::put(std::uint64_t at, std::span<const std::uint8_t> bytes) {
   while (!bytes.empty()) {
-    const ssize_t put = ::pwrite(fd_, bytes.data(), bytes.size(), static_cast<off_t>(at));
+    const ssize_t put = ::pwrite(fd_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at));
     if (put > 0) {
       bytes = bytes.subspan(static_cast<std::size_t>(put));
       at += static_cast<std::uint64_t>(put);
@@ -56,29 +49,25 @@ Result<void> OutputFile::put(std::uint64_t at, const std::string& text) {
 }
 
 void OutputFile::cut(std::uint64_t bytes) {
-  (void)!::ftruncate(fd_, static_cast<off_t>(bytes));
+  (void)!::ftruncate(fd_.get(), static_cast<off_t>(bytes));
 }
 
 Result<void> OutputFile::append(const fs::path& other, std::uint64_t at) {
-  const int from = ::open(other.c_str(), O_RDONLY | O_CLOEXEC);
-  if (from < 0) return cannot(other, errno);
+  const UniqueFd from(::open(other.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!from) return cannot(other, errno);
   std::vector<std::uint8_t> chunk(std::size_t{4} << 20U);
-  Result<void> done;
   for (;;) {
-    const ssize_t got = ::read(from, chunk.data(), chunk.size());
+    const ssize_t got = ::read(from.get(), chunk.data(), chunk.size());
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) done = cannot(other, errno);
-    if (got <= 0) break;
-    done = put(at, std::span(chunk).first(static_cast<std::size_t>(got)));
-    if (!done) break;
+    if (got < 0) return cannot(other, errno);
+    if (got == 0) return {};
+    if (auto done = put(at, std::span(chunk).first(static_cast<std::size_t>(got))); !done) return done;
     at += static_cast<std::uint64_t>(got);
   }
-  ::close(from);
-  return done;
 }
 
 Result<void> OutputFile::sync() {
-  if (::fsync(fd_) != 0) return cannot(path_, errno);
+  if (::fsync(fd_.get()) != 0) return cannot(path_, errno);
   return {};
 }
 

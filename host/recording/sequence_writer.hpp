@@ -9,6 +9,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::host {
 
@@ -16,9 +17,6 @@ namespace birdseye::host {
 class OutputFile {
  public:
   static Result<OutputFile> create(const std::filesystem::path& path);
-  OutputFile(OutputFile&& other) noexcept;
-  OutputFile& operator=(OutputFile&&) = delete;
-  ~OutputFile();
 
   /// All of bytes at that place, or what was there before it and why.
   Result<void> put(std::uint64_t at, std::span<const std::uint8_t> bytes);
@@ -31,8 +29,8 @@ class OutputFile {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
-  OutputFile(int fd, std::filesystem::path path) : fd_(fd), path_(std::move(path)) {}
-  int fd_;
+  OutputFile(UniqueFd fd, std::filesystem::path path) : fd_(std::move(fd)), path_(std::move(path)) {}
+  UniqueFd fd_;
   std::filesystem::path path_;
 };
 

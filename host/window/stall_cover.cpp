@@ -1,7 +1,5 @@
 #include "host/window/stall_cover.hpp"
 
-#include <pthread.h>
-#include <sched.h>
 #include <xcb/xcb.h>
 
 #include <algorithm>
@@ -110,10 +108,8 @@ int StallCover::covered() const {
 }
 
 void StallCover::watch(const std::stop_token& stop) {
-  // Real-time scheduling puts this thread before whatever keeps the window's thread from running. Without the right to
-  // it the call fails, and the thread runs as any other.
-  const sched_param least{.sched_priority = 1};
-  ::pthread_setschedparam(::pthread_self(), SCHED_RR, &least);
+  // Before whatever keeps the window's thread from running. Without the right to it the thread runs as any other.
+  (void)schedule_this_thread_real_time();
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     const std::optional<HostTime> until = until_;

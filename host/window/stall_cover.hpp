@@ -4,7 +4,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <thread>
 
 #include "calibration/base/image_view.hpp"
 #include "drivers/system/clock.hpp"

@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -14,7 +16,7 @@ namespace birdseye::hw_sim {
 class PseudoTerminal {
  public:
   static Result<PseudoTerminal> open(const std::filesystem::path& link);
-  PseudoTerminal(PseudoTerminal&& other) noexcept;
+  PseudoTerminal(PseudoTerminal&&) noexcept = default;
   PseudoTerminal& operator=(PseudoTerminal&&) = delete;
   ~PseudoTerminal();
 
@@ -23,14 +25,14 @@ class PseudoTerminal {
   /// Sends bytes; what the terminal's buffer cannot take is lost, as on a real line with nobody listening.
   void write(std::span<const std::uint8_t> bytes);
   /// For poll(): readable when the host has sent something.
-  [[nodiscard]] int fd() const { return ours_; }
+  [[nodiscard]] int fd() const { return ours_.get(); }
 
  private:
-  PseudoTerminal(int ours, int theirs, std::filesystem::path link)
-      : ours_(ours), theirs_(theirs), link_(std::move(link)) {}
+  PseudoTerminal(UniqueFd ours, UniqueFd theirs, std::filesystem::path link)
+      : ours_(std::move(ours)), theirs_(std::move(theirs)), link_(std::move(link)) {}
 
-  int ours_;
-  int theirs_;  ///< held open so that our end does not hang up between two drivers
+  UniqueFd ours_;
+  UniqueFd theirs_;  ///< held open so that our end does not hang up between two drivers
   std::filesystem::path link_;
 };
 

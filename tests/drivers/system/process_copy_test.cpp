@@ -7,6 +7,9 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -18,14 +21,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr Duration kShort = Duration::from_ms(50), kLong = Duration::from_ms(60'000);
+constexpr Duration kShortCopy = Duration::from_ms(50), kLongCopy = Duration::from_ms(60'000);
 
 bool is_gone(pid_t process) {
   return ::kill(process, 0) != 0 && errno == ESRCH;
 }
 
 /// What receiving one byte says of a copy that does this.
-Error error_of(const std::function<void(const ProcessCopy::Send&)>& work, Duration within = kLong) {
+Error error_of(const std::function<void(const ProcessCopy::Send&)>& work, Duration within = kLongCopy) {
   auto copy = ProcessCopy::start(work);
   if (!copy) return copy.error();
   char byte = 0;
@@ -39,22 +42,22 @@ TEST(ProcessCopy, SendsMoreThanAPipeHoldsAndKnowsWhatThisProcessKnew) {
       ProcessCopy::start([&](const ProcessCopy::Send& send) { send(values.data(), values.size() * sizeof values[0]); });
   ASSERT_TRUE(copy);
   std::vector<int> received(values.size());
-  ASSERT_TRUE(copy->receive(received.data(), received.size() * sizeof received[0], Deadline::after(kLong)));
+  ASSERT_TRUE(copy->receive(received.data(), received.size() * sizeof received[0], Deadline::after(kLongCopy)));
   EXPECT_EQ(received, values);
   char more = 0;
-  EXPECT_EQ(copy->receive(&more, 1, Deadline::after(kLong)).error().code, Errc::disconnected);
+  EXPECT_EQ(copy->receive(&more, 1, Deadline::after(kLongCopy)).error().code, Errc::disconnected);
 }
 
 TEST(ProcessCopy, OneThatHangsIsKilledAtItsDeadline) {
   auto copy = ProcessCopy::start([](const ProcessCopy::Send& send) {
     send("x", 1);
     ::signal(SIGTERM, SIG_IGN);
-    for (;;) sleep_for(kLong);
+    for (;;) sleep_for(kLongCopy);
   });
   ASSERT_TRUE(copy);
   const pid_t process = copy->pid();
   std::array<char, 2> bytes{};
-  const auto received = copy->receive(bytes.data(), bytes.size(), Deadline::after(kShort));
+  const auto received = copy->receive(bytes.data(), bytes.size(), Deadline::after(kShortCopy));
   ASSERT_FALSE(received);
   EXPECT_EQ(received.error().code, Errc::timeout);
   EXPECT_THAT(received.error().what, HasSubstr("not done in time"));
@@ -68,7 +71,7 @@ TEST(ProcessCopy, OneThatSendsWithoutEndIsKilledAtItsDeadline) {
   });
   ASSERT_TRUE(copy);
   const pid_t process = copy->pid();
-  const Deadline deadline = Deadline::after(kShort);
+  const Deadline deadline = Deadline::after(kShortCopy);
   std::array<char, 4096> bytes{};
   Result<void> received;
   while (received) received = copy->receive(bytes.data(), bytes.size(), deadline);
@@ -92,7 +95,7 @@ TEST(ProcessCopy, HowItEndedIsTold) {
 TEST(ProcessCopy, IsNoMoreWhenItsOwnerGoes) {
   pid_t process = -1;
   {
-    const auto copy = ProcessCopy::start([](const ProcessCopy::Send&) { sleep_for(kLong); });
+    const auto copy = ProcessCopy::start([](const ProcessCopy::Send&) { sleep_for(kLongCopy); });
     ASSERT_TRUE(copy);
     process = copy->pid();
     EXPECT_FALSE(is_gone(process));
@@ -108,7 +111,7 @@ TEST(ProcessCopy, NoneIsMadeWhileCopiesAreHeldOff) {
     made = true;
     EXPECT_TRUE(copy);
   });
-  sleep_for(kShort);
+  sleep_for(kShortCopy);
   EXPECT_FALSE(made);
   held.reset();
 }

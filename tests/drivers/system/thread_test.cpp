@@ -1,6 +1,7 @@
 #include "drivers/system/thread.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <array>
 #include <atomic>
@@ -27,6 +28,14 @@ TEST(OwnedThread, IsAskedToStopAndWaitedForWhenItsOwnerGoes) {
   }
   EXPECT_TRUE(ended);
   OwnedThread().join();  // nothing to wait for
+}
+
+TEST(OwnedThread, IsRealTimeWhereThatIsAllowedAndAsBeforeElse) {
+  const OwnedThread thread([](const std::stop_token&) {
+    const int before = ::sched_getscheduler(0);
+    const bool allowed = schedule_this_thread_real_time();
+    EXPECT_EQ(::sched_getscheduler(0), allowed ? SCHED_RR : before);
+  });
 }
 
 TEST(Condition, HoldsOnceItIsToldAndNotByTheDeadlineElse) {

@@ -5,23 +5,17 @@
 
 #include <array>
 
+#include "drivers/system/pipe.hpp"
 #include "drivers/system/thread.hpp"
-#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye {
 namespace {
 
 constexpr Duration kShortWait = Duration::from_ms(5), kLongWait = Duration::from_ms(60'000);
 
-struct Pipe {
-  Pipe() {
-    std::array<int, 2> ends{};
-    EXPECT_EQ(::pipe(ends.data()), 0);
-    out = UniqueFd(ends[0]);
-    in = UniqueFd(ends[1]);
-  }
+struct OnePipe : Pipe {
+  OnePipe() : Pipe(Pipe::open().value()) {}
   void fill() const { EXPECT_EQ(::write(in.get(), "x", 1), 1); }
-  UniqueFd out, in;
 };
 
 TEST(Wait, SleepsUntilTheMomentAndNoLessThanTheSpan) {
@@ -44,7 +38,7 @@ TEST(Wait, AStopEndsASleepAndTheSpanEndsItElse) {
 }
 
 TEST(Wait, AnEmptyPipeIsNotReadableAndAFullOneIs) {
-  const Pipe pipe;
+  const OnePipe pipe;
   const Deadline soon = Deadline::after(kShortWait);
   EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, soon), 0);
   EXPECT_TRUE(soon.passed());
@@ -54,13 +48,13 @@ TEST(Wait, AnEmptyPipeIsNotReadableAndAFullOneIs) {
 }
 
 TEST(Wait, AWriterThatHasGoneIsTold) {
-  Pipe pipe;
+  OnePipe pipe;
   OwnedThread closer([&](const std::stop_token&) { pipe.in = UniqueFd(); });
   EXPECT_EQ(wait_ready(pipe.out.get(), POLLIN, Deadline::after(kLongWait)), POLLHUP);
 }
 
 TEST(Wait, OfSeveralTheReadyOnesAreToldAndNobodyIsNeverReady) {
-  const Pipe silent, speaking;
+  const OnePipe silent, speaking;
   std::array<pollfd, 3> entries{{{silent.out.get(), POLLIN, 0}, {-1, POLLIN, 0}, {speaking.out.get(), POLLIN, 0}}};
   EXPECT_FALSE(wait_ready(entries, Deadline::after(kShortWait)));
   OwnedThread speaker([&](const std::stop_token&) { speaking.fill(); });
