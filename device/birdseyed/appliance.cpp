@@ -119,6 +119,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.frames = counters.frames;
   health.frames_dropped = counters.frames_lost;
   health.frames_repeated = counters.frames_repeated;
+  health.spurious_strobe_edges = counters.spurious_strobe_edges;
   health.messages_shed = sent.messages_shed;
   health.clients = sent.clients;
   health.clients_shed = sent.clients_shed;

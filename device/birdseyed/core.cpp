@@ -46,6 +46,7 @@ Core::Counters Core::counters() const {
   counters.frames_repeated = frames_repeated_;
   counters.clock_events = clock_events_;
   if (assembler_) counters.tracker_drift_ppm = assembler_->drift_ppm();
+  counters.spurious_strobe_edges = frame_clock_.spurious_strobe_edges();
   counters.camera_drift_ppm = frame_clock_.drift_ppm();
   counters.tracker_time_sigma_ms = time_sigma_.seconds() * 1e3;
   return counters;

@@ -40,6 +40,7 @@ class Core {
   struct Counters {
     drivers::minibird::MiniBirdCounters tracker;
     std::uint64_t frames = 0, frames_lost = 0, frames_repeated = 0, clock_events = 0;
+    std::uint64_t spurious_strobe_edges = 0;
     double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;
   };
   [[nodiscard]] Counters counters() const;

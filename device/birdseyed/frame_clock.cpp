@@ -21,6 +21,7 @@ void FrameClock::restart(double rate_hz, std::optional<Duration> exposure) {
   exposure_ = exposure.value_or(settings_.exposure);
   line_.reset();
   stamps_.reset();
+  spurious_before_ = spurious_strobe_edges();
   strobe_.reset();
 }
 
@@ -48,6 +49,7 @@ StrobeMatcher::Match FrameClock::match(const drivers::Frame& frame, std::int64_t
       settings.least_delay = Duration::from_seconds(expected_s - kEarlier * period().seconds());
       settings.most_delay = Duration::from_seconds(expected_s + kLater * period().seconds());
     }
+    spurious_before_ = spurious_strobe_edges();
     strobe_.emplace(settings);
     strobe_by_stamps_ = by_stamps;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -43,6 +44,10 @@ class FrameClock {
   Time time_of(const drivers::Frame& frame);
   /// Drift of the line under the arrivals; 0 where the camera stamps its frames.
   [[nodiscard]] double drift_ppm() const { return line_ ? line_->drift_ppm() : 0; }
+  /// Edges too close to another to be a frame's, so far.
+  [[nodiscard]] std::uint64_t spurious_strobe_edges() const {
+    return spurious_before_ + (strobe_ ? strobe_->spurious_edges() : 0);
+  }
   /// What happened to the camera's clock since the last call.
   std::vector<ClockEvent> take_events() { return std::exchange(events_, {}); }
 
@@ -57,6 +62,7 @@ class FrameClock {
   std::optional<ClockLine> stamps_;      ///< under the stamps: shows that they jump
   std::optional<StrobeMatcher> strobe_;  ///< from the first frame on
   bool strobe_by_stamps_ = false;
+  std::uint64_t spurious_before_ = 0;  ///< of strobe_'s predecessors
   std::vector<ClockEvent> events_;
 };
 

@@ -34,6 +34,7 @@ void each_of_health(AnyHealth& health, const Each& each) {
   each("frames", health.frames);
   each("frames_dropped", health.frames_dropped);
   each("frames_repeated", health.frames_repeated);
+  each("spurious_strobe_edges", health.spurious_strobe_edges);
   each("messages_shed", health.messages_shed);
   each("clients", health.clients);
   each("clients_shed", health.clients_shed);

@@ -91,6 +91,7 @@ struct Health {
   std::uint64_t measurements = 0, measurements_lost = 0, phase_errors = 0, senseless_records = 0, doubted = 0;
   std::uint64_t line_errors = 0, clock_events = 0;
   std::uint64_t frames = 0, frames_dropped = 0, frames_repeated = 0;
+  std::uint64_t spurious_strobe_edges = 0;  ///< too close to another to be a frame's
   std::uint64_t messages_shed = 0, clients = 0, clients_shed = 0, requests_refused = 0;
   std::uint64_t events_dropped = 0;  ///< events that came faster than messages could be made of them
   double tracker_drift_ppm = 0, camera_drift_ppm = 0, tracker_time_sigma_ms = 0;

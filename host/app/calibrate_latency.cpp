@@ -35,6 +35,7 @@ struct LatencyFound {
   StreamNames names;
   std::string advice;
   nlohmann::json more = nlohmann::json::object();
+  Drops drops;
 };
 
 /// What to do about it, for an appliance. The times of frames follow from [camera] delay_ms, those of poses from
@@ -77,7 +78,7 @@ Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progre
   auto latency = calibration::find_latency(std::span<const calibration::TimedMotionPose>(streams->tracker),
                                            std::span<const calibration::ImageMotion>(streams->video), options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: the tracker, b: the video)"};
-  LatencyFound found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}};
+  LatencyFound found{*std::move(latency), {"tracker", "video", "px/s"}, {}, {}, streams->drops};
   found.advice = advice_of(found.latency, options.delay_ms);
   found.more = {{"method", "picture motion"},
                 {"bird", streams->bird},
@@ -112,7 +113,7 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& o
   if (!b) return b.error();
   auto latency = calibration::find_latency(*a, *b, options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
-  LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}};
+  LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}, {}};
   found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",
                              options.eye_poses.filename().string(), std::abs(found.latency.offset_ms),
                              found.latency.offset_ms > 0 ? "late" : "early", options.poses.filename().string(),
@@ -152,6 +153,7 @@ void run(const CalibrateLatencyOptions& options, CommandStatus& status) {
   if (!found) return status.refuse(found.error());
   Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
   for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
+  found->drops.tell(verdict);
   if (verdict.grade != Grade::fail) {
     const Latency& l = found->latency;
     fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",

@@ -135,7 +135,10 @@ Result<ExitCode> demo(const DemoOptions& options) {
       settings.ct.empty() ? "Birdseye: the simulated cart" : "Birdseye: the simulated cart over a CT of yours";
   session.figures.position_noise_mm = settings.position_noise_mm;
   session.figures.angle_noise_deg = settings.angle_noise_deg;
-  if (auto ran = session.run(stream); !ran) return ran.error();
+  const auto ran = session.run(stream);
+  session.figures.drops = stream.drops();
+  if (const std::string words = session.figures.drops.words(); !words.empty()) progress.keep(words);
+  if (!ran) return ran.error();
   if (auto ended = (*cart)->finish(Deadline::after(Duration::from_ms(10'000))); !ended) return ended.error();
   if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
   if (auto filmed = session.finish(); !filmed) return filmed.error();
@@ -148,6 +151,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
     return written.error();
   }
   judge(session.figures);
+  session.figures.drops.tell(session.figures.verdict);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();
   progress.keep(fmt::format("{}: {}", name_of(session.figures.verdict.grade), session.figures.verdict.reasons.front()));

@@ -107,21 +107,19 @@ Result<ExitCode> run(const RecordOptions& options) {
   if (!writer) return writer.error();
   Progress progress;
   Ending ending;
-  std::string peer, dropped;
-  bool others_dropped = false;
+  std::string peer;
+  Drops drops;
   {
     EventStream stream(*std::move(client), kMostRecordFramesWaiting);
     ending = record(stream, **writer, options, progress);
     peer = stream.peer_words();
-    dropped = stream.dropped_words();
-    others_dropped = stream.others_dropped() > 0;
+    drops = stream.drops();
   }
   progress.keep("completing the files");
   const auto finished = (*writer)->finish(ending.why);
   Verdict verdict = judge(**writer, ending, finished.has_value());
   if (!peer.empty()) verdict.add(Grade::pass, fmt::format("{} is {}", options.server, peer));
-  // Frames are judged by how many are missing; for what else is, nothing else tells.
-  if (!dropped.empty()) verdict.add(others_dropped ? Grade::marginal : Grade::pass, dropped);
+  drops.tell(verdict);
   const RecordingFigures& figures = (*writer)->figures();
   if (auto written = write_file(options.json, text_of(json_of(figures, verdict))); !written) return written.error();
   fmt::print("{}: {:.1f} s, {} frames, {} measurements\n", options.out.string(), figures.seconds(), figures.frames,

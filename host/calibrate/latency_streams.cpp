@@ -108,9 +108,7 @@ std::string last_line(const std::filesystem::path& log) {
   return last;
 }
 
-}  // namespace
-
-Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress) {
+Result<LatencyStreams> gather(EventStream& stream, const LatencySource& source, Progress& progress) {
   Gatherer gatherer(source);
   HostTime heard = host_now();
   // Streams that come but tell nothing of this bird, or show no motion, do not last: finish() says why.
@@ -139,6 +137,16 @@ Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& 
                                 : fmt::format("playing: {:.0f} s", gatherer.lasted_s()));
   }
   return gatherer.finish();
+}
+
+}  // namespace
+
+Result<LatencyStreams> gather_streams(EventStream& stream, const LatencySource& source, Progress& progress) {
+  auto streams = gather(stream, source, progress);
+  const Drops drops = stream.drops();
+  if (const std::string words = drops.words(); !words.empty()) progress.keep(words);
+  if (streams) streams->drops = drops;
+  return streams;
 }
 
 Result<LatencyStreams> record_streams(const std::string& server, const LatencySource& source, Progress& progress) {

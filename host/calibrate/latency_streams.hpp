@@ -19,6 +19,7 @@ struct LatencyStreams {
   std::size_t frames = 0, frames_without_motion = 0;
   std::string usual_reason;  ///< why the latest frame without motion had none
   std::string bird;          ///< whose poses these are
+  Drops drops;
 };
 
 struct LatencySource {

@@ -67,6 +67,8 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"frames", f.frames},
       {"frames_dropped", f.frames_dropped},
       {"frames_without_overlay", f.frames_without_overlay},
+      {"board_frames_left_out", f.board_frames_left_out},
+      {"other_messages_dropped", f.drops.others},
       {"wall_s", f.wall_s},
   };
 
@@ -84,6 +86,8 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
   row("tracker noise, each axis", fmt::format("{} mm, {} deg", f.position_noise_mm, f.angle_noise_deg));
   row("frames / dropped / without overlay",
       fmt::format("{} / {} / {}", f.frames, f.frames_dropped, f.frames_without_overlay));
+  row("frames of the board without poses / other messages dropped",
+      fmt::format("{} / {}", f.board_frames_left_out, f.drops.others));
   row("wall time", fmt::format("{:.1f} s", f.wall_s));
 
   HtmlPage page(f.title);

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
 #include "calibration/base/verdict.hpp"
+#include "host/link/drops.hpp"
 
 namespace birdseye::host {
 
@@ -29,6 +31,8 @@ struct DemoFigures {
   int frames = 0;
   int frames_dropped = 0;
   int frames_without_overlay = 0;
+  Drops drops;                              ///< frames among frames_dropped, and other messages
+  std::uint64_t board_frames_left_out = 0;  ///< for want of poses
   double position_noise_mm = 0;
   double angle_noise_deg = 0;
   double wall_s = 0;

@@ -87,6 +87,8 @@ void DemoSession::take_stations() {
 Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
   stations_.finish();
   take_stations();
+  figures.board_frames_left_out = stations_.frames_left_out();
+  if (const std::string words = stations_.left_out_words(); !words.empty()) progress_.keep(words);
   std::vector<calibration::PatternView> views;
   views.reserve(seen_.stations.size());
   for (const calibration::HandEyeStation& station : seen_.stations) views.push_back(station.view);

@@ -1,8 +1,8 @@
 #include "host/guide/guide_worker.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
+
+#include "host/link/drops.hpp"
 
 namespace birdseye::host {
 
@@ -89,8 +89,8 @@ void GuideWorker::work(const std::stop_token& stop, const GuidePlan& plan) {
     const std::lock_guard lock(mutex_);
     state_ = guide.state();
   }
-  if (const auto frames = events_.dropped(kFrames), poses = events_.dropped(kPoses); frames + poses > 0)
-    tell(fmt::format("this machine fell behind, so {} frames and {} poses were left out", frames, poses));
+  const Drops drops{events_.dropped(kFrames), events_.dropped(kPoses)};
+  if (const std::string words = drops.words(); !words.empty()) tell(words);
   if (!fault) {
     const std::lock_guard lock(mutex_);
     state_.collecting = false;

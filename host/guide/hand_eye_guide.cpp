@@ -79,6 +79,7 @@ void HandEyeGuide::end(const std::string& why) {
 }
 
 GuidedStations HandEyeGuide::finish() {
+  if (const std::string words = stations_.left_out_words(); !words.empty()) tell_.lasting(words);
   tell_.lasting(session_.ended + "; the last solution is being worked out");
   solve(true);
   return std::move(session_);

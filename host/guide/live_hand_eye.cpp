@@ -88,7 +88,9 @@ Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) 
     return locked.error();
   note_interrupts();
   EventStream stream(*std::move(client), 60);
-  return lead(plan, stream, progress);
+  auto led = lead(plan, stream, progress);
+  if (const std::string words = stream.drops().words(); !words.empty()) progress.keep(words);
+  return led;
 }
 
 }  // namespace birdseye::host

@@ -38,7 +38,9 @@ void LiveStations::push(const wire::Birds& birds) {
 void LiveStations::push(const wire::VideoFrame& frame) {
   newest_ = frame;
   pending_.push_back(frame);
-  if (pending_.size() > kMostPending) pending_.pop_front();
+  if (pending_.size() <= kMostPending) return;
+  pending_.pop_front();
+  ++left_out_;
 }
 
 void LiveStations::consider(const wire::VideoFrame& frame) {
@@ -98,6 +100,11 @@ std::optional<LiveStation> LiveStations::take_station() {
 
 std::string LiveStations::take_remark() {
   return std::exchange(remark_, {});
+}
+
+std::string LiveStations::left_out_words() const {
+  if (left_out_ == 0) return {};
+  return fmt::format("{} frames were left out: no poses of \"{}\" came for them in time", left_out_, bird_);
 }
 
 std::optional<calibration::PatternView> LiveStations::look() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -40,6 +41,10 @@ class LiveStations {
   std::string take_remark();
   /// The pattern in the newest picture, to say how to go on from there; empty where it is not seen.
   [[nodiscard]] std::optional<calibration::PatternView> look() const;
+  /// Frames that waited for the tracker's poses until there was no more room.
+  [[nodiscard]] std::uint64_t frames_left_out() const { return left_out_; }
+  /// The same in words; empty where there are none.
+  [[nodiscard]] std::string left_out_words() const;
   /// Whether the scope is at rest and it is not yet decided if the rest becomes a station.
   [[nodiscard]] bool deciding() const { return rest_ && !rest_->done; }
 
@@ -59,6 +64,7 @@ class LiveStations {
   calibration::StillDetector still_;
   DeviceTime newest_pose_;
   std::deque<wire::VideoFrame> pending_;
+  std::uint64_t left_out_ = 0;
   std::optional<wire::VideoFrame> newest_;
   std::optional<Rest> rest_;
   std::deque<LiveStation> stations_;

@@ -1,7 +1,5 @@
 #include "host/link/event_stream.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "device/wire/clock_discipline.hpp"
@@ -56,12 +54,6 @@ std::optional<ClockGap> EventStream::gap_at(const wire::Event& event) const {
 std::optional<ClockGap> EventStream::host_from_device() const {
   const std::lock_guard lock(mutex_);
   return gap_;
-}
-
-std::string EventStream::dropped_words() const {
-  const std::uint64_t frames = frames_dropped(), others = others_dropped();
-  if (frames + others == 0) return {};
-  return fmt::format("this machine fell behind, so {} frames and {} other messages were dropped", frames, others);
 }
 
 std::string EventStream::peer_words() const {

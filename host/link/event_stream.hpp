@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -9,6 +8,7 @@
 #include "device/wire/client.hpp"
 #include "drivers/system/blocking_queue.hpp"
 #include "drivers/system/thread.hpp"
+#include "host/link/drops.hpp"
 #include "host/link/event_source.hpp"
 
 namespace birdseye::host {
@@ -35,11 +35,10 @@ class EventStream : public EventSource {
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// For a server that is no appliance: what it is, and which of its messages are passed over. Empty for an appliance.
   [[nodiscard]] std::string peer_words() const;
-  /// Frames that were dropped, for nobody took them in time; and what else was.
-  [[nodiscard]] std::uint64_t frames_dropped() const { return events_.dropped(kFrames); }
-  [[nodiscard]] std::uint64_t others_dropped() const { return events_.dropped(kPoses) + events_.dropped(kOthers); }
-  /// The same in words; empty where nothing was dropped.
-  [[nodiscard]] std::string dropped_words() const;
+  /// What nobody took in time.
+  [[nodiscard]] Drops drops() const {
+    return {events_.dropped(kFrames), events_.dropped(kPoses) + events_.dropped(kOthers)};
+  }
 
  private:
   enum Lane : std::size_t { kFrames, kPoses, kOthers, kLanes };

@@ -108,7 +108,7 @@ std::string LiveSource::words() const {
 std::string LiveSource::notes() const {
   constexpr std::size_t kMost = 3;
   std::string out;
-  if (const std::string dropped = stream_ != nullptr ? stream_->dropped_words() : ""; !dropped.empty())
+  if (const std::string dropped = stream_ != nullptr ? stream_->drops().words() : ""; !dropped.empty())
     out = "; " + dropped;
   if (recording_ == nullptr) return out;
   const std::vector<std::string>& notes = recording_->notes();

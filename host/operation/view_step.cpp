@@ -12,7 +12,10 @@ constexpr std::size_t kMostViews = 12;
 
 void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
                     const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
-  if (views_.size() >= kMostViews) return;
+  if (views_.size() >= kMostViews) {
+    note_.line = fmt::format("not kept: {} views are the most; undo the last one, or go on", kMostViews);
+    return;
+  }
   if (!frame || !camera_from_patient) {
     note_.line = "not kept: there is no overlay on this frame, so that where its camera was is not sure";
     return;

@@ -78,6 +78,22 @@ TEST(FrameClock, StampsTellWhichEdgeIsAFrames) {
   }
 }
 
+TEST(FrameClock, SpuriousEdgesOfTheStrobeAreCountedAcrossRestarts) {
+  FrameClock clock(with_strobe(Duration::from_seconds(kDelay_s)));
+  Camera().film(clock, 100);
+  EXPECT_EQ(clock.spurious_strobe_edges(), 0U);
+  const auto edge = [&](double seconds) { clock.take({drivers::GpioInput::strobe, true, at_seconds(seconds)}); };
+  edge(5);
+  edge(5.003);
+  EXPECT_EQ(clock.spurious_strobe_edges(), 1U);
+  clock.restart(60, {});
+  EXPECT_EQ(clock.spurious_strobe_edges(), 1U);
+  Camera().film(clock, 100);
+  edge(5);
+  edge(5.003);
+  EXPECT_EQ(clock.spurious_strobe_edges(), 2U);
+}
+
 TEST(FrameClock, AStrobeAloneIsNoTimeWhereFramesMayBeAnyEdges) {
   FrameClock clock(with_strobe({}));
   Camera camera;

@@ -167,6 +167,19 @@ TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
   EXPECT_EQ(step.note().line, "calibrated anew");
 }
 
+TEST(ViewStep, OneMoreThanTheMostIsRefusedAndToldSo) {
+  ViewStep step;
+  for (unsigned i = 0; i < 12; ++i) step.keep(noise(i), kCameraFromPatient);
+  EXPECT_EQ(step.note().line, "12 views kept");
+  step.keep(noise(12), kCameraFromPatient);
+  EXPECT_EQ(step.views().size(), 12U);
+  EXPECT_EQ(step.note().line, "not kept: 12 views are the most; undo the last one, or go on");
+  EXPECT_TRUE(step.note().done);
+  step.undo();
+  step.keep(noise(12), kCameraFromPatient);
+  EXPECT_EQ(step.note().line, "12 views kept");
+}
+
 std::shared_ptr<const PatientPlan> ball() {
   auto plan = std::make_shared<PatientPlan>();
   Volume& ct = plan->ct;
