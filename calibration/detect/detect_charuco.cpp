@@ -58,20 +58,20 @@ std::map<int, Predicted> predict(const Pattern& pattern, const std::vector<int>&
 
 /// How well a layout agrees with the tags that are seen: of the corners between two tags, those where both put them
 /// within reach of each other, and those that they put a square and more apart.
-struct Layout {
+struct TagAgreement {
   int joined = 0, torn = 0;
 };
-Layout layout_of(const std::map<int, Predicted>& corners) {
-  Layout layout;
+TagAgreement agreement_of(const std::map<int, Predicted>& corners) {
+  TagAgreement agreement;
   for (const auto& [id, predicted] : corners) {
     if (predicted.by_tag.size() != 2) continue;
     const Cross& cross = predicted.by_tag[0];
     const double apart_px = (cross.centre_px - predicted.by_tag[1].centre_px).norm();
     const double side_px = std::sqrt(std::abs(cross.px_per_square.determinant()));
-    if (apart_px < kAgree_squares * side_px) ++layout.joined;
-    if (apart_px > side_px) ++layout.torn;
+    if (apart_px < kAgree_squares * side_px) ++agreement.joined;
+    if (apart_px > side_px) ++agreement.torn;
   }
-  return layout;
+  return agreement;
 }
 
 /// What two tags that agree say of the corner between them.
@@ -179,8 +179,8 @@ bool is_other_layout(const Pattern& pattern, const std::map<int, Predicted>& pre
   if (pattern.rows % 2 != 0) return false;
   Pattern other = pattern;
   other.legacy = !pattern.legacy;
-  const Layout as_told = layout_of(predictions);
-  const Layout as_other = layout_of(predict(other, ids, quads));
+  const TagAgreement as_told = agreement_of(predictions);
+  const TagAgreement as_other = agreement_of(predict(other, ids, quads));
   return as_told.torn >= 2 && as_told.torn > 2 * as_other.torn && as_other.joined > as_told.joined;
 }
 

@@ -76,13 +76,13 @@ bool is_flank(const cv::Mat& smooth, const Slope& slope) {
 
 /// Where the pattern is dark, in steps of its grid from its first point, and which of two colours a square has: both
 /// colours of a chessboard are listed, for its counts alone do not always tell which is dark.
-struct Place {
+struct PatternPlace {
   Eigen::Vector2d at;
   int colour = 0;
 };
 
-std::vector<Place> places_of(const Pattern& pattern) {
-  std::vector<Place> places;
+std::vector<PatternPlace> places_of(const Pattern& pattern) {
+  std::vector<PatternPlace> places;
   if (pattern.kind == PatternKind::dots) {
     for (const auto& mm : pattern_points_mm(pattern)) places.push_back({mm.head<2>() / pattern.spacing_mm, 0});
     return places;
@@ -182,7 +182,7 @@ double glare_of(const Pattern& pattern, const GreyView& picture, const std::vect
   }
   cv::convexHull(std::vector<cv::Point2f>(outline), outline);
   std::array<std::vector<double>, 2> greys;
-  for (const Place& place : places_of(pattern)) {
+  for (const PatternPlace& place : places_of(pattern)) {
     const auto px = pixel_of(points, place.at);
     if (!px || !px->allFinite() || !inside(picture, *px, 1)) continue;
     const cv::Point2f at(static_cast<float>(px->x()), static_cast<float>(px->y()));

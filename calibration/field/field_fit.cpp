@@ -24,7 +24,7 @@ constexpr std::size_t kFewestSamples = 30;
 constexpr double kLeastScale = 0.8, kMostScale = 1.25;
 constexpr int kScreenings = 12;
 
-struct Grid {
+struct MeasuredGrid {
   Vectors measured_mm;
   Vectors wanted_mm;  ///< the correction at each: true, in the tracker's frame, less measured
   std::vector<bool> used;
@@ -57,7 +57,7 @@ Result<Rigid> board_in_tracker(std::span<const FieldSample> samples, const std::
   return Rigid{{fit->rotation, fit->translation_mm}, along / squares};
 }
 
-Result<void> align(std::span<const FieldSample> samples, Grid& grid, FieldFit& fit) {
+Result<void> align(std::span<const FieldSample> samples, MeasuredGrid& grid, FieldFit& fit) {
   const auto rigid = board_in_tracker(samples, grid.used);
   if (!rigid) return rigid.error();
   fit.tracker_from_board = rigid->tracker_from_board;
@@ -67,7 +67,7 @@ Result<void> align(std::span<const FieldSample> samples, Grid& grid, FieldFit& f
   return {};
 }
 
-FoldedNormals normals_of(const SmoothedBasis& basis, const Grid& grid, const Vectors& wanted) {
+FoldedNormals normals_of(const SmoothedBasis& basis, const MeasuredGrid& grid, const Vectors& wanted) {
   FoldedNormals normals(basis.size(), 3);
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<std::size_t> in;
@@ -85,14 +85,14 @@ FoldedNormals normals_of(const SmoothedBasis& basis, const Grid& grid, const Vec
   return normals;
 }
 
-struct HeldOut {
+struct HeldOutErrors {
   Vectors errors;                ///< corrected less true, of all samples, by fits that were not shown their folds
   std::vector<double> variance;  ///< of the prediction there, for noise of variance 1
 };
 
-HeldOut held_out(const SmoothedBasis& basis, const FoldedNormals& normals, const Grid& grid, const Vectors& wanted,
-                 double smoothing) {
-  HeldOut out{Vectors(wanted.size()), std::vector<double>(wanted.size())};
+HeldOutErrors held_out(const SmoothedBasis& basis, const FoldedNormals& normals, const MeasuredGrid& grid,
+                       const Vectors& wanted, double smoothing) {
+  HeldOutErrors out{Vectors(wanted.size()), std::vector<double>(wanted.size())};
   for (int fold = 0; fold < kFolds; ++fold) {
     if (std::find(grid.fold.begin(), grid.fold.end(), fold) == grid.fold.end()) continue;
     const auto solution = normals.solve(smoothing, fold);
@@ -106,7 +106,7 @@ HeldOut held_out(const SmoothedBasis& basis, const FoldedNormals& normals, const
   return out;
 }
 
-FieldCandidate best_smoothing(const SmoothedBasis& basis, const Grid& grid) {
+FieldCandidate best_smoothing(const SmoothedBasis& basis, const MeasuredGrid& grid) {
   const FoldedNormals normals = normals_of(basis, grid, grid.wanted_mm);
   FieldCandidate best{basis.functions.basis, basis.functions.order};
   for (const double smoothing : detail::kSmoothings) {
@@ -119,7 +119,7 @@ FieldCandidate best_smoothing(const SmoothedBasis& basis, const Grid& grid) {
 /// Takes out what does not fit the rest, the farthest first, so that one that drags its neighbours along does not take
 /// them with it; then looks at all again.
 Result<void> screen(std::span<const FieldSample> samples, const SmoothedBasis& basis, double smoothing, double least_mm,
-                    Grid& grid, FieldFit& fit) {
+                    MeasuredGrid& grid, FieldFit& fit) {
   for (int round = 0; round < kScreenings; ++round) {
     const auto normals = normals_of(basis, grid, grid.wanted_mm);
     auto [errors, variance] = held_out(basis, normals, grid, grid.wanted_mm, smoothing);
@@ -166,7 +166,8 @@ Vectors coefficients(const SmoothedBasis& basis, const MatrixXd& parameters) {
 }
 
 /// Of a new measurement: sigma^2 (1 + f^T A^-1 f) per axis, with sigma from how far held-out ones were off.
-std::vector<double> sigmas(const SmoothedBasis& basis, const Grid& grid, const HeldOut& held, const MatrixXd& inverse) {
+std::vector<double> sigmas(const SmoothedBasis& basis, const MeasuredGrid& grid, const HeldOutErrors& held,
+                           const MatrixXd& inverse) {
   double sum = 0, count = 0;
   Vectors places;
   for (std::size_t i = 0; i < held.errors.size(); ++i) {
@@ -183,7 +184,8 @@ std::vector<double> sigmas(const SmoothedBasis& basis, const Grid& grid, const H
                                });
 }
 
-Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& basis, const Grid& grid, FieldFit& fit) {
+Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& basis, const MeasuredGrid& grid,
+                    FieldFit& fit) {
   const double smoothing = fit.chosen.smoothing;
   const auto normals = normals_of(basis, grid, grid.wanted_mm);
   const auto held = held_out(basis, normals, grid, grid.wanted_mm, smoothing);
@@ -223,7 +225,7 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
   if (samples.size() < kFewestSamples)
     return Error{Errc::degenerate, fmt::format("{} samples; a map needs {} at least, and a good one over a hundred",
                                                samples.size(), kFewestSamples)};
-  Grid grid;
+  MeasuredGrid grid;
   for (const FieldSample& s : samples) {
     if (!s.true_mm.allFinite() || !s.measured.matrix().allFinite())
       return Error{Errc::bad_value, s.name + ": holds what is not a finite number; take it out"};

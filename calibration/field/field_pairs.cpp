@@ -29,12 +29,12 @@ constexpr std::size_t kMostFunctions = 64;  // six parameters each
 constexpr int kSteps = 3;
 
 /// The body as it is: sensor b in a's frame.
-struct Body {
+struct SensorPair {
   Eigen::Vector3d b_in_a_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d a_from_b = Eigen::Matrix3d::Identity();
 };
 
-struct Pairs {
+struct FoldedPairs {
   std::vector<FieldPair> pairs;
   std::vector<bool> used;
   std::vector<int> fold;
@@ -55,7 +55,7 @@ class PairModel {
     for (Index i = 0; i < n_; ++i) sum += row[i] * theta.segment<3>(from + 3 * i);
     return sum;
   }
-  [[nodiscard]] Eigen::VectorXd start(const Body& body) const {
+  [[nodiscard]] Eigen::VectorXd start(const SensorPair& body) const {
     Eigen::VectorXd theta = Eigen::VectorXd::Zero(parameters());
     theta.tail<3>() = body.b_in_a_mm;
     return theta;
@@ -66,7 +66,7 @@ class PairModel {
   ///   r = p_b + c(p_b) - p_a - c(p_a) - R_a' x,   R_a' = exp(w(p_a)) R_a,
   ///   dr = f_b dc - f_a dc + [R_a' x] f_a dw - R_a' dx,
   /// and of the orientations log(R_a' Y R_b'^T) = f_b dw - f_a dw, times kMmPerRad.
-  void linearise(const FieldPair& pair, const Body& body, const Eigen::VectorXd& theta, MatrixXd& rows,
+  void linearise(const FieldPair& pair, const SensorPair& body, const Eigen::VectorXd& theta, MatrixXd& rows,
                  Eigen::Matrix<double, 6, 1>& values) const {
     const Eigen::RowVectorXd fa = basis_.row(pair.a.translation()), fb = basis_.row(pair.b.translation());
     const Eigen::Matrix3d ra = rotation_exp(shift(fa, theta, true)) * pair.a.rotation();
@@ -116,7 +116,7 @@ class PairModel {
 };
 
 /// What pairs cannot see, said of the map: its sums over the samples, their moments, and the scale.
-void add_gauge(const PairModel& model, const Pairs& data, const Body& body, FoldedNormals& normals) {
+void add_gauge(const PairModel& model, const FoldedPairs& data, const SensorPair& body, FoldedNormals& normals) {
   const FieldFunctions& box = model.basis().functions;
   const Eigen::Vector3d middle_mm = (box.low_mm + box.high_mm) / 2;
   const double size_mm = (box.high_mm - box.low_mm).norm() / 2;
@@ -142,14 +142,15 @@ void add_gauge(const PairModel& model, const Pairs& data, const Body& body, Fold
   for (int fold = 0; fold < kFolds; ++fold) normals.add(fold, weight * rows, weight * values);
 }
 
-struct Linear {
+struct GaussNewtonEquations {
   FoldedNormals normals;
   Eigen::VectorXd theta;
 };
 
 /// Gauss-Newton: the equations at the last step's solution.
-Linear equations(const PairModel& model, const Pairs& data, const Body& body, double smoothing) {
-  Linear out{FoldedNormals(model.parameters(), 1), model.start(body)};
+GaussNewtonEquations equations(const PairModel& model, const FoldedPairs& data, const SensorPair& body,
+                               double smoothing) {
+  GaussNewtonEquations out{FoldedNormals(model.parameters(), 1), model.start(body)};
   MatrixXd rows;
   Eigen::Matrix<double, 6, 1> values;
   for (int step = 0; step < kSteps; ++step) {
@@ -180,7 +181,8 @@ Linear equations(const PairModel& model, const Pairs& data, const Body& body, do
   return out;
 }
 
-Vectors held_out(const PairModel& model, const Linear& linear, const Pairs& data, double smoothing) {
+Vectors held_out(const PairModel& model, const GaussNewtonEquations& linear, const FoldedPairs& data,
+                 double smoothing) {
   Vectors errors(data.pairs.size());
   for (int fold = 0; fold < kFolds; ++fold) {
     const Eigen::VectorXd theta = linear.normals.solve(smoothing, fold).parameters;
@@ -191,7 +193,7 @@ Vectors held_out(const PairModel& model, const Linear& linear, const Pairs& data
   return errors;
 }
 
-Body mean_body(const Pairs& data) {
+SensorPair mean_body(const FoldedPairs& data) {
   Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
@@ -206,7 +208,7 @@ Body mean_body(const Pairs& data) {
 }
 
 /// The least variance of the direction from a to b.
-double direction_spread(const Pairs& data) {
+double direction_spread(const FoldedPairs& data) {
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const FieldPair& pair : data.pairs) {
     const Eigen::Vector3d along = (pair.b.translation() - pair.a.translation()).normalized();
@@ -215,19 +217,19 @@ double direction_spread(const Pairs& data) {
   return symmetric_eigenvalues(scatter)[0];
 }
 
-Vectors before(const Pairs& data, const Body& body) {
+Vectors before(const FoldedPairs& data, const SensorPair& body) {
   Vectors out;
   for (const FieldPair& pair : data.pairs)
     out.push_back(pair.b.translation() - pair.a.translation() - pair.a.rotation() * body.b_in_a_mm);
   return out;
 }
 
-Result<Pairs> taken(std::span<const FieldPair> pairs, const FieldPairSettings& settings) {
+Result<FoldedPairs> taken(std::span<const FieldPair> pairs, const FieldPairSettings& settings) {
   if (pairs.size() < kFewestPairs)
     return Error{Errc::degenerate, fmt::format("{} pairs of poses at the same moment; a map needs {} at least, and a "
                                                "good one over a thousand",
                                                pairs.size(), kFewestPairs)};
-  Pairs data;
+  FoldedPairs data;
   const std::size_t count = std::min(pairs.size(), kMostPairs);
   for (std::size_t k = 0; k < count; ++k) {
     const FieldPair& pair = pairs[k * pairs.size() / count];
@@ -242,7 +244,7 @@ Result<Pairs> taken(std::span<const FieldPair> pairs, const FieldPairSettings& s
   return data;
 }
 
-FieldMapData map_of(const PairModel& model, const Pairs& data, const FoldedNormals::Solution& solution,
+FieldMapData map_of(const PairModel& model, const FoldedPairs& data, const FoldedNormals::Solution& solution,
                     double error_mm) {
   const SmoothedBasis& basis = model.basis();
   const Index n = basis.size();
@@ -271,9 +273,9 @@ FieldMapData map_of(const PairModel& model, const Pairs& data, const FoldedNorma
   return map;
 }
 
-FieldCandidate best_smoothing(const PairModel& model, const Pairs& data, const Body& body) {
+FieldCandidate best_smoothing(const PairModel& model, const FoldedPairs& data, const SensorPair& body) {
   constexpr double kForLinearising = 1e-5;
-  const Linear linear = equations(model, data, body, kForLinearising);
+  const GaussNewtonEquations linear = equations(model, data, body, kForLinearising);
   FieldCandidate best{model.basis().functions.basis, model.basis().functions.order};
   for (const double smoothing : detail::kSmoothings) {
     const double error_mm = detail::rms(held_out(model, linear, data, smoothing), data.used);
@@ -283,9 +285,9 @@ FieldCandidate best_smoothing(const PairModel& model, const Pairs& data, const B
 }
 
 /// Takes out pairs that no smooth map explains.
-void screen(const PairModel& model, double smoothing, Pairs& data) {
+void screen(const PairModel& model, double smoothing, FoldedPairs& data) {
   for (int round = 0; round < 2; ++round) {
-    const Linear linear = equations(model, data, mean_body(data), smoothing);
+    const GaussNewtonEquations linear = equations(model, data, mean_body(data), smoothing);
     const auto far =
         detail::far_off(held_out(model, linear, data, smoothing), data.used, detail::kLeastOutlierAtFirstMm);
     for (std::size_t i = 0; i < far.size(); ++i) data.used[i] = !far[i];
@@ -297,7 +299,7 @@ void screen(const PairModel& model, double smoothing, Pairs& data) {
 Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const FieldPairSettings& settings) {
   auto taken_pairs = taken(pairs, settings);
   if (!taken_pairs) return taken_pairs.error();
-  Pairs& data = *taken_pairs;
+  FoldedPairs& data = *taken_pairs;
   const auto box = detail::box_of(data.places_mm);
   if (!box) return box.error();
   for (std::size_t i = 0; i < data.pairs.size(); ++i)
@@ -312,7 +314,7 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   constexpr double kFirstSmoothing = 1e-5;
   screen(PairModel(detail::smoothed(first)), kFirstSmoothing, data);
 
-  const Body body = mean_body(data);
+  const SensorPair body = mean_body(data);
   const auto functions = detail::families(*box, data.places_mm, settings.basis, kMostFunctions);
   std::vector<FieldCandidate> candidates;
   candidates.reserve(functions.size());
@@ -321,7 +323,7 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   const std::size_t best = detail::best_of(candidates, functions);
   const PairModel model(detail::smoothed(functions[best]));
   const double smoothing = candidates[best].smoothing;
-  const Linear linear = equations(model, data, body, smoothing);
+  const GaussNewtonEquations linear = equations(model, data, body, smoothing);
   const Vectors after = held_out(model, linear, data, smoothing);
   const auto solution = linear.normals.solve(smoothing, -1);
   FieldMapData map_data = map_of(model, data, solution, detail::rms(after, data.used));

@@ -51,7 +51,7 @@ std::vector<Eigen::Vector3d> points_of(const Eigen::Vector3d& extent_mm) {
 }
 
 /// What is known before poses are compared.
-struct Search {
+struct PoseSearch {
   const CameraModel& camera;
   double fold;  ///< the camera's fold_radius
   std::vector<Eigen::Vector3d> points_mm;
@@ -63,7 +63,7 @@ struct Search {
 
 /// How much of the board is in the picture, by its points. margin_share: of the picture's size, that they are to be
 /// within its rim.
-double seen_share(const Search& search, const Transform<Camera, Marker>& camera_from_marker, double margin_share) {
+double seen_share(const PoseSearch& search, const Transform<Camera, Marker>& camera_from_marker, double margin_share) {
   const CameraModel& camera = search.camera;
   const Eigen::Vector2d size(camera.width_px, camera.height_px);
   const Eigen::Vector2d margin = margin_share * size;
@@ -88,9 +88,10 @@ double apart(const Transform<Camera, Marker>& a, const Transform<Camera, Marker>
   return rotation_angle_between(a.rotation(), b.rotation()) + move_mm / working_mm;
 }
 
-Search search_for(std::span<const Station> stations, const CameraModel& camera, const Eigen::Vector3d& extent_mm,
-                  const std::optional<Transform<Camera, Marker>>& now) {
-  Search s{camera, fold_radius(camera), points_of(extent_mm), 0.5 * Eigen::Vector3d(extent_mm.x(), extent_mm.y(), 0)};
+PoseSearch search_for(std::span<const Station> stations, const CameraModel& camera, const Eigen::Vector3d& extent_mm,
+                      const std::optional<Transform<Camera, Marker>>& now) {
+  PoseSearch s{camera, fold_radius(camera), points_of(extent_mm),
+               0.5 * Eigen::Vector3d(extent_mm.x(), extent_mm.y(), 0)};
   s.working_mm = fitting_distance_mm(camera, extent_mm);
   constexpr double kFitted = -0.02;  // a pose that was fitted may put corners beyond the rim that were seen within
   if (now) s.from_behind = scope_view(*now).from_behind;
@@ -106,7 +107,7 @@ Search search_for(std::span<const Station> stations, const CameraModel& camera, 
 }
 
 /// fresh: whether a direction is to be considered, as the rotation of camera_from_marker.
-std::vector<Transform<Camera, Marker>> candidates(const Search& search,
+std::vector<Transform<Camera, Marker>> candidates(const PoseSearch& search,
                                                   const std::function<bool(const Eigen::Matrix3d&)>& fresh) {
   constexpr double kTilts_deg[] = {0, 18, 36};
   constexpr double kDistances[] = {0.8, 1.0, 1.3};  // of the working distance
@@ -136,7 +137,8 @@ std::vector<Transform<Camera, Marker>> candidates(const Search& search,
   return out;
 }
 
-StationInformation information_of(const Search& search, std::span<const Station> stations, const StationNoise& noise) {
+StationInformation information_of(const PoseSearch& search, std::span<const Station> stations,
+                                  const StationNoise& noise) {
   std::vector<Transform<Tracker, Sensor>> tracker_from_sensor;
   std::vector<Transform<Camera, Marker>> camera_from_marker;
   for (const Station& station : stations) {
@@ -151,7 +153,7 @@ StationInformation information_of(const Search& search, std::span<const Station>
 }
 
 /// Every direction that no station has had, or all where none is left.
-std::vector<Transform<Camera, Marker>> poses_to_compare(const Search& search, std::span<const Station> stations) {
+std::vector<Transform<Camera, Marker>> poses_to_compare(const PoseSearch& search, std::span<const Station> stations) {
   constexpr double kSameDirection_rad = 15 * kRadPerDeg;
   const auto poses = candidates(search, [&](const Eigen::Matrix3d& rotation) {
     return std::none_of(stations.begin(), stations.end(), [&](const Station& s) {
@@ -243,7 +245,7 @@ NextPose next_best_pose(std::span<const Station> all, const CameraModel& camera,
                         const std::optional<Transform<Camera, Marker>>& said, const StationNoise& noise) {
   const std::vector<Station> stations = finite_of(all);
   const auto now = said && said->matrix().allFinite() ? said : std::nullopt;
-  const Search search = search_for(stations, camera, board_extent_mm, now);
+  const PoseSearch search = search_for(stations, camera, board_extent_mm, now);
   const ScopeView straight{.distance_mm = search.working_mm, .from_behind = search.from_behind};
   const Transform<Camera, Marker> from = now.value_or(pose_of(straight, search.centre_mm, {0, 0}));
   const std::vector<Transform<Camera, Marker>> poses = poses_to_compare(search, stations);

@@ -10,18 +10,18 @@ namespace birdseye::calibration {
 
 namespace {
 
-struct Linear {
+struct LinearisedResidual {
   Vector6d residual;
   Matrix6Xd by_parameter;
   Matrix6d covariance;
 };
 
-Linear linearise(const SummedStation& station, const ChainState& state, const TrackerNoise& noise,
-                 const ChainFreedom& freedom) {
+LinearisedResidual linearise(const SummedStation& station, const ChainState& state, const TrackerNoise& noise,
+                             const ChainFreedom& freedom) {
   const ChainResidual r = chain_residual(station.chain, station.camera_from_marker, state);
-  Linear out{r.value, Matrix6Xd(6, freedom.parameters()),
-             chain_covariance(station.chain, noise) +
-                 r.by_camera_from_marker * station.view_covariance * r.by_camera_from_marker.transpose()};
+  LinearisedResidual out{r.value, Matrix6Xd(6, freedom.parameters()),
+                         chain_covariance(station.chain, noise) +
+                             r.by_camera_from_marker * station.view_covariance * r.by_camera_from_marker.transpose()};
   out.by_parameter.leftCols<6>() = r.by_hand_eye;
   out.by_parameter.middleCols<6>(6) = r.by_body_from_marker;
   int column = 12;
@@ -61,7 +61,7 @@ ChainNormal normal_at(std::span<const SummedStation> stations, const ChainState&
   const int size = freedom.parameters();
   ChainNormal out{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), 0};
   for (const SummedStation& station : stations) {
-    const Linear at = linearise(station, state, noise, freedom);
+    const LinearisedResidual at = linearise(station, state, noise, freedom);
     const Matrix6d weight = inverse_symmetric(at.covariance);
     const double squared = at.residual.dot(weight * at.residual);
     const double down = robust ? (kRobustFreedom + 6) / (kRobustFreedom + squared) : 1;
@@ -168,7 +168,7 @@ TrackerNoise estimate_noise(std::span<const SummedStation> stations, ChainFit& f
     // tr(P G) = r^T V^-1 G V^-1 r for each variance's shape G, P being V^-1 less what the fit takes up.
     double position_trace = 0, angle_trace = 0, position_squares = 0, angle_squares = 0;
     for (const SummedStation& station : stations) {
-      const Linear at = linearise(station, fit.state, noise, freedom);
+      const LinearisedResidual at = linearise(station, fit.state, noise, freedom);
       const Matrix6d weight = inverse_symmetric(at.covariance);
       const Matrix6Xd weighted = weight * at.by_parameter;
       const Matrix6d left = weight - weighted * fit.covariance * weighted.transpose();
@@ -216,7 +216,7 @@ std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::si
     if (!step.allFinite()) return std::nullopt;
     out.state = stepped(out.state, step, freedom);
   }
-  const Linear left_out = linearise(stations[which], out.state, noise, freedom);
+  const LinearisedResidual left_out = linearise(stations[which], out.state, noise, freedom);
   const Matrix6d predicted =
       left_out.covariance + left_out.by_parameter * covariance * left_out.by_parameter.transpose();
   out.distance_squared = left_out.residual.dot(solve_symmetric(predicted, left_out.residual));

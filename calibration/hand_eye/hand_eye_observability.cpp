@@ -39,15 +39,15 @@ Eigen::Matrix3d body_from_sensor_rotation(const SummedStation& s) {
   return s.chain.tracker_from_body.rotation().transpose() * s.chain.tracker_from_sensor.rotation();
 }
 
-struct Axes {
+struct PrincipalAxes {
   Eigen::Matrix3d directions;
   Eigen::Vector3d turns_deg;
 };
 
 /// scatter: mean of turn * turn^T. The greatest first, each pointing along its greatest part.
-Axes principal(const Eigen::Matrix3d& scatter) {
+PrincipalAxes principal(const Eigen::Matrix3d& scatter) {
   const SymmetricEigen<3> scattered = symmetric_eigen(scatter);
-  Axes out;
+  PrincipalAxes out;
   for (int i = 0; i < 3; ++i) {
     Eigen::Vector3d axis = scattered.vectors.col(2 - i);
     Eigen::Index greatest = 0;
@@ -75,7 +75,7 @@ void find_axes(std::span<const SummedStation> stations, HandEyeObservability& ou
     }
   }
   const double pairs = static_cast<double>(std::max<std::size_t>(1, mismatches.size()));
-  const Axes sensor = principal(of_sensor / pairs), camera = principal(of_camera / pairs);
+  const PrincipalAxes sensor = principal(of_sensor / pairs), camera = principal(of_camera / pairs);
   out.axes_in_sensor = sensor.directions;
   out.axes_in_camera = camera.directions;
   // The picture's turns: the tracker's noise makes turns where there are none.

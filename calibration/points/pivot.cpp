@@ -53,7 +53,7 @@ Means means_of(const Poses& poses, const Indices& used, std::size_t divots) {
 }
 
 /// The tip's normal equations once each pivot is replaced by the mean of R t + q, and their solution of least length.
-struct Linear {
+struct TipEquations {
   Means means;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
@@ -63,8 +63,8 @@ struct Linear {
   }
 };
 
-Linear solve(const Poses& poses, const Indices& used, std::size_t divots) {
-  Linear out;
+TipEquations solve(const Poses& poses, const Indices& used, std::size_t divots) {
+  TipEquations out;
   out.means = means_of(poses, used, divots);
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const std::size_t i : used) {
@@ -117,7 +117,7 @@ std::vector<double> residuals_of(const Poses& poses, const Eigen::Vector3d& tip,
   return out;
 }
 
-PivotFit fit_of(const Poses& poses, const Indices& used, const Linear& linear) {
+PivotFit fit_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   PivotFit fit;
   fit.tip_in_sensor_mm = linear.tip;
   fit.pivots_in_tracker_mm = median_pivots(poses, linear.tip, linear.means.count.size());
@@ -157,7 +157,7 @@ void draw(Indices& from, std::size_t count, std::mt19937& random, Indices& sampl
 
 /// Residuals of the best of many tips, each from four poses in one divot, or three in each of two: what one divot
 /// leaves open another may tell.
-std::vector<double> sample_residuals(const Poses& poses, std::size_t divots, const Linear& all) {
+std::vector<double> sample_residuals(const Poses& poses, std::size_t divots, const TipEquations& all) {
   std::vector<Indices> members(divots);
   for (std::size_t i = 0; i < poses.size(); ++i) members[poses[i].divot].push_back(i);
   std::erase_if(members, [](const Indices& of_divot) { return of_divot.size() < kLeastPoses; });
@@ -169,7 +169,7 @@ std::vector<double> sample_residuals(const Poses& poses, std::size_t divots, con
     Indices sample;
     draw(members[one], one == other ? kLeastPoses : kLeastPoses - 1, random, sample);
     if (one != other) draw(members[other], kLeastPoses - 1, random, sample);
-    const Linear linear = solve(poses, sample, divots);
+    const TipEquations linear = solve(poses, sample, divots);
     auto found = residuals_of(poses, linear.tip, median_pivots(poses, linear.tip, divots));
     if (const double median = median_of(found); median < least) {
       least = median;
@@ -180,7 +180,7 @@ std::vector<double> sample_residuals(const Poses& poses, std::size_t divots, con
 }
 
 /// The poses that agree; all of them where fewer than a third of the poses do.
-Indices agreeing(const Poses& poses, std::size_t divots, const Linear& all) {
+Indices agreeing(const Poses& poses, std::size_t divots, const TipEquations& all) {
   auto residuals = sample_residuals(poses, divots, all);
   const std::size_t unknowns = 3 + 3 * divots;
   Indices used;
@@ -200,7 +200,7 @@ Indices agreeing(const Poses& poses, std::size_t divots, const Linear& all) {
 }
 
 /// To which of kSides sides each pose leans, from the mean of its divot.
-std::vector<int> sides_of(const Poses& poses, const Linear& linear) {
+std::vector<int> sides_of(const Poses& poses, const TipEquations& linear) {
   std::vector<int> sides;
   for (const PivotPose& pose : poses) {
     const Eigen::Vector3d mean = (linear.means.rotation[pose.divot] * shaft_of(linear.tip)).normalized();
@@ -215,7 +215,7 @@ std::vector<int> sides_of(const Poses& poses, const Linear& linear) {
 
 /// White's covariance of the tip, each residual as it would be had the fit not seen its pose (J. MacKinnon and H.
 /// White, 1985): with few poses it is too small otherwise.
-Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, const Linear& linear) {
+Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, const TipEquations& linear) {
   Eigen::Matrix3d scores = Eigen::Matrix3d::Zero();
   for (const std::size_t i : used) {
     const auto& pose = poses[i].tracker_from_sensor;
@@ -233,7 +233,7 @@ Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, 
 
 /// The same where the errors of all poses of a group may be one: those of a divot, where there are divots enough, or
 /// those that lean to one side. A field that metal bends errs alike there, however many poses there are.
-Eigen::Matrix3d grouped_covariance(const Poses& poses, const Indices& used, const Linear& linear) {
+Eigen::Matrix3d grouped_covariance(const Poses& poses, const Indices& used, const TipEquations& linear) {
   const bool by_divot = linear.means.count.size() >= kLeastGroups;
   const auto sides = sides_of(poses, linear);
   std::vector<Eigen::Vector3d> sums(by_divot ? linear.means.count.size() : kSides, Eigen::Vector3d::Zero());
@@ -250,13 +250,13 @@ Eigen::Matrix3d grouped_covariance(const Poses& poses, const Indices& used, cons
 }
 
 /// The first, as much larger as the second says that it is too small.
-Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const Linear& linear) {
+Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   const Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
   const double grouped_mm2 = grouped_covariance(poses, used, linear).trace();
   return independent * (grouped_mm2 > independent.trace() ? grouped_mm2 / independent.trace() : 1.0);
 }
 
-PivotTilt tilt_of(const Poses& poses, const Indices& used, const Linear& linear) {
+PivotTilt tilt_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   PivotTilt tilt;
   std::vector<Eigen::Vector3d> shafts;
   for (const PivotPose& pose : poses) shafts.emplace_back(pose.tracker_from_sensor.rotation() * shaft_of(linear.tip));
@@ -278,7 +278,7 @@ PivotTilt tilt_of(const Poses& poses, const Indices& used, const Linear& linear)
   return tilt;
 }
 
-double held_out_of(const Poses& poses, const Indices& used, const Linear& linear) {
+double held_out_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   const auto sides = sides_of(poses, linear);
   double squares = 0, count = 0;
   for (int side = 0; side < kSides; ++side) {
@@ -287,7 +287,7 @@ double held_out_of(const Poses& poses, const Indices& used, const Linear& linear
       if (sides[i] != side) rest.push_back(i);
     }
     if (rest.size() < kLeastPoses) continue;
-    const Linear without = solve(poses, rest, linear.means.count.size());
+    const TipEquations without = solve(poses, rest, linear.means.count.size());
     for (const std::size_t i : used) {
       if (sides[i] != side || without.means.count[poses[i].divot] == 0) continue;
       squares += (poses[i].tracker_from_sensor * without.tip - without.pivot(poses[i].divot)).squaredNorm();
@@ -358,10 +358,10 @@ Result<Pivot> solve_pivot(std::span<const PivotPose> given) {
 
   Indices all(poses.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
-  const Linear algebraic = solve(poses, all, divots);
+  const TipEquations algebraic = solve(poses, all, divots);
   out.algebraic = fit_of(poses, all, algebraic);
   const Indices used = agreeing(poses, divots, algebraic);
-  const Linear linear = solve(poses, used, divots);
+  const TipEquations linear = solve(poses, used, divots);
   out.robust = fit_of(poses, used, linear);
   out.tip_covariance_mm2 = covariance_of(poses, used, linear);
   out.tip_sigma_mm = std::sqrt(std::max(0.0, symmetric_eigenvalues(out.tip_covariance_mm2)[2]));

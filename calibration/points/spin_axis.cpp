@@ -18,12 +18,12 @@ using Indices = std::vector<std::size_t>;
 
 constexpr std::size_t kLeastSpinPoses = 4;
 
-struct Axis {
+struct SpunAxis {
   Eigen::Vector3d in_sensor, in_tracker;
   Eigen::Vector3d eigenvalues;  ///< of the mean squared swing, least first
 };
 
-Axis solve(const Rotations& rotations, const Indices& used) {
+SpunAxis solve(const Rotations& rotations, const Indices& used) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero(), swings = Eigen::Matrix3d::Zero();
   for (const std::size_t i : used) mean += rotations[i];
   mean /= static_cast<double>(used.size());
@@ -33,7 +33,7 @@ Axis solve(const Rotations& rotations, const Indices& used) {
   return {axis, (mean * axis).normalized(), eigen.values.cwiseMax(0)};
 }
 
-std::vector<double> residuals_of(const Rotations& rotations, const Axis& axis) {
+std::vector<double> residuals_of(const Rotations& rotations, const SpunAxis& axis) {
   std::vector<double> out;
   for (const Eigen::Matrix3d& r : rotations)
     out.push_back(std::asin(std::min(1.0, (r * axis.in_sensor).cross(axis.in_tracker).norm())) * kDegPerRad);
@@ -54,7 +54,7 @@ Indices inliers_of(const std::vector<double>& residuals_deg) {
   return inliers;
 }
 
-double turned_deg(const Rotations& rotations, const Indices& used, const Axis& axis) {
+double turned_deg(const Rotations& rotations, const Indices& used, const SpunAxis& axis) {
   const Eigen::Vector3d across = axis.in_sensor.unitOrthogonal();
   const Eigen::Vector3d x = axis.in_tracker.unitOrthogonal(), y = axis.in_tracker.cross(x);
   std::vector<double> turns;
@@ -84,7 +84,7 @@ Result<SpinAxis> solve_spin_axis(std::span<const Transform<Tracker, Sensor>> tra
   }
   Indices used(rotations.size());
   std::iota(used.begin(), used.end(), std::size_t{0});
-  Axis axis = solve(rotations, used);
+  SpunAxis axis = solve(rotations, used);
   for (int round = 0; round < 20; ++round) {
     Indices inliers = inliers_of(residuals_of(rotations, axis));
     if (inliers == used || inliers.size() < kLeastSpinPoses) break;

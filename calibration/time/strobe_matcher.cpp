@@ -54,7 +54,7 @@ const StrobeMatcher::Edge* StrobeMatcher::nearest(DeviceTime time) const {
 std::optional<double> StrobeMatcher::phase_ns() const {
   const auto period = static_cast<double>(settings_.period.ns);
   double sine = 0, cosine = 0, count = 0;
-  for (const Frame& frame : frames_) {
+  for (const NumberedFrame& frame : frames_) {
     const auto after = std::lower_bound(edges_.begin(), edges_.end(), frame.stamp,
                                         [](const Edge& e, DeviceTime t) { return e.at < t; });
     if (after == edges_.begin() || std::prev(after)->doubtful) continue;
@@ -72,13 +72,13 @@ std::optional<double> StrobeMatcher::phase_ns() const {
 int StrobeMatcher::contradictions(double delay_ns) const {
   const Duration delay{std::llround(delay_ns)};
   int count = 0;
-  for (const Frame& frame : frames_) count += nearest(frame.stamp - delay) == nullptr ? 1 : 0;
+  for (const NumberedFrame& frame : frames_) count += nearest(frame.stamp - delay) == nullptr ? 1 : 0;
   const Duration near{std::llround(kNear * static_cast<double>(settings_.period.ns))};
   for (const Edge& edge : edges_) {
     const DeviceTime expected = edge.at + delay;
     if (edge.doubtful || expected < frames_.front().stamp - near || frames_.back().stamp < expected) continue;
     const auto after = std::lower_bound(frames_.begin(), frames_.end(), expected - near,
-                                        [](const Frame& f, DeviceTime t) { return f.stamp < t; });
+                                        [](const NumberedFrame& f, DeviceTime t) { return f.stamp < t; });
     if (after == frames_.end() || after->stamp <= expected + near) continue;
     if (after != frames_.begin() && after->number - std::prev(after)->number > 1) continue;
     ++count;
@@ -127,7 +127,7 @@ void StrobeMatcher::learn() {
 bool StrobeMatcher::is_as_before(double delay_ns) const {
   const auto period = static_cast<double>(settings_.period.ns);
   if (std::abs(delay_ns - before_->delay_ns) > period / 4) return false;
-  const Frame& frame = frames_.back();
+  const NumberedFrame& frame = frames_.back();
   const std::int64_t counted = frame.number - before_->last.number;
   const Edge* edge = nearest(frame.stamp - Duration{std::llround(delay_ns)});
   return edge != nullptr && counted < kMostCounted &&

@@ -48,7 +48,7 @@ class StrobeMatcher {
     DeviceTime at;
     bool doubtful = false;  ///< another came too close to it
   };
-  struct Frame {
+  struct NumberedFrame {
     DeviceTime stamp;
     std::int64_t number = 0;
   };
@@ -70,7 +70,7 @@ class StrobeMatcher {
 
   Settings settings_;
   std::deque<Edge> edges_;
-  std::deque<Frame> frames_;
+  std::deque<NumberedFrame> frames_;
   std::optional<double> delay_ns_;
   std::optional<Pair> last_;
   std::optional<Before> before_;  ///< what was known when the delay was lost

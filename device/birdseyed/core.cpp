@@ -8,7 +8,7 @@ namespace birdseye::device {
 namespace {
 
 using drivers::minibird::BirdReading;
-using drivers::minibird::Doubt;
+using drivers::minibird::DoubtKind;
 using drivers::minibird::Measurement;
 using drivers::minibird::MiniBirdCounters;
 
@@ -40,7 +40,7 @@ Core::Counters Core::counters() const {
   Counters counters;
   counters.tracker = counted_;
   if (assembler_) add(counters.tracker, assembler_->counters());
-  counters.tracker.doubted[static_cast<std::size_t>(Doubt::unmapped)] += unmapped_;
+  counters.tracker.doubted[static_cast<std::size_t>(DoubtKind::unmapped)] += unmapped_;
   counters.frames = frames_seen_;
   counters.frames_lost = frames_lost_;
   counters.frames_repeated = frames_repeated_;
@@ -104,7 +104,7 @@ BirdReading Core::corrected(const BirdReading& reading) {
     ++unmapped_;
     out.pose.reset();
     out.doubt = settings_.field->why_not(*pose->position_mm);
-    out.kind = Doubt::unmapped;
+    out.kind = DoubtKind::unmapped;
   }
   return out;
 }
@@ -114,7 +114,7 @@ void Core::note_doubt(std::size_t index, const BirdReading& reading, DeviceTime 
   if (reading.kind != bird.doubt) {
     bird = {reading.kind, reading.doubt, at, {}, false};
   }
-  if (bird.doubt == Doubt::none) return;
+  if (bird.doubt == DoubtKind::none) return;
   if (bird.told.ns == 0 || at - bird.told > kDoubtToldEvery) {
     bird.told = at;
     out_.push_back(wire::pack(wire::Doubt{at, settings_.bird_names[index], reading.doubt}));
@@ -186,7 +186,7 @@ void Core::publish(const TimedFrame& timed) {
   out.info.arrived = frame.arrived;
   if (time.certain && time.sigma <= settings_.pose.max_time_sigma) {
     out.info.pose = scope_.at(time.acquired);
-    if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != Doubt::none)
+    if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != DoubtKind::none)
       out.info.pose.reason += ": " + birds_[0].why;
   } else {
     out.info.pose.reason = "when the frame was taken is not known well enough";

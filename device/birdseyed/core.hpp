@@ -50,7 +50,7 @@ class Core {
 
  private:
   struct BirdState {
-    drivers::minibird::Doubt doubt = drivers::minibird::Doubt::none;  ///< of the newest measurement
+    drivers::minibird::DoubtKind doubt = drivers::minibird::DoubtKind::none;  ///< of the newest measurement
     std::string why;
     DeviceTime since, told;
     bool in_status = false;

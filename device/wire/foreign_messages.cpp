@@ -16,13 +16,13 @@ namespace birdseye::wire {
 
 namespace {
 
-using Bytes = std::span<const std::uint8_t>;
+using ByteView = std::span<const std::uint8_t>;
 
 Error damaged(const Header& header, const std::string& how) {
   return {Errc::bad_format, fmt::format("{} \"{}\" {}", header.type, header.device, how)};
 }
 
-double number_at(Bytes bytes, std::size_t i) {
+double number_at(ByteView bytes, std::size_t i) {
   const std::size_t at = 4 * i;
   const std::uint32_t bits = std::uint32_t{bytes[at]} << 24U | std::uint32_t{bytes[at + 1]} << 16U |
                              std::uint32_t{bytes[at + 2]} << 8U | bytes[at + 3];
@@ -30,7 +30,7 @@ double number_at(Bytes bytes, std::size_t i) {
 }
 
 /// The same in all elements of lists: name, a byte for the type and one to spare.
-std::string name_at(Bytes element, const std::string& otherwise) {
+std::string name_at(ByteView element, const std::string& otherwise) {
   const auto name = element.first(20);
   const auto end = std::find(name.begin(), name.end(), 0);
   return end == name.begin() ? otherwise : readable({name.begin(), end});
@@ -40,7 +40,7 @@ std::string name_at(Bytes element, const std::string& otherwise) {
 constexpr double kOrthonormal = 1e-3;
 
 /// Empty where the matrix is no pose. The identity, which many send for a tool that is out of sight, is none either.
-std::optional<Transform<Tracker, Sensor>> pose_of_matrix(Bytes numbers) {
+std::optional<Transform<Tracker, Sensor>> pose_of_matrix(ByteView numbers) {
   Eigen::Matrix<double, 3, 4> columns;
   for (std::size_t i = 0; i < 12; ++i) columns.data()[i] = number_at(numbers, i);
   const Eigen::Matrix3d r = columns.leftCols<3>();
@@ -50,7 +50,7 @@ std::optional<Transform<Tracker, Sensor>> pose_of_matrix(Bytes numbers) {
 }
 
 /// Position, then the quaternion x y z w; of a quaternion without its w it is the positive one that makes it a unit.
-std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(Bytes numbers) {
+std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(ByteView numbers) {
   const Eigen::Vector3d position(number_at(numbers, 0), number_at(numbers, 1), number_at(numbers, 2));
   const Eigen::Vector3d xyz(number_at(numbers, 3), number_at(numbers, 4), number_at(numbers, 5));
   const double w = numbers.size() >= 28 ? number_at(numbers, 6) : std::sqrt(std::max(0.0, 1 - xyz.squaredNorm()));
@@ -80,14 +80,14 @@ void add(ForeignPoses& poses, const std::string& name, const std::optional<Trans
   }
 }
 
-Result<ForeignPoses> read_transform(const Header& header, Bytes content) {
+Result<ForeignPoses> read_transform(const Header& header, ByteView content) {
   if (content.size() != IGTL_TRANSFORM_SIZE) return damaged(header, "is cut short");
   ForeignPoses poses;
   add(poses, header.device, pose_of_matrix(content));
   return poses;
 }
 
-Result<ForeignPoses> read_list(const Header& header, Bytes content, std::size_t element_bytes) {
+Result<ForeignPoses> read_list(const Header& header, ByteView content, std::size_t element_bytes) {
   if (content.size() % element_bytes != 0) return damaged(header, "is cut short");
   const bool quaternions = element_bytes == IGTL_QTDATA_ELEMENT_SIZE;
   ForeignPoses poses;
@@ -98,7 +98,7 @@ Result<ForeignPoses> read_list(const Header& header, Bytes content, std::size_t 
   return poses;
 }
 
-Result<ForeignPoses> read_position(const Header& header, Bytes content) {
+Result<ForeignPoses> read_position(const Header& header, ByteView content) {
   constexpr std::size_t kPlace = 12, kShort = 24, kWhole = 28;
   if (content.size() != kPlace && content.size() != kShort && content.size() != kWhole)
     return damaged(header, "is cut short");
@@ -116,7 +116,7 @@ std::string pixels_in_words(const igtl_image_header& image) {
   return fmt::format("{} voxels of {} component{}", type, image.num_components, image.num_components == 1 ? "" : "s");
 }
 
-Result<ForeignMessage> read_image(const Header& header, Bytes content) {
+Result<ForeignMessage> read_image(const Header& header, ByteView content) {
   if (content.size() < IGTL_IMAGE_HEADER_SIZE) return damaged(header, "is cut short");
   igtl_image_header image{};
   std::memcpy(&image, content.data(), IGTL_IMAGE_HEADER_SIZE);
@@ -158,7 +158,7 @@ std::string readable(std::string name) {
   return name;
 }
 
-Result<ForeignMessage> read_foreign(const Header& header, Bytes body) {
+Result<ForeignMessage> read_foreign(const Header& header, ByteView body) {
   const std::string& type = header.type;
   const bool image = type == "IMAGE", transform = type == "TRANSFORM", tdata = type == "TDATA";
   const bool qtdata = type == "QTDATA", position = type == "POSITION" || type == "QTRANS";

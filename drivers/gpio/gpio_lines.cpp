@@ -31,7 +31,7 @@ static_assert(2 * (kKernelQueue + 1) <= GpioLines::kMostEdges);
 struct ChipCloser {
   void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // and gives back its lines
 };
-using Chip = std::unique_ptr<gpiod_chip, ChipCloser>;
+using GpioChip = std::unique_ptr<gpiod_chip, ChipCloser>;
 
 struct InputLine {
   GpioInput input = GpioInput::strobe;
@@ -58,9 +58,9 @@ std::string names_of(gpiod_chip* chip) {
   return fmt::format("{} lines{}{}", gpiod_chip_num_lines(chip), named == 0 ? ", none with a name" : ": ", text);
 }
 
-Result<Chip> open_chip(const std::string& name) {
+Result<GpioChip> open_chip(const std::string& name) {
   if (name.empty()) return Error{Errc::bad_value, "[gpio] chip: give /dev/gpiochipN, its name or its label"};
-  if (Chip chip{gpiod_chip_open_lookup(name.c_str())}) return chip;
+  if (GpioChip chip{gpiod_chip_open_lookup(name.c_str())}) return chip;
   switch (errno) {
     case EACCES:
     case EPERM:
@@ -76,7 +76,7 @@ Result<Chip> open_chip(const std::string& name) {
 
 class KernelGpioLines final : public GpioLines {
  public:
-  KernelGpioLines(Chip chip, const GpioSettings& settings)
+  KernelGpioLines(GpioChip chip, const GpioSettings& settings)
       : chip_(std::move(chip)), name_(settings.chip), pedal_hold_(settings.pedal_debounce) {}
 
   Result<void> request(const GpioSettings& s) {
@@ -109,7 +109,7 @@ class KernelGpioLines final : public GpioLines {
     return {Errc::disconnected, fmt::format("{}: the GPIO chip has gone; was it unplugged?", name_)};
   }
 
-  Chip chip_;
+  GpioChip chip_;
   std::string name_, used_;
   std::vector<InputLine> inputs_;  // at most two
   gpiod_line* led_ = nullptr;

@@ -44,7 +44,7 @@ void FtdiReceiver::clear() {
 FtdiReceiver::Taken FtdiReceiver::take(std::span<std::uint8_t> into) {
   if (packets_.empty()) errors_passed_ = errors_;
   if (packets_.empty() || into.empty()) return {};
-  Packet& front = packets_.front();
+  UsbPacket& front = packets_.front();
   const std::size_t count = std::min(into.size(), front.bytes.size() - front.taken);
   std::copy_n(front.bytes.begin() + static_cast<std::ptrdiff_t>(front.taken), count, into.begin());
   const Taken taken{count, front.arrived};

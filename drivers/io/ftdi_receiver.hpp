@@ -44,7 +44,7 @@ class FtdiReceiver {
   [[nodiscard]] const FtdiCounters& counters() const { return counters_; }
 
  private:
-  struct Packet {
+  struct UsbPacket {
     std::vector<std::uint8_t> bytes;
     std::size_t taken = 0;
     DeviceTime arrived;
@@ -52,7 +52,7 @@ class FtdiReceiver {
   };
 
   std::size_t max_packet_, most_bytes_;
-  std::deque<Packet> packets_;
+  std::deque<UsbPacket> packets_;
   std::size_t held_bytes_ = 0;
   std::uint64_t errors_ = 0, errors_passed_ = 0;
   FtdiCounters counters_;

@@ -93,7 +93,7 @@ void MeasurementAssembler::finish(std::vector<Measurement>& out) {
           guards_[bird].judge(*record, measurement.acquired, measurement.acquired_sigma, measurement.time_certain);
     }
     ++counters_.doubted[static_cast<std::size_t>(reading.kind)];
-    if (reading.kind == Doubt::senseless || reading.kind == Doubt::saturated) ++counters_.senseless_records;
+    if (reading.kind == DoubtKind::senseless || reading.kind == DoubtKind::saturated) ++counters_.senseless_records;
     measurement.birds.push_back(std::move(reading));
   }
   out.push_back(std::move(measurement));

@@ -31,22 +31,24 @@ double angle_deg(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 
 }  // namespace
 
-std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_words(const std::vector<std::int16_t>& words) const {
+std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<std::int16_t>& words) const {
   const auto first_of_rotation = words.begin() + (has_position(layout_.format) ? 3 : 0);
   const bool zeroed = has_orientation(layout_.format) && words.end() - first_of_rotation != 3 &&
                       std::all_of(first_of_rotation, words.end(), [](std::int16_t word) { return word == 0; });
-  if (zeroed) return Verdict{Doubt::saturated, "sensor saturated: too close to the transmitter or in a strong field"};
+  if (zeroed)
+    return Objection{DoubtKind::saturated, "sensor saturated: too close to the transmitter or in a strong field"};
   // The outputs stop at the end of the scale: the words 8000 and 7FFC.
   const bool at_end =
       std::any_of(words.begin(), first_of_rotation, [](std::int16_t word) { return word <= -32768 || word >= 32764; });
   if (has_position(layout_.format) && at_end) {
-    return Verdict{Doubt::beyond_scale,
-                   fmt::format("position beyond the scale of {:.0f} mm", layout_.mm_per_count * 32768)};
+    return Objection{DoubtKind::beyond_scale,
+                     fmt::format("position beyond the scale of {:.0f} mm", layout_.mm_per_count * 32768)};
   }
   return std::nullopt;
 }
 
-std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time) {
+std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vector<std::int16_t>& words,
+                                                                DeviceTime time) {
   if (words != last_words_) {
     last_words_ = words;
     repeats_ = 0;
@@ -58,7 +60,7 @@ std::optional<BirdGuard::Verdict> BirdGuard::doubt_of_repeats(const std::vector<
   const double moved_mm = speed_mm_s_ * std::min(gap_between(repeated_since_, time), kTrackHolds).seconds();
   const bool noise_is_gone = repeats_ >= limits_.frozen_after && restless_ > kRestless;
   if (!noise_is_gone && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
-  return Verdict{Doubt::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
+  return Objection{DoubtKind::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
 }
 
 bool BirdGuard::within_reach(const Sample& from, const Sample& to) const {
@@ -111,14 +113,14 @@ bool BirdGuard::is_mirrored(const Sample& sample) const {
          turn_deg <= limits_.slack_deg + limits_.most_turn_deg_s * (since + sample.sigma).seconds();
 }
 
-BirdGuard::Verdict BirdGuard::doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const {
+BirdGuard::Objection BirdGuard::doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const {
   if (!has_position(layout_.format)) return {};
-  if (mirrored) return {Doubt::hemisphere_flip, "hemisphere flip: the position is the negative of where it was"};
+  if (mirrored) return {DoubtKind::hemisphere_flip, "hemisphere flip: the position is the negative of where it was"};
   const double side_mm = layout_.into_hemisphere.dot(reported_mm);
   if (std::abs(side_mm) < limits_.hemisphere_border_mm) {
-    return {Doubt::hemisphere_border, fmt::format("near the hemisphere's border: {:.0f} mm", std::abs(side_mm))};
+    return {DoubtKind::hemisphere_border, fmt::format("near the hemisphere's border: {:.0f} mm", std::abs(side_mm))};
   }
-  if (side_mm < 0) return {Doubt::outside_hemisphere, "outside the hemisphere that is set: has the unit lost it?"};
+  if (side_mm < 0) return {DoubtKind::outside_hemisphere, "outside the hemisphere that is set: has the unit lost it?"};
   return {};
 }
 
@@ -141,12 +143,12 @@ void BirdGuard::follow(const Sample& sample) {
       seconds > 1e-4 ? (track_.back().position_mm - track_.front().position_mm).norm() / seconds : speed_mm_s_;
 }
 
-BirdGuard::Verdict BirdGuard::place(Sample sample) {
+BirdGuard::Objection BirdGuard::place(Sample sample) {
   const Eigen::Vector3d reported_mm = sample.position_mm;
   const bool mirrored = is_mirrored(sample);
   if (mirrored) sample.position_mm = -reported_mm;
   // Wrong by itself, and no place to follow: what is told as it should be would look like a flip from there.
-  if (Verdict side = doubt_of_side(reported_mm, mirrored); side.kind == Doubt::outside_hemisphere) return side;
+  if (Objection side = doubt_of_side(reported_mm, mirrored); side.kind == DoubtKind::outside_hemisphere) return side;
   const bool lost_sight = track_.empty() || gap_between(track_.back().time, sample.time) > limits_.gap;
   if (!lost_sight && on_track(sample)) {
     follow(sample);
@@ -160,10 +162,10 @@ BirdGuard::Verdict BirdGuard::place(Sample sample) {
     return doubt_of_side(reported_mm, mirrored);
   }
   candidate_ = sample;
-  if (Verdict side = doubt_of_side(reported_mm, mirrored); side.kind != Doubt::none) return side;
-  if (lost_sight) return {Doubt::unconfirmed, "not yet confirmed, after a start or a gap"};
+  if (Objection side = doubt_of_side(reported_mm, mirrored); side.kind != DoubtKind::none) return side;
+  if (lost_sight) return {DoubtKind::unconfirmed, "not yet confirmed, after a start or a gap"};
   const Sample& last = track_.back();
-  return {Doubt::step,
+  return {DoubtKind::step,
           fmt::format("a step of {:.0f} mm and {:.0f} deg in {:.0f} ms", (sample.position_mm - last.position_mm).norm(),
                       angle_deg(last.rotation, sample.rotation), gap_between(last.time, sample.time).seconds() * 1e3)};
 }
@@ -171,14 +173,14 @@ BirdGuard::Verdict BirdGuard::place(Sample sample) {
 BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain) {
   BirdReading reading;
   reading.button = record.button;
-  const auto withhold = [&reading](const Verdict& verdict) {
-    reading.kind = verdict.kind;
-    reading.doubt = verdict.words;
+  const auto withhold = [&reading](const Objection& objection) {
+    reading.kind = objection.kind;
+    reading.doubt = objection.words;
     return reading;
   };
   if (const auto doubt = doubt_of_words(record.words)) return withhold(*doubt);
   auto pose = decode_pose(layout_.format, record.words, layout_.mm_per_count);
-  if (!pose) return withhold({Doubt::senseless, pose.error().what});
+  if (!pose) return withhold({DoubtKind::senseless, pose.error().what});
   if (const auto doubt = doubt_of_repeats(record.words, acquired)) return withhold(*doubt);
   Sample sample;
   sample.time = acquired;
@@ -186,8 +188,8 @@ BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration
   sample.time_certain = time_certain;
   if (pose->position_mm) sample.position_mm = *pose->position_mm;
   if (pose->rotation) sample.rotation = *pose->rotation;
-  if (const Verdict verdict = place(sample); verdict.kind != Doubt::none) return withhold(verdict);
-  reading.kind = Doubt::none;
+  if (const Objection objection = place(sample); objection.kind != DoubtKind::none) return withhold(objection);
+  reading.kind = DoubtKind::none;
   reading.doubt.clear();
   reading.pose = *std::move(pose);
   return reading;

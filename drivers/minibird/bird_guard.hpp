@@ -29,15 +29,15 @@ class BirdGuard {
     Duration sigma;
     bool time_certain = true;
   };
-  struct Verdict {
-    Doubt kind = Doubt::none;
+  struct Objection {
+    DoubtKind kind = DoubtKind::none;
     std::string words;
   };
 
-  [[nodiscard]] std::optional<Verdict> doubt_of_words(const std::vector<std::int16_t>& words) const;
-  std::optional<Verdict> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
-  Verdict place(Sample sample);
-  [[nodiscard]] Verdict doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const;
+  [[nodiscard]] std::optional<Objection> doubt_of_words(const std::vector<std::int16_t>& words) const;
+  std::optional<Objection> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
+  Objection place(Sample sample);
+  [[nodiscard]] Objection doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const;
   /// Does the position, after the track, look like the negative of where the sensor is?
   [[nodiscard]] bool is_mirrored(const Sample& sample) const;
   [[nodiscard]] bool within_reach(const Sample& from, const Sample& to) const;

@@ -13,7 +13,7 @@
 namespace birdseye::drivers::minibird {
 
 /// Why a reading has no pose.
-enum class Doubt : std::uint8_t {
+enum class DoubtKind : std::uint8_t {
   none,
   lost,                ///< its record did not come whole
   senseless,           ///< no rotation, or an impossible angle
@@ -27,14 +27,14 @@ enum class Doubt : std::uint8_t {
   unconfirmed,         ///< the first after a start or a gap
   unmapped,            ///< outside the field map; found by whoever applies the map, never by the driver
 };
-inline constexpr std::size_t kDoubts = 12;
-std::string_view name_of(Doubt doubt);  ///< "hemisphere flip" and so on, for counters
+inline constexpr std::size_t kDoubtKinds = 12;
+std::string_view name_of(DoubtKind doubt);  ///< "hemisphere flip" and so on, for counters
 
 /// One bird at one measurement: a pose, or why there is none.
 struct BirdReading {
   std::optional<RecordPose> pose;
   std::string doubt = "its record was lost";  ///< in words; empty where there is a pose
-  Doubt kind = Doubt::lost;
+  DoubtKind kind = DoubtKind::lost;
   std::uint8_t button = 0;
 };
 
@@ -53,9 +53,9 @@ struct MiniBirdCounters {
   std::uint64_t measurements = 0;
   std::uint64_t lost_measurements = 0;  ///< that must have happened before, by the clock line
   std::uint64_t phase_errors = 0, discarded_bytes = 0, line_errors = 0, restarts = 0;
-  std::uint64_t senseless_records = 0;           ///< all that decode_pose() refused
-  std::array<std::uint64_t, kDoubts> doubted{};  ///< readings, by Doubt
-  [[nodiscard]] std::uint64_t of(Doubt doubt) const { return doubted[static_cast<std::size_t>(doubt)]; }
+  std::uint64_t senseless_records = 0;               ///< all that decode_pose() refused
+  std::array<std::uint64_t, kDoubtKinds> doubted{};  ///< readings, by DoubtKind
+  [[nodiscard]] std::uint64_t of(DoubtKind doubt) const { return doubted[static_cast<std::size_t>(doubt)]; }
 };
 
 }  // namespace birdseye::drivers::minibird

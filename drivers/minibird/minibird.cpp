@@ -131,7 +131,7 @@ Result<std::string> MiniBird::try_warm() {
 Result<std::string> MiniBird::odd_status(std::size_t index) {
   const auto reply = dialogue_.ask(kStatus, address_of(index));
   if (!reply) return reply.error();
-  const Status status = decode_status(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
+  const StatusWord status = decode_status_word(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
   if (status.format_code != static_cast<std::uint8_t>(format_of(settings_, index))) {
     return std::string("it had another record format");
   }
@@ -331,7 +331,7 @@ Result<Diagnosis> MiniBird::look_for_trouble() {
   for (std::size_t i = 0; i < info_.units.size(); ++i) {
     const auto reply = dialogue_.ask(kStatus, address_of(i));
     if (!reply) return reply.error();
-    const Status status = decode_status(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
+    const StatusWord status = decode_status_word(static_cast<std::uint16_t>((*reply)[0] + 256U * (*reply)[1]));
     const auto errors = read_errors(dialogue_, address_of(i));
     if (!errors) return errors.error();
     std::string words = words_of(status);

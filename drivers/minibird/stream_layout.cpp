@@ -14,8 +14,8 @@ std::size_t cycle_bytes(const StreamLayout& layout) {
   return bytes;
 }
 
-std::string_view name_of(Doubt doubt) {
-  static constexpr std::array<std::string_view, kDoubts> kNames = {
+std::string_view name_of(DoubtKind doubt) {
+  static constexpr std::array<std::string_view, kDoubtKinds> kNames = {
       "none", "lost record",     "senseless",         "saturated",          "beyond scale", "frozen",
       "step", "hemisphere flip", "hemisphere border", "outside hemisphere", "unconfirmed",  "unmapped field",
   };

@@ -7,9 +7,9 @@
 
 namespace birdseye::drivers::minibird {
 
-Status decode_status(std::uint16_t word) {
+StatusWord decode_status_word(std::uint16_t word) {
   const auto bit = [word](unsigned n) { return (word >> n & 1U) != 0; };
-  Status s{};
+  StatusWord s{};
   s.master = bit(15);
   s.initialised = bit(14);
   s.error = bit(13);
@@ -72,7 +72,7 @@ UnitStatus decode_unit_status(std::uint8_t byte) {
   return {bit(7), bit(6), bit(5), bit(4), bit(4) ? (byte & 0x0FU) != 0 : bit(0)};
 }
 
-std::string words_of(const Status& status) {
+std::string words_of(const StatusWord& status) {
   std::string words = status.master ? "master" : "slave";
   const auto add = [&words](bool when, std::string_view text) {
     if (when) words += fmt::format(", {}", text);

@@ -8,13 +8,13 @@
 namespace birdseye::drivers::minibird {
 
 /// The status word, bit by bit. Sources disagree on bit 12; `asleep` is what to trust.
-struct Status {
+struct StatusWord {
   bool master, initialised, error, host_sync, expanded_addressing, crt_sync, no_sync, factory_test, xoff, asleep,
       stream;
   std::uint8_t format_code;
 };
-Status decode_status(std::uint16_t word);
-std::string words_of(const Status& status);
+StatusWord decode_status_word(std::uint16_t word);
+std::string words_of(const StatusWord& status);
 
 /// A unit's error code in words; unknown codes say so.
 std::string error_text(std::uint8_t code);

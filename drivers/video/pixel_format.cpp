@@ -18,16 +18,16 @@ constexpr std::uint32_t fourcc(const char (&name)[5]) {
   return code;
 }
 
-struct Named {
+struct FourccFormat {
   std::uint32_t fourcc;
   PixelFormat format;
 };
 // The first of each format is the one to ask for.
 constexpr std::array kNamed = {
-    Named{fourcc("RGB3"), PixelFormat::rgb8},  Named{fourcc("BGR3"), PixelFormat::bgr8},
-    Named{fourcc("YUYV"), PixelFormat::yuyv},  Named{fourcc("UYVY"), PixelFormat::uyvy},
-    Named{fourcc("NV12"), PixelFormat::nv12},  Named{fourcc("MJPG"), PixelFormat::mjpeg},
-    Named{fourcc("JPEG"), PixelFormat::mjpeg}, Named{fourcc("GREY"), PixelFormat::grey8},
+    FourccFormat{fourcc("RGB3"), PixelFormat::rgb8},  FourccFormat{fourcc("BGR3"), PixelFormat::bgr8},
+    FourccFormat{fourcc("YUYV"), PixelFormat::yuyv},  FourccFormat{fourcc("UYVY"), PixelFormat::uyvy},
+    FourccFormat{fourcc("NV12"), PixelFormat::nv12},  FourccFormat{fourcc("MJPG"), PixelFormat::mjpeg},
+    FourccFormat{fourcc("JPEG"), PixelFormat::mjpeg}, FourccFormat{fourcc("GREY"), PixelFormat::grey8},
 };
 
 /// Bytes of width_px pixels in one row of the first plane.
@@ -70,7 +70,7 @@ YuvMatrix matrix_of(const YuvColour& colour) {
 }  // namespace
 
 std::optional<PixelFormat> pixel_format_of_fourcc(std::uint32_t code) {
-  for (const Named& named : kNamed) {
+  for (const FourccFormat& named : kNamed) {
     if (named.fourcc == code) return named.format;
   }
   return std::nullopt;
@@ -84,7 +84,7 @@ std::optional<PixelFormat> pixel_format_of_name(const std::string& name) {
 }
 
 std::uint32_t fourcc_of(PixelFormat format) {
-  for (const Named& named : kNamed) {
+  for (const FourccFormat& named : kNamed) {
     if (named.format == format) return named.fourcc;
   }
   return 0;

@@ -19,7 +19,7 @@ static_assert(std::endian::native == std::endian::little);
 constexpr std::size_t kPairs = 32;  // of pixels, done at a time in arrays that stay in the first-level cache
 constexpr std::size_t kPiece = 2 * kPairs;
 
-using Bytes = std::array<std::uint8_t, kPiece>;
+using PieceBytes = std::array<std::uint8_t, kPiece>;
 /// Both bytes of a pair in one number, the first in the lower half.
 using Pairs = std::array<std::uint16_t, kPairs>;
 
@@ -30,7 +30,7 @@ ALWAYS_INLINE Pairs pairs_of(const std::uint8_t* bytes) {
 }
 
 /// The first and the second byte of every two.
-ALWAYS_INLINE void split(const std::uint8_t* in, Bytes& first, Bytes& second) {
+ALWAYS_INLINE void split(const std::uint8_t* in, PieceBytes& first, PieceBytes& second) {
   for (std::size_t i = 0; i < kPiece; ++i) {
     first[i] = in[2 * i];
     second[i] = in[2 * i + 1];
@@ -71,9 +71,9 @@ ALWAYS_INLINE void mix(const Pairs& luma, const Pairs& chroma, const YuvMatrix& 
 }
 
 ALWAYS_INLINE void interleave(const Planes& in, std::uint8_t* rgb) {
-  Bytes r;
-  Bytes g;
-  Bytes b;
+  PieceBytes r;
+  PieceBytes g;
+  PieceBytes b;
   std::memcpy(r.data(), in.r.data(), sizeof r);
   std::memcpy(g.data(), in.g.data(), sizeof g);
   std::memcpy(b.data(), in.b.data(), sizeof b);
@@ -86,8 +86,8 @@ ALWAYS_INLINE void interleave(const Planes& in, std::uint8_t* rgb) {
 
 ALWAYS_INLINE void piece_to_rgb(const std::uint8_t* luma, const std::uint8_t* chroma, YuvPacking packing,
                                 const YuvMatrix& matrix, std::uint8_t* rgb) {
-  Bytes y;
-  Bytes uv;
+  PieceBytes y;
+  PieceBytes uv;
   if (packing == YuvPacking::luma_first) split(luma, y, uv);
   if (packing == YuvPacking::chroma_first) split(luma, uv, y);
   const bool packed = packing != YuvPacking::two_planes;

@@ -53,7 +53,7 @@ class V4l2Camera final : public FrameSource {
 
   V4l2Device device_;
   std::string name_;
-  CameraControls controls_{device_};
+  V4l2Controls controls_{device_};
   ControlReport report_;
   std::vector<Buffer> buffers_;
   PixelLayout layout_;

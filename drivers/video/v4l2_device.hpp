@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "drivers/system/unique_fd.hpp"
-#include "drivers/video/camera_controls.hpp"
 #include "drivers/video/camera_offers.hpp"
+#include "drivers/video/v4l2_controls.hpp"
 
 namespace birdseye::drivers {
 

@@ -132,7 +132,7 @@ Result<InstrumentTruth> DeviceRig::camera_truth() const {
   return read_truth(settings_.folder / "camera.json");
 }
 
-std::vector<FaultEvent> DeviceRig::faults() const {
+std::vector<FaultTruth> DeviceRig::faults() const {
   const std::lock_guard lock(mutex_);
   return faults_;
 }

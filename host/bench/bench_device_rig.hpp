@@ -36,7 +36,7 @@ struct InstrumentTruth {
 };
 
 /// The begin or end of a fault that the simulator injected.
-struct FaultEvent {
+struct FaultTruth {
   std::string name;
   bool begins = true;
   DeviceTime at;
@@ -57,7 +57,7 @@ class DeviceRig {
   /// The truth as the simulator has written it so far.
   [[nodiscard]] Result<InstrumentTruth> tracker_truth() const;
   [[nodiscard]] Result<InstrumentTruth> camera_truth() const;
-  [[nodiscard]] std::vector<FaultEvent> faults() const;
+  [[nodiscard]] std::vector<FaultTruth> faults() const;
 
  private:
   DeviceRig(DeviceRigSettings settings, int port) : settings_(std::move(settings)), port_(port) {}
@@ -70,7 +70,7 @@ class DeviceRig {
   std::vector<std::unique_ptr<ChildProcess>> instruments_;
   std::unique_ptr<ChildProcess> appliance_;
   mutable std::mutex mutex_;
-  std::vector<FaultEvent> faults_;
+  std::vector<FaultTruth> faults_;
   std::vector<OwnedThread> listeners_;
 };
 

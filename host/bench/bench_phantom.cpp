@@ -16,12 +16,12 @@ using Eigen::Vector3d;
 
 const Vector3d kBox_mm(256, 256, 160);
 
-struct Tube {
+struct Vessel {
   Vector3d from_mm, to_mm;
   double radius_mm;
 };
 
-const Tube kVessels[] = {
+const Vessel kVessels[] = {
     {{120, 128, 20}, {125, 130, 70}, 8},  {{125, 130, 70}, {90, 110, 105}, 6}, {{125, 130, 70}, {165, 125, 110}, 6},
     {{90, 110, 105}, {65, 95, 120}, 4},   {{90, 110, 105}, {80, 140, 130}, 4}, {{165, 125, 110}, {185, 150, 125}, 4},
     {{165, 125, 110}, {180, 95, 120}, 4}, {{125, 130, 70}, {120, 175, 90}, 5}, {{125, 130, 70}, {140, 85, 80}, 5},
@@ -32,10 +32,10 @@ double ellipsoid(const Vector3d& p, const Vector3d& centre, const Vector3d& radi
   return (p - centre).cwiseQuotient(radii).norm();
 }
 
-bool inside(const Tube& tube, const Vector3d& p) {
-  const Vector3d along = tube.to_mm - tube.from_mm;
-  const double t = std::clamp((p - tube.from_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
-  return (p - tube.from_mm - t * along).norm() < tube.radius_mm;
+bool inside(const Vessel& vessel, const Vector3d& p) {
+  const Vector3d along = vessel.to_mm - vessel.from_mm;
+  const double t = std::clamp((p - vessel.from_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  return (p - vessel.from_mm - t * along).norm() < vessel.radius_mm;
 }
 
 double body_hu(const Vector3d& p) {
@@ -50,7 +50,7 @@ double hu_at(const Vector3d& p, bool torso) {
   const bool liver = ellipsoid(p, {110, 128, 85}, {72, 60, 55}) < 1 || ellipsoid(p, {175, 122, 105}, {48, 40, 32}) < 1;
   if (!liver) return torso ? body_hu(p) : -1000;
   if (ellipsoid(p, {85, 150, 70}, {9, 9, 9}) < 1) return 45;
-  return std::any_of(std::begin(kVessels), std::end(kVessels), [&p](const Tube& tube) { return inside(tube, p); })
+  return std::any_of(std::begin(kVessels), std::end(kVessels), [&p](const Vessel& vessel) { return inside(vessel, p); })
              ? 210
              : 100;
 }

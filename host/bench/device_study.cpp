@@ -169,7 +169,7 @@ Result<void> measure_recovery(const std::filesystem::path& folder, nlohmann::jso
   double worst_s = 0;
   out["recovery_s"] = nlohmann::json::object();
   const std::set<std::string> of_camera{"silence"};
-  for (const FaultEvent& fault : rig.faults()) {
+  for (const FaultTruth& fault : rig.faults()) {
     if (fault.begins) continue;
     const auto after = [&](const auto& times, const auto& time_of) {
       for (const auto& one : times) {

@@ -25,13 +25,13 @@ constexpr double kLamps_mm[] = {0, 30, 90};
 constexpr std::pair<double, bool> kScenes[] = {{0, false}, {30, false}, {90, false}, {0, true}};
 
 /// What the methods are tried under; all else is as in the main table.
-struct Condition {
+struct StudyCondition {
   SimulatedCase wanted;
   std::vector<Method> methods;
   std::vector<int> views_kept{5};  ///< of each case, the first so many
 };
 
-std::vector<Condition> conditions(const StudyOptions& options) {
+std::vector<StudyCondition> conditions(const StudyOptions& options) {
   const auto wants = [&](const char* sweep) {
     return std::find(options.sweeps.begin(), options.sweeps.end(), sweep) != options.sweeps.end();
   };
@@ -40,10 +40,10 @@ std::vector<Condition> conditions(const StudyOptions& options) {
   for (const std::string& measure : similarity_names()) every.push_back({"simplex", measure});
   every.push_back({"gradient"});
   // All sweeps pass through this one.
-  std::vector<Condition> out{{options.usual, wants("light") ? every : both}};
+  std::vector<StudyCondition> out{{options.usual, wants("light") ? every : both}};
   if (wants("views")) out.front().views_kept = {5, 3, 2, 1};
   const auto add = [&](const std::vector<Method>& methods, const auto& change) {
-    Condition condition{options.usual, methods};
+    StudyCondition condition{options.usual, methods};
     change(condition.wanted);
     out.push_back(std::move(condition));
   };
@@ -185,7 +185,7 @@ std::string sweep_plot(const json& rows, const StudyOptions& options) {
 }
 
 /// The rows of one condition: for each number of views, each method.
-Result<json> rows_of(const Condition& condition, int trials, Progress& progress) {
+Result<json> rows_of(const StudyCondition& condition, int trials, Progress& progress) {
   const SimulatedCase& w = condition.wanted;
   const std::size_t methods = condition.methods.size();
   std::vector<std::vector<Trial>> of(condition.views_kept.size() * methods);
@@ -243,7 +243,7 @@ Result<void> register_study(const StudyOptions& options) {
     if (auto written = write_files(files); !written) return written.error();
   }
   Progress progress;
-  for (const Condition& condition : conditions(options)) {
+  for (const StudyCondition& condition : conditions(options)) {
     const auto rows = rows_of(condition, options.trials, progress);
     if (!rows) return rows.error();
     for (const json& row : *rows) all["rows"].push_back(row);

@@ -82,14 +82,14 @@ std::vector<std::uint8_t> over_white(const ImageRgba& image) {
   return rgb;
 }
 
-struct Case {
+struct TimedCase {
   std::string phantom;
   std::array<int, 3> size;
   double step_mm;
 };
 
 /// One engine at one level, with pruning or without.
-Result<nlohmann::json> bench_engine(const Case& c, const RenderStudyOptions& options, const Volume& volume,
+Result<nlohmann::json> bench_engine(const TimedCase& c, const RenderStudyOptions& options, const Volume& volume,
                                     Engine& engine, const Level& level, bool pruned) {
   const CameraModel camera = bench_camera(kWidth_px, kHeight_px);
   RenderSettings settings;
@@ -122,7 +122,7 @@ Result<nlohmann::json> bench_engine(const Case& c, const RenderStudyOptions& opt
   return row;
 }
 
-Level make_level(const Case& c, const Volume& volume, int number) {
+Level make_level(const TimedCase& c, const Volume& volume, int number) {
   Level level;
   level.number = number;
   if (number > 0) {
@@ -139,7 +139,7 @@ Level make_level(const Case& c, const Volume& volume, int number) {
 }
 
 /// The phantom cut open, as the manual shows it.
-Result<void> draw_level(const RenderStudyOptions& options, const Case& c, Engine& engine, const Level& level) {
+Result<void> draw_level(const RenderStudyOptions& options, const TimedCase& c, Engine& engine, const Level& level) {
   RenderSettings settings;
   settings.step_mm = 0.5 * c.step_mm;
   settings.clip = ClipPlane{Eigen::Vector3d(-1, 0, 0), -150};
@@ -151,7 +151,7 @@ Result<void> draw_level(const RenderStudyOptions& options, const Case& c, Engine
 }
 
 /// The undeformed case for another program: volume.mha and scene.json.
-Result<void> write_scene(const std::filesystem::path& folder, const Case& c, const Volume& volume) {
+Result<void> write_scene(const std::filesystem::path& folder, const TimedCase& c, const Volume& volume) {
   const Eigen::Vector3d& spacing = volume.spacing_mm;
   const Eigen::Vector3d origin = volume.patient_from_voxel.translation();
   std::string mha = fmt::format(
@@ -179,7 +179,8 @@ Result<void> write_scene(const std::filesystem::path& folder, const Case& c, con
   return write_files({{folder / "volume.mha", mha}, {folder / "scene.json", text_of(scene)}});
 }
 
-Result<void> bench_case(const Case& c, const RenderStudyOptions& options, const TellRow& tell, nlohmann::json& rows) {
+Result<void> bench_case(const TimedCase& c, const RenderStudyOptions& options, const TellRow& tell,
+                        nlohmann::json& rows) {
   const Volume volume = bench_phantom(c.phantom, c.size);
   if (!options.scene.empty() && c.phantom == "liver" && c.size[2] == 64) {
     if (auto written = write_scene(options.scene, c, volume); !written) return written;
@@ -215,12 +216,12 @@ Result<nlohmann::json> render_study(const RenderStudyOptions& options, const Tel
       static_cast<std::size_t>(options.threads > 0 ? options.threads : tbb::info::default_concurrency());
   const tbb::global_control at_most(tbb::global_control::max_allowed_parallelism, threads);
   nlohmann::json rows = nlohmann::json::array();
-  std::vector<Case> cases;
+  std::vector<TimedCase> cases;
   for (const std::string& phantom : options.phantoms) {
     for (const int depth : {64, 32}) cases.push_back({phantom, {256, 256, depth}, kStep_mm});
   }
   if (options.large) cases.push_back({"liver", {512, 512, 128}, 0.5});
-  for (const Case& c : cases) {
+  for (const TimedCase& c : cases) {
     if (auto done = bench_case(c, options, tell, rows); !done) return done.error();
   }
   // Pictures and memory are judged here; times are for whoever knows the machine.

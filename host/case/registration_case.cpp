@@ -26,9 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A table of the case, with its name and file for messages.
-class Table {
+class CaseTable {
  public:
-  Table(const fs::path& file, std::string name, const toml::value& table)
+  CaseTable(const fs::path& file, std::string name, const toml::value& table)
       : file_(file), name_(std::move(name)), table_(table) {}
   [[nodiscard]] bool has(const char* key) const { return table_.contains(key); }
   template <typename T>
@@ -103,7 +103,7 @@ Result<void> only_known_keys(const fs::path& file, const toml::value& all) {
   return {};
 }
 
-Result<void> read_volume(const Table& table, RegistrationCase& out) {
+Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   const auto path = table.path("path");
   if (!path) return path.error();
   auto ct = import_volume(*path);
@@ -126,7 +126,7 @@ Result<void> read_volume(const Table& table, RegistrationCase& out) {
 }
 
 /// What only the optimisers that go by the value alone have a choice of.
-Result<void> read_direct_search(const Table& table, RegistrationCase& out) {
+Result<void> read_direct_search(const CaseTable& table, RegistrationCase& out) {
   const bool direct = out.optimiser != "gradient";
   for (const char* key : {"unknowns", "similarity", "most_evaluations"}) {
     if (table.has(key) && !direct) return table.wrong(key, "needs optimiser = \"simplex\" or \"powell\"");
@@ -157,7 +157,7 @@ Result<void> read_direct_search(const Table& table, RegistrationCase& out) {
   return {};
 }
 
-Result<void> read_model(const Table& table, RegistrationCase& out) {
+Result<void> read_model(const CaseTable& table, RegistrationCase& out) {
   const auto& model = table.value();
   if (table.has("control_points") && model.at("control_points").is_string()) {
     if (model.at("control_points").as_string().str != "auto")
@@ -202,7 +202,7 @@ Result<void> read_model(const Table& table, RegistrationCase& out) {
   return {};
 }
 
-Result<void> read_view(const Table& table, const fs::path& folder, RegistrationCase& out) {
+Result<void> read_view(const CaseTable& table, const fs::path& folder, RegistrationCase& out) {
   VideoView view;
   const auto image = table.path("image");
   if (!image) return image.error();
@@ -303,17 +303,17 @@ Result<RegistrationCase> read_case(const fs::path& path) {
   if (auto known = only_known_keys(path, all); !known) return known.error();
   RegistrationCase out;
   const toml::value none = toml::table{};
-  const auto table = [&](const char* name) { return Table(path, name, all.contains(name) ? all.at(name) : none); };
+  const auto table = [&](const char* name) { return CaseTable(path, name, all.contains(name) ? all.at(name) : none); };
   if (auto done = read_volume(table("volume"), out); !done) return done.error();
   if (auto done = read_model(table("model"), out); !done) return done.error();
   if (!all.contains("view") || !all.at("view").is_array() || all.at("view").as_array().empty())
     return Error{Errc::bad_value, fmt::format("{}: has no [[view]]; name one or more", path.string())};
   int number = 0;
   for (const toml::value& view : all.at("view").as_array()) {
-    const Table one(path, fmt::format("view {}", number++), view);
+    const CaseTable one(path, fmt::format("view {}", number++), view);
     if (auto done = read_view(one, path.parent_path(), out); !done) return done.error();
   }
-  const Table truth = table("truth");
+  const CaseTable truth = table("truth");
   if (truth.has("landmarks")) {
     const auto landmarks_path = truth.path("landmarks");
     if (!landmarks_path) return landmarks_path.error();

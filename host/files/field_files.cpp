@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Row = std::vector<std::string>;
 
-struct Table {
+struct TextTable {
   Row columns;
   std::vector<std::pair<int, Row>> rows;  ///< with their lines
 };
@@ -38,12 +38,12 @@ Row row_of(const std::string& line) {
   return fields;
 }
 
-Result<Table> read_table(const fs::path& path, const Row& needed) {
+Result<TextTable> read_table(const fs::path& path, const Row& needed) {
   std::error_code ignored;
   std::ifstream in(path);
   if (!in || fs::is_directory(path, ignored))
     return Error{Errc::not_found, path.string() + ": no such file, or not to be read"};
-  Table table;
+  TextTable table;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
@@ -63,7 +63,7 @@ Result<Table> read_table(const fs::path& path, const Row& needed) {
 }
 
 /// A cell's text; empty where there is none.
-std::string cell(const Table& table, const Row& row, const std::string& column) {
+std::string cell(const TextTable& table, const Row& row, const std::string& column) {
   const auto found = std::find(table.columns.begin(), table.columns.end(), column);
   const auto at = static_cast<std::size_t>(found - table.columns.begin());
   return at < row.size() ? row[at] : "";
@@ -79,7 +79,7 @@ std::optional<double> number(const std::string& text) {
 }
 
 template <std::size_t N>
-std::optional<std::array<double, N>> numbers(const Table& table, const Row& row,
+std::optional<std::array<double, N>> numbers(const TextTable& table, const Row& row,
                                              const std::array<const char*, N>& columns) {
   std::array<double, N> out{};
   for (std::size_t i = 0; i < N; ++i) {

@@ -14,25 +14,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Row {
+struct NumberRow {
   int line = 0;
   std::vector<double> numbers;
 };
 
 /// The lines of numbers in a file; with headed, its first line may be one of names.
-Result<std::vector<Row>> read_rows(const fs::path& path, bool headed = false) {
+Result<std::vector<NumberRow>> read_rows(const fs::path& path, bool headed = false) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   std::ifstream in(path);
   if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
-  std::vector<Row> rows;
+  std::vector<NumberRow> rows;
   std::string text;
   for (int line = 1; std::getline(in, text); ++line) {
     std::replace(text.begin(), text.end(), ',', ' ');
     std::istringstream words(text);
     std::string word;
-    Row row;
+    NumberRow row;
     row.line = line;
     while (words >> word && word[0] != '#') {
       std::size_t used = 0;
@@ -71,7 +71,7 @@ Result<std::vector<Eigen::Vector3d>> read_points(const fs::path& path) {
   const auto rows = read_rows(path);
   if (!rows) return rows.error();
   std::vector<Eigen::Vector3d> points;
-  for (const Row& row : *rows) {
+  for (const NumberRow& row : *rows) {
     if (row.numbers.size() != 3) {
       return Error{Errc::bad_format, fmt::format("{}: line {}: {} numbers where a point has three", path.string(),
                                                  row.line, row.numbers.size())};
@@ -91,7 +91,7 @@ Result<Eigen::Matrix4d> read_pose(const fs::path& path) {
   }
   Eigen::Matrix4d m;
   for (int i = 0; i < 4; ++i) {
-    const Row& row = (*rows)[static_cast<std::size_t>(i)];
+    const NumberRow& row = (*rows)[static_cast<std::size_t>(i)];
     if (row.numbers.size() != 4) {
       return Error{Errc::bad_format, fmt::format("{}: line {}: {} numbers where a row has four", path.string(),
                                                  row.line, row.numbers.size())};
@@ -118,7 +118,7 @@ Result<std::vector<Transform<Camera, Patient>>> read_path(const fs::path& path) 
   } else {
     const auto rows = read_rows(path, true);
     if (!rows) return rows.error();
-    for (const Row& row : *rows) {
+    for (const NumberRow& row : *rows) {
       const std::string where = fmt::format("{}: line {}", path.string(), row.line);
       if (row.numbers.size() != 16 && row.numbers.size() != 18) {
         return Error{Errc::bad_format,

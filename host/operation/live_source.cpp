@@ -24,17 +24,17 @@ LiveSource::LiveSource(std::string name, Connect::Work connect)
 }
 
 std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address, const wire::ForeignSettings& foreign) {
-  const auto connect = [address, foreign](const std::stop_token&, const Connect::Say&) -> Result<Link> {
+  const auto connect = [address, foreign](const std::stop_token&, const Connect::Say&) -> Result<Connection> {
     auto client = connect_appliance(address, foreign);
     if (!client) return client.error();
-    return Link{nullptr, *std::move(client)};
+    return Connection{nullptr, *std::move(client)};
   };
   return std::unique_ptr<LiveSource>(new LiveSource(address, connect));
 }
 
 std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings settings) {
   const auto connect = [settings = std::move(settings)](const std::stop_token& stop,
-                                                        const Connect::Say& say) -> Result<Link> {
+                                                        const Connect::Say& say) -> Result<Connection> {
     say("making the patient");
     if (auto made = SimulatedCart::make_patient(settings); !made) return made.error();
     if (stop.stop_requested()) return Error{Errc::disconnected, "cancelled"};
@@ -43,12 +43,12 @@ std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings setti
     if (!cart) return cart.error();
     auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
     if (!client) return client.error();
-    return Link{*std::move(cart), *std::move(client)};
+    return Connection{*std::move(cart), *std::move(client)};
   };
   return std::unique_ptr<LiveSource>(new LiveSource("the simulated cart", connect));
 }
 
-void LiveSource::take_link(Result<Link> link) {
+void LiveSource::take_link(Result<Connection> link) {
   if (!link) {
     words_ = link.error().what;
     again_ = host_now() + kConnectAgain;

@@ -39,13 +39,13 @@ class LiveSource {
 
  private:
   /// What connecting gives: the cart where there is one to start.
-  struct Link {
+  struct Connection {
     std::unique_ptr<SimulatedCart> cart;
     std::unique_ptr<wire::Client> client;
   };
-  using Connect = Background<Result<Link>>;
+  using Connect = Background<Result<Connection>>;
   LiveSource(std::string name, Connect::Work connect);
-  void take_link(Result<Link> link);
+  void take_link(Result<Connection> link);
   void link_again();
   [[nodiscard]] std::string notes() const;
 

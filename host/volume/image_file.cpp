@@ -18,9 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What the copy of this process sends of itself: the file it is about to read, how it failed, or the image.
-enum class Record : std::uint8_t { reading = 'r', error = 'e', image = 'i' };
+enum class MessageKind : std::uint8_t { reading = 'r', error = 'e', image = 'i' };
 
-void send_text(const Send& send, Record kind, std::int32_t code, const std::string& text) {
+void send_text(const Send& send, MessageKind kind, std::int32_t code, const std::string& text) {
   const auto length = static_cast<std::uint32_t>(text.size());
   send(&kind, sizeof kind);
   send(&code, sizeof code);
@@ -29,7 +29,7 @@ void send_text(const Send& send, Record kind, std::int32_t code, const std::stri
 }
 
 void send_image(const Send& send, const ImageFile& image) {
-  const Record kind = Record::image;
+  const MessageKind kind = MessageKind::image;
   send(&kind, sizeof kind);
   send(image.size.data(), sizeof image.size);
   send(image.spacing_mm.data(), 3 * sizeof(double));
@@ -117,29 +117,29 @@ Result<ImageFile> read_image(const fs::path& path, int components) {
   }
   constexpr Duration kLongest = Duration::from_ms(300'000);
   const auto work = [&](const Send& send) {
-    const auto image =
-        decode(path, components, [&send](const fs::path& file) { send_text(send, Record::reading, 0, file.string()); });
+    const auto image = decode(
+        path, components, [&send](const fs::path& file) { send_text(send, MessageKind::reading, 0, file.string()); });
     if (image && image->components != components) {
       const Error other = refused(Errc::unsupported, path, "is a CT; give a displacement field");
-      send_text(send, Record::error, static_cast<std::int32_t>(other.code), other.what);
+      send_text(send, MessageKind::error, static_cast<std::int32_t>(other.code), other.what);
     } else if (image) {
       send_image(send, *image);
     } else {
-      send_text(send, Record::error, static_cast<std::int32_t>(image.error().code), image.error().what);
+      send_text(send, MessageKind::error, static_cast<std::int32_t>(image.error().code), image.error().what);
     }
   };
   fs::path reading = path;
   std::optional<Result<ImageFile>> read;
   const auto take = [&](const Receive& receive) {
-    Record kind{};
+    MessageKind kind{};
     while (!read && receive(&kind, sizeof kind)) {
-      if (kind == Record::image) {
+      if (kind == MessageKind::image) {
         if (auto image = receive_image(receive, components)) read = *std::move(image);
         return;
       }
       auto told = receive_text(receive);
       if (!told) return;
-      if (kind == Record::error) {
+      if (kind == MessageKind::error) {
         read = *std::move(told);
       } else {
         reading = told->what;

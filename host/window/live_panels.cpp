@@ -20,7 +20,7 @@ constexpr ImGuiWindowFlags kPanel = ImGuiWindowFlags_NoDecoration | ImGuiWindowF
                                     ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus |
                                     ImGuiWindowFlags_NoBackground;
 
-struct Layout {
+struct PanelLayout {
   float wide, high, side, strip, scale;
 };
 
@@ -203,7 +203,7 @@ void draw_run(const OperationView& operation, const PanelFacts& facts, TransferE
   if (ImGui::Button("snapshot (S)")) wishes.snapshot = true;
 }
 
-void draw_side(const Layout& at, const OperationView& operation, const PanelFacts& facts, TransferEditor& editor,
+void draw_side(const PanelLayout& at, const OperationView& operation, const PanelFacts& facts, TransferEditor& editor,
                PanelWishes& wishes) {
   ImGui::SetNextWindowPos(ImVec2(0, 0));
   ImGui::SetNextWindowSize(ImVec2(at.side, at.high));
@@ -286,8 +286,8 @@ void draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) 
   list->AddText(from, colour, text.c_str());
 }
 
-void draw_video(const Layout& at, const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
-                bool recorded) {
+void draw_video(const PanelLayout& at, const LiveWindow& window, const OperationView& operation,
+                const ShownPicture& shown, bool recorded) {
   const ImVec2 size(at.wide - at.side, at.high - at.strip);
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
   ImGui::SetNextWindowPos(ImVec2(at.side, 0));
@@ -312,7 +312,7 @@ void draw_video(const Layout& at, const LiveWindow& window, const OperationView&
   ImGui::PopStyleVar();
 }
 
-void draw_strip(const Layout& at, const OperationView& operation, const PanelFacts& facts) {
+void draw_strip(const PanelLayout& at, const OperationView& operation, const PanelFacts& facts) {
   ImGui::SetNextWindowPos(ImVec2(at.side, at.high - at.strip));
   ImGui::SetNextWindowSize(ImVec2(at.wide - at.side, at.strip));
   ImGui::Begin("strip", nullptr, kPanel);
@@ -361,7 +361,7 @@ PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation
   PanelWishes wishes;
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   const float scale = window.scale();
-  const Layout at{size.x, size.y, kSidePx * scale, kStripPx * scale, scale};
+  const PanelLayout at{size.x, size.y, kSidePx * scale, kStripPx * scale, scale};
   draw_side(at, operation, facts, editor, wishes);
   draw_video(at, window, operation, shown, facts.recorded);
   draw_strip(at, operation, facts);

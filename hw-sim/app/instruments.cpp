@@ -65,22 +65,22 @@ Result<void> run(Ft232rOptions& options) {
   return run_ft232r(options.program, note_interrupts());
 }
 
-struct CameraOptions {
+struct VideoOptions {
   CameraProgram program;
   std::string size = "1920x1080", format = "RGB3";
   bool no_stamps = false;
   std::filesystem::path faults;
 };
 
-Result<void> run(CameraOptions& options) {
+Result<void> run(VideoOptions& options) {
   CameraProgram& program = options.program;
   if (auto parsed = parse_size(options.size, program.width_px, program.height_px); !parsed) return parsed;
   if (program.width_px % 2 != 0 || program.height_px % 2 != 0) {
     return Error{Errc::bad_value, "--size: give even numbers, as 1920x1080"};
   }
-  const auto layout = pixel_layout_of(options.format);
-  if (!layout) return Error{Errc::bad_value, "--format: is none of RGB3, YUYV, UYVY, NV12, GREY"};
-  program.layout = *layout;
+  const auto format = frame_format_of(options.format);
+  if (!format) return Error{Errc::bad_value, "--format: is none of RGB3, YUYV, UYVY, NV12, GREY"};
+  program.format = *format;
   program.timing.stamps = !options.no_stamps;
   if (!options.faults.empty()) {
     auto script = read_fault_script(options.faults, Instruments::camera, program.timing.seed);
@@ -164,7 +164,7 @@ void add_ft232r_command(CLI::App& app, const Take& take) {
 }
 
 void add_camera_command(CLI::App& app, const Take& take) {
-  auto options = std::make_shared<CameraOptions>();
+  auto options = std::make_shared<VideoOptions>();
   CameraProgram& program = options->program;
   CameraTiming& timing = program.timing;
   CLI::App& command = *app.add_subcommand("camera", "run a camera with a test picture, in real time");

@@ -29,7 +29,7 @@ struct Hit {
 };
 
 /// How a point answers the lamp: the share of each colour it scatters, and the strength of its highlight.
-struct Surface {
+struct Reflectance {
   Vector3f albedo;
   float gloss = 0;
 };
@@ -164,12 +164,12 @@ class EmbreeLaparoscope final : public Laparoscope {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width_px) + static_cast<std::size_t>(x);
   }
 
-  [[nodiscard]] Surface cavity_surface(const Hit& hit) const {
+  [[nodiscard]] Reflectance cavity_surface(const Hit& hit) const {
     const Vector3f& p = hit.rest;
     const float coarse = texture_.at(p / 19.0F);
     const float middle = texture_.at(p / 6.3F);
     const float fine = texture_.at(p / 1.9F);
-    Surface out;
+    Reflectance out;
     if (coat_ == Coat::skin) {
       const bool organ = hit.geometry == kOrganGeometry;
       const float shade = organ ? 0.80F + 0.14F * coarse + 0.14F * middle + 0.12F * fine : 0.6F + 0.5F * middle;
@@ -190,7 +190,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     return out;
   }
 
-  [[nodiscard]] Surface bench_surface(const Hit& hit) const {
+  [[nodiscard]] Reflectance bench_surface(const Hit& hit) const {
     // The board's squares, box-filtered over the pixel's footprint along each axis, so that edges lie where they are.
     const float square = static_cast<float>(board_.square_mm);
     const float slant = std::max(0.3F, hit.normal.dot(Vector3f(0, 0, -1)));
@@ -207,7 +207,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     const float rows = static_cast<float>(board_.rows) * square;
     const bool printed = u > -square && v > -square && u < columns && v < rows;
     const bool paper = u > -2 * square && v > -2 * square && u < columns + square && v < rows + square;
-    Surface out;
+    Reflectance out;
     if (printed) {
       const float white = 0.5F + 0.5F * wave(u) * wave(v);
       out.albedo = Vector3f::Constant(0.035F + 0.78F * white);
@@ -302,7 +302,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     hit.normal = scene.normal(packet, lane);
     hit.normal.normalize();
     if (hit.normal.dot(direction) > 0) hit.normal = -hit.normal;
-    const Surface surface = surface_of_hit(hit);
+    const Reflectance surface = surface_of_hit(hit);
     Vector3f normal = hit.normal;
     if (surface.gloss > 0) {
       // A wet surface is not smooth: ripples break the highlight up.

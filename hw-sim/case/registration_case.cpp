@@ -27,7 +27,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// Everything of a case, before it is written.
-struct Case {
+struct MadeCase {
   Subject subject;
   TissueMap map;
   CameraModel lens;
@@ -61,20 +61,20 @@ Result<void> check(const CaseSettings& settings) {
   return {};
 }
 
-Result<Case> make_case(const CaseSettings& settings) {
+Result<MadeCase> make_case(const CaseSettings& settings) {
   auto subject = subject_of(settings);
   if (!subject) return subject.error();
   const TissueMap still(subject->grid.origin_mm, subject->grid.last_mm(), settings.inner);
   auto map = TissueMap::random(still, settings.amplitude_mm, subject->surface.vertices, settings.seed);
   if (!map) return map.error();
 
-  Case out{.subject = *std::move(subject),
-           .map = *std::move(map),
-           .lens = {},
-           .views = {},
-           .landmarks = {},
-           .pictures = {},
-           .lens_circle = {}};
+  MadeCase out{.subject = *std::move(subject),
+               .map = *std::move(map),
+               .lens = {},
+               .views = {},
+               .landmarks = {},
+               .pictures = {},
+               .lens_circle = {}};
   out.lens = laparoscope_lens(settings.width_px, settings.height_px);
   const double distance_mm = settings.distance_mm > 0 ? settings.distance_mm : out.subject.view_distance_mm;
   out.views = choose_viewpoints(out.subject, settings.views, distance_mm, settings.seed);
@@ -102,7 +102,7 @@ Result<Case> make_case(const CaseSettings& settings) {
   return out;
 }
 
-std::string case_toml(const CaseSettings& settings, const Case& made) {
+std::string case_toml(const CaseSettings& settings, const MadeCase& made) {
   std::string toml = fmt::format(
       "# Written by birdseye-sim case --seed {}. Paths are relative to this file.\n"
       "[volume]\npath = \"ct.nii.gz\"\nlabel = \"segmentation.nii.gz\"\nlabel_values = [{}]\ntransfer = \"{}\"\n\n"
@@ -118,7 +118,7 @@ std::string case_toml(const CaseSettings& settings, const Case& made) {
   return toml + "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\ncontrol_points = \"truth/control_points.json\"\n";
 }
 
-nlohmann::json truth_of(const CaseSettings& settings, const Case& made) {
+nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
   nlohmann::json truth;
   truth["seed"] = settings.seed;
   truth["phantom"] = settings.ct.empty() ? settings.phantom : "ct";
@@ -142,7 +142,7 @@ nlohmann::json truth_of(const CaseSettings& settings, const Case& made) {
   return truth;
 }
 
-Result<void> write_all(const CaseSettings& settings, const Case& made) {
+Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
   const std::filesystem::path& folder = settings.folder;
   std::error_code error;
   std::filesystem::create_directories(folder / "truth", error);

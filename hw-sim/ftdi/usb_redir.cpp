@@ -29,7 +29,7 @@ enum Type : std::uint32_t {
   kBulk = 101,
 };
 
-enum Status : std::uint8_t { kSuccess = 0, kCancelled = 1, kInvalid = 2, kStall = 4 };
+enum TransferStatus : std::uint8_t { kSuccess = 0, kCancelled = 1, kInvalid = 2, kStall = 4 };
 
 constexpr std::uint32_t kDeviceVersion = 1U << 1U, kPacketSizes = 1U << 4U, kWideIds = 1U << 5U, kLongBulk = 1U << 6U;
 // QEMU's xhci takes no device over a link that lacks one of the last three.

@@ -25,25 +25,25 @@ BirdPose PivotMotion::pose(std::size_t bird, double t_s) const {
   return {rotation, pivot_in_tracker_mm + beside - rotation * tip_in_sensor_mm};
 }
 
-Motion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns) {
+BirdMotion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns) {
   return [pivot, zero_ns](std::size_t bird, std::int64_t at_ns) {
     return pivot.pose(bird, static_cast<double>(at_ns - zero_ns) * 1e-9);
   };
 }
 
-Motion circle_motion(const Circle& circle, std::int64_t zero_ns) {
+BirdMotion circle_motion(const Circle& circle, std::int64_t zero_ns) {
   return [circle, zero_ns](std::size_t bird, std::int64_t at_ns) {
     return circle.pose(bird, static_cast<double>(at_ns - zero_ns) * 1e-9);
   };
 }
 
-Motion still_motion() {
+BirdMotion still_motion() {
   return [](std::size_t bird, std::int64_t /*at_ns*/) {
     return BirdPose{Eigen::Matrix3d::Identity(), Eigen::Vector3d(400, 60.0 * static_cast<double>(bird), 0)};
   };
 }
 
-Motion motion_named(const std::string& name, std::int64_t zero_ns) {
+BirdMotion motion_named(const std::string& name, std::int64_t zero_ns) {
   if (name == "still") return still_motion();
   if (name == "pivot") return pivot_motion({}, zero_ns);
   return circle_motion({}, zero_ns);

@@ -29,12 +29,12 @@ struct PivotMotion {
 };
 
 /// The motion on a circle; t counts from zero_ns.
-Motion circle_motion(const Circle& circle, std::int64_t zero_ns);
-Motion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns);
+BirdMotion circle_motion(const Circle& circle, std::int64_t zero_ns);
+BirdMotion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns);
 /// Each bird rests at (400, 60 * bird, 0) mm, not turned.
-Motion still_motion();
+BirdMotion still_motion();
 
 /// The motion "circle", "pivot" or "still" with its default parameters; the circle for any other name.
-Motion motion_named(const std::string& name, std::int64_t zero_ns);
+BirdMotion motion_named(const std::string& name, std::int64_t zero_ns);
 
 }  // namespace birdseye::hw_sim

@@ -9,7 +9,7 @@ namespace birdseye::hw_sim {
 enum class Addressing : std::uint8_t { normal = 0, expanded = 1, super_expanded = 3 };
 
 /// The parameters of EXAMINE and CHANGE by the names that the code uses.
-enum Parameter : std::uint8_t {
+enum ParameterNumber : std::uint8_t {
   kStatus = 0,
   kRevision = 1,
   kCrystal = 2,

@@ -56,7 +56,7 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   };
   if (auto written = write_truth(program.tracker.unit.rate_hz); !written) return written;
 
-  const Motion motion = motion_named(program.motion, zero_ns);
+  const BirdMotion motion = motion_named(program.motion, zero_ns);
   TrackerLoop::Listeners listeners;
   listeners.on_fault = [](const FaultEvent& event) { announce(event); };
   listeners.on_rate = [&write_truth](double rate_hz) { (void)write_truth(rate_hz); };

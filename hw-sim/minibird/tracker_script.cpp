@@ -29,7 +29,7 @@ BirdPose noisy(const BirdPose& pose, const BirdNoise& noise, std::uint64_t seed,
 
 }  // namespace
 
-TrackerScript::TrackerScript(const TrackerSettings& settings, Motion motion, std::int64_t start_ns)
+TrackerScript::TrackerScript(const TrackerSettings& settings, BirdMotion motion, std::int64_t start_ns)
     : settings_(settings),
       motion_(std::move(motion)),
       unit_(settings.unit),

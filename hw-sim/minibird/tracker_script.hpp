@@ -19,7 +19,7 @@ struct BirdNoise {
 };
 
 /// The true pose of a bird (0 is the first) at an instant of the caller's clock.
-using Motion = std::function<BirdPose(std::size_t bird, std::int64_t at_ns)>;
+using BirdMotion = std::function<BirdPose(std::size_t bird, std::int64_t at_ns)>;
 
 struct TrackerSettings {
   UnitSettings unit;
@@ -54,7 +54,7 @@ struct Delivery {
 /// rate and are late by the jitter. Bytes never overtake each other.
 class TrackerScript {
  public:
-  TrackerScript(const TrackerSettings& settings, Motion motion, std::int64_t start_ns);
+  TrackerScript(const TrackerSettings& settings, BirdMotion motion, std::int64_t start_ns);
 
   void receive(std::span<const std::uint8_t> bytes, std::int64_t now_ns);
   /// Sets RTS, where the transport carries it. Asserted, it holds the unit in reset; when it is released, the unit
@@ -86,7 +86,7 @@ class TrackerScript {
   void enqueue(Delivery delivery);
 
   TrackerSettings settings_;
-  Motion motion_;
+  BirdMotion motion_;
   Unit unit_;
   std::optional<FieldDistortion> room_;
   FaultTimeline faults_;

@@ -43,7 +43,7 @@ Unit::Unit(const UnitSettings& settings) : settings_(settings) {
 }
 
 void Unit::reset() {
-  birds_.assign(static_cast<std::size_t>(settings_.birds), Bird{});
+  birds_.assign(static_cast<std::size_t>(settings_.birds), FlockBird{});
   for (std::size_t i = 0; i < birds_.size(); ++i) {
     for (unsigned number = 0; number < 64; ++number) {
       const ParameterRule* const rule = parameter_rule(static_cast<std::uint8_t>(number), revision());
@@ -141,7 +141,7 @@ std::vector<std::uint8_t> Unit::receive(std::uint8_t byte) {
 }
 
 void Unit::execute(Bytes& reply) {
-  Bird& bird = birds_[addressed_];
+  FlockBird& bird = birds_[addressed_];
   const std::uint8_t code = command_[0];
   switch (code) {
     case 'V':
@@ -199,7 +199,7 @@ void Unit::execute(Bytes& reply) {
 }
 
 void Unit::execute_with_data(Bytes& reply) {
-  Bird& bird = birds_[addressed_];
+  FlockBird& bird = birds_[addressed_];
   const auto data = std::span<const std::uint8_t>(command_).subspan(1);
   switch (command_[0]) {
     case 'M':
@@ -259,7 +259,7 @@ void Unit::next_transmitter(std::uint8_t data) {
 }
 
 std::vector<std::uint8_t> Unit::record(std::size_t index, const BirdPose& pose) const {
-  const Bird& bird = birds_[index];
+  const FlockBird& bird = birds_[index];
   BirdPose reported = pose;
   // A dipole field is even: the unit cannot tell p from -p and answers with the one inside the chosen half-space.
   const Bytes& hemisphere = bird.values.at(kHemisphere);

@@ -63,7 +63,7 @@ class Unit {
   struct LatchedError {
     std::uint8_t code, detail;
   };
-  struct Bird {
+  struct FlockBird {
     OutputFormat format = OutputFormat::position_angles;
     bool button_mode = false;
     std::uint8_t button = 0;
@@ -82,7 +82,7 @@ class Unit {
   [[nodiscard]] bool running(std::size_t bird) const { return bird == 0 || bird < configured_; }
   [[nodiscard]] Bytes record(std::size_t bird, const BirdPose& pose) const;
   // unit_parameters.cpp: EXAMINE and CHANGE
-  void latch(Bird& bird, std::uint8_t code, std::uint8_t detail = 0);
+  void latch(FlockBird& bird, std::uint8_t code, std::uint8_t detail = 0);
   [[nodiscard]] unsigned revision() const { return 256U * settings_.revision_major + settings_.revision_minor; }
   [[nodiscard]] Addressing addressing() const;
   [[nodiscard]] std::size_t most_units() const;
@@ -95,7 +95,7 @@ class Unit {
   void auto_configure(std::size_t units);
 
   UnitSettings settings_;
-  std::vector<Bird> birds_;
+  std::vector<FlockBird> birds_;
   Disturbance disturbance_;
   double rate_hz_ = 0;
   bool group_mode_ = false, streaming_ = false, asleep_ = false, suspended_ = false;

@@ -17,7 +17,7 @@ void put_word(std::vector<std::uint8_t>& bytes, unsigned word) {
 
 }  // namespace
 
-void Unit::latch(Bird& bird, std::uint8_t code, std::uint8_t detail) {
+void Unit::latch(FlockBird& bird, std::uint8_t code, std::uint8_t detail) {
   if (bird.errors.size() < kMostErrors) bird.errors.push_back({code, detail});
 }
 
@@ -31,7 +31,7 @@ std::size_t Unit::most_units() const {
 }
 
 std::uint16_t Unit::status_word() const {
-  const Bird& bird = birds_[addressed_];
+  const FlockBird& bird = birds_[addressed_];
   unsigned word = addressed_ == master_ ? 0x8000U : 0U;
   if (addressed_ < configured_ || birds_.size() == 1) word |= 0x4000U;
   if (!bird.errors.empty()) word |= 0x2000U;
@@ -82,7 +82,7 @@ std::vector<std::uint8_t> Unit::take_error(std::size_t length) {
 }
 
 void Unit::examine(std::uint8_t parameter, Bytes& reply) {
-  Bird& bird = birds_[addressed_];
+  FlockBird& bird = birds_[addressed_];
   if (streaming_) ++violations_;
   const ParameterRule* const rule = parameter_rule(parameter, revision());
   if (rule == nullptr) {
@@ -140,7 +140,7 @@ void Unit::auto_configure(std::size_t units) {
 }
 
 void Unit::change(std::uint8_t parameter, std::span<const std::uint8_t> value) {
-  Bird& bird = birds_[addressed_];
+  FlockBird& bird = birds_[addressed_];
   const ParameterRule* const rule = parameter_rule(parameter, revision());
   if (rule == nullptr || rule->change_bytes == 0) {
     latch(bird, kErrorInvalidCommand);
@@ -169,7 +169,7 @@ void Unit::change(std::uint8_t parameter, std::span<const std::uint8_t> value) {
     case kAddressing:
       // Every unit of a flock is switched over alike.
       if (value[0] == 0 || value[0] == 1 || value[0] == 3) {
-        for (Bird& each : birds_) each.values[kAddressing] = {value[0]};
+        for (FlockBird& each : birds_) each.values[kAddressing] = {value[0]};
       }
       break;
     default:

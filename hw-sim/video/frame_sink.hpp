@@ -12,9 +12,9 @@
 namespace birdseye::hw_sim {
 
 /// A picture as it lies in memory.
-struct Picture {
+struct FramePixels {
   std::span<const std::uint8_t> pixels;
-  PixelLayout layout;
+  FrameFormat format;
   int width_px, height_px;
 };
 
@@ -28,7 +28,7 @@ class FrameSink {
   /// frame can begin.
   [[nodiscard]] virtual bool busy() const = 0;
   /// Begins to send a frame, with the faults that the plan has for it.
-  virtual void begin(const FramePlan& plan, const Picture& picture) = 0;
+  virtual void begin(const FramePlan& plan, const FramePixels& picture) = 0;
   /// Goes on sending, accepts a reader that wants to connect, and returns at this time of CLOCK_MONOTONIC or earlier.
   virtual void work(std::int64_t until_ns) = 0;
   virtual void unplug() = 0;
@@ -38,7 +38,7 @@ class FrameSink {
 /// A Unix socket, as docs/manual/frame-socket.md has it; one reader after another.
 Result<std::unique_ptr<FrameSink>> listen_for_frames(const std::filesystem::path& path, std::uint64_t seed);
 /// A Video4Linux2 output node, as v4l2loopback makes them: a frame is a write().
-Result<std::unique_ptr<FrameSink>> open_video_output(const std::filesystem::path& device, PixelLayout layout,
+Result<std::unique_ptr<FrameSink>> open_video_output(const std::filesystem::path& device, FrameFormat format,
                                                      int width_px, int height_px, double rate_hz, std::uint64_t seed);
 
 }  // namespace birdseye::hw_sim

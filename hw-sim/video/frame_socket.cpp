@@ -17,19 +17,19 @@ namespace birdseye::hw_sim {
 
 namespace {
 
-using Header = std::array<std::uint8_t, 64>;
+using FrameHeader = std::array<std::uint8_t, 64>;
 
 template <typename T>
-void put(Header& header, std::size_t offset, T value) {
+void put(FrameHeader& header, std::size_t offset, T value) {
   std::memcpy(header.data() + offset, &value, sizeof value);  // little endian, as the format is
 }
 
-Header header_of(const FramePlan& plan, const Picture& picture) {
-  Header header{};
+FrameHeader header_of(const FramePlan& plan, const FramePixels& picture) {
+  FrameHeader header{};
   std::memcpy(header.data(), "BEFRAME1", 8);
   put(header, 8, static_cast<std::uint32_t>(picture.width_px));
   put(header, 12, static_cast<std::uint32_t>(picture.height_px));
-  std::memcpy(header.data() + 16, fourcc_of(picture.layout).data(), 4);
+  std::memcpy(header.data() + 16, fourcc_of(picture.format).data(), 4);
   put(header, 24, plan.sequence);
   put(header, 32, plan.stamp_ns);
   put(header, 40, plan.sigma_ns);
@@ -46,7 +46,7 @@ class FrameSocket final : public FrameSink {
   [[nodiscard]] bool connected() const override { return static_cast<bool>(reader_); }
   [[nodiscard]] bool busy() const override { return !left_.empty(); }
 
-  void begin(const FramePlan& plan, const Picture& picture) override {
+  void begin(const FramePlan& plan, const FramePixels& picture) override {
     if (!reader_) return;
     garbage_.resize(plan.garbage_bytes);
     for (std::size_t i = 0; i < garbage_.size(); ++i) {
@@ -118,7 +118,7 @@ class FrameSocket final : public FrameSink {
   UniqueFd listener_, reader_;
   std::filesystem::path path_;
   std::uint64_t seed_;
-  Header header_{};
+  FrameHeader header_{};
   std::vector<std::uint8_t> garbage_;
   std::deque<std::span<const std::uint8_t>> left_;  ///< of the frame in hand
 };

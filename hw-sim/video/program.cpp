@@ -20,7 +20,7 @@ constexpr std::int64_t kLongestWaitNs = 20'000'000;
 
 Result<std::unique_ptr<FrameSink>> open_sink(const CameraProgram& program) {
   if (!program.socket.empty()) return listen_for_frames(program.socket, program.timing.seed);
-  return open_video_output(program.device, program.layout, program.width_px, program.height_px, program.timing.rate_hz,
+  return open_video_output(program.device, program.format, program.width_px, program.height_px, program.timing.rate_hz,
                            program.timing.seed);
 }
 
@@ -36,8 +36,8 @@ class Camera {
         sink_(std::move(sink)),
         script_(program.timing, zero_ns),
         zero_ns_(zero_ns),
-        whole_(program.layout, program.width_px, program.height_px),
-        half_(program.layout, half(program.width_px), half(program.height_px)) {}
+        whole_(program.format, program.width_px, program.height_px),
+        half_(program.format, half(program.width_px), half(program.height_px)) {}
 
   void run(const std::atomic<bool>& stop) {
     const std::int64_t end_ns =
@@ -66,7 +66,7 @@ class Camera {
     const double exposed_s = static_cast<double>(plan.exposed_ns - zero_ns_) * 1e-9;
     const double readout_s = program_.rolling ? 1.0 / program_.timing.rate_hz : 0;
     const auto pixels = pattern.draw(plan.number, exposed_s, readout_s);
-    sink_->begin(plan, {pixels, pattern.layout(), pattern.width_px(), pattern.height_px()});
+    sink_->begin(plan, {pixels, pattern.format(), pattern.width_px(), pattern.height_px()});
     ++sent_;
   }
   void wait(std::int64_t until_ns, const std::atomic<bool>& stop, bool only_while_busy) {
@@ -112,7 +112,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
                              {"rate_hz", camera.rate_hz()},
                              {"width_px", program.width_px},
                              {"height_px", program.height_px},
-                             {"format", fourcc_of(program.layout)},
+                             {"format", fourcc_of(program.format)},
                              {"rolling", program.rolling},
                              {"exposure_ms", program.timing.exposure_ms},
                              {"bar_period_s", TestPattern::kBarPeriodS}};

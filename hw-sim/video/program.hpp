@@ -13,7 +13,7 @@ namespace birdseye::hw_sim {
 struct CameraProgram {
   std::filesystem::path socket, device;
   int width_px = 1920, height_px = 1080;
-  PixelLayout layout = PixelLayout::rgb3;
+  FrameFormat format = FrameFormat::rgb3;
   bool rolling = false;          ///< rows are exposed one after another, over a frame's time
   std::filesystem::path truth;   ///< empty: none is written
   std::filesystem::path strobe;  ///< empty: the camera has none

@@ -26,17 +26,17 @@ int control(int fd, unsigned long request, void* argument) {
   return done;
 }
 
-std::uint32_t pixel_format_of(PixelLayout layout) {
-  const std::string_view name = fourcc_of(layout);
+std::uint32_t pixel_format_of(FrameFormat frame_format) {
+  const std::string_view name = fourcc_of(frame_format);
   return v4l2_fourcc(name[0], name[1], name[2], name[3]);
 }
 
 class VideoOutput final : public FrameSink {
  public:
-  VideoOutput(std::filesystem::path device, PixelLayout layout, int width_px, int height_px, double rate_hz,
+  VideoOutput(std::filesystem::path device, FrameFormat frame_format, int width_px, int height_px, double rate_hz,
               std::uint64_t seed)
       : device_(std::move(device)),
-        layout_(layout),
+        format_(frame_format),
         width_px_(width_px),
         height_px_(height_px),
         rate_hz_(rate_hz),
@@ -52,16 +52,16 @@ class VideoOutput final : public FrameSink {
     format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     format.fmt.pix.width = static_cast<std::uint32_t>(width_px);
     format.fmt.pix.height = static_cast<std::uint32_t>(height_px);
-    format.fmt.pix.pixelformat = pixel_format_of(layout_);
+    format.fmt.pix.pixelformat = pixel_format_of(format_);
     format.fmt.pix.field = V4L2_FIELD_NONE;
-    format.fmt.pix.sizeimage = static_cast<std::uint32_t>(frame_bytes(layout_, width_px, height_px));
+    format.fmt.pix.sizeimage = static_cast<std::uint32_t>(frame_bytes(format_, width_px, height_px));
     if (control(fd_.get(), VIDIOC_S_FMT, &format) != 0 ||
         format.fmt.pix.width != static_cast<std::uint32_t>(width_px) ||
         format.fmt.pix.height != static_cast<std::uint32_t>(height_px) ||
-        format.fmt.pix.pixelformat != pixel_format_of(layout_)) {
+        format.fmt.pix.pixelformat != pixel_format_of(format_)) {
       return Error{Errc::unsupported, fmt::format("{}: takes no {} of {}x{}; is it an output node (v4l2loopback), and "
                                                   "has no reader fixed another format?",
-                                                  device_.string(), fourcc_of(layout_), width_px, height_px)};
+                                                  device_.string(), fourcc_of(format_), width_px, height_px)};
     }
     v4l2_streamparm rate{};
     rate.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
@@ -74,7 +74,7 @@ class VideoOutput final : public FrameSink {
   [[nodiscard]] bool connected() const override { return static_cast<bool>(fd_); }
   [[nodiscard]] bool busy() const override { return false; }
 
-  void begin(const FramePlan& plan, const Picture& picture) override {
+  void begin(const FramePlan& plan, const FramePixels& picture) override {
     if (!fd_ || (picture.width_px != now_width_px_ && !open(picture.width_px, picture.height_px))) return;
     auto bytes = picture.pixels;
     if (plan.garbage_bytes > 0) {
@@ -97,7 +97,7 @@ class VideoOutput final : public FrameSink {
 
  private:
   std::filesystem::path device_;
-  PixelLayout layout_;
+  FrameFormat format_;
   int width_px_, height_px_;
   double rate_hz_;
   std::uint64_t seed_;
@@ -108,9 +108,9 @@ class VideoOutput final : public FrameSink {
 
 }  // namespace
 
-Result<std::unique_ptr<FrameSink>> open_video_output(const std::filesystem::path& device, PixelLayout layout,
+Result<std::unique_ptr<FrameSink>> open_video_output(const std::filesystem::path& device, FrameFormat frame_format,
                                                      int width_px, int height_px, double rate_hz, std::uint64_t seed) {
-  auto output = std::make_unique<VideoOutput>(device, layout, width_px, height_px, rate_hz, seed);
+  auto output = std::make_unique<VideoOutput>(device, frame_format, width_px, height_px, rate_hz, seed);
   if (const auto opened = output->open(width_px, height_px); !opened) return opened.error();
   return std::unique_ptr<FrameSink>(std::move(output));
 }

@@ -90,7 +90,7 @@ TrackerScript tracker_of(const CartSettings& settings, const World& world, std::
   tracker.seed = settings.seed;
   tracker.faults = std::move(faults);
   tracker.faults_from_streaming = false;
-  const Motion motion = [&world, &zero_ns](std::size_t bird, std::int64_t at_ns) -> BirdPose {
+  const BirdMotion motion = [&world, &zero_ns](std::size_t bird, std::int64_t at_ns) -> BirdPose {
     const std::int64_t zero = zero_ns;
     const double world_s = zero == 0 ? 0 : std::max(0.0, static_cast<double>(at_ns - zero) * 1e-9);
     if (bird == 0) {

@@ -112,9 +112,9 @@ bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {
   return true;
 }
 
-Picture FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
+FramePixels FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
   const int width = settings_.lens.width_px, height = settings_.lens.height_px;
-  if (!half_size) return {rendered.rgb, PixelLayout::rgb3, width, height};
+  if (!half_size) return {rendered.rgb, FrameFormat::rgb3, width, height};
   half_.clear();
   for (int y = 0; y + 1 < height; y += 2) {
     for (int x = 0; x + 1 < width; x += 2) {
@@ -122,7 +122,7 @@ Picture FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
       half_.insert(half_.end(), pixel, pixel + 3);
     }
   }
-  return {half_, PixelLayout::rgb3, width / 2, height / 2};
+  return {half_, FrameFormat::rgb3, width / 2, height / 2};
 }
 
 /// Faults of the plug up to now, then bytes out and readers in, until the time at the latest.

@@ -61,7 +61,7 @@ class FrameCamera {
   /// Whether a frame is exposed before it could be traced. tracing_ns: how long tracing takes.
   [[nodiscard]] bool too_late_for(std::uint64_t sequence, std::int64_t tracing_ns) const;
   [[nodiscard]] bool take(Rendered& rendered, const std::stop_token& stop);
-  [[nodiscard]] Picture picture_of(const Rendered& rendered, bool half_size);
+  [[nodiscard]] FramePixels picture_of(const Rendered& rendered, bool half_size);
 
   Settings settings_;
   const World& world_;

@@ -29,9 +29,9 @@ Eigen::MatrixXd distances(Points points) {
 }
 
 /// Depth first over assignments, touched point by touched point, cutting what cannot matter any more.
-class Search {
+class AssignmentSearch {
  public:
-  Search(Points ct_mm, Points touched_mm)
+  AssignmentSearch(Points ct_mm, Points touched_mm)
       : ct_mm_(ct_mm),
         touched_mm_(touched_mm),
         ct_distances_(distances(ct_mm)),
@@ -128,7 +128,7 @@ Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_trac
   for (const Eigen::Vector3d& p : ct_in_patient_mm) {
     if (!p.allFinite()) return Error{Errc::bad_value, "a CT point has a coordinate that is not a finite number"};
   }
-  Search search(ct_in_patient_mm, touched_in_tracker_mm);
+  AssignmentSearch search(ct_in_patient_mm, touched_in_tracker_mm);
   search.run();
   if (search.gave_up()) {
     return Error{Errc::degenerate,

@@ -10,18 +10,18 @@ namespace {
 
 using Value = std::function<double(const std::vector<double>&)>;
 
-struct Place {
+struct ValuedPlace {
   Eigen::VectorXd x;
   double value;
 };
 
-class Line {
+class LineSearch {
  public:
-  Line(const Value& value, const Place& from, const Eigen::VectorXd& along)
+  LineSearch(const Value& value, const ValuedPlace& from, const Eigen::VectorXd& along)
       : value_(value), from_(from), along_(along) {}
 
   /// The best place found along the line.
-  Place search(double step, double close) const {
+  ValuedPlace search(double step, double close) const {
     Point low{-step, 0}, middle{0, from_.value}, high = at(step);
     if (high.value > middle.value) {
       low = middle;
@@ -80,7 +80,7 @@ class Line {
   }
 
   const Value& value_;
-  const Place& from_;
+  const ValuedPlace& from_;
   const Eigen::VectorXd& along_;
 };
 
@@ -90,14 +90,14 @@ std::vector<double> climb_by_direction_set(const Value& value, const std::vector
                                            double close) {
   const auto n = static_cast<Eigen::Index>(start.size());
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(n, n);
-  Place here{Eigen::Map<const Eigen::VectorXd>(start.data(), n), value(start)};
+  ValuedPlace here{Eigen::Map<const Eigen::VectorXd>(start.data(), n), value(start)};
   for (;;) {
-    const Place before = here;
+    const ValuedPlace before = here;
     Eigen::Index best = 0;
     double most = 0;
     for (Eigen::Index i = 0; i < n; ++i) {
       const Eigen::VectorXd along = directions.col(i);
-      Place next = Line(value, here, along).search(step, close);
+      ValuedPlace next = LineSearch(value, here, along).search(step, close);
       if (next.value - here.value > most) {
         most = next.value - here.value;
         best = i;
@@ -113,7 +113,7 @@ std::vector<double> climb_by_direction_set(const Value& value, const std::vector
       continue;
     }
     const Eigen::VectorXd whole = went / length;
-    here = Line(value, here, whole).search(std::min(step, length), close);
+    here = LineSearch(value, here, whole).search(std::min(step, length), close);
     // In place of the direction that it most depends on, so that directions stay independent.
     directions.col(best) = directions.col(n - 1);
     directions.col(n - 1) = whole;

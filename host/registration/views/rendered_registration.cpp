@@ -81,9 +81,9 @@ struct Best {
   Parameters parameters;
 };
 
-class Search {
+class ParameterSearch {
  public:
-  Search(Unknowns& unknowns, RenderedViews& views, ViewRegistration& record)
+  ParameterSearch(Unknowns& unknowns, RenderedViews& views, ViewRegistration& record)
       : unknowns_(unknowns), views_(views), record_(record) {}
 
   /// Deformations that fold are worth -2 and less: every measure is -1 or more.
@@ -174,7 +174,7 @@ Result<ViewRegistration> register_rendered(const std::vector<VideoView>& views, 
       return Error{Errc::bad_value, "the initial field folds as these unknowns give it again; give more of them"};
   }
 
-  Search search(unknowns, *rendered, out);
+  ParameterSearch search(unknowns, *rendered, out);
   out.similarity_before = search.value(start);
   out.per_view_before = rendered->per_view();
   for (std::size_t n = 0; n < views.size(); ++n) {

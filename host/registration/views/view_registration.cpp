@@ -18,28 +18,28 @@ using Parameters = std::vector<double>;
 
 /// Coarse to fine: pictures about so wide, on a grid of this spacing. An organ that fills little of the pictures, or is
 /// small itself, still gets so many pixels and points.
-struct Stage {
+struct Resolution {
   int width_px, least_pixels;
   double spacing_mm;
   int least_points;  ///< along the volume's longest side
   int most_steps;
 };
-constexpr Stage kCoarse{96, 2000, 4, 48, 30}, kFine{128, 3500, 3, 64, 15};
+constexpr Resolution kCoarse{96, 2000, 4, 48, 30}, kFine{128, 3500, 3, 64, 15};
 constexpr int kFirstSteps = 12, kPoseSteps = 30;
 /// What more control points must bring on pixels that were not used, nats.
 constexpr double kWorthwhile = 0.004;
 constexpr int kMostControlPoints = 7;
 
-double spacing_mm(const Stage& stage, const Volume& ct) {
+double spacing_mm(const Resolution& resolution, const Volume& ct) {
   const Eigen::Vector3d extent_mm = ct.spacing_mm.cwiseProduct(Eigen::Vector3d(ct.size[0], ct.size[1], ct.size[2]));
-  return std::min(stage.spacing_mm, extent_mm.maxCoeff() / stage.least_points);
+  return std::min(resolution.spacing_mm, extent_mm.maxCoeff() / resolution.least_points);
 }
 
 /// Every so many pixels along each axis.
-int reduction_of(const Stage& stage, const VideoView& view) {
+int reduction_of(const Resolution& resolution, const VideoView& view) {
   const auto counts = view.mask.size() - static_cast<std::size_t>(std::count(view.mask.begin(), view.mask.end(), 0));
-  const double most = std::sqrt(static_cast<double>(counts) / stage.least_pixels);
-  return std::max(1, std::min(view.camera.width_px / stage.width_px, static_cast<int>(most)));
+  const double most = std::sqrt(static_cast<double>(counts) / resolution.least_pixels);
+  return std::max(1, std::min(view.camera.width_px / resolution.width_px, static_cast<int>(most)));
 }
 
 /// What a climb may change; the pose only where it is refined at all.
@@ -49,9 +49,9 @@ enum class Free { all, pose };
 class Problem {
  public:
   static Result<Problem> make(const std::vector<VideoView>& views, const Tissue& tissue, const ControlGrid& control,
-                              const Stage& stage, const Prior& prior, ViewRegistration& record,
+                              const Resolution& resolution, const Prior& prior, ViewRegistration& record,
                               const RegistrationWatch& watch) {
-    const int reduction = reduction_of(stage, views.front());
+    const int reduction = reduction_of(resolution, views.front());
     auto made = MultiView::make(views, tissue, control, reduction, prior);
     if (!made) return made.error();
     return Problem(control, reduction, *std::move(made), record, watch);

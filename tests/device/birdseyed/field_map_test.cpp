@@ -57,7 +57,7 @@ TEST(CoreWithAFieldMap, CorrectsEveryPose) {
     EXPECT_LT((corrected.translation() - wanted).norm(), 1e-3);  // the wire's floats
     EXPECT_LT((corrected.rotation() - rotation_exp({0, 0, 1.0 / 30}) * measured.rotation()).norm(), 1e-5);
   }
-  EXPECT_EQ(mapped.counters().tracker.of(drivers::minibird::Doubt::unmapped), 0U);
+  EXPECT_EQ(mapped.counters().tracker.of(drivers::minibird::DoubtKind::unmapped), 0U);
 }
 
 TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
@@ -82,7 +82,7 @@ TEST(CoreWithAFieldMap, OutsideTheMapPosesAreDoubtedInWords) {
   const auto birds = only<wire::Birds>(said);
   ASSERT_GT(birds.size(), 300U);
   for (const auto& one : birds) EXPECT_LE(one.birds.at(0).tracker_from_sensor.translation().x(), 450 + 3 + 4.5 + 1e-3);
-  EXPECT_GT(core.counters().tracker.of(drivers::minibird::Doubt::unmapped), 200U);
+  EXPECT_GT(core.counters().tracker.of(drivers::minibird::DoubtKind::unmapped), 200U);
   bool doubted = false;
   for (const auto& doubt : only<wire::Doubt>(said))
     doubted = doubted || doubt.why.find("outside the mapped field (100..450") != std::string::npos;

@@ -81,8 +81,8 @@ TEST(Assembler, AnyCutGivesTheSameMeasurementsAtTheSameTimes) {
     const MiniBirdCounters counters = assembler.counters();
     EXPECT_EQ(counters.measurements, std::uint64_t{kCycles});
     EXPECT_EQ(counters.lost_measurements + counters.phase_errors + counters.discarded_bytes, 0U);
-    EXPECT_EQ(counters.of(Doubt::unconfirmed), 2U);
-    EXPECT_EQ(counters.of(Doubt::none), 2 * kCycles - 2U);
+    EXPECT_EQ(counters.of(DoubtKind::unconfirmed), 2U);
+    EXPECT_EQ(counters.of(DoubtKind::none), 2 * kCycles - 2U);
   }
 }
 
@@ -206,7 +206,7 @@ TEST(Assembler, T10GroupAndButtonMode) {
   EXPECT_EQ(all[0].birds[0].button, 0x10);
   EXPECT_LT((*all[0].birds[0].pose->position_mm - Vector3d(253.9380, -133.3872, 76.1256)).norm(), 2e-3);
   // The second is behind the transmitter, where a unit set to the forward half-space never reports.
-  EXPECT_EQ(all[0].birds[1].kind, Doubt::outside_hemisphere);
+  EXPECT_EQ(all[0].birds[1].kind, DoubtKind::outside_hemisphere);
 }
 
 TEST(Assembler, BirdsOfDifferentFormats) {
@@ -306,7 +306,7 @@ TEST(Assembler, ABirdWhoseRecordIsLostIsNamedAndTheOtherStays) {
   MeasurementAssembler assembler(layout(2));
   const auto all = assemble(assembler, wire.cut([] { return 25; }, [] { return 0; }));
   ASSERT_EQ(all.size(), 40U);
-  EXPECT_EQ(all[20].birds[0].kind, Doubt::lost);
+  EXPECT_EQ(all[20].birds[0].kind, DoubtKind::lost);
   EXPECT_EQ(all[20].birds[0].doubt, "its record was lost");
   EXPECT_TRUE(all[20].birds[1].pose);
   EXPECT_LT(std::abs(all[20].acquired.ns - wire.start_of(20)), 100'000);

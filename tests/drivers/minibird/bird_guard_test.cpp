@@ -58,7 +58,7 @@ const Vector3d kHere(300, 80, -40);
 TEST(BirdGuard, TheFirstReadingIsConfirmedByTheNext) {
   Watch watch;
   const BirdReading first = watch.see(kHere);
-  EXPECT_EQ(first.kind, Doubt::unconfirmed);
+  EXPECT_EQ(first.kind, DoubtKind::unconfirmed);
   EXPECT_FALSE(first.pose);
   EXPECT_THAT(first.doubt, HasSubstr("not yet confirmed"));
   const BirdReading second = watch.see(kHere);
@@ -101,10 +101,10 @@ TEST(BirdGuard, ASingleWildReadingIsDoubtedAndTheStreamGoesOn) {
   Watch watch;
   watch.see_often(20, kHere);
   const BirdReading wild = watch.see(kHere + Vector3d(0, 60, 0));
-  EXPECT_EQ(wild.kind, Doubt::step);
+  EXPECT_EQ(wild.kind, DoubtKind::step);
   EXPECT_THAT(wild.doubt, HasSubstr("a step of 60 mm"));
   EXPECT_EQ(watch.see_often(100, kHere), 100);
-  EXPECT_EQ(watch.see(kHere, rotation_exp(Vector3d(0.8, 0, 0))).kind, Doubt::step);
+  EXPECT_EQ(watch.see(kHere, rotation_exp(Vector3d(0.8, 0, 0))).kind, DoubtKind::step);
   EXPECT_EQ(watch.see_often(100, kHere), 100);
 }
 
@@ -133,7 +133,7 @@ TEST(BirdGuard, AfterAGapTheSensorMayBeElsewhere) {
   Watch watch;
   watch.see_often(20, kHere);
   watch.seconds += 3;
-  EXPECT_EQ(watch.see({350, -200, 300}).kind, Doubt::unconfirmed);
+  EXPECT_EQ(watch.see({350, -200, 300}).kind, DoubtKind::unconfirmed);
   EXPECT_EQ(watch.see_often(100, {350, -200, 300}), 100);
 }
 
@@ -141,13 +141,13 @@ TEST(BirdGuard, SaturationAndTheEndOfTheScaleAreNamed) {
   Watch watch;
   watch.see_often(20, kHere);
   const BirdReading zero = watch.see(kHere, Matrix3d::Zero());
-  EXPECT_EQ(zero.kind, Doubt::saturated);
+  EXPECT_EQ(zero.kind, DoubtKind::saturated);
   EXPECT_THAT(zero.doubt, HasSubstr("saturated"));
   const BirdReading far = watch.see({kHere.x(), 914.4, 0});
-  EXPECT_EQ(far.kind, Doubt::beyond_scale);
+  EXPECT_EQ(far.kind, DoubtKind::beyond_scale);
   EXPECT_THAT(far.doubt, HasSubstr("914 mm"));
-  EXPECT_EQ(watch.see({kHere.x(), -914.4, 0}, Matrix3d::Identity(), 0).kind, Doubt::beyond_scale);
-  EXPECT_EQ(watch.see(kHere, 0.97 * Matrix3d::Identity()).kind, Doubt::senseless);
+  EXPECT_EQ(watch.see({kHere.x(), -914.4, 0}, Matrix3d::Identity(), 0).kind, DoubtKind::beyond_scale);
+  EXPECT_EQ(watch.see(kHere, 0.97 * Matrix3d::Identity()).kind, DoubtKind::senseless);
   EXPECT_EQ(watch.see_often(50, kHere), 50);
 }
 
@@ -156,9 +156,9 @@ TEST(BirdGuard, ARecordThatRepeatsWhereThereWasNoiseIsFrozen) {
   watch.see_often(60, kHere);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
   const BirdReading frozen = watch.see(kHere, Matrix3d::Identity(), 0);
-  EXPECT_EQ(frozen.kind, Doubt::frozen);
+  EXPECT_EQ(frozen.kind, DoubtKind::frozen);
   EXPECT_THAT(frozen.doubt, HasSubstr("101 times"));
-  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, Doubt::frozen);
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   watch.see(kHere);
   EXPECT_EQ(watch.see_often(10, kHere), 10);
 }
@@ -178,7 +178,7 @@ TEST(BirdGuard, WhatMovedIsFrozenAtOnce) {
   for (int i = 0; i < 50; ++i) watch.see(kHere + Vector3d(0, 4.0 * i, 0));  // 400 mm/s
   const Vector3d last = kHere + Vector3d(0, 4.0 * 50, 0);
   ASSERT_TRUE(watch.see(last, Matrix3d::Identity(), 0).pose);
-  for (int i = 0; i < 80; ++i) EXPECT_EQ(watch.see(last, Matrix3d::Identity(), 0).kind, Doubt::frozen);
+  for (int i = 0; i < 80; ++i) EXPECT_EQ(watch.see(last, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   watch.see(kHere);
   EXPECT_EQ(watch.see_often(10, kHere), 10);
 }
@@ -189,7 +189,7 @@ TEST(BirdGuard, AFlipIsNamedAsLongAsItLastsWhileTheSensorMoves) {
   for (int i = 0; i < 50; ++i) watch.see(at(i));
   for (int i = 50; i < 250; ++i) {
     const BirdReading reading = watch.see(-at(i));
-    EXPECT_EQ(reading.kind, Doubt::hemisphere_flip) << i;
+    EXPECT_EQ(reading.kind, DoubtKind::hemisphere_flip) << i;
     EXPECT_THAT(reading.doubt, HasSubstr("hemisphere flip"));
   }
   for (int i = 250; i < 300; ++i) EXPECT_TRUE(watch.see(at(i)).pose) << i;
@@ -207,8 +207,8 @@ TEST(BirdGuard, ASensorThatCrossesTheBorderIsNotBelievedBeyondIt) {
       ++good;
       EXPECT_LT((*reading.pose->position_mm - truth).norm(), 2) << i;
     }
-    near += reading.kind == Doubt::hemisphere_border ? 1 : 0;
-    flipped += reading.kind == Doubt::hemisphere_flip ? 1 : 0;
+    near += reading.kind == DoubtKind::hemisphere_border ? 1 : 0;
+    flipped += reading.kind == DoubtKind::hemisphere_flip ? 1 : 0;
   }
   EXPECT_GT(good, 180);
   EXPECT_GT(near, 10);
@@ -219,7 +219,7 @@ TEST(BirdGuard, AFlipIsRememberedOverAShortGapAndNotForEver) {
   Watch watch;
   watch.see_often(20, kHere);
   watch.seconds += 1;
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(watch.see(-kHere).kind, Doubt::hemisphere_flip);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(watch.see(-kHere).kind, DoubtKind::hemisphere_flip);
   // Whatever it was: after seconds of nothing, what the unit says is believed again.
   watch.seconds += 5;
   watch.see(kHere);
@@ -228,7 +228,7 @@ TEST(BirdGuard, AFlipIsRememberedOverAShortGapAndNotForEver) {
 
 TEST(BirdGuard, OutsideTheHalfSpaceThatIsSetNothingIsBelieved) {
   Watch watch({}, Hemisphere::lower);  // +Z
-  for (int i = 0; i < 100; ++i) EXPECT_EQ(watch.see({300, 0, -100}).kind, Doubt::outside_hemisphere);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(watch.see({300, 0, -100}).kind, DoubtKind::outside_hemisphere);
   watch.seconds += 3;
   watch.see({300, 0, 100});
   EXPECT_EQ(watch.see_often(50, {300, 0, 100}), 50);

@@ -132,7 +132,7 @@ TEST(MiniBird, StreamsTheTruePosesInEveryFormat) {
     EXPECT_EQ(bird.bird().info().crystal_mhz, 40);             // 28 00
     EXPECT_DOUBLE_EQ(bird.bird().info().rate_hz, 103.296875);  // 4C 67
     // The first after a start waits to be confirmed.
-    EXPECT_EQ(bird.read()->front().birds[0].kind, Doubt::unconfirmed);
+    EXPECT_EQ(bird.read()->front().birds[0].kind, DoubtKind::unconfirmed);
     for (int cycle = 0; cycle < 5; ++cycle) {
       const auto read = bird.read();
       ASSERT_TRUE(read);

@@ -207,11 +207,11 @@ TEST(Command, RatesOfCounts) {
 }
 
 TEST(Reply, StatusWordsOfT14) {
-  const Status point = decode_status(0xD008);
+  const StatusWord point = decode_status_word(0xD008);
   EXPECT_TRUE(point.master && point.initialised && !point.stream && !point.asleep && !point.error);
   EXPECT_EQ(point.format_code, 4);
-  EXPECT_TRUE(decode_status(0xD009).stream);
-  const Status asleep = decode_status(0xE030);
+  EXPECT_TRUE(decode_status_word(0xD009).stream);
+  const StatusWord asleep = decode_status_word(0xE030);
   EXPECT_TRUE(asleep.asleep && asleep.error && !asleep.stream);
   EXPECT_EQ(asleep.format_code, 8);
 }

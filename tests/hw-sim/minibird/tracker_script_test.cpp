@@ -24,7 +24,7 @@ Fault fault(FaultKind kind, double at_s, std::optional<double> for_s = std::null
 /// Runs a tracker by steps of a millisecond from the start of a stream of matrix records (24 bytes).
 class Bench {
  public:
-  explicit Bench(TrackerSettings settings = {}, Motion motion = circle_motion({}, kStartNs))
+  explicit Bench(TrackerSettings settings = {}, BirdMotion motion = circle_motion({}, kStartNs))
       : script(settings, std::move(motion), kStartNs), now_ns(kStartNs) {}
 
   void say(const Bytes& bytes) { script.receive(bytes, now_ns); }
@@ -234,7 +234,7 @@ struct Parts {
   std::vector<FaultEvent> events;
 };
 
-Parts parts_of(const Fault& one, TrackerSettings settings = {}, Motion motion = circle_motion({}, kStartNs)) {
+Parts parts_of(const Fault& one, TrackerSettings settings = {}, BirdMotion motion = circle_motion({}, kStartNs)) {
   settings.faults = {one};
   Bench bench(settings, std::move(motion));
   bench.say(kStream);

@@ -31,15 +31,15 @@ std::vector<FramePlan> frames_of(CameraTiming timing, int count) {
 TEST(TestPattern, TellsItsNumberInEveryLayoutAndSize) {
   for (const char* name : {"RGB3", "YUYV", "UYVY", "NV12", "GREY"}) {
     for (const auto& [width, height] : {std::pair{64, 64}, {1920, 1080}, {720, 576}}) {
-      TestPattern pattern(*pixel_layout_of(name), width, height);
+      TestPattern pattern(*frame_format_of(name), width, height);
       for (const std::uint32_t number : {0U, 1U, 0xFFFFFFFFU, 0x8001U, 123456789U}) {
         const auto pixels = pattern.draw(number, 0.1 * number, 0.016);
-        EXPECT_EQ(pixels.size(), frame_bytes(*pixel_layout_of(name), width, height));
+        EXPECT_EQ(pixels.size(), frame_bytes(*frame_format_of(name), width, height));
         EXPECT_EQ(number_in_picture(pixels, name, width), number) << name << width;
       }
     }
   }
-  EXPECT_FALSE(pixel_layout_of("MJPG"));
+  EXPECT_FALSE(frame_format_of("MJPG"));
 }
 
 /// The bar's left edge in a row of a grey picture.
@@ -52,7 +52,7 @@ int bar_in_row(std::span<const std::uint8_t> pixels, int width, int row) {
 
 TEST(TestPattern, TheBarTellsWhenEachRowWasExposed) {
   constexpr int kWidth = 640, kHeight = 480;
-  TestPattern pattern(PixelLayout::grey, kWidth, kHeight);
+  TestPattern pattern(FrameFormat::grey, kWidth, kHeight);
   for (const double at_s : {0.3, 1.0, 0.5, 1.7}) {  // back too: a frame is drawn over any other
     const auto pixels = pattern.draw(7, at_s, 0);
     for (const int row : {16, 240, 479}) EXPECT_NEAR(bar_in_row(pixels, kWidth, row), at_s / 2 * kWidth, 2) << at_s;
@@ -179,7 +179,7 @@ TEST(FrameSocket, FramesArriveAsPlannedAndAReaderMayComeAgain) {
   const testing::Scratch scratch;
   const auto sink = listen_for_frames(scratch / "frames", 1);
   ASSERT_TRUE(sink) << sink.error().what;
-  TestPattern pattern(PixelLayout::rgb3, 96, 64);
+  TestPattern pattern(FrameFormat::rgb3, 96, 64);
   for (int reader = 0; reader < 3; ++reader) {
     drivers::CameraSettings settings;
     settings.source = "socket:" + (scratch / "frames").string();
@@ -188,7 +188,7 @@ TEST(FrameSocket, FramesArriveAsPlannedAndAReaderMayComeAgain) {
     while (!(*sink)->connected()) (*sink)->work(device_now().ns + 10'000'000);
     for (const FramePlan& plan : frames_of({}, 5)) {
       const auto pixels = pattern.draw(plan.number, 0, 0);
-      (*sink)->begin(plan, {pixels, PixelLayout::rgb3, 96, 64});
+      (*sink)->begin(plan, {pixels, FrameFormat::rgb3, 96, 64});
       while ((*sink)->busy()) (*sink)->work(device_now().ns + 10'000'000);
       const auto frame = (*camera)->next(device_now() + Duration::from_ms(2000));
       ASSERT_TRUE(frame) << frame.error().what;
@@ -204,10 +204,10 @@ TEST(FrameSocket, FramesArriveAsPlannedAndAReaderMayComeAgain) {
 }
 
 TEST(VideoOutput, NamesWhatIsNoOutputNode) {
-  const auto missing = open_video_output("/nonexistent", PixelLayout::rgb3, 64, 64, 30, 1);
+  const auto missing = open_video_output("/nonexistent", FrameFormat::rgb3, 64, 64, 30, 1);
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, Errc::unreadable);
-  const auto null = open_video_output("/dev/null", PixelLayout::rgb3, 64, 64, 30, 1);
+  const auto null = open_video_output("/dev/null", FrameFormat::rgb3, 64, 64, 30, 1);
   ASSERT_FALSE(null);
   EXPECT_EQ(null.error().code, Errc::unsupported);
 }

@@ -25,9 +25,9 @@ class ControlPort {
 };
 
 /// Sets exposure, gain, white balance and focus, and holds those that the camera would otherwise change by itself.
-class CameraControls {
+class V4l2Controls {
  public:
-  explicit CameraControls(ControlPort& port) : port_(port) {}
+  explicit V4l2Controls(ControlPort& port) : port_(port) {}
   ControlReport apply(const CameraSettings& settings);
   /// Switches every automatism off and keeps the value that it had. A second call does nothing.
   ControlReport lock();

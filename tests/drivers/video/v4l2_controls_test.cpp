@@ -1,4 +1,4 @@
-#include "drivers/video/camera_controls.hpp"
+#include "drivers/video/v4l2_controls.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,9 +55,9 @@ class WebcamControls final : public ControlPort {
   };
 };
 
-TEST(CameraControls, LockHoldsWhatTheCameraHadChosen) {
+TEST(V4l2Controls, LockHoldsWhatTheCameraHadChosen) {
   WebcamControls camera;
-  CameraControls controls(camera);
+  V4l2Controls controls(camera);
   EXPECT_FALSE(controls.exposure());
   const auto report = controls.lock();
   EXPECT_THAT(report.refused, IsEmpty());
@@ -69,9 +69,9 @@ TEST(CameraControls, LockHoldsWhatTheCameraHadChosen) {
   EXPECT_EQ(controls.exposure()->ns, 8'000'000);
 }
 
-TEST(CameraControls, UnlockGivesBackWhatLockTook) {
+TEST(V4l2Controls, UnlockGivesBackWhatLockTook) {
   WebcamControls camera;
-  CameraControls controls(camera);
+  V4l2Controls controls(camera);
   (void)controls.lock();
   EXPECT_THAT(controls.lock().done, IsEmpty());
   EXPECT_THAT(controls.unlock().done, ElementsAre("exposure automatic again", "white balance automatic again"));
@@ -80,9 +80,9 @@ TEST(CameraControls, UnlockGivesBackWhatLockTook) {
   EXPECT_THAT(controls.unlock().done, IsEmpty());
 }
 
-TEST(CameraControls, WhatWasSetByHandStaysSetAfterUnlock) {
+TEST(V4l2Controls, WhatWasSetByHandStaysSetAfterUnlock) {
   WebcamControls camera;
-  CameraControls controls(camera);
+  V4l2Controls controls(camera);
   CameraSettings settings;
   settings.exposure_us = 5000;
   EXPECT_THAT(controls.apply(settings).done, ElementsAre("exposure 5000 us"));
@@ -92,19 +92,19 @@ TEST(CameraControls, WhatWasSetByHandStaysSetAfterUnlock) {
   EXPECT_EQ(camera.get(V4L2_CID_EXPOSURE_ABSOLUTE), 50);
 }
 
-TEST(CameraControls, TakesShutterPriorityWhereThereIsNoManualMode) {
+TEST(V4l2Controls, TakesShutterPriorityWhereThereIsNoManualMode) {
   WebcamControls camera;
   camera.has_manual = false;
-  CameraControls controls(camera);
+  V4l2Controls controls(camera);
   EXPECT_THAT(controls.lock().refused, IsEmpty());
   EXPECT_EQ(camera.get(V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_SHUTTER_PRIORITY);
   EXPECT_TRUE(controls.exposure());
 }
 
-TEST(CameraControls, SaysWhatCouldNotBeSet) {
+TEST(V4l2Controls, SaysWhatCouldNotBeSet) {
   WebcamControls camera;
   camera.sticky_white_balance = true;
-  CameraControls controls(camera);
+  V4l2Controls controls(camera);
   EXPECT_THAT(controls.lock().refused, ElementsAre("white balance: the camera goes on changing it by itself"));
 
   camera.controls.erase(V4L2_CID_GAIN);

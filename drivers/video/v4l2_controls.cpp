@@ -1,4 +1,4 @@
-#include "drivers/video/camera_controls.hpp"
+#include "drivers/video/v4l2_controls.hpp"
 
 #include <fmt/format.h>
 #include <linux/videodev2.h>
@@ -16,14 +16,14 @@ constexpr double kExposureUnit_us = 100;
 }  // namespace
 
 /// Something that a camera changes by itself: what switches that off, and the values it changes (0: no more).
-struct CameraControls::Automatism {
+struct V4l2Controls::Automatism {
   const char* name;
   std::uint32_t id;
   std::array<int, 2> off;  // the second, where the camera does not take the first
   std::array<std::uint32_t, 3> values;
 };
 
-const CameraControls::Automatism CameraControls::kAutomatisms[] = {
+const V4l2Controls::Automatism V4l2Controls::kAutomatisms[] = {
     {"exposure",
      V4L2_CID_EXPOSURE_AUTO,
      {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY},
@@ -38,13 +38,13 @@ const CameraControls::Automatism CameraControls::kAutomatisms[] = {
     {"frame rate in the dark", V4L2_CID_EXPOSURE_AUTO_PRIORITY, {0, 0}, {0, 0, 0}},
 };
 
-std::string CameraControls::value_text(std::uint32_t id, int value) {
+std::string V4l2Controls::value_text(std::uint32_t id, int value) {
   if (id == V4L2_CID_EXPOSURE_ABSOLUTE) return fmt::format("{:g} us", value * kExposureUnit_us);
   if (id == V4L2_CID_WHITE_BALANCE_TEMPERATURE) return fmt::format("{} K", value);
   return fmt::format("{}", value);
 }
 
-Result<void> CameraControls::switch_off(const Automatism& automatism) {
+Result<void> V4l2Controls::switch_off(const Automatism& automatism) {
   if (!port_.range(automatism.id)) return {};
   Result<void> set;
   for (const int off : automatism.off) {
@@ -54,7 +54,7 @@ Result<void> CameraControls::switch_off(const Automatism& automatism) {
   return set ? Result<void>(Error{Errc::unsupported, "the camera goes on changing it by itself"}) : set;
 }
 
-void CameraControls::hold(const Automatism& automatism, ControlReport& report) {
+void V4l2Controls::hold(const Automatism& automatism, ControlReport& report) {
   const auto was = port_.get(automatism.id);
   if (!was || *was == automatism.off[0] || *was == automatism.off[1]) return;
   std::map<std::uint32_t, int> values;
@@ -78,13 +78,13 @@ void CameraControls::hold(const Automatism& automatism, ControlReport& report) {
   report.done.push_back(fmt::format("{} held{}", automatism.name, held));
 }
 
-ControlReport CameraControls::lock() {
+ControlReport V4l2Controls::lock() {
   ControlReport report;
   for (const Automatism& automatism : kAutomatisms) hold(automatism, report);
   return report;
 }
 
-ControlReport CameraControls::unlock() {
+ControlReport V4l2Controls::unlock() {
   ControlReport report;
   for (const Automatism& automatism : kAutomatisms) {
     const auto was = before_lock_.find(automatism.id);
@@ -100,7 +100,7 @@ ControlReport CameraControls::unlock() {
 }
 
 /// The first value control that the camera has, to value; its automatism off.
-void CameraControls::set_value(const Automatism& automatism, int value, ControlReport& report) {
+void V4l2Controls::set_value(const Automatism& automatism, int value, ControlReport& report) {
   const std::uint32_t id = automatism.values[0];
   const auto range = port_.range(id);
   const auto refuse = [&](const std::string& why) {
@@ -115,7 +115,7 @@ void CameraControls::set_value(const Automatism& automatism, int value, ControlR
   report.done.push_back(fmt::format("{} {}", automatism.name, value_text(id, port_.get(id).value_or(value))));
 }
 
-ControlReport CameraControls::apply(const CameraSettings& settings) {
+ControlReport V4l2Controls::apply(const CameraSettings& settings) {
   ControlReport report;
   if (settings.exposure_us) {
     const double units = std::clamp(*settings.exposure_us / kExposureUnit_us, 0.0, 1e9);
@@ -126,7 +126,7 @@ ControlReport CameraControls::apply(const CameraSettings& settings) {
   return report;
 }
 
-std::optional<Duration> CameraControls::exposure() {
+std::optional<Duration> V4l2Controls::exposure() {
   const auto automatic = port_.get(V4L2_CID_EXPOSURE_AUTO);
   if (automatic && *automatic != V4L2_EXPOSURE_MANUAL && *automatic != V4L2_EXPOSURE_SHUTTER_PRIORITY) {
     return std::nullopt;
