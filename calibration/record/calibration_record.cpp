@@ -7,8 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "calibration/base/units.hpp"
-#include "calibration/geometry/rod.hpp"
 #include "calibration/record/checksum.hpp"
 
 namespace birdseye::calibration {
@@ -197,12 +195,6 @@ CalibrationRecord record_of(const Json& json) {
 }
 
 }  // namespace
-
-std::optional<Transform<Camera, Sensor>> HandEyeEntry::camera_from_sensor_at(double rod_angle_deg) const {
-  if (!rod) return std::nullopt;
-  const RodScope scope{camera_from_sensor, rod->axis_in_sensor, rod->axis_point_in_sensor_mm, rod->picture_turn};
-  return scope.camera_from_sensor((rod_angle_deg - rod->reference_angle_deg) * kRadPerDeg);
-}
 
 bool CalibrationRecord::set_lens(LensEntry entry) {
   const bool other = !lens || !(lens->camera == entry.camera);

@@ -46,9 +46,6 @@ struct HandEyeEntry {
   Eigen::Matrix<double, 6, 6> covariance;        ///< as the solver states it: rotation vector (rad), translation (mm)
   double rms_px = 0, held_out_px = 0, held_out_mm = 0;
   std::optional<RodEntry> rod;  ///< none: camera_from_sensor holds at the one angle at which it was made
-
-  /// With the rod at another angle. Empty without a rod.
-  [[nodiscard]] std::optional<Transform<Camera, Sensor>> camera_from_sensor_at(double rod_angle_deg) const;
 };
 
 struct TipEntry {

@@ -1,7 +1,5 @@
 #include "calibration/time/discipline.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -28,17 +26,9 @@ std::optional<ClockChoice> choose_clock(const std::optional<Duration>& exchange_
                                         const ClockDiscipline& host) {
   const auto common = common_clock_sigma(device, host);
   if (!common && !exchange_sigma) return std::nullopt;
-  const auto ms = [](Duration span) { return span.seconds() * 1e3; };
-  if (common && (!exchange_sigma || *common < *exchange_sigma)) {
-    return ClockChoice{
-        ClockChoice::Way::common_clock, *common,
-        fmt::format("both clocks are disciplined ({}; {}), to {:.3f} ms", device.source, host.source, ms(*common))};
-  }
-  const std::string other =
-      common ? fmt::format("the disciplined clocks only agree to {:.3f} ms", ms(*common))
-             : fmt::format("the {}'s clock is not synchronised", device.synchronised ? "host" : "device");
-  return ClockChoice{ClockChoice::Way::exchange, *exchange_sigma,
-                     fmt::format("exchanges over the wire tell {:.3f} ms; {}", ms(*exchange_sigma), other)};
+  if (common && (!exchange_sigma || *common < *exchange_sigma))
+    return ClockChoice{ClockChoice::Way::common_clock, *common};
+  return ClockChoice{ClockChoice::Way::exchange, *exchange_sigma};
 }
 
 }  // namespace birdseye

@@ -20,7 +20,6 @@ struct ClockChoice {
   enum class Way { exchange, common_clock };
   Way way = Way::exchange;
   Duration sigma;
-  std::string reason;  ///< in words
 };
 
 /// How far apart two disciplined clocks are (one sigma), by what both kernels say: for each side the estimated error,

@@ -209,7 +209,7 @@ void read_field_map(const std::string& path, ConfigSection& section, Config& con
   const auto text = text_of_file(path, kMostFieldBytes);
   if (!text) return section.fail("field", path + ": cannot be read; see whether it is there, its owner and mode");
   auto parsed = calibration::parse_field_map(*text);
-  if (!parsed) return section.fail("field", path + ": " + parsed.error().what);
+  if (!parsed) return section.fail("field", parsed.error().with_context(path).what);
   config.core.field = std::move(parsed->map);
 }
 
@@ -218,7 +218,7 @@ void read_calibration_record(const std::string& path, ConfigSection& section, Co
   if (!text) return section.fail("record", path + ": cannot be read; see whether it is there, its owner and mode");
   if (text->size() > kMostRecordBytes) return section.fail("record", path + ": is no calibration record");
   if (const auto record = calibration::parse_record(*text); !record)
-    return section.fail("record", path + ": " + record.error().what);
+    return section.fail("record", record.error().with_context(path).what);
   config.core.calibration = *text;
 }
 

@@ -87,15 +87,8 @@ std::optional<ClockChoice> Client::choose() const {
   std::optional<Duration> exchange_sigma;
   if (const auto related = relation_.device_from_host(host_now())) exchange_sigma = related->sigma;
   if (!here_ || !there_)
-    return exchange_sigma ? std::optional(ClockChoice{ClockChoice::Way::exchange, *exchange_sigma, "by questions"})
-                          : std::nullopt;
+    return exchange_sigma ? std::optional(ClockChoice{ClockChoice::Way::exchange, *exchange_sigma}) : std::nullopt;
   return choose_clock(exchange_sigma, there_->discipline, here_->discipline);
-}
-
-std::string Client::clock_choice() const {
-  if (foreign_) return "by arrivals";
-  const auto choice = choose();
-  return choice ? choice->reason : "the appliance has not answered yet";
 }
 
 std::optional<RelatedTime<HostTime>> Client::host_from_device(DeviceTime time) const {

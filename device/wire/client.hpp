@@ -39,8 +39,6 @@ class Client {
   /// count. discipline: what this machine's kernel says of its clock. wall_minus_monotonic: the time of day less
   /// CLOCK_MONOTONIC.
   void use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic);
-  /// How host_from_device() relates the clocks, and why that way was chosen, in words.
-  [[nodiscard]] std::string clock_choice() const;
   /// What a server that is no appliance of ours is, and what of it is passed over; empty for an appliance.
   [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
 

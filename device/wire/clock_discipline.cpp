@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 #include <sys/timex.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 
 namespace birdseye::wire {
 
@@ -31,20 +28,6 @@ Result<ClockDiscipline> read_clock_discipline() {
     return Error{Errc::io, fmt::format("adjtimex: {}; clocks are related by exchanges only", std::strerror(errno))};
   }
   return decode_discipline(reading, state);
-}
-
-std::vector<std::string> ptp_devices(const std::string& folder) {
-  std::vector<std::string> devices;
-  std::error_code failed;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
-    const std::string name = entry.path().filename();
-    const bool numbered = name.size() > 3 && std::all_of(name.begin() + 3, name.end(), [](char c) {
-                            return std::isdigit(static_cast<unsigned char>(c)) != 0;
-                          });
-    if (name.starts_with("ptp") && numbered) devices.push_back(entry.path());
-  }
-  std::sort(devices.begin(), devices.end());
-  return devices;
 }
 
 }  // namespace birdseye::wire

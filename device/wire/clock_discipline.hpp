@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "calibration/base/result.hpp"
 #include "calibration/time/discipline.hpp"
 #include "drivers/system/clock.hpp"
@@ -16,8 +13,5 @@ ClockDiscipline decode_discipline(const timex& reading, int state);
 
 /// Asks the kernel. Changes nothing, and needs no privilege.
 Result<ClockDiscipline> read_clock_discipline();
-
-/// Network cards' own clocks (/dev/ptp0 ...): where there are any, PTP can stamp packets in hardware.
-std::vector<std::string> ptp_devices(const std::string& folder = "/dev");
 
 }  // namespace birdseye::wire

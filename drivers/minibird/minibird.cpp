@@ -357,12 +357,6 @@ Result<Diagnosis> MiniBird::look_for_trouble() {
   return diagnosis;
 }
 
-Result<void> MiniBird::sleep() {
-  if (auto quiet = dialogue_.hush(); !quiet) return quiet;
-  if (auto sent = dialogue_.send({kSleep}); !sent) return sent;
-  return dialogue_.pause(settings_.sleep_wait);
-}
-
 Result<void> MiniBird::wake() {
   if (auto done = run(); !done) return done;
   restarted_ = true;

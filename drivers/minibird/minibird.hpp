@@ -62,10 +62,6 @@ class MiniBird {
   /// For a stream in trouble (saturated, silent, phase errors): stops it, has the units tell their status and errors,
   /// and begins it again. About half a second. Errc::timeout: nothing answers.
   Result<Diagnosis> diagnose(const std::stop_token& stop = {});
-  /// Stops measuring; the transmitter's field is off.
-  Result<void> sleep();
-  /// Measures and streams again.
-  Result<void> wake();
 
  private:
   MiniBird(std::unique_ptr<ByteStream> line, const MiniBirdSettings& settings);
@@ -81,6 +77,8 @@ class MiniBird {
   Result<void> run();
   Result<void> check_record();
   Result<void> stream();
+  /// Measures and streams again.
+  Result<void> wake();
   Result<Diagnosis> look_for_trouble();
   [[nodiscard]] std::uint8_t address_of(std::size_t index) const;
 

@@ -60,19 +60,6 @@ Bytes angle_words(std::uint8_t command, double azimuth, double elevation, double
   return bytes;
 }
 
-Bytes sincos_words(std::uint8_t command, double azimuth, double elevation, double roll) {
-  Bytes bytes{command};
-  const auto put = [&](double value) {
-    put_word(bytes, value >= 0.99998 ? 0x7FFF : static_cast<std::int32_t>(std::trunc(value * 32768.0)));
-  };
-  for (const double angle : {azimuth, elevation, roll}) {
-    put(std::sin(angle * kRadPerDeg));
-    // The cosine of a right angle is zero, not the rounding of pi.
-    put(std::abs(std::abs(angle) - 90) < 1e-12 ? 0.0 : std::cos(angle * kRadPerDeg));
-  }
-  return bytes;
-}
-
 Result<Eigen::Matrix3d> rotation_from_matrix_words(std::span<const std::int16_t> words) {
   // The unit sends M (transmitter to sensor) column by column, so the words in order fill R = M^T row by row.
   Eigen::Matrix3d r;
@@ -238,12 +225,6 @@ Bytes angle_align_deg(double azimuth, double elevation, double roll) {
 }
 Bytes reference_frame_deg(double azimuth, double elevation, double roll) {
   return angle_words('r', azimuth, elevation, roll);
-}
-Bytes angle_align_sincos_deg(double azimuth, double elevation, double roll) {
-  return sincos_words('J', azimuth, elevation, roll);
-}
-Bytes reference_frame_sincos_deg(double azimuth, double elevation, double roll) {
-  return sincos_words('H', azimuth, elevation, roll);
 }
 
 Bytes to_unit(std::uint8_t address, const Bytes& command) {

@@ -72,14 +72,10 @@ Bytes auto_configure(std::uint8_t units);
 /// q and r: rotations given as azimuth, elevation, roll in degrees, within 180.
 Bytes angle_align_deg(double azimuth, double elevation, double roll);
 Bytes reference_frame_deg(double azimuth, double elevation, double roll);
-/// J and H: the older forms, sines and cosines.
-Bytes angle_align_sincos_deg(double azimuth, double elevation, double roll);
-Bytes reference_frame_sincos_deg(double azimuth, double elevation, double roll);
 /// Puts the prefix that sends command to one unit of a flock: F0 + address up to 14, A0 address up to 126.
 Bytes to_unit(std::uint8_t address, const Bytes& command);
 
-inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kStreamStop = '?', kRun = 'F', kSleep = 'G', kBusReset = '/',
-                              kXon = 0x11;
+inline constexpr std::uint8_t kPoint = 'B', kStream = '@', kRun = 'F', kBusReset = '/', kXon = 0x11;
 
 /// Parameters of EXAMINE and CHANGE that the driver uses.
 enum Parameter : std::uint8_t {

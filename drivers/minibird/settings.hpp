@@ -58,7 +58,6 @@ struct MiniBirdSettings {
   Duration configure_wait = Duration::from_ms(600);
   Duration bus_reset_wait = Duration::from_ms(600);
   Duration run_wait = Duration::from_ms(200);
-  Duration sleep_wait = Duration::from_ms(300);
   Duration reply_timeout = Duration::from_ms(500);
   Duration quiet = Duration::from_ms(90);  ///< without a byte, after which no more is to come; over a cycle at 14 Hz
   Duration answer_within = Duration::from_ms(5000);  ///< for the first answer after a reset

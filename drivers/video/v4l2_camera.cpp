@@ -58,14 +58,10 @@ Result<std::unique_ptr<FrameSource>> V4l2Camera::open(const std::filesystem::pat
 }
 
 Result<void> V4l2Camera::set_up(const CameraSettings& settings) {
-  const auto named = [this](Error error) {
-    error.what = fmt::format("{}: {}", name_, error.what);
-    return error;
-  };
   const auto signal_hz = device_.follow_signal();
-  if (!signal_hz) return named(signal_hz.error());
+  if (!signal_hz) return signal_hz.error().with_context(name_);
   const auto plan = choose(device_.offers(settings), settings);
-  if (!plan) return named(plan.error());
+  if (!plan) return plan.error().with_context(name_);
   if (auto set = set_format(*plan); !set) return set;
   set_rate(*plan, *signal_hz);
   report_ = controls_.apply(settings);

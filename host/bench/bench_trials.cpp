@@ -130,8 +130,7 @@ Result<void> for_cases(SimulatedCase wanted, int count,
     const auto c = simulate(wanted);
     if (!c && wanted.seed < 2 * count + 10) continue;
     if (!c) return c.error();
-    if (auto done = work(*c, wanted.seed); !done)
-      return Error{done.error().code, fmt::format("seed {}: {}", wanted.seed, done.error().what)};
+    if (auto done = work(*c, wanted.seed); !done) return done.with_context(fmt::format("seed {}", wanted.seed));
     ++made;
   }
   return {};

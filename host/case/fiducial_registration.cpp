@@ -20,7 +20,7 @@ using Points = std::vector<Eigen::Vector3d>;
 
 Result<calibration::PointFit<Patient, Tracker>> fit_fiducials(const FiducialFiles& files, FiducialInput& input) {
   const auto named = [&](const Error& error) {
-    return Error{error.code, fmt::format("{}, {}: {}", files.ct.string(), files.tracker.string(), error.what)};
+    return error.with_context(fmt::format("{}, {}", files.ct.string(), files.tracker.string()));
   };
   if (!files.match) {
     auto fitted = calibration::fit_points<Patient, Tracker>(input.ct_mm, input.touched_mm);

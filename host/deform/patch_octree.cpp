@@ -221,30 +221,4 @@ std::optional<Vector3d> PatchOctree::inverse(const Vector3d& point, double toler
   return std::nullopt;
 }
 
-std::vector<double> PatchOctree::least_determinants() const {
-  // The determinant is a polynomial of degree two along each axis: 27 values determine it, and the least of its
-  // Bernstein coefficients bounds it from below. Along one axis, values at 0, 1/2, 1 -> coefficients v0, 2 vh - (v0 +
-  // v1) / 2, v1.
-  std::vector<double> out;
-  out.reserve(patches_.size());
-  for (const Patch& patch : patches_) {
-    const auto corner = corners(patch);
-    const double per_cube = static_cast<double>(kLattice) / patch.size();
-    std::array<double, 27> b{};
-    for (int n = 0; n < 27; ++n) {
-      const Vector3d t(0.5 * (n % 3), 0.5 * (n / 3 % 3),
-                       0.5 * static_cast<double>(n / 9));  // NOLINT(bugprone-integer-division)
-      b[static_cast<std::size_t>(n)] =
-          (Eigen::Matrix3d::Identity() + per_cube * trilinear_jacobian(corner, t)).determinant();
-    }
-    for (const std::size_t stride : {std::size_t{1}, std::size_t{3}, std::size_t{9}}) {
-      for (std::size_t n = 0; n < 27; ++n) {
-        if (n / stride % 3 == 1) b[n] = 2 * b[n] - 0.5 * (b[n - stride] + b[n + stride]);
-      }
-    }
-    out.push_back(*std::min_element(b.begin(), b.end()));
-  }
-  return out;
-}
-
 }  // namespace birdseye::host

@@ -38,9 +38,6 @@ class PatchOctree {
     [[nodiscard]] int size() const { return kLattice >> level; }
   };
   [[nodiscard]] const std::vector<Patch>& patches() const { return patches_; }
-  /// The patch that holds a point of the unit cube. A point on a face between two patches belongs to the one with the
-  /// larger coordinates.
-  [[nodiscard]] std::size_t patch_at(const Eigen::Vector3d& point) const;
 
   [[nodiscard]] std::size_t free_vertices() const { return free_.size(); }
   /// Where free vertex i is at rest, in the unit cube.
@@ -55,14 +52,14 @@ class PatchOctree {
   [[nodiscard]] Eigen::Matrix3d jacobian(const Eigen::Vector3d& point) const;
   /// The x for which x + u(x) is the given point, to within tolerance; empty where the map folds there.
   [[nodiscard]] std::optional<Eigen::Vector3d> inverse(const Eigen::Vector3d& point, double tolerance) const;
-  /// A lower bound of the map's Jacobian determinant over each patch, one per patch; where it is positive the patch
-  /// does not fold. From the Bernstein coefficients of the determinant, which is of degree two along each axis.
-  [[nodiscard]] std::vector<double> least_determinants() const;
 
  private:
   PatchOctree() = default;
   void divide(const std::function<bool(const Eigen::Vector3d&, const Eigen::Vector3d&, int)>& wanted, Patch patch,
               int deepest);
+  /// The patch that holds a point of the unit cube. A point on a face between two patches belongs to the one with the
+  /// larger coordinates.
+  [[nodiscard]] std::size_t patch_at(const Eigen::Vector3d& point) const;
   void classify_vertices();
   void apply_constraints();
   [[nodiscard]] static std::size_t lattice_index(int i, int j, int k);

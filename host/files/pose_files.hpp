@@ -44,7 +44,4 @@ Result<PoseSet> read_pose_set(const std::filesystem::path& path, const std::stri
 Result<PoseSet> read_relative_pose_set(const std::filesystem::path& path, const std::string& transform,
                                        const std::string& reference, double mm_per_unit = 1);
 
-/// The transforms that a PLUS sequence holds, as "StylusToTracker", by name.
-Result<std::vector<std::string>> sequence_transforms(const std::filesystem::path& path);
-
 }  // namespace birdseye::host

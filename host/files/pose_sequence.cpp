@@ -118,10 +118,4 @@ Result<PoseSet> read_relative_pose_set(const fs::path& path, const std::string& 
   return read_sequence(path, transform, reference, mm_per_unit);
 }
 
-Result<std::vector<std::string>> sequence_transforms(const fs::path& path) {
-  const auto sequence = read_header(path);
-  if (!sequence) return sequence.error();
-  return std::vector<std::string>(sequence->transforms.begin(), sequence->transforms.end());
-}
-
 }  // namespace birdseye::host

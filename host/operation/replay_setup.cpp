@@ -44,10 +44,7 @@ Result<std::optional<CalibrationRecord>> record_of(const ReplayInputs& inputs) {
   if (!looked) return looked.error();
   if (text.empty()) return std::optional<CalibrationRecord>();
   auto record = calibration::parse_record(text);
-  if (!record) {
-    return Error{record.error().code,
-                 fmt::format("{}: its calibration record {}", inputs.recording.string(), record.error().what)};
-  }
+  if (!record) return record.error().with_context(inputs.recording.string() + ": its calibration record");
   return std::optional(*std::move(record));
 }
 

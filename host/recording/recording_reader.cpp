@@ -100,8 +100,7 @@ Result<std::optional<EventOfLine>> RecordingReader::take_line() {
     notes_.push_back(fmt::format("{} is cut short in line {}", kRecordingEvents, line_));
     return std::optional<EventOfLine>();
   }
-  return Error{event.error().code,
-               fmt::format("{}: line {} {}", (path_ / kRecordingEvents).string(), line_, event.error().what)};
+  return event.error().with_context(fmt::format("{}: line {}", (path_ / kRecordingEvents).string(), line_));
 }
 
 Result<void> RecordingReader::make_events(std::size_t number, const SequenceHeader::Fields& fields) {

@@ -118,11 +118,6 @@ void GlSliceRenderer::measure_moves(const DisplacementField* field) {
   for (auto& slices : slices_) slices.reset();
 }
 
-std::size_t GlSliceRenderer::patches() const {
-  return static_cast<std::size_t>(kCells) * kCells *
-         static_cast<std::size_t>(*std::max_element(volume_.size.begin(), volume_.size.end()));
-}
-
 const GlSliceRenderer::Slices& GlSliceRenderer::slices_along(int axis) {
   std::optional<Slices>& cached = slices_[static_cast<std::size_t>(axis)];
   if (cached) return *cached;
@@ -184,7 +179,6 @@ const GlSliceRenderer::Slices& GlSliceRenderer::slices_along(int axis) {
         for (GLuint side = 0; side < 4; ++side) {
           indices.insert(indices.end(), {first + side, first + (side + 1) % 4, first + 4});
         }
-        ++made.drawn;
       }
     }
     made.count.push_back(static_cast<GLuint>(indices.size()) - made.first.back());
@@ -230,7 +224,6 @@ ImageRgba GlSliceRenderer::render(const CameraModel& camera, const Transform<Cam
     if (along(a) > along(axis)) axis = a;
   }
   const Slices& slices = slices_along(axis);
-  patches_drawn_ = slices.drawn;
 
   set(draw_, "camera_from_voxel", Eigen::Affine3d(Eigen::Affine3d(camera_from_patient.matrix()) * patient_from_voxel));
   set(draw_, "lens", Eigen::Vector4d(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px));

@@ -31,16 +31,12 @@ class GlSliceRenderer {
   void undeform();
   [[nodiscard]] ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                                  const RenderSettings& settings);
-  /// Counts of the last picture: patches of slices that were drawn, and all patches.
-  [[nodiscard]] std::size_t patches_drawn() const { return patches_drawn_; }
-  [[nodiscard]] std::size_t patches() const;
 
  private:
   struct Slices {
     std::vector<GLuint> first, count;  ///< of each slice's indices
     GlBuffer vertices, indices;
     GlVertexArray array;
-    std::size_t drawn = 0;
   };
   GlSliceRenderer(const Volume& volume, const TransferFunction& transfer, bool prune)
       : volume_(volume), transfer_(transfer), seen_(volume, transfer_), prune_(prune) {}
@@ -57,7 +53,6 @@ class GlSliceRenderer {
   GlBuffer affine_;
   std::vector<Eigen::Vector3f> moves_;  ///< at kCells + 1 points along each axis, voxels
   std::array<std::optional<Slices>, 3> slices_;
-  std::size_t patches_drawn_ = 0;
   int width_px_ = 0, height_px_ = 0;
   CameraModel folded_;  ///< the lens whose fold is in fold_, kept because finding it takes a while
   double fold_ = 0;

@@ -114,9 +114,7 @@ TEST(ClockChoice, TakesTheSmallerHonestSigma) {
   EXPECT_EQ(choose_clock(Duration{100'000}, ptp, ptp)->way, ClockChoice::Way::common_clock);
   EXPECT_EQ(choose_clock(Duration{100'000}, ptp, ptp)->sigma.ns, 2828);
   EXPECT_EQ(choose_clock(Duration{100'000}, ptp, ntp)->way, ClockChoice::Way::exchange);
-  const auto only = choose_clock(Duration{100'000}, ptp, alone);
-  EXPECT_EQ(only->way, ClockChoice::Way::exchange);
-  EXPECT_NE(only->reason.find("host's clock is not synchronised"), std::string::npos);
+  EXPECT_EQ(choose_clock(Duration{100'000}, ptp, alone)->way, ClockChoice::Way::exchange);
   // A bound without an estimate is not an error of nothing.
   EXPECT_GT(common_clock_sigma({true, {1'000'000}, {0}, false, ""}, ptp)->ns, 500'000);
 }

@@ -1,11 +1,9 @@
 #include <gtest/gtest.h>
 #include <sys/timex.h>
 
-#include <filesystem>
-#include <fstream>
+#include <string>
 
 #include "device/wire/clock_discipline.hpp"
-#include "tests/support/scratch.hpp"
 
 namespace birdseye::wire {
 namespace {
@@ -27,15 +25,6 @@ TEST(ClockDiscipline, IsDecodedFromTheKernelsWords) {
   reading.status = STA_PLL;
   EXPECT_FALSE(decode_discipline(reading, TIME_ERROR).synchronised);
   EXPECT_TRUE(decode_discipline(reading, TIME_INS).synchronised);
-}
-
-TEST(ClockDiscipline, FindsNetworkClocks) {
-  const testing::Scratch scratch;
-  for (const char* name : {"ptp1", "ptp0", "ptp", "ptp_kvm", "tty0"}) std::ofstream(scratch / name) << "";
-  const auto devices = ptp_devices(scratch.path());
-  ASSERT_EQ(devices.size(), 2U);
-  EXPECT_EQ(devices[0], scratch / "ptp0");
-  EXPECT_TRUE(ptp_devices("/nowhere").empty());
 }
 
 }  // namespace

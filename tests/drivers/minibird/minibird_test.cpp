@@ -105,8 +105,8 @@ class Stream {
 MiniBirdSettings quick(int birds) {
   MiniBirdSettings settings;
   settings.birds = birds;
-  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait = settings.run_wait =
-      settings.sleep_wait = {};
+  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait =
+      settings.run_wait = {};
   settings.quiet = Duration::from_ms(3);
   settings.reply_timeout = settings.answer_within = Duration::from_ms(20);
   return settings;

@@ -185,8 +185,8 @@ class ScriptedUnit final : public drivers::ByteStream {
 inline drivers::minibird::MiniBirdSettings without_waits(int birds = 1) {
   drivers::minibird::MiniBirdSettings settings;
   settings.birds = birds;
-  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait = settings.run_wait =
-      settings.sleep_wait = {};
+  settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait =
+      settings.run_wait = {};
   settings.reply_timeout = settings.answer_within = Duration::from_ms(40);
   settings.quiet = Duration::from_ms(5);
   return settings;

@@ -180,8 +180,11 @@ TEST(CalibrateHandEyeCommand, ARodTurnedByKnownAnglesGivesItsAxis) {
   // Whoever reads the record knows where the camera is at angles that were not calibrated.
   const auto after = calibration::parse_record(testing::contents_of(record));
   ASSERT_TRUE(after && after->hand_eye && after->hand_eye->rod);
+  const calibration::RodEntry& rod = *after->hand_eye->rod;
+  const RodScope scope{after->hand_eye->camera_from_sensor, rod.axis_in_sensor, rod.axis_point_in_sensor_mm,
+                       rod.picture_turn};
   for (const double deg : {20.0, 65.0, 110.0, 150.0}) {
-    const auto found = *after->hand_eye->camera_from_sensor_at(deg);
+    const auto found = scope.camera_from_sensor((deg - rod.reference_angle_deg) * kRadPerDeg);
     const auto truth = drawn.truth.camera_from_sensor(deg * kRadPerDeg);
     EXPECT_LT((found.inverse().translation() - truth.inverse().translation()).norm(), 1) << deg;
     EXPECT_LT(rotation_angle_between(found.rotation(), truth.rotation()) * kDegPerRad, 0.2) << deg;

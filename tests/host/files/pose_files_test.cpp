@@ -214,7 +214,6 @@ TEST(PoseFiles, RefusalsSayWhatToDo) {
     EXPECT_NE(set.error().what.find(words), std::string::npos) << set.error().what;
     EXPECT_EQ(set.error().what.find(path), 0U) << set.error().what;
   }
-  EXPECT_EQ(*sequence_transforms(two), (std::vector<std::string>{"AToTracker", "BToTracker"}));
 }
 
 class RecordedPoses : public ::testing::Test {
@@ -229,7 +228,6 @@ class RecordedPoses : public ::testing::Test {
 
 TEST_F(RecordedPoses, AnInvalidFrameOfARealSequenceIsNamed) {
   const fs::path path = data / "em_tracker_sequences/TransformInterpolationTest.igs.mha";
-  EXPECT_EQ(*sequence_transforms(path), (std::vector<std::string>{"ProbeToTracker", "ReferenceToTracker"}));
   const auto probe = read_pose_set(path, "ProbeToTracker");
   ASSERT_TRUE(probe) << probe.error().what;
   EXPECT_EQ(probe->poses.size(), 499U);

@@ -69,7 +69,6 @@ TEST(GlSliceRenderer, IsLikeTheReferenceScannedAndDeformed) {
   const DisplacementField field = bent(volume, 1, 0.2, 3);
   (*slices)->deform(field);
   check(&field);
-  EXPECT_LT((*slices)->patches_drawn(), (*slices)->patches() / 2);
   EXPECT_EQ(context->fault(), "");
 }
 
