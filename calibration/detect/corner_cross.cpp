@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/base/median.hpp"
+#include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::calibration {
 
@@ -82,9 +83,8 @@ SmoothPicture::SmoothPicture(const GreyView& picture)
     : width_px_(picture.width_px),
       height_px_(picture.height_px),
       grey_(static_cast<std::size_t>(picture.width_px) * static_cast<std::size_t>(picture.height_px)) {
-  const cv::Mat from(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
   cv::Mat to(height_px_, width_px_, CV_8UC1, grey_.data());
-  cv::GaussianBlur(from, to, cv::Size(0, 0), kCrossSmoothing_px);
+  cv::GaussianBlur(mat_of(picture), to, cv::Size(0, 0), kCrossSmoothing_px);
 }
 
 GreyView SmoothPicture::view() const {

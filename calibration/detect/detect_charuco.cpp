@@ -9,6 +9,7 @@
 #include "calibration/detect/corner_cross.hpp"
 
 #include "calibration/base/median.hpp"
+#include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::calibration {
 
@@ -187,7 +188,7 @@ bool is_other_layout(const Pattern& pattern, const std::map<int, Predicted>& pre
 }  // namespace
 
 FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Search search) {
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
+  const cv::Mat grey = mat_of(picture);
   std::vector<int> ids;
   std::vector<std::vector<cv::Point2f>> quads;
   detect_tags(pattern, grey, ids, quads);

@@ -8,6 +8,7 @@
 #include "calibration/base/median.hpp"
 #include "calibration/detect/corner_cross.hpp"
 #include "calibration/detect/picture_edges.hpp"
+#include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::calibration {
 
@@ -111,7 +112,7 @@ std::string why_not(const Pattern& pattern, const cv::Mat& grey) {
 }  // namespace
 
 FoundPattern find_chessboard(const Pattern& pattern, const GreyView& picture, Search search) {
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
+  const cv::Mat grey = mat_of(picture);
   FoundPattern found;
   std::vector<cv::Point2f> corners;
   const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -29,10 +31,6 @@ struct Spot {
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   double area = 0;
 };
-
-cv::Mat mat_of(const GreyView& picture) {
-  return {picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data())};
-}
 
 Spot moments_of(const cv::Mat& labels, const cv::Rect& box, int label) {
   Spot spot;

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/base/median.hpp"
+#include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::calibration {
 
@@ -125,7 +126,7 @@ std::optional<Eigen::Vector2d> pixel_of(const std::vector<GridPoint>& points, co
 }  // namespace
 
 std::vector<EdgeWidth> edges_of_picture(const GreyView& picture) {
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
+  const cv::Mat grey = mat_of(picture);
   cv::Mat smooth;
   grey.convertTo(smooth, CV_32F);
   cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kEdgeSmoothing_px);
@@ -156,7 +157,7 @@ bool is_blurred(const GreyView& picture) {
 double local_contrast(const GreyView& picture) {
   constexpr int kWindow_px = 25;
   constexpr int kStep_px = 8;
-  const cv::Mat grey(picture.height_px, picture.width_px, CV_8UC1, const_cast<std::uint8_t*>(picture.pixels.data()));
+  const cv::Mat grey = mat_of(picture);
   cv::Mat smooth;
   cv::GaussianBlur(grey, smooth, cv::Size(0, 0), kEdgeSmoothing_px);
   const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {kWindow_px, kWindow_px});

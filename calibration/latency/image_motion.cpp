@@ -7,6 +7,8 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -40,13 +42,11 @@ std::optional<ImageMotion> ImageMotionTracker::push(double time_s, const GreyVie
   const cv::Size window(21, 21);
   constexpr int kLevels = 3;
   auto next = std::make_unique<State>();
-  const cv::Mat whole(picture.height_px, picture.width_px, CV_8U,
-                      const_cast<std::uint8_t*>(picture.pixels.data()));  // NOLINT: OpenCV has no const view
   next->time_s = time_s;
   next->size = {picture.width_px, picture.height_px};
   next->scale = std::max(1.0, static_cast<double>(picture.width_px) / kWorkingWidthPx);
   cv::Mat small;
-  cv::resize(whole, small, {}, 1 / next->scale, 1 / next->scale, cv::INTER_AREA);
+  cv::resize(mat_of(picture), small, {}, 1 / next->scale, 1 / next->scale, cv::INTER_AREA);
   next->mask = state_ && state_->size == next->size ? state_->mask : field_mask(small.size());
   cv::buildOpticalFlowPyramid(small, next->pyramid, window, kLevels);
   cv::goodFeaturesToTrack(small, next->corners, kCorners, 0.01, 8, next->mask);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
+#include "calibration/camera/camera_bundle.hpp"
 #include "host/calibrate/residual_picture.hpp"
 #include "host/report/bar_chart.hpp"
 #include "host/report/line_plot.hpp"
@@ -19,12 +20,6 @@ nlohmann::json named(const CameraVector& values) {
   nlohmann::json out;
   for (std::size_t i = 0; i < kCameraParameterNames.size(); ++i)
     out[kCameraParameterNames[i]] = values[static_cast<Eigen::Index>(i)];
-  return out;
-}
-
-CameraVector parameters_of(const CameraModel& c) {
-  CameraVector out;
-  out << c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3;
   return out;
 }
 

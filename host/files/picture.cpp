@@ -3,6 +3,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -12,13 +14,6 @@ const cv::Scalar kMark(255, 255, 255), kRim(0, 0, 0);
 /// The picture's own pixels, for OpenCV to draw on.
 cv::Mat view_of(Picture& picture) {
   return {picture.height_px, picture.width_px, CV_8UC3, picture.rgb.data()};
-}
-
-/// For OpenCV to read, which has no view of what must not be written.
-template <std::size_t channels>
-cv::Mat mat_of(const ImageView<channels>& picture) {
-  return {picture.height_px, picture.width_px, CV_8UC(static_cast<int>(channels)),
-          const_cast<std::uint8_t*>(picture.pixels.data())};
 }
 
 std::string png_of(const cv::Mat& image, cv::ColorConversionCodes to_opencv) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -17,8 +19,7 @@ constexpr int kHighlight = 225, kOfHighlight = 210;
 std::vector<std::uint8_t> surface_cues(const RgbView& video) {
   if (!video.whole()) return {};
   std::vector<std::uint8_t> out(video.area_px());
-  // OpenCV's matrices of borrowed pixels are not const; nothing writes to this one.
-  const cv::Mat rgb(video.height_px, video.width_px, CV_8UC3, const_cast<std::uint8_t*>(video.pixels.data()));
+  const cv::Mat rgb = mat_of(video);
   cv::Mat grey, fine, low, high;
   cv::cvtColor(rgb, grey, cv::COLOR_RGB2GRAY);
   cv::boxFilter(grey, fine, -1, {3, 3});

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -107,8 +109,7 @@ void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int rad
 }
 
 void paste(Picture& onto, const Picture& what, int x_px, int y_px) {
-  const cv::Mat source(what.height_px, what.width_px, CV_8UC3, const_cast<std::uint8_t*>(what.rgb.data()));
-  source.copyTo(view_of(onto)(cv::Rect(x_px, y_px, what.width_px, what.height_px)));
+  mat_of(what.view()).copyTo(view_of(onto)(cv::Rect(x_px, y_px, what.width_px, what.height_px)));
 }
 
 }  // namespace birdseye::host

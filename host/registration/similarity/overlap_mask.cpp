@@ -7,17 +7,13 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "calibration/picture/picture_mat.hpp"
+
 namespace birdseye::host {
 
 namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
-
-template <std::size_t channels>
-cv::Mat mat_of(const ImageView<channels>& picture) {
-  return {picture.height_px, picture.width_px, CV_8UC(static_cast<int>(channels)),
-          const_cast<std::uint8_t*>(picture.pixels.data())};
-}
 
 /// Of each pixel, the least and the greatest of its channels.
 std::pair<cv::Mat, cv::Mat> channel_range(const cv::Mat& rgb) {
