@@ -1,19 +1,21 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <utility>
 
+#include "drivers/system/condition.hpp"
 #include "drivers/system/thread.hpp"
 
 namespace birdseye {
 
-/// One piece of work at a time on a thread of its own, so that the window goes on meanwhile. Ends its thread with
-/// itself.
+/// One piece of work at a time on a thread of its own, so that the window goes on meanwhile. None of its calls waits
+/// for work. Ends its thread with itself: asks the work to stop, and waits for it until a deadline. Work that hangs
+/// beyond that is let go, so work must own all that it uses.
 template <typename T>
 class Background {
  public:
@@ -21,41 +23,93 @@ class Background {
   using Say = std::function<void(const std::string&)>;
   using Work = std::function<T(const std::stop_token&, const Say&)>;
 
-  /// Not while it runs.
-  void start(Work work) {
-    thread_ = {};
-    (void)take();  // what came of the work before is not of this
-    running_ = true;
-    say("");
-    thread_ = OwnedThread([this, work = std::move(work)](const std::stop_token& stop) {
-      T result = work(stop, [this](const std::string& line) { say(line); });
-      const std::lock_guard lock(mutex_);
-      result_ = std::move(result);
-      running_ = false;
-    });
+  static constexpr Duration kEndsWithin = Duration::from_ms(20'000);
+
+  Background() = default;
+  /// ends_within: from when its owner goes.
+  explicit Background(Duration ends_within) : ends_within_(ends_within) {}
+  ~Background() {
+    cancel();
+    {
+      std::unique_lock lock(shared_->mutex);
+      shared_->next = nullptr;
+      if (shared_->ended.wait(lock, Deadline::after(ends_within_), [this] { return !shared_->running; })) return;
+    }
+    thread_.let_go();
   }
-  [[nodiscard]] bool running() const { return running_; }
-  void cancel() { thread_.request_stop(); }
+  Background(const Background&) = delete;
+  Background& operator=(const Background&) = delete;
+
+  /// Work that runs is asked to stop, and what comes of it is thrown away. This begins when that has ended.
+  void start(Work work) {
+    cancel();
+    const std::lock_guard lock(shared_->mutex);
+    shared_->next = std::move(work);
+    shared_->stop = std::stop_source();
+    shared_->result.reset();
+    shared_->line.clear();
+    if (shared_->running) return;
+    shared_->running = true;
+    thread_ = OwnedThread([shared = shared_](const std::stop_token&) { run(shared); });
+  }
+  [[nodiscard]] bool running() const {
+    const std::lock_guard lock(shared_->mutex);
+    return shared_->running;
+  }
+  void cancel() {
+    std::stop_source stop(std::nostopstate);
+    {
+      const std::lock_guard lock(shared_->mutex);
+      stop = shared_->stop;
+    }
+    stop.request_stop();  // what it calls may look here
+  }
   /// What came of it, once.
   std::optional<T> take() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(result_, std::nullopt);
+    const std::lock_guard lock(shared_->mutex);
+    return std::exchange(shared_->result, std::nullopt);
   }
   [[nodiscard]] std::string line() const {
-    const std::lock_guard lock(mutex_);
-    return line_;
+    const std::lock_guard lock(shared_->mutex);
+    return shared_->line;
   }
 
  private:
-  void say(const std::string& line) {
-    const std::lock_guard lock(mutex_);
-    line_ = line;
+  struct Shared {
+    std::mutex mutex;  // of what follows
+    Condition ended;
+    Work next;  ///< to be begun; replaces what runs
+    std::stop_source stop;
+    bool running = false;
+    std::optional<T> result;
+    std::string line;
+  };
+
+  static void run(const std::shared_ptr<Shared>& shared) {
+    const Say say = [&shared](const std::string& line) {
+      const std::lock_guard lock(shared->mutex);
+      if (!shared->next) shared->line = line;
+    };
+    std::unique_lock lock(shared->mutex);
+    while (shared->next) {
+      Work work = std::exchange(shared->next, nullptr);
+      const std::stop_token stop = shared->stop.get_token();
+      lock.unlock();
+      std::optional<T> result = work(stop, say);
+      work = nullptr;  // what it holds is gone before anybody hears that it has ended
+      lock.lock();
+      if (!shared->next) shared->result = std::exchange(result, std::nullopt);
+      if (!result) continue;
+      lock.unlock();  // to free a CT takes its time
+      result.reset();
+      lock.lock();
+    }
+    shared->running = false;
+    shared->ended.notify_all();
   }
 
-  std::atomic<bool> running_ = false;
-  mutable std::mutex mutex_;
-  std::optional<T> result_;
-  std::string line_;
+  Duration ends_within_ = kEndsWithin;
+  std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
   OwnedThread thread_;
 };
 
