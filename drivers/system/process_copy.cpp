@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <mutex>
@@ -108,14 +109,22 @@ Error ProcessCopy::ended() {
   return {Errc::disconnected, "ended before it had sent all"};
 }
 
-Result<void> ProcessCopy::receive(void* to, std::size_t size, Deadline deadline) {
+Result<void> ProcessCopy::receive(void* to, std::size_t size, Deadline deadline, const std::stop_token& stop) {
+  constexpr Duration kLook = Duration::from_ms(50);
   auto* bytes = static_cast<char*>(to);
   while (size > 0) {
     // Looked at first: of a copy that sends without end, something is always ready.
-    if (deadline.passed() || wait_ready(fd_.get(), POLLIN, deadline) == 0) {
+    if (deadline.passed()) {
       kill();
       return Error{Errc::timeout, "was not done in time, and was ended"};
     }
+    if (stop.stop_requested()) {
+      kill();
+      return Error{Errc::disconnected, "was called off"};
+    }
+    if (wait_ready(fd_.get(), POLLIN, stop.stop_possible() ? std::min(deadline, Deadline::after(kLook)) : deadline) ==
+        0)
+      continue;
     const ssize_t got = ::read(fd_.get(), bytes, size);
     if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (got <= 0) return ended();

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <shared_mutex>
+#include <stop_token>
 #include <utility>
 
 #include "calibration/base/result.hpp"
@@ -39,8 +40,9 @@ class ProcessCopy {
   ~ProcessCopy();
 
   /// The next `size` bytes that the work sends. Errc::timeout: they had not come by the deadline, and the copy has been
-  /// killed. Errc::disconnected: it ended before, and how (the signal, by number and name).
-  Result<void> receive(void* to, std::size_t size, Deadline deadline);
+  /// killed. Errc::disconnected: it ended before, and how (the signal, by number and name); or stop was requested,
+  /// which is seen within a twentieth of a second and kills it too.
+  Result<void> receive(void* to, std::size_t size, Deadline deadline, const std::stop_token& stop = {});
   [[nodiscard]] pid_t pid() const { return process_; }
 
  private:

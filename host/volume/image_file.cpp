@@ -106,7 +106,7 @@ Error refused(Errc code, const fs::path& path, const std::string& why) {
   return {code, fmt::format("{}: {}", path.string(), why)};
 }
 
-Result<ImageFile> read_image(const fs::path& path, int components) {
+Result<ImageFile> read_image(const fs::path& path, int components, const std::stop_token& stop) {
   std::error_code error;
   if (!fs::exists(path, error)) return refused(Errc::not_found, path, "no such file or folder");
   if (!fs::is_directory(path, error)) {
@@ -147,7 +147,8 @@ Result<ImageFile> read_image(const fs::path& path, int components) {
     }
   };
   try {
-    const auto ran = run_isolated(work, take, kLongest);
+    const auto ran = run_isolated(work, take, kLongest, stop);
+    if (stop.stop_requested()) return refused(Errc::disconnected, path, "was not read: cancelled");
     if (!read) {
       if (!ran && ran.error().code == Errc::io) return refused(Errc::io, path, ran.error().what);
       if (!ran && ran.error().code == Errc::timeout) {

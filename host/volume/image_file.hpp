@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <stop_token>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -23,8 +24,9 @@ struct ImageFile {
 /// Reads a folder of one DICOM series, a DICOM file, or a NIfTI, NRRD, MHA or MHD file, with `components` values a
 /// voxel. The decoders run in a process of their own (docs/decisions/0012-isolated-import.md), for no longer than five
 /// minutes. Refuses, in one line that names the path, a file that is missing, unreadable or cut short, one without a
-/// sound geometry, and (with one value a voxel) values that are not finite or beyond 16 bits.
-Result<ImageFile> read_image(const std::filesystem::path& path, int components);
+/// sound geometry, and (with one value a voxel) values that are not finite or beyond 16 bits. Once stop is requested,
+/// the decoders are ended before the next of their files, and nothing is read.
+Result<ImageFile> read_image(const std::filesystem::path& path, int components, const std::stop_token& stop = {});
 
 enum class StoredAs { uint8, int16, float32 };
 /// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha.

@@ -6,8 +6,8 @@
 
 namespace birdseye::host {
 
-Result<Volume> import_volume(const std::filesystem::path& path) {
-  auto image = read_image(path, 1);
+Result<Volume> import_volume(const std::filesystem::path& path, const std::stop_token& stop) {
+  auto image = read_image(path, 1, stop);
   if (!image) return image.error();
   Volume volume;
   volume.size = image->size;

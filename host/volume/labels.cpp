@@ -9,8 +9,8 @@
 
 namespace birdseye::host {
 
-Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct) {
-  auto labels = import_volume(path);
+Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct, const std::stop_token& stop) {
+  auto labels = import_volume(path, stop);
   if (!labels) return labels;
   // Corners, not matrices: what matters is where the voxels lie, however far from the origin the patient is.
   const double allowed_mm = 0.2 * ct.spacing_mm.minCoeff();

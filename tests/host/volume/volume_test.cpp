@@ -73,6 +73,18 @@ TEST(Import, EveryFormatGivesTheSameVolume) {
   expect_the_grid(import_volume(scratch / "a.nrrd"));
 }
 
+TEST(Import, ReadsNothingOnceItIsAskedToStop) {
+  const Scratch scratch;
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
+  std::stop_source stop;
+  expect_the_grid(import_volume(scratch / "ct", stop.get_token()));
+  stop.request_stop();
+  const auto stopped = import_volume(scratch / "ct", stop.get_token());
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, Errc::disconnected);
+  EXPECT_NE(stopped.error().what.find("ct: was not read: cancelled"), std::string::npos) << stopped.error().what;
+}
+
 TEST(Import, SlicesAreStackedByPlaceNotByName) {
   const Scratch scratch;
   ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid(), values(), 1));
