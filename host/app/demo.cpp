@@ -24,13 +24,13 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostDemoFramesWaiting = 256;
 
 /// Compares every overlaid frame with the truth, marks the kept pictures and writes them.
-Result<void> compare(const fs::path& out, DemoSession& session, const Plan& plan) {
+Result<void> compare(const fs::path& out, DemoSession& session, const PatientPlan& patient) {
   const auto truth = read_simulated_truth(out / "truth");
   if (!truth) return truth.error();
   std::map<std::uint64_t, std::pair<Eigen::Vector2d, Eigen::Vector2d>> places;
   for (const OverlaidFrame& frame : session.overlaid) {
     const auto found = overlay_error(*truth, frame.sequence, session.setup->camera(), frame.camera_from_patient,
-                                     plan.tumour_centre_in_patient_mm);
+                                     target_in_patient_mm(patient));
     if (!found) {
       return Error{Errc::bad_format, fmt::format("{}: lacks frame {}, which was overlaid; run the demo again",
                                                  (out / "truth").string(), frame.sequence)};
@@ -122,15 +122,15 @@ Result<ExitCode> demo(const DemoOptions& options) {
   auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
   if (!client) return client.error();
   EventStream stream(*std::move(client), kMostDemoFramesWaiting);
-  const auto plan = read_plan(out / "phantom", (*cart)->sheet().fiducials);
-  if (!plan) return plan.error();
+  const auto patient = read_with_fiducials(out, (*cart)->sheet().fiducials);
+  if (!patient) return patient.error();
   const auto board = calibration::parse_pattern((*cart)->sheet().board);
   if (!board) return board.error();
   auto film = Film::open(out / "overlay.mp4", settings.width_px, settings.height_px, settings.video_rate_hz);
   if (!film) return film.error();
-  progress.keep(fmt::format("the CT shows {} markers; the operation begins", plan->markers_in_patient_mm.size()));
+  progress.keep(fmt::format("the CT shows {} markers; the operation begins", patient->fiducials_in_patient_mm->size()));
 
-  DemoSession session(**cart, *board, *plan, *std::move(film), progress);
+  DemoSession session(**cart, *board, *patient, *std::move(film), progress);
   session.figures.title =
       settings.ct.empty() ? "Birdseye: the simulated cart" : "Birdseye: the simulated cart over a CT of yours";
   session.figures.position_noise_mm = settings.position_noise_mm;
@@ -142,7 +142,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   if (auto ended = (*cart)->finish(Deadline::after(Duration::from_ms(10'000))); !ended) return ended.error();
   if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
   if (auto filmed = session.finish(); !filmed) return filmed.error();
-  if (auto compared = compare(out, session, *plan); !compared) return compared.error();
+  if (auto compared = compare(out, session, *patient); !compared) return compared.error();
   const Setup& setup = *session.setup;
   if (auto written = write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient().matrix())},
                                   {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor().matrix())},

@@ -12,7 +12,7 @@
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/operation.hpp"
-#include "host/simulated/simulated_patient.hpp"
+#include "host/operation/patient.hpp"
 #include "host/window/live_app.hpp"
 
 namespace birdseye::host {
@@ -33,17 +33,6 @@ struct LiveOptions {
   double speed = 1;
   std::string size = "1280x720", video = "512x384", publish;
 };
-
-/// What the simulated patient's CT is shown and checked by.
-PatientFiles simulated_patient(const fs::path& folder) {
-  PatientFiles files;
-  files.ct = folder / "phantom" / "ct";
-  files.labels = folder / "phantom" / "segmentation.nii.gz";
-  files.shown.assign(SimulatedLabels::kShown.begin(), SimulatedLabels::kShown.end());
-  files.targets = {SimulatedLabels::kTumour};
-  files.organ.assign(SimulatedLabels::kOrgan.begin(), SimulatedLabels::kOrgan.end());
-  return files;
-}
 
 /// Where windows remember their layout between runs, by the XDG base directory specification.
 fs::path layout_file() {

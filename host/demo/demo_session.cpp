@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <utility>
+
 #include "calibration/base/median.hpp"
-#include "calibration/camera/camera_calibration.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/operation/findings.hpp"
-#include "host/simulated/simulated_patient.hpp"
-#include "host/volume/import.hpp"
-#include "host/volume/labels.hpp"
-#include "host/volume/marker_finder.hpp"
 
 namespace birdseye::host {
 
@@ -21,26 +18,18 @@ constexpr int kKeepEvery = 20;  // of the overlaid frames, for the pictures of t
 
 }  // namespace
 
-Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials) {
-  const auto ct = import_volume(patient / "ct");
-  if (!ct) return ct.error();
-  const auto labels = import_labels(patient / "segmentation.nii.gz", *ct);
-  if (!labels) return labels.error();
-  Plan plan;
-  auto kept = keep_labels(*ct, *labels, SimulatedLabels::kShown);
-  if (!kept) return kept.error();
-  plan.shown = *std::move(kept);
-  const auto centre = label_centroid_mm(*labels, SimulatedLabels::kTumour);
-  if (!centre) return centre.error();
-  plan.tumour_centre_in_patient_mm = *centre;
-  for (const MarkerFit& marker : find_markers(*ct).markers)
-    plan.markers_in_patient_mm.push_back(marker.centre_in_patient_mm);
-  if (static_cast<int>(plan.markers_in_patient_mm.size()) < fiducials) {
-    return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", (patient / "ct").string(),
-                                              plan.markers_in_patient_mm.size(), fiducials)};
+Result<PatientPlan> read_with_fiducials(const std::filesystem::path& folder, int fiducials) {
+  const PatientFiles files = simulated_patient(folder);
+  auto patient = read_patient(files);
+  if (!patient) return patient;
+  std::vector<Eigen::Vector3d> markers_in_patient_mm = find_fiducials(patient->ct, {});
+  if (static_cast<int>(markers_in_patient_mm.size()) < fiducials) {
+    return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", files.ct.string(),
+                                              markers_in_patient_mm.size(), fiducials)};
   }
-  plan.markers_in_patient_mm.resize(static_cast<std::size_t>(fiducials));  // the brightest
-  return plan;
+  markers_in_patient_mm.resize(static_cast<std::size_t>(fiducials));
+  patient->fiducials_in_patient_mm = std::move(markers_in_patient_mm);
+  return patient;
 }
 
 std::string DemoSession::stage_at(DeviceTime time) const {
@@ -80,43 +69,40 @@ void DemoSession::take_stations() {
     station.name = taken->view.name;
     station.view = std::move(taken->view);
     station.tracker_from_sensor = taken->tracker_from_sensor;
-    seen_.stations.push_back(std::move(station));
+    seen_.input.stations.push_back(std::move(station));
   }
 }
 
-Result<void> DemoSession::calibrate_and_register(const CameraModel& size) {
+Result<void> DemoSession::calibrate_and_register() {
   stations_.finish();
   take_stations();
   figures.board_frames_left_out = stations_.frames_left_out();
   if (const std::string words = stations_.left_out_words(); !words.empty()) progress_.keep(words);
-  std::vector<calibration::PatternView> views;
-  views.reserve(seen_.stations.size());
-  for (const calibration::HandEyeStation& station : seen_.stations) views.push_back(station.view);
-  const auto lens = calibration::calibrate_camera(views, size.width_px, size.height_px);
-  if (!lens) return lens.error().with_context("camera calibration");
-  seen_.camera = lens->camera;
-  const auto hand_eye = calibration::calibrate_hand_eye(seen_);
-  if (!hand_eye) return hand_eye.error().with_context("hand-eye calibration");
-  if (const Verdict verdict = calibration::judge(*hand_eye); verdict.grade == Grade::fail)
-    return Error{Errc::degenerate, fmt::format("hand-eye calibration: {}", fmt::join(verdict.reasons, "; "))};
-  const auto fit = register_by_touches(plan_.markers_in_patient_mm, touches_in_tracker_mm_);
+  figures.board_views = static_cast<int>(seen_.input.stations.size());
+  find_lens(seen_);
+  const auto calibrated = calibrate_guided(std::move(seen_));
+  if (!calibrated) return calibrated.error().with_context("calibration");
+  const auto found = calibrated_by_board(*calibrated, utc_now());
+  if (!found) {
+    return Error{found.error().code, fmt::format("calibration: {}", fmt::join(calibrated->verdict.reasons, "; "))};
+  }
+  const auto fit = register_by_touches(*patient_.fiducials_in_patient_mm, touches_in_tracker_mm_);
   if (!fit) return fit.error().with_context("registration");
-  figures.camera_rms_px = lens->rms_px;
-  figures.held_out_px = hand_eye->held_out_px;
-  figures.board_views = static_cast<int>(seen_.stations.size());
+  const ScopeSetup& scope = found->scope;
+  figures.camera_rms_px = calibrated->stations.lens->rms_px;
+  figures.held_out_px = calibrated->hand_eye.held_out_px;
   figures.fre_mm = fit->registered.fre_mm;
   figures.fiducial_residuals_mm = fit->residuals_mm;
-  const ScopeSetup scope = ScopeSetup::of_hand_eye(lens->camera, lens->rms_px, *hand_eye);
   setup = scope.registered(fit->registered.tracker_from_patient);
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
-  auto engine = make_engine("cpu", plan_.shown, *transfer);
+  auto engine = make_engine("cpu", patient_.shown, *transfer);
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
   look_.render.step_mm = 1.2;
-  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, plan_.tumour_centre_in_patient_mm));
+  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, target_in_patient_mm(patient_)));
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye held out {:.2f} px, registration {:.2f} mm",
-                             lens->rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
+                             figures.camera_rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
   return {};
 }
 
@@ -144,14 +130,13 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
   const std::string stage = stage_at(frame.info.acquired);
   if (stage == "calibrate") {
     stations_.push(frame);
-    progress_(fmt::format("calibrating: {} views of the board", seen_.stations.size()));
+    progress_(fmt::format("calibrating: {} views of the board", seen_.input.stations.size()));
   }
   if (stage != "look" && stage != "end") return {};
   if (!setup) {
-    CameraModel size;
-    size.width_px = frame.width_px;
-    size.height_px = frame.height_px;
-    if (auto done = calibrate_and_register(size); !done) return done;
+    seen_.width_px = frame.width_px;
+    seen_.height_px = frame.height_px;
+    if (auto done = calibrate_and_register(); !done) return done;
   }
   return overlay(frame);
 }

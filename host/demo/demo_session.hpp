@@ -6,30 +6,25 @@
 #include <string>
 #include <vector>
 
-#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "device/wire/messages.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/demo/demo_report.hpp"
 #include "host/files/film.hpp"
 #include "host/files/picture.hpp"
+#include "host/guide/guided_calibration.hpp"
 #include "host/guide/live_stations.hpp"
 #include "host/link/event_stream.hpp"
+#include "host/operation/patient.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/overlay/frame_painter.hpp"
 #include "host/render/engine.hpp"
 #include "host/simulated/simulated_cart.hpp"
-#include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
-/// What is read of the CT before the operation: all that the appliance does not send.
-struct Plan {
-  Volume shown;
-  Eigen::Vector3d tumour_centre_in_patient_mm;
-  std::vector<Eigen::Vector3d> markers_in_patient_mm;
-};
-/// patient: a folder that the simulator made; its CT must show at least this many fiducials.
-Result<Plan> read_plan(const std::filesystem::path& patient, int fiducials);
+/// The patient of the cart in folder, with so many fiducials: the brightest markers that its CT shows, which must be
+/// there.
+Result<PatientPlan> read_with_fiducials(const std::filesystem::path& folder, int fiducials);
 
 struct OverlaidFrame {
   std::uint64_t sequence;
@@ -45,8 +40,9 @@ struct KeptFrame {
 /// One run of the demo: takes the appliance's events in order and does what the stage asks for.
 class DemoSession {
  public:
-  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, const Plan& plan, Film film, Progress& progress)
-      : cart_(cart), plan_(plan), film_(std::move(film)), progress_(progress), stations_(board, "scope") {}
+  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, const PatientPlan& patient, Film film,
+              Progress& progress)
+      : cart_(cart), patient_(patient), film_(std::move(film)), progress_(progress), stations_(board, "scope") {}
 
   /// Until the operation has ended and its last frame has come.
   Result<void> run(EventStream& stream);
@@ -62,15 +58,15 @@ class DemoSession {
   Result<void> take(const wire::Birds& birds);
   Result<void> take(const wire::VideoFrame& frame);
   void take_stations();
-  Result<void> calibrate_and_register(const CameraModel& size);
+  Result<void> calibrate_and_register();
   Result<void> overlay(const wire::VideoFrame& frame);
 
   SimulatedCart& cart_;
-  const Plan& plan_;
+  const PatientPlan& patient_;  ///< all that the appliance does not send
   Film film_;
   Progress& progress_;
   LiveStations stations_;
-  calibration::HandEyeInput seen_;
+  GuidedStations seen_;
   PointerTip pointer_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
   std::unique_ptr<Engine> engine_;

@@ -1,56 +1,43 @@
 #pragma once
 
-#include <deque>
-#include <mutex>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "drivers/system/blocking_queue.hpp"
-#include "drivers/system/thread.hpp"
+#include "drivers/system/background.hpp"
+#include "host/guide/guided_calibration.hpp"
 #include "host/guide/hand_eye_guide.hpp"
 
 namespace birdseye::host {
 
-/// What a guided calibration found.
-struct GuidedCalibration {
-  GuidedStations stations;
-  calibration::HandEyeResult hand_eye;
-  Verdict verdict;  ///< of hand-eye and, where it was found too, of the lens
-};
-
-/// Runs the guided hand-eye calibration on a thread of its own, which looks at frames and solves while the window goes
-/// on.
+/// Runs guided hand-eye calibrations, one at a time, on a thread of its own, which looks at frames and solves while the
+/// window goes on. None of its calls waits for the solver.
 class GuideWorker {
  public:
-  explicit GuideWorker(GuidePlan plan);
+  /// What is guided already is given up.
+  void start(GuidePlan plan);
+  /// Nothing comes of what is guided: the thread is asked to stop, and what it still solves is thrown away.
+  void give_up();
+  [[nodiscard]] bool guiding() const { return session_ != nullptr; }
 
+  // Of what is guided; of nothing else do they do or tell anything.
   /// Hands over an event. Bounded: where the thread falls behind, the oldest frames are left out.
   void push(const wire::Event& event);
   /// Ends the calibration with the stations that it has.
   void end(const std::string& why);
-
-  [[nodiscard]] GuideState state() const;
+  [[nodiscard]] std::optional<GuideState> state() const;
   /// The lasting lines so far, the newest last; at most some dozens.
   [[nodiscard]] std::vector<std::string> lines() const;
-  /// The outcome, once the calibration has ended; an error where something could not be used.
+  /// The outcome, once the calibration has ended; an error where something could not be used. Nothing is guided then.
   std::optional<Result<GuidedCalibration>> take();
 
  private:
-  void work(const std::stop_token& stop, const GuidePlan& plan);
-  [[nodiscard]] std::optional<wire::Event> next(const std::stop_token& stop);
-  void tell(const std::string& line);
+  /// What the thread and its owner share.
+  class Session;
 
-  enum Lane : std::size_t { kFrames, kPoses, kLanes };
-  static constexpr std::size_t kMostFrames = 50, kMostPoses = 2000;
-
-  BlockingQueue<wire::Event, kLanes> events_{{{{kMostFrames, WhenFull::drop_oldest}, {kMostPoses, WhenFull::refuse}}}};
-  mutable std::mutex mutex_;  // of what follows
-  std::string end_;
-  GuideState state_;
-  std::deque<std::string> lines_;
-  std::optional<Result<GuidedCalibration>> result_;
-  OwnedThread thread_;
+  std::shared_ptr<Session> session_;  ///< null: nothing is guided
+  Background<Result<GuidedCalibration>> work_;
 };
 
 }  // namespace birdseye::host

@@ -81,7 +81,7 @@ void HandEyeGuide::end(const std::string& why) {
 GuidedStations HandEyeGuide::finish() {
   if (const std::string words = stations_.left_out_words(); !words.empty()) tell_.lasting(words);
   tell_.lasting(session_.ended + "; the last solution is being worked out");
-  solve(true);
+  find_lens_or_say({});
   return std::move(session_);
 }
 
@@ -105,7 +105,7 @@ Result<void> HandEyeGuide::add(LiveStation taken) {
   station.tracker_from_sensor = taken.tracker_from_sensor;
   station.view = std::move(taken.view);
   session_.input.stations.push_back(std::move(station));
-  if (number >= kFirstSolved) solve(false);
+  if (number >= kFirstSolved) solve();
   if (session_.ended.empty() && number >= plan_.most_stations)
     session_.ended = fmt::format("{} stations, the most that were asked for", number);
   next_look_ = {};
@@ -121,38 +121,26 @@ Result<void> HandEyeGuide::keep(const LiveStation& taken, std::size_t number) {
        {plan_.keep / "poses" / (name + ".txt"), pose_text(taken.tracker_from_sensor.matrix())}});
 }
 
-/// The lens that is given, or that the views so far tell of.
-std::optional<CameraModel> HandEyeGuide::lens(bool last) {
-  if (plan_.camera) return plan_.camera;
-  std::vector<calibration::PatternView> views;
-  views.reserve(session_.input.stations.size());
-  for (const HandEyeStation& station : session_.input.stations) views.push_back(station.view);
-  calibration::CameraCalibrationSettings settings;
-  if (!last) {  // quick: which model is best is asked at the end
-    settings.model = calibration::LensModel::radial2_tangential2;
-    settings.folds = 2;
-  }
-  auto found = calibration::calibrate_camera(views, session_.width_px, session_.height_px, settings);
-  if (!found) {
-    session_.lens_fault = found.error().what;
-    return std::nullopt;
-  }
-  session_.lens_fault.clear();
-  lens_grade_ = calibration::judge_camera(*found).grade;
-  session_.lens = *std::move(found);
-  return session_.lens->camera;
+/// Where none is given.
+void HandEyeGuide::find_lens_or_say(const calibration::CameraCalibrationSettings& settings) {
+  if (plan_.camera) return;
+  find_lens(session_, settings);
+  if (!session_.lens) tell_.lasting("lens: not found yet: " + session_.lens_fault);
 }
 
-void HandEyeGuide::solve(bool last) {
-  session_.input.camera = lens(last);
-  if (!session_.input.camera) {
-    tell_.lasting("lens: not found yet: " + session_.lens_fault);
-    return;
-  }
+void HandEyeGuide::solve() {
+  calibration::CameraCalibrationSettings quick;  // which model is best is asked at the end
+  quick.model = calibration::LensModel::radial2_tangential2;
+  quick.folds = 2;
+  find_lens_or_say(quick);
+  if (!session_.input.camera) return;
   const auto result = calibration::calibrate_hand_eye(session_.input);
-  if (last || !result) return;
+  if (!result) return;
   Verdict verdict = calibration::judge(*result);
-  if (!plan_.camera) verdict.add(lens_grade_, lens_grade_ == Grade::pass ? "" : "the lens wants more views");
+  if (session_.lens) {
+    const Grade lens = calibration::judge_camera(*session_.lens).grade;
+    verdict.add(lens, lens == Grade::pass ? "" : "the lens wants more views");
+  }
   state_.grade = verdict.grade;
   if (result->solved) state_.held_out_mm = result->held_out_mm;
   if (result->solved)

@@ -5,11 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "calibration/camera/camera_calibration.hpp"
 #include "calibration/detect/pattern.hpp"
-#include "calibration/guide/guidance.hpp"
-#include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "device/wire/messages.hpp"
+#include "host/guide/guide_state.hpp"
+#include "host/guide/guided_calibration.hpp"
 #include "host/guide/live_stations.hpp"
 
 namespace birdseye::host {
@@ -21,26 +20,6 @@ struct GuidePlan {
   std::optional<CameraModel> camera;  ///< a lens that is known; empty: found from the same views
   std::filesystem::path keep;         ///< a folder for the stations' pictures and poses; empty: none are kept
   std::size_t fewest_stations = 12, most_stations = 40;
-};
-
-/// The stations that a guided calibration took, and why it ended.
-struct GuidedStations {
-  calibration::HandEyeInput input;
-  int width_px = 0, height_px = 0;
-  std::optional<calibration::CameraCalibration> lens;  ///< where it was found here
-  std::string lens_fault;                              ///< why none was, in words
-  std::string ended;                                   ///< why, in words
-};
-
-/// Where a guided calibration stands, for whoever holds the scope.
-struct GuideState {
-  std::string next = "hold the scope over the pattern, all of it in the picture, and still for a second";
-  calibration::Coverage coverage;  ///< of the stations, once a lens is known
-  std::size_t stations = 0;
-  bool collecting = true;  ///< false: enough has been taken, and the last solution is being worked out
-  bool pattern_seen = false;
-  std::optional<double> held_out_mm;  ///< of the solution so far
-  Grade grade = Grade::fail;
 };
 
 /// Leads a person through the stations of a hand-eye calibration. Fed with the appliance's events in order, it takes a
@@ -63,7 +42,7 @@ class HandEyeGuide {
   /// Ends the calibration with the stations that it has. why: in words.
   void end(const std::string& why);
   [[nodiscard]] bool ended() const { return !session_.ended.empty(); }
-  /// Works out the last solution and gives all that was taken. To be called once, at the end.
+  /// Works out the last lens and gives all that was taken. To be called once, at the end.
   GuidedStations finish();
 
   [[nodiscard]] const GuideState& state() const { return state_; }
@@ -72,8 +51,8 @@ class HandEyeGuide {
   Result<void> take_frame(const wire::VideoFrame& frame);
   Result<void> add(LiveStation taken);
   Result<void> keep(const LiveStation& taken, std::size_t number);
-  std::optional<CameraModel> lens(bool last);
-  void solve(bool last);
+  void find_lens_or_say(const calibration::CameraCalibrationSettings& settings);
+  void solve();
   [[nodiscard]] std::optional<Transform<Camera, Marker>> pose_of(const calibration::PatternView& view) const;
   void look();
 
@@ -84,7 +63,6 @@ class HandEyeGuide {
   Eigen::Vector3d extent_mm_;
   GuidedStations session_;
   GuideState state_;
-  Grade lens_grade_ = Grade::pass;
 };
 
 }  // namespace birdseye::host

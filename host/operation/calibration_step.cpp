@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "drivers/system/clock.hpp"
-#include "host/operation/operation.hpp"
 
 namespace birdseye::host {
 
 void CalibrationStep::begin(const std::string& bird, const std::optional<calibration::Pattern>& board) {
-  if (guide_ || !board) return;
+  if (guiding() || !board) return;
   GuidePlan plan;
   plan.bird = bird;
   plan.pattern = *board;
@@ -18,40 +19,37 @@ void CalibrationStep::begin(const std::string& bird, const std::optional<calibra
   }
   verdict_.reset();
   note_ = {false, "hold the scope over the board"};
-  guide_ = std::make_unique<GuideWorker>(plan);
+  guide_.start(std::move(plan));
 }
 
 void CalibrationStep::end() {
-  if (guide_) guide_->end("ended by hand");
+  guide_.end("ended by hand");
 }
 
 void CalibrationStep::push(const wire::Event& event) {
-  if (guide_) guide_->push(event);
+  guide_.push(event);
 }
 
 bool CalibrationStep::tick() {
-  if (!guide_) return false;
-  auto guided = guide_->take();
-  return guided && finish(*std::move(guided));
+  auto guided = guide_.take();
+  return guided && finish(*guided);
 }
 
-bool CalibrationStep::finish(Result<GuidedCalibration> guided) {
-  guide_.reset();
+bool CalibrationStep::finish(const Result<GuidedCalibration>& guided) {
   if (!guided) {
     note_.line = guided.error().what;
     return false;
   }
   verdict_ = guided->verdict;
-  if (guided->verdict.grade == Grade::fail) {
-    note_.line = "the verdict is fail; " + (guided->verdict.reasons.empty() ? "" : guided->verdict.reasons.front());
+  auto scope = calibrated_by_board(*guided, utc_now());
+  if (!scope) {
+    note_.line = scope.error().what;
     return false;
   }
-  const GuidedStations& stations = guided->stations;
-  const auto camera_rms_px = stations.lens ? std::optional(stations.lens->rms_px) : std::nullopt;
-  found_ = {ScopeSetup::of_hand_eye(*stations.input.camera, camera_rms_px, guided->hand_eye), utc_now(), true};
+  found_ = *std::move(scope);
   note_.done = true;
   note_.line = fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(guided->verdict.grade),
-                           stations.input.stations.size(), guided->hand_eye.held_out_mm);
+                           guided->stations.input.stations.size(), guided->hand_eye.held_out_mm);
   return true;
 }
 
@@ -72,19 +70,10 @@ void CalibrationStep::tell_none(const std::string& why) {
 
 void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& line) {
   if (found_ && kept.made_utc <= found_->made_utc) return;
-  guide_.reset();
+  guide_.give_up();
   found_ = kept;
   found_->by_board = true;
   note_ = {true, line};
-}
-
-std::optional<GuideState> CalibrationStep::guide() const {
-  if (!guide_) return std::nullopt;
-  return guide_->state();
-}
-
-std::vector<std::string> CalibrationStep::guide_lines() const {
-  return guide_ ? guide_->lines() : std::vector<std::string>();
 }
 
 }  // namespace birdseye::host

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,20 +33,23 @@ class CalibrationStep {
 
   [[nodiscard]] const std::optional<CalibratedScope>& found() const { return found_; }
   [[nodiscard]] const StepNote& note() const { return note_; }
-  [[nodiscard]] bool guiding() const { return guide_ != nullptr; }
+  [[nodiscard]] bool guiding() const { return guide_.guiding(); }
   /// The stations are taken, and the last solution is being worked out.
-  [[nodiscard]] bool working_out() const { return guide_ && !guide_->state().collecting; }
-  [[nodiscard]] std::optional<GuideState> guide() const;
-  [[nodiscard]] std::vector<std::string> guide_lines() const;
+  [[nodiscard]] bool working_out() const {
+    const auto state = guide_.state();
+    return state && !state->collecting;
+  }
+  [[nodiscard]] std::optional<GuideState> guide() const { return guide_.state(); }
+  [[nodiscard]] std::vector<std::string> guide_lines() const { return guide_.lines(); }
   [[nodiscard]] const std::optional<Verdict>& verdict() const { return verdict_; }
 
  private:
-  bool finish(Result<GuidedCalibration> guided);
+  bool finish(const Result<GuidedCalibration>& guided);
 
   std::optional<CalibratedScope> found_;
   StepNote note_;
   std::optional<Verdict> verdict_;
-  std::unique_ptr<GuideWorker> guide_;
+  GuideWorker guide_;
 };
 
 }  // namespace birdseye::host

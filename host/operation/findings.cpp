@@ -1,8 +1,20 @@
 #include "host/operation/findings.hpp"
 
+#include "host/guide/guided_calibration.hpp"
 #include "host/registration/rigid/point_matching.hpp"
 
 namespace birdseye::host {
+
+Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc) {
+  if (found.verdict.grade == Grade::fail) {
+    const std::string why = found.verdict.reasons.empty() ? "" : "; " + found.verdict.reasons.front();
+    return Error{Errc::degenerate, "the verdict is fail" + why};
+  }
+  const auto& lens = found.stations.lens;
+  return CalibratedScope{ScopeSetup::of_hand_eye(*found.stations.input.camera,
+                                                 lens ? std::optional(lens->rms_px) : std::nullopt, found.hand_eye),
+                         made_utc, true};
+}
 
 Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,
                                      std::span<const Eigen::Vector3d> touched_in_tracker_mm) {

@@ -14,12 +14,16 @@
 /// What the steps of an operation find: values, which later steps are given, whoever found them.
 namespace birdseye::host {
 
+struct GuidedCalibration;
+
 /// How the scope is calibrated.
 struct CalibratedScope {
   ScopeSetup scope;
   std::string made_utc;   ///< 2026-11-22T09:30:00Z
   bool by_board = false;  ///< here, by the board; else by a record
 };
+/// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
+Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);
 
 /// How the patient is registered.
 struct RegisteredPatient {

@@ -8,6 +8,7 @@
 #include "host/files/field_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/operation/operation.hpp"
+#include "host/simulated/simulated_patient.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
@@ -16,8 +17,8 @@ namespace birdseye::host {
 
 namespace {
 
-Result<void> read_labels(const PatientFiles& files, PatientPlan& plan) {
-  const auto labels = import_labels(files.labels, plan.ct);
+Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std::stop_token& stop) {
+  const auto labels = import_labels(files.labels, plan.ct, stop);
   if (!labels) return labels.error();
   if (!files.shown.empty()) {
     auto kept = keep_labels(plan.ct, *labels, files.shown);
@@ -43,6 +44,16 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan) {
 
 }  // namespace
 
+PatientFiles simulated_patient(const std::filesystem::path& folder) {
+  PatientFiles files;
+  files.ct = folder / "phantom" / "ct";
+  files.labels = folder / "phantom" / "segmentation.nii.gz";
+  files.shown.assign(SimulatedLabels::kShown.begin(), SimulatedLabels::kShown.end());
+  files.targets = {SimulatedLabels::kTumour};
+  files.organ.assign(SimulatedLabels::kOrgan.begin(), SimulatedLabels::kOrgan.end());
+  return files;
+}
+
 Eigen::Vector3d middle_of_ct(const Volume& ct) {
   return ct.patient_from_voxel * Eigen::Vector3d(0.5 * Eigen::Vector3d(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1));
 }
@@ -62,15 +73,15 @@ Result<void> check_labels_named(const PatientFiles& files) {
   return {};
 }
 
-Result<PatientPlan> read_patient(const PatientFiles& files) {
+Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_token& stop) {
   if (auto named = check_labels_named(files); !named) return named.error();
   PatientPlan plan;
-  auto ct = import_volume(files.ct);
+  auto ct = import_volume(files.ct, stop);
   if (!ct) return ct.error();
   plan.ct = *std::move(ct);
   plan.checksum = ct_checksum(plan.ct);
   if (!files.labels.empty()) {
-    if (auto read = read_labels(files, plan); !read) return read.error();
+    if (auto read = read_labels(files, plan, stop); !read) return read.error();
   }
   if (plan.shown.hu.empty()) plan.shown = plan.ct;
   if (!files.fiducials.empty()) {

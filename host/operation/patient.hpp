@@ -27,6 +27,10 @@ struct PatientFiles {
   std::filesystem::path landmarks;  ///< a table name, x, y, z; or empty
 };
 
+/// The simulated cart's patient: its liver's vessels and tumour are shown, and the tumour's middle is the landmark.
+/// folder: the cart's.
+PatientFiles simulated_patient(const std::filesystem::path& folder);
+
 struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
@@ -44,8 +48,9 @@ Eigen::Vector3d target_in_patient_mm(const PatientPlan& plan);
 /// Refuses labels that are named without a file of labels, and a file of labels without those of the organ: nobody else
 /// knows which they are.
 Result<void> check_labels_named(const PatientFiles& files);
-/// An error names the file. Where no fiducials are given, they are left to find_fiducials.
-Result<PatientPlan> read_patient(const PatientFiles& files);
+/// An error names the file. Where no fiducials are given, they are left to find_fiducials. Once stop is requested, what
+/// is still to be read is not.
+Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_token& stop = {});
 /// The markers that the CT shows, the brightest first.
 std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop);
 

@@ -26,9 +26,9 @@ Result<std::shared_ptr<Engine>> PatientStep::make(const std::string& name,
 void PatientStep::load(const PatientFiles& files) {
   files_ = files;
   transfer_is_newer_ = false;
-  loading_.start([files, name = engine_name_, transfer = transfer_](const std::stop_token&, const auto& say) {
+  loading_.start([files, name = engine_name_, transfer = transfer_](const std::stop_token& stop, const auto& say) {
     say("reading the CT");
-    auto read = read_patient(files);
+    auto read = read_patient(files, stop);
     if (!read) return Result<Loaded>(read.error());
     auto plan = std::make_shared<const PatientPlan>(*std::move(read));
     auto engine = make(name, plan, transfer);

@@ -18,6 +18,7 @@ class PatientStep {
   /// transfer: a preset or a file; engine: its name.
   PatientStep(const std::string& transfer, std::string engine);
 
+  /// Of one that is still being read nothing comes any more.
   void load(const PatientFiles& files);
   /// The picture has these colours once an engine is made that draws by them.
   void set_transfer(const TransferFunction& transfer);

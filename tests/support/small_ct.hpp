@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +28,28 @@ inline std::string small_ct(const Scratch& scratch, double radius_mm = 12) {
   }
   EXPECT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid, hu, 1));
   return (scratch / "ct").string();
+}
+
+/// Spherical markers at these places of soft tissue, as a DICOM series.
+inline hw_sim::Grid write_ct_with_markers(const std::filesystem::path& folder,
+                                          std::span<const Eigen::Vector3d> markers_in_patient_mm) {
+  hw_sim::Grid grid;
+  grid.size = {68, 75, 61};
+  grid.spacing_mm = {1.5, 1.5, 1.5};
+  grid.origin_mm = {-20, -20, -20};
+  std::vector<std::int16_t> hu;
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        double outside_mm = 100;
+        for (const Eigen::Vector3d& marker : markers_in_patient_mm)
+          outside_mm = std::min(outside_mm, (grid.point(i, j, k) - marker).norm() - 4);
+        hu.push_back(static_cast<std::int16_t>(40 + 1500 * std::clamp(0.5 - outside_mm / 1.5, 0.0, 1.0)));
+      }
+    }
+  }
+  EXPECT_TRUE(hw_sim::write_dicom_series(folder, grid, hu, 1));
+  return grid;
 }
 
 }  // namespace birdseye::testing

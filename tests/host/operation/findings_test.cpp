@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "host/guide/guided_calibration.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/replay_setup.hpp"
+#include "tests/support/hand_eye_bench.hpp"
 #include "tests/support/live_operation.hpp"
 
 namespace birdseye::host {
@@ -25,6 +27,51 @@ Volume ct() {
   Volume out;
   out.size = {31, 41, 51};
   return out;
+}
+
+/// Of a simulated scope over a board, without its lens.
+GuidedStations stations_over_a_board() {
+  birdseye::testing::HandEyeBench bench({.stations = 20, .corner_px = 0.05, .position_mm = 0.1, .angle_deg = 0.02});
+  GuidedStations out;
+  out.width_px = bench.input.camera->width_px;
+  out.height_px = bench.input.camera->height_px;
+  out.input = std::move(bench.input);
+  out.input.camera.reset();
+  return out;
+}
+
+TEST(CalibratedByBoard, HasTheFiguresOfItsLensAndOfHandEye) {
+  GuidedStations stations = stations_over_a_board();
+  find_lens(stations);
+  ASSERT_TRUE(stations.lens.has_value()) << stations.lens_fault;
+  const auto solved = calibrate_guided(stations);
+  ASSERT_TRUE(solved) << solved.error().what;
+  const auto found = calibrated_by_board(*solved, "2026-11-22T09:30:00Z");
+  ASSERT_TRUE(found) << found.error().what;
+  EXPECT_TRUE(found->by_board);
+  EXPECT_EQ(found->made_utc, "2026-11-22T09:30:00Z");
+  EXPECT_EQ(found->scope.figures().camera_rms_px, stations.lens->rms_px);
+  EXPECT_EQ(found->scope.figures().held_out_px, solved->hand_eye.held_out_px);
+  EXPECT_EQ(found->scope.camera().fx_px, stations.lens->camera.fx_px);
+  // A lens that is given is not judged, and states no figure.
+  stations.lens.reset();
+  const auto given = calibrated_by_board(*calibrate_guided(stations), "");
+  ASSERT_TRUE(given) << given.error().what;
+  EXPECT_FALSE(given->scope.figures().camera_rms_px.has_value());
+}
+
+TEST(CalibratedByBoard, WhatTheVerdictFailsIsRefusedWithTheReason) {
+  GuidedStations stations = stations_over_a_board();
+  stations.input.stations.resize(2);
+  find_lens(stations);
+  EXPECT_FALSE(stations.input.camera.has_value());
+  const auto solved = calibrate_guided(stations);
+  ASSERT_TRUE(solved) << solved.error().what;
+  EXPECT_EQ(solved->verdict.grade, Grade::fail);
+  const auto found = calibrated_by_board(*solved, "");
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, Errc::degenerate);
+  EXPECT_EQ(found.error().what, "the verdict is fail; no lens was found: " + stations.lens_fault);
 }
 
 TEST(RegisterByTouches, TellsWhichFiducialEachTouchWas) {

@@ -55,24 +55,9 @@ TEST(LiveWorkflow, GoesFromTheLinkToARegisteredPatient) {
   EXPECT_EQ(workflow.view().step, LiveStep::run);
 }
 
-/// As kFiducials, in soft tissue.
+/// With markers where kFiducials are.
 std::string ct_with_markers(const Scratch& scratch) {
-  hw_sim::Grid grid;
-  grid.size = {68, 75, 61};
-  grid.spacing_mm = {1.5, 1.5, 1.5};
-  grid.origin_mm = {-20, -20, -20};
-  std::vector<std::int16_t> hu;
-  for (int k = 0; k < grid.size[2]; ++k) {
-    for (int j = 0; j < grid.size[1]; ++j) {
-      for (int i = 0; i < grid.size[0]; ++i) {
-        double outside_mm = 100;
-        for (const Eigen::Vector3d& f : kFiducials)
-          outside_mm = std::min(outside_mm, (grid.point(i, j, k) - f).norm() - 4);
-        hu.push_back(static_cast<std::int16_t>(40 + 1500 * std::clamp(0.5 - outside_mm / 1.5, 0.0, 1.0)));
-      }
-    }
-  }
-  EXPECT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid, hu, 1));
+  birdseye::testing::write_ct_with_markers(scratch / "ct", kFiducials);
   return (scratch / "ct").string();
 }
 

@@ -11,6 +11,7 @@
 #include "host/operation/fiducial_step.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation_keeper.hpp"
+#include "host/operation/patient_step.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/view_step.hpp"
 #include "tests/support/live_operation.hpp"
@@ -78,6 +79,45 @@ TEST(CalibrationStep, GuidesOnlyOverABoard) {
   }
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.found().has_value());
+}
+
+TEST(CalibrationStep, WhatIsTakenUpGivesUpTheGuideAndItMayBeginAgain) {
+  const auto board = calibration::parse_pattern("chessboard:14x9:3mm");
+  CalibrationStep step;
+  step.begin("scope", *board);
+  const CalibratedScope kept{ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}), "2026-11-22T09:35:00Z"};
+  step.take_up(kept, "taken up");
+  EXPECT_FALSE(step.guiding());
+  EXPECT_FALSE(step.guide().has_value());
+  EXPECT_FALSE(step.tick());
+  EXPECT_EQ(step.note().line, "taken up");
+  step.begin("scope", *board);
+  ASSERT_TRUE(step.guiding());
+  EXPECT_TRUE(step.guide()->collecting);
+  step.end();
+  for (int i = 0; i < 1000 && step.guiding(); ++i) {
+    sleep_for(Duration::from_ms(10));
+    EXPECT_FALSE(step.tick());
+  }
+  EXPECT_FALSE(step.guiding());
+  EXPECT_EQ(step.found()->made_utc, kept.made_utc) << "no station, and what there was still holds";
+}
+
+TEST(PatientStep, OfTwoPatientsTheSecondIsRead) {
+  const Scratch first, second;
+  PatientFiles files, others;
+  files.ct = birdseye::testing::small_ct(first);
+  others.ct = birdseye::testing::small_ct(second, 8);
+  PatientStep step("tumour-and-vessels", "cpu");
+  step.load(files);
+  step.load(others);  // while the first is read
+  for (int i = 0; i < 1000 && !step.plan() && step.fault().empty(); ++i) {
+    sleep_for(Duration::from_ms(10));
+    step.tick();
+  }
+  ASSERT_TRUE(step.plan()) << step.fault();
+  EXPECT_EQ(step.plan()->checksum, read_patient(others)->checksum);
+  EXPECT_NE(step.plan()->checksum, read_patient(files)->checksum);
 }
 
 Touch touch_at(const Eigen::Vector3d& in_patient_mm) {
