@@ -11,6 +11,7 @@
 #include "host/demo/demo_report.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/landmark_check.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/patient.hpp"
 #include "host/window/live_app.hpp"
@@ -121,7 +122,7 @@ nlohmann::json json_of(const LiveFigures& figures, const OperationView& operatio
                       {"age_ms_max", figures.ages.most_ms()},
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
                       {"stood_still", figures.stood_still},
-                      {"engine", operation.engine_name()},
+                      {"engine", operation.engine_name},
                       {"link_says", operation.link.words},
                       {"appliance_says", operation.link.appliance_says},
                       {"picture_says", figures.picture_says}};

@@ -1,20 +1,12 @@
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "device/wire/messages.hpp"
 #include "host/operation/live_step.hpp"
+#include "host/operation/step_states.hpp"
 
 namespace birdseye::host {
-
-/// What is connected.
-struct LinkState {
-  bool connected = false;
-  std::string words;  ///< to what, or why not
-  std::string appliance_says;
-  std::optional<wire::Health> health;
-};
 
 /// The first step: done while the appliance is there and ready. What tells nothing of its health, as another server or
 /// its recording, is ready when it sends video and says nothing against it.

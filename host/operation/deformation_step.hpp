@@ -10,17 +10,12 @@
 #include "host/operation/findings.hpp"
 #include "host/operation/live_step.hpp"
 #include "host/operation/patient.hpp"
+#include "host/operation/step_states.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/registration/views/view_registration.hpp"
 #include "host/render/scene/transfer_function.hpp"
 
 namespace birdseye::host {
-
-/// A registration that runs on a thread of its own, as far as it is.
-struct DeformProgress {
-  std::vector<float> similarity;  ///< nats, of each step so far; the resolution changes on the way
-  std::string line;
-};
 
 /// Matches the CT with views. The thread that does it has copies of all it is given, and shares what is never changed.
 class DeformationStep {

@@ -7,16 +7,10 @@
 
 #include "host/operation/findings.hpp"
 #include "host/operation/live_step.hpp"
+#include "host/operation/step_states.hpp"
 #include "host/registration/rigid/touch_detector.hpp"
 
 namespace birdseye::host {
-
-/// A fiducial that was touched.
-struct TouchedFiducial {
-  Eigen::Vector3d tip_in_tracker_mm;
-  double rms_mm = 0;  ///< of the tip while it rested
-  std::optional<double> residual_mm;
-};
 
 /// The registration of the patient by fiducials that the pointer touches.
 class FiducialStep {

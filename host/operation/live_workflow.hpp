@@ -63,6 +63,10 @@ class LiveWorkflow {
   ShownPicture shown_at(HostTime now) { return picture_.at(now); }
   [[nodiscard]] const LivePicture& picture() const { return picture_; }
   [[nodiscard]] OperationView view() const;
+  /// The CT as it is shown, from another place than the scope's. Empty: it cannot be drawn yet.
+  [[nodiscard]] std::optional<ImageRgba> ct_seen_from(const CameraModel& camera,
+                                                      const Transform<Camera, Patient>& camera_from_patient,
+                                                      const RenderSettings& settings) const;
 
  private:
   void take(const wire::Birds& birds);

@@ -1,6 +1,8 @@
 // What the steps know, told as values.
 #include "host/operation/live_workflow.hpp"
 
+#include "host/operation/landmark_check.hpp"
+
 namespace birdseye::host {
 
 OperationView LiveWorkflow::view() const {
@@ -34,7 +36,7 @@ OperationView LiveWorkflow::view() const {
   out.patient = patient_.plan();
   out.patient_files = patient_.files();
   out.engine_asked = settings_.engine;
-  out.engine = patient_.engine();
+  if (patient_.engine()) out.engine_name = patient_.engine()->name();
   out.transfer = patient_.transfer();
   out.drawn_by = patient_.drawn_by();
   out.shapes = shapes_;
@@ -55,6 +57,13 @@ OperationView LiveWorkflow::view() const {
                             deformed != nullptr ? deformed->uncertainty_mm : std::nullopt},
                            picture_.figures());
   return out;
+}
+
+std::optional<ImageRgba> LiveWorkflow::ct_seen_from(const CameraModel& camera,
+                                                    const Transform<Camera, Patient>& camera_from_patient,
+                                                    const RenderSettings& settings) const {
+  if (!patient_.engine()) return std::nullopt;
+  return patient_.engine()->render(camera, camera_from_patient, settings);
 }
 
 }  // namespace birdseye::host

@@ -7,16 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "host/guide/hand_eye_guide.hpp"
-#include "host/operation/connection_step.hpp"
-#include "host/operation/deformation_step.hpp"
-#include "host/operation/fiducial_step.hpp"
-#include "host/operation/landmark_check.hpp"
+#include "calibration/base/verdict.hpp"
+#include "host/guide/guide_state.hpp"
+#include "host/operation/findings.hpp"
 #include "host/operation/live_step.hpp"
 #include "host/operation/patient.hpp"
+#include "host/operation/step_states.hpp"
 #include "host/overlay/trust.hpp"
 #include "host/registration/views/view_advice.hpp"
-#include "host/render/engine.hpp"
+#include "host/render/scene/transfer_function.hpp"
 
 namespace birdseye::host {
 
@@ -57,12 +56,11 @@ struct OperationView {
   std::shared_ptr<const PatientPlan> patient;  ///< null: it is not read yet
   PatientFiles patient_files;
   std::string engine_asked;  ///< as it was named: "auto" too
-  std::shared_ptr<Engine> engine;
+  std::string engine_name;   ///< what runs, in words; empty: the CT cannot be drawn yet
   std::shared_ptr<const TransferFunction> transfer, drawn_by;  ///< that is asked for, and that the engine draws by
   std::uint64_t shapes = 0;  ///< another number: another CT, or it is deformed in another way
 
   [[nodiscard]] const StepNote& note(LiveStep which) const { return notes[static_cast<std::size_t>(which)]; }
-  [[nodiscard]] std::string engine_name() const { return engine ? engine->name() : ""; }
 };
 
 /// What the space bar and the pedal do in the present step.

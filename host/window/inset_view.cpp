@@ -35,11 +35,16 @@ InsetView::InsetView(const Volume& volume) {
   outside_from_patient_ = Transform<Camera, Patient>(outside_from_patient, -outside_from_patient * eye_mm);
 }
 
-Picture InsetView::draw(Engine& engine, const std::optional<Transform<Camera, Patient>>& camera_from_patient) const {
+RenderSettings InsetView::render_settings() {
   RenderSettings settings;
   settings.step_mm = 2;
+  return settings;
+}
+
+Picture InsetView::draw(const ImageRgba& ct,
+                        const std::optional<Transform<Camera, Patient>>& camera_from_patient) const {
   constexpr std::uint8_t kDark = 18;
-  Picture picture{kWidthPx, kHeightPx, on_grey(engine.render(camera_, outside_from_patient_, settings), kDark)};
+  Picture picture{kWidthPx, kHeightPx, on_grey(ct, kDark)};
   if (!camera_from_patient) return picture;
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient->inverse();
   cv::Mat canvas(kHeightPx, kWidthPx, CV_8UC3, picture.rgb.data());

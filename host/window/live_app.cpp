@@ -105,9 +105,12 @@ void LiveApp::note_patient() {
 /// Some times a second, between frames: it is no part of what must be live.
 void LiveApp::draw_inset() {
   constexpr Duration kEvery = Duration::from_ms(250);
-  if (!inset_ || !operation_.engine || Duration{host_now().ns - inset_drawn_.ns} < kEvery) return;
+  if (!inset_ || Duration{host_now().ns - inset_drawn_.ns} < kEvery) return;
   inset_drawn_ = host_now();
-  const Picture picture = inset_->draw(*operation_.engine, workflow_.picture().camera_from_patient());
+  const auto ct =
+      workflow_.ct_seen_from(inset_->camera(), inset_->outside_from_patient(), InsetView::render_settings());
+  if (!ct) return;
+  const Picture picture = inset_->draw(*ct, workflow_.picture().camera_from_patient());
   window_->set_picture(LiveWindow::Slot::inset, {picture.rgb, picture.width_px, picture.height_px});
 }
 

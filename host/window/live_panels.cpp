@@ -326,7 +326,7 @@ void draw_strip(const PanelLayout& at, const OperationView& operation, const Pan
   say(kText, fmt::format("exposure to screen, ms: p50 {:.0f}  p95 {:.0f}  max {:.0f}", facts.ages->percentile_ms(0.5),
                          facts.ages->percentile_ms(0.95), facts.ages->most_ms()));
   say(kQuiet, fmt::format("{:.1f} frames/s, {} skipped; engine {}", facts.frames_per_s, facts.frames_skipped,
-                          operation.engine_name()));
+                          operation.engine_name));
   if (const auto& health = operation.link.health)
     say(kQuiet, fmt::format("tracker {:.0f} Hz, {} doubted", health->tracker_rate_hz, health->doubted));
   if (!operation.fault.empty()) say(kBad, operation.fault);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "host/overlay/render_scene.hpp"
+#include "host/render/engine.hpp"
 #include "host/window/window.hpp"
 
 namespace birdseye::host {

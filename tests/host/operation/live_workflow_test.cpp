@@ -85,6 +85,28 @@ TEST(LiveWorkflow, WhatIsTouchedBeforeTheMarkersAreFoundCounts) {
   EXPECT_EQ(workflow.view().step, LiveStep::views);
 }
 
+TEST(LiveWorkflow, TheCtIsSeenFromElsewhereOnceItCanBeDrawn) {
+  const Scratch scratch;
+  CameraModel camera;
+  camera.width_px = 40;
+  camera.height_px = 30;
+  camera.fx_px = camera.fy_px = 40;
+  camera.cx_px = 20;
+  camera.cy_px = 15;
+  // The ball about the patient's origin, from 80 mm.
+  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, 80));
+  EXPECT_FALSE(LiveWorkflow(LiveSettings{}).ct_seen_from(camera, camera_from_patient, {}).has_value());
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  EXPECT_EQ(workflow.view().engine_name.substr(0, 3), "cpu") << workflow.view().fault;
+  const auto ct = workflow.ct_seen_from(camera, camera_from_patient, {});
+  ASSERT_TRUE(ct.has_value());
+  ASSERT_EQ(ct->rgba.size(), std::size_t{4} * 40 * 30);
+  const std::size_t middle = 4 * (std::size_t{15} * 40 + 20);
+  EXPECT_GT(ct->rgba[middle + 3], 0) << "the ball";
+  EXPECT_EQ(ct->rgba[3], 0) << "the air beside it";
+}
+
 /// The scope at its place, looking at the patient's point from so far.
 wire::VideoFrame looking_at(const LiveWorkflow& workflow, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
                             double sigma_mm) {

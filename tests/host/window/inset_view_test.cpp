@@ -6,17 +6,10 @@ namespace birdseye::host {
 namespace {
 
 /// Shows nothing of the volume.
-class Empty final : public Engine {
- public:
-  void deform(const DisplacementField& /*field*/) override {}
-  void undeform() override {}
-  ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& /*pose*/,
-                   const RenderSettings& /*settings*/) override {
-    const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
-    return {camera.width_px, camera.height_px, std::vector<std::uint8_t>(4 * pixels, 0)};
-  }
-  [[nodiscard]] std::string name() const override { return "empty"; }
-};
+ImageRgba empty(const CameraModel& camera) {
+  const auto pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+  return {camera.width_px, camera.height_px, std::vector<std::uint8_t>(4 * pixels, 0)};
+}
 
 Volume body() {
   Volume volume;
@@ -33,14 +26,14 @@ std::size_t bright(const Picture& picture) {
 }
 
 TEST(InsetView, ShowsTheScopeWhereItIsKnown) {
-  Empty engine;
   const InsetView inset(body());
-  EXPECT_EQ(bright(inset.draw(engine, std::nullopt)), 0U);
+  const ImageRgba ct = empty(inset.camera());
+  EXPECT_EQ(bright(inset.draw(ct, std::nullopt)), 0U);
   // In front of the patient (-y), looking to the back (+y).
   Eigen::Matrix3d camera_from_patient;
   camera_from_patient << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   const Transform<Camera, Patient> pose(camera_from_patient, -camera_from_patient * Eigen::Vector3d(0, -120, 0));
-  const Picture seen = inset.draw(engine, pose);
+  const Picture seen = inset.draw(ct, pose);
   EXPECT_GT(bright(seen), 100U);
   EXPECT_EQ(seen.width_px, InsetView::kWidthPx);
 }

@@ -96,12 +96,14 @@ class LiveWindowPictures : public ::testing::Test {
   void expect_looks(const std::string& name, LiveWorkflow& workflow, std::optional<HostTime> now) {
     const ShownPicture shown = now ? workflow.shown_at(*now) : ShownPicture{};
     if (shown.any) window_->set_picture(LiveWindow::Slot::video, {*shown.rgb, shown.width_px, shown.height_px});
-    if (workflow.view().patient != nullptr && workflow.view().engine != nullptr) {
+    if (workflow.view().patient != nullptr && !workflow.view().engine_name.empty()) {
       histogram_ = HuHistogram(workflow.view().patient->shown);
       facts_.histogram = &histogram_;
       editor_.set_points(workflow.view().transfer->points());
-      const Picture inset = InsetView(workflow.view().patient->shown)
-                                .draw(*workflow.view().engine, workflow.picture().camera_from_patient());
+      const InsetView view(workflow.view().patient->shown);
+      const auto ct = workflow.ct_seen_from(view.camera(), view.outside_from_patient(), InsetView::render_settings());
+      ASSERT_TRUE(ct.has_value());
+      const Picture inset = view.draw(*ct, workflow.picture().camera_from_patient());
       window_->set_picture(LiveWindow::Slot::inset, {inset.rgb, inset.width_px, inset.height_px});
     }
     for (int i = 0; i < 3; ++i) {
@@ -205,7 +207,7 @@ TEST_F(LiveWindowPictures, AnEngineOnTheCardLeavesTheWindowItsOwnContext) {
   LiveWorkflow workflow(settings);
   Hand hand(workflow);
   begin(workflow, hand, 4);
-  ASSERT_EQ(workflow.view().engine_name().substr(0, 2), "gl") << workflow.view().fault;
+  ASSERT_EQ(workflow.view().engine_name.substr(0, 2), "gl") << workflow.view().fault;
   const HostTime now = run_overlay(workflow);
   ASSERT_TRUE(workflow.shown_at(now).overlaid) << workflow.shown_at(now).reason;
   expect_looks("run-1920x1080", workflow, now);

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "device/wire/messages.hpp"
+
+/// How single steps stand, for whoever shows them: values alone, which tell nothing of how a step works.
+namespace birdseye::host {
+
+/// What is connected.
+struct LinkState {
+  bool connected = false;
+  std::string words;  ///< to what, or why not
+  std::string appliance_says;
+  std::optional<wire::Health> health;
+};
+
+/// A fiducial that was touched.
+struct TouchedFiducial {
+  Eigen::Vector3d tip_in_tracker_mm;
+  double rms_mm = 0;  ///< of the tip while it rested
+  std::optional<double> residual_mm;
+};
+
+/// A registration that runs on a thread of its own, as far as it is.
+struct DeformProgress {
+  std::vector<float> similarity;  ///< nats, of each step so far; the resolution changes on the way
+  std::string line;
+};
+
+/// What the pointer's tip is near to, in the CT as it is shown.
+struct CheckReading {
+  Eigen::Vector3d tip_in_patient_mm;
+  std::string nearest;  ///< landmark or fiducial; empty: there is none
+  double distance_mm = 0;
+};
+
+}  // namespace birdseye::host
