@@ -32,7 +32,6 @@ class Background {
     cancel();
     {
       std::unique_lock lock(shared_->mutex);
-      shared_->next = nullptr;
       if (shared_->ended.wait(lock, Deadline::after(ends_within_), [this] { return !shared_->running; })) return;
     }
     thread_.let_go();

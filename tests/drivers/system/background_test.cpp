@@ -87,6 +87,7 @@ TEST(Background, LetsGoOfWorkThatHangsWhenItsOwnerGoes) {
   EXPECT_TRUE(gone->pop(Deadline::after(kLongWork))) << "it has ended by itself, and touched nothing of its owner's";
 }
 
+/// Also where the thread has not begun it yet: what was to be written is written.
 TEST(Background, WaitsForWorkThatStopsWhenItsOwnerGoes) {
   const auto ended = std::make_shared<bool>(false);
   {
