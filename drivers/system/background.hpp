@@ -94,13 +94,16 @@ class Background {
       Work work = std::exchange(shared->next, nullptr);
       const std::stop_token stop = shared->stop.get_token();
       lock.unlock();
-      std::optional<T> result = work(stop, say);
-      work = nullptr;  // what it holds is gone before anybody hears that it has ended
-      lock.lock();
-      if (!shared->next) shared->result = std::exchange(result, std::nullopt);
-      if (!result) continue;
-      lock.unlock();  // to free a CT takes its time
-      result.reset();
+      {
+        T result = work(stop, say);
+        work = nullptr;  // what it holds is gone before anybody hears that it has ended
+        lock.lock();
+        if (!shared->next) {
+          shared->result.emplace(std::move(result));
+          continue;
+        }
+        lock.unlock();  // to free a CT takes its time
+      }
       lock.lock();
     }
     shared->running = false;
