@@ -1,9 +1,10 @@
 #pragma once
 
-#include <unistd.h>
+#include <stdlib.h>
 
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 
 namespace birdseye::testing {
@@ -14,12 +15,13 @@ inline std::string contents_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// A folder of its own for one test, removed after it.
+/// A folder of its own, removed with it.
 class Scratch {
  public:
-  Scratch() : path_(std::filesystem::temp_directory_path() / ("birdseye-test-" + std::to_string(::getpid()))) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
+  Scratch() {
+    std::string name = std::filesystem::temp_directory_path() / "birdseye-test-XXXXXX";
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error(name + " cannot be made");
+    path_ = name;
   }
   ~Scratch() { std::filesystem::remove_all(path_); }
   Scratch(const Scratch&) = delete;
