@@ -1,0 +1,207 @@
+#include "host/volume/signed_distance.hpp"
+
+#include <itkImage.h>
+#include <itkLinearInterpolateImageFunction.h>
+#include <itkNearestNeighborExtrapolateImageFunction.h>
+#include <itkReinitializeLevelSetImageFilter.h>
+#include <itkResampleImageFilter.h>
+#include <itkSmoothingRecursiveGaussianImageFilter.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace birdseye::host {
+
+namespace {
+
+using Share = itk::Image<float, 3>;
+
+constexpr double kSmoothing_mm = 1;
+
+/// Where a mask is not 0: its first and last voxel along each axis.
+struct Extent {
+  std::array<int, 3> first{}, last{};
+};
+Extent extent_of(const Volume& grid, std::span<const std::uint8_t> mask) {
+  Extent out{grid.size, {-1, -1, -1}};
+  for (int k = 0; k < grid.size[2]; ++k) {
+    for (int j = 0; j < grid.size[1]; ++j) {
+      for (int i = 0; i < grid.size[0]; ++i) {
+        if (mask[grid.index(i, j, k)] == 0) continue;
+        const std::array<int, 3> p{i, j, k};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          out.first[axis] = std::min(out.first[axis], p[axis]);
+          out.last[axis] = std::max(out.last[axis], p[axis]);
+        }
+      }
+    }
+  }
+  return out;
+}
+
+/// The share of organ at each voxel, in a frame of its own: mm along the grid's axes, from the first voxel's centre on.
+Share::Pointer image_of(const Volume& grid, std::span<const std::uint8_t> mask) {
+  const auto image = Share::New();
+  Share::SizeType size;
+  Share::SpacingType spacing;
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    size[axis] = static_cast<itk::SizeValueType>(grid.size[axis]);
+    spacing[axis] = grid.spacing_mm[axis];
+  }
+  image->SetRegions(size);
+  image->SetSpacing(spacing);
+  image->Allocate();
+  std::transform(mask.begin(), mask.end(), image->GetBufferPointer(),
+                 [](std::uint8_t m) { return m != 0 ? 1.0F : 0.0F; });
+  const auto smooth = itk::SmoothingRecursiveGaussianImageFilter<Share, Share>::New();
+  smooth->SetInput(image);
+  smooth->SetSigma(std::max(kSmoothing_mm, 0.5 * grid.spacing_mm.maxCoeff()));
+  smooth->Update();
+  return smooth->GetOutput();
+}
+
+/// At the points of another grid, whose first point is at origin_mm. Steps are of 1 there: the filters after it count
+/// in them.
+Share::Pointer resampled(const Share::Pointer& share, const std::array<int, 3>& points, double spacing_mm,
+                         const Eigen::Vector3d& origin_mm) {
+  const auto resample = itk::ResampleImageFilter<Share, Share>::New();
+  resample->SetInput(share);
+  resample->SetInterpolator(itk::LinearInterpolateImageFunction<Share>::New());
+  resample->SetExtrapolator(itk::NearestNeighborExtrapolateImageFunction<Share, double>::New());
+  Share::SizeType size;
+  Share::PointType origin;
+  Share::SpacingType steps;
+  steps.Fill(spacing_mm);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    size[axis] = static_cast<itk::SizeValueType>(points[axis]);
+    origin[axis] = origin_mm[axis];
+  }
+  resample->SetSize(size);
+  resample->SetOutputOrigin(origin);
+  resample->SetOutputSpacing(steps);
+  resample->Update();
+  const Share::Pointer out = resample->GetOutput();
+  steps.Fill(1);
+  out->SetSpacing(steps);
+  return out;
+}
+
+/// Steps of the grid, positive where the share is over a half: by fast marching from where the share is a half, between
+/// the grid's points.
+Share::Pointer distance_of(const Share::Pointer& share) {
+  const auto march = itk::ReinitializeLevelSetImageFilter<Share>::New();
+  march->SetInput(share);
+  march->SetLevelSetValue(0.5);
+  march->Update();
+  return march->GetOutput();
+}
+
+}  // namespace
+
+SignedDistance::SignedDistance(const std::array<int, 3>& points, double spacing_mm,
+                               const Eigen::Affine3d& patient_from_box, std::span<const float> distances_mm)
+    : points_(points),
+      spacing_mm_(spacing_mm),
+      box_mm_(spacing_mm * Eigen::Vector3d(points[0] - 1, points[1] - 1, points[2] - 1)),
+      patient_from_box_(patient_from_box),
+      box_from_patient_(patient_from_box.inverse()),
+      values_(grid_count(points)) {
+  for (int k = 0; k < points[2]; ++k) {
+    for (int j = 0; j < points[1]; ++j) {
+      for (int i = 0; i < points[0]; ++i) {
+        const std::array<int, 3> p{i, j, k};
+        Eigen::Vector4f& value = values_[grid_index(points, i, j, k)];
+        value[3] = distances_mm[grid_index(points, i, j, k)];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          std::array<int, 3> low = p, high = p;
+          low[axis] = std::max(0, p[axis] - 1);
+          high[axis] = std::min(points[axis] - 1, p[axis] + 1);
+          value[static_cast<Eigen::Index>(axis)] = (distances_mm[grid_index(points, high[0], high[1], high[2])] -
+                                                    distances_mm[grid_index(points, low[0], low[1], low[2])]) /
+                                                   static_cast<float>((high[axis] - low[axis]) * spacing_mm);
+        }
+      }
+    }
+  }
+}
+
+SignedDistance::Cell SignedDistance::cell_of(const Eigen::Vector3d& place_in_patient_mm) const {
+  const Eigen::Vector3d place_mm = box_from_patient_ * place_in_patient_mm;
+  const Eigen::Vector3d nearest_mm = place_mm.cwiseMax(0.0).cwiseMin(box_mm_);
+  const Eigen::Vector3f x = (nearest_mm / spacing_mm_).cast<float>();
+  Cell cell{};
+  std::array<int, 3> base{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float v = x[static_cast<Eigen::Index>(axis)];
+    base[axis] = std::min(static_cast<int>(v), points_[axis] - 2);
+    cell.t[axis] = v - static_cast<float>(base[axis]);
+  }
+  cell.base = grid_index(points_, base[0], base[1], base[2]);
+  cell.beyond_mm = place_mm - nearest_mm;
+  return cell;
+}
+
+SignedDistance::Sample SignedDistance::sample(const Eigen::Vector3d& place_in_patient_mm) const {
+  const Cell cell = cell_of(place_in_patient_mm);
+  const auto row = static_cast<std::size_t>(points_[0]), slice = row * static_cast<std::size_t>(points_[1]);
+  const Eigen::Vector4f* const v = &values_[cell.base];
+  const auto along_x = [&](std::size_t at) -> Eigen::Vector4f { return v[at] + cell.t[0] * (v[at + 1] - v[at]); };
+  const auto plane = [&](std::size_t at) -> Eigen::Vector4f {
+    const Eigen::Vector4f low = along_x(at);
+    return low + cell.t[1] * (along_x(at + row) - low);
+  };
+  const Eigen::Vector4f low = plane(0);
+  const Eigen::Vector4f value = low + cell.t[2] * (plane(slice) - low);
+  Sample out{static_cast<double>(value[3]), patient_from_box_.linear() * value.head<3>().cast<double>()};
+  if (const double away_mm = cell.beyond_mm.norm(); away_mm > 0) {
+    out.distance_mm += away_mm;
+    out.gradient = patient_from_box_.linear() * cell.beyond_mm / away_mm;
+  }
+  return out;
+}
+
+double SignedDistance::distance_mm(const Eigen::Vector3d& place_in_patient_mm) const {
+  const Cell cell = cell_of(place_in_patient_mm);
+  const auto row = static_cast<std::size_t>(points_[0]), slice = row * static_cast<std::size_t>(points_[1]);
+  const Eigen::Vector4f* const v = &values_[cell.base];
+  const auto along_x = [&](std::size_t at) { return v[at][3] + cell.t[0] * (v[at + 1][3] - v[at][3]); };
+  const auto plane = [&](std::size_t at) {
+    const float low = along_x(at);
+    return low + cell.t[1] * (along_x(at + row) - low);
+  };
+  const float low = plane(0);
+  return static_cast<double>(low + cell.t[2] * (plane(slice) - low)) + cell.beyond_mm.norm();
+}
+
+Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const std::uint8_t> mask, double spacing_mm,
+                                          double margin_mm) {
+  const Eigen::Matrix3d axes = grid.patient_from_voxel.linear() * grid.spacing_mm.cwiseInverse().asDiagonal();
+  if ((axes.transpose() * axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3)
+    return Error{Errc::bad_value, "the volume's axes are not at right angles; resample it"};
+  const auto inside = std::count_if(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; });
+  if (inside == 0)
+    return Error{Errc::not_found, "nothing of the volume is seen; check label_values and the transfer function"};
+  if (static_cast<std::size_t>(inside) == mask.size())
+    return Error{Errc::not_found,
+                 "all of the volume is seen, and so no surface; check label_values and the transfer function"};
+  const Extent extent = extent_of(grid, mask);
+  std::array<int, 3> points{};
+  Eigen::Vector3d origin_mm;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto n = static_cast<Eigen::Index>(axis);
+    origin_mm[n] = grid.spacing_mm[n] * extent.first[axis] - margin_mm;
+    const double extent_mm = grid.spacing_mm[n] * (extent.last[axis] - extent.first[axis]) + 2 * margin_mm;
+    points[axis] = static_cast<int>(std::ceil(extent_mm / spacing_mm)) + 1;
+  }
+  const Share::Pointer distance = distance_of(resampled(image_of(grid, mask), points, spacing_mm, origin_mm));
+  std::vector<float> distances_mm(distance->GetBufferPointer(), distance->GetBufferPointer() + grid_count(points));
+  for (float& d : distances_mm) d *= static_cast<float>(-spacing_mm);
+  Eigen::Affine3d patient_from_box;
+  patient_from_box.linear() = axes;
+  patient_from_box.translation() = grid.patient_from_voxel.translation() + axes * origin_mm;
+  patient_from_box.makeAffine();
+  return SignedDistance(points, spacing_mm, patient_from_box, distances_mm);
+}
+
+}  // namespace birdseye::host
