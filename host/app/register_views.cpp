@@ -66,6 +66,14 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
     }
   }
   const double gain = found.similarity_after - found.similarity_before;
+  constexpr std::size_t kFewest = 100;
+  if (found.stereo_points && *found.stereo_points < kFewest) {
+    return {Grade::marginal,
+            {fmt::format("only {} places of the surface are seen by two views or more, under {}: add views, nearer to "
+                         "one another",
+                         *found.stereo_points, kFewest)},
+            {}};
+  }
   if (c.views.size() == 1) return {Grade::marginal, {"a single view says little about depth: add others"}, {}};
   if (const double deg = widest_deg(c, found); deg < kApart_deg) {
     return {Grade::marginal,
@@ -86,8 +94,11 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
              "belong together"},
             {}};
   }
-  if (gain < kGain) return {Grade::marginal, {fmt::format("similarity rose by only {:.3f}{}", gain, unit)}, {}};
+  // By geometry, an organ that did not move is found where it was.
+  if (!found.stereo_points && gain < kGain)
+    return {Grade::marginal, {fmt::format("similarity rose by only {:.3f}{}", gain, unit)}, {}};
   std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);
+  if (found.stereo_points) reason = fmt::format("{} places of the surface are known by stereo", *found.stereo_points);
   if (found.uncertainty_mm)
     reason += fmt::format("; the surface is to be expected within {:.1f} mm", *found.uncertainty_mm);
   return {Grade::pass, {reason}, {}};
@@ -121,6 +132,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"min_jacobian", found.min_jacobian},
                          {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
+  if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
                    {"falloff", found.light.falloff},
                    {"ambient", found.light.ambient},

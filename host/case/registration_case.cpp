@@ -127,7 +127,7 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
 
 /// What only the optimisers that go by the value alone have a choice of.
 Result<void> read_direct_search(const CaseTable& table, RegistrationCase& out) {
-  const bool direct = out.optimiser != "gradient";
+  const bool direct = out.optimiser == "simplex" || out.optimiser == "powell";
   for (const char* key : {"unknowns", "similarity", "most_evaluations"}) {
     if (table.has(key) && !direct) return table.wrong(key, "needs optimiser = \"simplex\" or \"powell\"");
   }
@@ -178,8 +178,8 @@ Result<void> read_model(const CaseTable& table, RegistrationCase& out) {
   out.level = *level;
   const auto optimiser = table.get<std::string>("optimiser", out.optimiser);
   if (!optimiser) return optimiser.error();
-  if (*optimiser != "gradient" && *optimiser != "simplex" && *optimiser != "powell")
-    return table.wrong("optimiser", "is gradient, simplex or powell");
+  if (*optimiser != "geometry" && *optimiser != "gradient" && *optimiser != "simplex" && *optimiser != "powell")
+    return table.wrong("optimiser", "is geometry, gradient, simplex or powell");
   out.optimiser = *optimiser;
   if (auto done = read_direct_search(table, out); !done) return done.error();
   const auto refine_pose = table.get<bool>("refine_pose", out.refine_pose);
@@ -194,6 +194,8 @@ Result<void> read_model(const CaseTable& table, RegistrationCase& out) {
     out.pose_prior = *prior;
   }
   if (!table.has("initial")) return {};
+  if (out.optimiser == "geometry")
+    return table.wrong("initial", "needs optimiser = \"gradient\", \"simplex\" or \"powell\"; geometry begins at rest");
   const auto initial = table.path("initial");
   if (!initial) return initial.error();
   auto field = read_field(*initial);

@@ -31,7 +31,7 @@ struct RegistrationCase {
   /// Inner control points along each axis; empty for "auto".
   std::optional<std::array<int, 3>> control_points;
   int level = 5;
-  std::string optimiser = "gradient";  ///< or simplex, powell; only these use the three below
+  std::string optimiser = "gradient";  ///< or geometry, or simplex, powell; only these two use the three below
   bool vertices = false;               ///< the unknowns are the free vertices of `level`
   std::string similarity = "mi";
   int most_evaluations = 400;

@@ -1,5 +1,6 @@
 #include "host/case/run_registration.hpp"
 
+#include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/views/rendered_registration.hpp"
 
 namespace birdseye::host {
@@ -8,6 +9,15 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
                                           bool estimate_uncertainty,
                                           const std::function<void(const std::string&)>& tell) {
   const Volume* const labels = c.labels ? &*c.labels : nullptr;
+  if (c.optimiser == "geometry") {
+    GeometrySettings settings;
+    settings.control_points = c.control_points.value_or(settings.control_points);
+    settings.progress = tell;
+    std::vector<RgbView> pictures;
+    pictures.reserve(c.pictures.size());
+    for (const Picture& picture : c.pictures) pictures.push_back(picture.view());
+    return register_geometry(c.views, pictures, c.ct, labels, c.label_values, transfer, settings);
+  }
   if (c.optimiser == "gradient") {
     ViewRegistrationSettings settings;
     settings.control_points = c.control_points;

@@ -43,13 +43,8 @@ void smooth(std::vector<float>& values, const std::array<int, 3>& points, std::s
   });
 }
 
-/// How much of what is round each point of the tissue's grid is seen: 1 for a voxel that the transfer function shows.
-std::vector<float> occupancy_of(const Volume& ct, const Volume* labels, std::span<const int> values,
-                                const TransferFunction& transfer, const Tissue& tissue) {
-  const auto seen = [&](int i, int j, int k) {
-    if (labels != nullptr && std::find(values.begin(), values.end(), labels->at(i, j, k)) == values.end()) return 0.0F;
-    return transfer.at(ct.at(i, j, k)).extinction_per_mm > 0 ? 1.0F : 0.0F;
-  };
+/// How much of what is round each point of the tissue's grid is tissue.
+std::vector<float> occupancy_of(const Volume& ct, const std::vector<std::uint8_t>& voxels, const Tissue& tissue) {
   // The mean of the voxels whose centres lie within half a step of the point, or the nearest where none does.
   std::array<std::vector<std::pair<int, int>>, 3> ranges;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -70,7 +65,8 @@ std::vector<float> occupancy_of(const Volume& ct, const Volume* labels, std::spa
         int count = 0;
         for (int k = ranges[2][at(z)].first; k <= ranges[2][at(z)].second; ++k) {
           for (int j = ranges[1][at(y)].first; j <= ranges[1][at(y)].second; ++j) {
-            for (int i = ranges[0][at(x)].first; i <= ranges[0][at(x)].second; ++i, ++count) sum += seen(i, j, k);
+            for (int i = ranges[0][at(x)].first; i <= ranges[0][at(x)].second; ++i, ++count)
+              sum += voxels[ct.index(i, j, k)];
           }
         }
         out[grid_index(tissue.points, x, y, z)] = sum / static_cast<float>(count);
@@ -157,6 +153,18 @@ std::vector<std::uint8_t> level_cells(const Tissue& tissue) {
 
 }  // namespace
 
+std::vector<std::uint8_t> tissue_voxels(const Volume& ct, const Volume* labels, std::span<const int> values,
+                                        const TransferFunction& transfer) {
+  std::vector<std::uint8_t> out(ct.hu.size(), 0);
+  tbb::parallel_for(0, ct.size[2], [&](int k) {
+    for (std::size_t v = ct.index(0, 0, k); v < ct.index(0, 0, k + 1); ++v) {
+      if (labels != nullptr && std::find(values.begin(), values.end(), labels->hu[v]) == values.end()) continue;
+      out[v] = transfer.at(ct.hu[v]).extinction_per_mm > 0 ? 1 : 0;
+    }
+  });
+  return out;
+}
+
 Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const int> values,
                          const TransferFunction& transfer, double spacing_mm) {
   Tissue tissue;
@@ -173,7 +181,7 @@ Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const
   }
   tissue.patient_from_grid.linear() = axes;
   tissue.patient_from_grid.translation() = ct.patient_from_voxel.translation();
-  tissue.occupancy = occupancy_of(ct, labels, values, transfer, tissue);
+  tissue.occupancy = occupancy_of(ct, tissue_voxels(ct, labels, values, transfer), tissue);
   const double smoothing_mm = std::min(kMostSmoothing_mm, spacing_mm);  // a small organ keeps its shape
   for (std::size_t axis = 0; axis < 3; ++axis) {
     smooth(tissue.occupancy, tissue.points, axis, smoothing_mm / tissue.spacing_mm[static_cast<Eigen::Index>(axis)]);

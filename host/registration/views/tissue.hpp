@@ -31,6 +31,11 @@ struct Tissue {
   }
 };
 
+/// 1 at each voxel of the CT that is tissue: that the transfer function shows and, where labels are given on the CT's
+/// grid, that has one of values; 0 elsewhere.
+std::vector<std::uint8_t> tissue_voxels(const Volume& ct, const Volume* labels, std::span<const int> values,
+                                        const TransferFunction& transfer);
+
 /// labels, where given, on the CT's grid: only voxels with one of values count. Errc::not_found where nothing is left
 /// that the transfer function shows; Errc::bad_value for a volume whose axes are not at right angles.
 Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const int> values,

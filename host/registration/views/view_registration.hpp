@@ -64,6 +64,8 @@ struct ViewRegistration {
   /// The error of the organ's surface that is to be expected, root mean square (confidence.hpp). None where it was not
   /// asked for or nothing better than the start was found.
   std::optional<double> uncertainty_mm;
+  /// Places of the surface that stereo between the views found; only with optimiser geometry.
+  std::optional<std::size_t> stereo_points;
   std::string why_so_many_points;  ///< in words
   bool worse_than_start = false;   ///< the start is returned: the initial field itself, or none
   bool folded = false;             ///< the reason for that: every deformation that was found folds

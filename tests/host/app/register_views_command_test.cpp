@@ -70,6 +70,31 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
       0);
 }
 
+TEST(RegisterViewsCommand, FindsItByGeometry) {
+  const Scratch scratch;
+  const auto file = changed(scratch, "optimiser = \"gradient\"", "optimiser = \"geometry\"");
+  const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = read_json(scratch / "r.json");
+  EXPECT_EQ(json["optimiser"], "geometry");
+  EXPECT_GT(json["tre_before_mm_mean"], 3);
+  EXPECT_LT(json["surface_tre_after_mm_mean"], 1);
+  EXPECT_GT(json["stereo_points"], 100);
+  EXPECT_GT(json["min_jacobian"], 0.3);
+  EXPECT_GT(json["uncertainty_mm"], 0);
+}
+
+TEST(RegisterViewsCommand, GeometryLeavesAnOrganThatDidNotMove) {
+  const Scratch scratch;
+  const auto made = run(
+      "birdseye-sim", "case --out " + (scratch / "c").string() + " --seed 1 --views 4 --size 384x288 --no-deformation");
+  ASSERT_EQ(made.code, 0) << made.output;
+  const auto file = changed(scratch, "optimiser = \"gradient\"", "optimiser = \"geometry\"");
+  const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_NE(result.code, 2) << result.output;
+  EXPECT_LT(read_json(scratch / "r.json")["surface_tre_after_mm_mean"], 0.3);
+}
+
 TEST(RegisterViewsCommand, FindsItByValuesAlone) {
   const Scratch scratch;
   const auto file = changed(scratch, "optimiser = \"gradient\"",

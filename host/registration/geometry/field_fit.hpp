@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "host/registration/geometry/field_prior.hpp"
+#include "host/registration/geometry/lattice_field.hpp"
+#include "host/registration/geometry/surface_point.hpp"
+#include "host/volume/signed_distance.hpp"
+
+namespace birdseye::host {
+
+/// The displacement that surface points ask for under a prior, by Gauss and Newton's method on distance(seen +
+/// displacement) = 0 with Geman and McClure's weights, annealed: the posterior of a Gaussian process about the best
+/// linearisation.
+class FieldFit {
+ public:
+  /// start: where to begin; none: at rest. scales_mm: of each step, beyond which a residual is thought to be wrong.
+  static FieldFit solve(const SignedDistance& organ, std::span<const SurfacePoint> points, const FieldPrior& prior,
+                        const FieldFit* start, std::span<const double> scales_mm);
+
+  /// u of seen places.
+  [[nodiscard]] LatticeField seen_field(const SignedDistance& organ) const;
+  /// Of where tissue is seen, mm^2: of tissue seen at seen_mm, which lay at rest_mm.
+  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm, const Eigen::Vector3d& seen_mm) const;
+  /// Of the points under the prior, linearised where the fit ended, nats; with the prior's own belief.
+  [[nodiscard]] double log_evidence() const { return log_evidence_; }
+  [[nodiscard]] std::span<const double> weights() const { return weights_; }
+  [[nodiscard]] const FieldPrior& prior() const { return prior_; }
+
+ private:
+  /// At many places at once.
+  [[nodiscard]] Eigen::MatrixX3d values(const Eigen::MatrixX3d& places) const;
+  /// [i](a, b) = d w_a / d x_b at place i.
+  [[nodiscard]] std::vector<Eigen::Matrix3d> gradients(const Eigen::MatrixX3d& places) const;
+
+  FieldPrior prior_;
+  Eigen::MatrixX3d centres_ = Eigen::MatrixX3d(0, 3);  ///< places that the prior's function takes
+  Eigen::MatrixX3d rows_ = Eigen::MatrixX3d(0, 3);     ///< by which a residual sees the displacement at its centre
+  Eigen::MatrixXd basis_rows_;                         ///< the same of the basis's unknowns
+  Eigen::VectorXd alpha_;
+  Eigen::MatrixX3d weights_of_centres_ = Eigen::MatrixX3d(0, 3);
+  Eigen::VectorXd unknowns_;  ///< of the basis
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  double log_evidence_ = 0;
+  std::vector<double> weights_;
+};
+
+}  // namespace birdseye::host

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace birdseye::host {
+
+/// A part of what is believed of a deformation before anything is seen: a Gaussian process, its three components
+/// independent, with covariance sigma^2 exp(-distance^2 / (2 length^2)).
+struct GaussianPart {
+  double length_mm, sigma_mm;
+};
+
+/// Another part: a deformation of few unknowns, each of variance 1 before anything is seen.
+class FieldBasis {
+ public:
+  FieldBasis() = default;
+  FieldBasis(const FieldBasis&) = delete;
+  FieldBasis& operator=(const FieldBasis&) = delete;
+  virtual ~FieldBasis() = default;
+  [[nodiscard]] virtual Eigen::Index unknowns() const = 0;
+  /// 3 x unknowns: the displacement at a place, mm per unit of each unknown.
+  [[nodiscard]] virtual Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const = 0;
+};
+
+/// The inner control points of a Bezier patch over a box, independent, of sigma_mm along each axis.
+class BezierBasis : public FieldBasis {
+ public:
+  BezierBasis(const Eigen::Affine3d& patient_from_cube, const std::array<int, 3>& inner_points, double sigma_mm);
+  [[nodiscard]] Eigen::Index unknowns() const override;
+  [[nodiscard]] Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const override;
+
+ private:
+  Eigen::Affine3d cube_from_patient_;
+  std::array<int, 3> inner_;
+  double sigma_mm_;
+};
+
+/// A hypothesis: what may move the organ.
+struct FieldPrior {
+  std::string name;
+  std::vector<GaussianPart> parts;
+  std::shared_ptr<const FieldBasis> basis;  ///< or none
+  /// A function of the place where tissue is seen (rest = seen + u(seen)); else of where it was at rest (seen = rest -
+  /// w(rest)), as tissue bends.
+  bool of_seen = false;
+  double log_belief = 0;  ///< before anything is seen, nats
+};
+
+}  // namespace birdseye::host

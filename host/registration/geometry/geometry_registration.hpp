@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibration/base/image_view.hpp"
+#include "calibration/base/result.hpp"
+#include "host/registration/views/view_registration.hpp"
+
+namespace birdseye::host {
+
+struct GeometrySettings {
+  /// Inner control points of the Bezier patches that are among the hypotheses.
+  std::array<int, 3> control_points{3, 3, 3};
+  bool estimate_uncertainty = true;
+  /// Called with a line for a person now and then.
+  std::function<void(const std::string&)> progress = [](const std::string&) {};
+  RegistrationWatch watch;
+};
+
+/// Deforms the organ until its surface lies where the views show it: places found by stereo between the views and by
+/// the organ's outlines, under several priors, each believed as far as its evidence goes; their mean. Nothing is
+/// compared with a rendering. pictures: of the views, in colour. Similarities are mutual information of renderings at
+/// full size, for the report alone. Refuses what register_views() refuses; Errc::not_found where no place of the
+/// surface is found, and Errc::disconnected where the watch cancels. A field that folds is not returned: folded, and no
+/// deformation.
+Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
+                                           const Volume& ct, const Volume* labels, std::span<const int> label_values,
+                                           const TransferFunction& transfer, const GeometrySettings& settings);
+
+}  // namespace birdseye::host
