@@ -48,8 +48,8 @@ class Background {
     shared_->result.reset();
     shared_->line.clear();
     if (shared_->running) return;
+    thread_ = OwnedThread([shared = shared_](const std::stop_token&) { run(shared); });  // once the lock is free
     shared_->running = true;
-    thread_ = OwnedThread([shared = shared_](const std::stop_token&) { run(shared); });
   }
   [[nodiscard]] bool running() const {
     const std::lock_guard lock(shared_->mutex);

@@ -25,7 +25,9 @@ class OwnedThread {
     if (thread_.joinable()) thread_.join();
   }
   /// Lets it go on without an owner, for work that hangs and shares nothing with whoever started it.
-  void let_go() { thread_.detach(); }
+  void let_go() {
+    if (thread_.joinable()) thread_.detach();
+  }
 
  private:
   std::jthread thread_;

@@ -55,7 +55,8 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
     return {Grade::fail, {"every deformation that was found folds: check the poses; the start is written"}, {}};
   if (found.worse_than_start)
     return {Grade::fail, {"no deformation explains the views better than the start, which is what is written"}, {}};
-  for (std::size_t n = 0; n < c.views.size(); ++n) {
+  // Geometry compares no rendering with a view: its similarity says nothing of how well it did.
+  for (std::size_t n = 0; n < c.views.size() && !found.stereo_points; ++n) {
     const double gain = found.per_view_after[n] - found.per_view_before[n];
     if (gain < -kNoise) {
       return {Grade::fail,
@@ -84,8 +85,8 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
   }
   if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
     return {Grade::marginal,
-            {fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
-                         *found.uncertainty_mm, kSure_mm)},
+            {fmt::format("the surface may be {:.1f} mm off, over {} mm: add views{}", *found.uncertainty_mm, kSure_mm,
+                         found.stereo_points ? "" : ", or fewer control points")},
             {}};
   }
   if (found.lamp_at_limit) {

@@ -12,6 +12,7 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
   if (c.optimiser == "geometry") {
     GeometrySettings settings;
     settings.control_points = c.control_points.value_or(settings.control_points);
+    settings.estimate_uncertainty = estimate_uncertainty;
     settings.progress = tell;
     std::vector<RgbView> pictures;
     pictures.reserve(c.pictures.size());

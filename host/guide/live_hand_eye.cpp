@@ -74,6 +74,8 @@ Result<GuidedStations> lead(const LivePlan& plan, EventStream& stream, Progress&
     if (interrupted()) guide.end("interrupted");
     if (host_now() > ends) guide.end(fmt::format("{:g} s are over", plan.seconds));
   }
+  // What comes while the solver works is of no use to it.
+  if (const std::string words = stream.drops().words(); !words.empty()) progress.keep(words);
   return guide.finish();
 }
 
@@ -88,9 +90,7 @@ Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) 
     return locked.error();
   note_interrupts();
   EventStream stream(*std::move(client), 60);
-  auto led = lead(plan, stream, progress);
-  if (const std::string words = stream.drops().words(); !words.empty()) progress.keep(words);
-  return led;
+  return lead(plan, stream, progress);
 }
 
 }  // namespace birdseye::host

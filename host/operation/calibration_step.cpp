@@ -70,6 +70,11 @@ void CalibrationStep::tell_none(const std::string& why) {
 
 void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& line) {
   if (found_ && kept.made_utc <= found_->made_utc) return;
+  if (!kept.scope.figures().held_out_px) {
+    // As 0.1.0 kept it: nothing could be drawn by it.
+    if (!found_) note_.line = "what was kept does not say how far hand-eye is off: calibrate anew";
+    return;
+  }
   guide_.give_up();
   found_ = kept;
   found_->by_board = true;

@@ -34,8 +34,9 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std
     return std::find(files.organ.begin(), files.organ.end(), label) != files.organ.end();
   };
   if (std::none_of(labels->hu.begin(), labels->hu.end(), of_organ)) {
-    return Error{Errc::not_found, fmt::format("{}: holds none of the labels of --organ, {}; give those of the organ",
-                                              files.labels.string(), fmt::join(files.organ, ", "))};
+    return Error{Errc::not_found,
+                 fmt::format("{}: --organ {}: the file holds none of these labels; give those of the organ",
+                             files.labels.string(), fmt::join(files.organ, ","))};
   }
   plan.labels = *labels;
   plan.organ = files.organ;

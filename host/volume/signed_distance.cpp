@@ -179,6 +179,9 @@ Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const st
   const Eigen::Matrix3d axes = grid.patient_from_voxel.linear() * grid.spacing_mm.cwiseInverse().asDiagonal();
   if ((axes.transpose() * axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3)
     return Error{Errc::bad_value, "the volume's axes are not at right angles; resample it"};
+  constexpr int kFewest = 4;
+  if (*std::min_element(grid.size.begin(), grid.size.end()) < kFewest)
+    return Error{Errc::bad_value, "the volume has an axis of fewer than 4 voxels; give one of more slices"};
   const auto inside = std::count_if(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; });
   if (inside == 0)
     return Error{Errc::not_found, "nothing of the volume is seen; check label_values and the transfer function"};
@@ -192,9 +195,15 @@ Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const st
     const auto n = static_cast<Eigen::Index>(axis);
     origin_mm[n] = grid.spacing_mm[n] * extent.first[axis] - margin_mm;
     const double extent_mm = grid.spacing_mm[n] * (extent.last[axis] - extent.first[axis]) + 2 * margin_mm;
-    points[axis] = static_cast<int>(std::ceil(extent_mm / spacing_mm)) + 1;
+    points[axis] = std::max(2, static_cast<int>(std::ceil(extent_mm / spacing_mm)) + 1);
   }
-  const Share::Pointer distance = distance_of(resampled(image_of(grid, mask), points, spacing_mm, origin_mm));
+  const Share::Pointer share = resampled(image_of(grid, mask), points, spacing_mm, origin_mm);
+  if (*std::max_element(share->GetBufferPointer(), share->GetBufferPointer() + grid_count(points)) <= 0.5F) {
+    return Error{
+        Errc::not_found,
+        "what is seen of the volume is too thin to have an inside; check label_values and the transfer function"};
+  }
+  const Share::Pointer distance = distance_of(share);
   std::vector<float> distances_mm(distance->GetBufferPointer(), distance->GetBufferPointer() + grid_count(points));
   for (float& d : distances_mm) d *= static_cast<float>(-spacing_mm);
   Eigen::Affine3d patient_from_box;

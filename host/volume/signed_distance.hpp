@@ -52,7 +52,7 @@ class SignedDistance {
 /// From the boundary of a mask: one value a voxel of the grid, not 0 where the organ is. The boundary is where the
 /// mask, smoothed by a Gaussian of a millimetre or half a voxel, is a half; between voxels. The box holds the organ and
 /// a margin about it; past the volume's faces the organ goes on as it ends there. Errc::not_found for a mask that is
-/// empty or full; Errc::bad_value for a grid whose axes are not at right angles.
+/// empty, full or too thin; Errc::bad_value for a grid whose axes are not at right angles or have fewer than 4 voxels.
 Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const std::uint8_t> mask, double spacing_mm,
                                           double margin_mm);
 

@@ -10,7 +10,7 @@
 #include <optional>
 #include <random>
 
-#include "host/registration/geometry/field_fit.hpp"
+#include "host/registration/geometry/displacement_fit.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/stereo.hpp"
 #include "host/registration/views/rendered_views.hpp"
@@ -25,12 +25,12 @@ constexpr double kRenderSpacing_mm = 3;
 
 /// What may move an organ: long parts bend it, short ones follow what pushes it; and Bezier patches, which hold still
 /// at the faces of the CT's box.
-std::vector<FieldPrior> priors(const Volume& ct, const std::array<int, 3>& control_points) {
+std::vector<DisplacementPrior> priors(const Volume& ct, const std::array<int, 3>& control_points) {
   constexpr double kUsual_mm = 2, kUsualNearby_mm = 0.4, kNearby_mm = 20;
   struct Gaussian {
     double length_mm, sigma_mm, nearby_sigma_mm;
   };
-  std::vector<FieldPrior> out;
+  std::vector<DisplacementPrior> out;
   for (const auto& [length, sigma, nearby] : {Gaussian{65, 4, 0},
                                               {85, 4, 0},
                                               {120, 4, 0},
@@ -40,7 +40,7 @@ std::vector<FieldPrior> priors(const Volume& ct, const std::array<int, 3>& contr
                                               {85, 0.6, 1.6},
                                               {65, 4, 0.8},
                                               {50, 3, 0}}) {
-    FieldPrior prior;
+    DisplacementPrior prior;
     prior.name = fmt::format("{:g} mm over {:g} mm", sigma, length);
     prior.parts.push_back({length, sigma});
     if (nearby > 0) {
@@ -54,7 +54,7 @@ std::vector<FieldPrior> priors(const Volume& ct, const std::array<int, 3>& contr
   const Eigen::Vector3d last_voxel(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);
   const Eigen::Affine3d patient_from_cube = ct.patient_from_voxel * Eigen::Scaling(last_voxel);
   for (const double sigma_mm : {20.0, 40.0}) {
-    FieldPrior prior;
+    DisplacementPrior prior;
     prior.name = fmt::format("{}x{}x{} control points of {:g} mm", control_points[0], control_points[1],
                              control_points[2], sigma_mm);
     prior.basis = std::make_shared<BezierBasis>(patient_from_cube, control_points, sigma_mm);
@@ -68,7 +68,7 @@ std::vector<FieldPrior> priors(const Volume& ct, const std::array<int, 3>& contr
 struct Believed {
   explicit Believed(const SignedDistance& organ) : mean(organ) {}
 
-  std::vector<FieldFit> fits;
+  std::vector<DisplacementFit> fits;
   std::vector<LatticeField> fields;
   std::vector<double> beliefs;  ///< sum to 1
   LatticeField mean;
@@ -91,25 +91,26 @@ struct Believed {
 };
 
 /// Tries every prior on some of the points, and those with the most evidence on all of them.
-Believed believe(const SignedDistance& organ, std::span<const SurfacePoint> points,
-                 const std::vector<FieldPrior>& priors) {
+Believed believe(const SignedDistance& organ, std::span<const SeenPoint> points,
+                 const std::vector<DisplacementPrior>& priors) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.6, 1.3, 1.1, 1.0, 1.0, 1.0};
   constexpr std::array kSettle_mm{1.3, 1.0, 1.0, 1.0};
   constexpr std::size_t kFew = 400, kKept = 4;
   /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
   constexpr double kTemper = 4;
-  const std::span<const SurfacePoint> few = points.first(std::min(points.size(), kFew));
-  std::vector<std::optional<FieldFit>> tried(priors.size());
-  tbb::parallel_for(std::size_t{0}, priors.size(),
-                    [&](std::size_t i) { tried[i] = FieldFit::solve(organ, few, priors[i], nullptr, kAnneal_mm); });
+  const std::span<const SeenPoint> few = points.first(std::min(points.size(), kFew));
+  std::vector<std::optional<DisplacementFit>> tried(priors.size());
+  tbb::parallel_for(std::size_t{0}, priors.size(), [&](std::size_t i) {
+    tried[i] = DisplacementFit::solve(organ, few, priors[i], nullptr, kAnneal_mm);
+  });
   std::vector<std::size_t> order(priors.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return tried[a]->log_evidence() > tried[b]->log_evidence(); });
   order.resize(std::min(order.size(), kKept));
-  std::vector<std::optional<FieldFit>> full(order.size());
+  std::vector<std::optional<DisplacementFit>> full(order.size());
   tbb::parallel_for(std::size_t{0}, order.size(), [&](std::size_t i) {
-    full[i] = FieldFit::solve(organ, points, priors[order[i]], &*tried[order[i]], kSettle_mm);
+    full[i] = DisplacementFit::solve(organ, points, priors[order[i]], &*tried[order[i]], kSettle_mm);
   });
   Believed out(organ);
   for (std::size_t i = 0; i < order.size(); ++i) {
@@ -128,7 +129,7 @@ Believed believe(const SignedDistance& organ, std::span<const SurfacePoint> poin
 }
 
 /// In an order of chance that is the same each time; no more than so many.
-void draw(std::vector<SurfacePoint>& points, std::size_t most, std::mt19937& random) {
+void draw(std::vector<SeenPoint>& points, std::size_t most, std::mt19937& random) {
   std::shuffle(points.begin(), points.end(), random);
   if (points.size() > most) points.resize(most);
 }
@@ -169,6 +170,14 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
   if (pictures.size() != views.size())
     return Error{Errc::bad_value, fmt::format("{} pictures for {} views", pictures.size(), views.size())};
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    const CameraModel& camera = views[n].camera;
+    if (!pictures[n].whole() || pictures[n].width_px != camera.width_px || pictures[n].height_px != camera.height_px ||
+        views[n].mask.size() != pictures[n].area_px()) {
+      return Error{Errc::bad_value, fmt::format("{}: its picture or mask is not of the camera's {}x{} pixels",
+                                                views[n].name, camera.width_px, camera.height_px)};
+    }
+  }
   const auto organ =
       signed_distance_of(ct, tissue_voxels(ct, labels, label_values, transfer), kDistanceSpacing_mm, kMargin_mm);
   if (!organ) return organ.error();
@@ -196,21 +205,21 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   constexpr double kGrid_px = 12;
   constexpr std::size_t kStereo = 700, kOutlines = 300;
   std::mt19937 random(1);
-  const std::vector<FieldPrior> hypotheses = priors(ct, settings.control_points);
+  const std::vector<DisplacementPrior> hypotheses = priors(ct, settings.control_points);
   Believed found(*organ);
   for (const Round& round : kRounds) {
     if (settings.watch.cancelled()) return called_off();
     const SeenSurface surface(seen_distance(*organ, found.mean));
-    std::vector<SurfacePoint> points = stereo_points(seen_by, surface, {kGrid_px, round.span_mm, round.step_mm});
+    std::vector<SeenPoint> points = stereo_points(seen_by, surface, {kGrid_px, round.span_mm, round.step_mm});
     out.stereo_points = points.size();
     draw(points, kStereo, random);
-    std::vector<SurfacePoint> outlines;
+    std::vector<SeenPoint> outlines;
     if (round.outline_mm > 0) outlines = outline_points(seen_by, surface, round.outline_mm);
     const std::size_t outlined = outlines.size();
     draw(outlines, kOutlines, random);
     points.insert(points.end(), outlines.begin(), outlines.end());
     draw(points, points.size(), random);
-    if (points.empty() && round.outline_mm == 0) continue;  // views far apart: outlines may say more
+    if (points.empty() && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
     if (points.empty()) {
       return Error{Errc::not_found,
                    "no place of the surface is found in two views or as an outline: check that pictures, poses and CT "

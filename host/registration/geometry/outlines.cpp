@@ -64,8 +64,12 @@ cv::Mat silhouette(const PinholeView& view, const DepthMap& depths) {
   cv::Mat coarse(depths.rows, depths.columns, CV_8U), wide;
   std::transform(depths.depth_mm.begin(), depths.depth_mm.end(), coarse.begin<std::uint8_t>(),
                  [](float depth) { return static_cast<std::uint8_t>(std::isfinite(depth) ? 255 : 0); });
-  cv::resize(coarse, wide, {depths.columns * depths.step_px, depths.rows * depths.step_px});
-  return wide({0, 0, view.width_px, view.height_px}) > 127;
+  // Sample c of the map is of pixel c * step_px.
+  const double step = depths.step_px;
+  const cv::Matx23d coarse_from_wide(1 / step, 0, 0, 0, 1 / step, 0);
+  cv::warpAffine(coarse, wide, coarse_from_wide, {view.width_px, view.height_px},
+                 cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  return wide > 127;
 }
 
 /// Across a contour: from kBand_px inside the silhouette to as much outside.
@@ -150,7 +154,7 @@ Closest closest_place(const SeenSurface& surface, const PinholeView& view, const
   return out;
 }
 
-std::vector<SurfacePoint> of_view(const PinholeView& view, std::size_t n, const SeenSurface& surface, double most_mm) {
+std::vector<SeenPoint> of_view(const PinholeView& view, const SeenSurface& surface, double most_mm) {
   constexpr int kDepthStep_px = 4, kLeastPixels = 2000;
   constexpr std::size_t kEvery_px = 6, kLeastLength_px = 120;
   constexpr double kSigma_mm = 0.3;
@@ -164,7 +168,7 @@ std::vector<SurfacePoint> of_view(const PinholeView& view, std::size_t n, const 
   cv::erode(view.lens, trusted, disc(kBand_px), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
   std::vector<std::vector<cv::Point>> contours;
   cv::findContours(mask, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
-  std::vector<SurfacePoint> out;
+  std::vector<SeenPoint> out;
   for (const auto& contour : contours) {
     if (contour.size() < kLeastLength_px) continue;
     for (std::size_t i = 0; i < contour.size(); i += kEvery_px) {
@@ -178,7 +182,7 @@ std::vector<SurfacePoint> of_view(const PinholeView& view, std::size_t n, const 
       if (!met) continue;
       const Closest closest = closest_place(surface, view, ray, met->depth_mm);
       if (std::abs(closest.distance_mm) > most_mm) continue;
-      out.push_back({view.eye_in_patient_mm + closest.depth_mm * ray, kSigma_mm, std::nullopt, n});
+      out.push_back({view.eye_in_patient_mm + closest.depth_mm * ray, kSigma_mm, std::nullopt});
     }
   }
   return out;
@@ -186,12 +190,12 @@ std::vector<SurfacePoint> of_view(const PinholeView& view, std::size_t n, const 
 
 }  // namespace
 
-std::vector<SurfacePoint> outline_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
-                                         double most_mm) {
-  std::vector<std::vector<SurfacePoint>> each(views.size());
+std::vector<SeenPoint> outline_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                      double most_mm) {
+  std::vector<std::vector<SeenPoint>> each(views.size());
   tbb::parallel_for(std::size_t{0}, views.size(),
-                    [&](std::size_t n) { each[n] = of_view(views[n], n, surface, most_mm); });
-  std::vector<SurfacePoint> out;
+                    [&](std::size_t n) { each[n] = of_view(views[n], surface, most_mm); });
+  std::vector<SeenPoint> out;
   for (const auto& points : each) out.insert(out.end(), points.begin(), points.end());
   return out;
 }

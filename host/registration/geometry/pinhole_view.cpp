@@ -4,21 +4,24 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/geometry/lens_fold.hpp"
 #include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
-/// Where in the picture each pixel of the pinhole camera lies.
+/// Where in the picture each pixel of the pinhole camera lies; outside of it where the lens sees nothing.
 std::pair<cv::Mat, cv::Mat> lens_map(const CameraModel& camera) {
+  constexpr double kOutside_px = -8;
   cv::Mat x(camera.height_px, camera.width_px, CV_32F), y(camera.height_px, camera.width_px, CV_32F);
+  const double fold = fold_radius(camera);
   for (int row = 0; row < camera.height_px; ++row) {
     for (int column = 0; column < camera.width_px; ++column) {
-      const Eigen::Vector2d d =
-          distort(camera, {(column - camera.cx_px) / camera.fx_px, (row - camera.cy_px) / camera.fy_px});
-      x.at<float>(row, column) = static_cast<float>(d.x() * camera.fx_px + camera.cx_px);
-      y.at<float>(row, column) = static_cast<float>(d.y() * camera.fy_px + camera.cy_px);
+      const Eigen::Vector3d ray((column - camera.cx_px) / camera.fx_px, (row - camera.cy_px) / camera.fy_px, 1);
+      const Eigen::Vector2d pixel = project_seen(camera, ray, fold).value_or(Eigen::Vector2d::Constant(kOutside_px));
+      x.at<float>(row, column) = static_cast<float>(pixel.x());
+      y.at<float>(row, column) = static_cast<float>(pixel.y());
     }
   }
   return {x, y};

@@ -54,7 +54,6 @@ struct Patch {
 
 struct Found {
   Eigen::Vector3d place_mm, normal, from_camera;
-  std::size_t view;
 };
 
 class Sweep {
@@ -190,6 +189,7 @@ class Sweep {
       if (w == v || !sees(views_[w], depths_[w], *patch)) continue;
       for (std::size_t s = 0; s < steps; ++s) {
         const double depth = patch->depth_mm + (static_cast<int>(s) - half) * settings_.step_mm;
+        if (depth <= 0) continue;
         const float r = correlation(*patch, views_[w], depth);
         if (!std::isfinite(r)) continue;
         score[s] += r;
@@ -206,7 +206,7 @@ class Sweep {
     const float bend = std::max(1e-6F, 2 * at(best) - at(best - 1) - at(best + 1));
     const double between = std::clamp(0.5 * static_cast<double>((at(best + 1) - at(best - 1)) / bend), -0.5, 0.5);
     const double depth = patch->depth_mm + (best - half + between) * settings_.step_mm;
-    return Found{views_[v].eye_in_patient_mm + depth * patch->ray, patch->normal, patch->ray.normalized(), v};
+    return Found{views_[v].eye_in_patient_mm + depth * patch->ray, patch->normal, patch->ray.normalized()};
   }
 
   const std::vector<PinholeView>& views_;
@@ -272,14 +272,14 @@ std::vector<bool> in_line(const std::vector<Found>& points) {
 
 }  // namespace
 
-std::vector<SurfacePoint> stereo_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
-                                        const StereoSettings& settings) {
+std::vector<SeenPoint> stereo_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                     const StereoSettings& settings) {
   const std::vector<Found> found = Sweep(views, surface, settings).run();
   const std::vector<bool> keep = in_line(found);
   constexpr double kSigma_mm = 0.25;
-  std::vector<SurfacePoint> out;
+  std::vector<SeenPoint> out;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (keep[i]) out.push_back({found[i].place_mm, kSigma_mm, found[i].from_camera, found[i].view});
+    if (keep[i]) out.push_back({found[i].place_mm, kSigma_mm, found[i].from_camera});
   }
   return out;
 }

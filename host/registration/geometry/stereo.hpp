@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "host/registration/geometry/seen_point.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
-#include "host/registration/geometry/surface_point.hpp"
 
 namespace birdseye::host {
 
@@ -16,7 +16,7 @@ struct StereoSettings {
 /// Places of the surface by which small patches of one view are found again in the others: a plane sweep along the
 /// rays about the surface as it is believed to be, by the mean normalised cross-correlation over the views that see it.
 /// Kept are peaks that are high, alone and not at the span's ends, and that lie with their neighbours on a plane.
-std::vector<SurfacePoint> stereo_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
-                                        const StereoSettings& settings);
+std::vector<SeenPoint> stereo_points(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                     const StereoSettings& settings);
 
 }  // namespace birdseye::host

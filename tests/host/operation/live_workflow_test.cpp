@@ -296,8 +296,10 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
   for (const bool record_is_newer : {false, true}) {
     const LiveSettings again = resumed(scratch, scratch.path());
     Operation kept = registered_operation(again);
+    calibration::HandEyeResult found;
+    found.held_out_px = 1;
     // The record's is 09:30.
-    kept.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}),
+    kept.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found),
                        record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z", true};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
     LiveWorkflow workflow(again);

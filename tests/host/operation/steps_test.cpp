@@ -43,6 +43,13 @@ TEST(ConnectionStep, IsDoneWhileTheApplianceIsReady) {
   EXPECT_FALSE(step.link().health.has_value());
 }
 
+/// As a window kept it, made at 9:35.
+CalibratedScope kept_scope() {
+  calibration::HandEyeResult found;
+  found.held_out_px = 1;
+  return {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), "2026-11-22T09:35:00Z"};
+}
+
 TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
   CalibrationStep step;
   auto record = example_record(768, 576, {}, {});
@@ -51,7 +58,7 @@ TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
   EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::again);
   record.hand_eye->provenance.made_utc = "2026-11-22T09:40:00Z";
   EXPECT_EQ(step.adopt(record), CalibrationStep::Adopted::anew);
-  const CalibratedScope older{ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}), "2026-11-22T09:35:00Z"};
+  const CalibratedScope older = kept_scope();
   step.take_up(older, "taken up");
   EXPECT_FALSE(step.found()->by_board);
   CalibratedScope newer = older;
@@ -85,7 +92,7 @@ TEST(CalibrationStep, WhatIsTakenUpGivesUpTheGuideAndItMayBeginAgain) {
   const auto board = calibration::parse_pattern("chessboard:14x9:3mm");
   CalibrationStep step;
   step.begin("scope", *board);
-  const CalibratedScope kept{ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, {}), "2026-11-22T09:35:00Z"};
+  const CalibratedScope kept = kept_scope();
   step.take_up(kept, "taken up");
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.guide().has_value());
@@ -332,6 +339,12 @@ TEST(OperationKeeper, AFileOf010OpensAndItsResidualIsNoHeldOutError) {
   EXPECT_EQ(figures.camera_rms_px, 0.3);
   EXPECT_FALSE(figures.held_out_px.has_value());
   EXPECT_EQ(figures.held_out_mm, 0.6);
+
+  CalibrationStep step;
+  step.take_up(*read->calibrated, "taken up");
+  EXPECT_FALSE(step.found().has_value()) << "nothing could be drawn by it";
+  EXPECT_FALSE(step.note().done) << "the window still asks for a calibration";
+  EXPECT_NE(step.note().line.find("calibrate anew"), std::string::npos) << step.note().line;
 }
 
 TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {

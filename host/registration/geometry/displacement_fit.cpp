@@ -1,4 +1,4 @@
-#include "host/registration/geometry/field_fit.hpp"
+#include "host/registration/geometry/displacement_fit.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -26,7 +26,7 @@ Eigen::MatrixXd squared_distances(const Eigen::MatrixX3d& a, const Eigen::Matrix
 
 }  // namespace
 
-Eigen::MatrixX3d FieldFit::values(const Eigen::MatrixX3d& places) const {
+Eigen::MatrixX3d DisplacementFit::values(const Eigen::MatrixX3d& places) const {
   Eigen::MatrixX3d out = Eigen::MatrixX3d::Zero(places.rows(), 3);
   if (centres_.rows() == 0) return out;
   if (!prior_.parts.empty()) {
@@ -41,7 +41,7 @@ Eigen::MatrixX3d FieldFit::values(const Eigen::MatrixX3d& places) const {
   return out;
 }
 
-std::vector<Eigen::Matrix3d> FieldFit::gradients(const Eigen::MatrixX3d& places) const {
+std::vector<Eigen::Matrix3d> DisplacementFit::gradients(const Eigen::MatrixX3d& places) const {
   std::vector<Eigen::Matrix3d> out(static_cast<std::size_t>(places.rows()), Eigen::Matrix3d::Zero());
   if (centres_.rows() == 0) return out;
   if (!prior_.parts.empty()) {
@@ -70,10 +70,11 @@ std::vector<Eigen::Matrix3d> FieldFit::gradients(const Eigen::MatrixX3d& places)
   return out;
 }
 
-FieldFit FieldFit::solve(const SignedDistance& organ, std::span<const SurfacePoint> points, const FieldPrior& prior,
-                         const FieldFit* start, std::span<const double> scales_mm) {
+DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<const SeenPoint> points,
+                                       const DisplacementPrior& prior, const DisplacementFit* start,
+                                       std::span<const double> scales_mm) {
   const auto n = static_cast<Eigen::Index>(points.size());
-  FieldFit out;
+  DisplacementFit out;
   if (start != nullptr) {
     out.prior_ = start->prior_;
     out.centres_ = start->centres_;
@@ -149,7 +150,7 @@ FieldFit FieldFit::solve(const SignedDistance& organ, std::span<const SurfacePoi
   return out;
 }
 
-Eigen::Matrix3d FieldFit::covariance(const Eigen::Vector3d& rest_mm, const Eigen::Vector3d& seen_mm) const {
+Eigen::Matrix3d DisplacementFit::covariance(const Eigen::Vector3d& rest_mm, const Eigen::Vector3d& seen_mm) const {
   const Eigen::Vector3d place = prior_.of_seen ? seen_mm : rest_mm;
   Eigen::Matrix3d before = Eigen::Matrix3d::Zero();
   Eigen::MatrixX3d cross = Eigen::MatrixX3d::Zero(centres_.rows(), 3);
@@ -170,7 +171,7 @@ Eigen::Matrix3d FieldFit::covariance(const Eigen::Vector3d& rest_mm, const Eigen
   return before - half.transpose() * half;
 }
 
-LatticeField FieldFit::seen_field(const SignedDistance& organ) const {
+LatticeField DisplacementFit::seen_field(const SignedDistance& organ) const {
   constexpr std::size_t kBlock = 256;
   LatticeField field(organ);
   tbb::parallel_for(std::size_t{0}, (field.size() + kBlock - 1) / kBlock, [&](std::size_t block) {

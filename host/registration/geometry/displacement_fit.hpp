@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "host/registration/geometry/field_prior.hpp"
+#include "host/registration/geometry/displacement_prior.hpp"
 #include "host/registration/geometry/lattice_field.hpp"
-#include "host/registration/geometry/surface_point.hpp"
+#include "host/registration/geometry/seen_point.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
@@ -15,11 +15,12 @@ namespace birdseye::host {
 /// The displacement that surface points ask for under a prior, by Gauss and Newton's method on distance(seen +
 /// displacement) = 0 with Geman and McClure's weights, annealed: the posterior of a Gaussian process about the best
 /// linearisation.
-class FieldFit {
+class DisplacementFit {
  public:
   /// start: where to begin; none: at rest. scales_mm: of each step, beyond which a residual is thought to be wrong.
-  static FieldFit solve(const SignedDistance& organ, std::span<const SurfacePoint> points, const FieldPrior& prior,
-                        const FieldFit* start, std::span<const double> scales_mm);
+  static DisplacementFit solve(const SignedDistance& organ, std::span<const SeenPoint> points,
+                               const DisplacementPrior& prior, const DisplacementFit* start,
+                               std::span<const double> scales_mm);
 
   /// u of seen places.
   [[nodiscard]] LatticeField seen_field(const SignedDistance& organ) const;
@@ -28,7 +29,7 @@ class FieldFit {
   /// Of the points under the prior, linearised where the fit ended, nats; with the prior's own belief.
   [[nodiscard]] double log_evidence() const { return log_evidence_; }
   [[nodiscard]] std::span<const double> weights() const { return weights_; }
-  [[nodiscard]] const FieldPrior& prior() const { return prior_; }
+  [[nodiscard]] const DisplacementPrior& prior() const { return prior_; }
 
  private:
   /// At many places at once.
@@ -36,7 +37,7 @@ class FieldFit {
   /// [i](a, b) = d w_a / d x_b at place i.
   [[nodiscard]] std::vector<Eigen::Matrix3d> gradients(const Eigen::MatrixX3d& places) const;
 
-  FieldPrior prior_;
+  DisplacementPrior prior_;
   Eigen::MatrixX3d centres_ = Eigen::MatrixX3d(0, 3);  ///< places that the prior's function takes
   Eigen::MatrixX3d rows_ = Eigen::MatrixX3d(0, 3);     ///< by which a residual sees the displacement at its centre
   Eigen::MatrixXd basis_rows_;                         ///< the same of the basis's unknowns

@@ -1,4 +1,4 @@
-#include "host/registration/geometry/field_fit.hpp"
+#include "host/registration/geometry/displacement_fit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -40,38 +40,38 @@ Eigen::Vector3d on_sphere(std::mt19937& random) {
   return kRadius_mm * Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
 }
 
-std::vector<SurfacePoint> seen_surface(double noise_mm) {
+std::vector<SeenPoint> seen_surface(double noise_mm) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, noise_mm);
-  std::vector<SurfacePoint> out;
+  std::vector<SeenPoint> out;
   for (int i = 0; i < 300; ++i) {
     const Eigen::Vector3d rest_mm = on_sphere(random);
     const Eigen::Vector3d seen_mm = rest_mm - true_displacement(rest_mm) + noise(random) * rest_mm.normalized();
-    out.push_back({seen_mm, 0.25, std::nullopt, 0});
+    out.push_back({seen_mm, 0.25, std::nullopt});
   }
   return out;
 }
 
-FieldPrior long_prior() {
-  FieldPrior prior;
+DisplacementPrior long_prior() {
+  DisplacementPrior prior;
   prior.parts.push_back({85, 3});
   return prior;
 }
 
-TEST(FieldFit, BringsTheSurfaceToWhereItIsSeen) {
+TEST(DisplacementFit, BringsTheSurfaceToWhereItIsSeen) {
   const SignedDistance organ = ball();
   const auto points = seen_surface(0.2);
-  const FieldFit fit = FieldFit::solve(organ, points, long_prior(), nullptr, kSettle_mm);
+  const DisplacementFit fit = DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm);
   const LatticeField field = fit.seen_field(organ);
   double squares_mm2 = 0;
-  for (const SurfacePoint& point : points)
+  for (const SeenPoint& point : points)
     squares_mm2 += std::pow(organ.distance_mm(point.place_mm + field.at(point.place_mm)), 2);
   EXPECT_LT(std::sqrt(squares_mm2 / static_cast<double>(points.size())), 0.3);
 }
 
-TEST(FieldFit, ItsCovarianceHoldsItsErrors) {
+TEST(DisplacementFit, ItsCovarianceHoldsItsErrors) {
   const SignedDistance organ = ball();
-  const FieldFit fit = FieldFit::solve(organ, seen_surface(0.2), long_prior(), nullptr, kSettle_mm);
+  const DisplacementFit fit = DisplacementFit::solve(organ, seen_surface(0.2), long_prior(), nullptr, kSettle_mm);
   const LatticeField field = fit.seen_field(organ);
   std::mt19937 random(8);
   double actual_mm2 = 0, expected_mm2 = 0;
@@ -88,26 +88,27 @@ TEST(FieldFit, ItsCovarianceHoldsItsErrors) {
   EXPECT_LT(ratio, 4);
 }
 
-TEST(FieldFit, AFewWrongPlacesChangeLittle) {
+TEST(DisplacementFit, AFewWrongPlacesChangeLittle) {
   const SignedDistance organ = ball();
   auto points = seen_surface(0.2);
-  const LatticeField without = FieldFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).seen_field(organ);
+  const LatticeField without =
+      DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).seen_field(organ);
   for (std::size_t i = 0; i < points.size(); i += 10) points[i].place_mm *= 1.2;
   constexpr std::array kAnneal_mm{8.0, 6.0, 4.0, 3.0, 2.0, 1.3, 1.0, 1.0, 1.0};
-  const FieldFit fit = FieldFit::solve(organ, points, long_prior(), nullptr, kAnneal_mm);
+  const DisplacementFit fit = DisplacementFit::solve(organ, points, long_prior(), nullptr, kAnneal_mm);
   const LatticeField with = fit.seen_field(organ);
-  for (const SurfacePoint& point : seen_surface(0))
+  for (const SeenPoint& point : seen_surface(0))
     EXPECT_LT((with.at(point.place_mm) - without.at(point.place_mm)).norm(), 0.6);
   EXPECT_LT(fit.weights()[0], 0.1);
 }
 
-TEST(FieldFit, TheEvidenceKnowsWhichPriorMadeTheField) {
+TEST(DisplacementFit, TheEvidenceKnowsWhichPriorMadeTheField) {
   const SignedDistance organ = ball();
   const auto points = seen_surface(0.2);
-  FieldPrior still;
+  DisplacementPrior still;
   still.parts.push_back({85, 0.2});
-  EXPECT_GT(FieldFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).log_evidence(),
-            FieldFit::solve(organ, points, still, nullptr, kSettle_mm).log_evidence() + 50);
+  EXPECT_GT(DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).log_evidence(),
+            DisplacementFit::solve(organ, points, still, nullptr, kSettle_mm).log_evidence() + 50);
 }
 
 TEST(LatticeField, OfSeenPlacesUndoesThatOfRestPlaces) {

@@ -16,19 +16,19 @@ struct GaussianPart {
 };
 
 /// Another part: a deformation of few unknowns, each of variance 1 before anything is seen.
-class FieldBasis {
+class DisplacementBasis {
  public:
-  FieldBasis() = default;
-  FieldBasis(const FieldBasis&) = delete;
-  FieldBasis& operator=(const FieldBasis&) = delete;
-  virtual ~FieldBasis() = default;
+  DisplacementBasis() = default;
+  DisplacementBasis(const DisplacementBasis&) = delete;
+  DisplacementBasis& operator=(const DisplacementBasis&) = delete;
+  virtual ~DisplacementBasis() = default;
   [[nodiscard]] virtual Eigen::Index unknowns() const = 0;
   /// 3 x unknowns: the displacement at a place, mm per unit of each unknown.
   [[nodiscard]] virtual Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const = 0;
 };
 
 /// The inner control points of a Bezier patch over a box, independent, of sigma_mm along each axis.
-class BezierBasis : public FieldBasis {
+class BezierBasis : public DisplacementBasis {
  public:
   BezierBasis(const Eigen::Affine3d& patient_from_cube, const std::array<int, 3>& inner_points, double sigma_mm);
   [[nodiscard]] Eigen::Index unknowns() const override;
@@ -41,10 +41,10 @@ class BezierBasis : public FieldBasis {
 };
 
 /// A hypothesis: what may move the organ.
-struct FieldPrior {
+struct DisplacementPrior {
   std::string name;
   std::vector<GaussianPart> parts;
-  std::shared_ptr<const FieldBasis> basis;  ///< or none
+  std::shared_ptr<const DisplacementBasis> basis;  ///< or none
   /// A function of the place where tissue is seen (rest = seen + u(seen)); else of where it was at rest (seen = rest -
   /// w(rest)), as tissue bends.
   bool of_seen = false;

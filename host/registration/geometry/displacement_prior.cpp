@@ -1,4 +1,4 @@
-#include "host/registration/geometry/field_prior.hpp"
+#include "host/registration/geometry/displacement_prior.hpp"
 
 #include <algorithm>
 

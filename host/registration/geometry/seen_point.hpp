@@ -6,12 +6,11 @@
 namespace birdseye::host {
 
 /// A place that is on the organ's surface now, patient mm, known along the surface's normal.
-struct SurfacePoint {
+struct SeenPoint {
   Eigen::Vector3d place_mm;
   double sigma_mm = 0;  ///< of what is independent of its neighbours'
   /// From the camera that sees it, of unit length: the surface there faces it. None for a point of an outline.
   std::optional<Eigen::Vector3d> from_camera;
-  std::size_t view = 0;
 };
 
 }  // namespace birdseye::host
