@@ -56,12 +56,11 @@ class Background {
     return shared_->running;
   }
   void cancel() {
-    std::stop_source stop(std::nostopstate);
-    {
+    const auto stop = [this] {
       const std::lock_guard lock(shared_->mutex);
-      stop = shared_->stop;
-    }
-    stop.request_stop();  // what it calls may look here
+      return shared_->stop;
+    };
+    stop().request_stop();  // what it calls may look here
   }
   /// What came of it, once.
   std::optional<T> take() {
