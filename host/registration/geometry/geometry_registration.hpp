@@ -16,6 +16,8 @@ struct GeometrySettings {
   /// Inner control points of the Bezier patches that are among the hypotheses.
   std::array<int, 3> control_points{3, 3, 3};
   bool estimate_uncertainty = true;
+  /// Places whose expected error is asked for, of the organ as the CT has it, patient frame.
+  std::vector<Eigen::Vector3d> targets_at_rest_mm;
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
   RegistrationWatch watch;

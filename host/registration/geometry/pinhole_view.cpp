@@ -1,5 +1,7 @@
 #include "host/registration/geometry/pinhole_view.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 #include <vector>
@@ -25,6 +27,22 @@ std::pair<cv::Mat, cv::Mat> lens_map(const CameraModel& camera) {
     }
   }
   return {x, y};
+}
+
+/// What of a picture moves with the organ: log of its grey, without what changes slowly across it, such as shading and
+/// the halo of a highlight, which move with the lamp. NaN where a pixel does not count.
+cv::Mat texture_of(const cv::Mat& grey, const cv::Mat& usable) {
+  constexpr double kFine_px = 1, kCoarse_px = 3, kWidth_px = 768, kDark = 8, kFew = 1e-3;
+  const double coarse_px = std::max(2 * kFine_px, kCoarse_px * grey.cols / kWidth_px);
+  cv::Mat bright, fine, weight, weight_about, about;
+  cv::log(grey + kDark, bright);
+  cv::GaussianBlur(bright, fine, {}, kFine_px);
+  usable.convertTo(weight, CV_32F, 1 / 255.0);
+  cv::GaussianBlur(bright.mul(weight), about, {}, coarse_px);
+  cv::GaussianBlur(weight, weight_about, {}, coarse_px);
+  cv::Mat out = fine - about / cv::max(weight_about, kFew);
+  out.setTo(std::numeric_limits<float>::quiet_NaN(), usable == 0);
+  return out;
 }
 
 cv::Mat disc(int radius_px) {
@@ -56,7 +74,6 @@ PinholeView pinhole_view(const VideoView& view, const RgbView& picture) {
   cv::add(sum, channels[2], sum, {}, CV_32F);
   sum /= 3;
   cv::remap(sum, grey, x, y, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
-  cv::GaussianBlur(grey, out.smooth, {}, 1.0);
   const cv::Mat brightest = cv::max(cv::max(channels[0], channels[1]), channels[2]), seen = counts != 0;
   cv::dilate(brightest > kGlare, glare, disc(kGlareRim_px));
   // What the mask leaves out for its glare is no rim of the lens.
@@ -68,6 +85,7 @@ PinholeView pinhole_view(const VideoView& view, const RgbView& picture) {
   cv::erode(seen, usable, disc(kMaskRim_px), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
   usable = usable & ~glare & lens;
   cv::remap(usable, out.usable, x, y, cv::INTER_NEAREST, cv::BORDER_CONSTANT);
+  out.texture = texture_of(grey, out.usable);
   return out;
 }
 

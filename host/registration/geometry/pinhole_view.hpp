@@ -15,10 +15,10 @@ struct PinholeView {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   Transform<Camera, Patient> camera_from_patient;
   Eigen::Vector3d eye_in_patient_mm;
-  cv::Mat smooth;  ///< float: grey, smoothed by a pixel
-  cv::Mat colour;  ///< 8 bits a channel, RGB
-  cv::Mat lens;    ///< 8 bit: not 0 where the picture shows anything at all
-  cv::Mat usable;  ///< 8 bit: not 0 where moreover nothing glares
+  cv::Mat texture;  ///< float: log of grey without its slow changes; NaN where not usable
+  cv::Mat colour;   ///< 8 bits a channel, RGB
+  cv::Mat lens;     ///< 8 bit: not 0 where the picture shows anything at all
+  cv::Mat usable;   ///< 8 bit: not 0 where moreover nothing glares
 
   /// Along the pixel's ray: one unit is one mm of depth.
   [[nodiscard]] Eigen::Vector3d ray(double x_px, double y_px) const {

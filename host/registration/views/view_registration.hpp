@@ -45,6 +45,19 @@ struct ViewRegistrationSettings {
   RegistrationWatch watch;
 };
 
+struct ExpectedError {
+  double rms_mm = 0;
+  double radius95_mm = 0;  ///< the place is within, with a probability of 95 %
+};
+
+/// The error to be expected of places of the organ, by how the views see them.
+struct ExpectedErrors {
+  std::optional<ExpectedError> seen, hidden;  ///< of the surface; none where there is none of it
+  std::optional<ExpectedError> surface, inside;
+  std::vector<ExpectedError> targets;   ///< in the order in which they were asked for
+  std::optional<double> seen_moved_mm;  ///< of the surface that is seen, root mean square
+};
+
 struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
@@ -64,6 +77,8 @@ struct ViewRegistration {
   /// The error of the organ's surface that is to be expected, root mean square (confidence.hpp). None where it was not
   /// asked for or nothing better than the start was found.
   std::optional<double> uncertainty_mm;
+  /// Only with optimiser geometry.
+  std::optional<ExpectedErrors> expected;
   /// Places of the surface that stereo between the views found; only with optimiser geometry.
   std::optional<std::size_t> stereo_points;
   std::string why_so_many_points;  ///< in words

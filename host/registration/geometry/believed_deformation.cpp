@@ -1,0 +1,65 @@
+#include "host/registration/geometry/believed_deformation.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+namespace birdseye::host {
+
+Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) const {
+  const Eigen::Vector3d seen_mm = seen_place(mean, rest_mm);
+  Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+  std::vector<Eigen::Vector3d> each;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    each.push_back(seen_place(fields[i], rest_mm));
+    middle += beliefs[i] * each.back();
+  }
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    out += beliefs[i] * (fits[i].covariance(rest_mm, seen_mm) + (each[i] - middle) * (each[i] - middle).transpose());
+  }
+  return out;
+}
+
+BelievedDeformation believe(const SignedDistance& organ, std::span<const SeenPoint> points,
+                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before) {
+  constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.6, 1.3, 1.1, 1.0, 1.0, 1.0};
+  constexpr std::array kGoOn_mm{4.0, 2.0, 1.3, 1.0, 1.0};
+  constexpr std::size_t kMostBelieved = 4;
+  /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
+  constexpr double kTemper = 4;
+  const bool goes_on = before.all_fits.size() == priors.size();
+  std::vector<std::optional<DisplacementFit>> fits(priors.size());
+  tbb::parallel_for(std::size_t{0}, priors.size(), [&](std::size_t i) {
+    fits[i] = goes_on ? DisplacementFit::solve(organ, points, priors[i], &before.all_fits[i], kGoOn_mm)
+                      : DisplacementFit::solve(organ, points, priors[i], nullptr, kAnneal_mm);
+  });
+  BelievedDeformation out(organ);
+  for (std::optional<DisplacementFit>& fit : fits) out.all_fits.push_back(*std::move(fit));
+  std::vector<std::size_t> order(priors.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto evidence = [&](std::size_t i) { return out.all_fits[i].log_evidence(); };
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return evidence(a) > evidence(b); });
+  order.resize(std::min(order.size(), kMostBelieved));
+  double sum = 0;
+  for (const std::size_t i : order) {
+    out.beliefs.push_back(std::exp((evidence(i) - evidence(order.front())) / kTemper));
+    out.fits.push_back(out.all_fits[i]);
+    out.fields.push_back(out.all_fits[i].seen_field(organ));
+    sum += out.beliefs.back();
+  }
+  for (double& belief : out.beliefs) belief /= sum;
+  for (std::size_t n = 0; n < out.mean.size(); ++n) {
+    Eigen::Vector3d u = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < out.fields.size(); ++i) u += out.beliefs[i] * out.fields[i].displacement_mm(n);
+    out.mean.set(n, u);
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "host/registration/geometry/displacement_fit.hpp"
+#include "host/registration/geometry/lattice_field.hpp"
+
+namespace birdseye::host {
+
+/// Deformations by several hypotheses, how far each is believed, and their mean.
+struct BelievedDeformation {
+  explicit BelievedDeformation(const SignedDistance& organ) : mean(organ) {}
+
+  std::vector<DisplacementFit> fits;  ///< of the hypotheses that are believed, the most believed first
+  std::vector<LatticeField> fields;   ///< theirs, of seen places
+  std::vector<double> beliefs;        ///< sum to 1
+  LatticeField mean;
+  std::vector<DisplacementFit> all_fits;  ///< one a prior
+
+  /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, and between them.
+  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const;
+};
+
+/// By every prior, each believed as far as its evidence goes; before: by the same priors about fewer or worse points,
+/// or empty of fits.
+BelievedDeformation believe(const SignedDistance& organ, std::span<const SeenPoint> points,
+                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before);
+
+}  // namespace birdseye::host

@@ -1,0 +1,51 @@
+#include "host/registration/geometry/hypotheses.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace birdseye::host {
+
+std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::array<int, 3>& control_points) {
+  constexpr double kUsual_mm = 2, kUsualNearby_mm = 0.4, kNearby_mm = 20;
+  struct Gaussian {
+    double length_mm, sigma_mm, nearby_sigma_mm;
+  };
+  std::vector<DisplacementPrior> out;
+  for (const auto& [length, sigma, nearby] : {Gaussian{65, 4, 0},
+                                              {85, 4, 0},
+                                              {120, 4, 0},
+                                              {85, 2.5, 0},
+                                              {120, 1, 0},
+                                              {85, 1.2, 0.8},
+                                              {85, 0.6, 1.6},
+                                              {65, 4, 0.8},
+                                              {50, 3, 0},
+                                              {120, 1, 3}}) {
+    DisplacementPrior prior;
+    prior.name = fmt::format("{:g} mm over {:g} mm", sigma, length);
+    prior.parts.push_back({length, sigma});
+    if (nearby > 0) {
+      prior.name += fmt::format(" and {:g} mm over {:g} mm", nearby, kNearby_mm);
+      prior.parts.push_back({kNearby_mm, nearby});
+    }
+    prior.log_belief =
+        -0.5 * std::pow(std::log(sigma / kUsual_mm), 2) - 0.5 * std::pow(std::log((nearby + 0.1) / kUsualNearby_mm), 2);
+    out.push_back(std::move(prior));
+  }
+  const Eigen::Vector3d last_voxel(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);
+  const Eigen::Affine3d patient_from_cube = ct.patient_from_voxel * Eigen::Scaling(last_voxel);
+  for (const double sigma_mm : {20.0, 40.0}) {
+    DisplacementPrior prior;
+    prior.name = fmt::format("{}x{}x{} control points of {:g} mm", control_points[0], control_points[1],
+                             control_points[2], sigma_mm);
+    prior.basis = std::make_shared<BezierBasis>(patient_from_cube, control_points, sigma_mm);
+    prior.of_seen = true;
+    out.push_back(std::move(prior));
+  }
+  return out;
+}
+
+}  // namespace birdseye::host
