@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
   hw_sim::add_camera_command(app, take);
 
   hw_sim::CaseSettings registration;
-  std::string dof = "3";
+  std::string dof, deformation;
   bool still = false;
   CLI::App& make_case =
       *app.add_subcommand("case", "write a registration case: CT at rest, views of it deformed, truth");
@@ -86,9 +86,13 @@ int main(int argc, char** argv) {
   make_case.add_option("--liver-label", registration.liver_label, "the liver's value in the labels")->needs("--labels");
   make_case.add_option("--views", registration.views, "how many (default 5)");
   make_case.add_option("--size", size, "WIDTHxHEIGHT of the views (default 768x576)");
+  make_case.add_option("--deformation", deformation,
+                       "elastic (default), bezier, bend, push, compression, twist, breathing or pneumoperitoneum");
   make_case.add_option("--dof", dof,
-                       "of the deformation: 3 (default), 24, 81.., or inner control points an axis as 3x3x3");
-  make_case.add_option("--amplitude-mm", registration.amplitude_mm,
+                       "of bezier, which it implies: 3 (default), 24, 81.., or inner control points an axis as 3x3x3");
+  make_case.add_option("--push-width-mm", registration.deformation.push_width_mm,
+                       "of the dent of a push, at half its depth (default 40)");
+  make_case.add_option("--amplitude-mm", registration.deformation.amplitude_mm,
                        "the largest move of the organ's surface (default 10)");
   make_case.add_flag("--no-deformation", still, "the same views of the organ at rest");
   make_case.add_option("--distance-mm", registration.distance_mm,
@@ -97,14 +101,14 @@ int main(int argc, char** argv) {
   make_case.add_option("--light-offset-mm", registration.lamp_offset_mm, "of the lamp, to the right of the lens");
   make_case.add_flag("--plain-background", registration.plain_background, "black in place of the cavity's wall");
   make_case.callback([&] {
-    const auto inner = hw_sim::parse_dof(dof);
-    const auto parsed = hw_sim::parse_size(size, registration.width_px, registration.height_px);
-    if (!inner || !parsed) {
-      take(inner ? parsed : Result<void>(inner.error()));
-      return;
+    for (const Result<void>& parsed : {hw_sim::parse_size(size, registration.width_px, registration.height_px),
+                                       hw_sim::parse_deformation(deformation, dof, registration.deformation)}) {
+      if (!parsed) {
+        take(parsed);
+        return;
+      }
     }
-    registration.inner = *inner;
-    if (still) registration.amplitude_mm = 0;
+    if (still) registration.deformation.amplitude_mm = 0;
     take(hw_sim::write_case(registration));
   });
 

@@ -59,17 +59,19 @@ Result<void> write_map_field(const std::filesystem::path& path, const TissueMap&
   lattice.origin_mm = map.low_mm();
   lattice.spacing_mm = (map.high_mm() - map.low_mm()) / (kPoints - 1);
   std::vector<Eigen::Vector3f> displacement_mm(lattice.voxels(), Eigen::Vector3f::Zero());
-  // Not the outermost points, which lie on the box's surface: there, nothing moves, however they are rounded.
-  tbb::parallel_for(1, kPoints - 1, [&](int k) {
-    for (int j = 1; j < kPoints - 1; ++j) {
-      for (int i = 1; i < kPoints - 1; ++i)
-        displacement_mm[lattice.index(i, j, k)] = map.displacement_mm(lattice.point(i, j, k)).cast<float>();
+  constexpr double kStill_mm = 1e-9;  // where nothing moves but by rounding, as on the surface of a patch's box
+  tbb::parallel_for(0, kPoints, [&](int k) {
+    for (int j = 0; j < kPoints; ++j) {
+      for (int i = 0; i < kPoints; ++i) {
+        const Eigen::Vector3d u = map.displacement_mm(lattice.point(i, j, k));
+        if (u.norm() > kStill_mm) displacement_mm[lattice.index(i, j, k)] = u.cast<float>();
+      }
     }
   });
   return write_field(path, lattice, displacement_mm);
 }
 
-Result<void> write_control_points(const std::filesystem::path& path, const TissueMap& map) {
+Result<void> write_control_points(const std::filesystem::path& path, const BezierMap& map) {
   nlohmann::json json;
   json["frame"] = "patient LPS, mm";
   json["direction"] = "rest = deformed + u(deformed)";

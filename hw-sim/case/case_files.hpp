@@ -8,6 +8,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "hw-sim/case/bezier_map.hpp"
 #include "hw-sim/case/landmarks.hpp"
 #include "hw-sim/case/tissue_map.hpp"
 
@@ -25,6 +26,6 @@ Result<void> write_landmarks(const std::filesystem::path& path, const std::vecto
 /// The map as an ITK displacement field on a lattice that spans its box.
 Result<void> write_map_field(const std::filesystem::path& path, const TissueMap& map);
 /// The map itself, as JSON.
-Result<void> write_control_points(const std::filesystem::path& path, const TissueMap& map);
+Result<void> write_control_points(const std::filesystem::path& path, const BezierMap& map);
 
 }  // namespace birdseye::hw_sim

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,7 +14,6 @@
 #include "hw-sim/case/case_files.hpp"
 #include "hw-sim/case/landmarks.hpp"
 #include "hw-sim/case/subject.hpp"
-#include "hw-sim/case/tissue_map.hpp"
 #include "hw-sim/case/viewpoints.hpp"
 #include "hw-sim/phantom/image_files.hpp"
 #include "hw-sim/phantom/json_file.hpp"
@@ -29,7 +27,7 @@ using Eigen::Vector3d;
 /// Everything of a case, before it is written.
 struct MadeCase {
   Subject subject;
-  TissueMap map;
+  DrawnDeformation deformation;
   CameraModel lens;
   std::vector<Transform<Camera, Patient>> views;
   std::vector<TrueLandmark> landmarks;
@@ -47,7 +45,9 @@ Result<Subject> subject_of(const CaseSettings& settings) {
 Result<void> check(const CaseSettings& settings) {
   const auto in = [](double value, double low, double high) { return value >= low && value <= high; };
   if (!in(settings.views, 1, 50)) return Error{Errc::bad_value, "--views: give 1 to 50"};
-  if (!in(settings.amplitude_mm, 0, 100)) return Error{Errc::bad_value, "--amplitude-mm: give 0 to 100"};
+  if (!in(settings.deformation.amplitude_mm, 0, 100)) return Error{Errc::bad_value, "--amplitude-mm: give 0 to 100"};
+  if (!in(settings.deformation.push_width_mm, 10, 200))
+    return Error{Errc::bad_value, "--push-width-mm: give 10 to 200"};
   if (settings.distance_mm != 0 && !in(settings.distance_mm, 30, 400)) {
     return Error{Errc::bad_value, "--distance-mm: give 30 to 400, or 0 for what suits the organ"};
   }
@@ -64,12 +64,11 @@ Result<void> check(const CaseSettings& settings) {
 Result<MadeCase> make_case(const CaseSettings& settings) {
   auto subject = subject_of(settings);
   if (!subject) return subject.error();
-  const TissueMap still(subject->grid.origin_mm, subject->grid.last_mm(), settings.inner);
-  auto map = TissueMap::random(still, settings.amplitude_mm, subject->surface.vertices, settings.seed);
-  if (!map) return map.error();
+  auto deformation = draw_deformation(*subject, settings.deformation, settings.seed);
+  if (!deformation) return std::move(deformation).error();
 
   MadeCase out{.subject = *std::move(subject),
-               .map = *std::move(map),
+               .deformation = *std::move(deformation),
                .lens = {},
                .views = {},
                .landmarks = {},
@@ -84,16 +83,17 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
                                           .well_lit_mm = distance_mm,
                                           .noise = settings.noise});
   if (!scope) return scope.error();
+  const TissueMap& map = *out.deformation.map;
   Cavity cavity;
-  cavity.organ = deformed(out.subject.surface, out.map);
+  cavity.organ = deformed(out.subject.surface, map);
   cavity.rest_mm = out.subject.surface.vertices;
   cavity.coat = out.subject.coat;
   if (!settings.plain_background) {
-    cavity.wall_centre_mm = 0.5 * (out.map.low_mm() + out.map.high_mm());
-    cavity.wall_radius_mm = 1.1 * distance_mm + 0.5 * (out.map.high_mm() - out.map.low_mm()).norm();
+    cavity.wall_centre_mm = 0.5 * (map.low_mm() + map.high_mm());
+    cavity.wall_radius_mm = 1.1 * distance_mm + 0.5 * (map.high_mm() - map.low_mm()).norm();
   }
   (*scope)->set_cavity(cavity);
-  auto landmarks = choose_landmarks(out.subject, cavity.organ, out.map, **scope, out.views, settings.seed);
+  auto landmarks = choose_landmarks(out.subject, cavity.organ, map, **scope, out.views, settings.seed);
   if (!landmarks) return landmarks.error();
   out.landmarks = *std::move(landmarks);
   for (std::size_t i = 0; i < out.views.size(); ++i)
@@ -103,19 +103,35 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
 }
 
 std::string case_toml(const CaseSettings& settings, const MadeCase& made) {
+  // A registrar of patches knows how many points the truth has, where it is one.
+  const BezierMap* const patch = made.deformation.patch;
+  const std::string points = patch ? fmt::format("[{}]", fmt::join(patch->inner(), ", ")) : "\"auto\"";
   std::string toml = fmt::format(
       "# Written by birdseye-sim case --seed {}. Paths are relative to this file.\n"
       "[volume]\npath = \"ct.nii.gz\"\nlabel = \"segmentation.nii.gz\"\nlabel_values = [{}]\ntransfer = \"{}\"\n\n"
-      "[model]\ncontrol_points = [{}]\nlevel = 3\noptimiser = \"gradient\"\n",
-      settings.seed, fmt::join(made.subject.organ_labels, ", "), made.subject.transfer,
-      fmt::join(settings.inner, ", "));
+      "[model]\ncontrol_points = {}\nlevel = 3\noptimiser = \"gradient\"\n",
+      settings.seed, fmt::join(made.subject.organ_labels, ", "), made.subject.transfer, points);
   for (std::size_t i = 0; i < made.views.size(); ++i) {
     toml += fmt::format(
         "\n[[view]]\nimage = \"view{0}.png\"\ncamera = \"camera.yaml\"\ncamera_from_patient = \"view{0}.txt\"\n"
         "mask = \"mask.png\"\n",
         i);
   }
-  return toml + "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\ncontrol_points = \"truth/control_points.json\"\n";
+  toml += "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\n";
+  return patch ? toml + "control_points = \"truth/control_points.json\"\n" : toml;
+}
+
+nlohmann::json deformation_of(const DeformationSettings& settings, const DrawnDeformation& drawn) {
+  nlohmann::json json;
+  json["kind"] = settings.amplitude_mm == 0 ? std::string("none") : name_of(settings.kind);
+  for (const DrawnNumber& number : drawn.numbers) {
+    if (number.values.size() == 1) {
+      json[number.name] = number.values.front();
+    } else {
+      json[number.name] = number.values;
+    }
+  }
+  return json;
 }
 
 nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
@@ -123,9 +139,10 @@ nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
   truth["seed"] = settings.seed;
   truth["phantom"] = settings.ct.empty() ? settings.phantom : "ct";
   truth["frame"] = "patient LPS, mm";
-  truth["dof"] = 3 * made.map.control_mm().size();
-  truth["amplitude_mm"] = settings.amplitude_mm;
-  truth["min_jacobian"] = made.map.least_determinant();
+  truth["deformation"] = deformation_of(settings.deformation, made.deformation);
+  if (made.deformation.patch) truth["dof"] = 3 * made.deformation.patch->control_mm().size();
+  truth["amplitude_mm"] = settings.deformation.amplitude_mm;
+  truth["min_jacobian"] = made.deformation.map->least_determinant();
   truth["noise"] = settings.noise;
   truth["light_in_camera_mm"] = json_of(Vector3d(settings.lamp_offset_mm, 0, 0));
   truth["plain_background"] = settings.plain_background;
@@ -152,7 +169,7 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
   tbb::parallel_for(0, 3, [&](int file) {
     if (file == 0) written[0] = write_volume(folder / "ct.nii.gz", made.subject.grid, made.subject.hu);
     if (file == 1) written[1] = write_labels(folder / "segmentation.nii.gz", made.subject.grid, made.subject.labels);
-    if (file == 2) written[2] = write_map_field(folder / "truth" / "field.mha", made.map);
+    if (file == 2) written[2] = write_map_field(folder / "truth" / "field.mha", *made.deformation.map);
   });
   written.push_back(write_camera(folder / "camera.yaml", made.lens));
   written.push_back(write_picture(folder / "mask.png", made.lens_circle, made.lens));
@@ -160,7 +177,8 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
     written.push_back(write_picture(folder / fmt::format("view{}.png", i), made.pictures[i], made.lens));
     written.push_back(write_pose(folder / fmt::format("view{}.txt", i), made.views[i]));
   }
-  written.push_back(write_control_points(folder / "truth" / "control_points.json", made.map));
+  if (const BezierMap* const patch = made.deformation.patch)
+    written.push_back(write_control_points(folder / "truth" / "control_points.json", *patch));
   written.push_back(write_landmarks(folder / "truth" / "landmarks.csv", made.landmarks));
   written.push_back(write_json(folder / "truth" / "truth.json", truth_of(settings, made)));
   written.push_back(write_text(folder / "case.toml", case_toml(settings, made)));
@@ -169,25 +187,6 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
 }
 
 }  // namespace
-
-Result<std::array<int, 3>> parse_dof(const std::string& text) {
-  constexpr int kMost = TissueMap::kMostInner;
-  std::array<int, 3> inner{};
-  int read = 0;
-  int dof = 0;
-  if (std::sscanf(text.c_str(), "%dx%dx%d%n", inner.data(), &inner[1], &inner[2], &read) == 3 &&
-      static_cast<std::size_t>(read) == text.size()) {
-    if (*std::min_element(inner.begin(), inner.end()) >= 1 && *std::max_element(inner.begin(), inner.end()) <= kMost)
-      return inner;
-  } else if (std::sscanf(text.c_str(), "%d%n", &dof, &read) == 1 && static_cast<std::size_t>(read) == text.size()) {
-    for (int n = 1; n <= kMost; ++n) {
-      if (dof == 3 * n * n * n) return std::array<int, 3>{n, n, n};
-    }
-  }
-  return Error{Errc::bad_value, fmt::format("--dof {}: give 3, 24, 81, 192, 375, 648 or 1029, or inner control points "
-                                            "an axis, 1 to {}, as 3x3x3",
-                                            text, kMost)};
-}
 
 Result<void> write_case(const CaseSettings& settings) {
   if (auto checked = check(settings); !checked) return checked;

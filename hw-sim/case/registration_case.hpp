@@ -1,11 +1,11 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
 
 #include "calibration/base/result.hpp"
+#include "hw-sim/case/deformation.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -18,17 +18,12 @@ struct CaseSettings {
   int liver_label = 5;
   int views = 5;
   int width_px = 768, height_px = 576;
-  std::array<int, 3> inner = {1, 1,
-                              1};  ///< inner control points, those that move, along each axis of the true deformation
-  double amplitude_mm = 10;        ///< how far that point of the organ's surface moves that moves most
-  double distance_mm = 0;          ///< from the organ's surface to the lens, about; 0: as suits the organ
-  double noise = 1;                ///< of the sensor, as a multiple of the usual
-  double lamp_offset_mm = 0;       ///< of the lamp to the right of the lens
+  DeformationSettings deformation;
+  double distance_mm = 0;     ///< from the organ's surface to the lens, about; 0: as suits the organ
+  double noise = 1;           ///< of the sensor, as a multiple of the usual
+  double lamp_offset_mm = 0;  ///< of the lamp to the right of the lens
   bool plain_background = false;
 };
-
-/// "3", "24", "81".. degrees of freedom, or "3x2x1" inner control points an axis.
-Result<std::array<int, 3>> parse_dof(const std::string& text);
 
 /// Writes folder/case.toml and all that it names: a CT of an organ at rest, its segmentation, and what a laparoscope
 /// sees of it once it is deformed, with the truth beside it (docs/manual/simulator.md). The same settings give the same

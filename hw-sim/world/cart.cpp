@@ -10,7 +10,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
-#include "hw-sim/case/tissue_map.hpp"
+#include "hw-sim/case/bezier_map.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
@@ -34,12 +34,12 @@ nlohmann::json sheet_of(const World& world) {
 }
 
 /// The liver since the CT: one control point in the middle of a box about it, whose surface holds still.
-Result<TissueMap> moved_liver(const Mesh& liver, double deformation_mm, std::uint64_t seed) {
+Result<BezierMap> moved_liver(const Mesh& liver, double deformation_mm, std::uint64_t seed) {
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(25);
   const auto [low_mm, high_mm] = bounds(liver);
-  const TissueMap still(low_mm - margin, high_mm + margin, {1, 1, 1});
+  const BezierMap still(low_mm - margin, high_mm + margin, {1, 1, 1});
   if (deformation_mm <= 0) return still;
-  return TissueMap::random(still, deformation_mm, liver.vertices, seed);
+  return BezierMap::random(still, deformation_mm, liver.vertices, seed);
 }
 
 nlohmann::json truth_of(const World& world, const TissueMap& moved, const CameraModel& lens) {
