@@ -29,20 +29,25 @@ std::vector<Vector3d> spread_out(const std::vector<Vector3d>& points, std::size_
   return chosen;
 }
 
-/// Vertices at rest that some view sees where they are now, out of a seeded sample.
-std::vector<Vector3d> seen_vertices(const Subject& subject, const Mesh& deformed, const Laparoscope& scope,
-                                    std::span<const Transform<Camera, Patient>> views, std::uint64_t seed) {
+/// Vertices at rest, by whether some view sees them where they are now.
+struct SampledSurface {
+  std::vector<Vector3d> seen, hidden;
+};
+
+/// Out of a seeded sample.
+SampledSurface sample_surface(const Subject& subject, const Mesh& deformed, const Laparoscope& scope,
+                              std::span<const Transform<Camera, Patient>> views, std::uint64_t seed) {
   constexpr std::uint64_t kSample = 4000;
-  std::vector<Vector3d> seen;
+  SampledSurface out;
   const auto vertices = static_cast<double>(deformed.vertices.size());
   for (std::uint64_t i = 0; i < kSample; ++i) {
     const auto v = static_cast<std::size_t>(vertices * hashed_uniform(seed + 81, i));
     const bool visible = std::any_of(views.begin(), views.end(), [&](const Transform<Camera, Patient>& view) {
       return scope.sees(view, deformed.vertices[v].cast<double>(), deformed.normals[v].cast<double>());
     });
-    if (visible) seen.push_back(subject.surface.vertices[v].cast<double>());
+    (visible ? out.seen : out.hidden).push_back(subject.surface.vertices[v].cast<double>());
   }
-  return seen;
+  return out;
 }
 
 }  // namespace
@@ -51,7 +56,8 @@ Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const
                                                    const Laparoscope& scope,
                                                    std::span<const Transform<Camera, Patient>> views,
                                                    std::uint64_t seed) {
-  const auto surface = spread_out(seen_vertices(subject, deformed, scope, views, seed), kSurfacePoints);
+  const SampledSurface sampled = sample_surface(subject, deformed, scope, views, seed);
+  const auto surface = spread_out(sampled.seen, kSurfacePoints);
   if (surface.size() < kFewestSurfacePoints) {
     return Error{Errc::degenerate, fmt::format("the views see {} points of the organ's surface where {} are needed; "
                                                "give another --distance-mm or more --views",
@@ -72,6 +78,7 @@ Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const
   add_all("surface", surface);
   add_all("vessel", spread_out(inner, kVesselPoints));
   add("tumour", subject.tumour_centre_mm);
+  add_all("hidden", spread_out(sampled.hidden, surface.size()));
   return landmarks;
 }
 

@@ -20,8 +20,9 @@ struct TrueLandmark {
 };
 
 /// Points whose true place is known: surface_01.. on the deformed organ where a view sees it, vessel_01.. where vessels
-/// fork or halfway between forks, and tumour, its centre. All are spread out as far as possible. Refused where the
-/// views see too little of the organ. scope: a laparoscope with the deformed organ in its cavity.
+/// fork or halfway between forks, tumour, its centre, and hidden_01.., as many as surface_, where no view sees the
+/// organ or only at a slant. All are spread out as far as possible. Refused where the views see too little of the
+/// organ. scope: a laparoscope with the deformed organ in its cavity.
 Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const Mesh& deformed, const TissueMap& map,
                                                    const Laparoscope& scope,
                                                    std::span<const Transform<Camera, Patient>> views,

@@ -18,6 +18,7 @@
 #include "hw-sim/case/bezier_map.hpp"
 #include "hw-sim/case/landmarks.hpp"
 #include "hw-sim/case/subject.hpp"
+#include "hw-sim/case/viewpoints.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -110,7 +111,7 @@ TEST(Case, TheFieldTakesTheDeformedLandmarksToRest) {
     reader->Update();
     const auto field = itk::VectorLinearInterpolateImageFunction<Field, double>::New();
     field->SetInputImage(reader->GetOutput());
-    int surface = 0, vessels = 0, tumours = 0;
+    int surface = 0, vessels = 0, tumours = 0, hidden = 0;
     double furthest_mm = 0;
     for (const TrueLandmark& l : read_landmarks(scratch / phantom / "truth" / "landmarks.csv")) {
       Field::PointType at;
@@ -122,10 +123,12 @@ TEST(Case, TheFieldTakesTheDeformedLandmarksToRest) {
       surface += l.name.starts_with("surface_") ? 1 : 0;
       vessels += l.name.starts_with("vessel_") ? 1 : 0;
       tumours += l.name == "tumour" ? 1 : 0;
+      hidden += l.name.starts_with("hidden_") ? 1 : 0;
     }
     EXPECT_GE(surface, 30);
     EXPECT_GE(vessels, 10);
     EXPECT_EQ(tumours, 1);
+    EXPECT_EQ(hidden, surface);
     EXPECT_GT(furthest_mm, 3);
     EXPECT_GT(read_json(scratch / phantom / "truth" / "truth.json").at("min_jacobian"), 0.3);
   }
@@ -186,6 +189,45 @@ TEST(Case, DeformedSurfaceLandmarksLieOnTheOrganInThePicture) {
     EXPECT_TRUE(lit[i] || !landmarks[i].name.starts_with("surface_")) << landmarks[i].name;
   }
   EXPECT_GT(beside, 0);
+}
+
+/// Between the lens and a hidden point is other surface, or its own slants away, or it lies beside the picture: judged
+/// by the mesh's vertices, not by the ray tracer that chose it.
+TEST(Landmarks, HiddenLieWhereNoViewSeesThem) {
+  const Subject subject = head_subject(2);
+  const BezierMap still(subject.grid.origin_mm, subject.grid.last_mm(), {1, 1, 1});
+  const CameraModel lens = laparoscope_lens(384, 288);
+  const auto scope = Laparoscope::create({.lens = lens});
+  ASSERT_TRUE(scope);
+  (*scope)->set_cavity({.organ = subject.surface});
+  const auto views = choose_viewpoints(subject, 3, subject.view_distance_mm, 2);
+  const auto landmarks = choose_landmarks(subject, subject.surface, still, **scope, views, 2);
+  ASSERT_TRUE(landmarks);
+  int behind = 0;
+  for (const TrueLandmark& l : *landmarks) {
+    if (!l.name.starts_with("hidden_")) continue;
+    // A face's back of the head lies behind it, seen from in front of the face.
+    behind += subject.towards_scope.dot(l.deformed_mm - 0.5 * (still.low_mm() + still.high_mm())) < 0 ? 1 : 0;
+    for (const auto& view : views) {
+      double nearest_mm = 1e9;
+      const Vector3d eye = view.inverse().translation();
+      const Vector3d way = (l.deformed_mm - eye).normalized();
+      for (const Eigen::Vector3f& v : subject.surface.vertices) {
+        const Vector3d from = v.cast<double>() - eye;
+        if (from.cross(way).norm() < 1.5) nearest_mm = std::min(nearest_mm, from.dot(way));
+      }
+      const auto at = project(lens, view * l.deformed_mm);
+      const bool covered = nearest_mm < (l.deformed_mm - eye).norm() - 3;
+      const bool slanted = std::any_of(subject.surface.vertices.begin(), subject.surface.vertices.end(), [&](auto& v) {
+        const auto i = static_cast<std::size_t>(&v - subject.surface.vertices.data());
+        return (v.template cast<double>() - l.deformed_mm).norm() < 1e-3 &&
+               -way.dot(subject.surface.normals[i].template cast<double>()) < 0.26;
+      });
+      const bool beside = !at || (*at - Eigen::Vector2d(192, 144)).norm() > 120;
+      EXPECT_TRUE(covered || slanted || beside) << l.name;
+    }
+  }
+  EXPECT_GT(behind, 20);
 }
 
 TEST(Case, ALampBesideTheLensAndAStillOrganChangeThePictureAlone) {
