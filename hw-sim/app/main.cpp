@@ -100,6 +100,16 @@ int main(int argc, char** argv) {
   make_case.add_option("--noise", registration.noise, "of the sensor, as a multiple of the usual (default 1)");
   make_case.add_option("--light-offset-mm", registration.lamp_offset_mm, "of the lamp, to the right of the lens");
   make_case.add_flag("--plain-background", registration.plain_background, "black in place of the cavity's wall");
+  make_case.add_option("--texture", registration.texture, "contrast of the organ's pattern, of the usual (default 1)");
+  make_case.add_option("--wet", registration.wet, "highlights, as a multiple of the usual (default 1)");
+  make_case.add_option("--blood", registration.blood, "share of the organ's surface that it covers (default 0)");
+  make_case.add_option("--instruments", registration.instruments, "before the organ, 0 to 3 (default 0)");
+  make_case.add_option("--blur-px", registration.blur_px, "of the lens, a Gaussian's sigma (default 0)");
+  hw_sim::PoseError& pose = registration.pose_error;
+  make_case.add_option("--pose-noise-mm", pose.noise_mm, "of the tracker's sensor, per axis and view (default 0)");
+  make_case.add_option("--pose-noise-deg", pose.noise_deg, "likewise");
+  make_case.add_option("--pose-offset-mm", pose.offset_mm, "of hand-eye, the same in all views (default 0)");
+  make_case.add_option("--pose-offset-deg", pose.offset_deg, "likewise");
   make_case.callback([&] {
     for (const Result<void>& parsed : {hw_sim::parse_size(size, registration.width_px, registration.height_px),
                                        hw_sim::parse_deformation(deformation, dof, registration.deformation)}) {

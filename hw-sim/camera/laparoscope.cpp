@@ -8,6 +8,8 @@
 #include <limits>
 
 #include "hw-sim/base/hashed.hpp"
+#include "hw-sim/camera/blur.hpp"
+#include "hw-sim/camera/cavity_coat.hpp"
 #include "hw-sim/camera/embree_scene.hpp"
 #include "hw-sim/camera/solid_noise.hpp"
 #include "hw-sim/phantom/grid.hpp"
@@ -28,14 +30,6 @@ struct Hit {
   unsigned geometry = RTC_INVALID_GEOMETRY_ID;
 };
 
-/// How a point answers the lamp: the share of each colour it scatters, and the strength of its highlight.
-struct Reflectance {
-  Vector3f albedo;
-  float gloss = 0;
-};
-
-enum CavityGeometry : unsigned { kOrganGeometry = 0, kWallGeometry = 1 };
-
 constexpr float kReferenceMm = 100;  // where a lamp of strength one gives light of strength one
 
 class EmbreeLaparoscope final : public Laparoscope {
@@ -45,6 +39,7 @@ class EmbreeLaparoscope final : public Laparoscope {
         lamp_(settings.lamp_in_camera_mm.cast<float>()),
         exposure_(static_cast<float>(1.55 * std::pow(settings.well_lit_mm / kReferenceMm, 2))),
         noise_level_(static_cast<float>(settings.noise)),
+        blur_px_(settings.blur_px),
         seed_(settings.seed),
         device_(device),
         texture_(settings.seed + 31) {
@@ -79,7 +74,7 @@ class EmbreeLaparoscope final : public Laparoscope {
 
   void set_cavity(const Cavity& cavity) override {
     traced_scene_ = nullptr;
-    coat_ = cavity.coat;
+    coat_ = std::make_unique<CavityCoat>(texture_, cavity);
     cavity_ = std::make_unique<EmbreeScene>(device_);
     cavity_->add(cavity.organ, kOrganGeometry, cavity.rest_mm);
     if (cavity.wall_centre_mm) {
@@ -89,6 +84,7 @@ class EmbreeLaparoscope final : public Laparoscope {
       cavity_->add(surface_of(ScalarGrid::sample(wall, Grid::around(c - reach, c + reach, cavity.wall_radius_mm / 15))),
                    kWallGeometry);
     }
+    if (!cavity.instruments.vertices.empty()) cavity_->add(cavity.instruments, kInstrumentGeometry);
     cavity_->commit();
   }
 
@@ -109,7 +105,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     const Transform<Patient, Camera> pose = camera_from_patient.inverse();
     if (is_new(*cavity_, pose.matrix())) {
       trace(*cavity_, pose.rotation().cast<float>(), pose.translation().cast<float>(), exposure_,
-            [this](const Hit& hit) { return cavity_surface(hit); });
+            [this](const Hit& hit) { return coat_->at(hit.rest, hit.geometry); });
     }
     return expose(sequence);
   }
@@ -162,32 +158,6 @@ class EmbreeLaparoscope final : public Laparoscope {
  private:
   [[nodiscard]] std::size_t pixel(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width_px) + static_cast<std::size_t>(x);
-  }
-
-  [[nodiscard]] Reflectance cavity_surface(const Hit& hit) const {
-    const Vector3f& p = hit.rest;
-    const float coarse = texture_.at(p / 19.0F);
-    const float middle = texture_.at(p / 6.3F);
-    const float fine = texture_.at(p / 1.9F);
-    Reflectance out;
-    if (coat_ == Coat::skin) {
-      const bool organ = hit.geometry == kOrganGeometry;
-      const float shade = organ ? 0.80F + 0.14F * coarse + 0.14F * middle + 0.12F * fine : 0.6F + 0.5F * middle;
-      out.albedo = (organ ? Vector3f(0.58F, 0.37F, 0.27F) : Vector3f(0.05F, 0.16F, 0.20F)) * shade;
-      out.gloss = organ ? 0.16F : 0.0F;
-    } else if (hit.geometry == kOrganGeometry) {
-      const float shade = 0.62F + 0.40F * coarse + 0.26F * middle + 0.16F * fine;
-      out.albedo = Vector3f(0.40F, 0.105F, 0.075F) * shade;
-      // Fine capsular vessels: the thin set where a smooth scalar passes through its middle.
-      const float vein = 1.0F - std::min(1.0F, std::abs(texture_.at(p / 11.0F + Vector3f(9, 4, 2)) - 0.5F) / 0.022F);
-      out.albedo = out.albedo.cwiseProduct(Vector3f(1 - 0.25F * vein, 1 - 0.45F * vein, 1 - 0.40F * vein));
-      out.gloss = 0.55F;
-    } else {
-      const float shade = 0.55F + 0.5F * coarse + 0.3F * middle;
-      out.albedo = Vector3f(0.62F, 0.36F, 0.26F) * shade;
-      out.gloss = 0.1F;
-    }
-    return out;
   }
 
   [[nodiscard]] Reflectance bench_surface(const Hit& hit) const {
@@ -275,6 +245,7 @@ class EmbreeLaparoscope final : public Laparoscope {
         }
       }
     });
+    if (blur_px_ > 0) blur(light_, camera_.width_px, camera_.height_px, blur_px_);
   }
 
   /// The sensor: noise that is new with every frame, and the camera's gamma.
@@ -339,11 +310,12 @@ class EmbreeLaparoscope final : public Laparoscope {
   CameraModel camera_;
   Vector3f lamp_;  ///< in the camera frame
   float exposure_, noise_level_;
+  double blur_px_;
   std::uint64_t seed_;
   RTCDevice device_;
   SolidNoise texture_;
   Chessboard board_;
-  Coat coat_ = Coat::liver;
+  std::unique_ptr<CavityCoat> coat_;
   std::vector<Vector3f> rays_;  ///< unit directions in the camera frame, one per pixel
   std::vector<float> field_;    ///< how much of the light reaches each pixel, 0 outside the round field
   std::array<float, 1U << 16U> noise_{};

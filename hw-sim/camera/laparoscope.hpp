@@ -33,6 +33,10 @@ struct Cavity {
   std::optional<Eigen::Vector3d> wall_centre_mm =
       {};                       ///< of a round wall about everything; empty: the background is black
   double wall_radius_mm = 300;  ///< must reach beyond every place to look from
+  Mesh instruments = {};        ///< of grey metal, in front of the organ; empty: none
+  double texture = 1;           ///< the contrast of the organ's pattern, as a multiple of the usual
+  double wet = 1;               ///< the strength of highlights, as a multiple of the usual
+  double blood = 0;             ///< the share of the organ's surface that blood covers, which stays on the tissue
 };
 
 struct LaparoscopeSettings {
@@ -41,6 +45,7 @@ struct LaparoscopeSettings {
   Eigen::Vector3d lamp_in_camera_mm = {0, 0, 0};
   double well_lit_mm = 100;  ///< the distance at which the exposure is right
   double noise = 1;          ///< of the sensor, as a multiple of the usual; 0 is none
+  double blur_px = 0;        ///< of the lens: a Gaussian's standard deviation
 };
 
 /// The lens, light and sensor of a laparoscope before a scene, by ray tracing (Embree). Its image formation is its own

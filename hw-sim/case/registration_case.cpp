@@ -13,6 +13,7 @@
 #include "hw-sim/camera/laparoscope.hpp"
 #include "hw-sim/case/case_files.hpp"
 #include "hw-sim/case/landmarks.hpp"
+#include "hw-sim/case/placed_instruments.hpp"
 #include "hw-sim/case/subject.hpp"
 #include "hw-sim/case/viewpoints.hpp"
 #include "hw-sim/phantom/image_files.hpp"
@@ -29,7 +30,7 @@ struct MadeCase {
   Subject subject;
   DrawnDeformation deformation;
   CameraModel lens;
-  std::vector<Transform<Camera, Patient>> views;
+  std::vector<Transform<Camera, Patient>> views, stated_views;
   std::vector<TrueLandmark> landmarks;
   std::vector<std::vector<std::uint8_t>> pictures;
   std::vector<std::uint8_t> lens_circle;
@@ -53,6 +54,18 @@ Result<void> check(const CaseSettings& settings) {
   }
   if (!in(settings.noise, 0, 20)) return Error{Errc::bad_value, "--noise: give 0 to 20 times the usual"};
   if (!in(settings.lamp_offset_mm, -100, 100)) return Error{Errc::bad_value, "--light-offset-mm: give -100 to 100"};
+  if (!in(settings.texture, 0, 5)) return Error{Errc::bad_value, "--texture: give 0 to 5 times the usual"};
+  if (!in(settings.wet, 0, 5)) return Error{Errc::bad_value, "--wet: give 0 to 5 times the usual"};
+  if (!in(settings.blood, 0, 1)) return Error{Errc::bad_value, "--blood: give a share, 0 to 1"};
+  if (!in(settings.instruments, 0, 3)) return Error{Errc::bad_value, "--instruments: give 0 to 3"};
+  if (!in(settings.blur_px, 0, 20)) return Error{Errc::bad_value, "--blur-px: give 0 to 20"};
+  const PoseError& pose = settings.pose_error;
+  for (const auto& [option, value] : {std::pair{"--pose-noise-mm", pose.noise_mm},
+                                      {"--pose-noise-deg", pose.noise_deg},
+                                      {"--pose-offset-mm", pose.offset_mm},
+                                      {"--pose-offset-deg", pose.offset_deg}}) {
+    if (!in(value, 0, 30)) return Error{Errc::bad_value, fmt::format("{}: give 0 to 30", option)};
+  }
   std::error_code ignored;
   for (const auto& path : {settings.ct, settings.labels}) {
     if (!path.empty() && !std::filesystem::exists(path, ignored))
@@ -71,23 +84,35 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
                .deformation = *std::move(deformation),
                .lens = {},
                .views = {},
+               .stated_views = {},
                .landmarks = {},
                .pictures = {},
                .lens_circle = {}};
   out.lens = laparoscope_lens(settings.width_px, settings.height_px);
   const double distance_mm = settings.distance_mm > 0 ? settings.distance_mm : out.subject.view_distance_mm;
   out.views = choose_viewpoints(out.subject, settings.views, distance_mm, settings.seed);
+  out.stated_views =
+      settings.pose_error.any() ? tracked_poses(out.views, settings.pose_error, settings.seed) : out.views;
   const auto scope = Laparoscope::create({.lens = out.lens,
                                           .seed = settings.seed,
                                           .lamp_in_camera_mm = {settings.lamp_offset_mm, 0, 0},
                                           .well_lit_mm = distance_mm,
-                                          .noise = settings.noise});
+                                          .noise = settings.noise,
+                                          .blur_px = settings.blur_px});
   if (!scope) return scope.error();
   const TissueMap& map = *out.deformation.map;
   Cavity cavity;
   cavity.organ = deformed(out.subject.surface, map);
   cavity.rest_mm = out.subject.surface.vertices;
   cavity.coat = out.subject.coat;
+  cavity.texture = settings.texture;
+  cavity.wet = settings.wet;
+  cavity.blood = settings.blood;
+  if (settings.instruments > 0) {
+    auto instruments = place_instruments(cavity.organ, out.subject.towards_scope, settings.instruments, settings.seed);
+    if (!instruments) return instruments.error();
+    cavity.instruments = *std::move(instruments);
+  }
   if (!settings.plain_background) {
     cavity.wall_centre_mm = 0.5 * (map.low_mm() + map.high_mm());
     cavity.wall_radius_mm = 1.1 * distance_mm + 0.5 * (map.high_mm() - map.low_mm()).norm();
@@ -146,6 +171,15 @@ nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
   truth["noise"] = settings.noise;
   truth["light_in_camera_mm"] = json_of(Vector3d(settings.lamp_offset_mm, 0, 0));
   truth["plain_background"] = settings.plain_background;
+  truth["texture"] = settings.texture;
+  truth["wet"] = settings.wet;
+  truth["blood"] = settings.blood;
+  truth["instruments"] = settings.instruments;
+  truth["blur_px"] = settings.blur_px;
+  truth["pose_noise_mm"] = settings.pose_error.noise_mm;
+  truth["pose_noise_deg"] = settings.pose_error.noise_deg;
+  truth["pose_offset_mm"] = settings.pose_error.offset_mm;
+  truth["pose_offset_deg"] = settings.pose_error.offset_deg;
   truth["tumour_centre_mm"] = json_of(made.subject.tumour_centre_mm);
   double sum_mm = 0;
   double most_mm = 0;
@@ -175,10 +209,20 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
   written.push_back(write_picture(folder / "mask.png", made.lens_circle, made.lens));
   for (std::size_t i = 0; i < made.views.size(); ++i) {
     written.push_back(write_picture(folder / fmt::format("view{}.png", i), made.pictures[i], made.lens));
-    written.push_back(write_pose(folder / fmt::format("view{}.txt", i), made.views[i]));
+    written.push_back(write_pose(folder / fmt::format("view{}.txt", i), made.stated_views[i]));
+    const std::filesystem::path true_pose = folder / "truth" / fmt::format("view{}.txt", i);
+    if (settings.pose_error.any()) {
+      written.push_back(write_pose(true_pose, made.views[i]));
+    } else {
+      std::filesystem::remove(true_pose, error);  // of a case that lay here before
+    }
   }
-  if (const BezierMap* const patch = made.deformation.patch)
-    written.push_back(write_control_points(folder / "truth" / "control_points.json", *patch));
+  const std::filesystem::path control_points = folder / "truth" / "control_points.json";
+  if (made.deformation.patch) {
+    written.push_back(write_control_points(control_points, *made.deformation.patch));
+  } else {
+    std::filesystem::remove(control_points, error);
+  }
   written.push_back(write_landmarks(folder / "truth" / "landmarks.csv", made.landmarks));
   written.push_back(write_json(folder / "truth" / "truth.json", truth_of(settings, made)));
   written.push_back(write_text(folder / "case.toml", case_toml(settings, made)));

@@ -6,6 +6,7 @@
 
 #include "calibration/base/result.hpp"
 #include "hw-sim/case/deformation.hpp"
+#include "hw-sim/case/pose_error.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -23,6 +24,11 @@ struct CaseSettings {
   double noise = 1;           ///< of the sensor, as a multiple of the usual
   double lamp_offset_mm = 0;  ///< of the lamp to the right of the lens
   bool plain_background = false;
+  double texture = 1, wet = 1;  ///< contrast of the organ's pattern and highlights, as multiples of the usual
+  double blood = 0;             ///< share of the organ's surface that blood covers
+  int instruments = 0;          ///< how many stand before the organ
+  double blur_px = 0;           ///< of the lens: a Gaussian's standard deviation
+  PoseError pose_error;         ///< of the poses that the case states
 };
 
 /// Writes folder/case.toml and all that it names: a CT of an organ at rest, its segmentation, and what a laparoscope

@@ -250,6 +250,50 @@ TEST(Case, ALampBesideTheLensAndAStillOrganChangeThePictureAlone) {
     EXPECT_EQ(l.rest_mm, l.deformed_mm);
 }
 
+TEST(Case, PosesThatErrLeaveThePicturesAndTellTheTruthBesideThem) {
+  const Scratch scratch;
+  CaseSettings settings = small_case(scratch / "true");
+  ASSERT_TRUE(write_case(settings));
+  settings.folder = scratch / "erring";
+  settings.pose_error = {.noise_mm = 1, .noise_deg = 0.3, .offset_mm = 2};
+  ASSERT_TRUE(write_case(settings));
+  for (const char* view : {"view0", "view1", "view2"}) {
+    const std::string pose = std::string(view) + ".txt";
+    EXPECT_EQ(contents_of(scratch / "true" / (std::string(view) + ".png")),
+              contents_of(scratch / "erring" / (std::string(view) + ".png")));
+    EXPECT_EQ(contents_of(scratch / "true" / pose), contents_of(scratch / "erring/truth" / pose));
+    EXPECT_NE(contents_of(scratch / "true" / pose), contents_of(scratch / "erring" / pose));
+    EXPECT_FALSE(fs::exists(scratch / "true/truth" / pose));
+  }
+  EXPECT_EQ(contents_of(scratch / "true/truth/landmarks.csv"), contents_of(scratch / "erring/truth/landmarks.csv"));
+  EXPECT_EQ(read_json(scratch / "erring/truth/truth.json")["pose_offset_mm"], 2);
+}
+
+/// Before black and without noise, what changes in a picture is what they cover.
+TEST(Case, InstrumentsCoverPartOfThePictures) {
+  const Scratch scratch;
+  CaseSettings settings = small_case(scratch / "free");
+  settings.plain_background = true;
+  settings.noise = 0;
+  ASSERT_TRUE(write_case(settings));
+  settings.folder = scratch / "covered";
+  settings.instruments = 3;
+  ASSERT_TRUE(write_case(settings));
+  double most = 0;
+  for (const char* view : {"view0.png", "view1.png", "view2.png"}) {
+    const cv::Mat free = cv::imread((scratch / "free" / view).string());
+    const cv::Mat covered = cv::imread((scratch / "covered" / view).string());
+    int changed = 0;
+    for (int y = 0; y < free.rows; ++y) {
+      for (int x = 0; x < free.cols; ++x) changed += free.at<cv::Vec3b>(y, x) != covered.at<cv::Vec3b>(y, x) ? 1 : 0;
+    }
+    const double share = changed / static_cast<double>(free.total());
+    EXPECT_LT(share, 0.3) << view;
+    most = std::max(most, share);
+  }
+  EXPECT_GT(most, 0.01);
+}
+
 TEST(Case, RefusesInOneLine) {
   const Scratch scratch;
   const auto refused = [&](auto change, const std::string& word) {
@@ -269,6 +313,12 @@ TEST(Case, RefusesInOneLine) {
         s.deformation.amplitude_mm = 70;
       },
       "--amplitude-mm 70");
+  refused([](CaseSettings& s) { s.texture = -1; }, "--texture");
+  refused([](CaseSettings& s) { s.wet = 6; }, "--wet");
+  refused([](CaseSettings& s) { s.blood = 1.1; }, "--blood");
+  refused([](CaseSettings& s) { s.instruments = 4; }, "--instruments");
+  refused([](CaseSettings& s) { s.blur_px = -0.5; }, "--blur-px");
+  refused([](CaseSettings& s) { s.pose_error.offset_deg = -1; }, "--pose-offset-deg");
   refused([](CaseSettings& s) { s.deformation.push_width_mm = 5; }, "--push-width-mm");
   refused([](CaseSettings& s) { s.ct = "/nonexistent/ct.nii.gz"; }, "/nonexistent/ct.nii.gz: no such file");
   refused([](CaseSettings& s) { s.phantom = "foot"; }, "foot");
