@@ -18,6 +18,9 @@ void blur(std::vector<Vector3f>& light, int width_px, int height_px, double sigm
     sum += weight.back();
   }
   for (float& w : weight) w /= sum;
+  const auto pixel = [&](int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x);
+  };
   std::vector<Vector3f> from;
   // Along x, then along y.
   for (const bool rows : {true, false}) {
@@ -28,10 +31,10 @@ void blur(std::vector<Vector3f>& light, int width_px, int height_px, double sigm
         const int at = rows ? x : y;
         const int last = (rows ? width_px : height_px) - 1;
         for (int i = std::max(-reach, -at); i <= std::min(reach, last - at); ++i) {
-          const int other = rows ? y * width_px + x + i : (y + i) * width_px + x;
-          spread += weight[static_cast<std::size_t>(reach + i)] * from[static_cast<std::size_t>(other)];
+          const std::size_t other = rows ? pixel(x + i, y) : pixel(x, y + i);
+          spread += weight[static_cast<std::size_t>(reach + i)] * from[other];
         }
-        light[static_cast<std::size_t>(y * width_px + x)] = spread;
+        light[pixel(x, y)] = spread;
       }
     });
   }

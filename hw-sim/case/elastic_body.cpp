@@ -16,6 +16,11 @@ using Eigen::VectorXd;
 using CellStiffness = Eigen::Matrix<double, 24, 24>;
 using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
+/// Of a node's three numbers, the first.
+Eigen::Index first_of(int node) {
+  return Eigen::Index{3} * node;
+}
+
 /// The corner of a cell, x fastest.
 std::array<int, 3> corner(int at) {
   return {at & 1, (at >> 1) & 1, (at >> 2) & 1};
@@ -108,9 +113,9 @@ ElasticBody::ElasticBody(const Grid& nodes, const std::vector<double>& filled, d
       }
     }
   }
-  stiffness_.resize(3 * count, 3 * count);
+  stiffness_.resize(first_of(count), first_of(count));
   stiffness_.setFromTriplets(entries.begin(), entries.end());
-  springs_ = VectorXd::Zero(3 * count);
+  springs_ = VectorXd::Zero(first_of(count));
 }
 
 std::vector<std::pair<int, double>> ElasticBody::about(const Vector3d& point_mm) const {
@@ -129,7 +134,7 @@ std::vector<std::pair<int, double>> ElasticBody::about(const Vector3d& point_mm)
 }
 
 void ElasticBody::hold(const Vector3d& point_mm, double stiffness) {
-  for (const auto& [node, weight] : about(point_mm)) springs_.segment<3>(3 * node).array() += stiffness * weight;
+  for (const auto& [node, weight] : about(point_mm)) springs_.segment<3>(first_of(node)).array() += stiffness * weight;
 }
 
 ElasticBody::Load ElasticBody::no_load() const {
@@ -137,13 +142,13 @@ ElasticBody::Load ElasticBody::no_load() const {
 }
 
 void ElasticBody::push(Load& load, const Vector3d& point_mm, const Vector3d& force) const {
-  for (const auto& [node, weight] : about(point_mm)) load.segment<3>(3 * node) += weight * force;
+  for (const auto& [node, weight] : about(point_mm)) load.segment<3>(first_of(node)) += weight * force;
 }
 
 void ElasticBody::weigh(Load& load, const Vector3d& force_per_mm3) const {
   const double eighth_mm3 = nodes_.spacing_mm.prod() / 8;
   for (const Cell& cell : cells_) {
-    for (const int node : cell.nodes) load.segment<3>(3 * node) += cell.filled * eighth_mm3 * force_per_mm3;
+    for (const int node : cell.nodes) load.segment<3>(first_of(node)) += cell.filled * eighth_mm3 * force_per_mm3;
   }
 }
 
@@ -189,7 +194,7 @@ std::vector<Vector3d> ElasticBody::over_lattice(const VectorXd& displacement_mm)
           if (free[other] >= 0) {
             entries.emplace_back(row, free[other], -1);
           } else {
-            known.row(row) += displacement_mm.segment<3>(3 * number_[other]).transpose();
+            known.row(row) += displacement_mm.segment<3>(first_of(number_[other])).transpose();
           }
         }
       }
@@ -204,7 +209,7 @@ std::vector<Vector3d> ElasticBody::over_lattice(const VectorXd& displacement_mm)
   tbb::parallel_for(0, 3, [&](int axis) { followed.col(axis) = solver.solve(known.col(axis)); });
   std::vector<Vector3d> out(number_.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = number_[i] >= 0 ? Vector3d(displacement_mm.segment<3>(3 * number_[i]))
+    out[i] = number_[i] >= 0 ? Vector3d(displacement_mm.segment<3>(first_of(number_[i])))
                              : Vector3d(followed.row(free[i]).transpose());
   }
   return out;

@@ -94,7 +94,7 @@ TEST(Blur, KeepsTheLightAndSpreadsItByItsSigma) {
   double sum = 0, along2 = 0, across2 = 0;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      const double here = light[static_cast<std::size_t>(y * kWidth + x)].y();
+      const double here = light[static_cast<std::size_t>(y) * kWidth + static_cast<std::size_t>(x)].y();
       sum += here;
       along2 += here * (x - 30) * (x - 30);
       across2 += here * (y - 25) * (y - 25);

@@ -25,8 +25,8 @@ Grid nodes_of(int x, int y, int z) {
 }
 
 std::vector<double> cells_of(const Grid& nodes, double share) {
-  return std::vector<double>(static_cast<std::size_t>((nodes.size[0] - 1) * (nodes.size[1] - 1) * (nodes.size[2] - 1)),
-                             share);
+  const auto cells = [&](std::size_t axis) { return static_cast<std::size_t>(nodes.size[axis] - 1); };
+  return std::vector<double>(cells(0) * cells(1) * cells(2), share);
 }
 
 /// A force per area on the two ends of a block along x, drawing them apart: trilinear cells take half of it at the
