@@ -72,6 +72,12 @@ std::optional<Transform<Camera, Patient>> FramePainter::camera_from_patient(
   return setup_->camera_from_patient(*decision.tracker_from_sensor);
 }
 
+std::optional<Transform<Camera, Patient>> FramePainter::seen_from(const wire::VideoFrame& frame,
+                                                                  const OverlayGate::Decision& decision) const {
+  if (!setup_ || !fits(frame) || !decision.tracker_from_sensor || !decision.believed) return std::nullopt;
+  return setup_->camera_from_patient(*decision.tracker_from_sensor);
+}
+
 std::optional<FramePainter::Painted> FramePainter::paint(const wire::VideoFrame& frame,
                                                          const OverlayGate::Decision& decision, Engine& engine,
                                                          const OverlayLook& look) const {

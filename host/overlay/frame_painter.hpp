@@ -58,6 +58,10 @@ class FramePainter {
   [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient(
       const wire::VideoFrame& frame, const OverlayGate::Decision& decision) const;
 
+  /// Where the frame was seen from, where that is to be believed, whether anything may be drawn over it or not.
+  [[nodiscard]] std::optional<Transform<Camera, Patient>> seen_from(const wire::VideoFrame& frame,
+                                                                    const OverlayGate::Decision& decision) const;
+
   struct Painted {
     Transform<Camera, Patient> camera_from_patient;
     std::vector<std::uint8_t> rgb;  ///< of the frame's size, rows from the top

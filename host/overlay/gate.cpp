@@ -36,9 +36,17 @@ std::string OverlayGate::doubt(const PoseAnswer& pose) const {
   return {};
 }
 
+std::string OverlayGate::doubt_of_motion() const {
+  if (!figures_.moved_mm) return {};
+  return fmt::format("the organ has moved since the views ({:.0f} mm): keep views anew (or undo the deformation)",
+                     *figures_.moved_mm);
+}
+
 OverlayGate::Decision OverlayGate::decide(DeviceTime time, const PoseAnswer& pose) {
   Decision decision;
   decision.reason = doubt(pose);
+  decision.believed = decision.reason.empty();
+  if (decision.believed) decision.reason = doubt_of_motion();
   const double target = decision.reason.empty() ? 1.0 : 0.0;
   // The first frame has nothing to fade from.
   const double most = last_ ? std::max(0.0, (time - *last_).seconds()) / settings_.fade.seconds() : 1.0;

@@ -21,6 +21,9 @@ class OverlayGate {
   struct Decision {
     double strength = 0;  ///< of the overlay, 0 to 1
     std::string reason;   ///< why it is not whole; empty where it is
+    /// Pose, lens, hand-eye and registration are to be believed, though the organ may have moved since: nothing may be
+    /// drawn by them then, but the video may be held against what is known.
+    bool believed = false;
     /// The pose to draw with, where there is one that may be drawn with. Without one nothing is drawn: a fading overlay
     /// keeps to poses of the frames it is drawn on.
     std::optional<Transform<Tracker, Sensor>> tracker_from_sensor;
@@ -38,6 +41,7 @@ class OverlayGate {
  private:
   [[nodiscard]] std::string doubt_of_figures() const;
   [[nodiscard]] std::string doubt(const PoseAnswer& pose) const;
+  [[nodiscard]] std::string doubt_of_motion() const;
 
   Settings settings_;
   TrustFigures figures_;

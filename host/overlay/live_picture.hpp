@@ -76,6 +76,8 @@ class LivePicture {
   [[nodiscard]] std::uint64_t frames_skipped() const { return skipped_; }
   /// Where the newest frame's overlay is drawn from; empty where nothing is drawn over it.
   [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient() const;
+  /// Where the newest frame was seen from, where that is to be believed; whether the organ has moved since or not.
+  [[nodiscard]] std::optional<Transform<Camera, Patient>> seen_from() const;
 
  private:
   Settings settings_;

@@ -25,6 +25,9 @@ struct TrustFigures {
   ScopeFigures scope;
   std::optional<double> fre_mm;
   std::optional<double> target_mm;  ///< what the fiducials' error comes to at the target (registration_error_mm)
+  /// How far the video shows the organ off the surface that is drawn, where that is more than chance. Empty: nothing
+  /// says that it has moved.
+  std::optional<double> moved_mm = std::nullopt;
 };
 
 /// The one place where a figure that nobody knows counts as perfect: whoever gives a lens, a hand-eye or a pose in

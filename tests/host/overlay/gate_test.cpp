@@ -79,6 +79,18 @@ TEST(OverlayGate, DrawsNothingByAFigureThatIsNotKnown) {
   EXPECT_EQ(decide_still(vouched_for(bad)).strength, 0) << "what is stated is judged";
 }
 
+TEST(OverlayGate, DrawsNothingOverAnOrganThatMovedThoughThePoseIsBelieved) {
+  TrustFigures figures = kGood;
+  figures.moved_mm = 6;
+  OverlayGate gate;
+  gate.set_figures(figures);
+  const auto moved = gate.decide({0}, sound());
+  EXPECT_EQ(moved.strength, 0);
+  EXPECT_EQ(moved.reason, "the organ has moved since the views (6 mm): keep views anew (or undo the deformation)");
+  EXPECT_TRUE(moved.believed);
+  EXPECT_FALSE(gate.decide({40'000'000}, PoseAnswer{}).believed);
+}
+
 TEST(OverlayGate, FadesWhilePosesAreDoubtfulAndSaysWhy) {
   OverlayGate gate;
   gate.set_figures(kGood);
