@@ -1,5 +1,7 @@
 #include "host/operation/live_workflow.hpp"
 
+#include <cmath>
+
 namespace birdseye::host {
 
 namespace {
@@ -38,8 +40,11 @@ void LiveWorkflow::tick() {
   }
   if (deformation_.tick()) {
     show_shape();
+    matched_.deformed = deformation_.found();
+    watch_.show(matched_);
     keep();
   }
+  if (const auto checked = watch_.tick()) take(*checked);
   if (!calibration_.tick()) return;
   forget_views(kCalibratedAnew);
   update_setup();
@@ -63,7 +68,10 @@ void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::V
 
 void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
-    if (!frozen_) picture_.take(*frame, clock ? clock->host_from_device(frame->info.acquired) : now);
+    if (!frozen_) {
+      picture_.take(*frame, clock ? clock->host_from_device(frame->info.acquired) : now);
+      watch_surface(now);
+    }
   } else if (const auto* birds = std::get_if<wire::Birds>(&event)) {
     take(*birds);
   } else if (const auto* health = std::get_if<wire::Health>(&event)) {
@@ -106,6 +114,22 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
   update_setup();
 }
 
+/// The newest frame, if it is time for another check. Of a motion that is known the check goes on: it may pass.
+void LiveWorkflow::watch_surface(HostTime now) {
+  const auto seen_from = picture_.seen_from();
+  if (!seen_from) return;
+  std::optional<double> pose_mm;
+  if (const auto& hand_eye_mm = picture_.figures().scope.held_out_mm)
+    pose_mm = std::hypot(*hand_eye_mm, picture_.frame()->info.pose.position_sigma_mm);
+  watch_.offer({*picture_.frame(), *seen_from}, pose_mm, now);
+}
+
+void LiveWorkflow::take(const CheckedSurface& checked) {
+  if (!deformation_.found() || !motion_.take(checked)) return;
+  if (motion_.moved_mm()) views_.forget("the organ has moved since: keep views anew");
+  set_picture_up();
+}
+
 void LiveWorkflow::fit() {
   fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials);
   forget_views("the fiducials were touched anew: keep views again");
@@ -123,6 +147,10 @@ void LiveWorkflow::forget_views(const std::string& why) {
 
 void LiveWorkflow::show_shape() {
   ++shapes_;
+  watch_.forget();
+  const bool moved = motion_.moved_mm().has_value();
+  motion_ = {};
+  if (moved) set_picture_up();
   if (!patient_.engine()) return;
   if (deformation_.found()) {
     patient_.engine()->deform(deformation_.found()->field);
@@ -134,12 +162,17 @@ void LiveWorkflow::show_shape() {
 
 void LiveWorkflow::update_setup() {
   jitter_ = {};
+  set_picture_up();
+}
+
+void LiveWorkflow::set_picture_up() {
   const auto& scope = calibration_.found();
   const auto& registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
   if (!may) return picture_.set_setup(std::nullopt, {}, fiducials_.confirmed() ? kUnregistered : kUnconfirmed);
-  picture_.set_setup(scope->scope.registered(registered->tracker_from_patient),
-                     trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan())));
+  TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
+  figures.moved_mm = motion_.moved_mm();
+  picture_.set_setup(scope->scope.registered(registered->tracker_from_patient), figures);
 }
 
 void LiveWorkflow::keep() {
@@ -191,7 +224,8 @@ void LiveWorkflow::primary() {
   const auto& setup = picture_.setup();
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
                      step_ == LiveStep::deform;
-  if (works && view().note(step_).done) return go_on();
+  const bool outdated = step_ == LiveStep::deform && motion_.moved_mm();
+  if (works && !outdated && view().note(step_).done) return go_on();
   switch (step_) {
     case LiveStep::connect:
       break;
@@ -204,11 +238,13 @@ void LiveWorkflow::primary() {
       }
       break;
     case LiveStep::views:
-      return views_.keep(picture_.frame(), picture_.camera_from_patient());
+      return views_.keep(picture_.frame(), picture_.seen_from());
     case LiveStep::deform:
       if (deformation_.running()) return deformation_.cancel();
-      if (setup && patient_.plan() && patient_.transfer())
-        deformation_.begin(views_.views(), setup->camera(), patient_.plan(), *patient_.transfer());
+      if (setup && patient_.plan() && patient_.transfer()) {
+        matched_ = {views_.views(), setup->camera(), patient_.plan(), patient_.transfer(), nullptr};
+        deformation_.begin(matched_.views, matched_.camera, matched_.patient, *matched_.transfer);
+      }
       break;
     case LiveStep::check:
       fiducials_.confirm();

@@ -11,8 +11,10 @@
 #include "host/operation/fiducial_step.hpp"
 #include "host/operation/operation_keeper.hpp"
 #include "host/operation/operation_view.hpp"
+#include "host/operation/organ_motion.hpp"
 #include "host/operation/patient_step.hpp"
 #include "host/operation/pointer_tip.hpp"
+#include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/overlay/target_jitter.hpp"
@@ -39,6 +41,8 @@ class LiveWorkflow {
   explicit LiveWorkflow(LiveSettings settings);
 
   void take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock);
+  /// What a check of the video against the deformed surface has found.
+  void take(const CheckedSurface& checked);
   /// Collects what threads have finished.
   void tick();
   /// The link to the appliance came or went.
@@ -75,6 +79,8 @@ class LiveWorkflow {
   void forget_views(const std::string& why);
   void show_shape();
   void update_setup();
+  void set_picture_up();
+  void watch_surface(HostTime now);
   void take_up();
   void keep();
 
@@ -91,6 +97,9 @@ class LiveWorkflow {
   FiducialStep fiducials_;
   ViewStep views_;
   DeformationStep deformation_;
+  WatchedSurface matched_;  ///< what the deformation is, or is being, found by
+  SurfaceWatch watch_;
+  OrganMotion motion_;
   StepNote check_, run_;
   OperationKeeper keeper_;
   LivePicture picture_;

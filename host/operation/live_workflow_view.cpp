@@ -33,6 +33,10 @@ OperationView LiveWorkflow::view() const {
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();
+  out.organ_moved = motion_.moved_mm().has_value();
+  if (out.deformed)
+    out.surface_check =
+        watch_.watches() ? motion_.line() : "the surface is not checked: the views it was found by are not kept";
   out.patient = patient_.plan();
   out.patient_files = patient_.files();
   out.engine_asked = settings_.engine;
@@ -48,10 +52,10 @@ OperationView LiveWorkflow::view() const {
   }
   const auto& setup = picture_.setup();
   const auto camera_from_patient = picture_.camera_from_patient();
-  if (!camera_from_patient) return out;
   const Eigen::Vector3d target_mm = target_in_patient_mm(*out.patient);
-  if (step_ == LiveStep::views) out.view_advice = views_.advice(*camera_from_patient, target_mm);
-  if (!setup) return out;
+  if (const auto seen_from = picture_.seen_from(); seen_from && step_ == LiveStep::views)
+    out.view_advice = views_.advice(*seen_from, target_mm);
+  if (!camera_from_patient || !setup) return out;
   out.target = target_mark({setup->camera(), *camera_from_patient, as_shown_mm(target_mm, deformed),
                             picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm(),
                             deformed != nullptr ? deformed->uncertainty_mm : std::nullopt},

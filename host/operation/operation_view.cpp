@@ -15,7 +15,7 @@ std::string primary_words(const OperationView& operation) {
     case LiveStep::views:
       return done ? "go on" : "keep this view";
     case LiveStep::deform:
-      if (done) return "go on";
+      if (done && !operation.organ_moved) return "go on";
       return operation.deforming ? "cancel" : "match the CT with the views";
     case LiveStep::check:
       return operation.unconfirmed ? "the landmarks fit: go on" : "go on";

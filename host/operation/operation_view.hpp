@@ -46,6 +46,8 @@ struct OperationView {
 
   DeformProgress deform_progress;  ///< in its step
   std::shared_ptr<const DeformedOrgan> deformed;
+  bool organ_moved = false;   ///< since the views that it was found by
+  std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
 

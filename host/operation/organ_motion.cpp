@@ -1,0 +1,32 @@
+#include "host/operation/organ_motion.hpp"
+
+#include <fmt/format.h>
+
+namespace birdseye::host {
+
+bool OrganMotion::take(const CheckedSurface& checked) {
+  constexpr int kEnough = 2;
+  constexpr Duration kTold = Duration::from_ms(10'000);
+  const SurfaceFinding& finding = checked.finding;
+  if (finding.verdict == SurfaceVerdict::cannot_tell) {
+    if (!untold_since_) untold_since_ = checked.at;
+    const Duration untold = checked.at - *untold_since_;
+    if (untold >= kTold)
+      line_ = fmt::format("for {:.0f} s it cannot be told whether the organ has moved: {}", untold.seconds(),
+                          finding.words);
+    return false;
+  }
+  untold_since_.reset();
+  line_ = "surface: " + finding.words;
+  const bool moved = finding.verdict == SurfaceVerdict::moved;
+  if (moved == moved_mm_.has_value()) {
+    against_ = 0;
+    return false;
+  }
+  if (++against_ < kEnough) return false;
+  against_ = 0;
+  moved_mm_ = moved ? finding.figure_mm : std::nullopt;
+  return true;
+}
+
+}  // namespace birdseye::host

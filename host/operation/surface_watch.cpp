@@ -1,0 +1,85 @@
+#include "host/operation/surface_watch.hpp"
+
+#include <tbb/task_arena.h>
+
+#include <cmath>
+#include <utility>
+
+#include "host/registration/geometry/lattice_field.hpp"
+#include "host/registration/views/tissue.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+Result<PinholeView> seen_by(const KeptView& view, const CameraModel& camera) {
+  const wire::VideoFrame& frame = view.frame;
+  return view_to_check(camera, view.camera_from_patient, {*frame.rgb, frame.width_px, frame.height_px});
+}
+
+Result<SurfaceCheck> check_of(const WatchedSurface& surface) {
+  constexpr double kSpacing_mm = 2, kMargin_mm = 24;
+  const PatientPlan& patient = *surface.patient;
+  const Volume* const labels = patient.labels ? &*patient.labels : nullptr;
+  const auto rest = signed_distance_of(patient.ct, tissue_voxels(patient.ct, labels, patient.organ, *surface.transfer),
+                                       kSpacing_mm, kMargin_mm);
+  if (!rest) return rest.error();
+  LatticeField field(*rest);
+  for (std::size_t n = 0; n < field.size(); ++n) field.set(n, surface.deformed->field.displacement(field.place_mm(n)));
+  std::vector<PinholeView> kept;
+  for (const KeptView& view : surface.views) {
+    auto pinhole = seen_by(view, surface.camera);
+    if (!pinhole) return pinhole.error();
+    kept.push_back(*std::move(pinhole));
+  }
+  return SurfaceCheck(seen_distance(*rest, field), std::move(kept));
+}
+
+}  // namespace
+
+/// The thread's alone, but for the pointer.
+struct SurfaceWatch::Shown {
+  WatchedSurface surface;
+  std::optional<Result<SurfaceCheck>> check;  ///< made by the first frame
+
+  SurfaceFinding find(const KeptView& frame, const std::optional<double>& pose_mm) {
+    SurfaceFinding out;
+    if (!surface.deformed->uncertainty_mm || !pose_mm) {
+      out.words = pose_mm ? "how well the deformed surface is known was not estimated"
+                          : "how far hand-eye is off in mm is not known";
+      return out;
+    }
+    if (!check) check = check_of(surface);
+    const auto now = seen_by(frame, surface.camera);
+    if (!*check || !now) {
+      out.words = *check ? now.error().what : check->error().what;
+      return out;
+    }
+    // The uncertainty is of three axes, and one of them is along the normal.
+    return (*check)->check(*now, {*surface.deformed->uncertainty_mm / std::sqrt(3.0), *pose_mm});
+  }
+};
+
+void SurfaceWatch::show(WatchedSurface surface) {
+  shown_ = std::make_shared<Shown>(Shown{std::move(surface), std::nullopt});
+  last_.reset();
+}
+
+void SurfaceWatch::offer(const KeptView& frame, const std::optional<double>& pose_mm, HostTime now) {
+  constexpr Duration kEvery = Duration::from_ms(1000);
+  if (!shown_ || checking_.running() || (last_ && now - *last_ < kEvery)) return;
+  last_ = now;
+  checking_.start([shown = shown_, frame, pose_mm, now](const std::stop_token&, const auto&) {
+    // On one core: the others have the live picture to draw.
+    tbb::task_arena one(1);
+    return one.execute([&] { return Outcome{{shown->find(frame, pose_mm), now}, shown}; });
+  });
+}
+
+std::optional<CheckedSurface> SurfaceWatch::tick() {
+  auto outcome = checking_.take();
+  if (!outcome || outcome->of != shown_) return std::nullopt;
+  return std::move(outcome->checked);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,174 @@
+// A deformed organ that moves again, by checks that say so: their results are given here.
+#include "host/operation/organ_motion.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host/operation/operation.hpp"
+#include "tests/support/live_operation.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::give_record;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kMs;
+using birdseye::testing::kTrackerFromPatient;
+using birdseye::testing::load;
+using birdseye::testing::operation_settings;
+using birdseye::testing::Scratch;
+
+/// At that second.
+CheckedSurface said(SurfaceVerdict verdict, int at_s) {
+  SurfaceFinding finding;
+  finding.verdict = verdict;
+  if (verdict == SurfaceVerdict::cannot_tell) {
+    finding.words = "smoke";
+  } else {
+    finding.figure_mm = verdict == SurfaceVerdict::moved ? 5.0 : 0.4;
+    finding.bound_mm = 2.0;
+    finding.words = verdict == SurfaceVerdict::moved ? "5.0 mm off" : "0.4 mm off";
+  }
+  return {finding, HostTime{at_s * 1000 * kMs}};
+}
+
+constexpr SurfaceVerdict kHolds = SurfaceVerdict::holds, kMoved = SurfaceVerdict::moved,
+                         kCannotTell = SurfaceVerdict::cannot_tell;
+
+TEST(OrganMotion, TakesTwoChecksInARowEitherWay) {
+  OrganMotion motion;
+  EXPECT_FALSE(motion.take(said(kMoved, 0)));
+  EXPECT_FALSE(motion.take(said(kHolds, 1)));
+  EXPECT_FALSE(motion.take(said(kMoved, 2))) << "one odd frame and another";
+  EXPECT_FALSE(motion.moved_mm().has_value());
+  EXPECT_TRUE(motion.take(said(kMoved, 3)));
+  ASSERT_TRUE(motion.moved_mm().has_value());
+  EXPECT_EQ(*motion.moved_mm(), 5);
+  EXPECT_FALSE(motion.take(said(kHolds, 4)));
+  EXPECT_FALSE(motion.take(said(kMoved, 5)));
+  EXPECT_FALSE(motion.take(said(kHolds, 6)));
+  EXPECT_TRUE(motion.moved_mm().has_value());
+  EXPECT_TRUE(motion.take(said(kHolds, 7)));
+  EXPECT_FALSE(motion.moved_mm().has_value());
+}
+
+TEST(OrganMotion, WhatCannotBeToldChangesNothingAndIsToldAfterTenSeconds) {
+  OrganMotion motion;
+  (void)motion.take(said(kHolds, 0));
+  for (int s = 1; s <= 10; ++s) {
+    EXPECT_FALSE(motion.take(said(kCannotTell, s)));
+    EXPECT_EQ(motion.line(), "surface: 0.4 mm off");
+  }
+  EXPECT_FALSE(motion.take(said(kCannotTell, 11)));
+  EXPECT_EQ(motion.line(), "for 10 s it cannot be told whether the organ has moved: smoke");
+  // Nor does it stand between two that say the same.
+  EXPECT_FALSE(motion.take(said(kMoved, 12)));
+  EXPECT_FALSE(motion.take(said(kCannotTell, 13)));
+  EXPECT_TRUE(motion.take(said(kMoved, 14)));
+  for (int s = 15; s < 40; ++s) EXPECT_FALSE(motion.take(said(kCannotTell, s)));
+  EXPECT_TRUE(motion.moved_mm().has_value());
+}
+
+/// The scope at its place, looking at the CT's middle.
+wire::VideoFrame frame_at(const LiveWorkflow& workflow, int at_s) {
+  const Setup& setup = *workflow.picture().setup();
+  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-30, -30, 80));
+  wire::VideoFrame frame;
+  frame.width_px = setup.camera().width_px;
+  frame.height_px = setup.camera().height_px;
+  frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
+  frame.info.acquired = DeviceTime{at_s * 1000 * kMs};
+  frame.info.pose.kind = PoseKind::exact;
+  frame.info.pose.position_sigma_mm = 0.2;
+  frame.info.pose.tracker_from_sensor =
+      setup.tracker_from_patient() * camera_from_patient.inverse() * setup.camera_from_sensor();
+  return frame;
+}
+
+ShownPicture shown_after(LiveWorkflow& workflow, int at_s) {
+  workflow.take(frame_at(workflow, at_s), HostTime{at_s * 1000 * kMs}, std::nullopt);
+  workflow.draw();
+  return workflow.shown_at(HostTime{at_s * 1000 * kMs});
+}
+
+/// With a deformation, and the overlay drawn.
+class DeformedOperation : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    LiveSettings settings = operation_settings(scratch_);
+    Operation kept;
+    kept.ct_checksum = read_patient(settings.patient)->checksum;
+    kept.made_utc = "2026-11-22T10:00:00Z";
+    kept.registered = {kTrackerFromPatient, 0.3, kFiducials};
+    DisplacementField field;
+    field.size = {2, 2, 2};
+    field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+    field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+    kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7});
+    ASSERT_TRUE(write_operation(scratch_.path(), kept));
+    settings.resume = scratch_.path();
+    workflow_.emplace(settings);
+    load(*workflow_);
+    ASSERT_EQ(workflow_->view().fault, "");
+    give_record(*workflow_);
+    workflow_->primary();
+    ASSERT_TRUE(workflow_->picture().setup().has_value());
+  }
+
+  Scratch scratch_;
+  std::optional<LiveWorkflow> workflow_;
+};
+
+TEST_F(DeformedOperation, LosesItsOverlayWhereTheOrganMovesAndGetsItBack) {
+  LiveWorkflow& workflow = *workflow_;
+  EXPECT_TRUE(shown_after(workflow, 1).overlaid);
+  workflow.take(said(kMoved, 1));
+  EXPECT_TRUE(shown_after(workflow, 2).overlaid);
+  workflow.take(said(kMoved, 2));
+  EXPECT_FALSE(workflow.shown_at(HostTime{2000 * kMs}).overlaid) << "nor the frame that is on the screen";
+  const ShownPicture withdrawn = shown_after(workflow, 3);
+  EXPECT_FALSE(withdrawn.overlaid);
+  EXPECT_NE(withdrawn.reason.find("the organ has moved since the views"), std::string::npos) << withdrawn.reason;
+  EXPECT_TRUE(workflow.view().organ_moved);
+  EXPECT_FALSE(workflow.view().target.has_value());
+  workflow.take(said(kCannotTell, 3));
+  EXPECT_FALSE(shown_after(workflow, 4).overlaid);
+  workflow.take(said(kHolds, 4));
+  EXPECT_FALSE(shown_after(workflow, 5).overlaid);
+  workflow.take(said(kHolds, 5));
+  const ShownPicture back = shown_after(workflow, 6);
+  EXPECT_TRUE(back.overlaid) << back.reason;
+  EXPECT_EQ(back.strength, 1);
+}
+
+TEST_F(DeformedOperation, KeepsViewsAnewThoughItsOverlayIsWithdrawn) {
+  LiveWorkflow& workflow = *workflow_;
+  (void)shown_after(workflow, 1);
+  workflow.go_to(LiveStep::views);
+  workflow.primary();
+  ASSERT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept");
+  workflow.take(said(kMoved, 1));
+  workflow.take(said(kMoved, 2));
+  EXPECT_NE(workflow.view().note(LiveStep::views).line.find("moved since"), std::string::npos);
+  EXPECT_FALSE(shown_after(workflow, 3).overlaid);
+  workflow.primary();
+  EXPECT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept") << "the old one is not among them";
+}
+
+TEST_F(DeformedOperation, GetsItsOverlayBackWhereTheDeformationIsUndone) {
+  LiveWorkflow& workflow = *workflow_;
+  workflow.take(said(kMoved, 1));
+  workflow.take(said(kMoved, 2));
+  EXPECT_FALSE(shown_after(workflow, 3).overlaid);
+  workflow.go_to(LiveStep::deform);
+  workflow.undo();
+  EXPECT_FALSE(workflow.view().organ_moved);
+  EXPECT_EQ(workflow.view().surface_check, "");
+  EXPECT_TRUE(shown_after(workflow, 4).overlaid);
+  // Without a deformation there is nothing to check.
+  workflow.take(said(kMoved, 4));
+  workflow.take(said(kMoved, 5));
+  EXPECT_TRUE(shown_after(workflow, 6).overlaid);
+}
+
+}  // namespace
+}  // namespace birdseye::host
