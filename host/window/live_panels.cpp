@@ -329,8 +329,8 @@ void draw_strip(const PanelLayout& at, const OperationView& operation, const Pan
                           operation.engine_name));
   if (const auto& health = operation.link.health)
     say(kQuiet, fmt::format("tracker {:.0f} Hz, {} doubted", health->tracker_rate_hz, health->doubted));
-  if (!operation.surface_check.empty()) say(operation.organ_moved ? kWarn : kQuiet, operation.surface_check);
   if (!operation.fault.empty()) say(kBad, operation.fault);
+  if (!operation.surface_check.empty()) say(operation.organ_moved ? kWarn : kQuiet, operation.surface_check);
   if (!facts.said.empty()) say(kQuiet, facts.said);
   ImGui::EndGroup();
   ImGui::End();
