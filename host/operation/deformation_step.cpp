@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
-#include <mutex>
 #include <utility>
 
 #include "host/files/picture.hpp"
+#include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
 
 namespace birdseye::host {
@@ -32,22 +32,6 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
 
 }  // namespace
 
-class DeformationStep::Trace {
- public:
-  void add(double similarity) {
-    const std::lock_guard lock(mutex_);
-    similarity_.push_back(static_cast<float>(similarity));
-  }
-  [[nodiscard]] std::vector<float> similarity() const {
-    const std::lock_guard lock(mutex_);
-    return similarity_;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<float> similarity_;
-};
-
 void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
                             std::shared_ptr<const PatientPlan> patient, const TransferFunction& transfer) {
   if (running()) return;
@@ -56,6 +40,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     return;
   }
   std::vector<VideoView> views;
+  std::vector<wire::VideoFrame> frames;
   for (const KeptView& one : kept) {
     auto view = view_of(one, camera, views.size() + 1);
     if (!view) {
@@ -63,21 +48,22 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
       return;
     }
     views.push_back(*std::move(view));
+    frames.push_back(one.frame);
   }
   note_ = {false, "matching"};
   dropped_ = false;
-  trace_ = std::make_shared<Trace>();
-  matching_.start([views = std::move(views), patient = std::move(patient), transfer, trace = trace_](
+  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient), transfer](
                       const std::stop_token& stop, const auto& say) {
-    ViewRegistrationSettings settings;
-    settings.control_points = {3, 3, 3};  // what some views of one side tell, in seconds
+    std::vector<RgbView> pictures;
+    for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
+    GeometrySettings settings;
     settings.progress = say;
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
-    settings.watch.step = [&trace](const TracePoint& step) { trace->add(step.similarity); };
     const Volume* const labels = patient->labels ? &*patient->labels : nullptr;
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);
-    return one.execute([&] { return register_views(views, patient->ct, labels, patient->organ, transfer, settings); });
+    return one.execute(
+        [&] { return register_geometry(views, pictures, patient->ct, labels, patient->organ, transfer, settings); });
   });
 }
 
@@ -90,12 +76,11 @@ bool DeformationStep::tick() {
   }
   ViewRegistration& registration = **matched;
   if (registration.worse_than_start) {
-    note_ = {false, "no deformation explains the views better than none: keep other views, or go on without"};
+    note_ = {false, "what explains the views folds the organ: keep other views, or go on without"};
     return false;
   }
   note_.done = true;
-  note_.line =
-      fmt::format("similarity {:.3f} to {:.3f} nats", registration.similarity_before, registration.similarity_after);
+  note_.line = fmt::format("{} places of the surface are known by stereo", registration.stereo_points.value_or(0));
   if (registration.uncertainty_mm)
     note_.line += fmt::format("; the surface is known to {:.1f} mm", *registration.uncertainty_mm);
   found_ =
@@ -119,10 +104,6 @@ bool DeformationStep::forget() {
 void DeformationStep::take_up(std::shared_ptr<const DeformedOrgan> kept, const std::string& line) {
   found_ = std::move(kept);
   note_ = {true, line};
-}
-
-DeformProgress DeformationStep::progress() const {
-  return {trace_ ? trace_->similarity() : std::vector<float>(), matching_.line()};
 }
 
 }  // namespace birdseye::host

@@ -1,16 +1,13 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "drivers/system/background.hpp"
 #include "host/operation/findings.hpp"
 #include "host/operation/live_step.hpp"
 #include "host/operation/patient.hpp"
-#include "host/operation/step_states.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/registration/views/view_registration.hpp"
 #include "host/render/scene/transfer_function.hpp"
@@ -34,17 +31,14 @@ class DeformationStep {
   /// Null: the CT is shown as it was taken.
   [[nodiscard]] const std::shared_ptr<const DeformedOrgan>& found() const { return found_; }
   [[nodiscard]] bool running() const { return matching_.running(); }
-  [[nodiscard]] DeformProgress progress() const;
+  /// How far it is, in words; empty before it has found anything.
+  [[nodiscard]] std::string progress() const { return matching_.line(); }
   [[nodiscard]] const StepNote& note() const { return note_; }
 
  private:
-  /// What the thread tells of its steps.
-  class Trace;
-
   std::shared_ptr<const DeformedOrgan> found_;
   StepNote note_;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
-  std::shared_ptr<Trace> trace_;
   Background<Result<ViewRegistration>> matching_;
 };
 

@@ -44,7 +44,7 @@ struct OperationView {
 
   std::optional<ViewAdvice> view_advice;  ///< in its step, where an overlay is drawn
 
-  DeformProgress deform_progress;  ///< in its step
+  std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
   bool organ_moved = false;   ///< since the views that it was found by
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet

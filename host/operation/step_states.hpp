@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "device/wire/messages.hpp"
 
@@ -23,12 +22,6 @@ struct TouchedFiducial {
   Eigen::Vector3d tip_in_tracker_mm;
   double rms_mm = 0;  ///< of the tip while it rested
   std::optional<double> residual_mm;
-};
-
-/// A registration that runs on a thread of its own, as far as it is.
-struct DeformProgress {
-  std::vector<float> similarity;  ///< nats, of each step so far; the resolution changes on the way
-  std::string line;
 };
 
 /// What the pointer's tip is near to, in the CT as it is shown.

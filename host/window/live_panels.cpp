@@ -142,18 +142,10 @@ void draw_views(const OperationView& operation) {
   say(kQuiet, "Backspace takes the last one back");
 }
 
-void draw_deform(const OperationView& operation, float scale) {
+void draw_deform(const OperationView& operation) {
   say(kText, "match the CT with the kept views, or go on without (Enter)");
   say(operation.note(LiveStep::deform).done ? kGood : kQuiet, operation.note(LiveStep::deform).line);
-  const DeformProgress& progress = operation.deform_progress;
-  if (operation.deforming) say(kText, progress.line);
-  if (progress.similarity.size() > 1) {
-    say(kQuiet,
-        fmt::format("similarity, {} steps: {:.3f} nats", progress.similarity.size(), progress.similarity.back()));
-    const auto [low, high] = std::minmax_element(progress.similarity.begin(), progress.similarity.end());
-    ImGui::PlotLines("##similarity", progress.similarity.data(), static_cast<int>(progress.similarity.size()), 0,
-                     nullptr, *low, *high, ImVec2(ImGui::GetContentRegionAvail().x, 90 * scale));
-  }
+  if (operation.deforming) say(kText, operation.deform_progress);
   if (operation.deformed) say(kQuiet, "Backspace undoes it");
 }
 
@@ -225,7 +217,7 @@ void draw_side(const PanelLayout& at, const OperationView& operation, const Pane
       draw_views(operation);
       break;
     case LiveStep::deform:
-      draw_deform(operation, at.scale);
+      draw_deform(operation);
       break;
     case LiveStep::check:
       draw_check(operation, facts.simulated);

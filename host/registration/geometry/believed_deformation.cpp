@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 namespace birdseye::host {
@@ -26,8 +25,9 @@ Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) 
   return out;
 }
 
-BelievedDeformation believe(const SignedDistance& organ, std::span<const SeenPoint> points,
-                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before) {
+std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
+                                           std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
+                                           const RegistrationWatch& watch) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.6, 1.3, 1.1, 1.0, 1.0, 1.0};
   constexpr std::array kGoOn_mm{4.0, 2.0, 1.3, 1.0, 1.0};
   constexpr std::size_t kMostBelieved = 4;
@@ -36,9 +36,11 @@ BelievedDeformation believe(const SignedDistance& organ, std::span<const SeenPoi
   const bool goes_on = before.all_fits.size() == priors.size();
   std::vector<std::optional<DisplacementFit>> fits(priors.size());
   tbb::parallel_for(std::size_t{0}, priors.size(), [&](std::size_t i) {
+    if (watch.cancelled()) return;
     fits[i] = goes_on ? DisplacementFit::solve(organ, points, priors[i], &before.all_fits[i], kGoOn_mm)
                       : DisplacementFit::solve(organ, points, priors[i], nullptr, kAnneal_mm);
   });
+  if (!std::all_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.has_value(); })) return std::nullopt;
   BelievedDeformation out(organ);
   for (std::optional<DisplacementFit>& fit : fits) out.all_fits.push_back(*std::move(fit));
   std::vector<std::size_t> order(priors.size());

@@ -1,12 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "host/registration/geometry/displacement_fit.hpp"
 #include "host/registration/geometry/lattice_field.hpp"
+#include "host/registration/views/view_registration.hpp"
 
 namespace birdseye::host {
 
@@ -25,8 +26,9 @@ struct BelievedDeformation {
 };
 
 /// By every prior, each believed as far as its evidence goes; before: by the same priors about fewer or worse points,
-/// or empty of fits.
-BelievedDeformation believe(const SignedDistance& organ, std::span<const SeenPoint> points,
-                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before);
+/// or empty of fits. Empty where the watch cancels.
+std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
+                                           std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
+                                           const RegistrationWatch& watch);
 
 }  // namespace birdseye::host

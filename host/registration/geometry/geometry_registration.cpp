@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <random>
+#include <utility>
 
 #include "host/registration/geometry/believed_deformation.hpp"
 #include "host/registration/geometry/expected_errors.hpp"
@@ -71,7 +71,6 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   };
   constexpr std::array kRounds{Round{18, 12, 0.5, 0}, Round{18, 8, 0.4, 9}, Round{12, 6, 0.3, 8},
                                Round{12, 4, 0.25, 5}};
-  std::mt19937 random(1);
   const std::vector<DisplacementPrior> hypotheses = hypotheses_of(ct, settings.control_points);
   BelievedDeformation found(*organ);
   for (const Round& round : kRounds) {
@@ -80,23 +79,25 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     const std::vector<SeenPoint> by_stereo =
         stereo_points(seen_by, surface, {round.grid_px, round.span_mm, round.step_mm});
     out.stereo_points = by_stereo.size();
+    if (settings.watch.cancelled()) return called_off();
     std::vector<SeenPoint> by_outlines;
     if (round.outline_mm > 0) by_outlines = outline_points(seen_by, surface, round.outline_mm);
     std::vector<SeenPoint> points = gathered_points(by_stereo, surface);
     const std::vector<SeenPoint> of_outlines = gathered_points(by_outlines, surface);
     points.insert(points.end(), of_outlines.begin(), of_outlines.end());
-    // In an order of chance that is the same each time: the first of them stand for all.
-    std::shuffle(points.begin(), points.end(), random);
     if (points.empty() && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
     if (points.empty()) {
       return Error{Errc::not_found,
                    "no place of the surface is found in two views or as an outline: check that pictures, poses and CT "
                    "belong together, or give views nearer to one another"};
     }
-    found = believe(*organ, points, hypotheses, found);
+    auto believed = believe(*organ, points, hypotheses, found, settings.watch);
+    if (!believed) return called_off();
+    found = *std::move(believed);
     ++out.evaluations;
-    settings.progress(fmt::format("{} places by stereo, {} by outlines; most believed: {}", *out.stereo_points,
-                                  by_outlines.size(), found.fits.front().prior().name));
+    settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
+                                  out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),
+                                  found.fits.front().prior().name));
   }
   if (settings.watch.cancelled()) return called_off();
   out.field = field_over(ct, found.mean);

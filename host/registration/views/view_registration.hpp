@@ -21,7 +21,7 @@ struct TracePoint {
   double similarity = 0;
 };
 
-/// For whoever waits for a registration: sees each step, and may cancel it. Called on the registration's thread.
+/// For whoever waits for a registration: sees each step, and may cancel it. Called on the registration's threads.
 struct RegistrationWatch {
   std::function<void(const TracePoint&)> step = [](const TracePoint&) {};
   std::function<bool()> cancelled = [] { return false; };
