@@ -76,8 +76,8 @@ void DemoSession::take_stations() {
 Result<void> DemoSession::calibrate_and_register() {
   stations_.finish();
   take_stations();
-  figures.board_frames_left_out = stations_.frames_left_out();
-  if (const std::string words = stations_.left_out_words(); !words.empty()) progress_.keep(words);
+  figures.board_frames_left_out = stations_.rests().frames_left_out();
+  if (const std::string words = stations_.rests().left_out_words(); !words.empty()) progress_.keep(words);
   figures.board_views = static_cast<int>(seen_.input.stations.size());
   find_lens(seen_);
   const auto calibrated = calibrate_guided(std::move(seen_));

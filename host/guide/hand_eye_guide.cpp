@@ -79,7 +79,7 @@ void HandEyeGuide::end(const std::string& why) {
 }
 
 GuidedStations HandEyeGuide::finish() {
-  if (const std::string words = stations_.left_out_words(); !words.empty()) tell_.lasting(words);
+  if (const std::string words = stations_.rests().left_out_words(); !words.empty()) tell_.lasting(words);
   tell_.lasting(session_.ended + "; the last solution is being worked out");
   find_lens_or_say({});
   return std::move(session_);
@@ -160,7 +160,7 @@ std::optional<Transform<Camera, Marker>> HandEyeGuide::pose_of(const calibration
 /// What is covered, and the next best pose from where the scope is.
 void HandEyeGuide::look() {
   next_look_ = host_now() + kLookEvery;
-  if (stations_.deciding() || session_.width_px == 0) return;
+  if (stations_.rests().deciding() || session_.width_px == 0) return;
   if (!session_.input.camera) {
     state_.next =
         "tilt the scope by 20 to 40 degrees, each time another way, and turn it about its length between them";

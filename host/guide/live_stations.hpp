@@ -2,15 +2,13 @@
 
 #include <cstdint>
 #include <deque>
-#include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "calibration/detect/pattern.hpp"
 #include "calibration/detect/pattern_view.hpp"
-#include "calibration/guide/still_detector.hpp"
 #include "device/wire/messages.hpp"
+#include "host/guide/live_rests.hpp"
 
 namespace birdseye::host {
 
@@ -21,19 +19,19 @@ struct LiveStation {
   wire::VideoFrame frame;
 };
 
-/// Takes stations from an appliance's stream. Each time the scope is held still with the pattern in view, a station is
-/// taken after half a second, or when the scope moves on after at least a fifth of a second. What waits is bounded.
+/// Takes stations from an appliance's stream: each rest of the scope with the pattern in view. What waits is bounded.
 class LiveStations {
  public:
   /// bird: the scope's, as the appliance names it.
-  LiveStations(calibration::Pattern pattern, std::string bird) : pattern_(std::move(pattern)), bird_(std::move(bird)) {}
+  LiveStations(calibration::Pattern pattern, std::string bird)
+      : pattern_(std::move(pattern)), rests_(std::move(bird)) {}
 
   void push(const wire::Birds& birds);
   /// Frames are looked at once the tracker's poses reach past them.
-  void push(const wire::VideoFrame& frame);
+  void push(const wire::VideoFrame& frame) { rests_.push(frame); }
 
   /// Says that nothing more will come: a rest that still lasts is over.
-  void finish() { finish_rest(); }
+  void finish();
 
   /// The next station that was taken; empty where there is none.
   std::optional<LiveStation> take_station();
@@ -41,32 +39,14 @@ class LiveStations {
   std::string take_remark();
   /// The pattern in the newest picture, to say how to go on from there; empty where it is not seen.
   [[nodiscard]] std::optional<calibration::PatternView> look() const;
-  /// Frames that waited for the tracker's poses until there was no more room.
-  [[nodiscard]] std::uint64_t frames_left_out() const { return left_out_; }
-  /// The same in words; empty where there are none.
-  [[nodiscard]] std::string left_out_words() const;
-  /// Whether the scope is at rest and it is not yet decided if the rest becomes a station.
-  [[nodiscard]] bool deciding() const { return rest_ && !rest_->done; }
+  /// Of the scope's rests.
+  [[nodiscard]] const LiveRests& rests() const { return rests_; }
 
  private:
-  struct Rest {
-    DeviceTime first, last;
-    std::vector<wire::VideoFrame> frames;  ///< at most kMostKept, spread evenly over the rest
-    std::size_t seen = 0, stride = 1;
-    bool done = false;
-  };
-  void consider(const wire::VideoFrame& frame);
-  void keep(const wire::VideoFrame& frame);
-  void finish_rest();
+  void look_at_rests();
 
   calibration::Pattern pattern_;
-  std::string bird_;
-  calibration::StillDetector still_;
-  DeviceTime newest_pose_;
-  std::deque<wire::VideoFrame> pending_;
-  std::uint64_t left_out_ = 0;
-  std::optional<wire::VideoFrame> newest_;
-  std::optional<Rest> rest_;
+  LiveRests rests_;
   std::deque<LiveStation> stations_;
   std::size_t taken_ = 0;
   std::string remark_;
