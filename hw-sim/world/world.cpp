@@ -4,8 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <initializer_list>
 #include <limits>
 #include <numbers>
 
@@ -25,6 +25,7 @@ constexpr int kStations = 24;
 constexpr double kMoveS = 0.14;                           // from station to station over the board
 constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
 constexpr double kCarryS = 2;                             // of the scope from the board to the patient
+constexpr double kViewDwellS = 0.6, kViewMoveS = 0.45;    // of the scope about the liver
 constexpr double kSweepS = 7;                             // there and back
 constexpr double kRangeMm = 700;                          // of the transmitter
 
@@ -81,6 +82,7 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
     }
   }
   world.plan_stations(lens, seed);
+  if (pace.views) world.plan_views();
 
   const Vector3d park = world.tracker_from_patient_ * (truth.liver_centre_mm + Vector3d(170, -190, -40));
   world.tip_stops_in_tracker_mm_.push_back(park);
@@ -92,15 +94,13 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
   world.calibrate_s_ = pace.sway_s;
   world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS) + pace.pause_s;
-  world.look_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.views_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.look_s_ = world.views_s_ + static_cast<double>(world.views_.size()) * (kViewDwellS + kViewMoveS);
   world.ends_s_ = world.look_s_ + pace.look_s;
   if (pace.sway_s > 0) world.stages_.push_back({"sway", 0});
-  for (const Stage& stage : std::initializer_list<Stage>{{"calibrate", world.calibrate_s_},
-                                                         {"touch", world.touch_s_},
-                                                         {"look", world.look_s_},
-                                                         {"end", world.ends_s_}}) {
-    world.stages_.push_back(stage);
-  }
+  world.stages_.insert(world.stages_.end(), {{"calibrate", world.calibrate_s_}, {"touch", world.touch_s_}});
+  if (pace.views) world.stages_.push_back({"views", world.views_s_});
+  world.stages_.insert(world.stages_.end(), {{"look", world.look_s_}, {"end", world.ends_s_}});
   if (const auto in_range = world.check_range(); !in_range) return in_range.error();
   return world;
 }
@@ -133,6 +133,21 @@ void World::plan_stations(const CameraModel& lens, std::uint64_t seed) {
     }
     if (whole) stations_.push_back(tracker_from_marker_ * pose);
     if (draw > 100'000) break;
+  }
+}
+
+void World::plan_views() {
+  constexpr double kFromFaceMm = 112;
+  // Neighbours see the same of it from sides 18 to 23 degrees apart.
+  constexpr std::array<std::array<double, 2>, 5> kAsideDeg{{{-32, 0}, {-16, 8}, {0, -8}, {16, 8}, {32, 0}}};
+  const Vector3d out = towards_scope();
+  const Vector3d right = out.cross(Vector3d::UnitZ()).normalized();
+  const Vector3d up = right.cross(out);
+  for (const auto& [across, along] : kAsideDeg) {
+    const Vector3d direction =
+        rotation_exp(up * (across * kRadPerDeg)) * (rotation_exp(right * (along * kRadPerDeg)) * out);
+    const Vector3d eye = look_at_in_patient_mm_ + kFromFaceMm * direction;
+    views_.push_back(tracker_from_patient_ * look_at<Patient>(eye, look_at_in_patient_mm_, Vector3d(0, 0, -1), 0));
   }
 }
 
@@ -170,6 +185,14 @@ Transform<Tracker, Camera> World::sweep(double since_s) const {
   return tracker_from_patient_ * look_at<Patient>(eye, eye + direction, Vector3d(0, 0, -1), roll);
 }
 
+Transform<Tracker, Camera> World::about(double since_s) const {
+  const double beat = since_s / (kViewDwellS + kViewMoveS);
+  const auto view = std::min(static_cast<std::size_t>(beat), views_.size() - 1);
+  const double into_s = (beat - static_cast<double>(view)) * (kViewDwellS + kViewMoveS);
+  const Transform<Tracker, Camera> next = view + 1 < views_.size() ? views_[view + 1] : sweep(0);
+  return between(views_[view], next, ease((into_s - kViewDwellS) / kViewMoveS));
+}
+
 /// Over the board's middle, turned about two axes and rolled at paces that do not repeat, as a hand would.
 Transform<Tracker, Camera> World::sway(double world_s) const {
   const double fade = ease(world_s) * ease(calibrate_s_ - world_s);  // from rest, and back to it
@@ -191,7 +214,11 @@ Transform<Tracker, Camera> World::sway(double world_s) const {
 Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
   if (world_s < calibrate_s_) return sway(std::max(0.0, world_s));
   if (world_s >= look_s_) return sweep(std::min(world_s, ends_s_) - look_s_);
-  if (world_s >= touch_s_) return between(stations_.back(), sweep(0), ease((world_s - touch_s_) / kCarryS));
+  if (world_s >= views_s_) return about(world_s - views_s_);
+  if (world_s >= touch_s_) {
+    const Transform<Tracker, Camera> there = views_.empty() ? sweep(0) : views_.front();
+    return between(stations_.back(), there, ease((world_s - touch_s_) / kCarryS));
+  }
   const double beat = std::max(0.0, world_s - calibrate_s_) / (dwell_s_ + kMoveS);
   const auto station = std::min(static_cast<std::size_t>(beat), stations_.size() - 1);
   const double into_s = (beat - static_cast<double>(station)) * (dwell_s_ + kMoveS);

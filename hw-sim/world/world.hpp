@@ -13,7 +13,7 @@
 namespace birdseye::hw_sim {
 
 struct Stage {
-  std::string name;  ///< sway, calibrate, touch, look or end
+  std::string name;  ///< sway, calibrate, touch, views, look or end
   double begins_s;
 };
 
@@ -22,12 +22,14 @@ struct Pace {
   double sway_s = 0;     ///< how long the scope is turned to and fro over the board before anything else
   double dwell_s = 0.3;  ///< how long the scope is held still at each station
   double pause_s = 0;    ///< how long it stays at the last one, while the calibration is worked out
+  bool views = false;    ///< whether the scope is first held still at places about the liver
   double look_s = 7;     ///< how long the scope sweeps over the liver
 };
 
 /// The scripted operation: where everything truly is at any world time. If asked for, the scope is first turned to and
 /// fro over a board. Then it is held still over the board at one station after another, then the pointer rests at each
-/// fiducial in turn, then the scope, turning about its port in the abdominal wall, sweeps over the liver.
+/// fiducial in turn. Then, if asked for, the scope is held still at places about the liver, 64 degrees apart as seen
+/// from it, as several ports let it. Then, turning about one port in the abdominal wall, it sweeps over the liver.
 class World {
  public:
   /// liver: the liver's surface in the patient frame, at which the scope looks. Refused where the script would take a
@@ -53,8 +55,10 @@ class World {
  private:
   World() = default;
   void plan_stations(const CameraModel& lens, std::uint64_t seed);
+  void plan_views();
   [[nodiscard]] Result<void> check_range() const;
   [[nodiscard]] Transform<Tracker, Camera> sweep(double since_s) const;
+  [[nodiscard]] Transform<Tracker, Camera> about(double since_s) const;
   [[nodiscard]] Transform<Tracker, Camera> sway(double world_s) const;
 
   PhantomTruth truth_;
@@ -65,9 +69,10 @@ class World {
   Eigen::Vector3d tip_in_pointer_mm_;
   Eigen::Vector3d look_at_in_patient_mm_;  ///< on the liver's face, over the tumour
   std::vector<Transform<Tracker, Camera>> stations_;
+  std::vector<Transform<Tracker, Camera>> views_;
   std::vector<Eigen::Vector3d> tip_stops_in_tracker_mm_;  ///< park, each fiducial, park
   std::vector<Stage> stages_;
-  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, look_s_ = 0, ends_s_ = 0;
+  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, views_s_ = 0, look_s_ = 0, ends_s_ = 0;
 };
 
 }  // namespace birdseye::hw_sim

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <utility>
 
+#include "calibration/base/units.hpp"
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/implants.hpp"
 
@@ -97,6 +100,42 @@ TEST(World, TheScopeTurnsAboutOnePointOfTheWallWhileItLooks) {
     EXPECT_LT(in_camera.head<2>().norm(), 1e-6);
     EXPECT_LT(in_camera.z(), -60);
   }
+}
+
+TEST(World, TheScopeIsHeldStillAtPlacesAboutTheLiverWhereThatIsAskedFor) {
+  const CameraModel lens = laparoscope_lens(768, 576);
+  const auto without = World::create(scene().truth, scene().liver, lens, 1);
+  const auto world = World::create(scene().truth, scene().liver, lens, 1, {.views = true});
+  ASSERT_TRUE(without && world);
+  for (const Stage& stage : without->stages()) EXPECT_NE(stage.name, "views");
+  const auto& stages = world->stages();
+  const auto begins = [&stages](const char* name) {
+    return std::find_if(stages.begin(), stages.end(), [&](const Stage& s) { return s.name == name; })->begins_s;
+  };
+  const Eigen::Vector3d& tumour_mm = scene().truth.tumour_centre_mm;
+  std::vector<Eigen::Vector3d> directions;  // from the tumour to the lens, of each place where the scope is still
+  bool still = false;
+  for (int i = 0; begins("views") + 0.01 * i < begins("look"); ++i) {
+    const auto at = [&](double s) {
+      return world->tracker_from_patient().inverse() * world->tracker_from_camera(begins("views") + s);
+    };
+    const auto pose = at(0.01 * i);
+    const Eigen::Vector3d from_tumour = pose.translation() - tumour_mm;
+    EXPECT_LT((at(0.01 * i + 0.01).translation() - pose.translation()).norm(), 6) << i;
+    const bool was = std::exchange(still, (at(0.01 * i + 0.01).translation() - pose.translation()).norm() < 1e-9);
+    if (!still || was) continue;
+    directions.push_back(from_tumour.normalized());
+    EXPECT_TRUE(project(lens, pose.inverse() * tumour_mm));
+  }
+  ASSERT_EQ(directions.size(), 5U);
+  const auto between_deg = [&](std::size_t a, std::size_t b) {
+    return std::acos(directions[a].dot(directions[b])) / kRadPerDeg;
+  };
+  for (std::size_t i = 1; i < directions.size(); ++i) {
+    EXPECT_GT(between_deg(i - 1, i), 10);
+    EXPECT_LT(between_deg(i - 1, i), 25);
+  }
+  EXPECT_GT(between_deg(0, directions.size() - 1), 45);
 }
 
 TEST(Laparoscope, TheSameFrameIsTheSameBytesAndAnotherIsNot) {
