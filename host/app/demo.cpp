@@ -12,6 +12,7 @@
 #include "host/demo/demo_session.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/landmark_check.hpp"
 #include "host/simulated/simulated_truth.hpp"
 #include "host/volume/import.hpp"
 
@@ -23,36 +24,67 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostDemoFramesWaiting = 256;
 
-/// Compares every overlaid frame with the truth, marks the kept pictures and writes them.
-Result<void> compare(const fs::path& out, DemoSession& session, const PatientPlan& patient) {
+struct Places {
+  Eigen::Vector2d true_px, rigid_px, overlaid_px;
+};
+
+/// Every overlaid frame against the truth, as it was drawn and, where the CT was deformed, as it would be without that.
+/// By the frame's sequence, where the picture shows the tumour's centre.
+Result<std::map<std::uint64_t, Places>> compare(const fs::path& out, DemoSession& session, const PatientPlan& patient) {
   const auto truth = read_simulated_truth(out / "truth");
   if (!truth) return truth.error();
-  std::map<std::uint64_t, std::pair<Eigen::Vector2d, Eigen::Vector2d>> places;
+  const Eigen::Vector3d rigid_mm = target_in_patient_mm(patient), shown_mm = as_shown_mm(rigid_mm, session.deformed());
+  std::map<std::uint64_t, Places> places;
   for (const OverlaidFrame& frame : session.overlaid) {
-    const auto found = overlay_error(*truth, frame.sequence, session.setup->camera(), frame.camera_from_patient,
-                                     target_in_patient_mm(patient));
-    if (!found) {
+    const auto error_of = [&](const Eigen::Vector3d& tumour_mm) {
+      return overlay_error(*truth, frame.sequence, session.setup->camera(), frame.camera_from_patient, tumour_mm);
+    };
+    const auto drawn = error_of(shown_mm), rigid = error_of(rigid_mm);
+    if (!drawn || !rigid) {
       return Error{Errc::bad_format, fmt::format("{}: lacks frame {}, which was overlaid; run the demo again",
                                                  (out / "truth").string(), frame.sequence)};
     }
     const double time_s = (frame.acquired - session.overlaid.front().acquired).seconds();
-    session.figures.errors.push_back({time_s, found->target_mm, found->overlay_px});
-    if (found->true_and_overlaid_px) places[frame.sequence] = *found->true_and_overlaid_px;
+    session.figures.errors.push_back({time_s, drawn->target_mm, drawn->overlay_px});
+    if (session.deformed() != nullptr)
+      session.figures.deforming->rigid_errors.push_back({time_s, rigid->target_mm, rigid->overlay_px});
+    const auto &drawn_px = drawn->true_and_overlaid_px, &rigid_px = rigid->true_and_overlaid_px;
+    if (drawn_px && rigid_px) places[frame.sequence] = {drawn_px->first, rigid_px->second, drawn_px->second};
   }
-  std::vector<Picture> videos, overlays;
-  for (std::size_t i = 0; i < std::min<std::size_t>(6, session.kept.size()); ++i) {
-    KeptFrame& frame = session.kept[i * session.kept.size() / std::min<std::size_t>(6, session.kept.size())];
+  return places;
+}
+
+/// Marks some of the kept pictures, and writes them.
+Result<void> write_pictures(const fs::path& out, DemoSession& session, const std::map<std::uint64_t, Places>& places) {
+  constexpr std::size_t kMost = 6, kPairEvery = 2;
+  const std::size_t count = std::min(kMost, session.kept.size());
+  std::vector<Picture> videos, overlays, pairs;
+  for (std::size_t i = 0; i < count; ++i) {
+    KeptFrame& frame = session.kept[i * session.kept.size() / count];
     if (const auto place = places.find(frame.sequence); place != places.end()) {
-      draw_circle(frame.overlay, place->second.second);
-      draw_cross(frame.overlay, place->second.first);
+      const auto mark = [&place](Picture& picture, const Eigen::Vector2d& shown_px) {
+        draw_circle(picture, shown_px);
+        draw_cross(picture, place->second.true_px);
+      };
+      mark(frame.overlay, place->second.overlaid_px);
+      if (frame.rigid) mark(*frame.rigid, place->second.rigid_px);
     }
     videos.push_back(frame.video);
     overlays.push_back(frame.overlay);
+    if (!frame.rigid || i % kPairEvery != 0) continue;
+    pairs.push_back(*frame.rigid);
+    pairs.push_back(frame.overlay);
   }
-  if (videos.empty()) return {};
-  for (const auto& [name, pictures] : {std::pair{"overlay.png", &overlays}, {"video.png", &videos}}) {
-    const Picture grid = tile(*pictures, 3, 0.75);
-    if (auto written = write_file(out / name, png_of(grid.view())); !written) return written;
+  struct Grid {
+    const char* name;
+    const std::vector<Picture>& pictures;
+    int columns;
+  };
+  for (const Grid& grid :
+       {Grid{"overlay.png", overlays, 3}, Grid{"video.png", videos, 3}, Grid{"rigid_and_deformed.png", pairs, 2}}) {
+    if (grid.pictures.empty()) continue;
+    const Picture tiled = tile(grid.pictures, grid.columns, 0.75);
+    if (auto written = write_file(out / grid.name, png_of(tiled.view())); !written) return written;
   }
   return {};
 }
@@ -84,6 +116,8 @@ void judge(DemoFigures& figures) {
       {dropped_percent, 5, 20, fmt::format("{:.0f} % of the frames were dropped", dropped_percent)},
   };
   figures.verdict.add(Grade::pass, fmt::format("{}; {} mm pass", limits[0].said, limits[0].pass));
+  if (figures.deforming && !figures.deforming->found)
+    figures.verdict.add(Grade::fail, "the CT was not deformed: " + figures.deforming->words);
   for (const Limit& limit : limits) {
     if (limit.value <= limit.pass) continue;
     const bool said = &limit == &limits[0];
@@ -100,6 +134,7 @@ struct DemoOptions {
 Result<ExitCode> demo(const DemoOptions& options) {
   Progress progress;
   SimulatedCartSettings settings = options.cart;
+  settings.views = settings.deformation_mm > 0;
   if (options.noise == "none") settings.position_noise_mm = settings.angle_noise_deg = 0;
   const fs::path& out = settings.folder;
   std::error_code error;
@@ -109,8 +144,8 @@ Result<ExitCode> demo(const DemoOptions& options) {
     // With the host's own checks: what would be stacked wrongly is refused here, with the reason.
     if (const auto sound = import_volume(settings.ct); !sound) return sound.error();
   }
-  for (const char* name :
-       {"report.json", "report.html", "overlay.png", "video.png", "overlay.mp4", "simulator.log", "birdseyed.log"}) {
+  for (const char* name : {"report.json", "report.html", "overlay.png", "video.png", "rigid_and_deformed.png",
+                           "overlay.mp4", "simulator.log", "birdseyed.log"}) {
     fs::remove(out / name, error);
   }
   note_interrupts();
@@ -122,17 +157,19 @@ Result<ExitCode> demo(const DemoOptions& options) {
   auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
   if (!client) return client.error();
   EventStream stream(*std::move(client), kMostDemoFramesWaiting);
-  const auto patient = read_with_fiducials(out, (*cart)->sheet().fiducials);
-  if (!patient) return patient.error();
+  auto read = read_with_fiducials(out, (*cart)->sheet().fiducials);
+  if (!read) return read.error();
+  const auto patient = std::make_shared<const PatientPlan>(*std::move(read));
   const auto board = calibration::parse_pattern((*cart)->sheet().board);
   if (!board) return board.error();
   auto film = Film::open(out / "overlay.mp4", settings.width_px, settings.height_px, settings.video_rate_hz);
   if (!film) return film.error();
   progress.keep(fmt::format("the CT shows {} markers; the operation begins", patient->fiducials_in_patient_mm->size()));
 
-  DemoSession session(**cart, *board, *patient, *std::move(film), progress);
+  DemoSession session(**cart, *board, patient, *std::move(film), progress);
   session.figures.title =
       settings.ct.empty() ? "Birdseye: the simulated cart" : "Birdseye: the simulated cart over a CT of yours";
+  session.figures.deformation_mm = settings.deformation_mm;
   session.figures.position_noise_mm = settings.position_noise_mm;
   session.figures.angle_noise_deg = settings.angle_noise_deg;
   const auto ran = session.run(stream);
@@ -142,7 +179,9 @@ Result<ExitCode> demo(const DemoOptions& options) {
   if (auto ended = (*cart)->finish(Deadline::after(Duration::from_ms(10'000))); !ended) return ended.error();
   if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
   if (auto filmed = session.finish(); !filmed) return filmed.error();
-  if (auto compared = compare(out, session, *patient); !compared) return compared.error();
+  const auto places = compare(out, session, *patient);
+  if (!places) return places.error();
+  if (auto written = write_pictures(out, session, *places); !written) return written.error();
   const Setup& setup = *session.setup;
   if (auto written = write_files({{out / "tracker_from_patient.txt", pose_text(setup.tracker_from_patient().matrix())},
                                   {out / "camera_from_sensor.txt", pose_text(setup.camera_from_sensor().matrix())},
@@ -165,10 +204,17 @@ void add_demo(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<DemoOptions>();
   SimulatedCartSettings& cart = options->cart;
   cart.folder = "out/demo";
-  CLI::App& command = *app.add_subcommand("demo", "the whole cart, simulated: calibrate, register, overlay, report");
+  cart.deformation_mm = 10;
+  CLI::App& command =
+      *app.add_subcommand("demo", "the whole cart, simulated: calibrate, register, deform, overlay, report");
   command.add_option("--out", cart.folder, "folder for the report (default out/demo)");
   command.add_option("--ct", cart.ct, "a CT to operate on, in place of the procedural patient");
   command.add_option("--seed", cart.seed, "everything random follows from it");
+  command
+      .add_option(
+          "--deformation-mm", cart.deformation_mm,
+          "how far the liver has moved since the CT, where it has moved most (default 10); 0: nothing is deformed")
+      ->check(CLI::Range(0.0, 30.0));
   command.add_option("--noise", options->noise, "typical (0.5 mm, 0.1 deg) or none")
       ->check(CLI::IsMember({"typical", "none"}));
   command.callback([options, &status] {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,10 +19,22 @@ struct FrameError {
   double overlay_px = 0;
 };
 
+/// How the CT was deformed.
+struct DeformingFigures {
+  int views = 0;
+  double took_s = 0;                          ///< on one core, beside the video
+  std::string words;                          ///< what came of it
+  bool found = false;                         ///< whether the overlay shows the CT deformed
+  std::optional<double> surface_expected_mm;  ///< the error to be expected of the organ's surface, root mean square
+  std::vector<FrameError> rigid_errors;       ///< of the CT as it was taken, in the frames that were overlaid
+};
+
 /// All that the demo measured and its report says.
 struct DemoFigures {
   std::string title;
-  std::vector<FrameError> errors;
+  std::vector<FrameError> errors;             ///< of the overlay as it was drawn at last
+  double deformation_mm = 0;                  ///< how far the liver has moved since the CT, where it has moved most
+  std::optional<DeformingFigures> deforming;  ///< where views were kept
   std::vector<double> fiducial_residuals_mm;
   double fre_mm = 0;
   double camera_rms_px = 0;

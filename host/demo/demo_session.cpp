@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "calibration/base/median.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/wait.hpp"
 #include "host/operation/findings.hpp"
 
 namespace birdseye::host {
@@ -41,6 +43,7 @@ std::string DemoSession::stage_at(DeviceTime time) const {
 }
 
 Result<void> DemoSession::finish() {
+  if (auto ended = end_deforming(); !ended) return ended;
   // Of the middle one: measurements that a busy machine had no time for do not make the tracker a slower one.
   if (!tracker_periods_s_.empty()) figures.tracker_rate_hz = 1 / median_of(std::move(tracker_periods_s_));
   return film_.finish();
@@ -54,7 +57,11 @@ Result<void> DemoSession::take(const wire::Birds& birds) {
     stations_.push(birds);
     take_stations();
   }
-  if (stage != "touch" && stage != "look") return {};
+  if (stage == "views" || stage == "look") {
+    rests_.push(birds);
+    keep_views();
+  }
+  if (stage == "calibrate" || stage == "end") return {};
   const auto touch = pointer_.take(birds, "pointer", cart_.sheet().tip_in_pointer_mm);
   if (touch && stage == "touch") {
     touches_in_tracker_mm_.push_back(touch->tip_in_tracker_mm);
@@ -73,20 +80,35 @@ void DemoSession::take_stations() {
   }
 }
 
-Result<void> DemoSession::calibrate_and_register() {
+void DemoSession::begin_to_calibrate(const wire::VideoFrame& frame) {
+  if (std::exchange(calibrating_begun_, true)) return;
   stations_.finish();
   take_stations();
+  seen_.width_px = frame.width_px;
+  seen_.height_px = frame.height_px;
   figures.board_frames_left_out = stations_.rests().frames_left_out();
   if (const std::string words = stations_.rests().left_out_words(); !words.empty()) progress_.keep(words);
   figures.board_views = static_cast<int>(seen_.input.stations.size());
-  find_lens(seen_);
-  const auto calibrated = calibrate_guided(std::move(seen_));
+  calibrating_.start([seen = std::move(seen_)](const std::stop_token&, const auto&) mutable {
+    find_lens(seen);
+    return calibrate_guided(std::move(seen));
+  });
+}
+
+Result<void> DemoSession::end_calibrating_and_register() {
+  std::optional<Result<GuidedCalibration>> taken;
+  for (const Deadline deadline = Deadline::after(Duration::from_ms(60'000)); !(taken = calibrating_.take());) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
+    if (deadline.passed()) return Error{Errc::timeout, "the calibration took over 60 s"};
+    sleep_for(Duration::from_ms(5));
+  }
+  const Result<GuidedCalibration>& calibrated = *taken;
   if (!calibrated) return calibrated.error().with_context("calibration");
   const auto found = calibrated_by_board(*calibrated, utc_now());
   if (!found) {
     return Error{found.error().code, fmt::format("calibration: {}", fmt::join(calibrated->verdict.reasons, "; "))};
   }
-  const auto fit = register_by_touches(*patient_.fiducials_in_patient_mm, touches_in_tracker_mm_);
+  const auto fit = register_by_touches(*patient_->fiducials_in_patient_mm, touches_in_tracker_mm_);
   if (!fit) return fit.error().with_context("registration");
   const ScopeSetup& scope = found->scope;
   figures.camera_rms_px = calibrated->stations.lens->rms_px;
@@ -96,23 +118,81 @@ Result<void> DemoSession::calibrate_and_register() {
   setup = scope.registered(fit->registered.tracker_from_patient);
   const auto transfer = load_transfer_function("tumour-and-vessels");
   if (!transfer) return transfer.error();
-  auto engine = make_engine("cpu", patient_.shown, *transfer);
+  auto engine = make_engine("cpu", patient_->shown, *transfer);
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
   look_.render.step_mm = 1.2;
-  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, target_in_patient_mm(patient_)));
+  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, target_in_patient_mm(*patient_)));
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye held out {:.2f} px, registration {:.2f} mm",
                              figures.camera_rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
   return {};
 }
 
-Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
-  const auto painted = painter_.paint(frame, painter_.decide(frame), *engine_, look_);
+void DemoSession::keep_views() {
+  while (const auto rest = rests_.take()) {
+    // Of a rest the pose is known better than of a frame: the tracker's noise is averaged away.
+    if (!setup || began_to_deform_) continue;
+    views_.keep(rest->frame, setup->camera_from_patient(rest->tracker_from_sensor));
+    progress_(views_.note().line);
+  }
+}
+
+void DemoSession::begin_to_deform() {
+  rests_.finish();
+  keep_views();
+  began_to_deform_ = host_now();
+  progress_.keep(fmt::format("{} views kept; the CT is matched with them", views_.views().size()));
+  // All of the organ that the labels name, whatever of it is drawn.
+  const auto transfer = load_transfer_function("liver");
+  if (transfer) deformation_.begin(views_.views(), setup->camera(), patient_, *transfer);
+}
+
+void DemoSession::note_deformed() {
+  if (deforming_took_s_ || deformation_.running()) return;
+  deformation_.tick();
+  deforming_took_s_ = (host_now() - *began_to_deform_).seconds();
+}
+
+Result<void> DemoSession::end_deforming() {
+  if (!began_to_deform_) return {};
+  for (const Deadline deadline = Deadline::after(Duration::from_ms(120'000)); deformation_.running();) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
+    if (deadline.passed()) return Error{Errc::timeout, "matching the CT with the views took over 120 s"};
+    if (const std::string line = deformation_.progress(); !line.empty()) progress_(line);
+    sleep_for(Duration::from_ms(20));
+  }
+  note_deformed();
+  DeformingFigures& said = figures.deforming.emplace();
+  said.views = static_cast<int>(views_.views().size());
+  said.took_s = *deforming_took_s_;
+  said.words = deformation_.note().line;
+  said.found = deformed() != nullptr;
+  if (deformed() != nullptr) {
+    said.surface_expected_mm = deformed()->uncertainty_mm;
+    engine_->deform(deformed()->field);
+  }
+  progress_.keep(said.words);
+  for (const WaitingFrame& one : waiting_) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
+    if (auto drawn = overlay(one.frame, one.decision); !drawn) return drawn;
+  }
+  return {};
+}
+
+Result<void> DemoSession::overlay(const wire::VideoFrame& frame, const OverlayGate::Decision& decision) {
+  const auto painted = painter_.paint(frame, decision, *engine_, look_);
   if (painted) {
     if (overlaid.size() % kKeepEvery == 0) {
       kept.push_back({frame.info.sequence,
                       {frame.width_px, frame.height_px, *frame.rgb},
+                      std::nullopt,
                       {frame.width_px, frame.height_px, painted->rgb}});
+      if (deformed() != nullptr) {
+        engine_->undeform();
+        if (auto rigid = painter_.paint(frame, decision, *engine_, look_))
+          kept.back().rigid = {frame.width_px, frame.height_px, std::move(rigid->rgb)};
+        engine_->deform(deformed()->field);
+      }
     }
     overlaid.push_back({frame.info.sequence, frame.info.acquired, painted->camera_from_patient});
     if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
@@ -132,13 +212,26 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
     stations_.push(frame);
     progress_(fmt::format("calibrating: {} views of the board", seen_.input.stations.size()));
   }
-  if (stage != "look" && stage != "end") return {};
+  const bool sees_liver = stage == "views" || stage == "look" || stage == "end";
+  if (stage == "touch" || sees_liver) begin_to_calibrate(frame);
+  if (!sees_liver) return {};
   if (!setup) {
-    seen_.width_px = frame.width_px;
-    seen_.height_px = frame.height_px;
-    if (auto done = calibrate_and_register(); !done) return done;
+    if (auto done = end_calibrating_and_register(); !done) return done;
   }
-  return overlay(frame);
+  const OverlayGate::Decision decision = painter_.decide(frame);
+  if (stage == "views") {
+    rests_.push(frame);
+    return {};
+  }
+  if (!began_to_deform_) {
+    const auto stages = cart_.stages();
+    const bool viewed = std::any_of(stages.begin(), stages.end(), [](const auto& s) { return s.name == "views"; });
+    if (!viewed) return overlay(frame, decision);
+    begin_to_deform();
+  }
+  note_deformed();
+  waiting_.push_back({frame, decision});
+  return {};
 }
 
 Result<void> DemoSession::run(EventStream& stream) {

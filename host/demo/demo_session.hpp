@@ -7,15 +7,19 @@
 #include <vector>
 
 #include "device/wire/messages.hpp"
+#include "drivers/system/background.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/demo/demo_report.hpp"
 #include "host/files/film.hpp"
 #include "host/files/picture.hpp"
 #include "host/guide/guided_calibration.hpp"
+#include "host/guide/live_rests.hpp"
 #include "host/guide/live_stations.hpp"
 #include "host/link/event_stream.hpp"
+#include "host/operation/deformation_step.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/pointer_tip.hpp"
+#include "host/operation/view_step.hpp"
 #include "host/overlay/frame_painter.hpp"
 #include "host/render/engine.hpp"
 #include "host/simulated/simulated_cart.hpp"
@@ -34,19 +38,31 @@ struct OverlaidFrame {
 
 struct KeptFrame {
   std::uint64_t sequence;
-  Picture video, overlay;
+  Picture video;
+  std::optional<Picture> rigid;  ///< with the CT as it was taken, where the overlay has the CT deformed
+  Picture overlay;
 };
 
-/// One run of the demo: takes the appliance's events in order and does what the stage asks for.
+/// One run of the demo: takes the appliance's events in order and does what the stage asks for. Where the scope is held
+/// still about the liver, it keeps views and then matches the CT with them, on a thread of its own; frames that come
+/// meanwhile wait for that.
 class DemoSession {
  public:
-  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, const PatientPlan& patient, Film film,
-              Progress& progress)
-      : cart_(cart), patient_(patient), film_(std::move(film)), progress_(progress), stations_(board, "scope") {}
+  DemoSession(SimulatedCart& cart, const calibration::Pattern& board, std::shared_ptr<const PatientPlan> patient,
+              Film film, Progress& progress)
+      : cart_(cart),
+        patient_(std::move(patient)),
+        film_(std::move(film)),
+        progress_(progress),
+        stations_(board, "scope"),
+        rests_("scope") {}
 
   /// Until the operation has ended and its last frame has come.
   Result<void> run(EventStream& stream);
+  /// Waits for the deformation, where one was begun, and draws what waits for it.
   Result<void> finish();
+  /// What the overlay shows deformed; null where it shows the CT as it was taken.
+  [[nodiscard]] const DeformedOrgan* deformed() const { return deformation_.found().get(); }
 
   DemoFigures figures;
   std::vector<OverlaidFrame> overlaid;
@@ -58,17 +74,35 @@ class DemoSession {
   Result<void> take(const wire::Birds& birds);
   Result<void> take(const wire::VideoFrame& frame);
   void take_stations();
-  Result<void> calibrate_and_register();
-  Result<void> overlay(const wire::VideoFrame& frame);
+  void begin_to_calibrate(const wire::VideoFrame& frame);
+  Result<void> end_calibrating_and_register();
+  void keep_views();
+  void begin_to_deform();
+  void note_deformed();
+  Result<void> end_deforming();
+  Result<void> overlay(const wire::VideoFrame& frame, const OverlayGate::Decision& decision);
 
   SimulatedCart& cart_;
-  const PatientPlan& patient_;  ///< all that the appliance does not send
+  std::shared_ptr<const PatientPlan> patient_;  ///< all that the appliance does not send
   Film film_;
   Progress& progress_;
   LiveStations stations_;
   GuidedStations seen_;
+  bool calibrating_begun_ = false;
+  Background<Result<GuidedCalibration>> calibrating_;  ///< while the pointer touches
   PointerTip pointer_;
   std::vector<Eigen::Vector3d> touches_in_tracker_mm_;
+  LiveRests rests_;
+  ViewStep views_;
+  DeformationStep deformation_;
+  std::optional<HostTime> began_to_deform_;
+  std::optional<double> deforming_took_s_;
+  /// A frame that is to be drawn once the deformation is known.
+  struct WaitingFrame {
+    wire::VideoFrame frame;
+    OverlayGate::Decision decision;
+  };
+  std::vector<WaitingFrame> waiting_;
   std::unique_ptr<Engine> engine_;
   FramePainter painter_;
   OverlayLook look_;

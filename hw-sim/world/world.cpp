@@ -25,7 +25,7 @@ constexpr int kStations = 24;
 constexpr double kMoveS = 0.14;                           // from station to station over the board
 constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
 constexpr double kCarryS = 2;                             // of the scope from the board to the patient
-constexpr double kViewDwellS = 0.6, kViewMoveS = 0.45;    // of the scope about the liver
+constexpr double kViewDwellS = 0.8, kViewMoveS = 0.45;    // of the scope about the liver
 constexpr double kSweepS = 7;                             // there and back
 constexpr double kRangeMm = 700;                          // of the transmitter
 

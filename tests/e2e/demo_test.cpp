@@ -50,21 +50,30 @@ nlohmann::json demo(const Scratch& scratch, const std::string& options) {
   return report;
 }
 
-TEST(Demo, PutsTheTumourWhereItIsDespiteTheTrackersNoise) {
+TEST(Demo, PutsTheTumourWhereItHasMovedDespiteTheTrackersNoise) {
   const Scratch scratch;
   const nlohmann::json report = demo(scratch, "");
   EXPECT_LE(report.value("target_error_mm_p95", 1e9), 3.0);
   EXPECT_GT(report.value("target_error_mm_p50", 0.0), 0.0);
+  // The same frames with the CT as it was taken: the liver has moved by 10 mm since.
+  EXPECT_GT(report.value("rigid_target_error_mm_p50", 0.0), 6.0);
+  EXPECT_LE(report.value("target_error_mm_p50", 1e9), 0.4 * report.value("rigid_target_error_mm_p50", 0.0));
+  EXPECT_GT(report.value("deformed_surface_expected_mm", 0.0), 0.1);
+  EXPECT_GE(report.value("views_kept", 0), 4);
   EXPECT_LE(report.value("fre_mm", 1e9), 1.0);
   EXPECT_NEAR(report.value("tracker_rate_hz", 0.0), 103.3, 1.0);
-  EXPECT_GT(report.value("frames", 0), 600);
+  EXPECT_GT(report.value("frames", 0), 700);
   EXPECT_EQ(report.value("verdict", ""), "pass");
   EXPECT_LT(report.value("frames_without_overlay", 1000), 10);
+  EXPECT_GT(std::filesystem::file_size(scratch / "demo/rigid_and_deformed.png"), 2000U);
 }
 
-TEST(Demo, IsLimitedByTheRecordsStepsWithoutNoise) {
+TEST(Demo, IsLimitedByTheRecordsStepsWithoutNoiseAndWithoutDeformation) {
   const Scratch scratch;
-  EXPECT_LE(demo(scratch, "--noise none --seed 2").value("target_error_mm_p95", 1e9), 0.8);
+  const nlohmann::json report = demo(scratch, "--noise none --seed 2 --deformation-mm 0");
+  EXPECT_LE(report.value("target_error_mm_p95", 1e9), 0.8);
+  EXPECT_FALSE(report.contains("rigid_target_error_mm_p50"));
+  EXPECT_FALSE(report.contains("views_kept"));
 }
 
 }  // namespace
