@@ -14,6 +14,7 @@
 #include "host/case/registration_case.hpp"
 #include "host/case/registration_error.hpp"
 #include "host/case/registration_report.hpp"
+#include "host/case/registration_verdict.hpp"
 #include "host/case/run_registration.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
@@ -32,79 +33,6 @@ struct RegisterViewsOptions {
   fs::path file, out, json;
 };
 
-/// The widest angle between two views, seen from the middle of the CT.
-double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
-  const Eigen::Vector3d middle(c.ct.size[0] - 1, c.ct.size[1] - 1, c.ct.size[2] - 1);
-  const Eigen::Vector3d centre_mm = c.ct.patient_from_voxel * Eigen::Vector3d(0.5 * middle);
-  std::vector<Eigen::Vector3d> towards;
-  for (const VideoView& view : c.views) {
-    const Eigen::Vector3d eye_mm = (view.camera_from_patient * found.patient_from_model).inverse().translation();
-    towards.push_back((eye_mm - centre_mm).normalized());
-  }
-  double least_cosine = 1;
-  for (const Eigen::Vector3d& a : towards) {
-    for (const Eigen::Vector3d& b : towards) least_cosine = std::min(least_cosine, a.dot(b));
-  }
-  return std::acos(std::max(-1.0, least_cosine)) * 180 / std::numbers::pi;
-}
-
-Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
-  constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10, kNoise = 0.002;
-  const char* const unit = c.similarity == "mi" ? " nats" : "";
-  if (found.folded)
-    return {Grade::fail, {"every deformation that was found folds: check the poses; the start is written"}, {}};
-  if (found.worse_than_start)
-    return {Grade::fail, {"no deformation explains the views better than the start, which is what is written"}, {}};
-  // Geometry compares no rendering with a view: its similarity says nothing of how well it did.
-  for (std::size_t n = 0; n < c.views.size() && !found.stereo_points; ++n) {
-    const double gain = found.per_view_after[n] - found.per_view_before[n];
-    if (gain < -kNoise) {
-      return {Grade::fail,
-              {fmt::format("{} is explained worse than before, by {:.3f}{}, for others' sake: check its picture "
-                           "and its pose",
-                           c.views[n].name, -gain, unit)},
-              {}};
-    }
-  }
-  const double gain = found.similarity_after - found.similarity_before;
-  constexpr std::size_t kFewest = 100;
-  if (found.stereo_points && *found.stereo_points < kFewest) {
-    return {Grade::marginal,
-            {fmt::format("only {} places of the surface are seen by two views or more, under {}: add views, nearer to "
-                         "one another",
-                         *found.stereo_points, kFewest)},
-            {}};
-  }
-  if (c.views.size() == 1) return {Grade::marginal, {"a single view says little about depth: add others"}, {}};
-  if (const double deg = widest_deg(c, found); deg < kApart_deg) {
-    return {Grade::marginal,
-            {fmt::format("the views are at most {:.1f} degrees apart, under {}, and so say little about "
-                         "depth: add one from the side",
-                         deg, kApart_deg)},
-            {}};
-  }
-  if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
-    return {Grade::marginal,
-            {fmt::format("the surface may be {:.1f} mm off, over {} mm: add views{}", *found.uncertainty_mm, kSure_mm,
-                         found.stereo_points ? "" : ", or fewer control points")},
-            {}};
-  }
-  if (found.lamp_at_limit) {
-    return {Grade::marginal,
-            {"the lamp that explains the views best is no laparoscope's: check that pictures, poses and CT "
-             "belong together"},
-            {}};
-  }
-  // By geometry, an organ that did not move is found where it was.
-  if (!found.stereo_points && gain < kGain)
-    return {Grade::marginal, {fmt::format("similarity rose by only {:.3f}{}", gain, unit)}, {}};
-  std::string reason = fmt::format("similarity rose by {:.3f}{}", gain, unit);
-  if (found.stereo_points) reason = fmt::format("{} places of the surface are known by stereo", *found.stereo_points);
-  if (found.uncertainty_mm)
-    reason += fmt::format("; the surface is to be expected within {:.1f} mm", *found.uncertainty_mm);
-  return {Grade::pass, {reason}, {}};
-}
-
 /// Shift of the organ's centre, and turn.
 nlohmann::json motion_json(const Transform<Patient, Patient>& motion, const Eigen::Vector3d& centre_mm) {
   return {{"mm", (motion * centre_mm - centre_mm).norm()},
@@ -116,6 +44,31 @@ nlohmann::json pose_json(const ViewRegistration& found) {
   const Eigen::Matrix4d m = found.patient_from_model.matrix();
   for (int i = 0; i < 4; ++i) json["patient_from_model"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
   return json;
+}
+
+nlohmann::json expected_json(const std::optional<ExpectedError>& expected) {
+  if (!expected) return nullptr;
+  return {{"rms_mm", expected->rms_mm}, {"radius95_mm", expected->radius95_mm}};
+}
+
+/// What may be off, by kind of place and of each landmark, beside how far off the landmark is.
+void add_expected(nlohmann::json& json, const RegistrationCase& c, const ViewRegistration& found) {
+  const ExpectedErrors& expected = *found.expected;
+  json["expected_error"] = {{"seen", expected_json(expected.seen)},
+                            {"hidden", expected_json(expected.hidden)},
+                            {"surface", expected_json(expected.surface)},
+                            {"inside", expected_json(expected.inside)},
+                            {"target", nullptr}};
+  if (c.target_mm && !expected.targets.empty()) json["expected_error"]["target"] = expected_json(expected.targets[0]);
+  if (expected.seen_moved_mm) json["seen_moved_mm"] = *expected.seen_moved_mm;
+  const std::size_t first = c.target_mm ? 1 : 0;
+  for (std::size_t n = 0; n < c.landmarks.size() && first + n < expected.targets.size(); ++n) {
+    const Landmark& landmark = c.landmarks[n];
+    nlohmann::json row = expected_json(expected.targets[first + n]);
+    row["name"] = landmark.name;
+    row["error_mm"] = (found.field.deformed_of(landmark.rest_mm) - landmark.deformed_mm).norm();
+    json["landmarks"].push_back(row);
+  }
 }
 
 nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
@@ -134,6 +87,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
+  if (found.expected) add_expected(json, c, found);
   json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
                    {"falloff", found.light.falloff},
                    {"ambient", found.light.ambient},
@@ -142,6 +96,8 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
     json["per_view"].push_back({{"view", c.views[n].name},
                                 {"similarity_before", found.per_view_before[n]},
                                 {"similarity_after", found.per_view_after[n]}});
+    if (n < found.outline_off_mm.size() && found.outline_off_mm[n])
+      json["per_view"].back()["outline_off_mm"] = *found.outline_off_mm[n];
   }
   if (c.refine_pose) json["pose_correction"] = pose_json(found);
   // Without the true pose, the one that was found is believed.
@@ -157,8 +113,11 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
     json["epsilon_before"] = epsilon(*c.truth, initial);
     json["epsilon_after"] = epsilon(*c.truth, &found.field);
   }
-  for (const auto& [key, prefix] :
-       {std::pair{"", ""}, {"surface_", "surface"}, {"vessel_", "vessel"}, {"tumour_", "tumour"}}) {
+  for (const auto& [key, prefix] : {std::pair{"", ""},
+                                    {"surface_", "surface"},
+                                    {"hidden_", "hidden"},
+                                    {"vessel_", "vessel"},
+                                    {"tumour_", "tumour"}}) {
     const auto before = landmark_error(c.landmarks, prefix, initial, error_before);
     const auto after = landmark_error(c.landmarks, prefix, &found.field, error_after);
     if (!before || !after) continue;
@@ -208,6 +167,19 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
+/// The organ is not in the pictures where it should be: that is a verdict too.
+Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const Error& why) {
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error)
+    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", options.out.string())};
+  const std::string text = text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}});
+  if (auto written = write_files({{options.out / "result.json", text}, {options.json, text}}); !written)
+    return written.error();
+  fmt::print("{}: {} ({})\n", options.file.string(), name_of(Grade::fail), why.what);
+  return ExitCode::verdict_fail;
+}
+
 Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   auto read = read_case(options.file);
@@ -218,6 +190,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
 
   Progress progress;
   const auto found = run_registration(c, *transfer, true, [&progress](const std::string& line) { progress(line); });
+  if (!found && found.error().code == Errc::not_found) return write_nothing_found(options, found.error());
   if (!found) return found.error().with_context(options.file.string());
   const double time_s = progress.seconds();
 

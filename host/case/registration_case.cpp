@@ -76,12 +76,13 @@ Result<void> only_known_keys(const fs::path& file, const toml::value& all) {
        {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
         "most_evaluations"}},
       {"view", {"image", "camera", "camera_from_patient", "mask"}},
+      {"target", {"place_mm"}},
       {"truth", {"landmarks", "control_points", "pose"}}};
   for (const auto& [name, content] : all.as_table()) {
     const auto table = kKnown.find(name);
     if (table == kKnown.end())
-      return Error{Errc::bad_value,
-                   fmt::format("{}: [{}] is not known; there are volume, model, view, truth", file.string(), name)};
+      return Error{Errc::bad_value, fmt::format("{}: [{}] is not known; there are volume, model, view, target, truth",
+                                                file.string(), name)};
     const auto check = [&, &name = name](const toml::value& one) -> Result<void> {
       if (!one.is_table()) return {};
       for (const auto& [key, unused] : one.as_table()) {
@@ -314,6 +315,12 @@ Result<RegistrationCase> read_case(const fs::path& path) {
   for (const toml::value& view : all.at("view").as_array()) {
     const CaseTable one(path, fmt::format("view {}", number++), view);
     if (auto done = read_view(one, path.parent_path(), out); !done) return done.error();
+  }
+  if (const CaseTable target = table("target"); target.has("place_mm")) {
+    const auto place = target.get<std::vector<double>>("place_mm");
+    if (!place) return place.error();
+    if (place->size() != 3) return target.wrong("place_mm", "is three numbers, mm in the patient's frame");
+    out.target_mm = Eigen::Vector3d((*place)[0], (*place)[1], (*place)[2]);
   }
   const CaseTable truth = table("truth");
   if (truth.has("landmarks")) {

@@ -31,7 +31,7 @@ struct RegistrationCase {
   /// Inner control points along each axis; empty for "auto".
   std::optional<std::array<int, 3>> control_points;
   int level = 5;
-  std::string optimiser = "gradient";  ///< or geometry, or simplex, powell; only these two use the three below
+  std::string optimiser = "geometry";  ///< or gradient, or simplex, powell; only these two use the three below
   bool vertices = false;               ///< the unknowns are the free vertices of `level`
   std::string similarity = "mi";
   int most_evaluations = 400;
@@ -39,7 +39,8 @@ struct RegistrationCase {
   double pose_prior = Prior{}.pose;
   std::optional<DisplacementField> initial;
   std::vector<VideoView> views;
-  std::vector<Picture> pictures;  ///< of the views, in colour
+  std::vector<Picture> pictures;             ///< of the views, in colour
+  std::optional<Eigen::Vector3d> target_mm;  ///< what is to be hit, as the CT has it; none: the organ's inside
   std::vector<Landmark> landmarks;
   std::optional<TrueDeformation> truth;
   /// What a refined pose should be: patient_from_model.

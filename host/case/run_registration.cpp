@@ -14,6 +14,8 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
     settings.control_points = c.control_points.value_or(settings.control_points);
     settings.estimate_uncertainty = estimate_uncertainty;
     settings.progress = tell;
+    if (c.target_mm) settings.targets_at_rest_mm.push_back(*c.target_mm);
+    for (const Landmark& landmark : c.landmarks) settings.targets_at_rest_mm.push_back(landmark.rest_mm);
     std::vector<RgbView> pictures;
     pictures.reserve(c.pictures.size());
     for (const Picture& picture : c.pictures) pictures.push_back(picture.view());

@@ -8,7 +8,8 @@
 
 namespace birdseye::host {
 
-/// Registers a case by the optimiser that the case names. Now and then calls tell with a line for a person.
+/// Registers a case by the optimiser that the case names. By geometry, the expected errors of targets are of the
+/// target, where the case has one, and of its landmarks after it. Now and then calls tell with a line for a person.
 Result<ViewRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
                                           bool estimate_uncertainty,
                                           const std::function<void(const std::string&)>& tell);

@@ -134,7 +134,7 @@ std::string case_toml(const CaseSettings& settings, const MadeCase& made) {
   std::string toml = fmt::format(
       "# Written by birdseye-sim case --seed {}. Paths are relative to this file.\n"
       "[volume]\npath = \"ct.nii.gz\"\nlabel = \"segmentation.nii.gz\"\nlabel_values = [{}]\ntransfer = \"{}\"\n\n"
-      "[model]\ncontrol_points = {}\nlevel = 3\noptimiser = \"gradient\"\n",
+      "[model]\ncontrol_points = {}\nlevel = 3\noptimiser = \"geometry\"\n",
       settings.seed, fmt::join(made.subject.organ_labels, ", "), made.subject.transfer, points);
   for (std::size_t i = 0; i < made.views.size(); ++i) {
     toml += fmt::format(
@@ -142,6 +142,8 @@ std::string case_toml(const CaseSettings& settings, const MadeCase& made) {
         "mask = \"mask.png\"\n",
         i);
   }
+  toml += fmt::format("\n[target]\nplace_mm = [{:.3f}]  # the tumour's centre\n",
+                      fmt::join(made.subject.tumour_centre_mm, ", "));
   toml += "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\n";
   return patch ? toml + "control_points = \"truth/control_points.json\"\n" : toml;
 }

@@ -18,7 +18,8 @@ inline host::RegistrationCase simulated_case(const std::filesystem::path& folder
   settings.views = 3;
   settings.width_px = 384;
   settings.height_px = 288;
-  settings.amplitude_mm = amplitude_mm;
+  settings.deformation.kind = hw_sim::DeformationKind::bezier;
+  settings.deformation.amplitude_mm = amplitude_mm;
   const auto written = hw_sim::write_case(settings);
   EXPECT_TRUE(written) << written.error().what;
   auto read = host::read_case(folder / "case.toml");

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
+#include "calibration/base/median.hpp"
 #include "host/registration/geometry/believed_deformation.hpp"
 #include "host/registration/geometry/expected_errors.hpp"
 #include "host/registration/geometry/gathered_points.hpp"
@@ -28,6 +30,17 @@ Error called_off() {
 
 DisplacementField no_deformation(const Volume& ct, const SignedDistance& organ) {
   return field_over(ct, LatticeField(organ));
+}
+
+/// The median of how far a view's outline is from the surface; none where it shows too little of one.
+std::optional<double> outline_off_mm(const PinholeView& view, const SeenSurface& surface) {
+  constexpr double kFarthest_mm = 12;
+  constexpr std::size_t kFewest = 12;
+  std::vector<double> off_mm;
+  for (const SeenPoint& point : outline_points({view}, surface, kFarthest_mm))
+    off_mm.push_back(std::abs(surface.distance().distance_mm(point.place_mm)));
+  if (off_mm.size() < kFewest) return std::nullopt;
+  return median_of(std::move(off_mm));
 }
 
 }  // namespace
@@ -108,6 +121,8 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.field = no_deformation(ct, *organ);
     out.min_jacobian = 1;
   }
+  const SeenSurface surface(seen_distance(*organ, found.mean));
+  for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   out.similarity_after = rendered->similarity(out.field);
   out.per_view_after = rendered->per_view();
   if (settings.estimate_uncertainty && !out.folded) {

@@ -74,6 +74,7 @@ PinholeView pinhole_view(const VideoView& view, const RgbView& picture) {
   cv::add(sum, channels[2], sum, {}, CV_32F);
   sum /= 3;
   cv::remap(sum, grey, x, y, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  cv::GaussianBlur(grey, out.smooth, {}, 1.0);
   const cv::Mat brightest = cv::max(cv::max(channels[0], channels[1]), channels[2]), seen = counts != 0;
   cv::dilate(brightest > kGlare, glare, disc(kGlareRim_px));
   // What the mask leaves out for its glare is no rim of the lens.

@@ -15,6 +15,7 @@ struct PinholeView {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   Transform<Camera, Patient> camera_from_patient;
   Eigen::Vector3d eye_in_patient_mm;
+  cv::Mat smooth;   ///< float: grey, smoothed by a pixel
   cv::Mat texture;  ///< float: log of grey without its slow changes; NaN where not usable
   cv::Mat colour;   ///< 8 bits a channel, RGB
   cv::Mat lens;     ///< 8 bit: not 0 where the picture shows anything at all

@@ -81,6 +81,9 @@ struct ViewRegistration {
   std::optional<ExpectedErrors> expected;
   /// Places of the surface that stereo between the views found; only with optimiser geometry.
   std::optional<std::size_t> stereo_points;
+  /// Of each view, the median of how far its outline is from the surface that was found; none where it shows too little
+  /// of one. Only with optimiser geometry.
+  std::vector<std::optional<double>> outline_off_mm;
   std::string why_so_many_points;  ///< in words
   bool worse_than_start = false;   ///< the start is returned: the initial field itself, or none
   bool folded = false;             ///< the reason for that: every deformation that was found folds

@@ -129,7 +129,8 @@ Outcome registered(const fs::path& data, const fs::path& folder, unsigned seed, 
   const Transform<Camera, Patient> left_from_patient(turn, centre - turn * centre + shift);
   std::ofstream file(folder / "case.toml");
   file << "[volume]\npath = \"ct.nii.gz\"\ntransfer = \"skin\"\n"
-       << "[model]\ncontrol_points = [1, 1, 1]\nlevel = 3\nrefine_pose = true\npose_prior = 0.05\n"
+       << "[model]\ncontrol_points = [1, 1, 1]\nlevel = 3\noptimiser = \"gradient\"\nrefine_pose = true\npose_prior = "
+          "0.05\n"
        << "[truth]\npose = \"true_pose.txt\"\n";
   for (const std::string side : {"left", "right"}) {
     const CameraModel camera = write_camera(data, side, folder / (side + ".yaml"));

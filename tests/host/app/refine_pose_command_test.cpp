@@ -62,8 +62,8 @@ nlohmann::json registered(const Scratch& scratch, const std::string& deformation
     write_matrix(path, matrix_of(path) * disturbance.matrix());
   }
   write_matrix(folder / "truth/pose.txt", disturbance.inverse().matrix());
-  const std::string text =
-      std::regex_replace(contents_of(folder / "case.toml"), std::regex("\\[model\\]"), "[model]\nrefine_pose = true");
+  const std::string text = std::regex_replace(contents_of(folder / "case.toml"), std::regex("\"geometry\""),
+                                              "\"gradient\"\nrefine_pose = true");
   std::ofstream(folder / "case.toml") << std::regex_replace(text, std::regex("\\[truth\\]"),
                                                             "[truth]\npose = \"truth/pose.txt\"");
   const auto result = run("birdseye", "register views --case " + (folder / "case.toml").string() + " --out " +
