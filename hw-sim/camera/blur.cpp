@@ -22,6 +22,7 @@ void blur(std::vector<Vector3f>& light, int width_px, int height_px, double sigm
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x);
   };
   std::vector<Vector3f> from;
+  const float* const middle = &weight[static_cast<std::size_t>(reach)];
   // Along x, then along y.
   for (const bool rows : {true, false}) {
     from = light;
@@ -32,7 +33,7 @@ void blur(std::vector<Vector3f>& light, int width_px, int height_px, double sigm
         const int last = (rows ? width_px : height_px) - 1;
         for (int i = std::max(-reach, -at); i <= std::min(reach, last - at); ++i) {
           const std::size_t other = rows ? pixel(x + i, y) : pixel(x, y + i);
-          spread += weight[static_cast<std::size_t>(reach + i)] * from[other];
+          spread += middle[i] * from[other];
         }
         light[pixel(x, y)] = spread;
       }
