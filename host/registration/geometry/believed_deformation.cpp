@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace birdseye::host {
@@ -29,30 +28,33 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
                                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
                                            const RegistrationWatch& watch) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.6, 1.3, 1.1, 1.0, 1.0, 1.0};
-  constexpr std::array kGoOn_mm{4.0, 2.0, 1.3, 1.0, 1.0};
+  constexpr std::array kGoOn_mm{4.0, 2.0, 1.0, 0.6, 0.5};
   constexpr std::size_t kMostBelieved = 4;
   /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
   constexpr double kTemper = 4;
-  const bool goes_on = before.all_fits.size() == priors.size();
-  std::vector<std::optional<DisplacementFit>> fits(priors.size());
-  tbb::parallel_for(std::size_t{0}, priors.size(), [&](std::size_t i) {
+  constexpr double kHopeless_nats = 60;
+  const bool goes_on = !before.candidates.empty();
+  std::vector<std::optional<DisplacementFit>> fits(goes_on ? before.candidates.size() : priors.size());
+  tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t i) {
     if (watch.cancelled()) return;
-    fits[i] = goes_on ? DisplacementFit::solve(organ, points, priors[i], &before.all_fits[i], kGoOn_mm)
-                      : DisplacementFit::solve(organ, points, priors[i], nullptr, kAnneal_mm);
+    const DisplacementFit* const start = goes_on ? &before.candidates[i] : nullptr;
+    fits[i] = goes_on ? DisplacementFit::solve(organ, points, start->prior(), start, kGoOn_mm)
+                      : DisplacementFit::solve(organ, points, priors[i], start, kAnneal_mm);
   });
   if (!std::all_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.has_value(); })) return std::nullopt;
   BelievedDeformation out(organ);
-  for (std::optional<DisplacementFit>& fit : fits) out.all_fits.push_back(*std::move(fit));
-  std::vector<std::size_t> order(priors.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto evidence = [&](std::size_t i) { return out.all_fits[i].log_evidence(); };
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return evidence(a) > evidence(b); });
-  order.resize(std::min(order.size(), kMostBelieved));
+  for (std::optional<DisplacementFit>& fit : fits) out.candidates.push_back(*std::move(fit));
+  std::stable_sort(
+      out.candidates.begin(), out.candidates.end(),
+      [](const DisplacementFit& a, const DisplacementFit& b) { return a.log_evidence() > b.log_evidence(); });
+  const double most = out.candidates.front().log_evidence();
+  std::erase_if(out.candidates, [&](const DisplacementFit& fit) { return fit.log_evidence() < most - kHopeless_nats; });
   double sum = 0;
-  for (const std::size_t i : order) {
-    out.beliefs.push_back(std::exp((evidence(i) - evidence(order.front())) / kTemper));
-    out.fits.push_back(out.all_fits[i]);
-    out.fields.push_back(out.all_fits[i].seen_field(organ));
+  for (std::size_t i = 0; i < std::min(out.candidates.size(), kMostBelieved); ++i) {
+    const DisplacementFit& fit = out.candidates[i];
+    out.beliefs.push_back(std::exp((fit.log_evidence() - most) / kTemper));
+    out.fits.push_back(fit);
+    out.fields.push_back(fit.seen_field(organ));
     sum += out.beliefs.back();
   }
   for (double& belief : out.beliefs) belief /= sum;

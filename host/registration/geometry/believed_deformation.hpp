@@ -19,14 +19,14 @@ struct BelievedDeformation {
   std::vector<LatticeField> fields;   ///< theirs, of seen places
   std::vector<double> beliefs;        ///< sum to 1
   LatticeField mean;
-  std::vector<DisplacementFit> all_fits;  ///< one a prior
+  std::vector<DisplacementFit> candidates;  ///< by all hypotheses that more points may yet speak for
 
   /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, and between them.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const;
 };
 
-/// By every prior, each believed as far as its evidence goes; before: by the same priors about fewer or worse points,
-/// or empty of fits. Empty where the watch cancels.
+/// By every prior, each believed as far as its evidence goes. before: by fewer or worse points, of which the candidates
+/// are gone on with; or empty of them. Empty where the watch cancels.
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
                                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
                                            const RegistrationWatch& watch);

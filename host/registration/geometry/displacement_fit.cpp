@@ -34,10 +34,7 @@ Eigen::MatrixX3d DisplacementFit::values(const Eigen::MatrixX3d& places) const {
     for (const GaussianPart& part : prior_.parts)
       out += part.sigma_mm * part.sigma_mm * (gaussian(squared, part.length_mm) * weights_of_centres_);
   }
-  if (prior_.basis) {
-    for (Eigen::Index i = 0; i < places.rows(); ++i)
-      out.row(i) += (prior_.basis->at(places.row(i).transpose()) * unknowns_).transpose();
-  }
+  if (prior_.basis) out += prior_.basis->sum_at(unknowns_, places);
   return out;
 }
 
@@ -59,12 +56,14 @@ std::vector<Eigen::Matrix3d> DisplacementFit::gradients(const Eigen::MatrixX3d& 
   }
   if (prior_.basis) {
     constexpr double kStep_mm = 3;
-    for (Eigen::Index i = 0; i < places.rows(); ++i) {
-      for (Eigen::Index b = 0; b < 3; ++b) {
-        const Eigen::Vector3d at = places.row(i).transpose(), step = kStep_mm * Eigen::Vector3d::Unit(b);
-        out[static_cast<std::size_t>(i)].col(b) +=
-            (prior_.basis->at(at + step) - prior_.basis->at(at - step)) * unknowns_ / (2 * kStep_mm);
-      }
+    for (Eigen::Index b = 0; b < 3; ++b) {
+      Eigen::MatrixX3d before = places, after = places;
+      before.col(b).array() -= kStep_mm;
+      after.col(b).array() += kStep_mm;
+      const Eigen::MatrixX3d slope =
+          (prior_.basis->sum_at(unknowns_, after) - prior_.basis->sum_at(unknowns_, before)) / (2 * kStep_mm);
+      for (Eigen::Index i = 0; i < places.rows(); ++i)
+        out[static_cast<std::size_t>(i)].col(b) += slope.row(i).transpose();
     }
   }
   return out;

@@ -6,6 +6,12 @@
 
 namespace birdseye::host {
 
+Eigen::MatrixX3d DisplacementBasis::sum_at(const Eigen::VectorXd& unknowns, const Eigen::MatrixX3d& places) const {
+  Eigen::MatrixX3d out(places.rows(), 3);
+  for (Eigen::Index i = 0; i < places.rows(); ++i) out.row(i) = (at(places.row(i).transpose()) * unknowns).transpose();
+  return out;
+}
+
 BezierBasis::BezierBasis(const Eigen::Affine3d& patient_from_cube, const std::array<int, 3>& inner_points,
                          double sigma_mm)
     : cube_from_patient_(patient_from_cube.inverse()), inner_(inner_points), sigma_mm_(sigma_mm) {}

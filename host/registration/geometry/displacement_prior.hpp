@@ -25,6 +25,8 @@ class DisplacementBasis {
   [[nodiscard]] virtual Eigen::Index unknowns() const = 0;
   /// 3 x unknowns: the displacement at a place, mm per unit of each unknown.
   [[nodiscard]] virtual Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const = 0;
+  /// A row a place: the displacement by unknowns that are known, mm.
+  [[nodiscard]] virtual Eigen::MatrixX3d sum_at(const Eigen::VectorXd& unknowns, const Eigen::MatrixX3d& places) const;
 };
 
 /// The inner control points of a Bezier patch over a box, independent, of sigma_mm along each axis.

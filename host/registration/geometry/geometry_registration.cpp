@@ -84,7 +84,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   };
   constexpr std::array kRounds{Round{18, 12, 0.5, 0}, Round{18, 8, 0.4, 9}, Round{18, 6, 0.3, 8},
                                Round{12, 4, 0.25, 5}};
-  const std::vector<DisplacementPrior> hypotheses = hypotheses_of(ct, settings.control_points);
+  std::vector<DisplacementPrior> hypotheses = hypotheses_of(ct, ElasticModes::of(*organ), settings.control_points);
   BelievedDeformation found(*organ);
   for (const Round& round : kRounds) {
     if (settings.watch.cancelled()) return called_off();

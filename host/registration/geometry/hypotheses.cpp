@@ -8,7 +8,8 @@
 
 namespace birdseye::host {
 
-std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::array<int, 3>& control_points) {
+std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared_ptr<const ElasticModes>& modes,
+                                             const std::array<int, 3>& control_points) {
   constexpr double kUsual_mm = 2, kUsualNearby_mm = 0.4, kNearby_mm = 20;
   struct Gaussian {
     double length_mm, sigma_mm, nearby_sigma_mm;
@@ -33,6 +34,22 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::array<
     }
     prior.log_belief =
         -0.5 * std::pow(std::log(sigma / kUsual_mm), 2) - 0.5 * std::pow(std::log((nearby + 0.1) / kUsualNearby_mm), 2);
+    out.push_back(std::move(prior));
+  }
+  struct Elastic {
+    double sigma_mm, length_mm, beside_mm;
+  };
+  for (const auto& [sigma, length, beside] : {Elastic{1, 0, 0}, {2, 0, 0}, {4, 0, 0}, {2, 85, 2.5}, {1, 65, 4}}) {
+    constexpr double kRigid_mm = 3;
+    DisplacementPrior prior;
+    prior.name = fmt::format("elastic, {:g} mm", sigma);
+    prior.basis = std::make_shared<ElasticBasis>(modes, kRigid_mm, sigma);
+    prior.log_belief = -0.5 * std::pow(std::log(sigma / kUsual_mm), 2);
+    if (beside > 0) {
+      prior.name += fmt::format(" and {:g} mm over {:g} mm", beside, length);
+      prior.parts.push_back({length, beside});
+      prior.log_belief -= 0.5 * std::pow(std::log(beside / kUsual_mm), 2);
+    }
     out.push_back(std::move(prior));
   }
   const Eigen::Vector3d last_voxel(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);

@@ -5,29 +5,13 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/ball.hpp"
+
 namespace birdseye::host {
 namespace {
 
 constexpr double kRadius_mm = 40;
 constexpr std::array kSettle_mm{4.0, 2.0, 1.3, 1.0, 1.0, 1.0};
-
-/// A ball about the origin; its distance is exact at the grid's points.
-SignedDistance ball() {
-  const std::array<int, 3> points{71, 71, 71};
-  constexpr double kSpacing_mm = 2;
-  std::vector<float> distances_mm;
-  for (int k = 0; k < points[2]; ++k) {
-    for (int j = 0; j < points[1]; ++j) {
-      for (int i = 0; i < points[0]; ++i) {
-        const Eigen::Vector3d place_mm = kSpacing_mm * Eigen::Vector3d(i - 35, j - 35, k - 35);
-        distances_mm.push_back(static_cast<float>(place_mm.norm() - kRadius_mm));
-      }
-    }
-  }
-  Eigen::Affine3d patient_from_box = Eigen::Affine3d::Identity();
-  patient_from_box.translation().setConstant(-70);
-  return {points, kSpacing_mm, patient_from_box, distances_mm};
-}
 
 /// seen = rest - w(rest), of some millimetres over some 80.
 Eigen::Vector3d true_displacement(const Eigen::Vector3d& rest_mm) {
@@ -59,7 +43,7 @@ DisplacementPrior long_prior() {
 }
 
 TEST(DisplacementFit, BringsTheSurfaceToWhereItIsSeen) {
-  const SignedDistance organ = ball();
+  const SignedDistance organ = testing::ball(kRadius_mm);
   const auto points = seen_surface(0.2);
   const DisplacementFit fit = DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm);
   const LatticeField field = fit.seen_field(organ);
@@ -70,7 +54,7 @@ TEST(DisplacementFit, BringsTheSurfaceToWhereItIsSeen) {
 }
 
 TEST(DisplacementFit, ItsCovarianceHoldsItsErrors) {
-  const SignedDistance organ = ball();
+  const SignedDistance organ = testing::ball(kRadius_mm);
   const DisplacementFit fit = DisplacementFit::solve(organ, seen_surface(0.2), long_prior(), nullptr, kSettle_mm);
   const LatticeField field = fit.seen_field(organ);
   std::mt19937 random(8);
@@ -89,7 +73,7 @@ TEST(DisplacementFit, ItsCovarianceHoldsItsErrors) {
 }
 
 TEST(DisplacementFit, AFewWrongPlacesChangeLittle) {
-  const SignedDistance organ = ball();
+  const SignedDistance organ = testing::ball(kRadius_mm);
   auto points = seen_surface(0.2);
   const LatticeField without =
       DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).seen_field(organ);
@@ -103,7 +87,7 @@ TEST(DisplacementFit, AFewWrongPlacesChangeLittle) {
 }
 
 TEST(DisplacementFit, TheEvidenceKnowsWhichPriorMadeTheField) {
-  const SignedDistance organ = ball();
+  const SignedDistance organ = testing::ball(kRadius_mm);
   const auto points = seen_surface(0.2);
   DisplacementPrior still;
   still.parts.push_back({85, 0.2});
@@ -112,7 +96,7 @@ TEST(DisplacementFit, TheEvidenceKnowsWhichPriorMadeTheField) {
 }
 
 TEST(LatticeField, OfSeenPlacesUndoesThatOfRestPlaces) {
-  const SignedDistance organ = ball();
+  const SignedDistance organ = testing::ball(kRadius_mm);
   LatticeField rest(organ);
   for (std::size_t n = 0; n < rest.size(); ++n) rest.set(n, true_displacement(rest.place_mm(n)));
   const LatticeField seen = seen_from_rest(rest);
