@@ -27,12 +27,12 @@ Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) 
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
                                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
                                            const RegistrationWatch& watch) {
-  constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.6, 1.3, 1.1, 1.0, 1.0, 1.0};
+  constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0};
   constexpr std::array kGoOn_mm{4.0, 2.0, 1.0, 0.6, 0.5};
   constexpr std::size_t kMostBelieved = 4;
   /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
   constexpr double kTemper = 4;
-  constexpr double kHopeless_nats = 60;
+  constexpr double kHopeless_nats = 30;
   const bool goes_on = !before.candidates.empty();
   std::vector<std::optional<DisplacementFit>> fits(goes_on ? before.candidates.size() : priors.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t i) {
