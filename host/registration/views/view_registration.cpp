@@ -81,7 +81,6 @@ class Problem {
         gradient.insert(gradient.end(), by.begin() + inner, by.end());
       }
       record_.trace.push_back({reduction_, static_cast<std::size_t>(inner), value});
-      watch_.step(record_.trace.back());
       return value;
     };
     using Objective = decltype(objective);

@@ -21,9 +21,8 @@ struct TracePoint {
   double similarity = 0;
 };
 
-/// For whoever waits for a registration: sees each step, and may cancel it. Called on the registration's threads.
+/// For whoever waits for a registration: may cancel it. Called on the registration's threads.
 struct RegistrationWatch {
-  std::function<void(const TracePoint&)> step = [](const TracePoint&) {};
   std::function<bool()> cancelled = [] { return false; };
 };
 
