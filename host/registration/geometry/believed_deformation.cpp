@@ -26,7 +26,7 @@ Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) 
 
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
                                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
-                                           const RegistrationWatch& watch) {
+                                           const RegistrationWatch& watch, std::span<const MatchedPoint> matched) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0};
   constexpr std::array kGoOn_mm{4.0, 2.0, 1.0, 0.6, 0.5};
   constexpr std::size_t kMostBelieved = 4;
@@ -38,8 +38,8 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t i) {
     if (watch.cancelled()) return;
     const DisplacementFit* const start = goes_on ? &before.candidates[i] : nullptr;
-    fits[i] = goes_on ? DisplacementFit::solve(organ, points, start->prior(), start, kGoOn_mm)
-                      : DisplacementFit::solve(organ, points, priors[i], start, kAnneal_mm);
+    fits[i] = goes_on ? DisplacementFit::solve(organ, points, start->prior(), start, kGoOn_mm, matched)
+                      : DisplacementFit::solve(organ, points, priors[i], start, kAnneal_mm, matched);
   });
   if (!std::all_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.has_value(); })) return std::nullopt;
   BelievedDeformation out(organ);

@@ -29,6 +29,6 @@ struct BelievedDeformation {
 /// are gone on with; or empty of them. Empty where the watch cancels.
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
                                            std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
-                                           const RegistrationWatch& watch);
+                                           const RegistrationWatch& watch, std::span<const MatchedPoint> matched = {});
 
 }  // namespace birdseye::host

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -23,6 +24,42 @@ Eigen::MatrixXd squared_distances(const Eigen::MatrixX3d& a, const Eigen::Matrix
   out.rowwise() += b.rowwise().squaredNorm().transpose();
   return out.cwiseMax(0.0);
 }
+
+/// What of a change of the displacement a place's other end moves by, where the displacement at that end has this
+/// slope.
+Eigen::Matrix3d carried(const Eigen::Matrix3d& slope) {
+  constexpr double kTorn = 4;
+  Eigen::Matrix3d inverse = (Eigen::Matrix3d::Identity() - slope).inverse();
+  if (inverse.norm() < kTorn) return inverse;
+  return Eigen::Matrix3d::Identity();
+}
+
+/// Of noise, by how far the fit is annealed.
+double tempered(double sigma_mm, double scale_mm) {
+  return std::max(sigma_mm, scale_mm > 1.01 ? scale_mm / 4 : 0.0);
+}
+
+/// Geman and McClure's, of a squared deviation in scales.
+double robust_weight(double squared) {
+  return 1 / std::pow(1 + squared, 2);
+}
+
+/// A matched point along the axes of its covariance.
+struct MatchedAxes {
+  explicit MatchedAxes(const MatchedPoint& point) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(point.covariance_mm2);
+    axes = solver.eigenvectors();
+    sigma_mm = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  }
+  /// Of a point that is off by so much.
+  [[nodiscard]] double weight(const Eigen::Vector3d& off_mm, double scale_mm) const {
+    constexpr double kSigmas = 3.3;  // of three axes what 2.5 is of one
+    const Eigen::Array3d scales = (kSigmas * sigma_mm.array()).max(scale_mm);
+    return robust_weight(((axes.transpose() * off_mm).array() / scales).square().sum());
+  }
+  Eigen::Matrix3d axes;  ///< columns
+  Eigen::Vector3d sigma_mm;
+};
 
 }  // namespace
 
@@ -71,8 +108,11 @@ std::vector<Eigen::Matrix3d> DisplacementFit::gradients(const Eigen::MatrixX3d& 
 
 DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<const SeenPoint> points,
                                        const DisplacementPrior& prior, const DisplacementFit* start,
-                                       std::span<const double> scales_mm) {
-  const auto n = static_cast<Eigen::Index>(points.size());
+                                       std::span<const double> scales_mm, std::span<const MatchedPoint> matched) {
+  // A row of each point, then three of each matched point.
+  const auto of_points = static_cast<Eigen::Index>(points.size());
+  const auto of_matched = 3 * static_cast<Eigen::Index>(matched.size());
+  const Eigen::Index n = of_points + of_matched;
   DisplacementFit out;
   if (start != nullptr) {
     out.prior_ = start->prior_;
@@ -81,45 +121,66 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     out.unknowns_ = start->unknowns_;
   }
   out.weights_.assign(points.size(), 1);
-  Eigen::MatrixX3d seen(n, 3);
-  Eigen::VectorXd sigma(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    seen.row(i) = points[static_cast<std::size_t>(i)].place_mm.transpose();
+  out.matched_weights_.assign(matched.size(), 1);
+  Eigen::MatrixX3d known(n, 3);  // where a point is seen, and where what is matched was at rest
+  Eigen::VectorXd sigma(of_points);
+  for (Eigen::Index i = 0; i < of_points; ++i) {
+    known.row(i) = points[static_cast<std::size_t>(i)].place_mm.transpose();
     sigma[i] = points[static_cast<std::size_t>(i)].sigma_mm;
   }
+  std::vector<MatchedAxes> axes;
+  axes.reserve(matched.size());
+  for (const MatchedPoint& point : matched) axes.emplace_back(point);
+  for (Eigen::Index i = 0; i < of_matched; ++i)
+    known.row(of_points + i) = matched[static_cast<std::size_t>(i / 3)].rest_mm.transpose();
+  const Eigen::MatrixX3d seen = known.topRows(of_points);
   const Eigen::MatrixXd shared = kShared_mm * kShared_mm * gaussian(squared_distances(seen, seen), kSharedOver_mm);
-  Eigen::MatrixX3d places = seen;  // that the function takes
-  if (!prior.of_seen && start != nullptr) {
-    for (int i = 0; i < 6; ++i) places = seen + out.values(places);
+  // Places that the function takes: where a row has its known end at the other one, it goes by the fit.
+  Eigen::MatrixX3d places = known;
+  const Eigen::Index first = prior.of_seen ? of_points : 0, moving = prior.of_seen ? of_matched : of_points;
+  const double sign = prior.of_seen ? -1 : 1;  // rest = seen + u, or seen = rest - u
+  const auto go_by_fit = [&] {
+    places.middleRows(first, moving) =
+        known.middleRows(first, moving) + sign * out.values(places.middleRows(first, moving));
+  };
+  if (start != nullptr) {
+    for (int i = 0; i < 6; ++i) go_by_fit();
   }
   for (const double scale_mm : scales_mm) {
-    if (!prior.of_seen) places = seen + out.values(places);
+    go_by_fit();
     const Eigen::MatrixX3d w = out.values(places);
-    std::vector<Eigen::Matrix3d> slopes;
-    if (!prior.of_seen) slopes = out.gradients(places);
+    const std::vector<Eigen::Matrix3d> slopes = out.gradients(places.middleRows(first, moving));
+    // A change of the displacement moves the place that goes by the fit by so much of it.
+    const auto carries = [&](Eigen::Index row) -> Eigen::Matrix3d {
+      if (row < first || row >= first + moving) return Eigen::Matrix3d::Identity();
+      return carried(sign * slopes[static_cast<std::size_t>(row - first)]);
+    };
     Eigen::MatrixX3d rows(n, 3);
     Eigen::VectorXd wanted(n), noise(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index i = 0; i < of_points; ++i) {
       const auto m = static_cast<std::size_t>(i);
       const auto at = organ.sample(prior.of_seen ? Eigen::Vector3d((seen.row(i) + w.row(i)).transpose())
                                                  : Eigen::Vector3d(places.row(i).transpose()));
-      Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
-      if (!prior.of_seen) {
-        // A change of w moves the rest place of what is seen by (1 - dw/dr)^-1 of it.
-        const Eigen::Matrix3d inverse = (Eigen::Matrix3d::Identity() - slopes[m]).inverse();
-        constexpr double kTorn = 4;
-        if (inverse.norm() < kTorn) h = inverse;
-      }
-      rows.row(i) = at.gradient.transpose() * h;
+      rows.row(i) = at.gradient.transpose() * carries(i);
       wanted[i] = rows.row(i).dot(w.row(i)) - at.distance_mm;
-      const double tempered = std::max(sigma[i], scale_mm > 1.01 ? scale_mm / 4 : 0.0);
-      const double scale = std::max(scale_mm, 2.5 * sigma[i]);
-      double weight = 1 / std::pow(1 + std::pow(at.distance_mm / scale, 2), 2);
+      double weight = robust_weight(std::pow(at.distance_mm / std::max(scale_mm, 2.5 * sigma[i]), 2));
       const auto& from_camera = points[m].from_camera;
       constexpr double kFacesAway = 0.15;
       if (from_camera && at.gradient.dot(*from_camera) > kFacesAway) weight = 1e-4;
       out.weights_[m] = weight;
-      noise[i] = tempered * tempered / std::max(weight, 1e-5);
+      noise[i] = std::pow(tempered(sigma[i], scale_mm), 2) / std::max(weight, 1e-5);
+    }
+    for (std::size_t m = 0; m < matched.size(); ++m) {
+      const Eigen::Index row = of_points + 3 * static_cast<Eigen::Index>(m);
+      const Eigen::Vector3d rest = matched[m].rest_mm, place = places.row(row).transpose();
+      const Eigen::Vector3d now = prior.of_seen ? place : Eigen::Vector3d(rest - w.row(row).transpose());
+      const double weight = axes[m].weight(now - matched[m].seen_mm, scale_mm);
+      out.matched_weights_[m] = weight;
+      rows.middleRows<3>(row) = axes[m].axes.transpose() * carries(row);
+      wanted.segment<3>(row) =
+          axes[m].axes.transpose() * (now - matched[m].seen_mm) + rows.middleRows<3>(row) * (rest - now);
+      for (Eigen::Index k = 0; k < 3; ++k)
+        noise[row + k] = std::pow(tempered(axes[m].sigma_mm[k], scale_mm), 2) / std::max(weight, 1e-5);
     }
     out.prior_ = prior;
     out.centres_ = places;
@@ -137,7 +198,7 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
         out.basis_rows_.row(i) = rows.row(i) * prior.basis->at(places.row(i).transpose());
       m += out.basis_rows_ * out.basis_rows_.transpose();
     }
-    m += shared;
+    m.topLeftCorner(of_points, of_points) += shared;
     m.diagonal() += noise;
     out.factor_.compute(m);
     out.alpha_ = out.factor_.solve(wanted);

@@ -7,20 +7,21 @@
 
 #include "host/registration/geometry/displacement_prior.hpp"
 #include "host/registration/geometry/lattice_field.hpp"
+#include "host/registration/geometry/matched_point.hpp"
 #include "host/registration/geometry/seen_point.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
 
-/// The displacement that surface points ask for under a prior, by Gauss and Newton's method on distance(seen +
-/// displacement) = 0 with Geman and McClure's weights, annealed: the posterior of a Gaussian process about the best
-/// linearisation.
+/// The displacement that surface points and matched points ask for under a prior, by Gauss and Newton's method on
+/// distance(seen + displacement) = 0, and on seen + displacement = rest of what is matched, with Geman and McClure's
+/// weights, annealed: the posterior of a Gaussian process about the best linearisation.
 class DisplacementFit {
  public:
   /// start: where to begin; none: at rest. scales_mm: of each step, beyond which a residual is thought to be wrong.
   static DisplacementFit solve(const SignedDistance& organ, std::span<const SeenPoint> points,
                                const DisplacementPrior& prior, const DisplacementFit* start,
-                               std::span<const double> scales_mm);
+                               std::span<const double> scales_mm, std::span<const MatchedPoint> matched = {});
 
   /// u of seen places.
   [[nodiscard]] LatticeField seen_field(const SignedDistance& organ) const;
@@ -29,6 +30,7 @@ class DisplacementFit {
   /// Of the points under the prior, linearised where the fit ended, nats; with the prior's own belief.
   [[nodiscard]] double log_evidence() const { return log_evidence_; }
   [[nodiscard]] std::span<const double> weights() const { return weights_; }
+  [[nodiscard]] std::span<const double> matched_weights() const { return matched_weights_; }
   [[nodiscard]] const DisplacementPrior& prior() const { return prior_; }
 
  private:
@@ -38,7 +40,7 @@ class DisplacementFit {
   [[nodiscard]] std::vector<Eigen::Matrix3d> gradients(const Eigen::MatrixX3d& places) const;
 
   DisplacementPrior prior_;
-  Eigen::MatrixX3d centres_ = Eigen::MatrixX3d(0, 3);  ///< places that the prior's function takes
+  Eigen::MatrixX3d centres_ = Eigen::MatrixX3d(0, 3);  ///< of each row the place that the prior's function takes
   Eigen::MatrixX3d rows_ = Eigen::MatrixX3d(0, 3);     ///< by which a residual sees the displacement at its centre
   Eigen::MatrixXd basis_rows_;                         ///< the same of the basis's unknowns
   Eigen::VectorXd alpha_;
@@ -46,7 +48,7 @@ class DisplacementFit {
   Eigen::VectorXd unknowns_;  ///< of the basis
   Eigen::LLT<Eigen::MatrixXd> factor_;
   double log_evidence_ = 0;
-  std::vector<double> weights_;
+  std::vector<double> weights_, matched_weights_;
 };
 
 }  // namespace birdseye::host

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,6 +45,51 @@ std::optional<double> outline_off_mm(const PinholeView& view, const SeenSurface&
   return median_of(std::move(off_mm));
 }
 
+/// Places whose error is none would be believed against everything else.
+Result<void> check_places(const GeometrySettings& settings) {
+  for (std::size_t i = 0; i < settings.touches.size(); ++i) {
+    const SeenPoint& touch = settings.touches[i];
+    if (!touch.place_mm.allFinite() || !(touch.sigma_mm > 0))
+      return Error{Errc::bad_value, fmt::format("touch {}: give a place and a sigma over 0, in mm", i + 1)};
+  }
+  for (std::size_t i = 0; i < settings.matched.size(); ++i) {
+    const MatchedPoint& point = settings.matched[i];
+    if (!point.rest_mm.allFinite() || !point.seen_mm.allFinite() || !point.covariance_mm2.allFinite() ||
+        point.covariance_mm2.llt().info() != Eigen::Success) {
+      return Error{Errc::bad_value,
+                   fmt::format("matched place {}: give two places, in mm, and a positive definite covariance", i + 1)};
+    }
+  }
+  return {};
+}
+
+/// How the touches, which are the last of the points, and what is matched fit the result.
+void tell_fits(const GeometrySettings& settings, const BelievedDeformation& found, const SeenSurface& surface,
+               ViewRegistration& out) {
+  constexpr double kKnown_mm = 10;
+  for (std::size_t i = 0; i < settings.touches.size(); ++i) {
+    PlaceFit fit{std::abs(surface.distance().distance_mm(settings.touches[i].place_mm)), 0};
+    for (std::size_t n = 0; n < found.fits.size(); ++n) {
+      const auto weights = found.fits[n].weights();
+      fit.weight += found.beliefs[n] * weights[weights.size() - settings.touches.size() + i];
+    }
+    out.touches.push_back(fit);
+  }
+  for (std::size_t i = 0; i < settings.matched.size(); ++i) {
+    const MatchedPoint& point = settings.matched[i];
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(point.covariance_mm2);
+    const Eigen::Vector3d off_mm =
+        axes.eigenvectors().transpose() * (seen_place(found.mean, point.rest_mm) - point.seen_mm);
+    PlaceFit fit;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (axes.eigenvalues()[k] < kKnown_mm * kKnown_mm) fit.off_mm = std::hypot(fit.off_mm, off_mm[k]);
+    }
+    for (std::size_t n = 0; n < found.fits.size(); ++n)
+      fit.weight += found.beliefs[n] * found.fits[n].matched_weights()[i];
+    out.matched.push_back(fit);
+  }
+}
+
 }  // namespace
 
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
@@ -59,6 +106,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                                                 views[n].name, camera.width_px, camera.height_px)};
     }
   }
+  if (auto good = check_places(settings); !good) return good.error();
   const auto organ =
       signed_distance_of(ct, tissue_voxels(ct, labels, label_values, transfer), kDistanceSpacing_mm, kMargin_mm);
   if (!organ) return organ.error();
@@ -98,13 +146,15 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     std::vector<SeenPoint> points = gathered_points(by_stereo, surface);
     const std::vector<SeenPoint> of_outlines = gathered_points(by_outlines, surface);
     points.insert(points.end(), of_outlines.begin(), of_outlines.end());
-    if (points.empty() && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
-    if (points.empty()) {
+    points.insert(points.end(), settings.touches.begin(), settings.touches.end());
+    const bool nothing = points.empty() && settings.matched.empty();
+    if (nothing && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
+    if (nothing) {
       return Error{Errc::not_found,
                    "no place of the surface is found in two views or as an outline: check that pictures, poses and CT "
                    "belong together, or give views nearer to one another"};
     }
-    auto believed = believe(*organ, points, hypotheses, found, settings.watch);
+    auto believed = believe(*organ, points, hypotheses, found, settings.watch, settings.matched);
     if (!believed) return called_off();
     found = *std::move(believed);
     ++out.evaluations;
@@ -122,6 +172,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.min_jacobian = 1;
   }
   const SeenSurface surface(seen_distance(*organ, found.mean));
+  if (!out.folded) tell_fits(settings, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   out.similarity_after = rendered->similarity(out.field);
   out.per_view_after = rendered->per_view();

@@ -8,6 +8,8 @@
 
 #include "calibration/base/image_view.hpp"
 #include "calibration/base/result.hpp"
+#include "host/registration/geometry/matched_point.hpp"
+#include "host/registration/geometry/seen_point.hpp"
 #include "host/registration/views/view_registration.hpp"
 
 namespace birdseye::host {
@@ -18,16 +20,21 @@ struct GeometrySettings {
   bool estimate_uncertainty = true;
   /// Places whose expected error is asked for, of the organ as the CT has it, patient frame.
   std::vector<Eigen::Vector3d> targets_at_rest_mm;
+  /// Places that are on the organ's surface now, whatever tells of them: a pointer's tip, another modality. No camera
+  /// sees them.
+  std::vector<SeenPoint> touches;
+  std::vector<MatchedPoint> matched;  ///< what is known both at rest and now
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
   RegistrationWatch watch;
 };
 
 /// Deforms the organ until its surface lies where the views show it: places found by stereo between the views and by
-/// the organ's outlines, under several priors, each believed as far as its evidence goes; their mean. Nothing is
-/// compared with a rendering. pictures: of the views, in colour. Similarities are mutual information of renderings at
-/// full size, for the report alone. Refuses what register_views() refuses; Errc::not_found where no place of the
-/// surface is found, and Errc::disconnected where the watch cancels. A field that folds is not returned: folded, and no
+/// the organ's outlines, and the touches and matched points of the settings, under several priors, each believed as far
+/// as its evidence goes; their mean. Nothing is compared with a rendering. pictures: of the views, in colour.
+/// Similarities are mutual information of renderings at full size, for the report alone. Refuses what register_views()
+/// refuses, and a touch or a matched point without a positive error; Errc::not_found where no place of the surface is
+/// found, and Errc::disconnected where the watch cancels. A field that folds is not returned: folded, and no
 /// deformation.
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
                                            const Volume& ct, const Volume* labels, std::span<const int> label_values,

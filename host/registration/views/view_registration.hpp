@@ -57,6 +57,14 @@ struct ExpectedErrors {
   std::optional<double> seen_moved_mm;  ///< of the surface that is seen, root mean square
 };
 
+/// How a place that something else than the views tells of fits the result.
+struct PlaceFit {
+  double off_mm = 0;  ///< along the directions in which it is known to 10 mm or better
+  double weight = 0;  ///< 1: believed as its error says; to 0: not believed
+  /// Off by more than one place of a hundred is by its error.
+  [[nodiscard]] bool thought_wrong() const { return weight < 0.25; }
+};
+
 struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
@@ -83,6 +91,8 @@ struct ViewRegistration {
   /// Of each view, the median of how far its outline is from the surface that was found; none where it shows too little
   /// of one. Only with optimiser geometry.
   std::vector<std::optional<double>> outline_off_mm;
+  /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.
+  std::vector<PlaceFit> touches, matched;
   std::string why_so_many_points;  ///< in words
   bool worse_than_start = false;   ///< the start is returned: the initial field itself, or none
   bool folded = false;             ///< the reason for that: every deformation that was found folds
