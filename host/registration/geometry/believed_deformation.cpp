@@ -25,7 +25,7 @@ Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) 
 }
 
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
-                                           std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
+                                           std::span<const DisplacementPrior> more, const BelievedDeformation& before,
                                            const RegistrationWatch& watch, std::span<const MatchedPoint> matched) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0};
   constexpr std::array kGoOn_mm{4.0, 2.0, 1.0, 0.6, 0.5};
@@ -33,13 +33,13 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
   /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
   constexpr double kTemper = 4;
   constexpr double kHopeless_nats = 30;
-  const bool goes_on = !before.candidates.empty();
-  std::vector<std::optional<DisplacementFit>> fits(goes_on ? before.candidates.size() : priors.size());
+  const std::size_t known = before.candidates.size();
+  std::vector<std::optional<DisplacementFit>> fits(known + more.size());
   tbb::parallel_for(std::size_t{0}, fits.size(), [&](std::size_t i) {
     if (watch.cancelled()) return;
-    const DisplacementFit* const start = goes_on ? &before.candidates[i] : nullptr;
-    fits[i] = goes_on ? DisplacementFit::solve(organ, points, start->prior(), start, kGoOn_mm, matched)
-                      : DisplacementFit::solve(organ, points, priors[i], start, kAnneal_mm, matched);
+    const DisplacementFit* const start = i < known ? &before.candidates[i] : nullptr;
+    fits[i] = i < known ? DisplacementFit::solve(organ, points, start->prior(), start, kGoOn_mm, matched)
+                        : DisplacementFit::solve(organ, points, more[i - known], nullptr, kAnneal_mm, matched);
   });
   if (!std::all_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.has_value(); })) return std::nullopt;
   BelievedDeformation out(organ);
@@ -62,6 +62,33 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < out.fields.size(); ++i) u += out.beliefs[i] * out.fields[i].displacement_mm(n);
     out.mean.set(n, u);
+  }
+  return out;
+}
+
+std::optional<Eigen::Vector3d> pushed_place_mm(const SignedDistance& organ, std::span<const SeenPoint> points,
+                                               const LatticeField& seen) {
+  constexpr double kOff_mm = 0.5, kMost_mm = 3, kTogether_mm = 15;
+  constexpr double kFewest_mm = 4;  ///< of all that lie together
+  std::vector<Eigen::Vector3d> places_mm;
+  std::vector<double> off_mm;
+  for (const SeenPoint& point : points) {
+    const Eigen::Vector3d rest_mm = point.place_mm + seen.at(point.place_mm);
+    const double distance_mm = organ.distance_mm(rest_mm);
+    if (std::abs(distance_mm) < kOff_mm) continue;
+    places_mm.push_back(rest_mm);
+    off_mm.push_back(std::clamp(distance_mm, -kMost_mm, kMost_mm));
+  }
+  double most_mm = kFewest_mm;
+  std::optional<Eigen::Vector3d> out;
+  for (const Eigen::Vector3d& place_mm : places_mm) {
+    double sum_mm = 0;
+    for (std::size_t n = 0; n < places_mm.size(); ++n) {
+      sum_mm += off_mm[n] * std::exp(-0.5 * (places_mm[n] - place_mm).squaredNorm() / (kTogether_mm * kTogether_mm));
+    }
+    if (std::abs(sum_mm) <= most_mm) continue;
+    most_mm = std::abs(sum_mm);
+    out = place_mm;
   }
   return out;
 }

@@ -26,9 +26,14 @@ struct BelievedDeformation {
 };
 
 /// By every prior, each believed as far as its evidence goes. before: by fewer or worse points, of which the candidates
-/// are gone on with; or empty of them. Empty where the watch cancels.
+/// are gone on with; or empty of them. more: priors that are not among them. Empty where the watch cancels.
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
-                                           std::span<const DisplacementPrior> priors, const BelievedDeformation& before,
+                                           std::span<const DisplacementPrior> more, const BelievedDeformation& before,
                                            const RegistrationWatch& watch, std::span<const MatchedPoint> matched = {});
+
+/// Where, at rest, the places of the surface that a deformation leaves off lie closest together: where something pushes
+/// the organ more narrowly than the deformation follows. None where it leaves too few off.
+std::optional<Eigen::Vector3d> pushed_place_mm(const SignedDistance& organ, std::span<const SeenPoint> points,
+                                               const LatticeField& seen);
 
 }  // namespace birdseye::host

@@ -1,10 +1,24 @@
 #include "host/registration/geometry/displacement_prior.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "host/deform/bezier_patch.hpp"
 
 namespace birdseye::host {
+
+namespace {
+constexpr std::array kDents_mm{12.0, 20.0};  ///< standard deviations
+/// Where the place is not known better than this, dents of which the middle is so far off along an axis make up for it.
+constexpr double kBeside_mm = 12;
+constexpr Eigen::Index kMiddles = 7;
+
+Eigen::Vector3d middle_mm(Eigen::Index n) {
+  Eigen::Vector3d out = Eigen::Vector3d::Zero();
+  if (n > 0) out[(n - 1) / 2] = n % 2 == 0 ? kBeside_mm : -kBeside_mm;
+  return out;
+}
+}
 
 Eigen::MatrixX3d DisplacementBasis::sum_at(const Eigen::VectorXd& unknowns, const Eigen::MatrixX3d& places) const {
   Eigen::MatrixX3d out(places.rows(), 3);
@@ -32,6 +46,24 @@ Eigen::Matrix3Xd BezierBasis::at(const Eigen::Vector3d& place_in_patient_mm) con
         const double b = sigma_mm_ * x[i] * y[j] * z[k];
         for (Eigen::Index axis = 0; axis < 3; ++axis) out(axis, column++) = b;
       }
+    }
+  }
+  return out;
+}
+
+Eigen::Index PushBasis::unknowns() const {
+  return 3 * kMiddles * static_cast<Eigen::Index>(kDents_mm.size());
+}
+
+Eigen::Matrix3Xd PushBasis::at(const Eigen::Vector3d& place_in_patient_mm) const {
+  Eigen::Matrix3Xd out(3, unknowns());
+  Eigen::Index column = 0;
+  for (Eigen::Index n = 0; n < kMiddles; ++n) {
+    const double away_mm2 = (place_in_patient_mm - place_mm_ - middle_mm(n)).squaredNorm();
+    for (const double dent_mm : kDents_mm) {
+      out.middleCols<3>(column) =
+          sigma_mm_ * std::exp(-0.5 * away_mm2 / (dent_mm * dent_mm)) * Eigen::Matrix3d::Identity();
+      column += 3;
     }
   }
   return out;

@@ -42,6 +42,19 @@ class BezierBasis : public DisplacementBasis {
   double sigma_mm_;
 };
 
+/// A push at one place: Gaussian dents of several widths about it, each in any direction, of sigma_mm along each axis.
+class PushBasis : public DisplacementBasis {
+ public:
+  PushBasis(const Eigen::Vector3d& place_in_patient_mm, double sigma_mm)
+      : place_mm_(place_in_patient_mm), sigma_mm_(sigma_mm) {}
+  [[nodiscard]] Eigen::Index unknowns() const override;
+  [[nodiscard]] Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const override;
+
+ private:
+  Eigen::Vector3d place_mm_;
+  double sigma_mm_;
+};
+
 /// A hypothesis: what may move the organ.
 struct DisplacementPrior {
   std::string name;

@@ -132,7 +132,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   };
   constexpr std::array kRounds{Round{18, 12, 0.5, 0}, Round{18, 8, 0.4, 9}, Round{18, 6, 0.3, 8},
                                Round{12, 4, 0.25, 5}};
-  std::vector<DisplacementPrior> hypotheses = hypotheses_of(ct, ElasticModes::of(*organ), settings.control_points);
+  std::vector<DisplacementPrior> more = hypotheses_of(ct, ElasticModes::of(*organ), settings.control_points);
   BelievedDeformation found(*organ);
   for (const Round& round : kRounds) {
     if (settings.watch.cancelled()) return called_off();
@@ -154,7 +154,11 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                    "no place of the surface is found in two views or as an outline: check that pictures, poses and CT "
                    "belong together, or give views nearer to one another"};
     }
-    auto believed = believe(*organ, points, hypotheses, found, settings.watch, settings.matched);
+    if (!found.fits.empty()) {
+      const auto pushed_mm = pushed_place_mm(*organ, points, found.mean);
+      more = pushed_mm ? push_hypotheses_of(*pushed_mm) : std::vector<DisplacementPrior>{};
+    }
+    auto believed = believe(*organ, points, more, found, settings.watch, settings.matched);
     if (!believed) return called_off();
     found = *std::move(believed);
     ++out.evaluations;

@@ -8,9 +8,14 @@
 
 namespace birdseye::host {
 
+namespace {
+constexpr double kUsual_mm = 2;
+constexpr double kFewArePushed = -2;  ///< nats
+}  // namespace
+
 std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared_ptr<const ElasticModes>& modes,
                                              const std::array<int, 3>& control_points) {
-  constexpr double kUsual_mm = 2, kUsualNearby_mm = 0.4, kNearby_mm = 20;
+  constexpr double kUsualNearby_mm = 0.4, kNearby_mm = 20;
   struct Gaussian {
     double length_mm, sigma_mm, nearby_sigma_mm;
   };
@@ -60,6 +65,20 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
                              control_points[2], sigma_mm);
     prior.basis = std::make_shared<BezierBasis>(patient_from_cube, control_points, sigma_mm);
     prior.of_seen = true;
+    out.push_back(std::move(prior));
+  }
+  return out;
+}
+
+std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_mm) {
+  constexpr double kPush_mm = 4;
+  std::vector<DisplacementPrior> out;
+  for (const auto& [length_mm, sigma_mm] : {GaussianPart{85, 0.6}, {85, 2.5}, {50, 2}}) {
+    DisplacementPrior prior;
+    prior.name = fmt::format("{:g} mm over {:g} mm and a push", sigma_mm, length_mm);
+    prior.parts.push_back({length_mm, sigma_mm});
+    prior.basis = std::make_shared<PushBasis>(place_mm, kPush_mm);
+    prior.log_belief = -0.5 * std::pow(std::log(sigma_mm / kUsual_mm), 2) + kFewArePushed;
     out.push_back(std::move(prior));
   }
   return out;
