@@ -71,6 +71,41 @@ void add_expected(nlohmann::json& json, const RegistrationCase& c, const ViewReg
   }
 }
 
+/// Root mean square of what is not thought to be wrong; null where there is none of it.
+nlohmann::json off_rms_mm(const std::vector<PlaceFit>& fits) {
+  double sum_mm2 = 0, count = 0;
+  for (const PlaceFit& fit : fits) {
+    if (fit.thought_wrong()) continue;
+    sum_mm2 += fit.off_mm * fit.off_mm;
+    count += 1;
+  }
+  if (count == 0) return nullptr;
+  return std::sqrt(sum_mm2 / count);
+}
+
+/// How what else than stereo and outlines tells of the organ fits the result.
+void add_further(nlohmann::json& json, const RegistrationCase& c, const ViewRegistration& found) {
+  const auto wrong = [](const PlaceFit& fit) { return fit.thought_wrong(); };
+  if (!found.touches.empty()) {
+    json["surface_points"] = {{"used", found.touches.size()},
+                              {"rms_mm", off_rms_mm(found.touches)},
+                              {"thought_wrong", std::count_if(found.touches.begin(), found.touches.end(), wrong)}};
+  }
+  if (found.matched.empty()) return;
+  nlohmann::json& matched = json["matched_points"];
+  matched = {{"used", found.matched.size()},
+             {"rms_mm", off_rms_mm(found.matched)},
+             {"thought_wrong", std::count_if(found.matched.begin(), found.matched.end(), wrong)}};
+  for (std::size_t n = 0; n < found.matched.size(); ++n) {
+    const PlaceFit& fit = found.matched[n];
+    matched["each"].push_back({{"name", c.matched[n].name},
+                               {"views", c.matched[n].views},
+                               {"off_mm", fit.off_mm},
+                               {"weight", fit.weight},
+                               {"thought_wrong", fit.thought_wrong()}});
+  }
+}
+
 nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
   nlohmann::json json = {{"similarity_before", found.similarity_before},
                          {"similarity_after", found.similarity_after},
@@ -88,6 +123,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   if (found.expected) add_expected(json, c, found);
+  add_further(json, c, found);
   json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
                    {"falloff", found.light.falloff},
                    {"ambient", found.light.ambient},
@@ -219,6 +255,11 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (auto written = write_files(*files); !written) return written.error();
   progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), name_of(verdict.grade),
                             verdict.reasons.front()));
+  for (std::size_t n = 0; n < found->matched.size(); ++n) {
+    if (!found->matched[n].thought_wrong()) continue;
+    fmt::print("{} is {:.1f} mm off all else and was thought to be wrong: check its places\n", c.matched[n].name,
+               found->matched[n].off_mm);
+  }
   if (json.contains("tre_after_mm_mean")) {
     fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",
                json["tre_before_mm_mean"].get<double>(), json["tre_after_mm_mean"].get<double>(), c.landmarks.size());

@@ -5,14 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <iterator>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <set>
-#include <sstream>
 #include <toml.hpp>
 
+#include "host/case/named_landmarks.hpp"
 #include "host/files/text_files.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
 #include "host/registration/similarity/similarity.hpp"
@@ -30,7 +29,7 @@ class CaseTable {
  public:
   CaseTable(const fs::path& file, std::string name, const toml::value& table)
       : file_(file), name_(std::move(name)), table_(table) {}
-  [[nodiscard]] bool has(const char* key) const { return table_.contains(key); }
+  [[nodiscard]] bool has(const char* key) const { return table_.is_table() && table_.contains(key); }
   template <typename T>
   [[nodiscard]] Result<T> get(const char* key) const {
     if (!has(key)) return wrong(key, "is missing");
@@ -68,38 +67,37 @@ class CaseTable {
   const toml::value& table_;
 };
 
-/// A key that is not known is a slip of the pen, and would be taken for its default.
-Result<void> only_known_keys(const fs::path& file, const toml::value& all) {
-  static const std::map<std::string, std::set<std::string>> kKnown = {
+/// A key that is not known is a slip of the pen, and would be taken for its default. table: its name, "" for the
+/// file's.
+Result<void> only_known_keys(const fs::path& file, const std::string& table, const toml::value& content) {
+  static const std::map<std::string, std::vector<std::string>> kKnown = {
+      {"", {"volume", "model", "view", "target", "landmark", "points", "truth"}},
       {"volume", {"path", "label", "label_values", "transfer"}},
       {"model",
        {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
         "most_evaluations"}},
       {"view", {"image", "camera", "camera_from_patient", "mask"}},
       {"target", {"place_mm"}},
+      {"landmark", {"name", "place_mm", "sigma_mm", "seen"}},
+      {"landmark.seen", {"view", "pixel", "sigma_px"}},
+      {"points", {"path"}},
       {"truth", {"landmarks", "control_points", "pose"}}};
-  for (const auto& [name, content] : all.as_table()) {
-    const auto table = kKnown.find(name);
-    if (table == kKnown.end())
-      return Error{Errc::bad_value, fmt::format("{}: [{}] is not known; there are volume, model, view, target, truth",
-                                                file.string(), name)};
-    const auto check = [&, &name = name](const toml::value& one) -> Result<void> {
-      if (!one.is_table()) return {};
-      for (const auto& [key, unused] : one.as_table()) {
-        if (table->second.count(key) == 0) {
-          return Error{Errc::bad_value, fmt::format("{}: [{}] {}: is not known; there are {}", file.string(), name, key,
-                                                    fmt::join(table->second, ", "))};
-        }
-      }
-      return {};
-    };
-    if (content.is_array()) {
-      for (const toml::value& one : content.as_array()) {
-        if (auto known = check(one); !known) return known.error();
-      }
-    } else if (auto known = check(content); !known) {
-      return known.error();
+  const auto known = kKnown.find(table);
+  if (known == kKnown.end()) return {};
+  if (content.is_array()) {
+    for (const toml::value& one : content.as_array()) {
+      if (auto good = only_known_keys(file, table, one); !good) return good;
     }
+  }
+  if (!content.is_table()) return {};
+  for (const auto& [key, value] : content.as_table()) {
+    if (std::find(known->second.begin(), known->second.end(), key) == known->second.end()) {
+      return Error{Errc::bad_value,
+                   fmt::format("{}: {} is not known; there are {}", file.string(),
+                               table.empty() ? fmt::format("[{}]", key) : fmt::format("[{}] {}:", table, key),
+                               fmt::join(known->second, ", "))};
+    }
+    if (auto good = only_known_keys(file, table.empty() ? key : table + "." + key, value); !good) return good;
   }
   return {};
 }
@@ -262,29 +260,78 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   return {};
 }
 
-Result<std::vector<Landmark>> read_landmarks(const fs::path& path) {
-  std::vector<Landmark> landmarks;
-  std::ifstream in(path);
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    if (number == 1 && line.rfind("name", 0) == 0) continue;
-    if (line.empty()) continue;
-    Landmark landmark;
-    std::istringstream fields(line);
-    std::getline(fields, landmark.name, ',');
-    std::string rest;
-    std::getline(fields, rest);
-    std::replace(rest.begin(), rest.end(), ',', ' ');
-    std::istringstream numbers(rest);
-    for (int i = 0; i < 3; ++i) numbers >> landmark.rest_mm[i];
-    for (int i = 0; i < 3; ++i) numbers >> landmark.deformed_mm[i];
-    if (!numbers || !landmark.rest_mm.allFinite() || !landmark.deformed_mm.allFinite()) {
-      return Error{Errc::bad_format,
-                   fmt::format("{}: line {}: a name and six numbers are needed", path.string(), number)};
-    }
-    landmarks.push_back(std::move(landmark));
+/// So many numbers, whole or not.
+Result<Eigen::VectorXd> read_numbers(const CaseTable& table, const char* key, Eigen::Index count, const char* what) {
+  const auto numbers = table.get<toml::array>(key);
+  if (!numbers) return numbers.error();
+  std::vector<double> out;
+  for (const toml::value& one : *numbers) {
+    if (!one.is_integer() && !one.is_floating()) return table.wrong(key, what);
+    out.push_back(one.is_integer() ? static_cast<double>(one.as_integer()) : one.as_floating());
   }
-  return landmarks;
+  const Eigen::Map<const Eigen::VectorXd> all(out.data(), static_cast<Eigen::Index>(out.size()));
+  if (all.size() != count || !all.allFinite()) return table.wrong(key, what);
+  return Eigen::VectorXd(all);
+}
+
+/// Where a view shows a landmark.
+Result<LandmarkEntry::Seen> read_seen(const CaseTable& table) {
+  const auto view = table.get<std::string>("view");
+  if (!view) return view.error();
+  const auto pixel = read_numbers(table, "pixel", 2, "is two numbers, x and y in pixels");
+  if (!pixel) return pixel.error();
+  const auto sigma_px = table.get<double>("sigma_px", 1.0);
+  if (!sigma_px) return sigma_px.error();
+  return LandmarkEntry::Seen{*view, *pixel, *sigma_px};
+}
+
+/// A place of the organ that a person finds in the CT and in views.
+Result<NamedMatch> read_named(const CaseTable& table, const fs::path& file, const RegistrationCase& c) {
+  const auto name = table.get<std::string>("name");
+  if (!name) return name.error();
+  const auto place = read_numbers(table, "place_mm", 3, "is three numbers, mm in the patient's frame");
+  if (!place) return place.error();
+  const auto sigma_mm = table.get<double>("sigma_mm", 1.0);
+  if (!sigma_mm) return sigma_mm.error();
+  if (!table.has("seen") || !table.value().at("seen").is_array())
+    return table.wrong("seen", "is missing; name one [[landmark.seen]] or more");
+  LandmarkEntry entry{*name, *place, *sigma_mm, {}};
+  for (const toml::value& one : table.value().at("seen").as_array()) {
+    const auto seen = read_seen(CaseTable(file, fmt::format("landmark.seen {}", entry.seen.size()), one));
+    if (!seen) return Error{seen.error().code, seen.error().what + fmt::format(" (of landmark {})", *name)};
+    entry.seen.push_back(*seen);
+  }
+  auto match = match_of(entry, c.ct, c.views, c.matched);
+  if (!match) return table.wrong("name", fmt::format("{}: {}", *name, match.error().what));
+  return match;
+}
+
+/// What else than pictures tells of the organ, and what persons found in them.
+Result<void> read_further(const fs::path& file, const toml::value& all, RegistrationCase& out) {
+  const bool named = all.contains("landmark"), points = all.contains("points");
+  if ((named || points) && out.optimiser != "geometry") {
+    return Error{Errc::bad_value, fmt::format("{}: [{}] needs optimiser = \"geometry\", not \"{}\"", file.string(),
+                                              named ? "landmark" : "points", out.optimiser)};
+  }
+  if (named) {
+    constexpr std::size_t kMost = 100;
+    if (!all.at("landmark").is_array() || all.at("landmark").as_array().size() > kMost)
+      return Error{Errc::bad_value, fmt::format("{}: write [[landmark]], {} at most", file.string(), kMost)};
+    for (const toml::value& one : all.at("landmark").as_array()) {
+      const CaseTable table(file, fmt::format("landmark {}", out.matched.size()), one);
+      auto landmark = read_named(table, file, out);
+      if (!landmark) return landmark.error();
+      out.matched.push_back(*std::move(landmark));
+    }
+  }
+  if (!points) return {};
+  const auto path = CaseTable(file, "points", all.at("points")).path("path");
+  if (!path) return path.error();
+  auto rows = read_point_rows(*path);
+  if (!rows) return rows.error();
+  out.surface_points = std::move(rows->surface);
+  std::move(rows->matched.begin(), rows->matched.end(), std::back_inserter(out.matched));
+  return {};
 }
 
 }  // namespace
@@ -303,7 +350,7 @@ Result<RegistrationCase> read_case(const fs::path& path) {
     std::string what = problem.what();
     return Error{Errc::bad_format, fmt::format("{}: is no case: {}", path.string(), what.substr(0, what.find('\n')))};
   }
-  if (auto known = only_known_keys(path, all); !known) return known.error();
+  if (auto known = only_known_keys(path, "", all); !known) return known.error();
   RegistrationCase out;
   const toml::value none = toml::table{};
   const auto table = [&](const char* name) { return CaseTable(path, name, all.contains(name) ? all.at(name) : none); };
@@ -317,11 +364,11 @@ Result<RegistrationCase> read_case(const fs::path& path) {
     if (auto done = read_view(one, path.parent_path(), out); !done) return done.error();
   }
   if (const CaseTable target = table("target"); target.has("place_mm")) {
-    const auto place = target.get<std::vector<double>>("place_mm");
+    const auto place = read_numbers(target, "place_mm", 3, "is three numbers, mm in the patient's frame");
     if (!place) return place.error();
-    if (place->size() != 3) return target.wrong("place_mm", "is three numbers, mm in the patient's frame");
-    out.target_mm = Eigen::Vector3d((*place)[0], (*place)[1], (*place)[2]);
+    out.target_mm = *place;
   }
+  if (auto done = read_further(path, all, out); !done) return done.error();
   const CaseTable truth = table("truth");
   if (truth.has("landmarks")) {
     const auto landmarks_path = truth.path("landmarks");

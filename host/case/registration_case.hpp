@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/case/point_rows.hpp"
 #include "host/case/true_deformation.hpp"
 #include "host/deform/displacement_field.hpp"
 #include "host/files/picture.hpp"
@@ -15,12 +16,6 @@
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
-
-/// A point of the organ, patient frame, mm: where it was when the CT was taken, and where it is in the views.
-struct Landmark {
-  std::string name;
-  Eigen::Vector3d rest_mm, deformed_mm;
-};
 
 /// What `birdseye register views` is given: docs/manual/registration.md describes the file.
 struct RegistrationCase {
@@ -41,7 +36,9 @@ struct RegistrationCase {
   std::vector<VideoView> views;
   std::vector<Picture> pictures;             ///< of the views, in colour
   std::optional<Eigen::Vector3d> target_mm;  ///< what is to be hit, as the CT has it; none: the organ's inside
-  std::vector<Landmark> landmarks;
+  std::vector<SeenPoint> surface_points;     ///< only with geometry, as is what is matched
+  std::vector<NamedMatch> matched;           ///< landmarks that views show, then what the points' file has
+  std::vector<Landmark> landmarks;           ///< the truth's
   std::optional<TrueDeformation> truth;
   /// What a refined pose should be: patient_from_model.
   std::optional<Transform<Patient, Patient>> true_pose;

@@ -16,6 +16,8 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
     settings.progress = tell;
     if (c.target_mm) settings.targets_at_rest_mm.push_back(*c.target_mm);
     for (const Landmark& landmark : c.landmarks) settings.targets_at_rest_mm.push_back(landmark.rest_mm);
+    settings.touches = c.surface_points;
+    for (const NamedMatch& match : c.matched) settings.matched.push_back(match.place);
     std::vector<RgbView> pictures;
     pictures.reserve(c.pictures.size());
     for (const Picture& picture : c.pictures) pictures.push_back(picture.view());

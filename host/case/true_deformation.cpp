@@ -2,11 +2,38 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace birdseye::host {
+
+Result<std::vector<Landmark>> read_landmarks(const std::filesystem::path& path) {
+  std::vector<Landmark> landmarks;
+  std::ifstream in(path);
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    if (number == 1 && line.rfind("name", 0) == 0) continue;
+    if (line.empty()) continue;
+    Landmark landmark;
+    std::istringstream fields(line);
+    std::getline(fields, landmark.name, ',');
+    std::string rest;
+    std::getline(fields, rest);
+    std::replace(rest.begin(), rest.end(), ',', ' ');
+    std::istringstream numbers(rest);
+    for (int i = 0; i < 3; ++i) numbers >> landmark.rest_mm[i];
+    for (int i = 0; i < 3; ++i) numbers >> landmark.deformed_mm[i];
+    if (!numbers || !landmark.rest_mm.allFinite() || !landmark.deformed_mm.allFinite()) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}: line {}: a name and six numbers are needed", path.string(), number)};
+    }
+    landmarks.push_back(std::move(landmark));
+  }
+  return landmarks;
+}
 
 Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path) {
   const auto wrong = [&](const std::string& why) {

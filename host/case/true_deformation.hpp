@@ -2,12 +2,23 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "host/deform/bezier_patch.hpp"
 #include "host/deform/displacement_field.hpp"
 
 namespace birdseye::host {
+
+/// A point of the organ, patient frame, mm: where it was when the CT was taken, and where it is in the views.
+struct Landmark {
+  std::string name;
+  Eigen::Vector3d rest_mm, deformed_mm;
+};
+
+/// The simulator's truth/landmarks.csv. Errc::bad_format, naming file and line, for what is none.
+Result<std::vector<Landmark>> read_landmarks(const std::filesystem::path& path);
 
 /// The deformation that a simulated case was made by, exact: docs/manual/simulator.md.
 struct TrueDeformation {

@@ -111,6 +111,9 @@ int main(int argc, char** argv) {
   make_case.add_option("--pose-noise-deg", pose.noise_deg, "likewise");
   make_case.add_option("--pose-offset-mm", pose.offset_mm, "of hand-eye, the same in all views (default 0)");
   make_case.add_option("--pose-offset-deg", pose.offset_deg, "likewise");
+  make_case.add_option("--touches", registration.touches,
+                       "how many places of the surface that no view sees points.csv has (default 0)");
+  make_case.add_option("--touch-noise-mm", registration.touch_noise_mm, "of theirs, per axis (default 1)");
   make_case.callback([&] {
     for (const Result<void>& parsed : {hw_sim::parse_size(size, registration.width_px, registration.height_px),
                                        hw_sim::parse_deformation(deformation, dof, registration.deformation)}) {

@@ -52,6 +52,14 @@ Result<void> write_landmarks(const std::filesystem::path& path, const std::vecto
   return write_text(path, csv);
 }
 
+Result<void> write_surface_points(const std::filesystem::path& path, const std::vector<Eigen::Vector3d>& points_mm,
+                                  double sigma_mm) {
+  std::string csv = "x_mm,y_mm,z_mm,sigma_mm\n";
+  for (const Eigen::Vector3d& p : points_mm)
+    csv += fmt::format("{:.6f},{:.6f},{:.6f},{:g}\n", p.x(), p.y(), p.z(), sigma_mm);
+  return write_text(path, csv);
+}
+
 Result<void> write_map_field(const std::filesystem::path& path, const TissueMap& map) {
   constexpr int kPoints = 65;  // trilinear between them, the field is within 0.05 mm of a map of 10 mm
   Grid lattice;

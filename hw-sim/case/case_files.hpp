@@ -23,6 +23,9 @@ Result<void> write_picture(const std::filesystem::path& path, std::span<const st
                            const CameraModel& camera);
 /// name, rest and deformed, patient LPS mm.
 Result<void> write_landmarks(const std::filesystem::path& path, const std::vector<TrueLandmark>& landmarks);
+/// x y z and the one sigma, patient LPS mm.
+Result<void> write_surface_points(const std::filesystem::path& path, const std::vector<Eigen::Vector3d>& points_mm,
+                                  double sigma_mm);
 /// The map as an ITK displacement field on a lattice that spans its box.
 Result<void> write_map_field(const std::filesystem::path& path, const TissueMap& map);
 /// The map itself, as JSON.

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "hw-sim/base/hashed.hpp"
+#include "hw-sim/case/draw.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -80,6 +81,28 @@ Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const
   add("tumour", subject.tumour_centre_mm);
   add_all("hidden", spread_out(sampled.hidden, surface.size()));
   return landmarks;
+}
+
+Result<std::vector<Vector3d>> choose_touches(const Subject& subject, const Mesh& deformed, const TissueMap& map,
+                                             const Laparoscope& scope,
+                                             std::span<const Transform<Camera, Patient>> views, int count,
+                                             double noise_mm, std::uint64_t seed) {
+  constexpr std::uint64_t kOther = 523;
+  const auto most = static_cast<std::size_t>(count);
+  std::vector<Vector3d> touches =
+      spread_out(sample_surface(subject, deformed, scope, views, seed + kOther).hidden, most);
+  if (touches.size() < most) {
+    return Error{Errc::degenerate, fmt::format("--touches: the views leave {} places of the organ unseen where {} are "
+                                               "to be touched; give fewer --touches or fewer --views",
+                                               touches.size(), most)};
+  }
+  Draw draw(seed + 2 * kOther);
+  for (Vector3d& touch : touches) {
+    const Vector3d exact_mm = map.deformed_of(touch);
+    const double x = draw.normal(), y = draw.normal();
+    touch = exact_mm + noise_mm * Vector3d(x, y, draw.normal());
+  }
+  return touches;
 }
 
 }  // namespace birdseye::hw_sim

@@ -28,4 +28,12 @@ Result<std::vector<TrueLandmark>> choose_landmarks(const Subject& subject, const
                                                    std::span<const Transform<Camera, Patient>> views,
                                                    std::uint64_t seed);
 
+/// Places of the deformed organ's surface that no view sees, or only at a slant, as a pointer's tip there would be
+/// measured, patient LPS mm: spread out, off by noise_mm an axis, and none of them a landmark but by chance. Refused
+/// where the views leave too little of the organ unseen.
+Result<std::vector<Eigen::Vector3d>> choose_touches(const Subject& subject, const Mesh& deformed, const TissueMap& map,
+                                                    const Laparoscope& scope,
+                                                    std::span<const Transform<Camera, Patient>> views, int count,
+                                                    double noise_mm, std::uint64_t seed);
+
 }  // namespace birdseye::hw_sim

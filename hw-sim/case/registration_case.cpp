@@ -32,6 +32,7 @@ struct MadeCase {
   CameraModel lens;
   std::vector<Transform<Camera, Patient>> views, stated_views;
   std::vector<TrueLandmark> landmarks;
+  std::vector<Vector3d> touches_mm;
   std::vector<std::vector<std::uint8_t>> pictures;
   std::vector<std::uint8_t> lens_circle;
 };
@@ -59,6 +60,8 @@ Result<void> check(const CaseSettings& settings) {
   if (!in(settings.blood, 0, 1)) return Error{Errc::bad_value, "--blood: give a share, 0 to 1"};
   if (!in(settings.instruments, 0, 3)) return Error{Errc::bad_value, "--instruments: give 0 to 3"};
   if (!in(settings.blur_px, 0, 20)) return Error{Errc::bad_value, "--blur-px: give 0 to 20"};
+  if (!in(settings.touches, 0, 300)) return Error{Errc::bad_value, "--touches: give 0 to 300"};
+  if (!in(settings.touch_noise_mm, 0.01, 20)) return Error{Errc::bad_value, "--touch-noise-mm: give 0.01 to 20"};
   const PoseError& pose = settings.pose_error;
   for (const auto& [option, value] : {std::pair{"--pose-noise-mm", pose.noise_mm},
                                       {"--pose-noise-deg", pose.noise_deg},
@@ -86,6 +89,7 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
                .views = {},
                .stated_views = {},
                .landmarks = {},
+               .touches_mm = {},
                .pictures = {},
                .lens_circle = {}};
   out.lens = laparoscope_lens(settings.width_px, settings.height_px);
@@ -121,6 +125,12 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
   auto landmarks = choose_landmarks(out.subject, cavity.organ, map, **scope, out.views, settings.seed);
   if (!landmarks) return landmarks.error();
   out.landmarks = *std::move(landmarks);
+  if (settings.touches > 0) {
+    auto touches = choose_touches(out.subject, cavity.organ, map, **scope, out.views, settings.touches,
+                                  settings.touch_noise_mm, settings.seed);
+    if (!touches) return touches.error();
+    out.touches_mm = *std::move(touches);
+  }
   for (std::size_t i = 0; i < out.views.size(); ++i)
     out.pictures.push_back((*scope)->look_into_cavity(out.views[i], i));
   out.lens_circle = (*scope)->lens_circle();
@@ -144,6 +154,7 @@ std::string case_toml(const CaseSettings& settings, const MadeCase& made) {
   }
   toml += fmt::format("\n[target]\nplace_mm = [{:.3f}]  # the tumour's centre\n",
                       fmt::join(made.subject.tumour_centre_mm, ", "));
+  if (!made.touches_mm.empty()) toml += "\n[points]\npath = \"points.csv\"\n";
   toml += "\n[truth]\nlandmarks = \"truth/landmarks.csv\"\n";
   return patch ? toml + "control_points = \"truth/control_points.json\"\n" : toml;
 }
@@ -182,6 +193,8 @@ nlohmann::json truth_of(const CaseSettings& settings, const MadeCase& made) {
   truth["pose_noise_deg"] = settings.pose_error.noise_deg;
   truth["pose_offset_mm"] = settings.pose_error.offset_mm;
   truth["pose_offset_deg"] = settings.pose_error.offset_deg;
+  truth["touches"] = settings.touches;
+  truth["touch_noise_mm"] = settings.touch_noise_mm;
   truth["tumour_centre_mm"] = json_of(made.subject.tumour_centre_mm);
   double sum_mm = 0;
   double most_mm = 0;
@@ -224,6 +237,12 @@ Result<void> write_all(const CaseSettings& settings, const MadeCase& made) {
     written.push_back(write_control_points(control_points, *made.deformation.patch));
   } else {
     std::filesystem::remove(control_points, error);
+  }
+  const std::filesystem::path points = folder / "points.csv";
+  if (made.touches_mm.empty()) {
+    std::filesystem::remove(points, error);
+  } else {
+    written.push_back(write_surface_points(points, made.touches_mm, settings.touch_noise_mm));
   }
   written.push_back(write_landmarks(folder / "truth" / "landmarks.csv", made.landmarks));
   written.push_back(write_json(folder / "truth" / "truth.json", truth_of(settings, made)));

@@ -29,6 +29,8 @@ struct CaseSettings {
   int instruments = 0;          ///< how many stand before the organ
   double blur_px = 0;           ///< of the lens: a Gaussian's standard deviation
   PoseError pose_error;         ///< of the poses that the case states
+  int touches = 0;              ///< places of the surface that no view sees, for the case to name
+  double touch_noise_mm = 1;    ///< of theirs, an axis
 };
 
 /// Writes folder/case.toml and all that it names: a CT of an organ at rest, its segmentation, and what a laparoscope

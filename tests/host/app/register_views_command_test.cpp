@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,6 +8,8 @@
 #include <regex>
 #include <sstream>
 
+#include "calibration/geometry/camera_model.hpp"
+#include "host/case/registration_case.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
@@ -180,6 +184,128 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
            {"\\[truth\\]", "[turth]", {"turth", "truth"}},
            {"\\[model\\]", "[model", {"case.toml"}}}) {
     expect_refused("birdseye", arguments(changed(scratch, from, to), scratch), words, scratch / "out");
+  }
+}
+
+/// The case's landmarks of a kind, with where they are.
+std::vector<host::Landmark> of_kind(const host::RegistrationCase& c, const std::string& kind, std::size_t most) {
+  std::vector<host::Landmark> out;
+  for (const host::Landmark& landmark : c.landmarks) {
+    if (landmark.name.rfind(kind, 0) == 0 && out.size() < most) out.push_back(landmark);
+  }
+  return out;
+}
+
+/// As a case's file has a landmark, by the pixels of all views that have it in the picture, off by so many millimetres.
+std::string named_in_views(const host::RegistrationCase& c, const host::Landmark& landmark, double off_mm) {
+  std::string text = fmt::format("\n[[landmark]]\nname = \"{}\"\nplace_mm = [{:.6f}]\n", landmark.name,
+                                 fmt::join(landmark.rest_mm, ", "));
+  for (const host::VideoView& view : c.views) {
+    const Eigen::Vector3d place = landmark.deformed_mm + off_mm * Eigen::Vector3d(0.6, -0.64, 0.48);
+    const auto pixel = project(view.camera, view.camera_from_patient * place);
+    if (!pixel || pixel->minCoeff() < 0 || pixel->x() > view.camera.width_px - 1 ||
+        pixel->y() > view.camera.height_px - 1)
+      continue;
+    text += fmt::format("[[landmark.seen]]\nview = \"{}\"\npixel = [{:.6f}]\n", view.name, fmt::join(*pixel, ", "));
+  }
+  return text;
+}
+
+TEST(RegisterViewsCommand, GeometryTakesTouchesLandmarksAndOtherPlaces) {
+  const Scratch scratch;
+  const auto made = run("birdseye-sim", "case --out " + (scratch / "c").string() +
+                                            " --seed 2 --views 3 --size 384x288 --dof 81 --touches 40");
+  ASSERT_EQ(made.code, 0) << made.output;
+  const fs::path file = scratch / "c/case.toml";
+  const std::string touched = contents_of(file);
+  ASSERT_NE(touched.find("points.csv"), std::string::npos);
+  const auto registered = [&](const std::string& text) {
+    std::ofstream(file) << text;
+    const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
+    EXPECT_NE(result.code, 2) << result.output;
+    return read_json(scratch / "r.json");
+  };
+  const std::string plain = std::regex_replace(touched, std::regex("\\[points\\]\npath = .*\n"), "");
+  const nlohmann::json without = registered(plain), with = registered(touched);
+  EXPECT_FALSE(without.contains("surface_points"));
+  EXPECT_EQ(with["surface_points"]["used"], 40);
+  EXPECT_LE(with["surface_points"]["thought_wrong"], 4);
+  EXPECT_LT(with["surface_points"]["rms_mm"], 1.5);
+  EXPECT_LT(with["hidden_tre_after_mm_mean"], without["hidden_tre_after_mm_mean"]);
+  EXPECT_LT(with["expected_error"]["hidden"]["rms_mm"], without["expected_error"]["hidden"]["rms_mm"]);
+
+  const auto c = host::read_case(file);
+  ASSERT_TRUE(c) << c.error().what;
+  std::string named = plain;
+  for (const host::Landmark& landmark : of_kind(*c, "surface", 6)) named += named_in_views(*c, landmark, 0);
+  const host::Landmark wrong = of_kind(*c, "surface", 7).back();
+  named += named_in_views(*c, wrong, 20);
+  std::ofstream vessels(scratch / "c/vessels.csv");
+  vessels << "x_mm,y_mm,z_mm,sigma_mm,rest_x_mm,rest_y_mm,rest_z_mm\n";
+  for (const host::Landmark& vessel : of_kind(*c, "vessel", 8))
+    vessels << fmt::format("{:.6f}, 1, {:.6f}\n", fmt::join(vessel.deformed_mm, ","), fmt::join(vessel.rest_mm, ","));
+  vessels.close();
+  named += "\n[points]\npath = \"vessels.csv\"\n";
+  const nlohmann::json matched = registered(named);
+  ASSERT_EQ(matched["matched_points"]["used"], 15);
+  EXPECT_LT(matched["matched_points"]["rms_mm"], 1.5);
+  for (const nlohmann::json& one : matched["matched_points"]["each"])
+    EXPECT_EQ(one["thought_wrong"].get<bool>(), one["name"] == wrong.name) << one;
+  EXPECT_EQ(matched["matched_points"]["each"][14]["name"], "vessels.csv line 9");
+  EXPECT_LT(matched["vessel_tre_after_mm_mean"], without["vessel_tre_after_mm_mean"]);
+  EXPECT_LT(matched["expected_error"]["inside"]["rms_mm"], without["expected_error"]["inside"]["rms_mm"]);
+}
+
+TEST(RegisterViewsCommand, RefusesLandmarksAndPlacesThatCannotBe) {
+  const Scratch scratch;
+  make_case(scratch);
+  const std::string landmark = "[[landmark]]\nname = \"fissure\"\nplace_mm = [PLACE]\n";
+  const std::string good = "[[landmark.seen]]\nview = \"view0.png\"\npixel = [100, 80]\n";
+  const auto c = host::read_case(scratch / "c/case.toml");
+  ASSERT_TRUE(c);
+  const std::string place = fmt::format("{:.3f}", fmt::join(c->landmarks.front().rest_mm, ", "));
+  const std::string points = "[points]\npath = \"points.csv\"\n", header = "x_mm,y_mm,z_mm,sigma_mm\n";
+  std::string many = header;
+  for (int i = 0; i < 301; ++i) many += "1,2,3,1\n";
+  struct Refused {
+    std::string text, csv;
+    std::vector<std::string> words;
+  };
+  for (const auto& [text, csv, words] : std::vector<Refused>{
+           {landmark, "", {"[landmark 0] seen", "is missing"}},
+           {"[[landmark]]\nname = \"a\"\nplace_mm = [1, 2]\n" + good, "", {"[landmark 0] place_mm", "three numbers"}},
+           {"[[landmark]]\nname = \"a\"\nplace_mm = [4000, 2, 3]\n" + good, "", {"a: place_mm", "outside the CT"}},
+           {"landmark = [1]\n", "", {"[landmark 0] name", "missing"}},
+           {"[landmark]\nname = \"a\"\n", "", {"[[landmark]]"}},
+           {landmark + "sigma_mm = 0\n" + good, "", {"fissure", "sigma_mm is 0"}},
+           {landmark + good + good, "", {"fissure", "view0.png is named twice"}},
+           {landmark + good + landmark + good, "", {"[landmark 1]", "another landmark's"}},
+           {landmark + "[[landmark.seen]]\nview = \"view9.png\"\npixel = [1, 2]\n", "", {"view9.png", "none of"}},
+           {landmark + "[[landmark.seen]]\nview = \"view0.png\"\npixel = [384, 2]\n", "", {"view0.png", "384x288"}},
+           {landmark + "[[landmark.seen]]\nview = \"view0.png\"\npixel = [3]\n", "", {"[landmark.seen 0] pixel"}},
+           {landmark + good + "sigma_px = -1\n", "", {"view0.png", "sigma_px is -1"}},
+           {landmark + good + "sigma = 1\n", "", {"[landmark.seen] sigma", "sigma_px"}},
+           {"points = 3\n", "", {"[points] path", "missing"}},
+           {points, "1,2,3,1\n", {"points.csv", "first line", "x_mm,y_mm,z_mm,sigma_mm"}},
+           {points, "", {"points.csv", "empty"}},
+           {points, header, {"points.csv", "no places"}},
+           {points, header + "1,2,3\n", {"points.csv: line 2", "3 fields"}},
+           {points, header + "1,2,3,1\n1,two,3,1\n", {"points.csv: line 3", "'two'"}},
+           {points, header + "1,2,nan,1\n", {"points.csv: line 2", "'nan'"}},
+           {points, header + "1,2,3,0\n", {"points.csv: line 2", "sigma_mm is 0"}},
+           {points, "x_mm,y_mm,z_mm,sigma_mm,rest_x_mm,rest_y_mm,rest_z_mm\n1,2,3,1,4,,6\n", {"line 2", "'' is not"}},
+           {points, many, {"points.csv: line 302", "300"}}}) {
+    std::ofstream(scratch / "c/points.csv") << csv;
+    const std::string filled = std::regex_replace(text, std::regex("PLACE"), place);
+    // Before the tables, for a key of the file itself has to be there.
+    const fs::path file = changed(scratch, "^([^]*)\"gradient\"([^]*)$",
+                                  text[0] == '[' ? "$1\"geometry\"$2" + filled : filled + "$1\"geometry\"$2");
+    expect_refused("birdseye", arguments(file, scratch), words, scratch / "out");
+  }
+  std::ofstream(scratch / "c/points.csv") << header + "1,2,3,1\n";
+  for (const std::string& text : {points, std::regex_replace(landmark + good, std::regex("PLACE"), place)}) {
+    const fs::path file = changed(scratch, "^([^]*)$", "$1" + text);
+    expect_refused("birdseye", arguments(file, scratch), {"needs optimiser = \"geometry\""}, scratch / "out");
   }
 }
 

@@ -230,6 +230,50 @@ TEST(Landmarks, HiddenLieWhereNoViewSeesThem) {
   EXPECT_GT(behind, 20);
 }
 
+TEST(Landmarks, TouchesLieOnTheUnseenSideAsFarOffAsTheirNoise) {
+  const Subject subject = head_subject(2);
+  const BezierMap still(subject.grid.origin_mm, subject.grid.last_mm(), {1, 1, 1});
+  const auto scope = Laparoscope::create({.lens = laparoscope_lens(384, 288)});
+  ASSERT_TRUE(scope);
+  (*scope)->set_cavity({.organ = subject.surface});
+  const auto views = choose_viewpoints(subject, 3, subject.view_distance_mm, 2);
+  const auto touched = [&](int count, double noise_mm) {
+    return choose_touches(subject, subject.surface, still, **scope, views, count, noise_mm, 2);
+  };
+  const auto exact = touched(40, 0), noisy = touched(40, 2);
+  ASSERT_TRUE(exact && noisy);
+  ASSERT_EQ(exact->size(), 40U);
+  double sum_mm2 = 0;
+  for (std::size_t n = 0; n < exact->size(); ++n) {
+    const Mesh& organ = subject.surface;
+    const auto vertex = std::find_if(organ.vertices.begin(), organ.vertices.end(), [&](const Eigen::Vector3f& v) {
+      return (v.cast<double>() - (*exact)[n]).norm() < 1e-3;
+    });
+    ASSERT_NE(vertex, organ.vertices.end());
+    const Vector3d normal = organ.normals[static_cast<std::size_t>(vertex - organ.vertices.begin())].cast<double>();
+    for (const auto& view : views) EXPECT_FALSE((*scope)->sees(view, (*exact)[n], normal));
+    sum_mm2 += ((*noisy)[n] - (*exact)[n]).squaredNorm();
+  }
+  EXPECT_NEAR(std::sqrt(sum_mm2 / 120), 2, 0.4);
+  EXPECT_FALSE(touched(100000, 1));
+}
+
+TEST(Case, NamesTouchesWhereThereAreAny) {
+  const Scratch scratch;
+  CaseSettings settings = small_case(scratch / "c");
+  settings.touches = 12;
+  settings.touch_noise_mm = 0.5;
+  ASSERT_TRUE(write_case(settings));
+  const std::string points = contents_of(scratch / "c/points.csv");
+  EXPECT_EQ(points.rfind("x_mm,y_mm,z_mm,sigma_mm\n", 0), 0U);
+  EXPECT_EQ(std::count(points.begin(), points.end(), '\n'), 13);
+  EXPECT_NE(contents_of(scratch / "c/case.toml").find("[points]\npath = \"points.csv\""), std::string::npos);
+  settings.touches = 0;
+  ASSERT_TRUE(write_case(settings));
+  EXPECT_FALSE(fs::exists(scratch / "c/points.csv"));
+  EXPECT_EQ(contents_of(scratch / "c/case.toml").find("points.csv"), std::string::npos);
+}
+
 TEST(Case, ALampBesideTheLensAndAStillOrganChangeThePictureAlone) {
   const Scratch scratch;
   CaseSettings settings = small_case(scratch / "a");
@@ -319,6 +363,8 @@ TEST(Case, RefusesInOneLine) {
   refused([](CaseSettings& s) { s.instruments = 4; }, "--instruments");
   refused([](CaseSettings& s) { s.blur_px = -0.5; }, "--blur-px");
   refused([](CaseSettings& s) { s.pose_error.offset_deg = -1; }, "--pose-offset-deg");
+  refused([](CaseSettings& s) { s.touches = 301; }, "--touches");
+  refused([](CaseSettings& s) { s.touch_noise_mm = 0; }, "--touch-noise-mm");
   refused([](CaseSettings& s) { s.deformation.push_width_mm = 5; }, "--push-width-mm");
   refused([](CaseSettings& s) { s.ct = "/nonexistent/ct.nii.gz"; }, "/nonexistent/ct.nii.gz: no such file");
   refused([](CaseSettings& s) { s.phantom = "foot"; }, "foot");
