@@ -97,7 +97,8 @@ Result<void> only_known_keys(const fs::path& file, const std::string& table, con
                                table.empty() ? fmt::format("[{}]", key) : fmt::format("[{}] {}:", table, key),
                                fmt::join(known->second, ", "))};
     }
-    if (auto good = only_known_keys(file, table.empty() ? key : table + "." + key, value); !good) return good;
+    if (auto good = only_known_keys(file, table.empty() ? key : fmt::format("{}.{}", table, key), value); !good)
+      return good;
   }
   return {};
 }
