@@ -29,8 +29,7 @@ Eigen::Vector3d seen_of(const Eigen::Vector3d& rest_mm) {
 Eigen::Vector3d of_side(std::mt19937& random, double side) {
   std::normal_distribution<double> normal;
   for (;;) {
-    const Eigen::Vector3d place =
-        kBall_mm * Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+    Eigen::Vector3d place = kBall_mm * Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
     if (side * place.z() > 8) return place;
   }
 }
