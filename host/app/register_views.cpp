@@ -48,7 +48,8 @@ nlohmann::json pose_json(const ViewRegistration& found) {
 
 nlohmann::json expected_json(const std::optional<ExpectedError>& expected) {
   if (!expected) return nullptr;
-  return {{"rms_mm", expected->rms_mm}, {"radius95_mm", expected->radius95_mm}};
+  return {
+      {"rms_mm", expected->rms_mm}, {"radius95_mm", expected->radius95_mm}, {"left_of_prior", expected->left_of_prior}};
 }
 
 /// What may be off, by kind of place and of each landmark, beside how far off the landmark is.
@@ -60,6 +61,9 @@ void add_expected(nlohmann::json& json, const RegistrationCase& c, const ViewReg
                             {"inside", expected_json(expected.inside)},
                             {"target", nullptr}};
   if (c.target_mm && !expected.targets.empty()) json["expected_error"]["target"] = expected_json(expected.targets[0]);
+  json["open"] = nlohmann::json::array();
+  for (const OpenSide& side : expected.open)
+    json["open"].push_back({{"side", side.side}, {"share", side.share}, {"rms_mm", side.rms_mm}});
   if (expected.seen_moved_mm) json["seen_moved_mm"] = *expected.seen_moved_mm;
   const std::size_t first = c.target_mm ? 1 : 0;
   for (std::size_t n = 0; n < c.landmarks.size() && first + n < expected.targets.size(); ++n) {
@@ -121,6 +125,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"min_jacobian", found.min_jacobian},
                          {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
+  if (found.evidence_of_motion_nats) json["evidence_of_motion_nats"] = *found.evidence_of_motion_nats;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   if (found.expected) add_expected(json, c, found);
   add_further(json, c, found);

@@ -24,14 +24,22 @@ Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) 
   return out;
 }
 
+Eigen::Matrix3d BelievedDeformation::prior_covariance(const Eigen::Vector3d& rest_mm) const {
+  const Eigen::Vector3d seen_mm = seen_place(mean, rest_mm);
+  Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    const DisplacementPrior& prior = fits[i].prior();
+    out += beliefs[i] * prior.covariance(prior.of_seen ? seen_mm : rest_mm);
+  }
+  return out;
+}
+
 std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::span<const SeenPoint> points,
                                            std::span<const DisplacementPrior> more, const BelievedDeformation& before,
                                            const RegistrationWatch& watch, std::span<const MatchedPoint> matched) {
   constexpr std::array kAnneal_mm{8.0, 8.0, 6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0};
   constexpr std::array kGoOn_mm{4.0, 2.0, 1.0, 0.6, 0.5};
   constexpr std::size_t kMostBelieved = 4;
-  /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md).
-  constexpr double kTemper = 4;
   constexpr double kHopeless_nats = 30;
   const std::size_t known = before.candidates.size();
   std::vector<std::optional<DisplacementFit>> fits(known + more.size());
@@ -52,7 +60,7 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
   double sum = 0;
   for (std::size_t i = 0; i < std::min(out.candidates.size(), kMostBelieved); ++i) {
     const DisplacementFit& fit = out.candidates[i];
-    out.beliefs.push_back(std::exp((fit.log_evidence() - most) / kTemper));
+    out.beliefs.push_back(std::exp((fit.log_evidence() - most) / kEvidenceTemper));
     out.fits.push_back(fit);
     out.fields.push_back(fit.seen_field(organ));
     sum += out.beliefs.back();

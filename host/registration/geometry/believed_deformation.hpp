@@ -11,6 +11,9 @@
 
 namespace birdseye::host {
 
+/// Residuals are not as independent as the evidence has them (see docs/manual/registration.md): it is divided by this.
+inline constexpr double kEvidenceTemper = 4;
+
 /// Deformations by several hypotheses, how far each is believed, and their mean.
 struct BelievedDeformation {
   explicit BelievedDeformation(const SignedDistance& organ) : mean(organ) {}
@@ -23,6 +26,8 @@ struct BelievedDeformation {
 
   /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, and between them.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const;
+  /// The same before anything was seen.
+  [[nodiscard]] Eigen::Matrix3d prior_covariance(const Eigen::Vector3d& rest_mm) const;
 };
 
 /// By every prior, each believed as far as its evidence goes. before: by fewer or worse points, of which the candidates

@@ -64,6 +64,9 @@ struct DisplacementPrior {
   /// w(rest)), as tissue bends.
   bool of_seen = false;
   double log_belief = 0;  ///< before anything is seen, nats
+
+  /// Of the displacement before anything is seen, mm^2, at a place that the function takes.
+  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& place_in_patient_mm) const;
 };
 
 }  // namespace birdseye::host

@@ -2,21 +2,16 @@
 
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "host/registration/geometry/open_sides.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-constexpr std::size_t kPlaces = 120;  ///< of a kind
-
-/// Places at rest of each kind.
-struct Places {
-  std::vector<Eigen::Vector3d> surface, seen, hidden, inside;
-};
 
 /// Whether a view sees a place of the surface.
 class Sight {
@@ -26,6 +21,7 @@ class Sight {
     constexpr int kStep_px = 4;
     for (const PinholeView& view : views) depths_.push_back(depth_map(surface_, view, kStep_px));
   }
+  [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& place_mm) const { return surface_.normal(place_mm); }
   [[nodiscard]] bool sees(const Eigen::Vector3d& place_mm) const {
     constexpr double kLeastFacing = 0.1, kBehind_mm = 4;
     const Eigen::Vector3d normal = surface_.normal(place_mm);
@@ -48,15 +44,20 @@ class Sight {
   std::vector<DepthMap> depths_;
 };
 
-void thin_out(std::vector<Eigen::Vector3d>& places) {
-  const std::size_t every = std::max<std::size_t>(1, places.size() / kPlaces);
+void thin_out(std::vector<Eigen::Vector3d>& places, std::size_t most) {
+  const std::size_t every = std::max<std::size_t>(1, (places.size() + most - 1) / most);
   for (std::size_t i = 0; i * every < places.size(); ++i) places[i] = places[i * every];
   places.resize((places.size() + every - 1) / every);
 }
 
-Places places_of(const SignedDistance& organ, const LatticeField& seen, std::span<const PinholeView> views) {
+/// Spread over the organ, at rest.
+struct Places {
+  std::vector<Eigen::Vector3d> surface, inside;
+};
+
+Places places_of(const SignedDistance& organ) {
   constexpr double kInside_mm = 6;
-  const Sight sight(organ, seen, views);
+  constexpr std::size_t kOfSurface = 400, kOfInside = 120;
   Places out;
   for (int k = 0; k < organ.points()[2]; ++k) {
     for (int j = 0; j < organ.points()[1]; ++j) {
@@ -69,47 +70,92 @@ Places places_of(const SignedDistance& organ, const LatticeField& seen, std::spa
       }
     }
   }
-  for (const Eigen::Vector3d& place : out.surface)
-    (sight.sees(seen_place(seen, place)) ? out.seen : out.hidden).push_back(place);
-  for (auto* const places : {&out.surface, &out.seen, &out.hidden, &out.inside}) thin_out(*places);
+  thin_out(out.surface, kOfSurface);
+  thin_out(out.inside, kOfInside);
   return out;
 }
 
-/// Of the mean covariance over places; none where there are none.
-std::optional<ExpectedError> over(std::span<const Eigen::Vector3d> places, const BelievedDeformation& found) {
-  if (places.empty()) return std::nullopt;
-  std::vector<Eigen::Matrix3d> each(places.size());
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) { each[i] = found.covariance(places[i]); });
-  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const Eigen::Matrix3d& covariance : each) sum += covariance;
-  return expected_error(sum / static_cast<double>(places.size()));
+std::vector<KnownPlace> known_surface(std::span<const Eigen::Vector3d> rest_mm, const SignedDistance& organ,
+                                      const BelievedDeformation& found, std::span<const PinholeView> views) {
+  const Sight sight(organ, found.mean, views);
+  std::vector<KnownPlace> out(rest_mm.size());
+  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+    const Eigen::Vector3d seen_mm = seen_place(found.mean, rest_mm[i]);
+    out[i] = {rest_mm[i],
+              seen_mm,
+              sight.normal(seen_mm),
+              sight.sees(seen_mm),
+              found.covariance(rest_mm[i]),
+              found.prior_covariance(rest_mm[i])};
+  });
+  return out;
+}
+
+/// Of the mean covariance over places.
+class Mean {
+ public:
+  void add(const Eigen::Matrix3d& covariance, const Eigen::Matrix3d& prior_covariance) {
+    sum_ += covariance;
+    prior_sum_ += prior_covariance;
+    ++count_;
+  }
+  /// None where there are none.
+  [[nodiscard]] std::optional<ExpectedError> expected() const {
+    if (count_ == 0) return std::nullopt;
+    return expected_error(sum_ / count_, prior_sum_ / count_);
+  }
+
+ private:
+  Eigen::Matrix3d sum_ = Eigen::Matrix3d::Zero(), prior_sum_ = Eigen::Matrix3d::Zero();
+  int count_ = 0;
+};
+
+Mean inside_of(std::span<const Eigen::Vector3d> rest_mm, const BelievedDeformation& found) {
+  std::vector<Eigen::Matrix3d> each(rest_mm.size());
+  tbb::parallel_for(std::size_t{0}, each.size(), [&](std::size_t i) { each[i] = found.covariance(rest_mm[i]); });
+  Mean out;
+  for (std::size_t i = 0; i < each.size(); ++i) out.add(each[i], found.prior_covariance(rest_mm[i]));
+  return out;
 }
 
 }  // namespace
 
-ExpectedError expected_error(const Eigen::Matrix3d& covariance_mm2) {
+ExpectedError expected_error(const Eigen::Matrix3d& covariance_mm2, const Eigen::Matrix3d& prior_covariance_mm2) {
   const double mean = covariance_mm2.trace(), squares = (covariance_mm2 * covariance_mm2).trace();
-  if (!(mean > 0)) return {0, 0};
+  if (!(mean > 0)) return {0, 0, 0};
   constexpr double kQuantile95 = 1.6448536269514722;  // of the normal distribution
   const double freedom = mean * mean / squares, a = 2 / (9 * freedom);
-  return {std::sqrt(mean), std::sqrt(mean * std::pow(1 - a + kQuantile95 * std::sqrt(a), 3))};
+  ExpectedError out{std::sqrt(mean), std::sqrt(mean * std::pow(1 - a + kQuantile95 * std::sqrt(a), 3)), 1};
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix3d> left(covariance_mm2, prior_covariance_mm2,
+                                                                       Eigen::EigenvaluesOnly);
+  if (const double most = left.eigenvalues().maxCoeff(); most >= 0) out.left_of_prior = std::min(1.0, std::sqrt(most));
+  return out;
 }
 
 ExpectedErrors expected_errors(const SignedDistance& organ, const BelievedDeformation& found,
                                std::span<const PinholeView> views,
                                std::span<const Eigen::Vector3d> targets_at_rest_mm) {
-  const Places places = places_of(organ, found.mean, views);
+  const Places places = places_of(organ);
+  const std::vector<KnownPlace> surface = known_surface(places.surface, organ, found, views);
+  Mean all, seen, hidden;
+  double moved_mm2 = 0, count = 0;
   ExpectedErrors out;
-  out.surface = over(places.surface, found);
-  out.seen = over(places.seen, found);
-  out.hidden = over(places.hidden, found);
-  out.inside = over(places.inside, found);
+  for (const KnownPlace& place : surface) {
+    all.add(place.covariance, place.prior_covariance);
+    (place.seen ? seen : hidden).add(place.covariance, place.prior_covariance);
+    out.places.push_back({place.seen_mm, std::sqrt(place.covariance.trace())});
+    if (!place.seen) continue;
+    moved_mm2 += (place.seen_mm - place.rest_mm).squaredNorm();
+    count += 1;
+  }
+  out.surface = all.expected();
+  out.seen = seen.expected();
+  out.hidden = hidden.expected();
+  out.inside = inside_of(places.inside, found).expected();
   for (const Eigen::Vector3d& target : targets_at_rest_mm)
-    out.targets.push_back(expected_error(found.covariance(target)));
-  if (places.seen.empty()) return out;
-  double sum_mm2 = 0;
-  for (const Eigen::Vector3d& place : places.seen) sum_mm2 += (seen_place(found.mean, place) - place).squaredNorm();
-  out.seen_moved_mm = std::sqrt(sum_mm2 / static_cast<double>(places.seen.size()));
+    out.targets.push_back(expected_error(found.covariance(target), found.prior_covariance(target)));
+  if (count > 0) out.seen_moved_mm = std::sqrt(moved_mm2 / count);
+  out.open = open_sides(surface);
   return out;
 }
 

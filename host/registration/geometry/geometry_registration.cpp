@@ -14,6 +14,7 @@
 #include "host/registration/geometry/expected_errors.hpp"
 #include "host/registration/geometry/gathered_points.hpp"
 #include "host/registration/geometry/hypotheses.hpp"
+#include "host/registration/geometry/motion_evidence.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/stereo.hpp"
 #include "host/registration/views/rendered_views.hpp"
@@ -161,6 +162,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     auto believed = believe(*organ, points, more, found, settings.watch, settings.matched);
     if (!believed) return called_off();
     found = *std::move(believed);
+    out.evidence_of_motion_nats = evidence_of_motion_nats(*organ, points, found);
     ++out.evaluations;
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
                                   out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),

@@ -47,6 +47,22 @@ struct ViewRegistrationSettings {
 struct ExpectedError {
   double rms_mm = 0;
   double radius95_mm = 0;  ///< the place is within, with a probability of 95 %
+  /// Of its standard deviation before anything was seen, in the direction in which most of that is left; from 0 to 1.
+  double left_of_prior = 1;
+};
+
+/// A side of the organ of which the views leave places open: across the surface there, over half of the standard
+/// deviation is left that it had before anything was seen.
+struct OpenSide {
+  std::string side;   ///< left, right, front, back, top or underside, of the patient: where the surface there faces
+  double share = 0;   ///< of its places that are open
+  double rms_mm = 0;  ///< to be expected of those
+};
+
+/// The error to be expected of one place of the surface.
+struct SurfacePlace {
+  Eigen::Vector3d seen_mm;  ///< where it is now, patient frame
+  double rms_mm = 0;
 };
 
 /// The error to be expected of places of the organ, by how the views see them.
@@ -55,6 +71,8 @@ struct ExpectedErrors {
   std::optional<ExpectedError> surface, inside;
   std::vector<ExpectedError> targets;   ///< in the order in which they were asked for
   std::optional<double> seen_moved_mm;  ///< of the surface that is seen, root mean square
+  std::vector<OpenSide> open;           ///< the sides of which most is open first; none: all are known
+  std::vector<SurfacePlace> places;     ///< spread over the surface
 };
 
 /// How a place that something else than the views tells of fits the result.
@@ -86,6 +104,9 @@ struct ViewRegistration {
   std::optional<double> uncertainty_mm;
   /// Only with optimiser geometry.
   std::optional<ExpectedErrors> expected;
+  /// By how many nats what is seen speaks for the deformation and against none, tempered as hypotheses are; only with
+  /// optimiser geometry.
+  std::optional<double> evidence_of_motion_nats;
   /// Places of the surface that stereo between the views found; only with optimiser geometry.
   std::optional<std::size_t> stereo_points;
   /// Of each view, the median of how far its outline is from the surface that was found; none where it shows too little

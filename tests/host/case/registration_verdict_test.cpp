@@ -1,0 +1,78 @@
+#include "host/case/registration_verdict.hpp"
+
+#include <gtest/gtest.h>
+
+namespace birdseye::host {
+namespace {
+
+/// Of a target that a thousand places make known.
+ViewRegistration well_found() {
+  ViewRegistration out;
+  out.stereo_points = 1000;
+  out.evidence_of_motion_nats = 40;
+  out.expected.emplace();
+  out.expected->seen = ExpectedError{0.5, 0.8, 0.1};
+  out.expected->seen_moved_mm = 6;
+  out.expected->targets.push_back({1, 1.6, 0.2});
+  return out;
+}
+
+RegistrationCase with_target() {
+  RegistrationCase out;
+  out.target_mm = Eigen::Vector3d::Zero();
+  return out;
+}
+
+bool says(const Verdict& verdict, const std::string& words) {
+  return verdict.reasons.front().find(words) != std::string::npos;
+}
+
+TEST(RegistrationVerdict, PassesWhereTheTargetIsKnown) {
+  const Verdict verdict = verdict_of(with_target(), well_found());
+  EXPECT_EQ(verdict.grade, Grade::pass);
+  EXPECT_FALSE(says(verdict, "nothing moved")) << verdict.reasons.front();
+}
+
+TEST(RegistrationVerdict, SaysThatNothingMovedWhereEvidenceGainsNothingByAMotion) {
+  ViewRegistration found = well_found();
+  found.evidence_of_motion_nats = 2.9;
+  found.expected->seen_moved_mm = 3;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "nothing moved beyond 3.8 mm"));
+  found.expected->seen_moved_mm = 6;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "nothing moved beyond 6.8 mm"));
+}
+
+TEST(RegistrationVerdict, SaysThatNothingMovedWhereTheMotionIsUnderWhatIsUnknownOfIt) {
+  ViewRegistration found = well_found();
+  found.expected->seen_moved_mm = 0.9;
+  const Verdict verdict = verdict_of(with_target(), found);
+  EXPECT_EQ(verdict.grade, Grade::pass);
+  EXPECT_TRUE(says(verdict, "nothing moved beyond 1.7 mm")) << verdict.reasons.front();
+}
+
+TEST(RegistrationVerdict, NamesTheOpenSidesOfATargetThatIsNotKnown) {
+  ViewRegistration found = well_found();
+  found.expected->targets.front() = {4, 6.5, 0.7};
+  found.expected->open = {{"back", 0.9, 4.1}, {"left", 0.3, 2.2}};
+  const Verdict verdict = verdict_of(with_target(), found);
+  EXPECT_EQ(verdict.grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict, "add views of the organ's back (90 % of it known by the prior alone, 4.1 mm rms) and left"))
+      << verdict.reasons.front();
+  found.expected->targets.front().radius95_mm = 16;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+}
+
+TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereOtherPlacesMakeTheTargetKnown) {
+  ViewRegistration found = well_found();
+  found.stereo_points = 99;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.expected->targets.front().left_of_prior = 0.5;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  found.stereo_points = 100;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+}  // namespace
+}  // namespace birdseye::host
