@@ -11,6 +11,7 @@
 
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
+#include "host/case/error_picture.hpp"
 #include "host/case/registration_case.hpp"
 #include "host/case/registration_error.hpp"
 #include "host/case/registration_report.hpp"
@@ -246,6 +247,9 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (auto written = write_field(options.out / "field.mha", found->field); !written) return written.error();
   auto files = pictures_of(c, *transfer, *found);
   if (!files) return files.error();
+  const auto errors = expected_error_picture(c, *transfer, *found);
+  if (!errors) return errors.error();
+  if (*errors) files->push_back({"expected_error.png", png_of((*errors)->view())});
   files->push_back({"trace.svg", trace_svg(found->trace)});
   files->push_back({"report.html", registration_report(c, *found, verdict, json)});
   files->push_back({"result.json", text_of(json)});

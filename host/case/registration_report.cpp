@@ -64,6 +64,24 @@ std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageR
   return rgb;
 }
 
+namespace {
+
+/// expected_error.png lies beside the page.
+void add_expected(HtmlPage& page, const ExpectedErrors& expected) {
+  page.heading("Error to be expected");
+  page.picture_files(
+      {"expected_error.png"},
+      "The organ as it was found, from six sides of the patient: the brighter, the less is known of where "
+      "a place is. The cross is the target, where one is named; it may lie behind.");
+  std::vector<std::vector<std::string>> rows{{"side", "of it known by the prior alone", "expected there, mm rms"}};
+  for (const OpenSide& side : expected.open)
+    rows.push_back({side.side, fmt::format("{:.0f} %", 100 * side.share), fmt::format("{:.1f}", side.rms_mm)});
+  if (expected.open.empty()) page.paragraph("The views leave no side of the organ open.");
+  if (!expected.open.empty()) page.table(rows);
+}
+
+}  // namespace
+
 std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
                                 const nlohmann::json& json) {
   HtmlPage page(fmt::format("Registration to {} views", c.views.size()));
@@ -75,8 +93,11 @@ std::string registration_report(const RegistrationCase& c, const ViewRegistratio
     if (value.is_string()) rows.push_back({key, value.get<std::string>()});
   }
   page.table(rows);
-  page.heading("Similarity on the way");
-  page.svg(trace_svg(found.trace), "Each line is one stage; lines of different stages cannot be compared.");
+  if (found.expected && !found.expected->places.empty()) add_expected(page, *found.expected);
+  if (!found.trace.empty()) {
+    page.heading("Similarity on the way");
+    page.svg(trace_svg(found.trace), "Each line is one stage; lines of different stages cannot be compared.");
+  }
   page.heading("Views");
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     std::vector<std::string> files;
