@@ -11,6 +11,7 @@
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/bench/bench_machine.hpp"
+#include "host/bench/factor_study.hpp"
 #include "host/files/write_files.hpp"
 
 namespace birdseye::host {
@@ -21,6 +22,7 @@ struct BenchRegisterOptions {
   std::filesystem::path json, study;
   std::vector<std::string> sweeps = StudyOptions{}.sweeps;
   std::optional<int> trials;
+  FactorOptions factors;
   bool quick = false;
   std::vector<std::string> phantoms{"liver", "head"};
   std::vector<int> dof{3, 81};
@@ -101,16 +103,44 @@ Result<ExitCode> bench_register(const BenchRegisterOptions& options) {
   return report_of(rows)["verdict"] == "pass" ? ExitCode::success : ExitCode::verdict_fail;
 }
 
-Result<void> study(const BenchRegisterOptions& options) {
+Result<void> make_folder(const char* option, const std::filesystem::path& folder) {
   std::error_code error;
-  std::filesystem::create_directories(options.study, error);
-  if (error) {
-    return Error{Errc::unreadable,
-                 fmt::format("--study {}: cannot be made; choose another folder", options.study.string())};
-  }
+  std::filesystem::create_directories(folder, error);
+  if (!error) return {};
+  return Error{Errc::unreadable, fmt::format("{} {}: cannot be made; choose another folder", option, folder.string())};
+}
+
+Result<void> study(const BenchRegisterOptions& options) {
+  if (auto made = make_folder("--study", options.study); !made) return made;
   constexpr int kQuick = 2;
   const int trials = options.trials.value_or(StudyOptions{}.trials);
   return register_study({options.study, options.quick ? kQuick : trials, options.sweeps, options.simulated});
+}
+
+Result<void> factors(const BenchRegisterOptions& options) {
+  FactorOptions of = options.factors;
+  of.trials = options.trials.value_or(of.trials);
+  of.size = options.simulated.size;
+  if (auto made = make_folder("--factors", of.folder); !made) return made;
+  return factor_study(of);
+}
+
+/// Options of --factors alone.
+void add_factors(CLI::App& command, FactorOptions& factors, const std::vector<CLI::Option*>& not_with) {
+  CLI::Option* const folder =
+      command.add_option("--factors", factors.folder,
+                         "in place of the table: one factor at a time, to this folder; goes on with what is there");
+  for (CLI::Option* option : not_with) folder->excludes(option);
+  const auto only = [&](CLI::Option* option) { option->needs(folder); };
+  only(command.add_option("--only", factors.only, "of the factors, only these classes: NAME,NAME (default all)")
+           ->delimiter(','));
+  only(command.add_option("--optimiser", factors.optimisers, "geometry, gradient, simplex, powell (default geometry)")
+           ->delimiter(',')
+           ->check(CLI::IsMember({"geometry", "gradient", "simplex", "powell"})));
+  only(command.add_option("--first-seed", factors.first_seed, "of the trials (default 1)")
+           ->check(CLI::Range(1, 1'000'000)));
+  only(command.add_option("--jobs", factors.jobs, "cases at a time (default: one a core; 1: all cores on one case)")
+           ->check(CLI::Range(1, 256)));
 }
 
 }  // namespace
@@ -119,13 +149,16 @@ void add_bench_register(CLI::App& bench, CommandStatus& status) {
   const auto options = std::make_shared<BenchRegisterOptions>();
   CLI::App& command =
       *bench.add_subcommand("register", "the paper's Figure 6 on simulated video, its optimisers and ours");
-  command.add_option("--json", options->json, "write the table to this file");
-  command.add_option("--trials", options->trials, "random deformations of each kind (default 50; of a study 8)")
+  CLI::Option* const json = command.add_option("--json", options->json, "write the table to this file");
+  command
+      .add_option("--trials", options->trials,
+                  "random deformations of each kind (default 50; of a study 8, of factors 20)")
       ->check(CLI::Range(1, 1000));
-  command.add_flag("--quick", options->quick, "5 trials");
-  command.add_option("--phantom", options->phantoms, "only these: liver, head")
-      ->check(CLI::IsMember({"liver", "head"}));
-  command.add_option("--dof", options->dof, "only these: 3, 81")->check(CLI::IsMember({3, 81}));
+  CLI::Option* const quick = command.add_flag("--quick", options->quick, "5 trials");
+  CLI::Option* const phantom = command.add_option("--phantom", options->phantoms, "only these: liver, head")
+                                   ->check(CLI::IsMember({"liver", "head"}));
+  CLI::Option* const dof =
+      command.add_option("--dof", options->dof, "only these: 3, 81")->check(CLI::IsMember({3, 81}));
   CLI::Option* const views =
       command.add_option("--views", options->simulated.views, "of each case (default 5)")->check(CLI::Range(1, 20));
   command.add_option("--size", options->simulated.size, "of the views (default 768x576)")
@@ -133,13 +166,17 @@ void add_bench_register(CLI::App& bench, CommandStatus& status) {
   CLI::Option* const amplitude =
       command.add_option("--amplitude-mm", options->simulated.amplitude_mm, "of the deformation (default 10)")
           ->check(CLI::Range(0.5, 30.0));
-  command
-      .add_option("--study", options->study, "in place of the table: curves and sweeps on the liver, to this folder")
-      ->excludes(views)
-      ->excludes(amplitude);
+  CLI::Option* const study_folder =
+      command
+          .add_option("--study", options->study,
+                      "in place of the table: curves and sweeps on the liver, to this folder")
+          ->excludes(views)
+          ->excludes(amplitude);
   command.add_option("--sweep", options->sweeps, "of the study, only these: light, noise, views, error")
       ->check(CLI::IsMember(StudyOptions{}.sweeps));
+  add_factors(command, options->factors, {json, quick, phantom, dof, views, amplitude, study_folder});
   command.callback([options, &status] {
+    if (!options->factors.folder.empty()) return status.take(factors(*options));
     if (!options->study.empty()) return status.take(study(*options));
     const auto done = bench_register(*options);
     done ? void(status.code = *done) : status.refuse(done.error());

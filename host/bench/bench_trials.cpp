@@ -1,45 +1,21 @@
 #include "host/bench/bench_trials.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/median.hpp"
-#include "drivers/system/child_process.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/bench/bench_machine.hpp"
 #include "host/bench/processor_time.hpp"
+#include "host/bench/simulator_case.hpp"
 #include "host/case/registration_error.hpp"
 #include "host/case/run_registration.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-/// A folder that goes when it is done with.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("birdseye-bench-{}", ::getpid())) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 double mean_of(const std::vector<Trial>& trials, double Trial::*field) {
   double sum = 0;
@@ -57,13 +33,7 @@ double median_over(const std::vector<Trial>& trials, double Trial::*field) {
 }  // namespace
 
 Result<RegistrationCase> simulate(const SimulatedCase& wanted) {
-  const ScratchFolder scratch;
-  const fs::path folder = scratch.path() / "case", log = scratch.path() / "log";
-  std::vector<std::string> command{(fs::read_symlink("/proc/self/exe").parent_path() / "birdseye-sim").string(),
-                                   "case",
-                                   "--out",
-                                   folder.string(),
-                                   "--seed",
+  std::vector<std::string> options{"--seed",
                                    std::to_string(wanted.seed),
                                    "--phantom",
                                    wanted.phantom,
@@ -79,17 +49,10 @@ Result<RegistrationCase> simulate(const SimulatedCase& wanted) {
                                    fmt::format("{}", wanted.noise),
                                    "--light-offset-mm",
                                    fmt::format("{}", wanted.light_offset_mm)};
-  if (wanted.plain_background) command.emplace_back("--plain-background");
-  auto child = ChildProcess::start(command, log);
-  if (!child) return child.error();
-  constexpr Duration kPatience = Duration::from_ms(120'000);
-  if (child->wait(Deadline::after(kPatience)) != 0) {
-    std::ifstream in(log);
-    std::string line;
-    std::getline(in, line);
-    return Error{Errc::bad_value, fmt::format("birdseye-sim case --seed {}: {}", wanted.seed, line)};
-  }
-  return read_case(folder / "case.toml");
+  if (wanted.plain_background) options.emplace_back("--plain-background");
+  const auto made = SimulatorCase::make(options);
+  if (!made) return made.error();
+  return read_case(made->folder() / "case.toml");
 }
 
 Result<Trial> try_once(const RegistrationCase& c, const Method& method) {
