@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* kKinds[] = {"seen_by_two", "seen", "hidden", "inside"};
+constexpr const char* kKinds[] = {"seen_by_two", "seen", "seen_moved", "hidden", "inside"};
 
 /// A number of trial.kinds.<kind>, where it is there.
 struct Numbers {

@@ -68,7 +68,7 @@ std::vector<TruePlace> thinned(const std::vector<Vector3d>& rest_mm, const Displ
 Result<std::vector<PlacesOfKind>> true_places(const RegistrationCase& c, const TransferFunction& transfer,
                                               const DisplacementField& truth,
                                               std::span<const Transform<Camera, Patient>> true_poses) {
-  constexpr double kMargin_mm = 24, kInside_mm = 6;
+  constexpr double kMargin_mm = 24, kInside_mm = 6, kMoved_mm = 3;
   const Volume* const labels = c.labels ? &*c.labels : nullptr;
   const auto organ =
       signed_distance_of(c.ct, tissue_voxels(c.ct, labels, c.label_values, transfer), kGrid_mm, kMargin_mm);
@@ -81,7 +81,7 @@ Result<std::vector<PlacesOfKind>> true_places(const RegistrationCase& c, const T
     if (at.distance_mm < -kInside_mm) of_inside.push_back(place);
   });
   PlacesOfKind all{"surface", thinned(of_surface, truth)}, by_two{"seen_by_two", {}}, seen{"seen", {}},
-      hidden{"hidden", {}};
+      seen_moved{"seen_moved", {}}, hidden{"hidden", {}};
   std::vector<PinholeView> views;
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     VideoView view = c.views[n];
@@ -94,9 +94,10 @@ Result<std::vector<PlacesOfKind>> true_places(const RegistrationCase& c, const T
                                   [&](const PinholeView& view) { return sees(view, surface, place.now_mm); });
     if (by >= 2) by_two.places.push_back(place);
     (by >= 1 ? seen : hidden).places.push_back(place);
+    if (by >= 1 && (place.now_mm - place.rest_mm).norm() >= kMoved_mm) seen_moved.places.push_back(place);
   }
-  return std::vector<PlacesOfKind>{
-      std::move(all), std::move(by_two), std::move(seen), std::move(hidden), {"inside", thinned(of_inside, truth)}};
+  return std::vector<PlacesOfKind>{std::move(all),        std::move(by_two), std::move(seen),
+                                   std::move(seen_moved), std::move(hidden), {"inside", thinned(of_inside, truth)}};
 }
 
 PlacesError error_of(std::span<const TruePlace> places, const DisplacementField* field) {

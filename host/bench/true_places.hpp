@@ -16,8 +16,8 @@ namespace birdseye::host {
 struct TruePlace {
   Eigen::Vector3d rest_mm, now_mm;
 };
-/// Places of one kind: "surface", all of it; of that "seen_by_two" views or more, "seen" by one or more and "hidden"
-/// from all; and "inside", deeper than 6 mm.
+/// Places of one kind: "surface", all of it; of that "seen_by_two" views or more, "seen" by one or more, "seen_moved",
+/// those of them that moved by 3 mm or more, and "hidden" from all; and "inside", deeper than 6 mm.
 struct PlacesOfKind {
   std::string kind;
   std::vector<TruePlace> places;
