@@ -73,7 +73,7 @@ void add_expected(HtmlPage& page, const ExpectedErrors& expected) {
       {"expected_error.png"},
       "The organ as it was found, from six sides of the patient: the brighter, the less is known of where "
       "a place is. The cross is the target, where one is named; it may lie behind.");
-  std::vector<std::vector<std::string>> rows{{"side", "of it known by the prior alone", "expected there, mm rms"}};
+  std::vector<std::vector<std::string>> rows{{"side", "of it known mostly by the prior", "expected there, mm rms"}};
   for (const OpenSide& side : expected.open)
     rows.push_back({side.side, fmt::format("{:.0f} %", 100 * side.share), fmt::format("{:.1f}", side.rms_mm)});
   if (expected.open.empty()) page.paragraph("The views leave no side of the organ open.");

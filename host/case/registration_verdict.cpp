@@ -78,7 +78,7 @@ std::string views_to_add(const ExpectedErrors& expected) {
   const std::size_t sides = std::min(kMost, expected.open.size());
   for (std::size_t n = 0; n < sides; ++n) {
     if (n > 0) out += n + 1 == sides ? " and " : ", ";
-    out += fmt::format("{} ({:.0f} % of it known by the prior alone, {:.1f} mm rms)", expected.open[n].side,
+    out += fmt::format("{} ({:.0f} % of it known mostly by the prior, {:.1f} mm rms)", expected.open[n].side,
                        100 * expected.open[n].share, expected.open[n].rms_mm);
   }
   return out;
@@ -92,6 +92,13 @@ std::optional<double> nothing_moved_beyond_mm(const ViewRegistration& found) {
   const bool gains_nothing = found.evidence_of_motion_nats && *found.evidence_of_motion_nats < kGain_nats;
   if (!gains_nothing && *expected.seen_moved_mm >= kDeviations * expected.seen->rms_mm) return std::nullopt;
   return *expected.seen_moved_mm + expected.seen->radius95_mm;
+}
+
+/// Touches and matched places that the result is not at odds with.
+std::size_t others_that_fit(const ViewRegistration& found) {
+  const auto fits = [](const PlaceFit& fit) { return !fit.thought_wrong(); };
+  return static_cast<std::size_t>(std::count_if(found.touches.begin(), found.touches.end(), fits) +
+                                  std::count_if(found.matched.begin(), found.matched.end(), fits));
 }
 
 /// By where the surface is seen.
@@ -118,14 +125,15 @@ Verdict by_geometry(const RegistrationCase& c, const ViewRegistration& found) {
                          views_to_add(*expected))},
             {}};
   }
-  // With little stereo the prior may be what makes the target look known.
-  constexpr std::size_t kFewest = 100;
+  // With little stereo nothing says that pictures and poses belong together, for outlines fit wrong poses too; and the
+  // prior may be what makes the target look known.
+  constexpr std::size_t kFewest = 100, kFewestOthers = 6;
   constexpr double kHalf = 0.5;
-  if (*found.stereo_points < kFewest && target.left_of_prior >= kHalf) {
+  if (*found.stereo_points < kFewest && (others_that_fit(found) < kFewestOthers || target.left_of_prior >= kHalf)) {
     return {Grade::marginal,
-            {fmt::format("only {} places of the surface are seen by two views or more, under {}, and {:.0f} % of what "
-                         "{} may be off is left, over {:.0f}: {}",
-                         *found.stereo_points, kFewest, 100 * target.left_of_prior, what, 100 * kHalf,
+            {fmt::format("only {} places of the surface are seen by two views or more, under {}, and {} touches or "
+                         "landmarks fit, under {}, or leave over {:.0f} % of what {} may be off: {}",
+                         *found.stereo_points, kFewest, others_that_fit(found), kFewestOthers, 100 * kHalf, what,
                          views_to_add(*expected))},
             {}};
   }

@@ -58,16 +58,23 @@ TEST(RegistrationVerdict, NamesTheOpenSidesOfATargetThatIsNotKnown) {
   found.expected->open = {{"back", 0.9, 4.1}, {"left", 0.3, 2.2}};
   const Verdict verdict = verdict_of(with_target(), found);
   EXPECT_EQ(verdict.grade, Grade::marginal);
-  EXPECT_TRUE(says(verdict, "add views of the organ's back (90 % of it known by the prior alone, 4.1 mm rms) and left"))
+  EXPECT_TRUE(
+      says(verdict, "add views of the organ's back (90 % of it known mostly by the prior, 4.1 mm rms) and left"))
       << verdict.reasons.front();
   found.expected->targets.front().radius95_mm = 16;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
 }
 
-TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereOtherPlacesMakeTheTargetKnown) {
+TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereTouchesMakeTheTargetKnown) {
   ViewRegistration found = well_found();
   found.stereo_points = 99;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  found.touches.assign(4, {0.5, 0.9});
+  found.matched.assign(2, {0.5, 0.9});
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.touches.front().weight = 0.1;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  found.touches.push_back({0.5, 0.9});
   found.expected->targets.front().left_of_prior = 0.5;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
   found.stereo_points = 100;

@@ -12,7 +12,7 @@
 namespace birdseye::host {
 namespace {
 
-constexpr double kBall_mm = 40;
+constexpr double kOpenBall_mm = 40;
 
 /// Places of a ball that moved by shift_mm, where it faces the patient's front.
 std::vector<SeenPoint> seen_from_the_front(const Eigen::Vector3d& shift_mm) {
@@ -21,7 +21,7 @@ std::vector<SeenPoint> seen_from_the_front(const Eigen::Vector3d& shift_mm) {
   std::vector<SeenPoint> out;
   while (out.size() < 250) {
     const Eigen::Vector3d out_of_middle = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
-    const double off_mm = kBall_mm + 0.2 * normal(random);
+    const double off_mm = kOpenBall_mm + 0.2 * normal(random);
     if (out_of_middle.y() < -0.2) out.push_back({off_mm * out_of_middle + shift_mm, 0.25, std::nullopt});
   }
   return out;
@@ -52,7 +52,7 @@ PinholeView from_the_front() {
 }
 
 TEST(ExpectedErrors, LeaveOpenTheSideThatNothingIsKnownOf) {
-  const SignedDistance organ = testing::ball(kBall_mm);
+  const SignedDistance organ = testing::ball(kOpenBall_mm);
   const BelievedDeformation found = found_by(organ, seen_from_the_front({0, 3, 0}));
   const std::vector views{from_the_front()};
   const std::vector<Eigen::Vector3d> targets{{0, -30, 0}, {0, 30, 0}};
@@ -77,7 +77,7 @@ TEST(ExpectedErrors, OfWhatIsNotSeenAreThoseOfThePrior) {
 }
 
 TEST(MotionEvidence, GrowsWithTheMotionAndIsAgainstNone) {
-  const SignedDistance organ = testing::ball(kBall_mm);
+  const SignedDistance organ = testing::ball(kOpenBall_mm);
   double before_nats = -std::numeric_limits<double>::infinity();
   for (const double shift_mm : {0.0, 1.0, 3.0}) {
     const auto points = seen_from_the_front({0, shift_mm, 0});
