@@ -18,7 +18,7 @@ Eigen::Vector3d middle_mm(Eigen::Index n) {
   if (n > 0) out[(n - 1) / 2] = n % 2 == 0 ? kBeside_mm : -kBeside_mm;
   return out;
 }
-}
+}  // namespace
 
 Eigen::MatrixX3d DisplacementBasis::sum_at(const Eigen::VectorXd& unknowns, const Eigen::MatrixX3d& places) const {
   Eigen::MatrixX3d out(places.rows(), 3);
