@@ -111,36 +111,43 @@ void add_further(nlohmann::json& json, const RegistrationCase& c, const ViewRegi
   }
 }
 
+/// Of optimisers that compare renderings with the views.
+void add_similarity(nlohmann::json& json, const RegistrationCase& c, const ViewRegistration& found) {
+  json["similarity"] = c.similarity;
+  json["similarity_before"] = found.similarity_before;
+  json["similarity_after"] = found.similarity_after;
+  for (std::size_t n = 0; n < c.views.size(); ++n) {
+    json["per_view"][n]["similarity_before"] = found.per_view_before[n];
+    json["per_view"][n]["similarity_after"] = found.per_view_after[n];
+  }
+  json["gradient_evaluations"] = found.gradient_evaluations;
+  json["dof"] = found.parameters.size();
+  json["control_points"] = found.control_points;
+  json["why_so_many_points"] = found.why_so_many_points;
+  json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
+                   {"falloff", found.light.falloff},
+                   {"ambient", found.light.ambient},
+                   {"vignette", found.light.vignette}};
+  nlohmann::json& points = json["control_displacement_mm"];
+  for (std::size_t i = 0; i < found.parameters.size(); i += 3)
+    points.push_back({found.parameters[i], found.parameters[i + 1], found.parameters[i + 2]});
+}
+
 nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found, double time_s) {
-  nlohmann::json json = {{"similarity_before", found.similarity_before},
-                         {"similarity_after", found.similarity_after},
-                         {"evaluations", found.evaluations},
-                         {"gradient_evaluations", found.gradient_evaluations},
-                         {"time_s", time_s},
-                         {"dof", found.parameters.size()},
-                         {"control_points", found.control_points},
-                         {"why_so_many_points", found.why_so_many_points},
-                         {"optimiser", c.optimiser},
-                         {"similarity", c.similarity},
-                         {"views", c.views.size()},
-                         {"min_jacobian", found.min_jacobian},
-                         {"uncertainty_mm", nullptr}};
+  nlohmann::json json = {{"evaluations", found.evaluations},   {"time_s", time_s},
+                         {"optimiser", c.optimiser},           {"views", c.views.size()},
+                         {"min_jacobian", found.min_jacobian}, {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
   if (found.evidence_of_motion_nats) json["evidence_of_motion_nats"] = *found.evidence_of_motion_nats;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   if (found.expected) add_expected(json, c, found);
   add_further(json, c, found);
-  json["light"] = {{"offset_in_camera_mm", {found.light.offset_in_camera_mm.x(), found.light.offset_in_camera_mm.y()}},
-                   {"falloff", found.light.falloff},
-                   {"ambient", found.light.ambient},
-                   {"vignette", found.light.vignette}};
   for (std::size_t n = 0; n < c.views.size(); ++n) {
-    json["per_view"].push_back({{"view", c.views[n].name},
-                                {"similarity_before", found.per_view_before[n]},
-                                {"similarity_after", found.per_view_after[n]}});
+    json["per_view"].push_back({{"view", c.views[n].name}});
     if (n < found.outline_off_mm.size() && found.outline_off_mm[n])
       json["per_view"].back()["outline_off_mm"] = *found.outline_off_mm[n];
   }
+  if (!found.per_view_before.empty()) add_similarity(json, c, found);
   if (c.refine_pose) json["pose_correction"] = pose_json(found);
   // Without the true pose, the one that was found is believed.
   Transform<Patient, Patient> error_before, error_after;
@@ -168,9 +175,6 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
     json[fmt::format("{}tre_after_mm_mean", key)] = after->mean_mm;
     json[fmt::format("{}tre_after_mm_max", key)] = after->max_mm;
   }
-  nlohmann::json& points = json["control_displacement_mm"];
-  for (std::size_t i = 0; i < found.parameters.size(); i += 3)
-    points.push_back({found.parameters[i], found.parameters[i + 1], found.parameters[i + 2]});
   return json;
 }
 

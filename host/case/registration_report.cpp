@@ -80,6 +80,16 @@ void add_expected(HtmlPage& page, const ExpectedErrors& expected) {
   if (!expected.open.empty()) page.table(rows);
 }
 
+/// How a view is explained by what was found, by the figure that the optimiser goes by.
+std::string how_it_fits(const ViewRegistration& found, std::size_t view) {
+  if (view < found.per_view_before.size())
+    return fmt::format(": similarity {:.4f} before, {:.4f} after", found.per_view_before[view],
+                       found.per_view_after[view]);
+  if (view < found.outline_off_mm.size() && found.outline_off_mm[view])
+    return fmt::format(": outline {:.1f} mm off", *found.outline_off_mm[view]);
+  return "";
+}
+
 }  // namespace
 
 std::string registration_report(const RegistrationCase& c, const ViewRegistration& found, const Verdict& verdict,
@@ -103,11 +113,9 @@ std::string registration_report(const RegistrationCase& c, const ViewRegistratio
     std::vector<std::string> files;
     for (const char* kind : {"before", "after", "difference_before", "difference_after"})
       files.push_back(fmt::format("view{}_{}.png", n, kind));
-    page.picture_files(files,
-                       fmt::format("{}: similarity {:.4f} before, {:.4f} after. Left: before; right: after. Above: "
-                                   "the overlay; below: difference of grey (red: the video is brighter; blue: "
-                                   "darker; grey: not compared).",
-                                   c.views[n].name, found.per_view_before[n], found.per_view_after[n]));
+    page.picture_files(files, fmt::format("{}{}. Left: before; right: after. Above: the overlay; below: difference of "
+                                          "grey (red: the video is brighter; blue: darker; grey: not compared).",
+                                          c.views[n].name, how_it_fits(found, n)));
   }
   return page.html();
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/registration/geometry/geometry_verdict.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -68,89 +70,6 @@ Verdict by_similarity(const RegistrationCase& c, const ViewRegistration& found) 
   return {Grade::pass, {reason}, {}};
 }
 
-constexpr double kSure_mm = 5;
-
-/// What to do about a target of which too little is known.
-std::string views_to_add(const ExpectedErrors& expected) {
-  constexpr std::size_t kMost = 3;
-  if (expected.open.empty()) return "add views, nearer to the organ or from further aside";
-  std::string out = "add views of the organ's ";
-  const std::size_t sides = std::min(kMost, expected.open.size());
-  for (std::size_t n = 0; n < sides; ++n) {
-    if (n > 0) out += n + 1 == sides ? " and " : ", ";
-    out += fmt::format("{} ({:.0f} % of it known mostly by the prior, {:.1f} mm rms)", expected.open[n].side,
-                       100 * expected.open[n].share, expected.open[n].rms_mm);
-  }
-  return out;
-}
-
-/// Beyond how many mm nothing moved where the surface is seen. Empty: something did.
-std::optional<double> nothing_moved_beyond_mm(const ViewRegistration& found) {
-  constexpr double kGain_nats = 3, kDeviations = 2;
-  const ExpectedErrors& expected = *found.expected;
-  if (!expected.seen || !expected.seen_moved_mm) return std::nullopt;
-  const bool gains_nothing = found.evidence_of_motion_nats && *found.evidence_of_motion_nats < kGain_nats;
-  if (!gains_nothing && *expected.seen_moved_mm >= kDeviations * expected.seen->rms_mm) return std::nullopt;
-  return *expected.seen_moved_mm + expected.seen->radius95_mm;
-}
-
-/// Touches and matched places that the result is not at odds with.
-std::size_t others_that_fit(const ViewRegistration& found) {
-  const auto fits = [](const PlaceFit& fit) { return !fit.thought_wrong(); };
-  return static_cast<std::size_t>(std::count_if(found.touches.begin(), found.touches.end(), fits) +
-                                  std::count_if(found.matched.begin(), found.matched.end(), fits));
-}
-
-/// By where the surface is seen.
-Verdict by_geometry(const RegistrationCase& c, const ViewRegistration& found) {
-  constexpr double kLost_mm = 15, kFits_mm = 2;
-  for (std::size_t n = 0; n < found.outline_off_mm.size(); ++n) {
-    const std::optional<double>& off_mm = found.outline_off_mm[n];
-    if (!off_mm || *off_mm < kFits_mm) continue;
-    return {Grade::fail,
-            {fmt::format("{}: the organ's outline there is {:.1f} mm off what all views together say: check its "
-                         "picture and its pose",
-                         c.views[n].name, *off_mm)},
-            {}};
-  }
-  const std::optional<ExpectedErrors>& expected = found.expected;
-  const bool known = expected && (c.target_mm ? !expected->targets.empty() : expected->inside.has_value());
-  if (!known)
-    return {Grade::marginal, {"the error to be expected of the target is not known: it was not asked for"}, {}};
-  const ExpectedError target = c.target_mm ? expected->targets.front() : *expected->inside;
-  const char* const what = c.target_mm ? "the target" : "the organ's inside";
-  if (target.radius95_mm > kSure_mm) {
-    return {target.radius95_mm > kLost_mm ? Grade::fail : Grade::marginal,
-            {fmt::format("{} may be {:.1f} mm off (95 %), over {} mm: {}", what, target.radius95_mm, kSure_mm,
-                         views_to_add(*expected))},
-            {}};
-  }
-  // With little stereo nothing says that pictures and poses belong together, for outlines fit wrong poses too; and the
-  // prior may be what makes the target look known.
-  constexpr std::size_t kFewest = 100, kFewestOthers = 6;
-  constexpr double kHalf = 0.5;
-  if (*found.stereo_points < kFewest && (others_that_fit(found) < kFewestOthers || target.left_of_prior >= kHalf)) {
-    return {Grade::marginal,
-            {fmt::format("only {} places of the surface are seen by two views or more, under {}, and {} touches or "
-                         "landmarks fit, under {}, or leave over {:.0f} % of what {} may be off: {}",
-                         *found.stereo_points, kFewest, others_that_fit(found), kFewestOthers, 100 * kHalf, what,
-                         views_to_add(*expected))},
-            {}};
-  }
-  const auto beyond_mm = nothing_moved_beyond_mm(found);
-  if (beyond_mm && *beyond_mm > kSure_mm) {
-    return {Grade::marginal,
-            {fmt::format("nothing moved beyond {:.1f} mm where the surface is seen, and no more is known of it, over "
-                         "{} mm: {}",
-                         *beyond_mm, kSure_mm, views_to_add(*expected))},
-            {}};
-  }
-  std::string reason = fmt::format("{} is known within {:.1f} mm (95 %), by {} places of the surface", what,
-                                   target.radius95_mm, *found.stereo_points);
-  if (beyond_mm) reason += fmt::format("; nothing moved beyond {:.1f} mm where the surface is seen", *beyond_mm);
-  return {Grade::pass, {reason}, {}};
-}
-
 }  // namespace
 
 Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
@@ -158,7 +77,7 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
     return {Grade::fail, {"every deformation that was found folds: check the poses; the start is written"}, {}};
   if (found.worse_than_start)
     return {Grade::fail, {"no deformation explains the views better than the start, which is what is written"}, {}};
-  return found.stereo_points ? by_geometry(c, found) : by_similarity(c, found);
+  return found.stereo_points ? geometry_verdict(c.views, found) : by_similarity(c, found);
 }
 
 }  // namespace birdseye::host

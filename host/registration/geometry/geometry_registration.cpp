@@ -17,7 +17,7 @@
 #include "host/registration/geometry/motion_evidence.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/stereo.hpp"
-#include "host/registration/views/rendered_views.hpp"
+#include "host/registration/views/tissue.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
@@ -25,7 +25,6 @@ namespace birdseye::host {
 namespace {
 
 constexpr double kDistanceSpacing_mm = 2, kMargin_mm = 24;
-constexpr double kRenderSpacing_mm = 3;
 
 Error called_off() {
   return {Errc::disconnected, "the registration was called off; nothing of it is kept"};
@@ -62,6 +61,25 @@ Result<void> check_places(const GeometrySettings& settings) {
     }
   }
   return {};
+}
+
+/// Refuses a view of one grey, and one that sees nothing of the organ as it was at rest.
+Result<void> check_seen(const VideoView& view, const PinholeView& pinhole, const SeenSurface& rest) {
+  constexpr int kStep_px = 4;
+  std::uint8_t least = 255, most = 0;
+  for (std::size_t i = 0; i < view.grey.size(); ++i) {
+    if (view.mask[i] == 0) continue;
+    least = std::min(least, view.grey[i]);
+    most = std::max(most, view.grey[i]);
+  }
+  if (least >= most) {
+    return Error{Errc::degenerate,
+                 fmt::format("{}: is of one grey; is the lens covered? Take another view", view.name)};
+  }
+  const DepthMap depths = depth_map(rest, pinhole, kStep_px);
+  if (std::any_of(depths.depth_mm.begin(), depths.depth_mm.end(), [](float mm) { return std::isfinite(mm); }))
+    return {};
+  return Error{Errc::not_found, fmt::format("{}: sees nothing of the organ; check its pose and the labels", view.name)};
 }
 
 /// How the touches, which are the last of the points, and what is matched fit the result.
@@ -111,21 +129,13 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   const auto organ =
       signed_distance_of(ct, tissue_voxels(ct, labels, label_values, transfer), kDistanceSpacing_mm, kMargin_mm);
   if (!organ) return organ.error();
-  const auto tissue = tissue_of(ct, labels, label_values, transfer, kRenderSpacing_mm);
-  if (!tissue) return tissue.error();
-  auto rendered = RenderedViews::make(views, *tissue, "mi");
-  if (!rendered) return rendered.error();
   ViewRegistration out;
-  out.why_so_many_points = "as the evidence weighs the hypotheses";
-  out.similarity_before = rendered->similarity(no_deformation(ct, *organ));
-  out.per_view_before = rendered->per_view();
-  for (std::size_t n = 0; n < views.size(); ++n) {
-    if (rendered->tissue_pixels(n) > 0) continue;
-    return Error{Errc::not_found,
-                 fmt::format("{}: sees nothing of the organ; check its pose and the labels", views[n].name)};
-  }
   std::vector<PinholeView> seen_by;
-  for (std::size_t n = 0; n < views.size(); ++n) seen_by.push_back(pinhole_view(views[n], pictures[n]));
+  const SeenSurface rest(*organ);
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    seen_by.push_back(pinhole_view(views[n], pictures[n]));
+    if (auto good = check_seen(views[n], seen_by.back(), rest); !good) return good.error();
+  }
 
   // Each round looks nearer to the surface as the round before left it.
   struct Round {
@@ -180,8 +190,6 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   const SeenSurface surface(seen_distance(*organ, found.mean));
   if (!out.folded) tell_fits(settings, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
-  out.similarity_after = rendered->similarity(out.field);
-  out.per_view_after = rendered->per_view();
   if (settings.estimate_uncertainty && !out.folded) {
     out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;

@@ -32,10 +32,9 @@ struct GeometrySettings {
 /// Deforms the organ until its surface lies where the views show it: places found by stereo between the views and by
 /// the organ's outlines, and the touches and matched points of the settings, under several priors, each believed as far
 /// as its evidence goes; their mean. Nothing is compared with a rendering. pictures: of the views, in colour.
-/// Similarities are mutual information of renderings at full size, for the report alone. Refuses what register_views()
-/// refuses, and a touch or a matched point without a positive error; Errc::not_found where no place of the surface is
-/// found, and Errc::disconnected where the watch cancels. A field that folds is not returned: folded, and no
-/// deformation.
+/// Refuses what register_views() refuses, and a touch or a matched point without a positive error; Errc::not_found
+/// where no place of the surface is found, and Errc::disconnected where the watch cancels. A field that folds is not
+/// returned: folded, and no deformation.
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
                                            const Volume& ct, const Volume* labels, std::span<const int> label_values,
                                            const TransferFunction& transfer, const GeometrySettings& settings);

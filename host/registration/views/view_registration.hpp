@@ -95,7 +95,7 @@ struct ViewRegistration {
       Eigen::Vector3d::Zero();  ///< of the organ, about which the pose's correction turns; model's frame
   Headlight light;
   double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
-  std::vector<double> per_view_before, per_view_after;
+  std::vector<double> per_view_before, per_view_after;  ///< empty with optimiser geometry, which renders nothing
   int evaluations = 0, gradient_evaluations = 0;
   std::vector<TracePoint> trace;
   double min_jacobian = 1;
