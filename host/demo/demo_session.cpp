@@ -168,7 +168,7 @@ Result<void> DemoSession::end_deforming() {
   said.words = deformation_.note().line;
   said.found = deformed() != nullptr;
   if (deformed() != nullptr) {
-    said.surface_expected_mm = deformed()->uncertainty_mm;
+    said.surface_expected_mm = deformed()->seen_rms_mm;
     engine_->deform(deformed()->field);
   }
   progress_.keep(said.words);

@@ -7,6 +7,7 @@
 
 #include "host/files/picture.hpp"
 #include "host/registration/geometry/geometry_registration.hpp"
+#include "host/registration/geometry/geometry_verdict.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
 
 namespace birdseye::host {
@@ -57,13 +58,18 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
     GeometrySettings settings;
+    settings.targets_at_rest_mm = {target_in_patient_mm(*patient)};
     settings.progress = say;
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
     const Volume* const labels = patient->labels ? &*patient->labels : nullptr;
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);
-    return one.execute(
-        [&] { return register_geometry(views, pictures, patient->ct, labels, patient->organ, transfer, settings); });
+    return one.execute([&]() -> Result<Matched> {
+      auto found = register_geometry(views, pictures, patient->ct, labels, patient->organ, transfer, settings);
+      if (!found) return found.error();
+      const Verdict verdict = geometry_verdict(views, *found);
+      return Matched{*std::move(found), verdict};
+    });
   });
 }
 
@@ -74,17 +80,24 @@ bool DeformationStep::tick() {
     note_ = {false, matched->error().what};
     return false;
   }
-  ViewRegistration& registration = **matched;
+  ViewRegistration& registration = (*matched)->found;
+  const Verdict& verdict = (*matched)->verdict;
   if (registration.worse_than_start) {
     note_ = {false, "what explains the views folds the organ: keep other views, or go on without"};
     return false;
   }
-  note_.done = true;
-  note_.line = fmt::format("{} places of the surface are known by stereo", registration.stereo_points.value_or(0));
-  if (registration.uncertainty_mm)
-    note_.line += fmt::format("; the surface is known to {:.1f} mm", *registration.uncertainty_mm);
-  found_ =
-      std::make_shared<const DeformedOrgan>(DeformedOrgan{std::move(registration.field), registration.uncertainty_mm});
+  if (verdict.grade == Grade::fail) {
+    note_ = {false, verdict.reasons.front()};
+    return false;
+  }
+  note_ = {true, verdict.grade == Grade::marginal ? "with care: " + verdict.reasons.front() : verdict.reasons.front()};
+  DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt};
+  if (const auto& expected = registration.expected) {
+    if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;
+    if (!expected->targets.empty())
+      organ.target = MotionError{expected->targets.front().rms_mm, expected->targets.front().radius95_mm};
+  }
+  found_ = std::make_shared<const DeformedOrgan>(std::move(organ));
   return true;
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "calibration/base/verdict.hpp"
 #include "drivers/system/background.hpp"
 #include "host/operation/findings.hpp"
 #include "host/operation/live_step.hpp"
@@ -36,10 +37,16 @@ class DeformationStep {
   [[nodiscard]] const StepNote& note() const { return note_; }
 
  private:
+  /// What the thread found, and whether it may be believed.
+  struct Matched {
+    ViewRegistration found;
+    Verdict verdict;
+  };
+
   std::shared_ptr<const DeformedOrgan> found_;
   StepNote note_;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
-  Background<Result<ViewRegistration>> matching_;
+  Background<Result<Matched>> matching_;
 };
 
 }  // namespace birdseye::host

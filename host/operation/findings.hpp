@@ -32,10 +32,11 @@ struct RegisteredPatient {
   std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
 };
 
-/// How the organ is deformed.
+/// How the organ is deformed, and how well that is known; what was not estimated is absent.
 struct DeformedOrgan {
-  DisplacementField field;               ///< patient LPS, mm
-  std::optional<double> uncertainty_mm;  ///< of the organ's surface
+  DisplacementField field;            ///< patient LPS, mm
+  std::optional<double> seen_rms_mm;  ///< to be expected of the surface that the views see, of three axes together
+  std::optional<MotionError> target;
 };
 
 struct TouchFit {

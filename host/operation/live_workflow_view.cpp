@@ -58,7 +58,7 @@ OperationView LiveWorkflow::view() const {
   if (!camera_from_patient || !setup) return out;
   out.target = target_mark({setup->camera(), *camera_from_patient, as_shown_mm(target_mm, deformed),
                             picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm(),
-                            deformed != nullptr ? deformed->uncertainty_mm : std::nullopt},
+                            deformed != nullptr ? deformed->target : std::nullopt},
                            picture_.figures());
   return out;
 }

@@ -77,7 +77,11 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
   }
   sheet["deformed"] = operation.deformed != nullptr;
   if (const auto& found = operation.deformed) {
-    if (found->uncertainty_mm) sheet["uncertainty_mm"] = *found->uncertainty_mm;
+    if (found->seen_rms_mm) sheet["deformed_seen_rms_mm"] = *found->seen_rms_mm;
+    if (found->target) {
+      sheet["deformed_target_rms_mm"] = found->target->rms_mm;
+      sheet["deformed_target_radius95_mm"] = found->target->radius95_mm;
+    }
     if (auto written = write_field(folder / kField, found->field); !written) return written;
   } else {
     fs::remove(folder / kField, ignored);  // export would take an old one for the present
@@ -125,8 +129,12 @@ Result<Operation> read_operation(const fs::path& folder) {
     if (sheet.at("deformed").get<bool>()) {
       auto field = read_field(folder / kField);
       if (!field) return field.error();
-      out.deformed =
-          std::make_shared<const DeformedOrgan>(DeformedOrgan{*std::move(field), figure_of(sheet, "uncertainty_mm")});
+      const auto rms_mm = figure_of(sheet, "deformed_target_rms_mm");
+      const auto radius95_mm = figure_of(sheet, "deformed_target_radius95_mm");
+      std::optional<MotionError> target;
+      if (rms_mm && radius95_mm) target = {*rms_mm, *radius95_mm};
+      out.deformed = std::make_shared<const DeformedOrgan>(
+          DeformedOrgan{*std::move(field), figure_of(sheet, "deformed_seen_rms_mm"), target});
     }
     return out;
   } catch (const nlohmann::json::exception& wrong) {

@@ -44,7 +44,7 @@ struct SurfaceWatch::Shown {
 
   SurfaceFinding find(const KeptView& frame, const std::optional<double>& pose_mm) {
     SurfaceFinding out;
-    if (!surface.deformed->uncertainty_mm || !pose_mm) {
+    if (!surface.deformed->seen_rms_mm || !pose_mm) {
       out.words = pose_mm ? "how well the deformed surface is known was not estimated"
                           : "how far hand-eye is off in mm is not known";
       return out;
@@ -55,8 +55,8 @@ struct SurfaceWatch::Shown {
       out.words = *check ? now.error().what : check->error().what;
       return out;
     }
-    // The uncertainty is of three axes, and one of them is along the normal.
-    return (*check)->check(*now, {*surface.deformed->uncertainty_mm / std::sqrt(3.0), *pose_mm});
+    // The error is of three axes, and one of them is along the normal.
+    return (*check)->check(*now, {*surface.deformed->seen_rms_mm / std::sqrt(3.0), *pose_mm});
   }
 };
 

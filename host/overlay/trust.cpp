@@ -37,12 +37,13 @@ std::optional<TargetMark> target_mark(const TargetView& view, const TrustFigures
   const double pose_mm = std::max(std::sqrt(3.0) * view.position_sigma_mm, view.jitter_mm.value_or(0));
   // Hand-eye's is given across the line of sight, of two axes.
   const double hand_eye_mm = std::sqrt(1.5) * *figures.scope.held_out_mm;
-  const double rms_mm =
-      std::hypot(std::hypot(*figures.target_mm, hand_eye_mm), std::hypot(pose_mm, view.motion_error_mm.value_or(0)));
-  // Two of three axes show in the picture; 5.99 is the 95 % quantile of chi-square with two degrees of freedom.
-  const double radius_mm = rms_mm * std::sqrt(5.99 / 3);
-  return TargetMark{*at_px, rms_mm, radius_mm * camera.fx_px / target_in_camera_mm.z(), radius_mm,
-                    view.motion_error_mm.has_value()};
+  const double rigid_mm = std::hypot(*figures.target_mm, hand_eye_mm, pose_mm);
+  // Two of three axes show in the picture; 5.99 is the 95 % quantile of chi-square with two degrees of freedom. A
+  // deformation may be much less sure of one axis, which may lie across the picture: its radius is taken whole.
+  const MotionError motion = view.motion_error.value_or(MotionError{});
+  const double radius_mm = std::hypot(rigid_mm * std::sqrt(5.99 / 3), motion.radius95_mm);
+  return TargetMark{*at_px, std::hypot(rigid_mm, motion.rms_mm), radius_mm * camera.fx_px / target_in_camera_mm.z(),
+                    radius_mm, view.motion_error.has_value()};
 }
 
 }  // namespace birdseye::host

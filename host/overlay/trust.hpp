@@ -48,14 +48,19 @@ struct TargetMark {
   bool motion_counted = false;          ///< whether that counts how the organ has moved since the CT
 };
 
+/// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
+struct MotionError {
+  double rms_mm = 0, radius95_mm = 0;
+};
+
 /// One frame as the target is seen in it.
 struct TargetView {
   CameraModel camera;
   Transform<Camera, Patient> camera_from_patient;
-  Eigen::Vector3d target_in_patient_mm;   ///< where it is shown: deformed, where the CT is
-  double position_sigma_mm = 0;           ///< of the frame's pose, each axis
-  std::optional<double> jitter_mm;        ///< of single poses at the target; empty before there are enough
-  std::optional<double> motion_error_mm;  ///< of where the deformation has the organ; empty: it is not known
+  Eigen::Vector3d target_in_patient_mm;     ///< where it is shown: deformed, where the CT is
+  double position_sigma_mm = 0;             ///< of the frame's pose, each axis
+  std::optional<double> jitter_mm;          ///< of single poses at the target; empty before there are enough
+  std::optional<MotionError> motion_error;  ///< empty: the organ's motion since the CT is not known
 };
 
 /// Empty where the target is out of view, or hand-eye's or the registration's error is not known.

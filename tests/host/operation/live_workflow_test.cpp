@@ -175,7 +175,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   field.size = {2, 2, 2};
   field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
   field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
-  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7});
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
   ASSERT_TRUE(write_operation(scratch.path(), kept));
   LiveWorkflow workflow(again);
   load(workflow);

@@ -49,7 +49,7 @@ TEST(SurfaceWatch, HoldsAFrameASecondAgainstTheDeformationThatIsShown) {
                          by.views[0].camera,
                          std::make_shared<const PatientPlan>(*std::move(plan)),
                          std::make_shared<const TransferFunction>(*std::move(transfer)),
-                         std::make_shared<const DeformedOrgan>(DeformedOrgan{*truth, 0.9})};
+                         std::make_shared<const DeformedOrgan>(DeformedOrgan{*truth, 0.9, std::nullopt})};
   SurfaceWatch watch;
   watch.offer(kept(by, 0), 0.3, at_ms(0));
   EXPECT_FALSE(watch.watches());
@@ -66,7 +66,7 @@ TEST(SurfaceWatch, HoldsAFrameASecondAgainstTheDeformationThatIsShown) {
   EXPECT_EQ(second->at, at_ms(1000));
   EXPECT_EQ(second->finding.verdict, SurfaceVerdict::cannot_tell) << "the pose's error is not known";
   // Nothing is known of how good a deformation is that nobody estimated.
-  surface.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{*truth, std::nullopt});
+  surface.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{*truth, std::nullopt, std::nullopt});
   watch.show(surface);
   watch.offer(kept(by, 0), 0.3, at_ms(1100));
   const auto third = next(watch);

@@ -29,9 +29,11 @@ TEST(TargetMark, AddsUpWhatIsKnownOfTheTarget) {
   EXPECT_FALSE(mark->motion_counted);
   TargetView moved = view();
   moved.jitter_mm = 2;
-  moved.motion_error_mm = 0.7;
+  moved.motion_error = MotionError{0.7, 1.4};
   const auto more = target_mark(moved, figures);
   EXPECT_NEAR(more->rms_mm, std::sqrt(1.5 * 1.5 + 1.5 * 0.25 + 4 + 0.49), 1e-12);
+  const double rigid_mm = std::sqrt(1.5 * 1.5 + 1.5 * 0.25 + 4);
+  EXPECT_NEAR(more->radius_mm, std::hypot(rigid_mm * std::sqrt(5.99 / 3), 1.4), 1e-12);
   EXPECT_TRUE(more->motion_counted);
 }
 
