@@ -141,6 +141,12 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
   if (found.evidence_of_motion_nats) json["evidence_of_motion_nats"] = *found.evidence_of_motion_nats;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   if (found.expected) add_expected(json, c, found);
+  if (found.held_out) {
+    json["held_out"] = {{"view", c.views[found.held_out->view].name},
+                        {"places", found.held_out->places},
+                        {"off_mm", found.held_out->off_mm},
+                        {"expected_off_mm", found.held_out->expected_off_mm}};
+  }
   add_further(json, c, found);
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     json["per_view"].push_back({{"view", c.views[n].name}});

@@ -11,8 +11,7 @@ namespace birdseye::host {
 
 namespace {
 
-/// What neighbouring residuals have wrong together: the surface's own error, and that of the views' poses.
-constexpr double kShared_mm = 0.15, kSharedOver_mm = 8;
+constexpr double kSharedOver_mm = 8;
 
 Eigen::MatrixXd gaussian(const Eigen::MatrixXd& squared_mm2, double length_mm) {
   return (squared_mm2.array() * (-0.5 / (length_mm * length_mm))).exp().matrix();

@@ -13,6 +13,9 @@
 
 namespace birdseye::host {
 
+/// What neighbouring residuals have wrong together: the surface's own error, and that of the views' poses.
+inline constexpr double kShared_mm = 0.15;
+
 /// The displacement that surface points and matched points ask for under a prior, by Gauss and Newton's method on
 /// distance(seen + displacement) = 0, and on seen + displacement = rest of what is matched, with Geman and McClure's
 /// weights, annealed: the posterior of a Gaussian process about the best linearisation.

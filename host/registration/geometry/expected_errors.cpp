@@ -7,42 +7,11 @@
 #include <cmath>
 
 #include "host/registration/geometry/open_sides.hpp"
-#include "host/registration/geometry/seen_surface.hpp"
+#include "host/registration/geometry/sight.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-/// Whether a view sees a place of the surface.
-class Sight {
- public:
-  Sight(const SignedDistance& organ, const LatticeField& seen, std::span<const PinholeView> views)
-      : surface_(seen_distance(organ, seen)), views_(views) {
-    constexpr int kStep_px = 4;
-    for (const PinholeView& view : views) depths_.push_back(depth_map(surface_, view, kStep_px));
-  }
-  [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& place_mm) const { return surface_.normal(place_mm); }
-  [[nodiscard]] bool sees(const Eigen::Vector3d& place_mm) const {
-    constexpr double kLeastFacing = 0.1, kBehind_mm = 4;
-    const Eigen::Vector3d normal = surface_.normal(place_mm);
-    for (std::size_t n = 0; n < views_.size(); ++n) {
-      const PinholeView& view = views_[n];
-      const auto pixel = view.project(place_mm);
-      if (!(pixel.depth_mm > 0) || pixel.x_px < 0 || pixel.y_px < 0 || pixel.x_px > view.width_px - 1 ||
-          pixel.y_px > view.height_px - 1)
-        continue;
-      if ((view.eye_in_patient_mm - place_mm).normalized().dot(normal) < kLeastFacing) continue;
-      const double depth_mm = static_cast<double>(depths_[n].at(pixel.x_px, pixel.y_px));
-      if (std::isfinite(depth_mm) && depth_mm > pixel.depth_mm - kBehind_mm) return true;
-    }
-    return false;
-  }
-
- private:
-  SeenSurface surface_;
-  std::span<const PinholeView> views_;
-  std::vector<DepthMap> depths_;
-};
 
 void thin_out(std::vector<Eigen::Vector3d>& places, std::size_t most) {
   const std::size_t every = std::max<std::size_t>(1, (places.size() + most - 1) / most);
@@ -77,14 +46,15 @@ Places places_of(const SignedDistance& organ) {
 
 std::vector<KnownPlace> known_surface(std::span<const Eigen::Vector3d> rest_mm, const SignedDistance& organ,
                                       const BelievedDeformation& found, std::span<const PinholeView> views) {
-  const Sight sight(organ, found.mean, views);
+  const SeenSurface surface(seen_distance(organ, found.mean));
+  const Sight sight(surface, views);
   std::vector<KnownPlace> out(rest_mm.size());
   tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     const Eigen::Vector3d seen_mm = seen_place(found.mean, rest_mm[i]);
     out[i] = {rest_mm[i],
               seen_mm,
-              sight.normal(seen_mm),
-              sight.sees(seen_mm),
+              surface.normal(seen_mm),
+              sight.seen_by(seen_mm) > 0,
               found.covariance(rest_mm[i]),
               found.prior_covariance(rest_mm[i])};
   });

@@ -13,6 +13,7 @@
 #include "host/registration/geometry/believed_deformation.hpp"
 #include "host/registration/geometry/expected_errors.hpp"
 #include "host/registration/geometry/gathered_points.hpp"
+#include "host/registration/geometry/held_out_view.hpp"
 #include "host/registration/geometry/hypotheses.hpp"
 #include "host/registration/geometry/motion_evidence.hpp"
 #include "host/registration/geometry/outlines.hpp"
@@ -193,6 +194,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (settings.estimate_uncertainty && !out.folded) {
     out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
+    out.held_out = held_out_view(*organ, seen_by, found, settings.touches, settings.matched);
   }
   return out;
 }

@@ -45,6 +45,7 @@ std::size_t others_that_fit(const ViewRegistration& found) {
 
 Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found) {
   constexpr double kLost_mm = 15, kFits_mm = 2;
+  constexpr double kHeldOut_mm = 0.5, kHeldOutTimes = 3;
   for (std::size_t n = 0; n < found.outline_off_mm.size(); ++n) {
     const std::optional<double>& off_mm = found.outline_off_mm[n];
     if (!off_mm || *off_mm < kFits_mm) continue;
@@ -76,6 +77,14 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
                          "landmarks fit, under {}, or leave over {:.0f} % of what {} may be off: {}",
                          *found.stereo_points, kFewest, others_that_fit(found), kFewestOthers, 100 * kHalf, what,
                          views_to_add(*expected))},
+            {}};
+  }
+  if (const auto& held_out = found.held_out;
+      held_out && held_out->off_mm > std::max(kHeldOut_mm, kHeldOutTimes * held_out->expected_off_mm)) {
+    return {Grade::marginal,
+            {fmt::format("{} does not bear out what the other views say: it is {:.1f} mm off, where {:.1f} mm is to be "
+                         "expected: check its pose, and hand-eye's error",
+                         views[held_out->view].name, held_out->off_mm, held_out->expected_off_mm)},
             {}};
   }
   const auto beyond_mm = nothing_moved_beyond_mm(found);

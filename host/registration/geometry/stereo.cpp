@@ -8,6 +8,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/registration/geometry/sight.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -53,10 +55,7 @@ struct Found {
 class Sweep {
  public:
   Sweep(const std::vector<PinholeView>& views, const SeenSurface& surface, const StereoSettings& settings)
-      : views_(views), surface_(surface), settings_(settings) {
-    constexpr int kDepthStep_px = 4;
-    for (const PinholeView& view : views) depths_.push_back(depth_map(surface, view, kDepthStep_px));
-  }
+      : views_(views), surface_(surface), settings_(settings), sight_(surface, views, {kLeastFacing, 8, 10}) {}
 
   std::vector<Found> run() const {
     std::vector<std::pair<std::size_t, int>> rows;
@@ -90,7 +89,7 @@ class Sweep {
   std::optional<Patch> patch_at(std::size_t v, int x, int y) const {
     const PinholeView& view = views_[v];
     if (view.usable.at<std::uint8_t>(y, x) == 0) return std::nullopt;
-    if (!std::isfinite(depths_[v].at(x, y))) return std::nullopt;
+    if (!std::isfinite(sight_.depths(v).at(x, y))) return std::nullopt;
     Patch patch{};
     patch.view = v;
     patch.x_px = x;
@@ -113,18 +112,6 @@ class Sweep {
     }
     if (count < kLeastCommon * kSamples) return std::nullopt;
     return patch;
-  }
-
-  /// Whether the other view sees the patch where the surface is believed to be.
-  bool sees(const PinholeView& other, const DepthMap& depths, const Patch& patch) const {
-    constexpr double kBehind_mm = 8, kBorder_px = 10;
-    const auto pixel = other.project(patch.place_mm);
-    if (!(pixel.depth_mm > 0) || pixel.x_px < kBorder_px || pixel.y_px < kBorder_px ||
-        pixel.x_px > other.width_px - kBorder_px || pixel.y_px > other.height_px - kBorder_px)
-      return false;
-    const Eigen::Vector3d towards = (other.eye_in_patient_mm - patch.place_mm).normalized();
-    const double depth = static_cast<double>(depths.at(pixel.x_px, pixel.y_px));
-    return patch.normal.dot(towards) > kLeastFacing && std::isfinite(depth) && depth > pixel.depth_mm - kBehind_mm;
   }
 
   /// Normalised cross-correlation of the patch with the other view where its plane is moved to a depth.
@@ -174,7 +161,7 @@ class Sweep {
     std::vector<float> score(steps, 0);
     std::vector<int> seen(steps, 0);
     for (std::size_t w = 0; w < views_.size(); ++w) {
-      if (w == v || !sees(views_[w], depths_[w], *patch)) continue;
+      if (w == v || !sight_.sees(w, patch->place_mm)) continue;
       for (std::size_t s = 0; s < steps; ++s) {
         const double depth = patch->depth_mm + (static_cast<int>(s) - half) * settings_.step_mm;
         if (depth <= 0) continue;
@@ -206,7 +193,7 @@ class Sweep {
   const std::vector<PinholeView>& views_;
   const SeenSurface& surface_;
   const StereoSettings& settings_;
-  std::vector<DepthMap> depths_;
+  Sight sight_;
 };
 
 /// Whether a point lies on the plane through its neighbours, robustly fitted.

@@ -83,6 +83,14 @@ struct PlaceFit {
   [[nodiscard]] bool thought_wrong() const { return weight < 0.25; }
 };
 
+/// A view that a registration was found again without.
+struct HeldOutView {
+  std::size_t view = 0;        ///< of those that were given
+  std::size_t places = 0;      ///< of its outline and by stereo with it
+  double off_mm = 0;           ///< the median of how far they are from the surface that was found without it
+  double expected_off_mm = 0;  ///< the same as it was to be expected
+};
+
 struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
@@ -94,7 +102,7 @@ struct ViewRegistration {
   Eigen::Vector3d centre_mm =
       Eigen::Vector3d::Zero();  ///< of the organ, about which the pose's correction turns; model's frame
   Headlight light;
-  double similarity_before = 0, similarity_after = 0;  ///< mean over the views, nats, under the light found
+  double similarity_before = 0, similarity_after = 0;   ///< mean over the views, nats, under the light found
   std::vector<double> per_view_before, per_view_after;  ///< empty with optimiser geometry, which renders nothing
   int evaluations = 0, gradient_evaluations = 0;
   std::vector<TracePoint> trace;
@@ -112,6 +120,8 @@ struct ViewRegistration {
   /// Of each view, the median of how far its outline is from the surface that was found; none where it shows too little
   /// of one. Only with optimiser geometry.
   std::vector<std::optional<double>> outline_off_mm;
+  /// Only with optimiser geometry, three views or more and enough to compare.
+  std::optional<HeldOutView> held_out;
   /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.
   std::vector<PlaceFit> touches, matched;
   std::string why_so_many_points;  ///< in words

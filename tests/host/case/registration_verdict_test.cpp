@@ -19,6 +19,8 @@ ViewRegistration well_found() {
 
 RegistrationCase with_target() {
   RegistrationCase out;
+  out.views.resize(3);
+  out.views[1].name = "view1.png";
   out.target_mm = Eigen::Vector3d::Zero();
   return out;
 }
@@ -63,6 +65,18 @@ TEST(RegistrationVerdict, NamesTheOpenSidesOfATargetThatIsNotKnown) {
       << verdict.reasons.front();
   found.expected->targets.front().radius95_mm = 16;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+}
+
+TEST(RegistrationVerdict, NamesAViewThatDoesNotBearOutTheOthers) {
+  ViewRegistration found = well_found();
+  found.held_out = HeldOutView{1, 40, 0.59, 0.2};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.held_out->off_mm = 0.61;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "view1.png does not bear out"));
+  // So little may be the lens's.
+  found.held_out = HeldOutView{1, 40, 0.49, 0.1};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
 }
 
 TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereTouchesMakeTheTargetKnown) {
