@@ -1,5 +1,6 @@
 #include "host/operation/live_workflow.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace birdseye::host {
@@ -119,8 +120,12 @@ void LiveWorkflow::watch_surface(HostTime now) {
   const auto seen_from = picture_.seen_from();
   if (!seen_from) return;
   std::optional<double> pose_mm;
-  if (const auto& hand_eye_mm = picture_.figures().scope.held_out_mm)
-    pose_mm = std::hypot(*hand_eye_mm, picture_.frame()->info.pose.position_sigma_mm);
+  if (const auto& hand_eye_mm = picture_.figures().scope.held_out_mm) {
+    // Of a pose, each axis: its position's error, or where its angles' too have the target, which the jitter counts.
+    const double one_mm =
+        std::max(picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm().value_or(0) / std::sqrt(3.0));
+    pose_mm = std::hypot(*hand_eye_mm, std::sqrt(2.0) * one_mm);  // this view's, and that of a kept one
+  }
   watch_.offer({*picture_.frame(), *seen_from}, pose_mm, now);
 }
 
