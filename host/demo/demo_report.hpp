@@ -22,11 +22,12 @@ struct FrameError {
 /// How the CT was deformed.
 struct DeformingFigures {
   int views = 0;
-  double took_s = 0;                          ///< on one core, beside the video
-  std::string words;                          ///< what came of it
-  bool found = false;                         ///< whether the overlay shows the CT deformed
-  std::optional<double> surface_expected_mm;  ///< the error to be expected of the surface that is seen, root mean square
-  std::vector<FrameError> rigid_errors;       ///< of the CT as it was taken, in the frames that were overlaid
+  double took_s = 0;   ///< on one core, beside the video
+  std::string words;   ///< what came of it
+  bool found = false;  ///< whether the overlay shows the CT deformed
+  std::optional<double>
+      surface_expected_mm;               ///< the error to be expected of the surface that is seen, root mean square
+  std::vector<FrameError> rigid_errors;  ///< of the CT as it was taken, in the frames that were overlaid
 };
 
 /// All that the demo measured and its report says.
