@@ -88,13 +88,11 @@ Share::Pointer resampled(const Share::Pointer& share, const std::array<int, 3>& 
 }
 
 /// Steps of the grid, positive where the share is over a half: by fast marching from where the share is a half, between
-/// the grid's points. Huge further than that many steps from there.
-Share::Pointer distance_of(const Share::Pointer& share, double furthest_steps) {
+/// the grid's points.
+Share::Pointer distance_of(const Share::Pointer& share) {
   const auto march = itk::ReinitializeLevelSetImageFilter<Share>::New();
   march->SetInput(share);
   march->SetLevelSetValue(0.5);
-  march->NarrowBandingOn();
-  march->SetNarrowBandwidth(2 * (furthest_steps - 2));  // marches half of it and two steps more
   march->Update();
   return march->GetOutput();
 }
@@ -205,11 +203,9 @@ Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const st
         Errc::not_found,
         "what is seen of the volume is too thin to have an inside; check label_values and the transfer function"};
   }
-  const double furthest_mm = std::max(SignedDistance::kFurthest_mm, 3 * spacing_mm);
-  const Share::Pointer distance = distance_of(share, furthest_mm / spacing_mm);
+  const Share::Pointer distance = distance_of(share);
   std::vector<float> distances_mm(distance->GetBufferPointer(), distance->GetBufferPointer() + grid_count(points));
-  for (float& d : distances_mm)
-    d = static_cast<float>(std::clamp(-spacing_mm * static_cast<double>(d), -furthest_mm, furthest_mm));
+  for (float& d : distances_mm) d *= static_cast<float>(-spacing_mm);
   Eigen::Affine3d patient_from_box;
   patient_from_box.linear() = axes;
   patient_from_box.translation() = grid.patient_from_voxel.translation() + axes * origin_mm;

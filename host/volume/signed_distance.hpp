@@ -16,9 +16,6 @@ namespace birdseye::host {
 /// grid over a box.
 class SignedDistance {
  public:
-  /// As far from the boundary as signed_distance_of() measures: further in or out, it says so much.
-  static constexpr double kFurthest_mm = 16;
-
   /// distances_mm: one a point, x fastest, 2 points an axis at least. patient_from_box: rigid, from mm along the box's
   /// axes, from its first point on.
   SignedDistance(const std::array<int, 3>& points, double spacing_mm, const Eigen::Affine3d& patient_from_box,
@@ -54,9 +51,8 @@ class SignedDistance {
 
 /// From the boundary of a mask: one value a voxel of the grid, not 0 where the organ is. The boundary is where the
 /// mask, smoothed by a Gaussian of a millimetre or half a voxel, is a half; between voxels. The box holds the organ and
-/// a margin about it, and the distance is told up to kFurthest_mm from the boundary (or 3 points of the grid); past the
-/// volume's faces the organ goes on as it ends there. Errc::not_found for a mask that is empty, full or too thin;
-/// Errc::bad_value for a grid whose axes are not at right angles or have fewer than 4 voxels.
+/// a margin about it; past the volume's faces the organ goes on as it ends there. Errc::not_found for a mask that is
+/// empty, full or too thin; Errc::bad_value for a grid whose axes are not at right angles or have fewer than 4 voxels.
 Result<SignedDistance> signed_distance_of(const Volume& grid, std::span<const std::uint8_t> mask, double spacing_mm,
                                           double margin_mm);
 

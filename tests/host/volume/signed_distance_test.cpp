@@ -62,17 +62,6 @@ TEST(SignedDistance, OfABallIsTheDistanceToItsSphereWithinAPartOfAVoxel) {
   EXPECT_LT(std::sqrt(squares_mm2 / count), 0.35);
 }
 
-TEST(SignedDistance, IsHeldWhereTheBoundaryIsFurtherThanItMeasures) {
-  const Volume grid = oblique_grid();
-  const Eigen::Vector3d middle_mm = grid.patient_from_voxel * Eigen::Vector3d(30, 28, 20);
-  const auto distance = signed_distance_of(grid, ball(grid, middle_mm, 30), 2, 40);
-  ASSERT_TRUE(distance) << distance.error().what;
-  EXPECT_NEAR(distance->distance_mm(middle_mm), -SignedDistance::kFurthest_mm, 1e-4);
-  const Eigen::Vector3d outside_mm = middle_mm + distance->patient_from_box().linear() * Eigen::Vector3d(60, 0, 0);
-  EXPECT_NEAR(distance->distance_mm(outside_mm), SignedDistance::kFurthest_mm, 1e-4);
-  EXPECT_NEAR(distance->sample(outside_mm).gradient.norm(), 0, 1e-4);
-}
-
 TEST(SignedDistance, GrowsByTheWayToItsBox) {
   const Volume grid = oblique_grid();
   const Eigen::Vector3d middle_mm = grid.patient_from_voxel * Eigen::Vector3d(30, 28, 20);
