@@ -71,13 +71,20 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
   // prior may be what makes the target look known.
   constexpr std::size_t kFewest = 100, kFewestOthers = 6;
   constexpr double kHalf = 0.5;
-  if (*found.stereo_points < kFewest && (others_that_fit(found) < kFewestOthers || target.left_of_prior >= kHalf)) {
-    return {Grade::marginal,
-            {fmt::format("only {} places of the surface are seen by two views or more, under {}, and {} touches or "
-                         "landmarks fit, under {}, or leave over {:.0f} % of what {} may be off: {}",
-                         *found.stereo_points, kFewest, others_that_fit(found), kFewestOthers, 100 * kHalf, what,
-                         views_to_add(*expected))},
-            {}};
+  if (*found.stereo_points < kFewest) {
+    const std::size_t others = others_that_fit(found);
+    std::string lacks;
+    if (others < kFewestOthers)
+      lacks = fmt::format("{} touches or landmarks fit, under {}", others, kFewestOthers);
+    else if (target.left_of_prior >= kHalf)
+      lacks = fmt::format("touches and landmarks leave {:.0f} % of what {} may be off, over {:.0f} %",
+                          100 * target.left_of_prior, what, 100 * kHalf);
+    if (!lacks.empty()) {
+      return {Grade::marginal,
+              {fmt::format("two views or more see only {} places of the surface, under {}, and {}: {}",
+                           *found.stereo_points, kFewest, lacks, views_to_add(*expected))},
+              {}};
+    }
   }
   if (const auto& held_out = found.held_out;
       held_out && held_out->off_mm > std::max(kHeldOut_mm, kHeldOutTimes * held_out->expected_off_mm)) {
