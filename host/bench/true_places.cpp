@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/pinhole_view.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
-#include "host/registration/views/tissue.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
@@ -13,8 +13,6 @@ namespace birdseye::host {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kGrid_mm = 2;
 
 Vector3d grid_place(const SignedDistance& organ, int i, int j, int k) {
   return organ.patient_from_box() * (organ.spacing_mm() * Vector3d(i, j, k));
@@ -68,10 +66,8 @@ std::vector<TruePlace> thinned(const std::vector<Vector3d>& rest_mm, const Displ
 Result<std::vector<PlacesOfKind>> true_places(const RegistrationCase& c, const TransferFunction& transfer,
                                               const DisplacementField& truth,
                                               std::span<const Transform<Camera, Patient>> true_poses) {
-  constexpr double kMargin_mm = 24, kInside_mm = 6, kMoved_mm = 3;
-  const Volume* const labels = c.labels ? &*c.labels : nullptr;
-  const auto organ =
-      signed_distance_of(c.ct, tissue_voxels(c.ct, labels, c.label_values, transfer), kGrid_mm, kMargin_mm);
+  constexpr double kInside_mm = 6, kMoved_mm = 3;
+  const auto organ = organ_distance(c.ct, c.labels ? &*c.labels : nullptr, c.label_values, transfer);
   if (!organ) return organ.error();
   std::vector<Vector3d> of_surface, of_inside;
   for_grid(*organ, [&](const Vector3d& place) {

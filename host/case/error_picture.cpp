@@ -9,9 +9,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "host/registration/geometry/lattice_field.hpp"
+#include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
-#include "host/registration/views/tissue.hpp"
 #include "host/report/slice_picture.hpp"
 
 namespace birdseye::host {
@@ -183,17 +182,12 @@ Picture draw_expected_error(const SignedDistance& organ, std::span<const Surface
 
 Result<std::optional<Picture>> expected_error_picture(const RegistrationCase& c, const TransferFunction& transfer,
                                                       const ViewRegistration& found) {
-  constexpr double kSpacing_mm = 2, kMargin_mm = 24;
   if (!found.expected || found.expected->places.empty()) return std::optional<Picture>();
-  const Volume* const labels = c.labels ? &*c.labels : nullptr;
-  const auto rest =
-      signed_distance_of(c.ct, tissue_voxels(c.ct, labels, c.label_values, transfer), kSpacing_mm, kMargin_mm);
+  const auto rest = organ_distance(c.ct, c.labels ? &*c.labels : nullptr, c.label_values, transfer);
   if (!rest) return rest.error();
-  LatticeField field(*rest);
-  for (std::size_t n = 0; n < field.size(); ++n) field.set(n, found.field.displacement(field.place_mm(n)));
   std::optional<Vector3d> target_mm;
   if (c.target_mm) target_mm = found.field.deformed_of(*c.target_mm);
-  return std::optional(draw_expected_error(seen_distance(*rest, field), found.expected->places, target_mm));
+  return std::optional(draw_expected_error(deformed_distance(*rest, found.field), found.expected->places, target_mm));
 }
 
 }  // namespace birdseye::host

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "host/registration/geometry/lattice_field.hpp"
-#include "host/registration/views/tissue.hpp"
+#include "host/registration/geometry/organ_surface.hpp"
 
 namespace birdseye::host {
 
@@ -18,21 +17,17 @@ Result<PinholeView> seen_by(const KeptView& view, const CameraModel& camera) {
 }
 
 Result<SurfaceCheck> check_of(const WatchedSurface& surface) {
-  constexpr double kSpacing_mm = 2, kMargin_mm = 24;
   const PatientPlan& patient = *surface.patient;
-  const Volume* const labels = patient.labels ? &*patient.labels : nullptr;
-  const auto rest = signed_distance_of(patient.ct, tissue_voxels(patient.ct, labels, patient.organ, *surface.transfer),
-                                       kSpacing_mm, kMargin_mm);
+  const auto rest =
+      organ_distance(patient.ct, patient.labels ? &*patient.labels : nullptr, patient.organ, *surface.transfer);
   if (!rest) return rest.error();
-  LatticeField field(*rest);
-  for (std::size_t n = 0; n < field.size(); ++n) field.set(n, surface.deformed->field.displacement(field.place_mm(n)));
   std::vector<PinholeView> kept;
   for (const KeptView& view : surface.views) {
     auto pinhole = seen_by(view, surface.camera);
     if (!pinhole) return pinhole.error();
     kept.push_back(*std::move(pinhole));
   }
-  return SurfaceCheck(seen_distance(*rest, field), std::move(kept));
+  return SurfaceCheck(deformed_distance(*rest, surface.deformed->field), std::move(kept));
 }
 
 }  // namespace

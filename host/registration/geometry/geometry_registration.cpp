@@ -16,16 +16,13 @@
 #include "host/registration/geometry/held_out_view.hpp"
 #include "host/registration/geometry/hypotheses.hpp"
 #include "host/registration/geometry/motion_evidence.hpp"
+#include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/stereo.hpp"
-#include "host/registration/views/tissue.hpp"
-#include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-constexpr double kDistanceSpacing_mm = 2, kMargin_mm = 24;
 
 Error called_off() {
   return {Errc::disconnected, "the registration was called off; nothing of it is kept"};
@@ -44,6 +41,22 @@ std::optional<double> outline_off_mm(const PinholeView& view, const SeenSurface&
     off_mm.push_back(std::abs(surface.distance().distance_mm(point.place_mm)));
   if (off_mm.size() < kFewest) return std::nullopt;
   return median_of(std::move(off_mm));
+}
+
+/// A picture and a mask a view, of its camera's size.
+Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const RgbView> pictures) {
+  if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
+  if (pictures.size() != views.size())
+    return Error{Errc::bad_value, fmt::format("{} pictures for {} views", pictures.size(), views.size())};
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    const CameraModel& camera = views[n].camera;
+    if (!pictures[n].whole() || pictures[n].width_px != camera.width_px || pictures[n].height_px != camera.height_px ||
+        views[n].mask.size() != pictures[n].area_px()) {
+      return Error{Errc::bad_value, fmt::format("{}: its picture or mask is not of the camera's {}x{} pixels",
+                                                views[n].name, camera.width_px, camera.height_px)};
+    }
+  }
+  return {};
 }
 
 /// Places whose error is none would be believed against everything else.
@@ -115,20 +128,9 @@ void tell_fits(const GeometrySettings& settings, const BelievedDeformation& foun
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
                                            const Volume& ct, const Volume* labels, std::span<const int> label_values,
                                            const TransferFunction& transfer, const GeometrySettings& settings) {
-  if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
-  if (pictures.size() != views.size())
-    return Error{Errc::bad_value, fmt::format("{} pictures for {} views", pictures.size(), views.size())};
-  for (std::size_t n = 0; n < views.size(); ++n) {
-    const CameraModel& camera = views[n].camera;
-    if (!pictures[n].whole() || pictures[n].width_px != camera.width_px || pictures[n].height_px != camera.height_px ||
-        views[n].mask.size() != pictures[n].area_px()) {
-      return Error{Errc::bad_value, fmt::format("{}: its picture or mask is not of the camera's {}x{} pixels",
-                                                views[n].name, camera.width_px, camera.height_px)};
-    }
-  }
+  if (auto good = check_pictures(views, pictures); !good) return good.error();
   if (auto good = check_places(settings); !good) return good.error();
-  const auto organ =
-      signed_distance_of(ct, tissue_voxels(ct, labels, label_values, transfer), kDistanceSpacing_mm, kMargin_mm);
+  const auto organ = organ_distance(ct, labels, label_values, transfer);
   if (!organ) return organ.error();
   ViewRegistration out;
   std::vector<PinholeView> seen_by;
