@@ -111,6 +111,20 @@ void add_further(nlohmann::json& json, const RegistrationCase& c, const ViewRegi
   }
 }
 
+/// By how much the views' poses were off, and by how much each was moved.
+void add_poses(nlohmann::json& json, const RegistrationCase& c, const AdjustedPoses& adjusted) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  json["poses"] = {{"matches", adjusted.matches},
+                   {"eye_sigma_mm", adjusted.noise.eye_mm},
+                   {"angle_sigma_deg", adjusted.noise.angle_rad * kDegrees}};
+  for (std::size_t n = 0; n < c.views.size(); ++n) {
+    const Transform<Patient, Camera> given = c.views[n].camera_from_patient.inverse();
+    const Transform<Patient, Camera> now = adjusted.camera_from_patient[n].inverse();
+    json["per_view"][n]["eye_moved_mm"] = (now.translation() - given.translation()).norm();
+    json["per_view"][n]["turned_deg"] = rotation_log(given.rotation().transpose() * now.rotation()).norm() * kDegrees;
+  }
+}
+
 /// Of optimisers that compare renderings with the views.
 void add_similarity(nlohmann::json& json, const RegistrationCase& c, const ViewRegistration& found) {
   json["similarity"] = c.similarity;
@@ -153,6 +167,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
     if (n < found.outline_off_mm.size() && found.outline_off_mm[n])
       json["per_view"].back()["outline_off_mm"] = *found.outline_off_mm[n];
   }
+  if (found.adjusted) add_poses(json, c, *found.adjusted);
   if (!found.per_view_before.empty()) add_similarity(json, c, found);
   if (c.refine_pose) json["pose_correction"] = pose_json(found);
   // Without the true pose, the one that was found is believed.
@@ -204,8 +219,9 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
     if (!after && c.initial) (*engine)->deform(*c.initial);
     for (std::size_t n = 0; n < c.views.size(); ++n) {
       const VideoView& view = c.views[n];
-      const Transform<Camera, Patient> camera_from_model =
-          after ? view.camera_from_patient * found.patient_from_model : view.camera_from_patient;
+      Transform<Camera, Patient> camera_from_model = view.camera_from_patient;
+      if (after && found.adjusted) camera_from_model = found.adjusted->camera_from_patient[n];
+      if (after) camera_from_model = camera_from_model * found.patient_from_model;
       const Still still{c.pictures[n].rgb, view.camera, camera_from_model};
       const PaintedStill painted = paint_still(still, **engine, look, vouched_for({}));
       const char* const when = after ? "after" : "before";

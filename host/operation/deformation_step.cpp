@@ -98,6 +98,8 @@ bool DeformationStep::tick() {
       organ.target = MotionError{expected->targets.front().rms_mm, expected->targets.front().radius95_mm};
   }
   found_ = std::make_shared<const DeformedOrgan>(std::move(organ));
+  adjusted_.clear();
+  if (registration.adjusted) adjusted_ = std::move(registration.adjusted->camera_from_patient);
   return true;
 }
 

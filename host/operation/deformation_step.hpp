@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/background.hpp"
@@ -31,6 +32,9 @@ class DeformationStep {
 
   /// Null: the CT is shown as it was taken.
   [[nodiscard]] const std::shared_ptr<const DeformedOrgan>& found() const { return found_; }
+  /// Where the views were taken from by what they show of one another, in the order in which they were kept; empty:
+  /// from where the tracker had them.
+  [[nodiscard]] const std::vector<Transform<Camera, Patient>>& adjusted() const { return adjusted_; }
   [[nodiscard]] bool running() const { return matching_.running(); }
   /// How far it is, in words; empty before it has found anything.
   [[nodiscard]] std::string progress() const { return matching_.line(); }
@@ -44,6 +48,7 @@ class DeformationStep {
   };
 
   std::shared_ptr<const DeformedOrgan> found_;
+  std::vector<Transform<Camera, Patient>> adjusted_;
   StepNote note_;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
   Background<Result<Matched>> matching_;

@@ -42,6 +42,8 @@ void LiveWorkflow::tick() {
   if (deformation_.tick()) {
     show_shape();
     matched_.deformed = deformation_.found();
+    for (std::size_t n = 0; n < deformation_.adjusted().size(); ++n)
+      matched_.views[n].camera_from_patient = deformation_.adjusted()[n];
     watch_.show(matched_);
     keep();
   }

@@ -18,6 +18,7 @@
 #include "host/registration/geometry/motion_evidence.hpp"
 #include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/outlines.hpp"
+#include "host/registration/geometry/pose_adjustment.hpp"
 #include "host/registration/geometry/stereo.hpp"
 
 namespace birdseye::host {
@@ -41,6 +42,12 @@ std::optional<double> outline_off_mm(const PinholeView& view, const SeenSurface&
     off_mm.push_back(std::abs(surface.distance().distance_mm(point.place_mm)));
   if (off_mm.size() < kFewest) return std::nullopt;
   return median_of(std::move(off_mm));
+}
+
+Eigen::Vector3d middle_of(const SignedDistance& organ) {
+  const auto& points = organ.points();
+  return organ.patient_from_box() *
+         (0.5 * organ.spacing_mm() * Eigen::Vector3d(points[0] - 1, points[1] - 1, points[2] - 1));
 }
 
 /// A picture and a mask a view, of its camera's size.
@@ -140,6 +147,15 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     if (auto good = check_seen(views[n], seen_by.back(), rest); !good) return good.error();
   }
 
+  if (settings.watch.cancelled()) return called_off();
+  out.adjusted = adjusted_poses(seen_by, rest);
+  std::optional<CommonPoseError> common;
+  if (out.adjusted) {
+    common.emplace(seen_by, out.adjusted->noise, middle_of(*organ));
+    for (std::size_t n = 0; n < seen_by.size(); ++n)
+      seen_by[n] = moved(std::move(seen_by[n]), out.adjusted->camera_from_patient[n]);
+  }
+
   // Each round looks nearer to the surface as the round before left it.
   struct Round {
     double grid_px, span_mm, step_mm, outline_mm;
@@ -194,7 +210,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (!out.folded) tell_fits(settings, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
-    out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm);
+    out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm, common);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
     out.held_out = held_out_view(*organ, seen_by, found, settings.touches, settings.matched);
   }

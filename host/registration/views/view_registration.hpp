@@ -91,6 +91,18 @@ struct HeldOutView {
   double expected_off_mm = 0;  ///< the same as it was to be expected
 };
 
+/// Standard deviations of a view's pose, per axis, apart from what all views have in common.
+struct PoseNoise {
+  double eye_mm = 0, angle_rad = 0;
+};
+
+/// Where the cameras were by what the pictures show of one another.
+struct AdjustedPoses {
+  std::vector<Transform<Camera, Patient>> camera_from_patient;
+  PoseNoise noise;          ///< of the poses that were given
+  std::size_t matches = 0;  ///< of places between two views, those that agree
+};
+
 struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
@@ -122,6 +134,8 @@ struct ViewRegistration {
   std::vector<std::optional<double>> outline_off_mm;
   /// Only with optimiser geometry, three views or more and enough to compare.
   std::optional<HeldOutView> held_out;
+  /// By which the result was found; none: by the poses that were given. Only with optimiser geometry.
+  std::optional<AdjustedPoses> adjusted;
   /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.
   std::vector<PlaceFit> touches, matched;
   std::string why_so_many_points;  ///< in words

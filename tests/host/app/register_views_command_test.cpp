@@ -137,6 +137,31 @@ TEST(RegisterViewsCommand, GeometryHoldsOneViewAgainstTheOthers) {
   EXPECT_NE(read_json(scratch / "r.json")["verdict"], "pass") << bad.output;
 }
 
+/// The poses err as a filtered tracker's do, so that the views' rays pass by one another by some pixels.
+TEST(RegisterViewsCommand, GeometryFindsWhereTheCamerasWereWhenTheirPosesErr) {
+  const Scratch scratch;
+  const auto made = run("birdseye-sim", "case --out " + (scratch / "c").string() +
+                                            " --seed 1 --size 384x288 --pose-noise-mm 0.3 --pose-noise-deg 0.15");
+  ASSERT_EQ(made.code, 0) << made.output;
+  const auto result =
+      run("birdseye", arguments(scratch / "c/case.toml", scratch) + " --json " + (scratch / "r.json").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  const nlohmann::json json = read_json(scratch / "r.json");
+  EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
+  EXPECT_GT(json["stereo_points"], 300);
+  EXPECT_LT(json["surface_tre_after_mm_mean"], 0.3 * json["surface_tre_before_mm_mean"].get<double>());
+  EXPECT_LT(json["hidden_tre_after_mm_mean"], 0.5 * json["hidden_tre_before_mm_mean"].get<double>());
+  // The sensor's errors, its turn with a lever to the eye.
+  EXPECT_GT(json["poses"]["eye_sigma_mm"], 0.2);
+  EXPECT_LT(json["poses"]["eye_sigma_mm"], 1.5);
+  EXPECT_GT(json["poses"]["angle_sigma_deg"], 0.05);
+  EXPECT_LT(json["poses"]["angle_sigma_deg"], 0.3);
+  EXPECT_GT(json["per_view"][0]["eye_moved_mm"], 0.05);
+  // What the views have wrong together is in the error that is to be expected.
+  EXPECT_LT(json["tumour_tre_after_mm_mean"], json["expected_error"]["target"]["radius95_mm"]);
+  EXPECT_GT(json["expected_error"]["target"]["rms_mm"], 0.4);
+}
+
 TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
   const Scratch scratch;
   const auto file = changed(scratch, "\"gradient\"", "\"geometry\"");

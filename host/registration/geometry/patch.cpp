@@ -1,0 +1,108 @@
+#include "host/registration/geometry/patch.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace birdseye::host {
+
+namespace {
+
+/// Between samples, in pixels of a picture of 768; so large a patch in every picture, that it is as large on the organ.
+constexpr double kBetween_px = 1.5;
+constexpr int kMiddle = kPatchSide / 2;
+constexpr double kLeastCommon = 0.85;  ///< share of a patch that both pictures show
+
+/// From a patch's middle to sample i of it.
+Eigen::Vector2d offset(int i) {
+  const int column = i % kPatchSide, row = i / kPatchSide;
+  return {column - kMiddle, row - kMiddle};
+}
+
+/// Bilinear; x and y at least 0 and less than one from the last. NaN beside a pixel that does not count.
+float sample(const cv::Mat& picture, float x, float y) {
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const float s = x - static_cast<float>(column), t = y - static_cast<float>(row);
+  const float* const upper = picture.ptr<float>(row) + column;
+  const float* const lower = picture.ptr<float>(row + 1) + column;
+  const float a = upper[0] + s * (upper[1] - upper[0]), b = lower[0] + s * (lower[1] - lower[0]);
+  return a + t * (b - a);
+}
+
+double between_px(const PinholeView& view) {
+  return kBetween_px * view.width_px / kWidth_px;
+}
+
+}  // namespace
+
+int patch_margin_px(const PinholeView& view) {
+  constexpr int kBorder_px = 4;
+  return static_cast<int>(std::ceil(between_px(view) * kMiddle)) + kBorder_px;
+}
+
+std::optional<Patch> patch_at(const PinholeView& view, const DepthMap& depths, const SeenSurface& surface, int x_px,
+                              int y_px) {
+  if (view.usable.at<std::uint8_t>(y_px, x_px) == 0) return std::nullopt;
+  if (!std::isfinite(depths.at(x_px, y_px))) return std::nullopt;
+  Patch patch{};
+  patch.view = &view;
+  patch.x_px = x_px;
+  patch.y_px = y_px;
+  patch.between_px = between_px(view);
+  patch.ray = view.ray(x_px, y_px);
+  const auto met = surface.meet(view.eye_in_patient_mm, patch.ray);
+  if (!met || met->distance_mm != 0) return std::nullopt;
+  patch.depth_mm = met->depth_mm;
+  patch.place_mm = view.eye_in_patient_mm + met->depth_mm * patch.ray;
+  patch.normal = surface.normal(patch.place_mm);
+  if (-patch.normal.dot(patch.ray.normalized()) < kPatchFacing) return std::nullopt;
+  int count = 0;
+  for (int i = 0; i < kPatchSamples; ++i) {
+    const auto sx = static_cast<float>(x_px + patch.between_px * offset(i).x());
+    const auto sy = static_cast<float>(y_px + patch.between_px * offset(i).y());
+    const float value = sample(view.texture, sx, sy);
+    patch.texture[static_cast<std::size_t>(i)] = value;
+    if (!std::isnan(value)) ++count;
+  }
+  if (count < kLeastCommon * kPatchSamples) return std::nullopt;
+  return patch;
+}
+
+float correlation(const Patch& patch, const PinholeView& other, double depth_mm, const Eigen::Vector2d& beside_px) {
+  const PinholeView& view = *patch.view;
+  // Of the plane n . (p - eye) = d, the places of the view's pixels, seen by the other.
+  const double d = patch.normal.dot(patch.ray) * depth_mm;
+  const Eigen::Matrix3d rotation = other.camera_from_patient.rotation();
+  const Eigen::Vector3d apart = other.camera_from_patient * view.eye_in_patient_mm;
+  Eigen::Matrix3d lens;
+  lens << other.fx_px, 0, other.cx_px + beside_px.x(), 0, other.fy_px, other.cy_px + beside_px.y(), 0, 0, 1;
+  Eigen::Matrix3d ray_of;  // of (x, y, 1)
+  ray_of << 1 / view.fx_px, 0, -view.cx_px / view.fx_px, 0, 1 / view.fy_px, -view.cy_px / view.fy_px, 0, 0, 1;
+  ray_of = view.camera_from_patient.rotation().transpose() * ray_of;
+  const Eigen::Matrix3f h =
+      (lens * (rotation * ray_of + apart * (patch.normal.transpose() * ray_of) / d)).cast<float>();
+  float count = 0, sum_a = 0, sum_b = 0, sum_aa = 0, sum_bb = 0, sum_ab = 0;
+  const auto most_x = static_cast<float>(other.width_px - 2), most_y = static_cast<float>(other.height_px - 2);
+  for (int i = 0; i < kPatchSamples; ++i) {
+    const auto x = static_cast<float>(patch.x_px + patch.between_px * offset(i).x());
+    const auto y = static_cast<float>(patch.y_px + patch.between_px * offset(i).y());
+    const float w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
+    const float u = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) / w, v = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) / w;
+    if (!(u >= 0 && v >= 0 && u < most_x && v < most_y)) continue;
+    const float a = patch.texture[static_cast<std::size_t>(i)], b = sample(other.texture, u, v);
+    if (std::isnan(a + b)) continue;
+    count += 1;
+    sum_a += a;
+    sum_b += b;
+    sum_aa += a * a;
+    sum_bb += b * b;
+    sum_ab += a * b;
+  }
+  if (count < static_cast<float>(kLeastCommon) * kPatchSamples) return std::numeric_limits<float>::quiet_NaN();
+  // Both are about 0 in the mean, so that little is lost by taking the means off at the end.
+  const float aa = sum_aa - sum_a * sum_a / count, bb = sum_bb - sum_b * sum_b / count;
+  constexpr float kFlat = 1e-6F;
+  if (aa < kFlat * count || bb < kFlat * count) return 0;
+  return (sum_ab - sum_a * sum_b / count) / std::sqrt(aa * bb);
+}
+
+}  // namespace birdseye::host

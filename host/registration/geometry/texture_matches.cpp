@@ -1,0 +1,175 @@
+#include "host/registration/geometry/texture_matches.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "host/registration/geometry/patch.hpp"
+#include "host/registration/geometry/sight.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr double kGrid_px = 36;
+constexpr double kStep_px = 1.5;
+constexpr double kLeastAlong = 0.574;  ///< cosine of 55 degrees between the views' rays
+constexpr std::size_t kMostOthers = 2;
+constexpr float kLeastCorrelation = 0.6F, kLeastLead = 0.1F;
+
+struct Peak {
+  double along = 0, beside = 0;  ///< steps
+  float score = -1;
+};
+
+/// Scores of shifts on a grid about none.
+class Scores {
+ public:
+  Scores(int along, int beside)
+      : along_(along), beside_(beside), scores_(Eigen::ArrayXXf::Constant(2 * along + 1, 2 * beside + 1, -1)) {}
+
+  float& at(int along, int beside) { return scores_(along + along_, beside + beside_); }
+  [[nodiscard]] int along() const { return along_; }
+  [[nodiscard]] int beside() const { return beside_; }
+
+ private:
+  int along_, beside_;
+  Eigen::ArrayXXf scores_;
+};
+
+double between(float before, float at, float after) {
+  const float bend = std::max(1e-6F, 2 * at - before - after);
+  return std::clamp(0.5 * static_cast<double>((after - before) / bend), -0.5, 0.5);
+}
+
+/// The highest score, if it is within the grid and none beside its own is nearly as high.
+std::optional<Peak> peak_of(Scores& scores) {
+  constexpr double kOwn = 4.5;
+  Peak best;
+  for (int s = -scores.along(); s <= scores.along(); ++s) {
+    for (int b = -scores.beside(); b <= scores.beside(); ++b) {
+      if (scores.at(s, b) > best.score) best = {static_cast<double>(s), static_cast<double>(b), scores.at(s, b)};
+    }
+  }
+  const int s = static_cast<int>(best.along), b = static_cast<int>(best.beside);
+  if (best.score < kLeastCorrelation || std::abs(s) == scores.along() || std::abs(b) == scores.beside())
+    return std::nullopt;
+  for (int i = -scores.along(); i <= scores.along(); ++i) {
+    for (int j = -scores.beside(); j <= scores.beside(); ++j) {
+      if (std::hypot(i - s, j - b) > kOwn && scores.at(i, j) > best.score - kLeastLead) return std::nullopt;
+    }
+  }
+  best.along += between(scores.at(s - 1, b), best.score, scores.at(s + 1, b));
+  best.beside += between(scores.at(s, b - 1), best.score, scores.at(s, b + 1));
+  return best;
+}
+
+class Search {
+ public:
+  Search(const std::vector<PinholeView>& views, const SeenSurface& surface, const MatchSettings& settings)
+      : views_(views), surface_(surface), settings_(settings), sight_(surface, views, {kPatchFacing, 8, 10}) {}
+
+  TextureMatches run() const {
+    std::vector<std::pair<std::size_t, int>> rows;
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      const int margin_px = patch_margin_px(views_[v]);
+      for (int y = margin_px; y < views_[v].height_px - margin_px; y += grid_px(views_[v])) rows.emplace_back(v, y);
+    }
+    std::vector<TextureMatches> of_rows(rows.size());
+    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t n) {
+      const auto [v, y] = rows[n];
+      const int margin_px = patch_margin_px(views_[v]);
+      for (int x = margin_px; x < views_[v].width_px - margin_px; x += grid_px(views_[v]))
+        look_for(v, x, y, of_rows[n]);
+    });
+    TextureMatches out;
+    std::size_t places = 0;
+    for (const TextureMatches& row : of_rows) {
+      out.looked_for += row.looked_for;
+      for (std::size_t i = 0; i < row.found.size(); ++i) {
+        if (i == 0 || row.found[i].at_px != row.found[i - 1].at_px) ++places;
+        out.found.push_back(row.found[i]);
+        out.found.back().place = places - 1;
+      }
+    }
+    return out;
+  }
+
+ private:
+  static int grid_px(const PinholeView& view) {
+    return std::max(1, static_cast<int>(std::lround(kGrid_px * view.width_px / kWidth_px)));
+  }
+
+  /// The views that see the place from nearly the same side, the nearest first.
+  std::vector<std::size_t> others_of(std::size_t v, const Patch& patch) const {
+    std::vector<std::pair<double, std::size_t>> by_cosine;
+    for (std::size_t w = 0; w < views_.size(); ++w) {
+      if (w == v || !sight_.sees(w, patch.place_mm)) continue;
+      const double cosine = patch.ray.normalized().dot((patch.place_mm - views_[w].eye_in_patient_mm).normalized());
+      if (cosine > kLeastAlong) by_cosine.emplace_back(-cosine, w);
+    }
+    std::sort(by_cosine.begin(), by_cosine.end());
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < std::min(kMostOthers, by_cosine.size()); ++i) out.push_back(by_cosine[i].second);
+    return out;
+  }
+
+  void look_for(std::size_t v, int x, int y, TextureMatches& out) const {
+    const auto patch = patch_at(views_[v], sight_.depths(v), surface_, x, y);
+    if (!patch) return;
+    for (const std::size_t w : others_of(v, *patch)) {
+      ++out.looked_for;
+      if (auto match = found_in(*patch, views_[w])) {
+        match->view = v;
+        match->other_view = w;
+        out.found.push_back(*match);
+      }
+    }
+  }
+
+  std::optional<TextureMatch> found_in(const Patch& patch, const PinholeView& other) const {
+    constexpr double kLeastStep_mm = 0.4, kMostStep_mm = 2;
+    const PinholeView& view = *patch.view;
+    const auto pixel_at = [&](double depth_mm) -> Eigen::Vector2d {
+      const auto pixel = other.project(view.eye_in_patient_mm + depth_mm * patch.ray);
+      return {pixel.x_px, pixel.y_px};
+    };
+    const double step_px = kStep_px * other.width_px / kWidth_px;
+    const Eigen::Vector2d along_px = pixel_at(patch.depth_mm + 0.5) - pixel_at(patch.depth_mm - 0.5);
+    const double step_mm = std::clamp(step_px / std::max(along_px.norm(), 1e-6), kLeastStep_mm, kMostStep_mm);
+    const Eigen::Vector2d beside_px = step_px * Eigen::Vector2d(-along_px.y(), along_px.x()).normalized();
+    Scores scores(static_cast<int>(settings_.span_mm / step_mm), static_cast<int>(settings_.beside_px / kStep_px));
+    for (int s = -scores.along(); s <= scores.along(); ++s) {
+      const double depth_mm = patch.depth_mm + s * step_mm;
+      if (depth_mm <= 0) continue;
+      for (int b = -scores.beside(); b <= scores.beside(); ++b) {
+        const float score = correlation(patch, other, depth_mm, b * beside_px);
+        if (std::isfinite(score)) scores.at(s, b) = score;
+      }
+    }
+    const auto peak = peak_of(scores);
+    if (!peak) return std::nullopt;
+    TextureMatch match;
+    match.at_px = {patch.x_px, patch.y_px};
+    match.depth_mm = patch.depth_mm + peak->along * step_mm;
+    match.other_px = pixel_at(match.depth_mm) + peak->beside * beside_px;
+    return match;
+  }
+
+  const std::vector<PinholeView>& views_;
+  const SeenSurface& surface_;
+  const MatchSettings& settings_;
+  Sight sight_;
+};
+
+}  // namespace
+
+TextureMatches texture_matches(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                               const MatchSettings& settings) {
+  return Search(views, surface, settings).run();
+}
+
+}  // namespace birdseye::host
