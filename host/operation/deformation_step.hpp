@@ -32,8 +32,8 @@ class DeformationStep {
 
   /// Null: the CT is shown as it was taken.
   [[nodiscard]] const std::shared_ptr<const DeformedOrgan>& found() const { return found_; }
-  /// Where the views were taken from by what they show of one another, in the order in which they were kept; empty:
-  /// from where the tracker had them.
+  /// The corrected poses of the views by which found() was found, in the order in which they were kept; empty: the
+  /// tracker's poses were not corrected.
   [[nodiscard]] const std::vector<Transform<Camera, Patient>>& adjusted() const { return adjusted_; }
   [[nodiscard]] bool running() const { return matching_.running(); }
   /// How far it is, in words; empty before it has found anything.

@@ -44,12 +44,6 @@ std::optional<double> outline_off_mm(const PinholeView& view, const SeenSurface&
   return median_of(std::move(off_mm));
 }
 
-Eigen::Vector3d middle_of(const SignedDistance& organ) {
-  const auto& points = organ.points();
-  return organ.patient_from_box() *
-         (0.5 * organ.spacing_mm() * Eigen::Vector3d(points[0] - 1, points[1] - 1, points[2] - 1));
-}
-
 /// A picture and a mask a view, of its camera's size.
 Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const RgbView> pictures) {
   if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
@@ -151,7 +145,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   out.adjusted = adjusted_poses(seen_by, rest);
   std::optional<CommonPoseError> common;
   if (out.adjusted) {
-    common.emplace(seen_by, out.adjusted->noise, middle_of(*organ));
+    common.emplace(seen_by, out.adjusted->noise);
     for (std::size_t n = 0; n < seen_by.size(); ++n)
       seen_by[n] = moved(std::move(seen_by[n]), out.adjusted->camera_from_patient[n]);
   }

@@ -1,5 +1,6 @@
 #include "host/registration/geometry/patch.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -29,14 +30,27 @@ float sample(const cv::Mat& picture, float x, float y) {
 }
 
 double between_px(const PinholeView& view) {
-  return kBetween_px * view.width_px / kWidth_px;
+  return kBetween_px * view.width_px / kReferenceWidth_px;
+}
+
+/// So far from a picture's border every patch's middle is.
+int margin_px(const PinholeView& view) {
+  constexpr int kBorder_px = 4;
+  return static_cast<int>(std::ceil(between_px(view) * kMiddle)) + kBorder_px;
 }
 
 }  // namespace
 
-int patch_margin_px(const PinholeView& view) {
-  constexpr int kBorder_px = 4;
-  return static_cast<int>(std::ceil(between_px(view) * kMiddle)) + kBorder_px;
+std::vector<GridPixel> patch_grid(const std::vector<PinholeView>& views, double every_px) {
+  std::vector<GridPixel> out;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const PinholeView& view = views[v];
+    const int step_px = std::max(1, static_cast<int>(std::lround(every_px * view.width_px / kReferenceWidth_px)));
+    for (int y = margin_px(view); y < view.height_px - margin_px(view); y += step_px) {
+      for (int x = margin_px(view); x < view.width_px - margin_px(view); x += step_px) out.push_back({v, x, y});
+    }
+  }
+  return out;
 }
 
 std::optional<Patch> patch_at(const PinholeView& view, const DepthMap& depths, const SeenSurface& surface, int x_px,

@@ -3,14 +3,15 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "host/registration/geometry/seen_surface.hpp"
 
 namespace birdseye::host {
 
 inline constexpr int kPatchSide = 13, kPatchSamples = kPatchSide * kPatchSide;
-inline constexpr double kPatchFacing = 0.25;  ///< the least cosine of the surface's normal and the way to the eye
-inline constexpr double kWidth_px = 768;      ///< of the pictures that lengths in pixels are given for
+inline constexpr double kPatchFacing = 0.25;       ///< the least cosine of the surface's normal and the way to the eye
+inline constexpr double kReferenceWidth_px = 768;  ///< of the picture that lengths in pixels are given for
 
 /// A patch of one view and the plane that it is thought to lie in. Holds on to the view.
 struct Patch {
@@ -20,15 +21,22 @@ struct Patch {
   std::array<float, kPatchSamples> texture;  ///< NaN where it does not count
 };
 
-/// So far from a picture's border every patch's middle is.
-int patch_margin_px(const PinholeView& view);
+/// A pixel of a view.
+struct GridPixel {
+  std::size_t view;
+  int x_px, y_px;
+};
+
+/// The middles of patches that lie within their picture, every so many pixels of a picture kReferenceWidth_px wide:
+/// view by view, row by row.
+std::vector<GridPixel> patch_grid(const std::vector<PinholeView>& views, double every_px);
 
 /// Empty where the view shows too little of the surface, or not from its front. depths: of the view.
 std::optional<Patch> patch_at(const PinholeView& view, const DepthMap& depths, const SeenSurface& surface, int x_px,
                               int y_px);
 
-/// Normalised cross-correlation of the patch with another view where its plane is moved to a depth, and where it is
-/// found beside what the poses say: so many pixels. NaN where the other view shows too little of it.
+/// Normalised cross-correlation of the patch with another view, if the patch's plane is moved to a depth and the other
+/// view shows the patch beside_px from where the poses have it. NaN where the other view shows too little of it.
 float correlation(const Patch& patch, const PinholeView& other, double depth_mm,
                   const Eigen::Vector2d& beside_px = Eigen::Vector2d::Zero());
 

@@ -51,6 +51,12 @@ cv::Mat disc(int radius_px) {
 
 }  // namespace
 
+PinholeView moved(PinholeView view, const Transform<Camera, Patient>& camera_from_patient) {
+  view.camera_from_patient = camera_from_patient;
+  view.eye_in_patient_mm = camera_from_patient.inverse().translation();
+  return view;
+}
+
 PinholeView pinhole_view(const VideoView& view, const RgbView& picture) {
   constexpr int kRim_px = 4, kGlareRim_px = 4, kMaskRim_px = 2;
   constexpr double kGlare = 235;

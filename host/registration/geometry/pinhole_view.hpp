@@ -35,6 +35,9 @@ struct PinholeView {
   }
 };
 
+/// The view as if it had been taken from there.
+PinholeView moved(PinholeView view, const Transform<Camera, Patient>& camera_from_patient);
+
 /// picture: the view's, in colour, of its camera's size.
 PinholeView pinhole_view(const VideoView& view, const RgbView& picture);
 

@@ -27,7 +27,7 @@ using Change = std::array<double, 6>;
 constexpr double kMatch_px = 0.5;  ///< standard deviation of a match, in pixels of a picture 768 wide
 
 double sigma_px(const PinholeView& view) {
-  return kMatch_px * view.width_px / kWidth_px;
+  return kMatch_px * view.width_px / kReferenceWidth_px;
 }
 
 /// How far a place of one view is seen in the other from where it was found, in standard deviations.
@@ -106,7 +106,7 @@ class Bundle {
     ceres::Solve(options, &problem, &summary);
   }
 
-  /// Of what all views do not have in common: a shift, a turn and a scale of everything show in no picture.
+  /// Of the changes. A shift, a turn and a scale that all views share show in no picture, and take away freedoms.
   [[nodiscard]] PoseNoise noise() const {
     double angles = 0, shifts_mm2 = 0;
     for (const Change& change : changes_) {
@@ -188,12 +188,6 @@ std::optional<AdjustedPoses> adjusted_poses(const std::vector<PinholeView>& view
   return AdjustedPoses{bundle.poses(), noise, agreeing};
 }
 
-PinholeView moved(PinholeView view, const Transform<Camera, Patient>& camera_from_patient) {
-  view.camera_from_patient = camera_from_patient;
-  view.eye_in_patient_mm = camera_from_patient.inverse().translation();
-  return view;
-}
-
 std::optional<AdjustedPoses> adjusted_poses(const std::vector<PinholeView>& views, const SeenSurface& surface) {
   constexpr double kNear_px = 3, kFar_px = 12, kMany = 0.2;
   MatchSettings settings;
@@ -215,12 +209,11 @@ std::optional<AdjustedPoses> adjusted_poses(const std::vector<PinholeView>& view
   return again && again->matches > further->matches ? again : further;
 }
 
-CommonPoseError::CommonPoseError(const std::vector<PinholeView>& views, const PoseNoise& noise,
-                                 const Eigen::Vector3d& about_mm)
-    : about_mm_(about_mm) {
+CommonPoseError::CommonPoseError(const std::vector<PinholeView>& views, const PoseNoise& noise) {
+  for (const PinholeView& view : views) about_mm_ += view.eye_in_patient_mm / static_cast<double>(views.size());
   Motion precision = Motion::Zero();
   for (const PinholeView& view : views) {
-    const Eigen::Matrix<double, 3, 7> eye = moves_by(view.eye_in_patient_mm - about_mm);
+    const Eigen::Matrix<double, 3, 7> eye = moves_by(view.eye_in_patient_mm - about_mm_);
     precision += eye.transpose() * eye / (noise.eye_mm * noise.eye_mm);
     precision.block<3, 3>(3, 3).diagonal().array() += 1 / (noise.angle_rad * noise.angle_rad);
   }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/registration/geometry/parabola.hpp"
 #include "host/registration/geometry/patch.hpp"
 #include "host/registration/geometry/sight.hpp"
 
@@ -29,32 +30,20 @@ class Sweep {
       : views_(views), surface_(surface), settings_(settings), sight_(surface, views, {kPatchFacing, 8, 10}) {}
 
   std::vector<Found> run() const {
-    std::vector<std::pair<std::size_t, int>> rows;
-    for (std::size_t v = 0; v < views_.size(); ++v) {
-      for (int y = patch_margin_px(views_[v]); y < views_[v].height_px - patch_margin_px(views_[v]);
-           y += grid_px(views_[v]))
-        rows.emplace_back(v, y);
-    }
-    std::vector<std::vector<Found>> of_rows(rows.size());
-    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t n) {
-      const auto [v, y] = rows[n];
-      const PinholeView& view = views_[v];
-      for (int x = patch_margin_px(view); x < view.width_px - patch_margin_px(view); x += grid_px(view)) {
-        if (auto found = find(v, x, y)) of_rows[n].push_back(*found);
-      }
-    });
+    const std::vector<GridPixel> pixels = patch_grid(views_, settings_.grid_px);
+    std::vector<std::optional<Found>> of_pixels(pixels.size());
+    tbb::parallel_for(std::size_t{0}, pixels.size(), [&](std::size_t n) { of_pixels[n] = find(pixels[n]); });
     std::vector<Found> out;
-    for (const auto& row : of_rows) out.insert(out.end(), row.begin(), row.end());
+    for (const std::optional<Found>& found : of_pixels) {
+      if (found) out.push_back(*found);
+    }
     return out;
   }
 
  private:
-  [[nodiscard]] int grid_px(const PinholeView& view) const {
-    return std::max(1, static_cast<int>(std::lround(settings_.grid_px * view.width_px / kWidth_px)));
-  }
-
-  std::optional<Found> find(std::size_t v, int x, int y) const {
-    const auto patch = patch_at(views_[v], sight_.depths(v), surface_, x, y);
+  std::optional<Found> find(const GridPixel& pixel) const {
+    const std::size_t v = pixel.view;
+    const auto patch = patch_at(views_[v], sight_.depths(v), surface_, pixel.x_px, pixel.y_px);
     if (!patch) return std::nullopt;
     const int half = static_cast<int>(std::lround(settings_.span_mm / settings_.step_mm));
     const std::size_t steps = 2 * static_cast<std::size_t>(half) + 1;
@@ -78,8 +67,8 @@ class Sweep {
     for (int s = 0; s <= 2 * half; ++s) {
       if (std::abs(s - best) > kPeak && at(s) > at(best) - kLeastLead) return std::nullopt;
     }
-    const float bend = std::max(1e-6F, 2 * at(best) - at(best - 1) - at(best + 1));
-    const double between = std::clamp(0.5 * static_cast<double>((at(best + 1) - at(best - 1)) / bend), -0.5, 0.5);
+    const float bend = bend_of(at(best - 1), at(best), at(best + 1));
+    const double between = peak_between(at(best - 1), at(best), at(best + 1));
     const double depth = patch->depth_mm + (best - half + between) * settings_.step_mm;
     // The flatter the peak and the less alike the patches, the less is known; of stereo on simulated organs, where the
     // truth is known, 0.45 of it and what it says nothing of.

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "host/registration/geometry/parabola.hpp"
 #include "host/registration/geometry/patch.hpp"
 #include "host/registration/geometry/sight.hpp"
 
@@ -40,11 +41,6 @@ class Scores {
   Eigen::ArrayXXf scores_;
 };
 
-double between(float before, float at, float after) {
-  const float bend = std::max(1e-6F, 2 * at - before - after);
-  return std::clamp(0.5 * static_cast<double>((after - before) / bend), -0.5, 0.5);
-}
-
 /// The highest score, if it is within the grid and none beside its own is nearly as high.
 std::optional<Peak> peak_of(Scores& scores) {
   constexpr double kOwn = 4.5;
@@ -62,8 +58,8 @@ std::optional<Peak> peak_of(Scores& scores) {
       if (std::hypot(i - s, j - b) > kOwn && scores.at(i, j) > best.score - kLeastLead) return std::nullopt;
     }
   }
-  best.along += between(scores.at(s - 1, b), best.score, scores.at(s + 1, b));
-  best.beside += between(scores.at(s, b - 1), best.score, scores.at(s, b + 1));
+  best.along += peak_between(scores.at(s - 1, b), best.score, scores.at(s + 1, b));
+  best.beside += peak_between(scores.at(s, b - 1), best.score, scores.at(s, b + 1));
   return best;
 }
 
@@ -73,36 +69,24 @@ class Search {
       : views_(views), surface_(surface), settings_(settings), sight_(surface, views, {kPatchFacing, 8, 10}) {}
 
   TextureMatches run() const {
-    std::vector<std::pair<std::size_t, int>> rows;
-    for (std::size_t v = 0; v < views_.size(); ++v) {
-      const int margin_px = patch_margin_px(views_[v]);
-      for (int y = margin_px; y < views_[v].height_px - margin_px; y += grid_px(views_[v])) rows.emplace_back(v, y);
-    }
-    std::vector<TextureMatches> of_rows(rows.size());
-    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t n) {
-      const auto [v, y] = rows[n];
-      const int margin_px = patch_margin_px(views_[v]);
-      for (int x = margin_px; x < views_[v].width_px - margin_px; x += grid_px(views_[v]))
-        look_for(v, x, y, of_rows[n]);
-    });
+    const std::vector<GridPixel> pixels = patch_grid(views_, kGrid_px);
+    std::vector<TextureMatches> of_pixels(pixels.size());
+    tbb::parallel_for(std::size_t{0}, pixels.size(), [&](std::size_t n) { of_pixels[n] = look_for(pixels[n]); });
     TextureMatches out;
     std::size_t places = 0;
-    for (const TextureMatches& row : of_rows) {
-      out.looked_for += row.looked_for;
-      for (std::size_t i = 0; i < row.found.size(); ++i) {
-        if (i == 0 || row.found[i].at_px != row.found[i - 1].at_px) ++places;
-        out.found.push_back(row.found[i]);
-        out.found.back().place = places - 1;
+    for (const TextureMatches& of_pixel : of_pixels) {
+      out.looked_for += of_pixel.looked_for;
+      if (of_pixel.found.empty()) continue;
+      for (TextureMatch match : of_pixel.found) {
+        match.place = places;
+        out.found.push_back(match);
       }
+      ++places;
     }
     return out;
   }
 
  private:
-  static int grid_px(const PinholeView& view) {
-    return std::max(1, static_cast<int>(std::lround(kGrid_px * view.width_px / kWidth_px)));
-  }
-
   /// The views that see the place from nearly the same side, the nearest first.
   std::vector<std::size_t> others_of(std::size_t v, const Patch& patch) const {
     std::vector<std::pair<double, std::size_t>> by_cosine;
@@ -117,17 +101,19 @@ class Search {
     return out;
   }
 
-  void look_for(std::size_t v, int x, int y, TextureMatches& out) const {
-    const auto patch = patch_at(views_[v], sight_.depths(v), surface_, x, y);
-    if (!patch) return;
-    for (const std::size_t w : others_of(v, *patch)) {
+  TextureMatches look_for(const GridPixel& pixel) const {
+    TextureMatches out;
+    const auto patch = patch_at(views_[pixel.view], sight_.depths(pixel.view), surface_, pixel.x_px, pixel.y_px);
+    if (!patch) return out;
+    for (const std::size_t w : others_of(pixel.view, *patch)) {
       ++out.looked_for;
       if (auto match = found_in(*patch, views_[w])) {
-        match->view = v;
+        match->view = pixel.view;
         match->other_view = w;
         out.found.push_back(*match);
       }
     }
+    return out;
   }
 
   std::optional<TextureMatch> found_in(const Patch& patch, const PinholeView& other) const {
@@ -137,7 +123,7 @@ class Search {
       const auto pixel = other.project(view.eye_in_patient_mm + depth_mm * patch.ray);
       return {pixel.x_px, pixel.y_px};
     };
-    const double step_px = kStep_px * other.width_px / kWidth_px;
+    const double step_px = kStep_px * other.width_px / kReferenceWidth_px;
     const Eigen::Vector2d along_px = pixel_at(patch.depth_mm + 0.5) - pixel_at(patch.depth_mm - 0.5);
     const double step_mm = std::clamp(step_px / std::max(along_px.norm(), 1e-6), kLeastStep_mm, kMostStep_mm);
     const Eigen::Vector2d beside_px = step_px * Eigen::Vector2d(-along_px.y(), along_px.x()).normalized();

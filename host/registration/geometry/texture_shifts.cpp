@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "host/registration/geometry/parabola.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -171,12 +173,6 @@ double shift_per_surface(const PinholeView& earlier, const PinholeView& now, con
          place.depth_mm;
 }
 
-/// Of a parabola through three scores, from the middle one.
-double between(float before, float at, float after) {
-  const float bend = std::max(1e-6F, 2 * at - before - after);
-  return std::clamp(0.5 * static_cast<double>((after - before) / bend), -0.5, 0.5);
-}
-
 TextureShift shift_of(const Scores& scores, int part, double step_mm) {
   constexpr double kLeastCorrelation = 0.2, kLeastLead = 0.08, kApart_mm = 2;
   constexpr double kLeadOfOne = 0.8;  // chance leads by less, the more places there are
@@ -200,8 +196,8 @@ TextureShift shift_of(const Scores& scores, int part, double step_mm) {
   if (at.x == 0 || at.y == 0 || at.x == kShifts - 1 || at.y == kShifts - 1) return out;
   if (out.correlation < kLeastCorrelation || out.correlation - out.runner_up < least_lead) return out;
   const auto value = [&](int column, int row) { return mean.at<float>(at.y + row, at.x + column); };
-  out.shift_mm = step_mm * Eigen::Vector2d(at.x - kReach + between(value(-1, 0), value(0, 0), value(1, 0)),
-                                           at.y - kReach + between(value(0, -1), value(0, 0), value(0, 1)));
+  out.shift_mm = step_mm * Eigen::Vector2d(at.x - kReach + peak_between(value(-1, 0), value(0, 0), value(1, 0)),
+                                           at.y - kReach + peak_between(value(0, -1), value(0, 0), value(0, 1)));
   return out;
 }
 

@@ -91,12 +91,12 @@ struct HeldOutView {
   double expected_off_mm = 0;  ///< the same as it was to be expected
 };
 
-/// Standard deviations of a view's pose, per axis, apart from what all views have in common.
+/// Standard deviations of the poses of views, per axis, apart from the error that all of them share.
 struct PoseNoise {
   double eye_mm = 0, angle_rad = 0;
 };
 
-/// Where the cameras were by what the pictures show of one another.
+/// Poses of views, corrected by what the views show of one another.
 struct AdjustedPoses {
   std::vector<Transform<Camera, Patient>> camera_from_patient;
   PoseNoise noise;          ///< of the poses that were given
@@ -134,7 +134,7 @@ struct ViewRegistration {
   std::vector<std::optional<double>> outline_off_mm;
   /// Only with optimiser geometry, three views or more and enough to compare.
   std::optional<HeldOutView> held_out;
-  /// By which the result was found; none: by the poses that were given. Only with optimiser geometry.
+  /// The poses by which the result was found; none: the given ones. Only with optimiser geometry.
   std::optional<AdjustedPoses> adjusted;
   /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.
   std::vector<PlaceFit> touches, matched;

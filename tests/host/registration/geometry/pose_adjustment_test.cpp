@@ -167,7 +167,7 @@ TEST(CommonPoseError, IsWhatErringPosesLeaveOfACommonMotion) {
     const Eigen::Vector3d moved_mm = motion.head<3>() + turn.cross(from) + motion[6] * from;
     sum += moved_mm * moved_mm.transpose();
   }
-  const Eigen::Matrix3d found = CommonPoseError(views, kNoise, about_mm).covariance(place_mm);
+  const Eigen::Matrix3d found = CommonPoseError(views, kNoise).covariance(place_mm);
   EXPECT_LT((found - sum / kSets).norm(), 0.08 * found.norm()) << found << "\n" << sum / kSets;
 }
 
