@@ -142,12 +142,12 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   }
 
   if (settings.watch.cancelled()) return called_off();
-  out.adjusted = adjusted_poses(seen_by, rest);
   std::optional<CommonPoseError> common;
-  if (out.adjusted) {
-    common.emplace(seen_by, out.adjusted->noise);
+  if (auto adjusted = adjusted_poses(seen_by, rest)) {
+    common = adjusted->common;
     for (std::size_t n = 0; n < seen_by.size(); ++n)
-      seen_by[n] = moved(std::move(seen_by[n]), out.adjusted->camera_from_patient[n]);
+      seen_by[n] = moved(std::move(seen_by[n]), adjusted->poses.camera_from_patient[n]);
+    out.adjusted = std::move(adjusted->poses);
   }
 
   // Each round looks nearer to the surface as the round before left it.

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "host/registration/geometry/texture_matches.hpp"
+#include "host/registration/views/view_registration.hpp"
+
+namespace birdseye::host {
+
+/// The error of a place of the patient by the shift, turn and scale that all views share: the views show little or
+/// nothing of these, so that the poses' noise leaves them uncertain.
+struct CommonPoseError {
+  Eigen::Vector3d about_mm = Eigen::Vector3d::Zero();
+  /// Of shift (mm), turn (rotation vector) and scale (a share) about about_mm.
+  Eigen::Matrix<double, 7, 7> motion = Eigen::Matrix<double, 7, 7>::Zero();
+  /// mm^2.
+  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& place_mm) const;
+};
+
+/// A bundle adjustment: views, and places that were matched between two of them, each on its view's ray.
+class PoseBundle {
+ public:
+  /// views and matches stay the caller's, and must outlive the bundle.
+  PoseBundle(const std::vector<PinholeView>& views, std::span<const TextureMatch> matches);
+
+  /// Changes poses and depths until the matches agree, from where they are. noise: of the poses as they were given.
+  /// scale: of Cauchy's loss, in standard deviations of a match.
+  void solve(const PoseNoise& noise, double scale);
+
+  /// What the width of the poses' prior is to be, by the changes under a prior of the given width: the sum of their
+  /// squares over the number of freedoms that the matches determine (D. MacKay, Bayesian interpolation, 1992).
+  [[nodiscard]] PoseNoise noise(const PoseNoise& prior, double scale) const;
+  /// What matches and prior leave open of the motion that all matched places share. A narrow base leaves more open than
+  /// shift, turn and scale of the eyes: that the cameras turn towards one another looks almost like another distance.
+  [[nodiscard]] CommonPoseError common_error(const PoseNoise& noise, double scale) const;
+
+  [[nodiscard]] std::size_t agreeing() const;
+  [[nodiscard]] std::vector<Transform<Camera, Patient>> poses() const;
+  /// Where the matched places lie, by their numbers; of a number that no match has, the origin.
+  [[nodiscard]] std::vector<Eigen::Vector3d> places_mm() const;
+
+ private:
+  /// What a pose is changed by: a turn of the camera about its eye, camera frame, and the eye's shift, patient mm.
+  using Change = std::array<double, 6>;
+  /// A place's depth in the normal equations of all changes, where it is eliminated.
+  struct Place {
+    Eigen::RowVectorXd by_changes;
+    double by_depth = 0;
+  };
+  /// The changes' covariance, and the places' rows by which their depths follow.
+  struct Posterior {
+    Eigen::MatrixXd covariance;
+    std::vector<Place> places;
+  };
+  [[nodiscard]] Posterior posterior(const PoseNoise& noise, double scale) const;
+
+  const std::vector<PinholeView>& views_;
+  std::span<const TextureMatch> matches_;
+  std::vector<Change> changes_;
+  std::vector<double> depths_mm_;
+};
+
+}  // namespace birdseye::host
