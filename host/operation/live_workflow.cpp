@@ -92,7 +92,10 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
 void LiveWorkflow::take(const wire::Birds& birds) {
   const auto& setup = picture_.setup();
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name != settings_.scope || !setup || !patient_.plan()) continue;
+    if (bird.name != settings_.scope) continue;
+    views_.take(birds.acquired, bird.tracker_from_sensor);
+    if (!setup || !patient_.plan()) continue;
+    views_.average(*setup);
     jitter_.push(birds.acquired,
                  setup->camera_from_patient(bird.tracker_from_sensor) * target_in_patient_mm(*patient_.plan()));
   }

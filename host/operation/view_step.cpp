@@ -2,13 +2,38 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
+
 namespace birdseye::host {
 
 namespace {
 
 constexpr std::size_t kMostViews = 12;
+// Two views from one place tell no depth. At 100 mm from the organ 5 mm are 3 degrees. A scope that turned by more than
+// half of its field of view shows another part of the organ.
+constexpr double kApartMm = 5, kTurnedDeg = 30;
+// A hand's motion is a line to some hundredths of a millimetre for so long, and twelve measurements of a miniBIRD lie
+// within it.
+constexpr Duration kHalfWindow = Duration::from_ms(60);
+
+bool same_place(const Transform<Camera, Patient>& a, const Transform<Camera, Patient>& b) {
+  const Transform<Camera, Camera> moved = a * b.inverse();
+  return moved.translation().norm() < kApartMm && rotation_log(moved.rotation()).norm() < kTurnedDeg * kRadPerDeg;
+}
+
+PoseHistory::Settings averaging() {
+  PoseHistory::Settings settings;
+  settings.smoothing = kHalfWindow;
+  return settings;
+}
 
 }  // namespace
+
+ViewStep::ViewStep() : scope_(averaging()) {}
 
 void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
                     const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
@@ -20,17 +45,41 @@ void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
     note_.line = "not kept: there is no overlay on this frame, so that where its camera was is not sure";
     return;
   }
+  const auto there = std::find_if(views_.begin(), views_.end(), [&](const KeptView& view) {
+    return same_place(view.camera_from_patient, *camera_from_patient);
+  });
+  if (there != views_.end()) {
+    note_.line = fmt::format("not kept: view {} was kept from here: move the scope by {:.0f} mm or more",
+                             there - views_.begin() + 1, kApartMm);
+    return;
+  }
   views_.push_back({*frame, *camera_from_patient});
   note_ = {views_.size() >= kEnoughViews, fmt::format("{} views kept", views_.size())};
 }
 
+void ViewStep::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+  scope_.push(acquired, Duration{}, tracker_from_sensor);
+}
+
+void ViewStep::average(const Setup& setup) {
+  for (; averaged_ < views_.size(); ++averaged_) {
+    KeptView& view = views_[averaged_];
+    const DeviceTime exposed = view.frame.info.acquired;
+    if (!scope_.newest() || *scope_.newest() < exposed + kHalfWindow) return;
+    const PoseAnswer pose = scope_.at(exposed);
+    if (pose.tracker_from_sensor) view.camera_from_patient = setup.camera_from_patient(*pose.tracker_from_sensor);
+  }
+}
+
 void ViewStep::undo() {
   if (!views_.empty()) views_.pop_back();
+  averaged_ = std::min(averaged_, views_.size());
   note_ = {views_.size() >= kEnoughViews, fmt::format("{} views kept", views_.size())};
 }
 
 void ViewStep::forget(const std::string& why) {
   views_.clear();
+  averaged_ = 0;
   note_ = {false, why};
 }
 

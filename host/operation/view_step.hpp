@@ -5,8 +5,10 @@
 #include <vector>
 
 #include "calibration/geometry/transform.hpp"
+#include "calibration/time/pose_history.hpp"
 #include "device/wire/messages.hpp"
 #include "host/operation/live_step.hpp"
+#include "host/overlay/scope_setup.hpp"
 #include "host/registration/views/view_advice.hpp"
 
 namespace birdseye::host {
@@ -22,9 +24,17 @@ struct KeptView {
 /// The views of the organ that are kept.
 class ViewStep {
  public:
-  /// The newest frame, with where its overlay was drawn from; empty where none was.
+  ViewStep();
+
+  /// The newest frame, with where its overlay was drawn from; empty where none was. A view from where a kept one was
+  /// taken is refused: it tells no depth.
   void keep(const std::optional<wire::VideoFrame>& frame,
             const std::optional<Transform<Camera, Patient>>& camera_from_patient);
+  /// A measurement of the scope's bird.
+  void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  /// Gives each kept view the pose on which the measurements before and after its frame agree, as soon as they have
+  /// come: a single measurement's noise is averaged away.
+  void average(const Setup& setup);
   void undo();
   /// All of them; why in words.
   void forget(const std::string& why);
@@ -35,7 +45,9 @@ class ViewStep {
   [[nodiscard]] ViewAdvice advice(const Transform<Camera, Patient>& now, const Eigen::Vector3d& middle_mm) const;
 
  private:
+  PoseHistory scope_;
   std::vector<KeptView> views_;
+  std::size_t averaged_ = 0;  ///< of views_, from the first on
   StepNote note_;
 };
 

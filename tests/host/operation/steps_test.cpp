@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/operation/calibration_step.hpp"
@@ -199,12 +200,17 @@ std::optional<wire::VideoFrame> noise(unsigned seed) {
 
 const Transform<Camera, Patient> kCameraFromPatient(Eigen::Matrix3d::Identity(), {-12, -12, 60});
 
+/// The camera n steps of 6 mm to the right of there.
+Transform<Camera, Patient> beside(unsigned n) {
+  return {Eigen::Matrix3d::Identity(), kCameraFromPatient.translation() - Eigen::Vector3d(6.0 * n, 0, 0)};
+}
+
 TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
   ViewStep step;
   step.keep(noise(1), std::nullopt);
   EXPECT_TRUE(step.views().empty());
   EXPECT_EQ(step.note().line.substr(0, 9), "not kept:");
-  for (unsigned i = 0; i < 5; ++i) step.keep(noise(i), kCameraFromPatient);
+  for (unsigned i = 0; i < 5; ++i) step.keep(noise(i), beside(i));
   EXPECT_TRUE(step.note().done);
   step.undo();
   EXPECT_FALSE(step.note().done);
@@ -216,15 +222,69 @@ TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
 
 TEST(ViewStep, OneMoreThanTheMostIsRefusedAndToldSo) {
   ViewStep step;
-  for (unsigned i = 0; i < 12; ++i) step.keep(noise(i), kCameraFromPatient);
+  for (unsigned i = 0; i < 12; ++i) step.keep(noise(i), beside(i));
   EXPECT_EQ(step.note().line, "12 views kept");
-  step.keep(noise(12), kCameraFromPatient);
+  step.keep(noise(12), beside(12));
   EXPECT_EQ(step.views().size(), 12U);
   EXPECT_EQ(step.note().line, "not kept: 12 views are the most; undo the last one, or go on");
   EXPECT_TRUE(step.note().done);
   step.undo();
-  step.keep(noise(12), kCameraFromPatient);
+  step.keep(noise(12), beside(12));
   EXPECT_EQ(step.note().line, "12 views kept");
+}
+
+TEST(ViewStep, AViewFromWhereOneWasKeptIsRefused) {
+  ViewStep step;
+  step.keep(noise(1), beside(0));
+  step.keep(noise(2), beside(1));
+  const Transform<Camera, Patient> near(Eigen::Matrix3d::Identity(),
+                                        beside(1).translation() + Eigen::Vector3d(0, 2, -3));
+  step.keep(noise(3), near);
+  EXPECT_EQ(step.views().size(), 2U);
+  EXPECT_EQ(step.note().line, "not kept: view 2 was kept from here: move the scope by 5 mm or more");
+  // From there it sees another part of the organ.
+  const Transform<Camera, Camera> turned(rotation_exp(Eigen::Vector3d(0, 0.6, 0)), Eigen::Vector3d::Zero());
+  step.keep(noise(4), turned * near);
+  EXPECT_EQ(step.note().line, "3 views kept");
+}
+
+TEST(ViewStep, AveragesTheTrackersNoiseAboutAKeptFrame) {
+  const auto setup = ScopeSetup::of_hand_eye({64, 48, 60, 60, 32, 24}, std::nullopt, {})
+                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {300, 0, 0}));
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise_mm(0, 0.5);
+  // 100 measurements a second while the scope moves by 30 mm/s; the frame is of the middle.
+  const auto truth = [](int i) {
+    return Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), {250 + 0.3 * (i - 100), 0, -80});
+  };
+  const auto measured = [&](int i) {
+    const Eigen::Vector3d off(noise_mm(random), noise_mm(random), noise_mm(random));
+    return Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), truth(i).translation() + off);
+  };
+  const auto time = [](int i) { return DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}); };
+  double before_mm2 = 0, after_mm2 = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    ViewStep step;
+    for (int i = 0; i <= 103; ++i) {
+      const auto pose = measured(i);
+      step.take(time(i), pose);
+      if (i != 100) continue;
+      wire::VideoFrame frame = *noise(1);
+      frame.info.acquired = time(i);
+      step.keep(frame, setup.camera_from_patient(pose));
+      before_mm2 += (pose.translation() - truth(i).translation()).squaredNorm();
+    }
+    const auto given = step.views().front().camera_from_patient;
+    step.average(setup);
+    EXPECT_EQ(step.views().front().camera_from_patient.matrix(), given.matrix()) << "what comes after it is missing";
+    for (int i = 104; i <= 120; ++i) step.take(time(i), measured(i));
+    step.average(setup);
+    const auto is = step.views().front().camera_from_patient.translation();
+    after_mm2 += (is - setup.camera_from_patient(truth(100)).translation()).squaredNorm();
+    EXPECT_NE(is, given.translation());
+  }
+  // Thirteen measurements, of which a line takes its value in the middle: a share of 1 / sqrt(13).
+  EXPECT_NEAR(std::sqrt(after_mm2 / before_mm2), 0.28, 0.08);
 }
 
 std::shared_ptr<const PatientPlan> ball() {
@@ -247,7 +307,7 @@ TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
   DeformationStep step;
   {
     ViewStep views;
-    for (unsigned i = 0; i < 2; ++i) views.keep(noise(i), kCameraFromPatient);
+    for (unsigned i = 0; i < 2; ++i) views.keep(noise(i), beside(i));
     const auto plan = ball();
     watched = plan;
     step.begin(views.views(), {64, 48, 60, 60, 32, 24}, plan, transfer);
