@@ -228,6 +228,7 @@ void add_live(CLI::App& app, CommandStatus& status) {
   options->cart.deformation_mm = 8;
   options->cart.dwell_s = 0.7;
   options->cart.pause_s = 8;
+  options->cart.views = true;  // from several ports: from one alone, how far away the organ is stays uncertain
   options->cart.look_s = 3600;
   options->cart.drop_late = true;
   options->cart.smoothing_ms = 12;  // what is averaged after a frame, the frame has to wait for
