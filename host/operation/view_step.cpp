@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -58,6 +57,8 @@ void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
 }
 
 void ViewStep::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+  // A clock that went back is another one, as of an appliance that was started anew: its times must not meet the old.
+  if (scope_.newest() && acquired < *scope_.newest()) scope_ = PoseHistory(averaging());
   scope_.push(acquired, Duration{}, tracker_from_sensor);
 }
 

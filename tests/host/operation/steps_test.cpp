@@ -279,12 +279,30 @@ TEST(ViewStep, AveragesTheTrackersNoiseAboutAKeptFrame) {
     EXPECT_EQ(step.views().front().camera_from_patient.matrix(), given.matrix()) << "what comes after it is missing";
     for (int i = 104; i <= 120; ++i) step.take(time(i), measured(i));
     step.average(setup);
-    const auto is = step.views().front().camera_from_patient.translation();
+    const Eigen::Vector3d is = step.views().front().camera_from_patient.translation();
     after_mm2 += (is - setup.camera_from_patient(truth(100)).translation()).squaredNorm();
     EXPECT_NE(is, given.translation());
   }
   // Thirteen measurements, of which a line takes its value in the middle: a share of 1 / sqrt(13).
   EXPECT_NEAR(std::sqrt(after_mm2 / before_mm2), 0.28, 0.08);
+}
+
+/// As of an appliance that was started anew: a measurement of before has no say in a frame of now.
+TEST(ViewStep, AClockThatWentBackAveragesNothingOfBefore) {
+  const auto setup = ScopeSetup::of_hand_eye({64, 48, 60, 60, 32, 24}, std::nullopt, {})
+                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {300, 0, 0}));
+  const Transform<Tracker, Sensor> before(Eigen::Matrix3d::Identity(), {200, 0, 0});
+  const Transform<Tracker, Sensor> now(Eigen::Matrix3d::Identity(), {260, 0, 0});
+  ViewStep step;
+  for (int i = 0; i < 200; ++i) step.take(DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}), before);
+  wire::VideoFrame frame = *noise(1);
+  frame.info.acquired = DeviceTime{} + Duration::from_ms(500);
+  for (int i = 40; i < 60; ++i) step.take(DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}), now);
+  step.keep(frame, setup.camera_from_patient(now));
+  step.average(setup);
+  const Eigen::Vector3d off_mm =
+      step.views().front().camera_from_patient.translation() - setup.camera_from_patient(now).translation();
+  EXPECT_LT(off_mm.norm(), 1e-9);
 }
 
 std::shared_ptr<const PatientPlan> ball() {
