@@ -10,6 +10,7 @@
 
 namespace birdseye::host {
 
+/// Corrected poses, and the error that all of them may still share.
 struct PoseAdjustment {
   AdjustedPoses poses;
   CommonPoseError common;
