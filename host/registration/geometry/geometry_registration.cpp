@@ -64,7 +64,7 @@ Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const
 Result<void> check_places(const GeometrySettings& settings) {
   for (std::size_t i = 0; i < settings.touches.size(); ++i) {
     const SeenPoint& touch = settings.touches[i];
-    if (!touch.place_mm.allFinite() || !(touch.sigma_mm > 0))
+    if (!touch.place_mm.allFinite() || !(touch.sigma_mm > 0) || !(touch.shift_mm >= 0))
       return Error{Errc::bad_value, fmt::format("touch {}: give a place and a sigma over 0, in mm", i + 1)};
   }
   for (std::size_t i = 0; i < settings.matched.size(); ++i) {
@@ -98,14 +98,14 @@ Result<void> check_seen(const VideoView& view, const PinholeView& pinhole, const
 }
 
 /// How the touches, which are the last of the points, and what is matched fit the result.
-void tell_fits(const GeometrySettings& settings, const BelievedDeformation& found, const SeenSurface& surface,
-               ViewRegistration& out) {
+void tell_fits(const GeometrySettings& settings, std::span<const SeenPoint> touches, const BelievedDeformation& found,
+               const SeenSurface& surface, ViewRegistration& out) {
   constexpr double kKnown_mm = 10;
-  for (std::size_t i = 0; i < settings.touches.size(); ++i) {
-    PlaceFit fit{std::abs(surface.distance().distance_mm(settings.touches[i].place_mm)), 0};
+  for (std::size_t i = 0; i < touches.size(); ++i) {
+    PlaceFit fit{std::abs(surface.distance().distance_mm(touches[i].place_mm)), 0};
     for (std::size_t n = 0; n < found.fits.size(); ++n) {
       const auto weights = found.fits[n].weights();
-      fit.weight += found.beliefs[n] * weights[weights.size() - settings.touches.size() + i];
+      fit.weight += found.beliefs[n] * weights[weights.size() - touches.size() + i];
     }
     out.touches.push_back(fit);
   }
@@ -150,6 +150,8 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.adjusted = std::move(adjusted->poses);
   }
 
+  const std::vector<SeenPoint> touches =
+      settings.gather_touches ? gathered_points(settings.touches, rest) : settings.touches;
   // Each round looks nearer to the surface as the round before left it.
   struct Round {
     double grid_px, span_mm, step_mm, outline_mm;
@@ -170,7 +172,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     std::vector<SeenPoint> points = gathered_points(by_stereo, surface);
     const std::vector<SeenPoint> of_outlines = gathered_points(by_outlines, surface);
     points.insert(points.end(), of_outlines.begin(), of_outlines.end());
-    points.insert(points.end(), settings.touches.begin(), settings.touches.end());
+    points.insert(points.end(), touches.begin(), touches.end());
     const bool nothing = points.empty() && settings.matched.empty();
     if (nothing && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more
     if (nothing) {
@@ -201,12 +203,12 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.min_jacobian = 1;
   }
   const SeenSurface surface(seen_distance(*organ, found.mean));
-  if (!out.folded) tell_fits(settings, found, surface, out);
+  if (!out.folded) tell_fits(settings, touches, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
     out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm, common);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
-    out.held_out = held_out_view(*organ, seen_by, found, settings.touches, settings.matched);
+    out.held_out = held_out_view(*organ, seen_by, found, touches, settings.matched);
   }
   return out;
 }

@@ -23,6 +23,9 @@ struct GeometrySettings {
   /// Places that are on the organ's surface now, whatever tells of them: a pointer's tip, another modality. No camera
   /// sees them.
   std::vector<SeenPoint> touches;
+  /// Whether touches close together are told as one, for their errors are alike: those of a stroke. The result's
+  /// touches are the gathered ones then.
+  bool gather_touches = false;
   std::vector<MatchedPoint> matched;  ///< what is known both at rest and now
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};

@@ -5,9 +5,11 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 
 #include "host/registration/geometry/believed_deformation.hpp"
 #include "host/registration/geometry/displacement_fit.hpp"
+#include "host/registration/geometry/gathered_points.hpp"
 #include "tests/support/ball.hpp"
 
 namespace birdseye::host {
@@ -209,6 +211,46 @@ TEST(FurtherRows, AreBelievedUnderEveryHypothesisAndWhereOneGoesOn) {
     for (const MatchedPoint& point : matched)
       EXPECT_LT((seen_place(found->fields[n], point.rest_mm) - point.seen_mm).norm(), 2.5);
   }
+}
+
+/// Of the upper side of a ball at rest, shifted upwards by so much.
+std::vector<SeenPoint> lifted(int number, double up_mm, double sigma_mm, double shift_mm, unsigned seed) {
+  std::mt19937 random(seed);
+  std::vector<SeenPoint> out;
+  for (int i = 0; i < number; ++i)
+    out.push_back({of_side(random, 1) + up_mm * Eigen::Vector3d::UnitZ(), sigma_mm, std::nullopt, shift_mm});
+  return out;
+}
+
+TEST(SeenPoint, WhatPlacesHaveWrongTogetherIsNotLessenedByTheirNumber) {
+  const SignedDistance organ = testing::ball(kBall_mm);
+  DisplacementPrior prior;
+  prior.parts.push_back({400, 4});  // nearly a shift of all of the organ
+  const auto up = [&](const std::vector<SeenPoint>& points) {
+    const auto fit = DisplacementFit::solve(organ, points, prior, nullptr, kDown_mm);
+    const Eigen::Vector3d now = seen_place(fit.seen_field(organ), Eigen::Vector3d::Zero());
+    return std::pair(now.z(), std::sqrt(fit.covariance(Eigen::Vector3d::Zero(), now)(2, 2)));
+  };
+  // By themselves they are believed, and known as well as the shift is: of 4 mm before and 1 mm, 0.97 mm.
+  const auto [alone_mm, alone_sigma_mm] = up(lifted(200, 1, 0.3, 1, 3));
+  EXPECT_NEAR(alone_mm, 1, 0.15);
+  EXPECT_NEAR(alone_sigma_mm, 0.97, 0.1);
+  EXPECT_LT(up(lifted(200, 1, 0.3, 0, 3)).second, 0.5) << "as if each were new";
+  // What tells of the organ without that shift, and is fewer, is believed more.
+  for (const double shift_mm : {0.0, 1.0}) {
+    std::vector<SeenPoint> points = lifted(40, 0, 0.5, 0, 5);
+    const std::vector<SeenPoint> touches = lifted(200, 1, 0.3, shift_mm, 3);
+    points.insert(points.end(), touches.begin(), touches.end());
+    EXPECT_EQ(up(points).first<0.3, shift_mm> 0) << up(points).first;
+  }
+}
+
+TEST(GatheredPoints, KeepTheShiftThatTheyHaveTogether) {
+  const SeenSurface surface(testing::ball(kBall_mm));
+  const std::vector<SeenPoint> touches = lifted(400, 1, 0.3, 0.8, 3);
+  const std::vector<SeenPoint> gathered = gathered_points(touches, surface);
+  EXPECT_LT(gathered.size(), touches.size() / 2);
+  for (const SeenPoint& point : gathered) EXPECT_EQ(point.shift_mm, 0.8);
 }
 
 }  // namespace
