@@ -132,6 +132,7 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
                                    fmt::format("{}", settings.pause_s),
                                    "--look-s",
                                    fmt::format("{}", settings.look_s)};
+  if (settings.strokes) command.emplace_back("--strokes");
   if (settings.views) command.emplace_back("--views");
   if (settings.drop_late) command.emplace_back("--drop-late");
   if (!settings.faults.empty()) command.insert(command.end(), {"--faults", settings.faults.string()});

@@ -27,6 +27,7 @@ struct SimulatedCartSettings {
   double video_rate_hz = 25;
   double dwell_s = 0.3;  ///< how long the scope is held still at each station over the board
   double pause_s = 0;    ///< how long it then stays at the last one, so that the calibration can be worked out
+  bool strokes = false;  ///< whether the pointer strokes the liver's face after the fiducials
   bool views = false;    ///< whether it is held still at places about the liver, so that views can be kept
   double look_s = 7;     ///< how long it then sweeps over the liver
   int smoothing_ms = 40, wait_ms = 90;  ///< [pose] of birdseyed: frames wait for the poses that are averaged
@@ -43,7 +44,7 @@ struct CartSheet {
 
 /// What the operator does from a moment on.
 struct CartStage {
-  std::string name;  ///< calibrate, touch, views, look or end
+  std::string name;  ///< calibrate, touch, stroke, views, look or end
   DeviceTime begins;
 };
 

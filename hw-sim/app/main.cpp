@@ -58,6 +58,7 @@ int main(int argc, char** argv) {
                  "how long it then stays there, before the pointer touches the fiducials")
       ->check(CLI::Range(0.0, 600.0));
   run.add_flag("--drop-late", cart.drop_late, "leave out frames that are not traced in time, as a camera would");
+  run.add_flag("--strokes", cart.pace.strokes, "after the fiducials, stroke the liver's face with the pointer");
   run.add_flag("--views", cart.pace.views, "hold the scope still at places about the liver, to keep views from");
   run.add_option("--look-s", cart.pace.look_s, "how long the scope then sweeps over the liver (default 7)")
       ->check(CLI::Range(1.0, 86400.0));

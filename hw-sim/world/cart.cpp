@@ -117,10 +117,6 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   const auto liver = read_ply(settings.phantom / "surfaces" / "liver.ply");
   if (!liver) return liver.error();
   const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
-  const auto world = World::create(*truth, *liver, lens, settings.seed, settings.pace);
-  if (!world) return world.error();
-  const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
-  if (!laparoscope) return laparoscope.error();
   const auto moved = moved_liver(*liver, settings.deformation_mm, settings.seed);
   if (!moved) return moved.error();
   Cavity cavity{.organ = *liver, .wall_centre_mm = truth->liver_centre_mm};
@@ -128,6 +124,10 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
     cavity.organ = deformed(*liver, *moved);
     cavity.rest_mm = liver->vertices;
   }
+  const auto world = World::create(*truth, *liver, lens, settings.seed, settings.pace, &cavity.organ);
+  if (!world) return world.error();
+  const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
+  if (!laparoscope) return laparoscope.error();
   (*laparoscope)->set_cavity(cavity);
   (*laparoscope)->set_bench(world->board());
 

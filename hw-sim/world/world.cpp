@@ -49,7 +49,7 @@ Transform<To, From> between(const Transform<To, From>& a, const Transform<To, Fr
 }  // namespace
 
 Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
-                            const Pace& pace) {
+                            const Pace& pace, const Mesh* moved) {
   World world;
   world.dwell_s_ = pace.dwell_s;
   world.truth_ = truth;
@@ -84,21 +84,32 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   world.plan_stations(lens, seed);
   if (pace.views) world.plan_views();
 
-  const Vector3d park = world.tracker_from_patient_ * (truth.liver_centre_mm + Vector3d(170, -190, -40));
+  const Vector3d park_in_patient_mm = truth.liver_centre_mm + Vector3d(170, -190, -40);
+  const Vector3d park = world.tracker_from_patient_ * park_in_patient_mm;
   world.tip_stops_in_tracker_mm_.push_back(park);
   for (const Vector3d& fiducial : truth.fiducials_mm) {
     world.tip_stops_in_tracker_mm_.push_back(world.tracker_from_patient_ * fiducial);
   }
   world.tip_stops_in_tracker_mm_.push_back(park);
 
+  if (pace.strokes) {
+    // The hand is at the upper end of the shaft, which stands along the tracker's z.
+    const Vector3d towards_hand = -(world.tracker_from_patient_.rotation().transpose() * Vector3d::UnitZ());
+    world.stroke_ = StrokePath::over(moved != nullptr ? *moved : liver, towards_hand, park_in_patient_mm);
+    if (!(world.stroke_.lasts_s() > 0))
+      return Error{Errc::bad_value, "no part of the liver faces the hand with the pointer; leave out --strokes"};
+  }
+
   const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
   world.calibrate_s_ = pace.sway_s;
   world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS) + pace.pause_s;
-  world.views_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.stroke_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
+  world.views_s_ = world.stroke_s_ + world.stroke_.lasts_s();
   world.look_s_ = world.views_s_ + static_cast<double>(world.views_.size()) * (kViewDwellS + kViewMoveS);
   world.ends_s_ = world.look_s_ + pace.look_s;
   if (pace.sway_s > 0) world.stages_.push_back({"sway", 0});
   world.stages_.insert(world.stages_.end(), {{"calibrate", world.calibrate_s_}, {"touch", world.touch_s_}});
+  if (pace.strokes) world.stages_.push_back({"stroke", world.stroke_s_});
   if (pace.views) world.stages_.push_back({"views", world.views_s_});
   world.stages_.insert(world.stages_.end(), {{"look", world.look_s_}, {"end", world.ends_s_}});
   if (const auto in_range = world.check_range(); !in_range) return in_range.error();
@@ -238,8 +249,9 @@ Transform<Tracker, Pointer> World::tracker_from_pointer(double world_s) const {
   const double into_s = (beat - static_cast<double>(stop)) * (kTouchDwellS + kTouchMoveS);
   const double u = ease((into_s - kTouchDwellS) / kTouchMoveS);
   const std::size_t next = std::min(stop + 1, last);
-  const Vector3d tip =
-      tip_stops_in_tracker_mm_[stop] + u * (tip_stops_in_tracker_mm_[next] - tip_stops_in_tracker_mm_[stop]);
+  Vector3d tip = tip_stops_in_tracker_mm_[stop] + u * (tip_stops_in_tracker_mm_[next] - tip_stops_in_tracker_mm_[stop]);
+  if (stroke_.lasts_s() > 0 && world_s > stroke_s_)
+    tip = tracker_from_patient_ * stroke_.tip_in_patient_mm(world_s - stroke_s_);
   // The hand holds the pointer from in front of the patient, a little differently at each place.
   const auto hold = [](std::size_t i) {
     const auto a = static_cast<double>(i);

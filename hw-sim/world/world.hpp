@@ -9,11 +9,12 @@
 #include "calibration/geometry/transform.hpp"
 #include "hw-sim/camera/laparoscope.hpp"
 #include "hw-sim/phantom/phantom.hpp"
+#include "hw-sim/world/stroke_path.hpp"
 
 namespace birdseye::hw_sim {
 
 struct Stage {
-  std::string name;  ///< sway, calibrate, touch, views, look or end
+  std::string name;  ///< sway, calibrate, touch, stroke, views, look or end
   double begins_s;
 };
 
@@ -22,20 +23,23 @@ struct Pace {
   double sway_s = 0;     ///< how long the scope is turned to and fro over the board before anything else
   double dwell_s = 0.3;  ///< how long the scope is held still at each station
   double pause_s = 0;    ///< how long it stays at the last one, while the calibration is worked out
+  bool strokes = false;  ///< whether the pointer strokes the liver's face after the fiducials
   bool views = false;    ///< whether the scope is first held still at places about the liver
   double look_s = 7;     ///< how long the scope sweeps over the liver
 };
 
 /// The scripted operation: where everything truly is at any world time. If asked for, the scope is first turned to and
 /// fro over a board. Then it is held still over the board at one station after another, then the pointer rests at each
-/// fiducial in turn. Then, if asked for, the scope is held still at places about the liver, 64 degrees apart as seen
-/// from it, as several ports let it. Then, turning about one port in the abdominal wall, it sweeps over the liver.
+/// fiducial in turn. Then, if asked for, the pointer strokes the liver's face, while the scope stays. Then, if asked
+/// for, the scope is held still at places about the liver, 64 degrees apart as seen from it, as several ports let it.
+/// Then, turning about one port in the abdominal wall, it sweeps over the liver.
 class World {
  public:
-  /// liver: the liver's surface in the patient frame, at which the scope looks. Refused where the script would take a
-  /// bird out of the tracker's range.
+  /// liver: the liver's surface in the patient frame as the CT has it, at which the scope looks. moved: the same as it
+  /// lies now, which the pointer strokes; null: as in the CT. Refused where the script would take a bird out of the
+  /// tracker's range, and where no part of the liver faces the hand that is to stroke it.
   static Result<World> create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
-                              const Pace& pace = {});
+                              const Pace& pace = {}, const Mesh* moved = nullptr);
 
   [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
   [[nodiscard]] double ends_s() const { return ends_s_; }
@@ -48,6 +52,8 @@ class World {
   [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
   [[nodiscard]] const Transform<Tracker, Patient>& tracker_from_patient() const { return tracker_from_patient_; }
   [[nodiscard]] const Transform<Tracker, Marker>& tracker_from_marker() const { return tracker_from_marker_; }
+  /// Whether the pointer's tip goes along the liver's surface.
+  [[nodiscard]] bool strokes(double world_s) const { return stroke_.on_surface(world_s - stroke_s_); }
   [[nodiscard]] const Eigen::Vector3d& tip_in_pointer_mm() const { return tip_in_pointer_mm_; }
   [[nodiscard]] const Chessboard& board() const { return board_; }
   [[nodiscard]] const PhantomTruth& truth() const { return truth_; }
@@ -71,8 +77,9 @@ class World {
   std::vector<Transform<Tracker, Camera>> stations_;
   std::vector<Transform<Tracker, Camera>> views_;
   std::vector<Eigen::Vector3d> tip_stops_in_tracker_mm_;  ///< park, each fiducial, park
+  StrokePath stroke_;
   std::vector<Stage> stages_;
-  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, views_s_ = 0, look_s_ = 0, ends_s_ = 0;
+  double dwell_s_ = 0, calibrate_s_ = 0, touch_s_ = 0, stroke_s_ = 0, views_s_ = 0, look_s_ = 0, ends_s_ = 0;
 };
 
 }  // namespace birdseye::hw_sim

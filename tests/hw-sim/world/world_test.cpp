@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <utility>
 
 #include "calibration/base/units.hpp"
@@ -136,6 +139,79 @@ TEST(World, TheScopeIsHeldStillAtPlacesAboutTheLiverWhereThatIsAskedFor) {
     EXPECT_LT(between_deg(i - 1, i), 25);
   }
   EXPECT_GT(between_deg(0, directions.size() - 1), 45);
+}
+
+/// From a place to the nearest place of a triangle.
+double off_triangle_mm(const Eigen::Vector3d& place, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                       const Eigen::Vector3d& c) {
+  const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
+  const auto beyond = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return (to - from).cross(place - from).dot(normal) < 0;
+  };
+  if (!beyond(a, b) && !beyond(b, c) && !beyond(c, a)) return std::abs((place - a).dot(normal));
+  const auto off_edge_mm = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    const double along = std::clamp((place - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
+    return (place - from - along * (to - from)).norm();
+  };
+  return std::min({off_edge_mm(a, b), off_edge_mm(b, c), off_edge_mm(c, a)});
+}
+
+double off_mesh_mm(const Eigen::Vector3d& place, const Mesh& mesh) {
+  constexpr double kNear_mm = 12;
+  double least_mm = 1e9;
+  for (const auto& triangle : mesh.triangles) {
+    const auto corner = [&](std::size_t i) -> Eigen::Vector3d { return mesh.vertices[triangle[i]].cast<double>(); };
+    if ((corner(0) - place).cwiseAbs().maxCoeff() > kNear_mm) continue;
+    least_mm = std::min(least_mm, off_triangle_mm(place, corner(0), corner(1), corner(2)));
+  }
+  return least_mm;
+}
+
+TEST(World, ThePointerStrokesTheLiverAsItLiesNowWhereThatIsAskedFor) {
+  const CameraModel lens = laparoscope_lens(768, 576);
+  Mesh moved = scene().liver;
+  for (Eigen::Vector3f& vertex : moved.vertices)
+    vertex += Eigen::Vector3f(2, -6 + 2 * std::sin(vertex.x() / 40), 1 + std::cos(vertex.z() / 50));
+  compute_normals(moved);
+  const auto without = World::create(scene().truth, scene().liver, lens, 1);
+  const auto world = World::create(scene().truth, scene().liver, lens, 1, {.strokes = true}, &moved);
+  ASSERT_TRUE(without && world);
+  const auto& stages = world->stages();
+  const auto stroke = std::find_if(stages.begin(), stages.end(), [](const Stage& s) { return s.name == "stroke"; });
+  ASSERT_NE(stroke, stages.end());
+  const double lasts_s = std::next(stroke)->begins_s - stroke->begins_s;
+  EXPECT_GT(lasts_s, 8);
+  EXPECT_LT(lasts_s, 30);
+  EXPECT_NEAR(world->ends_s(), without->ends_s() + lasts_s, 1e-9);
+  // What comes before is as without strokes, and what comes after, later.
+  for (int i = 0; i < 200; ++i) {
+    const double before_s = stroke->begins_s * i / 200, look_s = stroke->begins_s + 0.03 * i;
+    EXPECT_EQ(world->tracker_from_pointer(before_s).matrix(), without->tracker_from_pointer(before_s).matrix());
+    EXPECT_EQ(world->tracker_from_sensor(before_s).matrix(), without->tracker_from_sensor(before_s).matrix());
+    EXPECT_LT(
+        (world->tracker_from_sensor(look_s + lasts_s).matrix() - without->tracker_from_sensor(look_s).matrix()).norm(),
+        1e-6);
+  }
+  const auto tip_mm = [&](double s) -> Eigen::Vector3d {
+    return world->tracker_from_patient().inverse() * (world->tracker_from_pointer(s) * world->tip_in_pointer_mm());
+  };
+  const double begins_s = stroke->begins_s;
+  EXPECT_LT((tip_mm(begins_s + lasts_s + 1) - tip_mm(begins_s)).norm(), 1e-6) << "parked again";
+  Eigen::AlignedBox3d about;
+  int stroking = 0, of_rest = 0;
+  const int steps = static_cast<int>(lasts_s / 0.05);
+  for (int i = 0; i < steps; ++i) {
+    const double s = begins_s + 0.05 * i;
+    if (!world->strokes(s) || !world->strokes(s + 0.01)) continue;
+    ++stroking;
+    about.extend(tip_mm(s));
+    EXPECT_LT(off_mesh_mm(tip_mm(s), moved), 0.1) << s;
+    EXPECT_NEAR((tip_mm(s + 0.01) - tip_mm(s)).norm(), 0.4, 0.05) << "40 mm/s";
+    of_rest += off_mesh_mm(tip_mm(s), scene().liver) < 1 ? 1 : 0;
+  }
+  EXPECT_GT(stroking, steps / 2);
+  EXPECT_LT(of_rest, stroking / 10) << "not the liver as the CT has it";
+  EXPECT_GT(about.diagonal().norm(), 80);
 }
 
 TEST(Laparoscope, TheSameFrameIsTheSameBytesAndAnotherIsNot) {
