@@ -122,6 +122,7 @@ nlohmann::json json_of(const LiveFigures& figures, const OperationView& operatio
                       {"age_ms_max", figures.ages.most_ms()},
                       {"oldest_overlay_ms", figures.oldest_overlay_ms},
                       {"stood_still", figures.stood_still},
+                      {"touches", operation.touched_places},
                       {"engine", operation.engine_name},
                       {"link_says", operation.link.words},
                       {"appliance_says", operation.link.appliance_says},
@@ -253,6 +254,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
                    "with --simulate: the size of its video (default 512x384, which two "
                    "cores trace and overlay in time)")
       ->type_name("WxH");
+  command->add_flag("--strokes", options->cart.strokes,
+                    "with --simulate: the pointer strokes the liver's face after the fiducials");
   command->add_option("--look-s", options->cart.look_s, "with --simulate: how long the operation lasts")
       ->check(CLI::Range(1.0, 86400.0));
   PatientFiles& patient = options->live.patient;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "host/files/picture.hpp"
@@ -14,7 +15,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr std::size_t kFewestViews = 2;
+constexpr std::size_t kFewestViews = 2, kFewestBesideTouches = 1;
 
 Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::size_t number) {
   VideoView view;
@@ -31,12 +32,22 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
   return view;
 }
 
+/// How the touches fit, to come after what is said of the deformation; empty: there are none.
+std::string words_of(const std::vector<PlaceFit>& touches) {
+  if (touches.empty()) return {};
+  const auto wrong =
+      std::count_if(touches.begin(), touches.end(), [](const PlaceFit& fit) { return fit.thought_wrong(); });
+  const std::string how_many = wrong == 0 ? "none is" : wrong == 1 ? "1 is" : fmt::format("{} are", wrong);
+  return fmt::format("; of {} touched patches {} thought wrong", touches.size(), how_many);
+}
+
 }  // namespace
 
 void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
-                            std::shared_ptr<const PatientPlan> patient, const TransferFunction& transfer) {
+                            std::shared_ptr<const PatientPlan> patient, const TransferFunction& transfer,
+                            std::vector<SeenPoint> touches) {
   if (running()) return;
-  if (kept.size() < kFewestViews) {
+  if (kept.size() < (touches.empty() ? kFewestViews : kFewestBesideTouches)) {
     note_.line = fmt::format("{} views are too few: keep {} or more, from different sides", kept.size(), kEnoughViews);
     return;
   }
@@ -53,12 +64,14 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
   }
   note_ = {false, "matching"};
   dropped_ = false;
-  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient), transfer](
-                      const std::stop_token& stop, const auto& say) {
+  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient), transfer,
+                   touches = std::move(touches)](const std::stop_token& stop, const auto& say) {
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
     GeometrySettings settings;
     settings.targets_at_rest_mm = {target_in_patient_mm(*patient)};
+    settings.touches = touches;
+    settings.gather_touches = true;
     settings.progress = say;
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
     const Volume* const labels = patient->labels ? &*patient->labels : nullptr;
@@ -87,10 +100,11 @@ bool DeformationStep::tick() {
     return false;
   }
   if (verdict.grade == Grade::fail) {
-    note_ = {false, verdict.reasons.front()};
+    note_ = {false, verdict.reasons.front() + words_of(registration.touches)};
     return false;
   }
   note_ = {true, verdict.grade == Grade::marginal ? "with care: " + verdict.reasons.front() : verdict.reasons.front()};
+  note_.line += words_of(registration.touches);
   DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt};
   if (const auto& expected = registration.expected) {
     if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;

@@ -11,6 +11,7 @@
 #include "host/operation/live_step.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/view_step.hpp"
+#include "host/registration/geometry/seen_point.hpp"
 #include "host/registration/views/view_registration.hpp"
 #include "host/render/scene/transfer_function.hpp"
 
@@ -19,8 +20,9 @@ namespace birdseye::host {
 /// Matches the CT with views. The thread that does it has copies of all it is given, and shares what is never changed.
 class DeformationStep {
  public:
+  /// touches: places of the organ's surface as it lies now, patient mm, whose neighbours err alike.
   void begin(std::span<const KeptView> views, const CameraModel& camera, std::shared_ptr<const PatientPlan> patient,
-             const TransferFunction& transfer);
+             const TransferFunction& transfer, std::vector<SeenPoint> touches = {});
   void cancel() { matching_.cancel(); }
   /// True: another deformation was found.
   bool tick();

@@ -101,6 +101,11 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   }
   if (!settings_.tip_in_pointer_mm) return;
   const auto rested = pointer_.take(birds, settings_.pointer, *settings_.tip_in_pointer_mm);
+  for (const wire::Bird& bird : birds.birds) {
+    if (bird.name != settings_.pointer || !strokes_.stroking()) continue;
+    strokes_.take(birds.acquired, fiducials_.registered()->tracker_from_patient.inverse() *
+                                      (bird.tracker_from_sensor * *settings_.tip_in_pointer_mm));
+  }
   // The hand need not wait for the arithmetic.
   const bool touching = step_ == LiveStep::fiducials ||
                         (step_ == LiveStep::calibrate && fiducials_.confirmed() && calibration_.working_out());
@@ -113,7 +118,10 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
   if (!calibration.in_force) return calibration_.tell_none(calibration.why_not);
   const auto record = calibration::parse_record(calibration.record);
   if (!record) return;
-  if (record->tip && !settings_.tip_in_pointer_mm) settings_.tip_in_pointer_mm = record->tip->tip_in_sensor_mm;
+  if (record->tip && !settings_.tip_in_pointer_mm) {
+    settings_.tip_in_pointer_mm = record->tip->tip_in_sensor_mm;
+    tip_rms_mm_ = record->tip->rms_mm;
+  }
   const auto adopted = calibration_.adopt(*record);
   if (adopted == CalibrationStep::Adopted::no) return;
   if (adopted == CalibrationStep::Adopted::anew) forget_views(kCalibratedAnew);
@@ -136,7 +144,10 @@ void LiveWorkflow::watch_surface(HostTime now) {
 
 void LiveWorkflow::take(const CheckedSurface& checked) {
   if (!deformation_.found() || !motion_.take(checked)) return;
-  if (motion_.moved_mm()) views_.forget("the organ has moved since: keep views anew");
+  if (motion_.moved_mm()) {
+    views_.forget("the organ has moved since: keep views anew");
+    strokes_.forget();
+  }
   set_picture_up();
 }
 
@@ -147,11 +158,13 @@ void LiveWorkflow::fit() {
   if (fiducials_.note().done && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
 }
 
-/// Views are of the poses that they were kept with, and a deformation takes in what the registration was off by:
-/// another setup's is no better than none.
+/// Views are of the poses that they were kept with, touches are where the former registration had them, and a
+/// deformation takes in what that was off by: another setup's is no better than none.
 void LiveWorkflow::forget_views(const std::string& why) {
-  if (views_.views().empty() && !deformation_.found() && !deformation_.running()) return;
+  const bool touched = strokes_.stroking() || strokes_.places() > 0;
+  if (views_.views().empty() && !touched && !deformation_.found() && !deformation_.running()) return;
   views_.forget(why);
+  strokes_.forget();
   if (deformation_.forget()) show_shape();
 }
 
@@ -218,6 +231,7 @@ void LiveWorkflow::take_up() {
 
 void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
+  if (step != LiveStep::views) strokes_.end();
   if (step == LiveStep::calibrate && !calibration_.note().done) calibration_.begin(settings_.scope, settings_.pattern);
   if (step == LiveStep::run) run_ = {true, "the overlay runs"};
 }
@@ -253,7 +267,8 @@ void LiveWorkflow::primary() {
       if (deformation_.running()) return deformation_.cancel();
       if (setup && patient_.plan() && patient_.transfer()) {
         matched_ = {views_.views(), setup->camera(), patient_.plan(), patient_.transfer(), nullptr};
-        deformation_.begin(matched_.views, matched_.camera, matched_.patient, *matched_.transfer);
+        deformation_.begin(matched_.views, matched_.camera, matched_.patient, *matched_.transfer,
+                           strokes_.touches(tip_shift_mm(tip_rms_mm_, picture_.figures().scope.held_out_mm)));
       }
       break;
     case LiveStep::check:
@@ -265,12 +280,22 @@ void LiveWorkflow::primary() {
   }
 }
 
+void LiveWorkflow::stroke() {
+  if (step_ != LiveStep::views) return;
+  if (strokes_.stroking()) return strokes_.end();
+  if (!settings_.tip_in_pointer_mm) return strokes_.refuse("no stroke: where the pointer's tip is, is not known");
+  if (!fiducials_.registered() || !fiducials_.confirmed()) {
+    return strokes_.refuse(std::string("no stroke: ") + (fiducials_.confirmed() ? kUnregistered : kUnconfirmed));
+  }
+  strokes_.begin(views_.views().size());
+}
+
 void LiveWorkflow::undo() {
   if (step_ == LiveStep::fiducials && fiducials_.undo()) {
     fit();
     keep();
   }
-  if (step_ == LiveStep::views) views_.undo();
+  if (step_ == LiveStep::views && !strokes_.undo(views_.views().size())) views_.undo();
   if (step_ == LiveStep::deform && deformation_.found() && !deformation_.running()) {
     deformation_.undo();
     show_shape();

@@ -12,6 +12,7 @@
 #include "host/operation/operation_keeper.hpp"
 #include "host/operation/operation_view.hpp"
 #include "host/operation/organ_motion.hpp"
+#include "host/operation/organ_strokes.hpp"
 #include "host/operation/patient_step.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/surface_watch.hpp"
@@ -55,6 +56,7 @@ class LiveWorkflow {
   // What a person does.
   void primary();  ///< the space bar and the pedal
   void undo();     ///< the last thing of the present step
+  void stroke();   ///< of the pointer over the organ: begins one, or ends it
   void go_on();    ///< to the next step, where this one is done
   void go_to(LiveStep step);
   void freeze_or_let_go() { frozen_ = !frozen_; }
@@ -96,6 +98,8 @@ class LiveWorkflow {
   PointerTip pointer_;
   FiducialStep fiducials_;
   ViewStep views_;
+  OrganStrokes strokes_;
+  std::optional<double> tip_rms_mm_;  ///< of the tip's calibration, where the record has it
   DeformationStep deformation_;
   WatchedSurface matched_;  ///< what the deformation is, or is being, found by
   SurfaceWatch watch_;

@@ -1,6 +1,8 @@
 // What the steps know, told as values.
 #include "host/operation/live_workflow.hpp"
 
+#include <fmt/format.h>
+
 #include "host/operation/landmark_check.hpp"
 
 namespace birdseye::host {
@@ -10,6 +12,13 @@ OperationView LiveWorkflow::view() const {
   out.step = step_;
   out.notes = {
       connection_.note(), calibration_.note(), fiducials_.note(), views_.note(), deformation_.note(), check_, run_};
+  out.stroking = strokes_.stroking();
+  out.touched_places = strokes_.places();
+  out.stroke_line = strokes_.line();
+  if (out.touched_places > 0) {
+    std::string& line = out.notes[static_cast<std::size_t>(LiveStep::views)].line;
+    line += fmt::format("{}{} places touched", line.empty() ? "" : ", ", out.touched_places);
+  }
   out.frozen = frozen_;
   for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
     if (out.fault.empty()) out.fault = *fault;

@@ -42,6 +42,10 @@ struct OperationView {
   std::optional<double> fre_mm;
   std::string registration_fault;
 
+  bool stroking = false;           ///< the pointer, over the organ
+  std::size_t touched_places = 0;  ///< by strokes
+  std::string stroke_line;         ///< of them, in words; empty: nothing is to be said
+
   std::optional<ViewAdvice> view_advice;  ///< in its step, where an overlay is drawn
 
   std::string deform_progress;  ///< how far it is, in its step

@@ -191,6 +191,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (scripted_.primary) wishes.primary = true;
   if (scripted_.next) wishes.next = true;
   if (scripted_.undo) wishes.undo = true;
+  if (scripted_.stroke) wishes.stroke = true;
   if (scripted_.freeze) wishes.freeze = true;
   if (scripted_.snapshot) wishes.snapshot = true;
   if (scripted_.step) wishes.step = scripted_.step;
@@ -202,6 +203,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (wishes.primary) workflow_.primary();
   if (wishes.next) workflow_.go_on();
   if (wishes.undo) workflow_.undo();
+  if (wishes.stroke) workflow_.stroke();
   if (wishes.freeze) workflow_.freeze_or_let_go();
   if (wishes.step) workflow_.go_to(*wishes.step);
   if (wishes.opacity) look_.opacity = facts_.opacity = *wishes.opacity;

@@ -131,15 +131,19 @@ void draw_fiducials(const OperationView& operation, bool simulated) {
   say(kQuiet, "Backspace takes the last one back");
 }
 
-void draw_views(const OperationView& operation) {
+void draw_views(const OperationView& operation, PanelWishes& wishes) {
   say(kText, "keep five views or more of the organ, from different sides; or go on without (Enter)");
   say(kQuiet, operation.note(LiveStep::views).line);
+  if (ImGui::Button(operation.stroking ? "end the stroke (T)###stroke"
+                                       : "stroke the organ with the pointer (T)###stroke"))
+    wishes.stroke = true;
+  if (!operation.stroke_line.empty()) say(operation.stroking ? kGood : kWarn, operation.stroke_line);
   const auto& advice = operation.view_advice;
   if (!advice) return say(kWarn, "no overlay now: a view cannot be kept");
   say(advice->words == "keep this view" ? kGood : kText, advice->words);
   say(kQuiet, fmt::format("this view would shrink what is open by {:.0f} %, the best in reach by {:.0f} %",
                           100 * advice->gain_now, 100 * advice->gain_best));
-  say(kQuiet, "Backspace takes the last one back");
+  say(kQuiet, "Backspace takes the last view or stroke back");
 }
 
 void draw_deform(const OperationView& operation) {
@@ -214,7 +218,7 @@ void draw_side(const PanelLayout& at, const OperationView& operation, const Pane
       draw_fiducials(operation, facts.simulated);
       break;
     case LiveStep::views:
-      draw_views(operation);
+      draw_views(operation, wishes);
       break;
     case LiveStep::deform:
       draw_deform(operation);
@@ -339,6 +343,7 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
   if (key == "space") wishes.primary = true;
   if (key == "enter") wishes.next = true;
   if (key == "backspace") wishes.undo = true;
+  if (key == "t") wishes.stroke = true;
   if (key == "f") wishes.freeze = true;
   if (key == "s") wishes.snapshot = true;
   if (key == "c") wishes.clip = !facts.clip;

@@ -12,7 +12,7 @@ namespace birdseye::host {
 
 /// What a person asked for in a frame of the window.
 struct PanelWishes {
-  bool primary = false, next = false, undo = false, freeze = false, snapshot = false;
+  bool primary = false, next = false, undo = false, stroke = false, freeze = false, snapshot = false;
   std::optional<LiveStep> step;
   std::optional<double> opacity;
   std::optional<bool> clip, surface_in_front;
@@ -40,7 +40,7 @@ int side_px(float scale);
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
 PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
                         const PanelFacts& facts, TransferEditor& editor);
-/// The wish that a key stands for: "space", "enter", "backspace", "f", "s", "1" to "7", "+", "-", "c", "g".
+/// The wish that a key stands for: "space", "enter", "backspace", "t", "f", "s", "1" to "7", "+", "-", "c", "g".
 void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);
 
 }  // namespace birdseye::host

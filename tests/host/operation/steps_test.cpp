@@ -1,6 +1,7 @@
 // Each step of the operation alone: what it makes of the values that it is given.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "calibration/geometry/rotations.hpp"
@@ -12,6 +13,7 @@
 #include "host/operation/fiducial_step.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation_keeper.hpp"
+#include "host/operation/organ_strokes.hpp"
 #include "host/operation/patient_step.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/view_step.hpp"
@@ -340,6 +342,34 @@ TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
   EXPECT_EQ(step.note().line, "");
   step.begin({}, {}, ball(), transfer);
   EXPECT_EQ(step.note().line, "0 views are too few: keep 5 or more, from different sides");
+}
+
+/// Round the side of the ball that no view sees, and off it by so much.
+std::vector<SeenPoint> strokes_round_the_ball(double off_mm) {
+  OrganStrokes strokes;
+  strokes.begin(1);
+  for (int i = 0; i < 400; ++i) {
+    const double around = 0.08 * i, down = i < 200 ? 0.3 : 0.9;
+    const Eigen::Vector3d outward(std::cos(down) * std::cos(around), std::cos(down) * std::sin(around), std::sin(down));
+    strokes.take(DeviceTime{(5000 + 10 * i) * kMs}, Eigen::Vector3d::Constant(12) + (8 + off_mm) * outward);
+  }
+  return strokes.touches(0.3);
+}
+
+TEST(DeformationStep, IsFoundByTouchesBesideASingleView) {
+  const TransferFunction transfer = *load_transfer_function("abdomen");
+  const CameraModel camera{64, 48, 60, 60, 32, 24};
+  ViewStep views;
+  views.keep(noise(1), kCameraFromPatient);
+  DeformationStep step;
+  step.begin(views.views(), camera, ball(), transfer);
+  EXPECT_FALSE(step.running());
+  EXPECT_EQ(step.note().line, "1 views are too few: keep 5 or more, from different sides");
+  step.begin(views.views(), camera, ball(), transfer, strokes_round_the_ball(0.5));
+  for (int i = 0; i < 6000 && step.running(); ++i) sleep_for(Duration::from_ms(10));
+  ASSERT_FALSE(step.running());
+  (void)step.tick();
+  EXPECT_NE(step.note().line.find(" touched patches none is thought wrong"), std::string::npos) << step.note().line;
 }
 
 TEST(DeformationStep, WhatIsTakenUpCanBeUndone) {
