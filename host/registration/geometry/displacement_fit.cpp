@@ -118,15 +118,15 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     out.centres_ = start->centres_;
     out.weights_of_centres_ = start->weights_of_centres_;
     out.unknowns_ = start->unknowns_;
+    out.shared_ = start->shared_;
   }
   out.weights_.assign(points.size(), 1);
   out.matched_weights_.assign(matched.size(), 1);
-  Eigen::MatrixX3d known(n, 3);                      // where a point is seen, and where what is matched was at rest
-  Eigen::VectorXd sigma(of_points), off(of_points);  // of what is each point's own, and of all
+  Eigen::MatrixX3d known(n, 3);  // where a point is seen, and where what is matched was at rest
+  Eigen::VectorXd sigma(of_points);
   for (Eigen::Index i = 0; i < of_points; ++i) {
     known.row(i) = points[static_cast<std::size_t>(i)].place_mm.transpose();
     sigma[i] = points[static_cast<std::size_t>(i)].sigma_mm;
-    off[i] = std::hypot(sigma[i], points[static_cast<std::size_t>(i)].shift_mm);
   }
   std::vector<MatchedAxes> axes;
   axes.reserve(matched.size());
@@ -157,20 +157,21 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     };
     Eigen::MatrixX3d rows(n, 3);
     Eigen::VectorXd wanted(n), noise(n);
-    Eigen::MatrixX3d by_shift(of_points, 3);
+    Eigen::Matrix<double, Eigen::Dynamic, kShared> by_shared(of_points, kShared);
     for (Eigen::Index i = 0; i < of_points; ++i) {
       const auto m = static_cast<std::size_t>(i);
       const auto at = organ.sample(prior.of_seen ? Eigen::Vector3d((seen.row(i) + w.row(i)).transpose())
                                                  : Eigen::Vector3d(places.row(i).transpose()));
       rows.row(i) = at.gradient.transpose() * carries(i);
       wanted[i] = rows.row(i).dot(w.row(i)) - at.distance_mm;
-      double weight = robust_weight(std::pow(at.distance_mm / std::max(scale_mm, 2.5 * off[i]), 2));
+      by_shared.row(i) << rows.row(i) * points[m].by_common_mm, points[m].shift_mm * rows.row(i);
+      const double off_mm = at.distance_mm - by_shared.row(i).dot(out.shared_);
+      double weight = robust_weight(std::pow(off_mm / std::max(scale_mm, 2.5 * sigma[i]), 2));
       const auto& from_camera = points[m].from_camera;
       constexpr double kFacesAway = 0.15;
       if (from_camera && at.gradient.dot(*from_camera) > kFacesAway) weight = 1e-4;
       out.weights_[m] = weight;
       noise[i] = std::pow(tempered(sigma[i], scale_mm), 2) / std::max(weight, 1e-5);
-      by_shift.row(i) = points[m].shift_mm * rows.row(i);
     }
     for (std::size_t m = 0; m < matched.size(); ++m) {
       const Eigen::Index row = of_points + 3 * static_cast<Eigen::Index>(m);
@@ -200,10 +201,11 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
         out.basis_rows_.row(i) = rows.row(i) * prior.basis->at(places.row(i).transpose());
       m += out.basis_rows_ * out.basis_rows_.transpose();
     }
-    m.topLeftCorner(of_points, of_points) += shared + by_shift * by_shift.transpose();
+    m.topLeftCorner(of_points, of_points) += shared + by_shared * by_shared.transpose();
     m.diagonal() += noise;
     out.factor_.compute(m);
     out.alpha_ = out.factor_.solve(wanted);
+    out.shared_ = -(by_shared.transpose() * out.alpha_.head(of_points));
     out.weights_of_centres_ = rows.array().colwise() * out.alpha_.array();
     if (prior.basis) out.unknowns_ = out.basis_rows_.transpose() * out.alpha_;
     out.log_evidence_ =

@@ -35,8 +35,13 @@ class DisplacementFit {
   [[nodiscard]] std::span<const double> weights() const { return weights_; }
   [[nodiscard]] std::span<const double> matched_weights() const { return matched_weights_; }
   [[nodiscard]] const DisplacementPrior& prior() const { return prior_; }
+  /// What is found of the errors that all views share, in standard deviations; 0 where no point has them.
+  [[nodiscard]] CommonErrors common_errors() const { return shared_.head<kCommonErrors>(); }
 
  private:
+  /// Errors that points share: the views', and the shift along three axes.
+  static constexpr int kShared = kCommonErrors + 3;
+
   /// At many places at once.
   [[nodiscard]] Eigen::MatrixX3d values(const Eigen::MatrixX3d& places) const;
   /// [i](a, b) = d w_a / d x_b at place i.
@@ -49,6 +54,7 @@ class DisplacementFit {
   Eigen::VectorXd alpha_;
   Eigen::MatrixX3d weights_of_centres_ = Eigen::MatrixX3d(0, 3);
   Eigen::VectorXd unknowns_;  ///< of the basis
+  Eigen::Matrix<double, kShared, 1> shared_ = Eigen::Matrix<double, kShared, 1>::Zero();
   Eigen::LLT<Eigen::MatrixXd> factor_;
   double log_evidence_ = 0;
   std::vector<double> weights_, matched_weights_;

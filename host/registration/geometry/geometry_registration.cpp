@@ -160,6 +160,16 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                                Round{12, 4, 0.25, 5}};
   std::vector<DisplacementPrior> more = hypotheses_of(ct, ElasticModes::of(*organ), settings.control_points);
   BelievedDeformation found(*organ);
+  // Touches tell of the errors that all views share: the views are moved by what is found of these.
+  const bool told_of_common = common && !touches.empty();
+  const std::vector<PinholeView> given = seen_by;
+  CommonErrors errors = CommonErrors::Zero();
+  const auto move_views = [&] {
+    for (std::size_t n = 0; told_of_common && n < seen_by.size(); ++n) {
+      out.adjusted->camera_from_patient[n] = common->without(errors, given[n]);
+      seen_by[n] = moved(std::move(seen_by[n]), out.adjusted->camera_from_patient[n]);
+    }
+  };
   for (const Round& round : kRounds) {
     if (settings.watch.cancelled()) return called_off();
     const SeenSurface surface(seen_distance(*organ, found.mean));
@@ -184,9 +194,17 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       const auto pushed_mm = pushed_place_mm(*organ, points, found.mean);
       more = pushed_mm ? push_hypotheses_of(*pushed_mm) : std::vector<DisplacementPrior>{};
     }
+    // What the views as they were given would tell, for it is their errors that are asked for.
+    for (std::size_t i = 0; told_of_common && i + touches.size() < points.size(); ++i) {
+      points[i].by_common_mm = common->at(points[i].place_mm);
+      points[i].place_mm += points[i].by_common_mm * errors;
+    }
     auto believed = believe(*organ, points, more, found, settings.watch, settings.matched);
     if (!believed) return called_off();
     found = *std::move(believed);
+    errors.setZero();
+    for (std::size_t n = 0; n < found.fits.size(); ++n) errors += found.beliefs[n] * found.fits[n].common_errors();
+    move_views();
     out.evidence_of_motion_nats = evidence_of_motion_nats(*organ, points, found);
     ++out.evaluations;
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
@@ -206,7 +224,8 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (!out.folded) tell_fits(settings, touches, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
-    out.expected = expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm, common);
+    out.expected =
+        expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm, told_of_common ? std::nullopt : common);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
     out.held_out = held_out_view(*organ, seen_by, found, touches, settings.matched);
   }

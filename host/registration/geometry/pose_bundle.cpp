@@ -78,25 +78,11 @@ Reprojection reprojection(const std::vector<PinholeView>& views, const TextureMa
           match.other_px};
 }
 
-/// How a place moves with a shift, a turn and a scale of everything about another.
-Eigen::Matrix<double, 3, 7> moves_by(const Eigen::Vector3d& from_middle_mm) {
-  Eigen::Matrix<double, 3, 7> out;
-  out << Eigen::Matrix3d::Identity(), -cross_matrix(from_middle_mm), from_middle_mm;
-  return out;
-}
-
-using Motion = Eigen::Matrix<double, 7, 7>;
-
 Eigen::Index first_of(std::size_t view) {
   return 6 * static_cast<Eigen::Index>(view);
 }
 
 }  // namespace
-
-Eigen::Matrix3d CommonPoseError::covariance(const Eigen::Vector3d& place_mm) const {
-  const Eigen::Matrix<double, 3, 7> by = moves_by(place_mm - about_mm);
-  return by * motion * by.transpose();
-}
 
 PoseBundle::PoseBundle(const std::vector<PinholeView>& views, std::span<const TextureMatch> matches)
     : views_(views), matches_(matches), changes_(views.size(), Change{}) {
@@ -186,11 +172,11 @@ CommonPoseError PoseBundle::common_error(const PoseNoise& noise, double scale) c
     if (found.places[match.place].by_depth > 0) one_of[match.place] = &match;
   }
   std::erase(one_of, nullptr);
-  CommonPoseError out;
-  for (const TextureMatch* match : one_of) out.about_mm += places_mm[match->place] / static_cast<double>(one_of.size());
+  Eigen::Vector3d about_mm = Eigen::Vector3d::Zero();
+  for (const TextureMatch* match : one_of) about_mm += places_mm[match->place] / static_cast<double>(one_of.size());
   // The motion by least squares of how far all places move.
-  Motion normal = Motion::Zero();
-  Eigen::MatrixXd motion_by_changes = Eigen::MatrixXd::Zero(7, found.covariance.cols());
+  CommonPoseError::Covariance normal = CommonPoseError::Covariance::Zero();
+  Eigen::MatrixXd motion_by_changes = Eigen::MatrixXd::Zero(kCommonErrors, found.covariance.cols());
   for (const TextureMatch* match : one_of) {
     const Place& place = found.places[match->place];
     const Eigen::Matrix3d patient_from_camera = poses[match->view].rotation().transpose();
@@ -199,13 +185,12 @@ CommonPoseError PoseBundle::common_error(const PoseNoise& noise, double scale) c
     const Eigen::Index at = first_of(match->view);
     place_by_changes.middleCols<3>(at) += patient_from_camera * cross_matrix(depths_mm_[match->place] * ray);
     place_by_changes.middleCols<3>(at + 3) += Eigen::Matrix3d::Identity();
-    const Eigen::Matrix<double, 3, 7> by_motion = moves_by(places_mm[match->place] - out.about_mm);
+    const Eigen::Matrix<double, 3, kCommonErrors> by_motion = moves_by(places_mm[match->place] - about_mm);
     normal += by_motion.transpose() * by_motion;
     motion_by_changes += by_motion.transpose() * place_by_changes;
   }
   motion_by_changes = normal.ldlt().solve(motion_by_changes).eval();
-  out.motion = motion_by_changes * found.covariance * motion_by_changes.transpose();
-  return out;
+  return {about_mm, motion_by_changes * found.covariance * motion_by_changes.transpose()};
 }
 
 std::size_t PoseBundle::agreeing() const {

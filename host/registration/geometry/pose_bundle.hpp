@@ -6,20 +6,11 @@
 #include <span>
 #include <vector>
 
+#include "host/registration/geometry/common_pose_error.hpp"
 #include "host/registration/geometry/texture_matches.hpp"
 #include "host/registration/views/view_registration.hpp"
 
 namespace birdseye::host {
-
-/// The error of a place of the patient by the shift, turn and scale that all views share: the views show little or
-/// nothing of these, so that the poses' noise leaves them uncertain.
-struct CommonPoseError {
-  Eigen::Vector3d about_mm = Eigen::Vector3d::Zero();
-  /// Of shift (mm), turn (rotation vector) and scale (a share) about about_mm.
-  Eigen::Matrix<double, 7, 7> motion = Eigen::Matrix<double, 7, 7>::Zero();
-  /// mm^2.
-  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& place_mm) const;
-};
 
 /// A bundle adjustment: views, and places that were matched between two of them, each on its view's ray.
 class PoseBundle {

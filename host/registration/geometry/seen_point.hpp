@@ -5,6 +5,11 @@
 
 namespace birdseye::host {
 
+/// Errors that all views share: a shift, a turn and a scale, as seven independent ones of a standard deviation of 1.
+inline constexpr int kCommonErrors = 7;
+using ByCommonErrors = Eigen::Matrix<double, 3, kCommonErrors>;  ///< how they move a place, mm
+using CommonErrors = Eigen::Matrix<double, kCommonErrors, 1>;
+
 /// A place that is on the organ's surface now, patient mm, known along the surface's normal.
 struct SeenPoint {
   Eigen::Vector3d place_mm;
@@ -13,6 +18,7 @@ struct SeenPoint {
   std::optional<Eigen::Vector3d> from_camera;
   /// Of one axis of a shift that all places with one have wrong together, each in proportion; 0: none of it.
   double shift_mm = 0;
+  ByCommonErrors by_common_mm = ByCommonErrors::Zero();  ///< of a place that views tell of, where these errors count
 };
 
 }  // namespace birdseye::host

@@ -173,6 +173,36 @@ TEST(FurtherRows, TouchesOfTheUnseenSideTellOfItAndOfTheInside) {
   EXPECT_LT(with.expected_hidden_mm / with.hidden_mm, 1.7);
 }
 
+/// All places by the views are off alike, as by a pose that the views' mean has wrong.
+TEST(FurtherRows, TouchesTellOfWhatAllViewsHaveWrongTogether) {
+  const Eigen::Vector3d off_mm(1.8, -1.4, 0.9);
+  const SignedDistance organ = testing::ball(kBall_mm);
+  std::vector<SeenPoint> unaware;
+  for (const double side : {1.0, -1.0}) {
+    for (const SeenPoint& point : places_of_side(120, side, 0.25, 1)) unaware.push_back(point);
+  }
+  for (SeenPoint& point : unaware) point.place_mm += off_mm;
+  std::vector<SeenPoint> aware = unaware;
+  for (SeenPoint& point : aware) point.by_common_mm.leftCols<3>() = 2 * Eigen::Matrix3d::Identity();
+  const auto fit_of = [&](const std::vector<SeenPoint>& points) {
+    return DisplacementFit::solve(organ, points, bending(), nullptr, kDown_mm);
+  };
+  const Errors sure = errors_of(organ, fit_of(unaware)), open = errors_of(organ, fit_of(aware));
+  EXPECT_GT(sure.inside_mm, 1.8 * sure.expected_inside_mm);
+  EXPECT_LT(open.inside_mm, 1.3 * open.expected_inside_mm);
+  for (std::vector<SeenPoint>* points : {&unaware, &aware}) {
+    for (const double side : {1.0, -1.0}) {
+      for (const SeenPoint& touch : places_of_side(20, side, 0.3, 3)) points->push_back(touch);
+    }
+  }
+  const DisplacementFit told = fit_of(aware);
+  const Errors after = errors_of(organ, told);
+  EXPECT_LT(after.inside_mm, 0.5 * errors_of(organ, fit_of(unaware)).inside_mm);
+  EXPECT_LT(after.expected_inside_mm, 0.6 * open.expected_inside_mm);
+  EXPECT_LT((2 * told.common_errors().head<3>() - off_mm).norm(), 0.5 * off_mm.norm());
+  for (const double weight : told.weights()) EXPECT_GT(weight, 0.2);
+}
+
 TEST(FurtherRows, LandmarksTellOfHiddenAndInsideAndAWrongOneDoesNotMislead) {
   const SignedDistance organ = testing::ball(kBall_mm);
   const std::vector<SeenPoint> stereo = places_of_side(150, 1, 0.25, 1);

@@ -181,10 +181,10 @@ TEST(PoseBundle, ExpectsTheCommonMotionThatErringPosesLeave) {
     exact.solve({1e-4, 1e-7}, kScale);
     bundle.solve(kNoise, kScale);
     const CommonPoseError error = bundle.common_error(kNoise, kScale);
-    const auto motion = common_motion(exact.places_mm(), bundle.places_mm(), error.about_mm);
+    const auto motion = common_motion(exact.places_mm(), bundle.places_mm(), error.about_mm());
     found_mm2 += motion[2] * motion[2] / kSets;
     side_mm2 += motion.head<2>().squaredNorm() / kSets;
-    const Eigen::Matrix3d covariance = error.covariance(error.about_mm);
+    const Eigen::Matrix3d covariance = error.covariance(error.about_mm());
     expected_mm2 += covariance(2, 2) / kSets;
     expected_side_mm2 += covariance.topLeftCorner<2, 2>().trace() / kSets;
   }
@@ -209,6 +209,25 @@ TEST(PoseBundle, FindsTheNoiseOfPosesFromNearlyOneSide) {
   }
   EXPECT_NEAR(eye, 1, 0.3);
   EXPECT_NEAR(angle, 1, 0.3);
+}
+
+/// Views that have such errors see a place off by them: without the errors, where it is.
+TEST(CommonPoseError, ViewsWithoutItSeeAPlaceWhereItIs) {
+  const std::vector<PinholeView> views = five_views();
+  CommonErrors sigma;
+  sigma << 0.3, 0.2, 0.8, 0.003, 0.004, 0.002, 0.006;
+  const CommonPoseError common({5, 0, 0}, sigma.cwiseAbs2().asDiagonal());
+  CommonErrors errors;
+  errors << 1, -0.5, 0.8, -1.2, 0.6, 0.4, -0.9;
+  const Eigen::Vector3d place_mm(20, -30, 10), off_mm = common.at(place_mm) * errors;
+  EXPECT_GT(off_mm.norm(), 0.5);
+  for (const PinholeView& view : views) {
+    const PinholeView true_view = moved(view, common.without(errors, view));
+    const auto seen = view.project(place_mm + off_mm), truly = true_view.project(place_mm);
+    const auto as_given = view.project(place_mm);
+    EXPECT_LT(std::hypot(seen.x_px - truly.x_px, seen.y_px - truly.y_px), 0.15);
+    EXPECT_GT(std::hypot(seen.x_px - as_given.x_px, seen.y_px - as_given.y_px), 1);
+  }
 }
 
 }  // namespace
