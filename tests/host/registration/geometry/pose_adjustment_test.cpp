@@ -215,7 +215,7 @@ TEST(PoseBundle, FindsTheNoiseOfPosesFromNearlyOneSide) {
 TEST(CommonPoseError, ViewsWithoutItSeeAPlaceWhereItIs) {
   const std::vector<PinholeView> views = five_views();
   CommonErrors sigma;
-  sigma << 0.3, 0.2, 0.8, 0.003, 0.004, 0.002, 0.006;
+  sigma << 0.6, 0.4, 1.6, 0.006, 0.008, 0.004, 0.012;
   const CommonPoseError common({5, 0, 0}, sigma.cwiseAbs2().asDiagonal());
   CommonErrors errors;
   errors << 1, -0.5, 0.8, -1.2, 0.6, 0.4, -0.9;
