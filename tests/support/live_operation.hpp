@@ -92,4 +92,22 @@ inline void connect_and_calibrate(LiveWorkflow& workflow) {
   EXPECT_EQ(workflow.view().step, LiveStep::fiducials);
 }
 
+/// The scope at its place, looking at the patient's point from so far.
+inline wire::VideoFrame looking_at(const LiveWorkflow& workflow, const Eigen::Vector3d& point_in_patient_mm,
+                                   double from_mm, double sigma_mm) {
+  const host::Setup& setup = *workflow.picture().setup();
+  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
+                                                       Eigen::Vector3d(0, 0, from_mm) - point_in_patient_mm);
+  wire::VideoFrame frame;
+  frame.width_px = setup.camera().width_px;
+  frame.height_px = setup.camera().height_px;
+  frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
+  frame.info.acquired = DeviceTime{40 * kMs};
+  frame.info.pose.kind = PoseKind::exact;
+  frame.info.pose.position_sigma_mm = sigma_mm;
+  frame.info.pose.tracker_from_sensor =
+      setup.tracker_from_patient() * camera_from_patient.inverse() * setup.camera_from_sensor();
+  return frame;
+}
+
 }  // namespace birdseye::testing

@@ -14,6 +14,7 @@ using birdseye::testing::kFiducials;
 using birdseye::testing::kMs;
 using birdseye::testing::kTrackerFromPatient;
 using birdseye::testing::load;
+using birdseye::testing::looking_at;
 using birdseye::testing::operation_settings;
 using birdseye::testing::Scratch;
 
@@ -37,17 +38,7 @@ class LiveStrokes : public ::testing::Test {
   }
 
   void keep_view() {
-    const auto& setup = *workflow_.picture().setup();
-    const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, 100));
-    wire::VideoFrame frame;
-    frame.width_px = setup.camera().width_px;
-    frame.height_px = setup.camera().height_px;
-    frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
-    frame.info.acquired = DeviceTime{40 * kMs};
-    frame.info.pose.kind = PoseKind::exact;
-    frame.info.pose.tracker_from_sensor =
-        setup.tracker_from_patient() * camera_from_patient.inverse() * setup.camera_from_sensor();
-    workflow_.take(frame, HostTime{0}, ClockGap{});
+    workflow_.take(looking_at(workflow_, Eigen::Vector3d::Zero(), 100, 0.2), HostTime{0}, ClockGap{});
     workflow_.draw();
     workflow_.primary();
   }

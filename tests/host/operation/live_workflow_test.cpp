@@ -18,6 +18,7 @@ using birdseye::testing::kFiducials;
 using birdseye::testing::kMs;
 using birdseye::testing::kTrackerFromPatient;
 using birdseye::testing::load;
+using birdseye::testing::looking_at;
 using birdseye::testing::operation_settings;
 using birdseye::testing::Scratch;
 
@@ -105,24 +106,6 @@ TEST(LiveWorkflow, TheCtIsSeenFromElsewhereOnceItCanBeDrawn) {
   const std::size_t middle = 4 * (std::size_t{15} * 40 + 20);
   EXPECT_GT(ct->rgba[middle + 3], 0) << "the ball";
   EXPECT_EQ(ct->rgba[3], 0) << "the air beside it";
-}
-
-/// The scope at its place, looking at the patient's point from so far.
-wire::VideoFrame looking_at(const LiveWorkflow& workflow, const Eigen::Vector3d& point_in_patient_mm, double from_mm,
-                            double sigma_mm) {
-  const Setup& setup = *workflow.picture().setup();
-  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
-                                                       Eigen::Vector3d(0, 0, from_mm) - point_in_patient_mm);
-  wire::VideoFrame frame;
-  frame.width_px = setup.camera().width_px;
-  frame.height_px = setup.camera().height_px;
-  frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::size_t{3} * 768 * 576, 90);
-  frame.info.acquired = DeviceTime{40 * kMs};
-  frame.info.pose.kind = PoseKind::exact;
-  frame.info.pose.position_sigma_mm = sigma_mm;
-  frame.info.pose.tracker_from_sensor =
-      setup.tracker_from_patient() * camera_from_patient.inverse() * setup.camera_from_sensor();
-  return frame;
 }
 
 TEST(LiveWorkflow, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
