@@ -18,7 +18,7 @@ constexpr std::size_t kMostSamples = 1000;  // of a tracker ten times as fast as
 
 constexpr double kUnknownNoise_mm = 0.5;  // one axis of a sample, where too few tell of it
 constexpr double kPressed_mm = 0.5;       // by how much a light touch dents the organ, or leaves it
-constexpr double kUnknownTip_mm = 1;
+constexpr double kUnknown_mm = 1;         // what a calibration is off by whose error is not known
 
 /// How samples go on straight: how fast, and how far they scatter about that, one axis.
 struct Going {
@@ -155,7 +155,8 @@ void OrganStrokes::tell() {
 
 double tip_shift_mm(std::optional<double> tip_rms_mm, std::optional<double> hand_eye_mm) {
   // The tip's is of three axes, hand-eye's of the two across the line of sight.
-  return std::hypot(tip_rms_mm.value_or(kUnknownTip_mm) / std::sqrt(3.0), hand_eye_mm.value_or(0) / std::sqrt(2.0));
+  return std::hypot(tip_rms_mm.value_or(kUnknown_mm) / std::sqrt(3.0),
+                    hand_eye_mm.value_or(kUnknown_mm) / std::sqrt(2.0));
 }
 
 }  // namespace birdseye::host

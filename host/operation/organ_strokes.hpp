@@ -23,7 +23,7 @@ class OrganStrokes {
  public:
   /// views: how many were kept before it, for undo().
   void begin(std::size_t views);
-  /// One without a place is none.
+  /// A stroke that touched no place is dropped.
   void end();
   [[nodiscard]] bool stroking() const { return stroking_; }
   /// A tip of the tracked pointer. Counts only while stroking.
@@ -31,7 +31,7 @@ class OrganStrokes {
   /// Takes the last stroke back, also one that has not ended. False, and nothing is taken back: there is none, or it is
   /// older than the last of so many views.
   bool undo(std::size_t views);
-  /// All of them.
+  /// Drops all strokes, also one that has not ended.
   void forget();
   /// Why no stroke can begin, in words.
   void refuse(const std::string& why) { line_ = why; }
@@ -65,7 +65,7 @@ class OrganStrokes {
 };
 
 /// How far the tip may be from where the views have it, one axis, mm: by the calibration of the pointer's tip, and by
-/// hand-eye, by which the views have their places. Empty: not known; 1 mm and none are taken then.
+/// hand-eye, by which the views have their places. An error that is not known counts as 1 mm.
 double tip_shift_mm(std::optional<double> tip_rms_mm, std::optional<double> hand_eye_mm);
 
 }  // namespace birdseye::host

@@ -216,7 +216,8 @@ TEST(OrganStrokes, AreForgottenWithTheOneThatHasNotEnded) {
 
 TEST(OrganStrokes, TheShiftOfAllIsTheTipsAndHandEyes) {
   EXPECT_NEAR(tip_shift_mm(0.3, 0.4), std::sqrt(0.09 / 3 + 0.16 / 2), 1e-12);
-  EXPECT_NEAR(tip_shift_mm(std::nullopt, std::nullopt), 1 / std::sqrt(3.0), 1e-12) << "what is not known is not 0";
+  EXPECT_NEAR(tip_shift_mm(std::nullopt, std::nullopt), std::sqrt(1 / 3.0 + 1 / 2.0), 1e-12)
+      << "what is not known is not 0";
 }
 
 }  // namespace
