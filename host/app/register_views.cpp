@@ -257,43 +257,43 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (!transfer) return transfer.error();
 
   Progress progress;
-  const auto found = run_registration(c, *transfer, true, [&progress](const std::string& line) { progress(line); });
-  if (!found && found.error().code == Errc::not_found) return write_nothing_found(options, found.error());
-  if (!found) return found.error().with_context(options.file.string());
+  const auto result = run_registration(c, *transfer, true, [&progress](const std::string& line) { progress(line); });
+  if (!result && result.error().code == Errc::not_found) return write_nothing_found(options, result.error());
+  if (!result) return result.error().with_context(options.file.string());
+  const ViewRegistration& found = result->found;
   const double time_s = progress.seconds();
 
-  nlohmann::json json = json_of(c, *found, time_s);
-  const Verdict verdict = verdict_of(c, *found);
+  nlohmann::json json = json_of(c, found, time_s);
+  const Verdict verdict = verdict_of(c, found);
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error)
     return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", options.out.string())};
-  if (auto written = write_field(options.out / "field.mha", found->field); !written) return written.error();
-  auto files = pictures_of(c, *transfer, *found);
+  if (auto written = write_field(options.out / "field.mha", found.field); !written) return written.error();
+  auto files = pictures_of(c, *transfer, found);
   if (!files) return files.error();
-  const auto errors = expected_error_picture(c, *transfer, *found);
-  if (!errors) return errors.error();
-  if (*errors) files->push_back({"expected_error.png", png_of((*errors)->view())});
-  files->push_back({"trace.svg", trace_svg(found->trace)});
-  files->push_back({"report.html", registration_report(c, *found, verdict, json)});
+  if (const auto errors = expected_error_picture(c, *result))
+    files->push_back({"expected_error.png", png_of(errors->view())});
+  files->push_back({"trace.svg", trace_svg(found.trace)});
+  files->push_back({"report.html", registration_report(c, found, verdict, json)});
   files->push_back({"result.json", text_of(json)});
   if (c.refine_pose) {
     files->push_back({"pose.txt",
                       "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given "
                       "poses, mm\n" +
-                          pose_text(found->patient_from_model.matrix())});
+                          pose_text(found.patient_from_model.matrix())});
   }
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();
   progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), name_of(verdict.grade),
                             verdict.reasons.front()));
-  for (std::size_t n = 0; n < found->matched.size(); ++n) {
-    if (!found->matched[n].thought_wrong()) continue;
+  for (std::size_t n = 0; n < found.matched.size(); ++n) {
+    if (!found.matched[n].thought_wrong()) continue;
     fmt::print("{} is {:.1f} mm off all else and was thought to be wrong: check its places\n", c.matched[n].name,
-               found->matched[n].off_mm);
+               found.matched[n].off_mm);
   }
   if (json.contains("tre_after_mm_mean")) {
     fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",

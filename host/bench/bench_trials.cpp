@@ -64,24 +64,25 @@ Result<Trial> try_once(const RegistrationCase& c, const Method& method) {
   own.most_evaluations = method.most_evaluations;
   const HostTime began = host_now();
   const double processor_began_s = process_cpu_s();
-  const auto found = run_registration(own, *transfer, false, [](const std::string&) {});
-  if (!found) return found.error();
+  const auto ran = run_registration(own, *transfer, false, [](const std::string&) {});
+  if (!ran) return ran.error();
+  const ViewRegistration& found = ran->found;
   Trial trial;
   trial.time_s = (host_now() - began).seconds();
   trial.processor_s = process_cpu_s() - processor_began_s;
-  trial.evaluations = found->evaluations + found->gradient_evaluations;
+  trial.evaluations = found.evaluations + found.gradient_evaluations;
   if (!c.truth) return Error{Errc::bad_value, "the case has no [truth] control_points; make it by birdseye-sim case"};
   trial.epsilon_before = epsilon(*c.truth, nullptr);
-  trial.epsilon_after = epsilon(*c.truth, &found->field);
+  trial.epsilon_after = epsilon(*c.truth, &found.field);
   const auto mean_mm = [&](const char* prefix, const DisplacementField* field) {
     const auto error = landmark_error(c.landmarks, prefix, field);
     return error ? error->mean_mm : 0;
   };
   trial.tre_before_mm = mean_mm("", nullptr);
-  trial.tre_after_mm = mean_mm("", &found->field);
-  trial.surface_after_mm = mean_mm("surface", &found->field);
+  trial.tre_after_mm = mean_mm("", &found.field);
+  trial.surface_after_mm = mean_mm("surface", &found.field);
   // Both lie inside the organ.
-  const double tumour_mm = mean_mm("tumour", &found->field), vessels_mm = mean_mm("vessel", &found->field);
+  const double tumour_mm = mean_mm("tumour", &found.field), vessels_mm = mean_mm("vessel", &found.field);
   trial.inside_after_mm = std::max(tumour_mm, vessels_mm);
   return trial;
 }

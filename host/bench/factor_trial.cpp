@@ -113,7 +113,7 @@ json factor_trial(const FactorCase& c, const std::string& optimiser, bool one_th
   own.most_evaluations = kPapersEvaluations;
   const HostTime began = host_now();
   const double processor_began_s = one_thread ? thread_cpu_s() : process_cpu_s();
-  const auto found = run_registration(own, c.transfer, true, [](const std::string&) {});
+  const auto ran = run_registration(own, c.transfer, true, [](const std::string&) {});
   const double processor_s = (one_thread ? thread_cpu_s() : process_cpu_s()) - processor_began_s;
   json trial{{"optimiser", optimiser},
              {"views", own.views.size()},
@@ -121,11 +121,11 @@ json factor_trial(const FactorCase& c, const std::string& optimiser, bool one_th
              {"truth_off_mm", c.truth_off_mm},
              {"registration_s", (host_now() - began).seconds()},
              {"processor_s", processor_s}};
-  const ViewRegistration* const what = found ? &*found : nullptr;
-  trial["kinds"] = kinds_of(c, what);
-  trial["target"] = target_of(c, what);
-  if (!found) {
-    trial["error"] = found.error().what;
+  const ViewRegistration* const found = ran ? &ran->found : nullptr;
+  trial["kinds"] = kinds_of(c, found);
+  trial["target"] = target_of(c, found);
+  if (found == nullptr) {
+    trial["error"] = ran.error().what;
     trial["grade"] = name_of(Grade::fail);
     return trial;
   }

@@ -180,14 +180,12 @@ Picture draw_expected_error(const SignedDistance& organ, std::span<const Surface
   return out;
 }
 
-Result<std::optional<Picture>> expected_error_picture(const RegistrationCase& c, const TransferFunction& transfer,
-                                                      const ViewRegistration& found) {
-  if (!found.expected || found.expected->places.empty()) return std::optional<Picture>();
-  const auto rest = organ_distance(c.ct, c.labels ? &*c.labels : nullptr, c.label_values, transfer);
-  if (!rest) return rest.error();
+std::optional<Picture> expected_error_picture(const RegistrationCase& c, const CaseRegistration& result) {
+  const ViewRegistration& found = result.found;
+  if (!result.organ || !found.expected || found.expected->places.empty()) return std::nullopt;
   std::optional<Vector3d> target_mm;
   if (c.target_mm) target_mm = found.field.deformed_of(*c.target_mm);
-  return std::optional(draw_expected_error(deformed_distance(*rest, found.field), found.expected->places, target_mm));
+  return draw_expected_error(deformed_distance(result.organ->distance, found.field), found.expected->places, target_mm);
 }
 
 }  // namespace birdseye::host

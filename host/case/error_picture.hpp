@@ -3,10 +3,9 @@
 #include <optional>
 #include <span>
 
-#include "calibration/base/result.hpp"
 #include "host/case/registration_case.hpp"
+#include "host/case/run_registration.hpp"
 #include "host/files/picture.hpp"
-#include "host/registration/views/view_registration.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {
@@ -17,8 +16,7 @@ namespace birdseye::host {
 Picture draw_expected_error(const SignedDistance& organ, std::span<const SurfacePlace> places,
                             const std::optional<Eigen::Vector3d>& target_mm);
 
-/// Of a registration, the organ as it is now; empty where it says nothing of the error to be expected.
-Result<std::optional<Picture>> expected_error_picture(const RegistrationCase& c, const TransferFunction& transfer,
-                                                      const ViewRegistration& found);
+/// Of a registration, the organ as it is now; empty where nothing is said of the error to be expected.
+std::optional<Picture> expected_error_picture(const RegistrationCase& c, const CaseRegistration& result);
 
 }  // namespace birdseye::host

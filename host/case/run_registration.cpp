@@ -1,15 +1,26 @@
 #include "host/case/run_registration.hpp"
 
+#include <utility>
+
 #include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/views/rendered_registration.hpp"
 
 namespace birdseye::host {
 
-Result<ViewRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
+namespace {
+Result<CaseRegistration> alone(Result<ViewRegistration> found) {
+  if (!found) return found.error();
+  return CaseRegistration{*std::move(found), nullptr};
+}
+}  // namespace
+
+Result<CaseRegistration> run_registration(const RegistrationCase& c, const TransferFunction& transfer,
                                           bool estimate_uncertainty,
                                           const std::function<void(const std::string&)>& tell) {
   const Volume* const labels = c.labels ? &*c.labels : nullptr;
   if (c.optimiser == "geometry") {
+    auto organ = organ_at_rest(c.ct, labels, c.label_values, transfer);
+    if (!organ) return organ.error();
     GeometrySettings settings;
     settings.control_points = c.control_points.value_or(settings.control_points);
     settings.estimate_uncertainty = estimate_uncertainty;
@@ -21,7 +32,9 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
     std::vector<RgbView> pictures;
     pictures.reserve(c.pictures.size());
     for (const Picture& picture : c.pictures) pictures.push_back(picture.view());
-    return register_geometry(c.views, pictures, c.ct, labels, c.label_values, transfer, settings);
+    auto found = register_geometry(c.views, pictures, c.ct, **organ, settings);
+    if (!found) return found.error();
+    return CaseRegistration{*std::move(found), *std::move(organ)};
   }
   if (c.optimiser == "gradient") {
     ViewRegistrationSettings settings;
@@ -32,7 +45,7 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
     settings.prior.pose = c.pose_prior;
     settings.estimate_uncertainty = estimate_uncertainty;
     settings.progress = tell;
-    return register_views(c.views, c.ct, labels, c.label_values, transfer, settings);
+    return alone(register_views(c.views, c.ct, labels, c.label_values, transfer, settings));
   }
   RenderedRegistrationSettings settings;
   settings.optimiser = c.optimiser == "powell" ? DirectOptimiser::powell : DirectOptimiser::simplex;
@@ -43,7 +56,7 @@ Result<ViewRegistration> run_registration(const RegistrationCase& c, const Trans
   settings.initial = c.initial;
   settings.most_evaluations = c.most_evaluations;
   settings.progress = tell;
-  return register_rendered(c.views, c.ct, labels, c.label_values, transfer, settings);
+  return alone(register_rendered(c.views, c.ct, labels, c.label_values, transfer, settings));
 }
 
 }  // namespace birdseye::host

@@ -143,8 +143,10 @@ void DemoSession::begin_to_deform() {
   began_to_deform_ = host_now();
   progress_.keep(fmt::format("{} views kept; the CT is matched with them", views_.views().size()));
   // All of the organ that the labels name, whatever of it is drawn.
-  const auto transfer = load_transfer_function("liver");
-  if (transfer) deformation_.begin(views_.views(), setup->camera(), patient_, *transfer);
+  auto transfer = load_transfer_function("liver");
+  if (!transfer) return;
+  deformation_.begin(views_.views(), setup->camera(), patient_,
+                     std::make_shared<const TransferFunction>(*std::move(transfer)));
 }
 
 void DemoSession::note_deformed() {

@@ -44,8 +44,8 @@ std::string words_of(const std::vector<PlaceFit>& touches) {
 }  // namespace
 
 void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
-                            std::shared_ptr<const PatientPlan> patient, const TransferFunction& transfer,
-                            std::vector<SeenPoint> touches) {
+                            std::shared_ptr<const PatientPlan> patient,
+                            std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches) {
   if (running()) return;
   if (kept.size() < (touches.empty() ? kFewestViews : kFewestBesideTouches)) {
     note_.line = fmt::format("{} views are too few: keep {} or more, from different sides", kept.size(), kEnoughViews);
@@ -64,7 +64,9 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
   }
   note_ = {false, "matching"};
   dropped_ = false;
-  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient), transfer,
+  if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
+  matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient),
+                   transfer = std::move(transfer), made = made_.organ,
                    touches = std::move(touches)](const std::stop_token& stop, const auto& say) {
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
@@ -74,14 +76,20 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     settings.gather_touches = true;
     settings.progress = say;
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
-    const Volume* const labels = patient->labels ? &*patient->labels : nullptr;
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);
     return one.execute([&]() -> Result<Matched> {
-      auto found = register_geometry(views, pictures, patient->ct, labels, patient->organ, transfer, settings);
+      auto organ = made;
+      if (!organ) {
+        auto fresh =
+            organ_at_rest(patient->ct, patient->labels ? &*patient->labels : nullptr, patient->organ, *transfer);
+        if (!fresh) return fresh.error();
+        organ = *std::move(fresh);
+      }
+      auto found = register_geometry(views, pictures, patient->ct, *organ, settings);
       if (!found) return found.error();
       const Verdict verdict = geometry_verdict(views, *found);
-      return Matched{*std::move(found), verdict};
+      return Matched{*std::move(found), verdict, std::move(organ)};
     });
   });
 }
@@ -94,6 +102,7 @@ bool DeformationStep::tick() {
     return false;
   }
   ViewRegistration& registration = (*matched)->found;
+  made_.organ = std::move((*matched)->organ);
   const Verdict& verdict = (*matched)->verdict;
   if (registration.worse_than_start) {
     note_ = {false, "what explains the views folds the organ: keep other views, or go on without"};

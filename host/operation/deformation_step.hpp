@@ -11,6 +11,7 @@
 #include "host/operation/live_step.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/view_step.hpp"
+#include "host/registration/geometry/organ_at_rest.hpp"
 #include "host/registration/geometry/seen_point.hpp"
 #include "host/registration/views/view_registration.hpp"
 #include "host/render/scene/transfer_function.hpp"
@@ -22,7 +23,7 @@ class DeformationStep {
  public:
   /// touches: places of the organ's surface as it lies now, patient mm, whose neighbours err alike.
   void begin(std::span<const KeptView> views, const CameraModel& camera, std::shared_ptr<const PatientPlan> patient,
-             const TransferFunction& transfer, std::vector<SeenPoint> touches = {});
+             std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches = {});
   void cancel() { matching_.cancel(); }
   /// True: another deformation was found.
   bool tick();
@@ -37,6 +38,8 @@ class DeformationStep {
   /// The corrected poses of the views by which found() was found, in the order in which they were kept; empty: the
   /// tracker's poses were not corrected.
   [[nodiscard]] const std::vector<Transform<Camera, Patient>>& adjusted() const { return adjusted_; }
+  /// Of the CT that was matched last; null: none was.
+  [[nodiscard]] const std::shared_ptr<const OrganAtRest>& organ() const { return made_.organ; }
   [[nodiscard]] bool running() const { return matching_.running(); }
   /// How far it is, in words; empty before it has found anything.
   [[nodiscard]] std::string progress() const { return matching_.line(); }
@@ -47,8 +50,17 @@ class DeformationStep {
   struct Matched {
     ViewRegistration found;
     Verdict verdict;
+    std::shared_ptr<const OrganAtRest> organ;
   };
 
+  /// The organ, and what it was made of.
+  struct Made {
+    std::weak_ptr<const PatientPlan> patient;
+    std::weak_ptr<const TransferFunction> transfer;
+    std::shared_ptr<const OrganAtRest> organ;  ///< null: it is not made yet
+  };
+
+  Made made_;
   std::shared_ptr<const DeformedOrgan> found_;
   std::vector<Transform<Camera, Patient>> adjusted_;
   StepNote note_;

@@ -41,6 +41,7 @@ void LiveWorkflow::tick() {
   }
   if (deformation_.tick()) {
     show_shape();
+    matched_.organ = deformation_.organ();
     matched_.deformed = deformation_.found();
     for (std::size_t n = 0; n < deformation_.adjusted().size(); ++n)
       matched_.views[n].camera_from_patient = deformation_.adjusted()[n];
@@ -266,8 +267,8 @@ void LiveWorkflow::primary() {
     case LiveStep::deform:
       if (deformation_.running()) return deformation_.cancel();
       if (setup && patient_.plan() && patient_.transfer()) {
-        matched_ = {views_.views(), setup->camera(), patient_.plan(), patient_.transfer(), nullptr};
-        deformation_.begin(matched_.views, matched_.camera, matched_.patient, *matched_.transfer,
+        matched_ = {views_.views(), setup->camera(), nullptr, nullptr};
+        deformation_.begin(matched_.views, matched_.camera, patient_.plan(), patient_.transfer(),
                            strokes_.touches(tip_shift_mm(tip_rms_mm_, picture_.figures().scope.held_out_mm)));
       }
       break;

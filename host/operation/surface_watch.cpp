@@ -17,17 +17,13 @@ Result<PinholeView> seen_by(const KeptView& view, const CameraModel& camera) {
 }
 
 Result<SurfaceCheck> check_of(const WatchedSurface& surface) {
-  const PatientPlan& patient = *surface.patient;
-  const auto rest =
-      organ_distance(patient.ct, patient.labels ? &*patient.labels : nullptr, patient.organ, *surface.transfer);
-  if (!rest) return rest.error();
   std::vector<PinholeView> kept;
   for (const KeptView& view : surface.views) {
     auto pinhole = seen_by(view, surface.camera);
     if (!pinhole) return pinhole.error();
     kept.push_back(*std::move(pinhole));
   }
-  return SurfaceCheck(deformed_distance(*rest, surface.deformed->field), std::move(kept));
+  return SurfaceCheck(deformed_distance(surface.organ->distance, surface.deformed->field), std::move(kept));
 }
 
 }  // namespace

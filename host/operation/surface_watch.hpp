@@ -8,9 +8,8 @@
 #include "drivers/system/background.hpp"
 #include "host/operation/findings.hpp"
 #include "host/operation/organ_motion.hpp"
-#include "host/operation/patient.hpp"
 #include "host/operation/view_step.hpp"
-#include "host/render/scene/transfer_function.hpp"
+#include "host/registration/geometry/organ_at_rest.hpp"
 
 namespace birdseye::host {
 
@@ -18,8 +17,7 @@ namespace birdseye::host {
 struct WatchedSurface {
   std::vector<KeptView> views;
   CameraModel camera;
-  std::shared_ptr<const PatientPlan> patient;
-  std::shared_ptr<const TransferFunction> transfer;
+  std::shared_ptr<const OrganAtRest> organ;
   std::shared_ptr<const DeformedOrgan> deformed;
 };
 

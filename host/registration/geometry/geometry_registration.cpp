@@ -16,7 +16,6 @@
 #include "host/registration/geometry/held_out_view.hpp"
 #include "host/registration/geometry/hypotheses.hpp"
 #include "host/registration/geometry/motion_evidence.hpp"
-#include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/pose_adjustment.hpp"
 #include "host/registration/geometry/stereo.hpp"
@@ -127,15 +126,14 @@ void tell_fits(const GeometrySettings& settings, std::span<const SeenPoint> touc
 }  // namespace
 
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
-                                           const Volume& ct, const Volume* labels, std::span<const int> label_values,
-                                           const TransferFunction& transfer, const GeometrySettings& settings) {
+                                           const Volume& ct, const OrganAtRest& organ,
+                                           const GeometrySettings& settings) {
   if (auto good = check_pictures(views, pictures); !good) return good.error();
   if (auto good = check_places(settings); !good) return good.error();
-  const auto organ = organ_distance(ct, labels, label_values, transfer);
-  if (!organ) return organ.error();
+  const SignedDistance& distance = organ.distance;
   ViewRegistration out;
   std::vector<PinholeView> seen_by;
-  const SeenSurface rest(*organ);
+  const SeenSurface rest(distance);
   for (std::size_t n = 0; n < views.size(); ++n) {
     seen_by.push_back(pinhole_view(views[n], pictures[n]));
     if (auto good = check_seen(views[n], seen_by.back(), rest); !good) return good.error();
@@ -158,8 +156,8 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   };
   constexpr std::array kRounds{Round{18, 12, 0.5, 0}, Round{18, 8, 0.4, 9}, Round{18, 6, 0.3, 8},
                                Round{12, 4, 0.25, 5}};
-  std::vector<DisplacementPrior> more = hypotheses_of(ct, ElasticModes::of(*organ), settings.control_points);
-  BelievedDeformation found(*organ);
+  std::vector<DisplacementPrior> more = hypotheses_of(ct, organ.modes, settings.control_points);
+  BelievedDeformation found(distance);
   // Touches tell of the errors that all views share: the views are moved by what is found of these.
   const bool told_of_common = common && !touches.empty();
   const std::vector<PinholeView> given = seen_by;
@@ -172,7 +170,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   };
   for (const Round& round : kRounds) {
     if (settings.watch.cancelled()) return called_off();
-    const SeenSurface surface(seen_distance(*organ, found.mean));
+    const SeenSurface surface(seen_distance(distance, found.mean));
     const std::vector<SeenPoint> by_stereo =
         stereo_points(seen_by, surface, {round.grid_px, round.span_mm, round.step_mm});
     out.stereo_points = by_stereo.size();
@@ -191,7 +189,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                    "belong together, or give views nearer to one another"};
     }
     if (!found.fits.empty()) {
-      const auto pushed_mm = pushed_place_mm(*organ, points, found.mean);
+      const auto pushed_mm = pushed_place_mm(distance, points, found.mean);
       more = pushed_mm ? push_hypotheses_of(*pushed_mm) : std::vector<DisplacementPrior>{};
     }
     // What the views as they were given would tell, for it is their errors that are asked for.
@@ -199,13 +197,13 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       points[i].by_common_mm = common->at(points[i].place_mm);
       points[i].place_mm += points[i].by_common_mm * errors;
     }
-    auto believed = believe(*organ, points, more, found, settings.watch, settings.matched);
+    auto believed = believe(distance, points, more, found, settings.watch, settings.matched);
     if (!believed) return called_off();
     found = *std::move(believed);
     errors.setZero();
     for (std::size_t n = 0; n < found.fits.size(); ++n) errors += found.beliefs[n] * found.fits[n].common_errors();
     move_views();
-    out.evidence_of_motion_nats = evidence_of_motion_nats(*organ, points, found);
+    out.evidence_of_motion_nats = evidence_of_motion_nats(distance, points, found);
     ++out.evaluations;
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
                                   out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),
@@ -217,17 +215,17 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   out.folded = out.min_jacobian <= 0;
   if (out.folded) {
     out.worse_than_start = true;
-    out.field = no_deformation(ct, *organ);
+    out.field = no_deformation(ct, distance);
     out.min_jacobian = 1;
   }
-  const SeenSurface surface(seen_distance(*organ, found.mean));
+  const SeenSurface surface(seen_distance(distance, found.mean));
   if (!out.folded) tell_fits(settings, touches, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
     out.expected =
-        expected_errors(*organ, found, seen_by, settings.targets_at_rest_mm, told_of_common ? std::nullopt : common);
+        expected_errors(distance, found, seen_by, settings.targets_at_rest_mm, told_of_common ? std::nullopt : common);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
-    out.held_out = held_out_view(*organ, seen_by, found, touches, settings.matched);
+    out.held_out = held_out_view(distance, seen_by, found, touches, settings.matched);
   }
   return out;
 }

@@ -9,6 +9,7 @@
 #include "calibration/base/image_view.hpp"
 #include "calibration/base/result.hpp"
 #include "host/registration/geometry/matched_point.hpp"
+#include "host/registration/geometry/organ_at_rest.hpp"
 #include "host/registration/geometry/seen_point.hpp"
 #include "host/registration/views/view_registration.hpp"
 
@@ -34,12 +35,13 @@ struct GeometrySettings {
 
 /// Deforms the organ until its surface lies where the views show it: places found by stereo between the views and by
 /// the organ's outlines, and the touches and matched points of the settings, under several priors, each believed as far
-/// as its evidence goes; their mean. Nothing is compared with a rendering. pictures: of the views, in colour.
+/// as its evidence goes; their mean. Nothing is compared with a rendering. pictures: of the views, in colour;
+/// organ: of the CT.
 /// Refuses what register_views() refuses, and a touch or a matched point without a positive error; Errc::not_found
 /// where no place of the surface is found, and Errc::disconnected where the watch cancels. A field that folds is not
 /// returned: folded, and no deformation.
 Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, std::span<const RgbView> pictures,
-                                           const Volume& ct, const Volume* labels, std::span<const int> label_values,
-                                           const TransferFunction& transfer, const GeometrySettings& settings);
+                                           const Volume& ct, const OrganAtRest& organ,
+                                           const GeometrySettings& settings);
 
 }  // namespace birdseye::host

@@ -81,42 +81,49 @@ std::optional<Patch> patch_at(const PinholeView& view, const DepthMap& depths, c
   return patch;
 }
 
-float correlation(const Patch& patch, const PinholeView& other, double depth_mm, const Eigen::Vector2d& beside_px) {
+PatchSeenBy::PatchSeenBy(const Patch& patch, const PinholeView& other) : patch_(patch), other_(other) {
   const PinholeView& view = *patch.view;
-  // Of the plane n . (p - eye) = d, the places of the view's pixels, seen by the other.
-  const double d = patch.normal.dot(patch.ray) * depth_mm;
-  const Eigen::Matrix3d rotation = other.camera_from_patient.rotation();
-  const Eigen::Vector3d apart = other.camera_from_patient * view.eye_in_patient_mm;
-  Eigen::Matrix3d lens;
-  lens << other.fx_px, 0, other.cx_px + beside_px.x(), 0, other.fy_px, other.cy_px + beside_px.y(), 0, 0, 1;
+  for (int i = 0; i < kPatchSamples; ++i) {
+    x_px_[i] = static_cast<float>(patch.x_px + patch.between_px * offset(i).x());
+    y_px_[i] = static_cast<float>(patch.y_px + patch.between_px * offset(i).y());
+  }
   Eigen::Matrix3d ray_of;  // of (x, y, 1)
   ray_of << 1 / view.fx_px, 0, -view.cx_px / view.fx_px, 0, 1 / view.fy_px, -view.cy_px / view.fy_px, 0, 0, 1;
   ray_of = view.camera_from_patient.rotation().transpose() * ray_of;
-  const Eigen::Matrix3f h =
-      (lens * (rotation * ray_of + apart * (patch.normal.transpose() * ray_of) / d)).cast<float>();
-  float count = 0, sum_a = 0, sum_b = 0, sum_aa = 0, sum_bb = 0, sum_ab = 0;
-  const auto most_x = static_cast<float>(other.width_px - 2), most_y = static_cast<float>(other.height_px - 2);
-  for (int i = 0; i < kPatchSamples; ++i) {
-    const auto x = static_cast<float>(patch.x_px + patch.between_px * offset(i).x());
-    const auto y = static_cast<float>(patch.y_px + patch.between_px * offset(i).y());
-    const float w = h(2, 0) * x + h(2, 1) * y + h(2, 2);
-    const float u = (h(0, 0) * x + h(0, 1) * y + h(0, 2)) / w, v = (h(1, 0) * x + h(1, 1) * y + h(1, 2)) / w;
-    if (!(u >= 0 && v >= 0 && u < most_x && v < most_y)) continue;
-    const float a = patch.texture[static_cast<std::size_t>(i)], b = sample(other.texture, u, v);
-    if (std::isnan(a + b)) continue;
-    count += 1;
-    sum_a += a;
-    sum_b += b;
-    sum_aa += a * a;
-    sum_bb += b * b;
-    sum_ab += a * b;
+  Eigen::Matrix3d lens;
+  lens << other.fx_px, 0, other.cx_px, 0, other.fy_px, other.cy_px, 0, 0, 1;
+  far_ = lens * other.camera_from_patient.rotation() * ray_of;
+  const Eigen::Vector3d apart = lens * (other.camera_from_patient * view.eye_in_patient_mm);
+  per_inverse_depth_ = apart * (patch.normal.transpose() * ray_of) / patch.normal.dot(patch.ray);
+}
+
+float PatchSeenBy::correlation(double depth_mm, const Eigen::Vector2d& beside_px) const {
+  // Pixels of the view to pixels of the other by the plane n . (p - eye) = n . ray * depth.
+  Eigen::Matrix3d by_plane = far_ + per_inverse_depth_ / depth_mm;
+  by_plane.topRows<2>() += beside_px * by_plane.row(2);
+  const Eigen::Matrix3f h = by_plane.cast<float>();
+  const Samples per_w = (h(2, 0) * x_px_ + h(2, 1) * y_px_ + h(2, 2)).inverse();
+  const Samples u = (h(0, 0) * x_px_ + h(0, 1) * y_px_ + h(0, 2)) * per_w;
+  const Samples v = (h(1, 0) * x_px_ + h(1, 1) * y_px_ + h(1, 2)) * per_w;
+  const auto most_x = static_cast<float>(other_.width_px - 2), most_y = static_cast<float>(other_.height_px - 2);
+  Samples b;
+  for (Eigen::Index i = 0; i < b.size(); ++i) {
+    const bool within = u[i] >= 0 && v[i] >= 0 && u[i] < most_x && v[i] < most_y;
+    b[i] = within ? sample(other_.texture, u[i], v[i]) : std::numeric_limits<float>::quiet_NaN();
   }
+  const Eigen::Map<const Samples> texture(patch_.texture.data());
+  const Samples both = texture + b;
+  const auto untold = both.isNaN();
+  const Samples a = untold.select(0.0F, texture);
+  b = untold.select(0.0F, b);
+  const auto count = static_cast<float>(kPatchSamples - untold.count());
   if (count < static_cast<float>(kLeastCommon) * kPatchSamples) return std::numeric_limits<float>::quiet_NaN();
+  const float sum_a = a.sum(), sum_b = b.sum();
   // Both are about 0 in the mean, so that little is lost by taking the means off at the end.
-  const float aa = sum_aa - sum_a * sum_a / count, bb = sum_bb - sum_b * sum_b / count;
+  const float aa = a.square().sum() - sum_a * sum_a / count, bb = b.square().sum() - sum_b * sum_b / count;
   constexpr float kFlat = 1e-6F;
   if (aa < kFlat * count || bb < kFlat * count) return 0;
-  return (sum_ab - sum_a * sum_b / count) / std::sqrt(aa * bb);
+  return ((a * b).sum() - sum_a * sum_b / count) / std::sqrt(aa * bb);
 }
 
 }  // namespace birdseye::host

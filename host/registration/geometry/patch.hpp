@@ -35,9 +35,22 @@ std::vector<GridPixel> patch_grid(const std::vector<PinholeView>& views, double 
 std::optional<Patch> patch_at(const PinholeView& view, const DepthMap& depths, const SeenSurface& surface, int x_px,
                               int y_px);
 
-/// Normalised cross-correlation of the patch with another view, if the patch's plane is moved to a depth and the other
-/// view shows the patch beside_px from where the poses have it. NaN where the other view shows too little of it.
-float correlation(const Patch& patch, const PinholeView& other, double depth_mm,
-                  const Eigen::Vector2d& beside_px = Eigen::Vector2d::Zero());
+/// A patch and another view that may show it. Holds on to both.
+class PatchSeenBy {
+ public:
+  PatchSeenBy(const Patch& patch, const PinholeView& other);
+
+  /// Normalised cross-correlation of the two, if the patch's plane is moved to a depth and the other view shows the
+  /// patch beside_px from where the poses have it. NaN where the other view shows too little of it.
+  [[nodiscard]] float correlation(double depth_mm, const Eigen::Vector2d& beside_px = Eigen::Vector2d::Zero()) const;
+
+ private:
+  using Samples = Eigen::Array<float, kPatchSamples, 1>;
+
+  const Patch& patch_;
+  const PinholeView& other_;
+  Samples x_px_, y_px_;                      ///< of the patch, in its own view
+  Eigen::Matrix3d far_, per_inverse_depth_;  ///< the view's pixels to the other's: far_ + per_inverse_depth_ / depth
+};
 
 }  // namespace birdseye::host

@@ -24,6 +24,18 @@ struct Found {
   double sigma_mm;
 };
 
+/// Over the views that show the patch at this depth; -1: none does.
+float mean_correlation(const std::vector<PatchSeenBy>& seen_by, double depth_mm) {
+  float sum = 0, count = 0;
+  for (const PatchSeenBy& other : seen_by) {
+    const float r = other.correlation(depth_mm);
+    if (!std::isfinite(r)) continue;
+    sum += r;
+    count += 1;
+  }
+  return count > 0 ? sum / count : -1;
+}
+
 class Sweep {
  public:
   Sweep(const std::vector<PinholeView>& views, const SeenSurface& surface, const StereoSettings& settings)
@@ -46,22 +58,24 @@ class Sweep {
     const auto patch = patch_at(views_[v], sight_.depths(v), surface_, pixel.x_px, pixel.y_px);
     if (!patch) return std::nullopt;
     const int half = static_cast<int>(std::lround(settings_.span_mm / settings_.step_mm));
-    const std::size_t steps = 2 * static_cast<std::size_t>(half) + 1;
-    std::vector<float> score(steps, 0);
-    std::vector<int> seen(steps, 0);
+    std::vector<PatchSeenBy> seen_by;
     for (std::size_t w = 0; w < views_.size(); ++w) {
-      if (w == v || !sight_.sees(w, patch->place_mm)) continue;
-      for (std::size_t s = 0; s < steps; ++s) {
-        const double depth = patch->depth_mm + (static_cast<int>(s) - half) * settings_.step_mm;
-        if (depth <= 0) continue;
-        const float r = correlation(*patch, views_[w], depth);
-        if (!std::isfinite(r)) continue;
-        score[s] += r;
-        ++seen[s];
-      }
+      if (w != v && sight_.sees(w, patch->place_mm)) seen_by.emplace_back(*patch, views_[w]);
     }
-    for (std::size_t s = 0; s < steps; ++s) score[s] = seen[s] > 0 ? score[s] / static_cast<float>(seen[s]) : -1;
-    const auto best = static_cast<int>(std::max_element(score.begin(), score.end()) - score.begin());
+    if (seen_by.empty()) return std::nullopt;
+    std::vector<float> score(2 * static_cast<std::size_t>(half) + 1, -1);
+    const auto look_at = [&](int s) {
+      const double depth = patch->depth_mm + (s - half) * settings_.step_mm;
+      if (depth > 0) score[static_cast<std::size_t>(s)] = mean_correlation(seen_by, depth);
+    };
+    const auto best_so_far = [&] {
+      return static_cast<int>(std::max_element(score.begin(), score.end()) - score.begin());
+    };
+    // Every other depth, then all about the best.
+    for (int s = 0; s <= 2 * half; s += 2) look_at(s);
+    const int near = best_so_far();
+    for (int s = std::max(1, near - kPeak + 1); s <= std::min(2 * half - 1, near + kPeak - 1); s += 2) look_at(s);
+    const int best = best_so_far();
     const auto at = [&](int s) { return score[static_cast<std::size_t>(s)]; };
     if (at(best) < kLeastCorrelation || best == 0 || best == 2 * half) return std::nullopt;
     for (int s = 0; s <= 2 * half; ++s) {

@@ -128,11 +128,12 @@ class Search {
     const double step_mm = std::clamp(step_px / std::max(along_px.norm(), 1e-6), kLeastStep_mm, kMostStep_mm);
     const Eigen::Vector2d beside_px = step_px * Eigen::Vector2d(-along_px.y(), along_px.x()).normalized();
     Scores scores(static_cast<int>(settings_.span_mm / step_mm), static_cast<int>(settings_.beside_px / kStep_px));
+    const PatchSeenBy seen_by(patch, other);
     for (int s = -scores.along(); s <= scores.along(); ++s) {
       const double depth_mm = patch.depth_mm + s * step_mm;
       if (depth_mm <= 0) continue;
       for (int b = -scores.beside(); b <= scores.beside(); ++b) {
-        const float score = correlation(patch, other, depth_mm, b * beside_px);
+        const float score = seen_by.correlation(depth_mm, b * beside_px);
         if (std::isfinite(score)) scores.at(s, b) = score;
       }
     }

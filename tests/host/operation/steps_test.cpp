@@ -322,7 +322,7 @@ std::shared_ptr<const PatientPlan> ball() {
 
 /// The patient may be replaced while it runs: the thread keeps what it was given.
 TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
-  const TransferFunction transfer = *load_transfer_function("abdomen");
+  const auto transfer = std::make_shared<const TransferFunction>(*load_transfer_function("abdomen"));
   std::weak_ptr<const PatientPlan> watched;
   DeformationStep step;
   {
@@ -357,7 +357,7 @@ std::vector<SeenPoint> strokes_round_the_ball(double off_mm) {
 }
 
 TEST(DeformationStep, IsFoundByTouchesBesideASingleView) {
-  const TransferFunction transfer = *load_transfer_function("abdomen");
+  const auto transfer = std::make_shared<const TransferFunction>(*load_transfer_function("abdomen"));
   const CameraModel camera{64, 48, 60, 60, 32, 24};
   ViewStep views;
   views.keep(noise(1), kCameraFromPatient);

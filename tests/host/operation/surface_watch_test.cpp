@@ -36,19 +36,14 @@ HostTime at_ms(int ms) {
 TEST(SurfaceWatch, HoldsAFrameASecondAgainstTheDeformationThatIsShown) {
   const Scratch scratch;
   const RegistrationCase by = simulated_case(scratch / "c", 6);
-  PatientFiles files;
-  files.ct = scratch / "c/ct.nii.gz";
-  files.labels = scratch / "c/segmentation.nii.gz";
-  files.organ = by.label_values;
-  auto plan = read_patient(files);
-  ASSERT_TRUE(plan) << plan.error().what;
   auto truth = read_field(scratch / "c/truth/field.mha");
   auto transfer = load_transfer_function(by.transfer);
   ASSERT_TRUE(truth && transfer);
+  auto organ = organ_at_rest(by.ct, &*by.labels, by.label_values, *transfer);
+  ASSERT_TRUE(organ) << organ.error().what;
   WatchedSurface surface{{kept(by, 1), kept(by, 2)},
                          by.views[0].camera,
-                         std::make_shared<const PatientPlan>(*std::move(plan)),
-                         std::make_shared<const TransferFunction>(*std::move(transfer)),
+                         *std::move(organ),
                          std::make_shared<const DeformedOrgan>(DeformedOrgan{*truth, 0.9, std::nullopt})};
   SurfaceWatch watch;
   watch.offer(kept(by, 0), 0.3, at_ms(0));
