@@ -236,16 +236,7 @@ Eigen::Matrix3d DisplacementFit::covariance(const Eigen::Vector3d& rest_mm, cons
 }
 
 LatticeField DisplacementFit::seen_field(const SignedDistance& organ) const {
-  constexpr std::size_t kBlock = 256;
-  LatticeField field(organ);
-  tbb::parallel_for(std::size_t{0}, (field.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    const std::size_t first = block * kBlock, last = std::min(field.size(), first + kBlock);
-    Eigen::MatrixX3d places(static_cast<Eigen::Index>(last - first), 3);
-    for (std::size_t i = first; i < last; ++i)
-      places.row(static_cast<Eigen::Index>(i - first)) = field.place_mm(i).transpose();
-    const Eigen::MatrixX3d w = values(places);
-    for (std::size_t i = first; i < last; ++i) field.set(i, w.row(static_cast<Eigen::Index>(i - first)).transpose());
-  });
+  LatticeField field = sampled_field(organ, [this](const Eigen::MatrixX3d& places) { return values(places); });
   return prior_.of_seen ? field : seen_from_rest(field);
 }
 

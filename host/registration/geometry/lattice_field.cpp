@@ -47,6 +47,57 @@ Eigen::Vector3d LatticeField::at(const Eigen::Vector3d& place_in_patient_mm) con
   return (low + t[2] * (plane(slice) - low)).cast<double>();
 }
 
+LatticeField sampled_field(const SignedDistance& organ,
+                           const std::function<Eigen::MatrixX3d(const Eigen::MatrixX3d&)>& displacements_mm) {
+  constexpr double kNear_mm = 15;
+  constexpr int kEvery = 3;
+  constexpr std::size_t kBlock = 256;
+  LatticeField out(organ);
+  const std::array<int, 3>& points = out.points();
+  const auto is_coarse = [&](std::size_t axis, int n) { return n % kEvery == 0 || n == points[axis] - 1; };
+  std::vector<std::size_t> sampled;
+  std::vector<std::array<int, 3>> between;
+  for (int k = 0; k < points[2]; ++k) {
+    for (int j = 0; j < points[1]; ++j) {
+      for (int i = 0; i < points[0]; ++i) {
+        const std::size_t point = grid_index(points, i, j, k);
+        if ((is_coarse(0, i) && is_coarse(1, j) && is_coarse(2, k)) ||
+            organ.distance_mm(out.place_mm(point)) < kNear_mm) {
+          sampled.push_back(point);
+        } else {
+          between.push_back({i, j, k});
+        }
+      }
+    }
+  }
+  tbb::parallel_for(std::size_t{0}, (sampled.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    const std::size_t first = block * kBlock, last = std::min(sampled.size(), first + kBlock);
+    Eigen::MatrixX3d places(static_cast<Eigen::Index>(last - first), 3);
+    for (std::size_t n = first; n < last; ++n)
+      places.row(static_cast<Eigen::Index>(n - first)) = out.place_mm(sampled[n]).transpose();
+    const Eigen::MatrixX3d w_mm = displacements_mm(places);
+    for (std::size_t n = first; n < last; ++n)
+      out.set(sampled[n], w_mm.row(static_cast<Eigen::Index>(n - first)).transpose());
+  });
+  for (const std::array<int, 3>& at : between) {
+    Eigen::Vector3d sum_mm = Eigen::Vector3d::Zero();
+    for (int n = 0; n < 8; ++n) {
+      double weight = 1;
+      std::array<int, 3> corner{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const int low = at[axis] / kEvery * kEvery, high = std::min(low + kEvery, points[axis] - 1);
+        const double t = high > low ? static_cast<double>(at[axis] - low) / (high - low) : 0;
+        const bool is_high = (n >> axis & 1) != 0;
+        corner[axis] = is_high ? high : low;
+        weight *= is_high ? t : 1 - t;
+      }
+      if (weight > 0) sum_mm += weight * out.displacement_mm(grid_index(points, corner[0], corner[1], corner[2]));
+    }
+    out.set(grid_index(points, at[0], at[1], at[2]), sum_mm);
+  }
+  return out;
+}
+
 LatticeField seen_from_rest(const LatticeField& rest) {
   LatticeField out = rest;
   tbb::parallel_for(std::size_t{0}, rest.size(), [&](std::size_t n) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "host/deform/displacement_field.hpp"
@@ -19,6 +20,7 @@ class LatticeField {
 
   [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& place_in_patient_mm) const;
   [[nodiscard]] std::size_t size() const { return displacement_mm_.size(); }
+  [[nodiscard]] const std::array<int, 3>& points() const { return points_; }
   [[nodiscard]] Eigen::Vector3d place_mm(std::size_t point) const;
   [[nodiscard]] Eigen::Vector3d displacement_mm(std::size_t point) const {
     return displacement_mm_[point].cast<double>();
@@ -33,6 +35,11 @@ class LatticeField {
   Eigen::Affine3d patient_from_box_, box_from_patient_;
   std::vector<Eigen::Vector3f> displacement_mm_;
 };
+
+/// A field over the box of an organ by a function of many places at once, a row a place: at every point near the organ;
+/// further off, where a deformation is smooth, at every third along each axis and between these.
+LatticeField sampled_field(const SignedDistance& organ,
+                           const std::function<Eigen::MatrixX3d(const Eigen::MatrixX3d&)>& displacements_mm);
 
 /// u of seen places from w of rest places: u(x) = w(x + u(x)).
 LatticeField seen_from_rest(const LatticeField& rest);
