@@ -29,6 +29,15 @@ Result<CaseRegistration> run_registration(const RegistrationCase& c, const Trans
     for (const Landmark& landmark : c.landmarks) settings.targets_at_rest_mm.push_back(landmark.rest_mm);
     settings.touches = c.surface_points;
     for (const NamedMatch& match : c.matched) settings.matched.push_back(match.place);
+    settings.by_similarity = [&](const std::vector<VideoView>& views) -> Result<DisplacementField> {
+      ViewRegistrationSettings by_gradient;
+      by_gradient.control_points = settings.control_points;
+      by_gradient.estimate_uncertainty = false;
+      by_gradient.progress = tell;
+      auto found = register_views(views, c.ct, labels, c.label_values, transfer, by_gradient);
+      if (!found) return found.error();
+      return std::move(found->field);
+    };
     std::vector<RgbView> pictures;
     pictures.reserve(c.pictures.size());
     for (const Picture& picture : c.pictures) pictures.push_back(picture.view());

@@ -1,7 +1,5 @@
 #include "host/registration/geometry/displacement_fit.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -11,7 +9,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kSharedOver_mm = 8;
+constexpr double kSharedOver_mm = 8, kBroadOver_mm = 25;
 
 Eigen::MatrixXd gaussian(const Eigen::MatrixXd& squared_mm2, double length_mm) {
   return (squared_mm2.array() * (-0.5 / (length_mm * length_mm))).exp().matrix();
@@ -123,10 +121,11 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
   out.weights_.assign(points.size(), 1);
   out.matched_weights_.assign(matched.size(), 1);
   Eigen::MatrixX3d known(n, 3);  // where a point is seen, and where what is matched was at rest
-  Eigen::VectorXd sigma(of_points);
+  Eigen::VectorXd sigma(of_points), broad(of_points);
   for (Eigen::Index i = 0; i < of_points; ++i) {
     known.row(i) = points[static_cast<std::size_t>(i)].place_mm.transpose();
     sigma[i] = points[static_cast<std::size_t>(i)].sigma_mm;
+    broad[i] = points[static_cast<std::size_t>(i)].broad_mm;
   }
   std::vector<MatchedAxes> axes;
   axes.reserve(matched.size());
@@ -134,7 +133,9 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
   for (Eigen::Index i = 0; i < of_matched; ++i)
     known.row(of_points + i) = matched[static_cast<std::size_t>(i / 3)].rest_mm.transpose();
   const Eigen::MatrixX3d seen = known.topRows(of_points);
-  const Eigen::MatrixXd shared = kShared_mm * kShared_mm * gaussian(squared_distances(seen, seen), kSharedOver_mm);
+  const Eigen::MatrixXd apart_mm2 = squared_distances(seen, seen);
+  Eigen::MatrixXd shared = kShared_mm * kShared_mm * gaussian(apart_mm2, kSharedOver_mm);
+  if (broad.any()) shared += broad.asDiagonal() * gaussian(apart_mm2, kBroadOver_mm) * broad.asDiagonal();
   // Places that the function takes: where a row has its known end at the other one, it goes by the fit.
   Eigen::MatrixX3d places = known;
   const Eigen::Index first = prior.of_seen ? of_points : 0, moving = prior.of_seen ? of_matched : of_points;

@@ -68,7 +68,7 @@ std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const 
     const Eigen::Vector3d normal = surface.normal(place_mm);
     place_mm += (mean_mm - surface.distance().distance_mm(place_mm)) * normal;
     SeenPoint gathered{place_mm, std::max(kLeastSigma_mm, std::sqrt(variance_mm2 * (1 / count + kCommon))),
-                       std::nullopt, points[members.front()].shift_mm};
+                       std::nullopt, points[members.front()].shift_mm, points[members.front()].broad_mm};
     if (points[members.front()].from_camera) gathered.from_camera = from_camera.normalized();
     out.push_back(gathered);
   }

@@ -18,11 +18,15 @@
 #include "host/registration/geometry/motion_evidence.hpp"
 #include "host/registration/geometry/outlines.hpp"
 #include "host/registration/geometry/pose_adjustment.hpp"
+#include "host/registration/geometry/similarity_points.hpp"
 #include "host/registration/geometry/stereo.hpp"
 
 namespace birdseye::host {
 
 namespace {
+
+/// Fewer places than this by stereo are told of by similarity too.
+constexpr std::size_t kLittleStereo = 100;
 
 Error called_off() {
   return {Errc::disconnected, "the registration was called off; nothing of it is kept"};
@@ -94,6 +98,12 @@ Result<void> check_seen(const VideoView& view, const PinholeView& pinhole, const
   if (std::any_of(depths.depth_mm.begin(), depths.depth_mm.end(), [](float mm) { return std::isfinite(mm); }))
     return {};
   return Error{Errc::not_found, fmt::format("{}: sees nothing of the organ; check its pose and the labels", view.name)};
+}
+
+/// The views with their poses as they were corrected.
+std::vector<VideoView> posed(std::vector<VideoView> views, std::span<const PinholeView> by) {
+  for (std::size_t n = 0; n < views.size(); ++n) views[n].camera_from_patient = by[n].camera_from_patient;
+  return views;
 }
 
 /// How the touches, which are the last of the points, and what is matched fit the result.
@@ -180,6 +190,13 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     std::vector<SeenPoint> points = gathered_points(by_stereo, surface);
     const std::vector<SeenPoint> of_outlines = gathered_points(by_outlines, surface);
     points.insert(points.end(), of_outlines.begin(), of_outlines.end());
+    const bool last = &round == &kRounds.back();
+    if (last && by_stereo.size() < kLittleStereo && settings.by_similarity) {
+      if (const auto field = settings.by_similarity(posed(views, seen_by))) {
+        const std::vector<SeenPoint> similar = gathered_points(similarity_points(seen_by, distance, *field), surface);
+        points.insert(points.end(), similar.begin(), similar.end());
+      }
+    }
     points.insert(points.end(), touches.begin(), touches.end());
     const bool nothing = points.empty() && settings.matched.empty();
     if (nothing && (round.outline_mm == 0 || !found.fits.empty())) continue;  // other rounds may say more

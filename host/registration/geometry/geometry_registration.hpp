@@ -28,6 +28,9 @@ struct GeometrySettings {
   /// touches are the gathered ones then.
   bool gather_touches = false;
   std::vector<MatchedPoint> matched;  ///< what is known both at rest and now
+  /// Registers the views by similarity of renderings: asked once, where stereo finds little. What it finds are further
+  /// places of the surface, of a large error that neighbours share. Empty: stereo, outlines and touches alone tell.
+  std::function<Result<DisplacementField>(const std::vector<VideoView>& views)> by_similarity;
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
   RegistrationWatch watch;

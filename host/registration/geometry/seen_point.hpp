@@ -18,6 +18,7 @@ struct SeenPoint {
   std::optional<Eigen::Vector3d> from_camera;
   /// Of one axis of a shift that all places with one have wrong together, each in proportion; 0: none of it.
   double shift_mm = 0;
+  double broad_mm = 0;  ///< a standard deviation of what places within some 25 mm have wrong together; 0: nothing
   ByCommonErrors by_common_mm = ByCommonErrors::Zero();  ///< of a place that views tell of, where these errors count
 };
 
