@@ -217,7 +217,7 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
 
 Eigen::Matrix3d DisplacementFit::covariance(const Eigen::Vector3d& rest_mm, const Eigen::Vector3d& seen_mm) const {
   const Eigen::Vector3d place = prior_.of_seen ? seen_mm : rest_mm;
-  Eigen::Matrix3d before = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d before = prior_.unfollowed_mm * prior_.unfollowed_mm * Eigen::Matrix3d::Identity();
   Eigen::MatrixX3d cross = Eigen::MatrixX3d::Zero(centres_.rows(), 3);
   for (const GaussianPart& part : prior_.parts) {
     const double s2 = part.sigma_mm * part.sigma_mm;

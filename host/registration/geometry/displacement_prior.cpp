@@ -70,7 +70,7 @@ Eigen::Matrix3Xd PushBasis::at(const Eigen::Vector3d& place_in_patient_mm) const
 }
 
 Eigen::Matrix3d DisplacementPrior::covariance(const Eigen::Vector3d& place_in_patient_mm) const {
-  Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d out = unfollowed_mm * unfollowed_mm * Eigen::Matrix3d::Identity();
   for (const GaussianPart& part : parts) out += part.sigma_mm * part.sigma_mm * Eigen::Matrix3d::Identity();
   if (!basis) return out;
   const Eigen::Matrix3Xd here = basis->at(place_in_patient_mm);

@@ -64,6 +64,9 @@ struct DisplacementPrior {
   /// w(rest)), as tissue bends.
   bool of_seen = false;
   double log_belief = 0;  ///< before anything is seen, nats
+  /// Of a displacement beside these, which has nothing to do with that of the place next to it and which no residual
+  /// tells of: a standard deviation of each axis.
+  double unfollowed_mm = 0;
 
   /// Of the displacement before anything is seen, mm^2, at a place that the function takes.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& place_in_patient_mm) const;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -11,6 +12,8 @@ namespace birdseye::host {
 namespace {
 constexpr double kUsual_mm = 2;
 constexpr double kFewArePushed = -2;  ///< nats
+/// What no hypothesis follows of an organ that moved by some kMoved_mm: of simulated bends and twists.
+constexpr double kUnfollowed_mm = 0.2, kMoved_mm = 4;
 }  // namespace
 
 std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared_ptr<const ElasticModes>& modes,
@@ -23,12 +26,13 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
   for (const auto& [length, sigma, nearby] : {Gaussian{65, 4, 0},
                                               {85, 4, 0},
                                               {120, 4, 0},
+                                              {120, 8, 0},
+                                              {160, 4, 0},
+                                              {160, 8, 0},
                                               {85, 2.5, 0},
                                               {120, 1, 0},
                                               {85, 1.2, 0.8},
                                               {85, 0.6, 1.6},
-                                              {65, 4, 0.8},
-                                              {50, 3, 0},
                                               {120, 1, 3}}) {
     DisplacementPrior prior;
     prior.name = fmt::format("{:g} mm over {:g} mm", sigma, length);
@@ -39,22 +43,22 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
     }
     prior.log_belief =
         -0.5 * std::pow(std::log(sigma / kUsual_mm), 2) - 0.5 * std::pow(std::log((nearby + 0.1) / kUsualNearby_mm), 2);
+    prior.unfollowed_mm = kUnfollowed_mm * std::min(1.0, sigma / kMoved_mm);
     out.push_back(std::move(prior));
   }
+  // No organ is quite one elastic material in no other's hands: an elastic hypothesis alone is surer than it is right.
   struct Elastic {
     double sigma_mm, length_mm, beside_mm;
   };
-  for (const auto& [sigma, length, beside] : {Elastic{1, 0, 0}, {2, 0, 0}, {4, 0, 0}, {2, 85, 2.5}, {1, 65, 4}}) {
+  for (const auto& [sigma, length, beside] :
+       {Elastic{0.5, 120, 2}, {0.5, 160, 4}, {1, 120, 2}, {1, 160, 4}, {2, 85, 2.5}, {1, 65, 4}}) {
     constexpr double kRigid_mm = 3;
     DisplacementPrior prior;
-    prior.name = fmt::format("elastic, {:g} mm", sigma);
+    prior.name = fmt::format("elastic, {:g} mm and {:g} mm over {:g} mm", sigma, beside, length);
     prior.basis = std::make_shared<ElasticBasis>(modes, kRigid_mm, sigma);
-    prior.log_belief = -0.5 * std::pow(std::log(sigma / kUsual_mm), 2);
-    if (beside > 0) {
-      prior.name += fmt::format(" and {:g} mm over {:g} mm", beside, length);
-      prior.parts.push_back({length, beside});
-      prior.log_belief -= 0.5 * std::pow(std::log(beside / kUsual_mm), 2);
-    }
+    prior.parts.push_back({length, beside});
+    prior.log_belief = -0.5 * (std::pow(std::log(sigma / kUsual_mm), 2) + std::pow(std::log(beside / kUsual_mm), 2));
+    prior.unfollowed_mm = kUnfollowed_mm;
     out.push_back(std::move(prior));
   }
   const Eigen::Vector3d last_voxel(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);
@@ -65,6 +69,7 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
                              control_points[2], sigma_mm);
     prior.basis = std::make_shared<BezierBasis>(patient_from_cube, control_points, sigma_mm);
     prior.of_seen = true;
+    prior.unfollowed_mm = kUnfollowed_mm;
     out.push_back(std::move(prior));
   }
   return out;
@@ -79,6 +84,7 @@ std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_m
     prior.parts.push_back({length_mm, sigma_mm});
     prior.basis = std::make_shared<PushBasis>(place_mm, kPush_mm);
     prior.log_belief = -0.5 * std::pow(std::log(sigma_mm / kUsual_mm), 2) + kFewArePushed;
+    prior.unfollowed_mm = kUnfollowed_mm;
     out.push_back(std::move(prior));
   }
   return out;
