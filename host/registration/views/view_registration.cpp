@@ -198,9 +198,9 @@ double uncertainty_mm(Problem& problem, const Tissue& tissue, const ControlGrid&
   constexpr std::size_t kEvery = 5;
   std::vector<std::size_t> surface;
   std::size_t seen = 0;
-  for (std::size_t v = 0; v < tissue.occupancy.size(); ++v) {
-    constexpr float kInside = 0.7F;
-    if (tissue.occupancy[v] > kSurface && tissue.occupancy[v] < kInside && seen++ % kEvery == 0) surface.push_back(v);
+  const auto half_step_mm = static_cast<float>(0.5 * tissue.spacing_mm.mean());
+  for (std::size_t v = 0; v < tissue.depth_mm.size(); ++v) {
+    if (std::abs(tissue.depth_mm[v]) < half_step_mm && seen++ % kEvery == 0) surface.push_back(v);
   }
   // Directions: what few control points can change, and the pose.
   constexpr int kFew = 3;
@@ -293,8 +293,9 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
                                         std::span<const int> label_values, const TransferFunction& transfer,
                                         const ViewRegistrationSettings& settings) {
   if (views.empty()) return Error{Errc::bad_value, "no views to register to"};
-  const auto coarse = tissue_of(ct, labels, label_values, transfer, spacing_mm(kCoarse, ct));
-  if (!coarse) return coarse.error();
+  const auto organ = organ_distance(ct, labels, label_values, transfer);
+  if (!organ) return organ.error();
+  const Tissue coarse = tissue_of(*organ, ct, spacing_mm(kCoarse, ct));
   if (settings.initial && least_determinant(*settings.initial) <= 0)
     return Error{Errc::bad_value, "the initial field folds; start from another or from none"};
 
@@ -302,8 +303,8 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   if (settings.refine_pose) out.pose.emplace();
   const ControlGrid one({1, 1, 1});
   Parameters start_of_one(3, 0.0);
-  if (settings.initial) start_of_one = closest_parameters(*settings.initial, one, *coarse);
-  auto few = Problem::make(views, *coarse, one, kCoarse, settings.prior, out, settings.watch);
+  if (settings.initial) start_of_one = closest_parameters(*settings.initial, one, coarse);
+  auto few = Problem::make(views, coarse, one, kCoarse, settings.prior, out, settings.watch);
   if (!few) return few.error();
   if (auto sound = check_views(views, *few, start_of_one); !sound) return sound.error();
   out.light = settings.light.value_or(Headlight{});
@@ -316,7 +317,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
     out.control_points = *settings.control_points;
     out.why_so_many_points = fmt::format("{} control points, as asked", times(out.control_points));
   } else {
-    const auto chosen = choose_control_points(views, *coarse, out.light, settings, out);
+    const auto chosen = choose_control_points(views, coarse, out.light, settings, out);
     if (!chosen) return chosen.error();
     out.control_points = *chosen;
   }
@@ -324,12 +325,12 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   const ControlGrid control(out.control_points);
   Parameters start(control.parameters(), 0.0);
   if (settings.initial) {
-    start = closest_parameters(*settings.initial, control, *coarse);
-    if (least_determinant(driven_field(control, start, *coarse, settings.level)) <= 0)
+    start = closest_parameters(*settings.initial, control, coarse);
+    if (least_determinant(driven_field(control, start, coarse, settings.level)) <= 0)
       return Error{Errc::bad_value, "the initial field folds as these control points give it again; give more of them"};
   }
   Parameters rough = settings.initial ? start : one.refine(of_one, control);
-  auto wide = Problem::make(views, *coarse, control, kCoarse, settings.prior, out, settings.watch);
+  auto wide = Problem::make(views, coarse, control, kCoarse, settings.prior, out, settings.watch);
   if (!wide) return wide.error();
   if (!settings.light) {
     // A rough fit first, so that the lamp does not stand in for a deformation.
@@ -340,10 +341,9 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
                     out.light.ambient, out.light.vignette));
   }
 
-  const auto fine = tissue_of(ct, labels, label_values, transfer, spacing_mm(kFine, ct));
-  if (!fine) return fine.error();
+  const Tissue fine = tissue_of(*organ, ct, spacing_mm(kFine, ct));
   Prior prior = settings.prior;
-  auto judged = Problem::make(views, *fine, control, kFine, prior, out, settings.watch);
+  auto judged = Problem::make(views, fine, control, kFine, prior, out, settings.watch);
   if (!judged) return judged.error();
   Problem& judge = *judged;
   const std::optional<PoseUnknowns> rough_pose = out.pose;
@@ -353,13 +353,13 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   out.pose = rough_pose;
   constexpr int kTries = 3;
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    auto close = Problem::make(views, *fine, control, kFine, prior, out, settings.watch);
-    auto broad = Problem::make(views, *coarse, control, kCoarse, prior, out, settings.watch);
+    auto close = Problem::make(views, fine, control, kFine, prior, out, settings.watch);
+    auto broad = Problem::make(views, coarse, control, kCoarse, prior, out, settings.watch);
     if (!close || !broad) return (close ? broad : close).error();
     rough = broad->climb(rough, out.light, kCoarse.most_steps);
     out.parameters = close->climb(rough, out.light, kFine.most_steps);
     if (settings.watch.cancelled()) return called_off();
-    out.field = driven_field(control, out.parameters, *fine, settings.level);
+    out.field = driven_field(control, out.parameters, fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     if (out.min_jacobian > 0) break;
     constexpr double kStiffer = 10;
@@ -373,7 +373,7 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   if (out.worse_than_start) {
     out.parameters = start;
     if (out.pose) out.pose.emplace();
-    out.field = settings.initial ? *settings.initial : driven_field(control, start, *fine, settings.level);
+    out.field = settings.initial ? *settings.initial : driven_field(control, start, fine, settings.level);
     out.min_jacobian = least_determinant(out.field);
     out.similarity_after = out.similarity_before;
     out.per_view_after = out.per_view_before;
@@ -382,9 +382,9 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   if (out.pose) out.patient_from_model = judge.views().motion().patient_from_model(*out.pose);
   if (settings.estimate_uncertainty && !out.worse_than_start) {
     // By the usual prior: a stiffer one, against folds, knows no more of the organ.
-    auto summit = Problem::make(views, *coarse, control, kCoarse, settings.prior, out, settings.watch);
+    auto summit = Problem::make(views, coarse, control, kCoarse, settings.prior, out, settings.watch);
     if (!summit) return summit.error();
-    out.uncertainty_mm = uncertainty_mm(*summit, *coarse, control, out);
+    out.uncertainty_mm = uncertainty_mm(*summit, coarse, control, out);
   }
   return out;
 }

@@ -213,7 +213,7 @@ TEST(MultiView, PoseGradientAgreesWithCentralDifferences) {
         multi->set_pose(moved);
         return multi->value(p, light);
       };
-      constexpr double kStep_mm = 0.005;
+      constexpr double kStep_mm = 0.0025;
       const double slope = (at(kStep_mm) - at(-kStep_mm)) / (2 * kStep_mm);
       EXPECT_NEAR(gradient[axis], slope, 1e-3 * length) << trial << " " << axis;
     }
