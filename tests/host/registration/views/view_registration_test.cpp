@@ -290,6 +290,13 @@ TEST(RegisterViews, KeepsAStartThatIsBetter) {
   for (std::size_t i = 0; i < moved.size(); ++i) EXPECT_NEAR(found->parameters[i], moved[i], 0.2);
 }
 
+TEST(HeldOutGain, IsOfAMotionWhereItIsWorthwhile) {
+  EXPECT_TRUE((HeldOutGain{-0.01, 0.001}.nothing_moved()));
+  EXPECT_TRUE((HeldOutGain{0.0039, 0.0001}.nothing_moved()));
+  // One view sees most of what moved.
+  EXPECT_FALSE((HeldOutGain{0.15, 0.12}.nothing_moved()));
+}
+
 TEST(RegisterViews, RefusesAViewThatSeesNothing) {
   VideoView away = view_from({0, 0, 0});
   away.name = std::string("away.png");
