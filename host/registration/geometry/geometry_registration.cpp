@@ -191,10 +191,12 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     const std::vector<SeenPoint> of_outlines = gathered_points(by_outlines, surface);
     points.insert(points.end(), of_outlines.begin(), of_outlines.end());
     const bool last = &round == &kRounds.back();
-    if (last && by_stereo.size() < kLittleStereo && settings.by_similarity) {
+    if (last && views.size() > 1 && by_stereo.size() < kLittleStereo && settings.by_similarity) {
       if (const auto field = settings.by_similarity(posed(views, seen_by))) {
         const std::vector<SeenPoint> similar = gathered_points(similarity_points(seen_by, distance, *field), surface);
         points.insert(points.end(), similar.begin(), similar.end());
+      } else {
+        settings.progress(field.error().what);
       }
     }
     points.insert(points.end(), touches.begin(), touches.end());

@@ -46,7 +46,7 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
     prior.unfollowed_mm = kUnfollowed_mm * std::min(1.0, sigma / kMoved_mm);
     out.push_back(std::move(prior));
   }
-  // No organ is quite one elastic material in no other's hands: an elastic hypothesis alone is surer than it is right.
+  // No organ is quite one elastic material: an elastic hypothesis alone expects too small an error.
   struct Elastic {
     double sigma_mm, length_mm, beside_mm;
   };

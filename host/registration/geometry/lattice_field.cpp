@@ -51,7 +51,7 @@ LatticeField sampled_field(const SignedDistance& organ,
                            const std::function<Eigen::MatrixX3d(const Eigen::MatrixX3d&)>& displacements_mm) {
   constexpr double kNear_mm = 15;
   constexpr int kEvery = 3;
-  constexpr std::size_t kBlock = 256;
+  constexpr std::size_t kBlock = 1024;
   LatticeField out(organ);
   const std::array<int, 3>& points = out.points();
   const auto is_coarse = [&](std::size_t axis, int n) { return n % kEvery == 0 || n == points[axis] - 1; };

@@ -1,10 +1,8 @@
 #include "host/registration/geometry/similarity_points.hpp"
 
-#include <cmath>
-
 #include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/patch.hpp"
-#include "host/registration/geometry/sight.hpp"
+#include "host/registration/geometry/seen_surface.hpp"
 
 namespace birdseye::host {
 
@@ -13,14 +11,14 @@ std::vector<SeenPoint> similarity_points(const std::vector<PinholeView>& views, 
   // Of normals that mutual information finds: 1.2 mm off, over 25 mm together.
   constexpr double kGrid_px = 24, kSigma_mm = 0.4, kBroad_mm = 1.2;
   const SeenSurface surface(deformed_distance(organ, field));
-  const Sight sight(surface, views);
   std::vector<SeenPoint> out;
   for (const GridPixel& pixel : patch_grid(views, kGrid_px)) {
     const PinholeView& view = views[pixel.view];
-    const auto depth_mm = static_cast<double>(sight.depths(pixel.view).at(pixel.x_px, pixel.y_px));
-    if (!std::isfinite(depth_mm) || view.usable.at<std::uint8_t>(pixel.y_px, pixel.x_px) == 0) continue;
+    if (view.usable.at<std::uint8_t>(pixel.y_px, pixel.x_px) == 0) continue;
     const Eigen::Vector3d ray = view.ray(pixel.x_px, pixel.y_px);
-    const Eigen::Vector3d place_mm = view.eye_in_patient_mm + depth_mm * ray;
+    const auto met = surface.meet(view.eye_in_patient_mm, ray);
+    if (!met || met->distance_mm != 0) continue;
+    const Eigen::Vector3d place_mm = view.eye_in_patient_mm + met->depth_mm * ray;
     if (-surface.normal(place_mm).dot(ray.normalized()) < kPatchFacing) continue;
     out.push_back({place_mm, kSigma_mm, ray.normalized(), 0, kBroad_mm});
   }

@@ -52,8 +52,10 @@ double MultiView::penalty(const std::vector<double>& parameters, double weight, 
 }
 
 void MultiView::deform(const std::vector<double>& parameters) {
+  if (parameters == deformed_by_) return;  // another lamp alone is tried
   controlled_.displacements(parameters, moves_);
   warp(tissue_, moves_, warped_);
+  deformed_by_ = parameters;
 }
 
 double MultiView::similarity(const std::vector<double>& parameters, const Headlight& light) {

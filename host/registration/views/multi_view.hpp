@@ -59,6 +59,7 @@ class MultiView {
   std::vector<ParzenMutualInformation> measures_;
   std::vector<double> per_view_;
   std::vector<float> moves_, warped_;
+  std::vector<double> deformed_by_;  ///< the parameters that warped_ is by; none before the first
 };
 
 }  // namespace birdseye::host

@@ -200,7 +200,8 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   const Tissue fine = tissue_of(*organ, ct, spacing_mm(kFine, ct));
   if (views.size() >= kFewestToHoldOut && !settings.initial && !out.pose) {
     bool none_at_limit = false;
-    const Headlight light_of_none = settings.light.value_or(find_light(*wide, start, out.light, none_at_limit));
+    const Headlight light_of_none =
+        settings.light ? *settings.light : find_light(*wide, start, out.light, none_at_limit);
     const auto gain = gain_on_held_out_views(views, coarse, control, out.light, light_of_none, settings, out);
     if (settings.watch.cancelled()) return called_off();
     if (!gain) return gain.error();
