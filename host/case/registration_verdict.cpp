@@ -108,7 +108,8 @@ Verdict verdict_of(const RegistrationCase& c, const ViewRegistration& found) {
     return {Grade::fail, {"every deformation that was found folds: check the poses; the start is written"}, {}};
   if (found.worse_than_start)
     return {Grade::fail, {"no deformation explains the views better than the start, which is what is written"}, {}};
-  return found.stereo_points ? geometry_verdict(c.views, found) : by_similarity(c, found);
+  if (!found.stereo_points) return by_similarity(c, found);
+  return geometry_verdict(c.views, found, c.target_mm ? JudgedBy::target : JudgedBy::inside);
 }
 
 }  // namespace birdseye::host

@@ -88,7 +88,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
       }
       auto found = register_geometry(views, pictures, patient->ct, *organ, settings);
       if (!found) return found.error();
-      const Verdict verdict = geometry_verdict(views, *found);
+      const Verdict verdict = geometry_verdict(views, *found, JudgedBy::target);
       return Matched{*std::move(found), verdict, std::move(organ)};
     });
   });

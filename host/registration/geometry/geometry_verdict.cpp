@@ -43,7 +43,7 @@ std::size_t others_that_fit(const ViewRegistration& found) {
 
 }  // namespace
 
-Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found) {
+Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found, JudgedBy by) {
   constexpr double kLost_mm = 15, kFits_mm = 2;
   constexpr double kHeldOut_mm = 0.5, kHeldOutTimes = 3;
   for (std::size_t n = 0; n < found.outline_off_mm.size(); ++n) {
@@ -56,9 +56,9 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
             {}};
   }
   const std::optional<ExpectedErrors>& expected = found.expected;
-  if (!expected || (expected->targets.empty() && !expected->inside))
+  const bool named = by == JudgedBy::target;
+  if (!expected || (named ? expected->targets.empty() : !expected->inside))
     return {Grade::marginal, {"the error to be expected of the target is not known: it was not asked for"}, {}};
-  const bool named = !expected->targets.empty();
   const ExpectedError target = named ? expected->targets.front() : *expected->inside;
   const char* const what = named ? "the target" : "the organ's inside";
   if (target.radius95_mm > kSure_mm) {

@@ -7,8 +7,11 @@
 
 namespace birdseye::host {
 
-/// Whether an overlay by what register_geometry() found of these views may be believed: by the error to be expected of
-/// the first target that it was asked for, or of the organ's inside where it was asked for none.
-Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found);
+/// By the error of what a registration is judged: of the first place that it was asked for, which is to be hit; or,
+/// where no such place is named, of the organ's inside, whatever other places it was asked for.
+enum class JudgedBy { target, inside };
+
+/// Whether an overlay by what register_geometry() found of these views may be believed.
+Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found, JudgedBy by);
 
 }  // namespace birdseye::host

@@ -35,6 +35,19 @@ TEST(RegistrationVerdict, PassesWhereTheTargetIsKnown) {
   EXPECT_FALSE(says(verdict, "nothing moved")) << verdict.reasons.front();
 }
 
+TEST(RegistrationVerdict, OfACaseThatNamesNoTargetIsByTheInsideAndNotByALandmark) {
+  RegistrationCase none_named = with_target();
+  none_named.target_mm.reset();
+  ViewRegistration found = well_found();
+  found.expected->inside = {4, 6.5, 0.7};  // its targets are the truth's landmarks then, which are well known
+  EXPECT_EQ(verdict_of(none_named, found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(none_named, found), "the organ's inside may be 6.5 mm off"));
+  found.expected->inside = {0.5, 1, 0.2};
+  EXPECT_EQ(verdict_of(none_named, found).grade, Grade::pass);
+  found.expected->inside.reset();
+  EXPECT_EQ(verdict_of(none_named, found).grade, Grade::marginal);
+}
+
 TEST(RegistrationVerdict, SaysThatNothingMovedWhereEvidenceGainsNothingByAMotion) {
   ViewRegistration found = well_found();
   found.evidence_of_motion_nats = 2.9;
