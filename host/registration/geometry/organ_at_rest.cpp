@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "host/registration/views/tissue.hpp"
+#include "host/registration/geometry/organ_surface.hpp"
 
 namespace birdseye::host {
 
