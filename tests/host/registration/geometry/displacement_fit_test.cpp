@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <memory>
 #include <random>
+#include <span>
 
 #include "tests/support/ball.hpp"
 
@@ -93,6 +96,60 @@ TEST(DisplacementFit, TheEvidenceKnowsWhichPriorMadeTheField) {
   still.parts.push_back({85, 0.2});
   EXPECT_GT(DisplacementFit::solve(organ, points, long_prior(), nullptr, kSettle_mm).log_evidence(),
             DisplacementFit::solve(organ, points, still, nullptr, kSettle_mm).log_evidence() + 50);
+}
+
+/// What a fit with a basis alone makes least: Geman and McClure's of the residuals, in standard deviations, and half
+/// the squares of the unknowns. From the definition: no derivative of the fit's is used.
+double cost_of(const Eigen::Vector3d& unknowns, const SignedDistance& organ, std::span<const SeenPoint> points,
+               const DisplacementPrior& prior) {
+  constexpr double kDeviations = 2.5;  // beyond which the fit thinks a residual wrong, once it is annealed
+  double cost = 0.5 * unknowns.squaredNorm();
+  for (const SeenPoint& point : points) {
+    Eigen::Vector3d rest_mm = point.place_mm;
+    for (int i = 0; i < (prior.of_seen ? 1 : 100); ++i)
+      rest_mm = point.place_mm + prior.basis->at(prior.of_seen ? point.place_mm : rest_mm) * unknowns;
+    const double deviations = organ.distance_mm(rest_mm) / point.sigma_mm;
+    cost += 0.5 * deviations * deviations / (1 + std::pow(deviations / kDeviations, 2));
+  }
+  return cost;
+}
+
+TEST(DisplacementFit, EndsWhereCentralDifferencesOfItsCostVanish) {
+  const SignedDistance organ = testing::ball(kRadius_mm);
+  std::vector<SeenPoint> points;  // so far apart that they share no error
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        const int axes = std::abs(x) + std::abs(y) + std::abs(z);
+        if (axes != 1 && axes != 3) continue;
+        const Eigen::Vector3d seen_mm = kRadius_mm * Eigen::Vector3d(x, y, z).normalized() - Eigen::Vector3d(9, -5, 7);
+        points.push_back({seen_mm, 6, std::nullopt});
+      }
+    }
+  }
+  const Eigen::Affine3d box = Eigen::Translation3d(Eigen::Vector3d::Constant(-60)) * Eigen::Scaling(120.0);
+  for (const bool of_seen : {true, false}) {
+    DisplacementPrior prior;
+    prior.basis = std::make_shared<BezierBasis>(box, std::array{1, 1, 1}, 60);
+    prior.of_seen = of_seen;
+    const std::vector<double> steps_mm(30, 1.0);
+    const LatticeField field = DisplacementFit::solve(organ, points, prior, nullptr, steps_mm).seen_field(organ);
+    const Eigen::Vector3d place_mm = field.place_mm(field.size() / 2), u_mm = field.at(place_mm);
+    const Eigen::Matrix3d basis = prior.basis->at(of_seen ? place_mm : place_mm + u_mm);
+    const Eigen::Vector3d found = basis.inverse() * u_mm;
+    EXPECT_GT(u_mm.norm(), 4);
+    Eigen::Vector3d gradient;
+    Eigen::Matrix3d bend = Eigen::Matrix3d::Zero();
+    constexpr double kStep = 1e-3;
+    const auto cost = [&](const Eigen::Vector3d& at) { return cost_of(at, organ, points, prior); };
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Vector3d along = kStep * Eigen::Vector3d::Unit(a);
+      gradient[a] = (cost(found + along) - cost(found - along)) / (2 * kStep);
+      bend(a, a) = (cost(found + along) - 2 * cost(found) + cost(found - along)) / (kStep * kStep);
+    }
+    // How far Newton's method would go on.
+    EXPECT_LT((bend.inverse() * gradient).norm(), 0.01 * found.norm()) << of_seen;
+  }
 }
 
 TEST(LatticeField, OfSeenPlacesUndoesThatOfRestPlaces) {
