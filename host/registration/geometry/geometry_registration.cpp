@@ -25,7 +25,7 @@ namespace birdseye::host {
 
 namespace {
 
-/// Fewer places than this by stereo are told of by similarity too.
+/// Where stereo finds fewer places than this, places by similarity are taken too.
 constexpr std::size_t kLittleStereo = 100;
 
 Error called_off() {
