@@ -248,6 +248,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
       ->add_option("--deformation-mm", options->cart.deformation_mm,
                    "with --simulate: how far the liver has moved since the CT, where it has moved most (default 8)")
       ->check(CLI::Range(0.0, 30.0));
+  command->add_option("--deformation", options->cart.deformation, "with --simulate: of which kind")
+      ->check(CLI::IsMember(deformation_kinds()));
   command->add_option("--faults", options->cart.faults, "with --simulate: a script of faults")->type_name("FILE");
   command
       ->add_option("--video", options->video,

@@ -94,6 +94,10 @@ Result<void> SimulatedCart::make_patient(const SimulatedCartSettings& settings) 
                fmt::format("the simulated patient could not be made: {}", last.empty() ? "it took over 60 s" : last)};
 }
 
+std::vector<std::string> deformation_kinds() {
+  return {"elastic", "bezier", "bend", "push", "compression", "twist", "breathing", "pneumoperitoneum"};
+}
+
 Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartSettings& settings) {
   const std::filesystem::path& folder = settings.folder;
   auto rendezvous = RendezvousFolder::make();
@@ -132,6 +136,7 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
                                    fmt::format("{}", settings.pause_s),
                                    "--look-s",
                                    fmt::format("{}", settings.look_s)};
+  if (!settings.deformation.empty()) command.insert(command.end(), {"--deformation", settings.deformation});
   if (settings.strokes) command.emplace_back("--strokes");
   if (settings.views) command.emplace_back("--views");
   if (settings.drop_late) command.emplace_back("--drop-late");

@@ -16,11 +16,15 @@
 
 namespace birdseye::host {
 
+/// What `birdseye-sim cart --deformation` takes; the first is its default.
+std::vector<std::string> deformation_kinds();
+
 struct SimulatedCartSettings {
   std::filesystem::path folder;  ///< all that the cart writes goes here
   std::filesystem::path ct;      ///< a CT of the user's own, or empty for the procedural patient
   unsigned seed = 1;
   double deformation_mm = 0;       ///< how far the liver has moved since the CT, where it has moved most
+  std::string deformation;         ///< one of deformation_kinds; empty: the first
   double position_noise_mm = 0.5;  ///< standard deviation per axis and record
   double angle_noise_deg = 0.1;
   int width_px = 768, height_px = 576;

@@ -8,6 +8,13 @@
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
 
+namespace {
+
+constexpr const char* kDeformationKinds =
+    "elastic (default), bezier, bend, push, compression, twist, breathing or pneumoperitoneum";
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace birdseye;
   CLI::App app{"birdseye-sim: a patient, a tracker and a laparoscope for the appliance, with known truth",
@@ -40,9 +47,11 @@ int main(int argc, char** argv) {
   run.add_option("--seed", cart.seed, "everything random follows from it");
   run.add_option("--position-noise-mm", cart.noise.position_mm, "per axis and record")->check(CLI::Range(0.0, 50.0));
   run.add_option("--angle-noise-deg", cart.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
-  run.add_option("--deformation-mm", cart.deformation_mm,
+  run.add_option("--deformation-mm", cart.deformation.amplitude_mm,
                  "how far the liver has moved since the CT, where it has moved most")
       ->check(CLI::Range(0.0, 30.0));
+  std::string cart_deformation;
+  run.add_option("--deformation", cart_deformation, kDeformationKinds);
   run.add_option("--distortion-mm", cart.distortion_mm, "largest displacement by metal in the room")
       ->check(CLI::Range(0.0, 500.0));
   run.add_option("--sway-s", cart.pace.sway_s, "how long the scope is first turned to and fro over the board")
@@ -64,9 +73,12 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1.0, 86400.0));
   run.add_option("--rate", cart.rate_hz, "frames a second")->check(CLI::Range(1.0, 120.0));
   run.callback([&] {
-    if (const auto parsed = hw_sim::parse_size(size, cart.width_px, cart.height_px); !parsed) {
-      take(parsed);
-      return;
+    for (const Result<void>& parsed : {hw_sim::parse_size(size, cart.width_px, cart.height_px),
+                                       hw_sim::parse_deformation(cart_deformation, "", cart.deformation)}) {
+      if (!parsed) {
+        take(parsed);
+        return;
+      }
     }
     take(hw_sim::run_cart(cart, note_interrupts()));
   });
@@ -88,8 +100,7 @@ int main(int argc, char** argv) {
   make_case.add_option("--liver-label", registration.liver_label, "the liver's value in the labels")->needs("--labels");
   make_case.add_option("--views", registration.views, "how many (default 5)");
   make_case.add_option("--size", size, "WIDTHxHEIGHT of the views (default 768x576)");
-  make_case.add_option("--deformation", deformation,
-                       "elastic (default), bezier, bend, push, compression, twist, breathing or pneumoperitoneum");
+  make_case.add_option("--deformation", deformation, kDeformationKinds);
   make_case.add_option("--dof", dof,
                        "of bezier, which it implies: 3 (default), 24, 81.., or inner control points an axis as 3x3x3");
   make_case.add_option("--push-width-mm", registration.deformation.push_width_mm,

@@ -20,25 +20,25 @@ using Eigen::Vector3d;
 constexpr std::array<std::string_view, 8> kNames = {"elastic",     "bezier", "bend",      "push",
                                                     "compression", "twist",  "breathing", "pneumoperitoneum"};
 
-Result<DrawnMove> draw_move(const Subject& subject, const DeformationSettings& settings, Draw& draw) {
+Result<DrawnMove> draw_move(const OrganShape& organ, const DeformationSettings& settings, Draw& draw) {
   switch (settings.kind) {
     case DeformationKind::bend:
-      return bend(subject, draw);
+      return bend(organ, draw);
     case DeformationKind::push:
-      return push(subject, settings.push_width_mm, draw);
+      return push(organ, settings.push_width_mm, draw);
     case DeformationKind::compression:
-      return compression(subject, draw);
+      return compression(organ, draw);
     case DeformationKind::twist:
-      return twist(subject, draw);
+      return twist(organ, draw);
     case DeformationKind::breathing:
-      return breathing(subject, draw);
+      return breathing(organ, draw);
     case DeformationKind::pneumoperitoneum:
-      return pneumoperitoneum(subject, draw);
+      return pneumoperitoneum(organ, draw);
     case DeformationKind::elastic:
     case DeformationKind::bezier:
       break;
   }
-  return elastic(subject, draw);
+  return elastic(organ, draw);
 }
 
 /// The size at which the surface moves by amplitude_mm; 0 where none is found.
@@ -64,9 +64,9 @@ bool stays_within(const TissueMap& map, const Mesh& surface) {
   });
 }
 
-Result<DrawnDeformation> draw_patch(const Subject& subject, const DeformationSettings& settings, std::uint64_t seed) {
-  const BezierMap still(subject.grid.origin_mm, subject.grid.last_mm(), settings.inner);
-  auto map = BezierMap::random(still, settings.amplitude_mm, subject.surface.vertices, seed);
+Result<DrawnDeformation> draw_patch(const OrganShape& organ, const DeformationSettings& settings, std::uint64_t seed) {
+  const BezierMap still(organ.grid.origin_mm, organ.grid.last_mm(), settings.inner);
+  auto map = BezierMap::random(still, settings.amplitude_mm, organ.surface.vertices, seed);
   if (!map) return map.error();
   auto patch = std::make_unique<const BezierMap>(*std::move(map));
   const BezierMap* const seen = patch.get();
@@ -116,27 +116,27 @@ Result<void> parse_deformation(const std::string& kind, const std::string& dof, 
   return {};
 }
 
-Result<DrawnDeformation> draw_deformation(const Subject& subject, const DeformationSettings& settings,
+Result<DrawnDeformation> draw_deformation(const OrganShape& organ, const DeformationSettings& settings,
                                           std::uint64_t seed) {
-  if (settings.kind == DeformationKind::bezier || settings.amplitude_mm == 0)
-    return draw_patch(subject, settings, seed);
+  if (settings.kind == DeformationKind::bezier || settings.amplitude_mm == 0) return draw_patch(organ, settings, seed);
   constexpr int kDraws = 10;
   Draw draw(seed + 62);
   for (int i = 0; i < kDraws; ++i) {
-    auto drawn = draw_move(subject, settings, draw);
+    auto drawn = draw_move(organ, settings, draw);
     if (!drawn) return drawn.error();
-    const double size_mm = fitted_size_mm(*drawn, subject.surface, settings.amplitude_mm);
+    const double size_mm = fitted_size_mm(*drawn, organ.surface, settings.amplitude_mm);
     if (size_mm == 0) continue;
     auto map = std::make_unique<const ForwardMap>(
-        subject.grid.origin_mm, subject.grid.last_mm(),
+        organ.grid.origin_mm, organ.grid.last_mm(),
         [move = drawn->move_mm, size_mm](const Vector3d& rest) { return move(rest, size_mm); });
-    if (!stays_within(*map, subject.surface) || map->least_determinant() <= TissueMap::kLeastDeterminant) continue;
+    if (!stays_within(*map, organ.surface) || map->least_determinant() <= TissueMap::kLeastDeterminant) continue;
     drawn->numbers.push_back({"size_mm", {size_mm}});
     return DrawnDeformation{std::move(map), nullptr, std::move(drawn->numbers)};
   }
-  return Error{Errc::bad_value, fmt::format("--amplitude-mm {:g}: a deformation of kind {} that moves the organ so far "
-                                            "folds its tissue or takes it out of its CT; give less",
-                                            settings.amplitude_mm, name_of(settings.kind))};
+  return Error{Errc::bad_value,
+               fmt::format("a deformation of kind {} that moves the organ by {:g} mm folds its tissue or "
+                           "takes it out of its CT; give less",
+                           name_of(settings.kind), settings.amplitude_mm)};
 }
 
 }  // namespace birdseye::hw_sim

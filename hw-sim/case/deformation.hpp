@@ -40,7 +40,7 @@ struct DrawnDeformation {
 
 /// Draws a deformation over the organ's CT by the seed. Refused where every draw folds the tissue or takes the organ
 /// out of its CT.
-Result<DrawnDeformation> draw_deformation(const Subject& subject, const DeformationSettings& settings,
+Result<DrawnDeformation> draw_deformation(const OrganShape& organ, const DeformationSettings& settings,
                                           std::uint64_t seed);
 
 }  // namespace birdseye::hw_sim

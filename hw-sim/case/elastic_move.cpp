@@ -32,7 +32,7 @@ Grid lattice_about(const Grid& ct) {
 }
 
 /// The share of each cell that is the organ, and a little where only its surface is.
-std::vector<double> filled_cells(const Subject& subject, const Grid& nodes) {
+std::vector<double> filled_cells(const OrganShape& organ, const Grid& nodes) {
   constexpr double kLeast = 0.05;
   const std::array<int, 3> cells = {nodes.size[0] - 1, nodes.size[1] - 1, nodes.size[2] - 1};
   const auto cell_of = [&](const Vector3d& p) {
@@ -44,21 +44,21 @@ std::vector<double> filled_cells(const Subject& subject, const Grid& nodes) {
   const auto count =
       static_cast<std::size_t>(cells[0]) * static_cast<std::size_t>(cells[1]) * static_cast<std::size_t>(cells[2]);
   std::vector<double> filled(count, 0), voxels(count, 0);
-  const Grid& ct = subject.grid;
+  const Grid& ct = organ.grid;
   for (int k = 0; k < ct.size[2]; ++k) {
     for (int j = 0; j < ct.size[1]; ++j) {
       for (int i = 0; i < ct.size[0]; ++i) {
         const std::size_t cell = cell_of(ct.point(i, j, k));
-        const int label = subject.labels[ct.index(i, j, k)];
+        const int label = organ.labels[ct.index(i, j, k)];
         voxels[cell] += 1;
-        if (std::count(subject.organ_labels.begin(), subject.organ_labels.end(), label) > 0) filled[cell] += 1;
+        if (std::count(organ.organ_labels.begin(), organ.organ_labels.end(), label) > 0) filled[cell] += 1;
       }
     }
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (filled[i] > 0) filled[i] = std::max(kLeast, filled[i] / voxels[i]);
   }
-  for (const Eigen::Vector3f& v : subject.surface.vertices) {
+  for (const Eigen::Vector3f& v : organ.surface.vertices) {
     double& share = filled[cell_of(v.cast<double>())];
     share = std::max(share, kLeast);
   }
@@ -111,18 +111,18 @@ double most_moved_mm(const Mesh& mesh, const NodeField& field) {
 
 }  // namespace
 
-Result<DrawnMove> elastic(const Subject& subject, Draw& draw) {
+Result<DrawnMove> elastic(const OrganShape& organ, Draw& draw) {
   constexpr double kBedPerMm = 5e-4;     // everywhere: what lies about the organ
   constexpr std::size_t kTractions = 3;  // and gravity
-  const Mesh& mesh = subject.surface;
+  const Mesh& mesh = organ.surface;
   const std::vector<double> areas = vertex_areas(mesh);
   DrawnMove out;
   const double poisson = draw.uniform(0.35, 0.45);
-  const Grid nodes = lattice_about(subject.grid);
-  ElasticBody body(nodes, filled_cells(subject, nodes), poisson);
+  const Grid nodes = lattice_about(organ.grid);
+  ElasticBody body(nodes, filled_cells(organ, nodes), poisson);
   out.numbers = {{"poisson", {poisson}}, {"cell_mm", {kCellMm}}, {"cells", {static_cast<double>(body.cells())}}};
 
-  const std::vector<Patch> holds = draw_holds(mesh, subject.towards_scope, draw);
+  const std::vector<Patch> holds = draw_holds(mesh, organ.towards_scope, draw);
   const double hold_per_mm = draw.uniform(0.03, 0.1);
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const Vector3d p = mesh.vertices[v].cast<double>();

@@ -81,7 +81,10 @@ Result<MadeCase> make_case(const CaseSettings& settings) {
   auto subject = subject_of(settings);
   if (!subject) return subject.error();
   auto deformation = draw_deformation(*subject, settings.deformation, settings.seed);
-  if (!deformation) return std::move(deformation).error();
+  if (!deformation)
+    return std::move(deformation)
+        .error()
+        .with_context(fmt::format("--amplitude-mm {:g}", settings.deformation.amplitude_mm));
 
   MadeCase out{.subject = *std::move(subject),
                .deformation = *std::move(deformation),

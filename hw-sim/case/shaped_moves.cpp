@@ -65,12 +65,12 @@ DrawnNumber number(const char* name, const Vector3d& v) {
 
 }  // namespace
 
-DrawnMove bend(const Subject& subject, Draw& draw) {
-  const Vector3d mean = mean_vertex(subject.surface);
-  const Vector3d along = draw.about(longest_axis(subject.surface, mean), 20 * kRadPerDeg);
+DrawnMove bend(const OrganShape& organ, Draw& draw) {
+  const Vector3d mean = mean_vertex(organ.surface);
+  const Vector3d along = draw.about(longest_axis(organ.surface, mean), 20 * kRadPerDeg);
   const Vector3d axis = along.cross(draw.direction()).normalized();
   const Vector3d towards = axis.cross(along);
-  const double half_mm = span_along(subject.surface, along).half_mm();
+  const double half_mm = span_along(organ.surface, along).half_mm();
   const Vector3d middle = mean + draw.uniform(-0.3, 0.3) * half_mm * along;
   const auto move = [=](const Vector3d& rest, double size_mm) -> Vector3d {
     const double curvature = 2 * size_mm / (half_mm * half_mm);
@@ -86,12 +86,12 @@ DrawnMove bend(const Subject& subject, Draw& draw) {
   return {move, {number("axis", axis), number("along", along), number("middle_mm", middle)}};
 }
 
-DrawnMove push(const Subject& subject, double width_mm, Draw& draw) {
+DrawnMove push(const OrganShape& organ, double width_mm, Draw& draw) {
   constexpr double kFacing = 0.3;
   constexpr int kTries = 200;
-  const Mesh& mesh = subject.surface;
+  const Mesh& mesh = organ.surface;
   std::size_t v = draw.index(mesh.vertices.size());
-  for (int i = 0; i < kTries && mesh.normals[v].cast<double>().dot(subject.towards_scope) < kFacing; ++i)
+  for (int i = 0; i < kTries && mesh.normals[v].cast<double>().dot(organ.towards_scope) < kFacing; ++i)
     v = draw.index(mesh.vertices.size());
   const Vector3d tip = mesh.vertices[v].cast<double>();
   const Vector3d inwards = -mesh.normals[v].cast<double>().normalized();
@@ -106,10 +106,10 @@ DrawnMove push(const Subject& subject, double width_mm, Draw& draw) {
   return {move, {number("tip_mm", tip), number("direction", inwards), number("width_mm", width_mm)}};
 }
 
-DrawnMove compression(const Subject& subject, Draw& draw) {
+DrawnMove compression(const OrganShape& organ, Draw& draw) {
   const Vector3d axis = draw.direction();
-  const double half_mm = span_along(subject.surface, axis).half_mm();
-  const Vector3d middle = mean_vertex(subject.surface) + draw.uniform(-0.3, 0.3) * half_mm * axis;
+  const double half_mm = span_along(organ.surface, axis).half_mm();
+  const Vector3d middle = mean_vertex(organ.surface) + draw.uniform(-0.3, 0.3) * half_mm * axis;
   const double width_mm = 0.6 * half_mm;
   const auto move = [=](const Vector3d& rest, double size_mm) -> Vector3d {
     const double most_mm = width_mm * std::sqrt(std::numbers::pi / 2);  // by which it would shorten, pressed flat
@@ -122,12 +122,12 @@ DrawnMove compression(const Subject& subject, Draw& draw) {
   return {move, {number("axis", axis), number("middle_mm", middle)}};
 }
 
-DrawnMove twist(const Subject& subject, Draw& draw) {
+DrawnMove twist(const OrganShape& organ, Draw& draw) {
   const Vector3d axis = draw.direction();
-  const Vector3d middle = mean_vertex(subject.surface);
-  const Span span = span_along(subject.surface, axis);
+  const Vector3d middle = mean_vertex(organ.surface);
+  const Span span = span_along(organ.surface, axis);
   double radius_mm = 0;
-  for (const Eigen::Vector3f& v : subject.surface.vertices)
+  for (const Eigen::Vector3f& v : organ.surface.vertices)
     radius_mm = std::max(radius_mm, (v.cast<double>() - middle).cross(axis).norm());
   const double still_mm = span.low_mm + draw.uniform(0, 0.5) * 2 * span.half_mm();
   const auto move = [=](const Vector3d& rest, double size_mm) -> Vector3d {
@@ -137,8 +137,8 @@ DrawnMove twist(const Subject& subject, Draw& draw) {
   return {move, {number("axis", axis), number("middle_mm", middle), number("still_at_mm", still_mm)}};
 }
 
-DrawnMove breathing(const Subject& subject, Draw& draw) {
-  const Mesh& mesh = subject.surface;
+DrawnMove breathing(const OrganShape& organ, Draw& draw) {
+  const Mesh& mesh = organ.surface;
   const Span x = span_along(mesh, Vector3d::UnitX());
   const Span y = span_along(mesh, Vector3d::UnitY());
   const Span z = span_along(mesh, Vector3d::UnitZ());
@@ -157,8 +157,8 @@ DrawnMove breathing(const Subject& subject, Draw& draw) {
            number("forward_share", forward)}};
 }
 
-DrawnMove pneumoperitoneum(const Subject& subject, Draw& draw) {
-  const Mesh& mesh = subject.surface;
+DrawnMove pneumoperitoneum(const OrganShape& organ, Draw& draw) {
+  const Mesh& mesh = organ.surface;
   const Vector3d front = draw.about(-Vector3d::UnitY(), 15 * kRadPerDeg);
   const Vector3d side = (Vector3d::UnitX() - front.x() * front).normalized();
   const Vector3d tall = side.cross(front);

@@ -24,16 +24,16 @@ struct DrawnMove {
 };
 
 /// The organ is bent into an arc, about an axis drawn across its length.
-DrawnMove bend(const Subject& subject, Draw& draw);
+DrawnMove bend(const OrganShape& organ, Draw& draw);
 /// An instrument dents the side that the scope sees, so wide at half the dent's depth; deep inside nothing moves.
-DrawnMove push(const Subject& subject, double width_mm, Draw& draw);
+DrawnMove push(const OrganShape& organ, double width_mm, Draw& draw);
 /// Pressed together along a drawn axis, and spread across it so that each piece keeps its volume.
-DrawnMove compression(const Subject& subject, Draw& draw);
+DrawnMove compression(const OrganShape& organ, Draw& draw);
 /// Turned about a drawn axis, the more the further along it.
-DrawnMove twist(const Subject& subject, Draw& draw);
+DrawnMove twist(const OrganShape& organ, Draw& draw);
 /// The diaphragm comes down towards the feet, and the upper end with it more than the lower.
-DrawnMove breathing(const Subject& subject, Draw& draw);
+DrawnMove breathing(const OrganShape& organ, Draw& draw);
 /// Gas presses the front back and flattens it; the sides spread.
-DrawnMove pneumoperitoneum(const Subject& subject, Draw& draw);
+DrawnMove pneumoperitoneum(const OrganShape& organ, Draw& draw);
 
 }  // namespace birdseye::hw_sim

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "hw-sim/phantom/body.hpp"
+#include "hw-sim/phantom/image_files.hpp"
 #include "hw-sim/phantom/procedural_head.hpp"
 
 namespace birdseye::hw_sim {
@@ -29,11 +32,12 @@ Grid scan_about(const Mesh& surface) {
   return grid;
 }
 
-/// The voxels of body about a surface; where the margin reaches beyond the scan, air.
-void crop(Body& body, const Mesh& surface) {
+/// The voxels about a surface, of those of whole; where the margin reaches beyond the scan, blank.
+template <typename Voxel>
+std::pair<Grid, std::vector<Voxel>> cropped(const Grid& whole, const std::vector<Voxel>& voxels, const Mesh& surface,
+                                            Voxel blank) {
   const auto [low, high] = bounds(surface);
-  const Grid whole = body.grid;
-  Grid& grid = body.grid;
+  Grid grid = whole;
   std::array<int, 3> first{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<Eigen::Index>(axis);
@@ -42,7 +46,7 @@ void crop(Body& body, const Mesh& surface) {
     grid.size[axis] = static_cast<int>(std::ceil(voxel(high[a] + kMarginMm))) - first[axis] + 1;
   }
   grid.origin_mm = whole.point(first[0], first[1], first[2]);
-  std::vector<std::int16_t> hu(grid.voxels(), -1000);
+  std::vector<Voxel> out(grid.voxels(), blank);
   const auto inside = [&](int i, std::size_t axis) { return i >= 0 && i < whole.size[axis]; };
   for (int k = 0; k < grid.size[2]; ++k) {
     for (int j = 0; j < grid.size[1]; ++j) {
@@ -50,11 +54,11 @@ void crop(Body& body, const Mesh& surface) {
         const int x = first[0] + i;
         const int y = first[1] + j;
         const int z = first[2] + k;
-        if (inside(x, 0) && inside(y, 1) && inside(z, 2)) hu[grid.index(i, j, k)] = body.hu[whole.index(x, y, z)];
+        if (inside(x, 0) && inside(y, 1) && inside(z, 2)) out[grid.index(i, j, k)] = voxels[whole.index(x, y, z)];
       }
     }
   }
-  body.hu = std::move(hu);
+  return {grid, std::move(out)};
 }
 
 Result<Subject> subject_of(Body body, Mesh surface, std::uint64_t seed) {
@@ -94,10 +98,23 @@ Result<Subject> liver_subject(const std::filesystem::path& ct, const std::filesy
   if (surface.vertices.empty()) {
     return Error{Errc::degenerate, fmt::format("{}: no liver is found in it; give its --labels", ct.string())};
   }
-  crop(*body, surface);
+  std::tie(body->grid, body->hu) = cropped<std::int16_t>(body->grid, body->hu, surface, -1000);
   auto subject = subject_of(std::move(*body), std::move(surface), seed);
   if (!subject) return subject.error().with_context(ct.string());
   return subject;
+}
+
+Result<OrganShape> liver_shape(const std::filesystem::path& phantom) {
+  OrganShape out;
+  auto surface = read_ply(phantom / "surfaces" / "liver.ply");
+  if (!surface) return surface.error();
+  const auto whole = read_labels(phantom / "segmentation.nii.gz");
+  if (!whole) return whole.error();
+  out.surface = *std::move(surface);
+  std::tie(out.grid, out.labels) = cropped<std::uint8_t>(whole->grid, whole->labels, out.surface, 0);
+  out.organ_labels = {kLiver, kPortal, kHepatic, kTumour};
+  out.towards_scope = towards_scope();
+  return out;
 }
 
 Subject head_subject(std::uint64_t seed) {

@@ -1,6 +1,7 @@
 #include "hw-sim/phantom/image_files.hpp"
 
 #include <fmt/format.h>
+#include <itkImageFileReader.h>
 #include <itkImageFileWriter.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
@@ -37,6 +38,30 @@ Result<void> write_volume(const std::filesystem::path& path, const Grid& grid, s
 
 Result<void> write_labels(const std::filesystem::path& path, const Grid& grid, std::span<const std::uint8_t> labels) {
   return write<itk::NiftiImageIO>(path, grid, labels);
+}
+
+Result<LabelVolume> read_labels(const std::filesystem::path& path) {
+  using Image = itk::Image<std::uint8_t, 3>;
+  try {
+    const auto reader = itk::ImageFileReader<Image>::New();
+    reader->SetImageIO(itk::NiftiImageIO::New());
+    reader->SetFileName(path.string());
+    reader->Update();
+    const Image& image = *reader->GetOutput();
+    const Image::RegionType region = image.GetLargestPossibleRegion();
+    LabelVolume out;
+    for (unsigned axis = 0; axis < 3; ++axis) {
+      out.grid.size[axis] = static_cast<int>(region.GetSize()[axis]);
+      out.grid.origin_mm[axis] = image.GetOrigin()[axis];
+      out.grid.spacing_mm[axis] = image.GetSpacing()[axis];
+    }
+    out.labels.assign(image.GetBufferPointer(), image.GetBufferPointer() + region.GetNumberOfPixels());
+    return out;
+  } catch (const std::exception&) {
+    return Error{Errc::unreadable, fmt::format("{}: no labels can be read from it; make the patient anew with "
+                                               "`birdseye-sim phantom`",
+                                               path.string())};
+  }
 }
 
 Result<void> write_field(const std::filesystem::path& path, const Grid& grid,

@@ -10,7 +10,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
-#include "hw-sim/case/bezier_map.hpp"
+#include "hw-sim/case/deformation.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
@@ -33,19 +33,12 @@ nlohmann::json sheet_of(const World& world) {
   return sheet;
 }
 
-/// The liver since the CT: one control point in the middle of a box about it, whose surface holds still.
-Result<BezierMap> moved_liver(const Mesh& liver, double deformation_mm, std::uint64_t seed) {
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(25);
-  const auto [low_mm, high_mm] = bounds(liver);
-  const BezierMap still(low_mm - margin, high_mm + margin, {1, 1, 1});
-  if (deformation_mm <= 0) return still;
-  return BezierMap::random(still, deformation_mm, liver.vertices, seed);
-}
-
-nlohmann::json truth_of(const World& world, const TissueMap& moved, const CameraModel& lens) {
+nlohmann::json truth_of(const World& world, const DeformationSettings& settings, const DrawnDeformation& deformation,
+                        const CameraModel& lens) {
   nlohmann::json truth;
+  truth["deformation"] = {{"kind", name_of(settings.kind)}, {"amplitude_mm", settings.amplitude_mm}};
   truth["tumour_centre_in_patient_mm"] = json_of(world.truth().tumour_centre_mm);
-  truth["tumour_centre_moved_to_mm"] = json_of(moved.deformed_of(world.truth().tumour_centre_mm));
+  truth["tumour_centre_moved_to_mm"] = json_of(deformation.map->deformed_of(world.truth().tumour_centre_mm));
   for (const Eigen::Vector3d& f : world.truth().fiducials_mm) truth["fiducials_in_patient_mm"].push_back(json_of(f));
   truth["tracker_from_patient"] = json_of(world.tracker_from_patient().matrix());
   truth["tracker_from_marker"] = json_of(world.tracker_from_marker().matrix());
@@ -114,17 +107,18 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
     if (!script) return script.error();
     faults = *std::move(script);
   }
-  const auto liver = read_ply(settings.phantom / "surfaces" / "liver.ply");
+  const auto liver = liver_shape(settings.phantom);
   if (!liver) return liver.error();
   const CameraModel lens = laparoscope_lens(settings.width_px, settings.height_px);
-  const auto moved = moved_liver(*liver, settings.deformation_mm, settings.seed);
-  if (!moved) return moved.error();
-  Cavity cavity{.organ = *liver, .wall_centre_mm = truth->liver_centre_mm};
-  if (settings.deformation_mm > 0) {
-    cavity.organ = deformed(*liver, *moved);
-    cavity.rest_mm = liver->vertices;
+  const auto deformation = draw_deformation(*liver, settings.deformation, settings.seed);
+  if (!deformation)
+    return deformation.error().with_context(fmt::format("--deformation-mm {:g}", settings.deformation.amplitude_mm));
+  Cavity cavity{.organ = liver->surface, .wall_centre_mm = truth->liver_centre_mm};
+  if (settings.deformation.amplitude_mm > 0) {
+    cavity.organ = deformed(liver->surface, *deformation->map);
+    cavity.rest_mm = liver->surface.vertices;
   }
-  const auto world = World::create(*truth, *liver, lens, settings.seed, settings.pace, &cavity.organ);
+  const auto world = World::create(*truth, liver->surface, lens, settings.seed, settings.pace, &cavity.organ);
   if (!world) return world.error();
   const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
   if (!laparoscope) return laparoscope.error();
@@ -134,7 +128,8 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   std::error_code error;
   std::filesystem::create_directories(settings.folder / "truth", error);
   for (const Result<void>& written :
-       {write_json(settings.folder / "truth" / "truth.json", truth_of(*world, *moved, lens)),
+       {write_json(settings.folder / "truth" / "truth.json",
+                   truth_of(*world, settings.deformation, *deformation, lens)),
         write_text(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
         write_json(settings.folder / "cart.json", sheet_of(*world))}) {
     if (!written) return written.error();

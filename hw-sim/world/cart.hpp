@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "calibration/base/result.hpp"
+#include "hw-sim/case/deformation.hpp"
 #include "hw-sim/minibird/tracker_script.hpp"
 #include "hw-sim/world/world.hpp"
 
@@ -20,10 +21,10 @@ struct CartSettings {
   int width_px = 768, height_px = 576;
   double rate_hz = 25;
   Pace pace;
-  double camera_delay_ms = 0;    ///< from exposure to arrival; frames then bear no stamp. 0: frames are stamped
-  bool drop_late = false;        ///< true: frames that are not traced in time are left out
-  double deformation_mm = 0;     ///< how far the liver's surface has moved since the CT, where it has moved most
-  double distortion_mm = 0;      ///< of the tracker's field, where it is largest
+  double camera_delay_ms = 0;  ///< from exposure to arrival; frames then bear no stamp. 0: frames are stamped
+  bool drop_late = false;      ///< true: frames that are not traced in time are left out
+  DeformationSettings deformation = {.amplitude_mm = 0};  ///< of the liver since the CT
+  double distortion_mm = 0;                               ///< of the tracker's field, where it is largest
   std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
 };
 

@@ -101,6 +101,8 @@ TEST(Programs, WrongOptionsAreNamed) {
   expect_refused("birdseye-sim", "minibird " + tty + " --truth /nonexistent/t.json", {"/nonexistent/t.json"});
   expect_refused("birdseye-sim", "minibird " + tty + " --faults " + scratch.file("f", "[[fault]]\nname = \"fire\"\n"),
                  {"line 2", "fire", "drop_byte"});
+  expect_refused("birdseye-sim", "cart --phantom p --socket s --tty t --out o --deformation melt",
+                 {"--deformation melt", "elastic", "pneumoperitoneum"});
   const std::string socket = "--socket " + (scratch / "frames").string();
   expect_refused("birdseye-sim", "camera", {"--v4l2"});
   expect_refused("birdseye-sim", "camera --v4l2 /dev/null", {"/dev/null", "v4l2loopback"});

@@ -4,8 +4,11 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <filesystem>
 
 #include "hw-sim/base/hashed.hpp"
+#include "hw-sim/phantom/image_files.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
 namespace {
@@ -84,12 +87,40 @@ TEST_P(EachKind, FollowsFromItsSeedAlone) {
   EXPECT_NE(place_now(1), place_now(2));
 }
 
+TEST_P(EachKind, MovesAPatientsLiverAsItIsDrawnFromTheFilesOfThePatient) {
+  const testing::Scratch patient;
+  const Subject subject = lump();
+  ASSERT_TRUE(std::filesystem::create_directory(patient / "surfaces"));
+  ASSERT_TRUE(write_ply(patient / "surfaces" / "liver.ply", subject.surface));
+  ASSERT_TRUE(write_labels(patient / "segmentation.nii.gz", subject.grid, subject.labels));
+  const auto shape = liver_shape(patient.path());
+  ASSERT_TRUE(shape) << shape.error().what;
+  EXPECT_TRUE((shape->grid.origin_mm - subject.grid.origin_mm).cwiseAbs().maxCoeff() <= 4) << "a voxel";
+  EXPECT_EQ(std::count(shape->labels.begin(), shape->labels.end(), 1),
+            std::count(subject.labels.begin(), subject.labels.end(), 1));
+  const auto drawn = draw_deformation(*shape, {.kind = GetParam()}, 7);
+  ASSERT_TRUE(drawn) << drawn.error().what;
+  double most_mm = 0;
+  for (const Eigen::Vector3f& v : shape->surface.vertices)
+    most_mm = std::max(most_mm, (drawn->map->deformed_of(v.cast<double>()) - v.cast<double>()).norm());
+  EXPECT_NEAR(most_mm, 10, GetParam() == DeformationKind::bezier ? 0.02 : 1e-3);
+}
+
+TEST(Deformation, OfAPatientWithoutASegmentationIsRefused) {
+  const testing::Scratch patient;
+  ASSERT_TRUE(std::filesystem::create_directory(patient / "surfaces"));
+  ASSERT_TRUE(write_ply(patient / "surfaces" / "liver.ply", lump().surface));
+  const auto shape = liver_shape(patient.path());
+  ASSERT_FALSE(shape);
+  EXPECT_NE(shape.error().what.find("segmentation.nii.gz"), std::string::npos) << shape.error().what;
+}
+
 TEST(Deformation, IsRefusedWhereItFoldsOrLeavesTheScan) {
   const Subject subject = lump();
   for (const DeformationKind kind : {DeformationKind::bend, DeformationKind::push, DeformationKind::breathing}) {
     const auto drawn = draw_deformation(subject, {.kind = kind, .amplitude_mm = 95}, 11);
     ASSERT_FALSE(drawn);
-    EXPECT_NE(drawn.error().what.find("--amplitude-mm 95"), std::string::npos) << drawn.error().what;
+    EXPECT_NE(drawn.error().what.find("by 95 mm"), std::string::npos) << drawn.error().what;
     EXPECT_NE(drawn.error().what.find(name_of(kind)), std::string::npos) << drawn.error().what;
   }
 }
