@@ -47,8 +47,7 @@ function(birdseye_test name)
   # Not in the environment, where gtest_discover_tests keeps only the first of several. The emulator, empty on the machine
   # that is built for, goes before programs that a test runs.
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
-  target_compile_definitions(${name} PRIVATE
-    BIRDSEYE_BIN="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}" BIRDSEYE_EMULATOR="${emulator}")
+  target_compile_definitions(${name} PRIVATE BIRDSEYE_EMULATOR="${emulator}")
   set(alone "")
   if(ARG_LABEL STREQUAL "e2e")
     set(alone RUN_SERIAL TRUE)

@@ -12,6 +12,7 @@
 #include "hw-sim/minibird/pseudo_terminal.hpp"
 #include "tests/support/child.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/programs_folder.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye {
@@ -110,7 +111,7 @@ TEST(Appliance, TellsTheServiceManagerAndTakesAReloadWhileClientsStay) {
     return (*free)->port();
   }();
   const std::string path = scratch.file("c.toml", config((scratch / "tty").string(), camera, port) + record);
-  testing::Child daemon({"env", manager.variable(), BIRDSEYE_BIN "/birdseyed", "--config", path});
+  testing::Child daemon({"env", manager.variable(), testing::programs_folder() + "/birdseyed", "--config", path});
   const auto deadline = Deadline::after(Duration::from_ms(30'000));
   EXPECT_NE(manager.told("READY=1"), "");
   EXPECT_NE(manager.told("WATCHDOG=1"), "");

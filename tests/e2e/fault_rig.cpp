@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "drivers/system/clock.hpp"
+#include "tests/support/programs_folder.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::testing {
@@ -19,7 +20,7 @@ constexpr Duration kStartsWithin = Duration::from_ms(20'000);
 
 std::vector<std::string> simulator(const std::string& words) {
   std::vector<std::string> all;
-  std::istringstream in(BIRDSEYE_EMULATOR " " BIRDSEYE_BIN "/birdseye-sim " + words);
+  std::istringstream in(BIRDSEYE_EMULATOR " " + testing::programs_folder() + "/birdseye-sim " + words);
   for (std::string word; in >> word;) all.push_back(word);
   return all;
 }
@@ -59,7 +60,7 @@ FaultRig::FaultRig(Settings settings) : settings_(std::move(settings)) {
                     device, (settings_.folder / "camera").string(), settings_.size.substr(0, cross),
                     settings_.size.substr(cross + 1), kFrameRateHz, settings_.more));
   std::vector<std::string> words = settings_.within;
-  std::istringstream in(BIRDSEYE_EMULATOR " " BIRDSEYE_BIN "/birdseyed --config " + config_path());
+  std::istringstream in(BIRDSEYE_EMULATOR " " + testing::programs_folder() + "/birdseyed --config " + config_path());
   for (std::string word; in >> word;) words.push_back(word);
   birdseyed_ = std::make_unique<Child>(words);
   connect();

@@ -18,6 +18,7 @@
 #include "host/operation/operation.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
+#include "tests/support/programs_folder.hpp"
 #include "tests/support/slicer.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -195,8 +196,8 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
   std::istringstream in(fmt::format(
       "{} {}/birdseye live --server 127.0.0.1:{} --ct {} --fiducials {} --fiducial-count 4 --transfer {} --resume {} "
       "--out {} --script {} --publish {} --size {}x{} --scale 1",
-      display_.env(), BIRDSEYE_BIN, appliance_->port(), ct, fiducials, magenta, (scratch / "operation").string(),
-      (scratch / "out").string(), script, port, kWindowWidth, kWindowHeight));
+      display_.env(), testing::programs_folder(), appliance_->port(), ct, fiducials, magenta,
+      (scratch / "operation").string(), (scratch / "out").string(), script, port, kWindowWidth, kWindowHeight));
   for (std::string word; in >> word;) words.push_back(word);
   first_frame_ns_ = appliance_->first_frame_ns();
   window_ = std::make_unique<Child>(words);

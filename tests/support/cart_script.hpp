@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/support/command.hpp"
+#include "tests/support/programs_folder.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::testing {
@@ -42,8 +43,8 @@ for n in $(seq 150); do grep -q 'camera running' birdseyed.log && break; sleep 0
   EXPECT_TRUE(std::filesystem::exists(config));
   const std::string script = scratch.file("cart.sh", kStart + commands);
   // run() begins with one of our programs.
-  return run("birdseye", "--help > /dev/null; bash " + script + " " + scratch.path().string() + " " BIRDSEYE_BIN " " +
-                             port + " " + width + "x" + height + " '" + cart.simulator + "'");
+  return run("birdseye", "--help > /dev/null; bash " + script + " " + scratch.path().string() + " " +
+                             programs_folder() + " " + port + " " + width + "x" + height + " '" + cart.simulator + "'");
 }
 
 }  // namespace birdseye::testing

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/programs_folder.hpp"
+
 namespace birdseye::testing {
 
 struct CommandResult {
@@ -21,7 +23,7 @@ struct CommandResult {
 /// "env NAME=value" or "xvfb-run -a".
 inline CommandResult run(const std::string& program, const std::string& arguments, const std::string& within = {}) {
   const std::string line =
-      within + " " BIRDSEYE_EMULATOR " " + std::string(BIRDSEYE_BIN) + "/" + program + " " + arguments + " 2>&1";
+      within + " " BIRDSEYE_EMULATOR " " + programs_folder() + "/" + program + " " + arguments + " 2>&1";
   CommandResult result;
   std::FILE* pipe = ::popen(line.c_str(), "r");
   if (pipe == nullptr) return result;

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "drivers/system/wait.hpp"
+#include "tests/support/programs_folder.hpp"
 
 namespace birdseye::vm {
 
@@ -13,7 +14,7 @@ Cart::Cart(Machine& machine, const std::string& name, const std::string& config)
   // Not on the guest's view of the tree, which need not show what changes out here.
   std::ofstream(machine.out() / (name + ".toml"))
       << config << fmt::format("[wire]\nbind = \"0.0.0.0\"\nport = {}\n", Machine::kGuestPort);
-  machine.must(fmt::format("start {0} {1}/birdseyed --config /run/out/{0}.toml", name, BIRDSEYE_BIN));
+  machine.must(fmt::format("start {0} {1}/birdseyed --config /run/out/{0}.toml", name, testing::programs_folder()));
   (void)some<wire::Birds>("first poses", 1);
   (void)some<wire::VideoFrame>("first frame", 1);
 }

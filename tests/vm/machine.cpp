@@ -12,6 +12,7 @@
 
 #include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
+#include "tests/support/programs_folder.hpp"
 
 namespace birdseye::vm {
 
@@ -69,7 +70,7 @@ Machine::Machine(const std::filesystem::path& out) : out_(out), port_(*free_port
   }
   // An emulated processor stops now and then for longer than the chip's own fifo lasts.
   adapter_ = std::make_unique<Process>(
-      std::vector<std::string>{std::string(BIRDSEYE_BIN) + "/birdseye-sim", "ft232r", "--unix",
+      std::vector<std::string>{testing::programs_folder() + "/birdseye-sim", "ft232r", "--unix",
                                (out_ / "adapter.sock").string(), "--serial", kAdapterSerial, "--receive-fifo", "4096"},
       out_ / "adapter.log");
   if (control_ >= 0 && read_line(deadline) == "ready") return;

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "calibration/time/clock_line.hpp"
+#include "tests/support/programs_folder.hpp"
 #include "tests/vm/cart.hpp"
 #include "tests/vm/machine.hpp"
 
@@ -178,7 +179,7 @@ trigger = "trigger"
 trigger_rate_hz = 5
 )";
   static void prepare() {
-    g_machine->must("start camera " BIRDSEYE_BIN
+    g_machine->must("start camera " + testing::programs_folder() +
                     "/vm_instruments camera --v4l2 /dev/video7 --size 320x180 --rate 10 --format YUYV --exposure-ms 8 "
                     "--strobe $(gpio_line strobe)/pull --truth /run/out/camera.json && wait_for /run/out/camera.json");
   }
@@ -233,7 +234,8 @@ TEST_F(ThroughLibusb, FormatsOfTheKernelAreTaken) {
       R"([tracker]\ndevice = "/dev/null"\n[camera]\nsource = "v4l2:/dev/video0"\nwidth = 320\nheight = 180\nrate_hz = 25\n)";
   for (const std::string format : {"YUYV", "UYVY", "NV12", "GREY"}) {
     g_machine->must("printf '" + config + "format = \"" + format + "\"\\n' > /run/format.toml");
-    const std::string said = g_machine->must(BIRDSEYE_BIN "/birdseyed --config /run/format.toml --probe 2>&1 || true");
+    const std::string said =
+        g_machine->must(testing::programs_folder() + "/birdseyed --config /run/format.toml --probe 2>&1 || true");
     EXPECT_NE(said.find("camera: /dev/video0"), std::string::npos) << said;
     EXPECT_NE(said.find(format), std::string::npos) << said;
     EXPECT_NE(said.find("320x180"), std::string::npos) << said;

@@ -12,6 +12,7 @@
 #include "device/wire/server.hpp"
 #include "drivers/system/wait.hpp"
 #include "tests/support/child.hpp"
+#include "tests/support/programs_folder.hpp"
 
 namespace birdseye::wire {
 namespace {
@@ -24,7 +25,7 @@ std::vector<std::string> peer(const char* name, int port, const std::vector<std:
   std::vector<std::string> words;
   std::stringstream emulator(BIRDSEYE_EMULATOR);
   for (std::string word; emulator >> word;) words.push_back(word);
-  words.insert(words.end(), {std::string(BIRDSEYE_BIN) + "/../peers/" + name, "127.0.0.1", std::to_string(port)});
+  words.insert(words.end(), {testing::programs_folder() + "/../peers/" + name, "127.0.0.1", std::to_string(port)});
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
