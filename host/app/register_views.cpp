@@ -152,6 +152,10 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"optimiser", c.optimiser},           {"views", c.views.size()},
                          {"min_jacobian", found.min_jacobian}, {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
+  if (found.held_out_gain) {
+    json["held_out_gain_nats"] = found.held_out_gain->nats;
+    json["held_out_gain_error_nats"] = found.held_out_gain->standard_error_nats;
+  }
   if (found.evidence_of_motion_nats) json["evidence_of_motion_nats"] = *found.evidence_of_motion_nats;
   if (found.stereo_points) json["stereo_points"] = *found.stereo_points;
   if (found.expected) add_expected(json, c, found);

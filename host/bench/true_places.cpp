@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/pinhole_view.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
+#include "host/registration/views/tissue.hpp"
 #include "host/volume/signed_distance.hpp"
 
 namespace birdseye::host {

@@ -28,6 +28,28 @@ double widest_deg(const RegistrationCase& c, const ViewRegistration& found) {
   return std::acos(std::max(-1.0, least_cosine)) * 180 / std::numbers::pi;
 }
 
+/// No deformation explains views that it was not fitted to better than none does.
+Verdict nothing_moved_verdict(const ViewRegistration& found) {
+  constexpr double kSure_mm = 5;  // as by geometry
+  // The radius within which a place is in 95 of 100 cases, of an error that is alike along three axes: the root of the
+  // 95 % quantile of chi squared of three degrees of freedom over three.
+  constexpr double kRadius95 = 1.614;
+  const std::string gain =
+      fmt::format("a deformation brings {:+.4f} nats, give or take {:.4f}, in views that it was not fitted to",
+                  found.held_out_gain->nats, found.held_out_gain->standard_error_nats);
+  if (!found.uncertainty_mm)
+    return {Grade::marginal, {fmt::format("nothing moved, but beyond how many mm was not asked: {}", gain)}, {}};
+  const double beyond_mm = kRadius95 * *found.uncertainty_mm;
+  if (beyond_mm > kSure_mm) {
+    return {Grade::marginal,
+            {fmt::format("nothing moved beyond {:.1f} mm, and no more is known, over {} mm: add views, or give fewer "
+                         "control points; {}",
+                         beyond_mm, kSure_mm, gain)},
+            {}};
+  }
+  return {Grade::pass, {fmt::format("nothing moved beyond {:.1f} mm: {}", beyond_mm, gain)}, {}};
+}
+
 /// By optimisers that compare renderings with the views.
 Verdict by_similarity(const RegistrationCase& c, const ViewRegistration& found) {
   constexpr double kSure_mm = 3, kGain = 0.01, kApart_deg = 10, kNoise = 0.002;
@@ -51,7 +73,8 @@ Verdict by_similarity(const RegistrationCase& c, const ViewRegistration& found) 
                          deg, kApart_deg)},
             {}};
   }
-  if (found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
+  const bool nothing_moved = found.held_out_gain && found.held_out_gain->nothing_moved();
+  if (!nothing_moved && found.uncertainty_mm && *found.uncertainty_mm > kSure_mm) {
     return {Grade::marginal,
             {fmt::format("the surface may be {:.1f} mm off, over {} mm: add views, or fewer control points",
                          *found.uncertainty_mm, kSure_mm)},
@@ -61,6 +84,14 @@ Verdict by_similarity(const RegistrationCase& c, const ViewRegistration& found) 
     return {Grade::marginal,
             {"the lamp that explains the views best is no laparoscope's: check that pictures, poses and CT "
              "belong together"},
+            {}};
+  }
+  if (nothing_moved) return nothing_moved_verdict(found);
+  if (found.held_out_gain && found.held_out_gain->nats < 2 * found.held_out_gain->standard_error_nats) {
+    return {Grade::marginal,
+            {fmt::format("the views do not agree that anything moved: a deformation brings {:+.3f} nats, give or take "
+                         "{:.3f}, in views that it was not fitted to: add views",
+                         found.held_out_gain->nats, found.held_out_gain->standard_error_nats)},
             {}};
   }
   if (gain < kGain) return {Grade::marginal, {fmt::format("similarity rose by only {:.3f}{}", gain, unit)}, {}};

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "host/registration/geometry/organ_surface.hpp"
+#include "host/registration/views/tissue.hpp"
 
 namespace birdseye::host {
 

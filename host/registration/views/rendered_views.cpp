@@ -10,11 +10,12 @@ namespace birdseye::host {
 
 namespace {
 
-/// Occupancy as HU: tissue begins half way.
-constexpr double kFullHu = 1000, kEmptyHu = 450, kOpaqueHu = 550;
+/// Depth as HU: tissue begins where it is 0. All of a tissue's depths on this grid are HU that there are.
+constexpr double kHuPerMm = 190, kBoundaryHu = 1000;
+constexpr double kEmptyHu = kBoundaryHu - 50, kOpaqueHu = kBoundaryHu + 50;
 constexpr double kExtinctionPerMm = 4;
 /// Of a shell, mm: several mean free paths of the light.
-constexpr double kShell_mm = 4;
+constexpr double kShell_mm = 6;
 
 TransferFunction opaque() {
   const Eigen::Vector3d white = Eigen::Vector3d::Ones();
@@ -31,38 +32,16 @@ RenderSettings lit_from_the_lens() {
   return settings;
 }
 
-/// The least of each point and those beside it along one axis.
-void erode(std::vector<float>& values, const std::array<int, 3>& points, std::size_t axis) {
-  const std::vector<float> before = values;
-  tbb::parallel_for(0, points[2], [&](int k) {
-    for (int j = 0; j < points[1]; ++j) {
-      for (int i = 0; i < points[0]; ++i) {
-        float& least = values[grid_index(points, i, j, k)];
-        for (const int step : {-1, 1}) {
-          std::array<int, 3> p{i, j, k};
-          p[axis] = std::clamp(p[axis] + step, 0, points[axis] - 1);
-          least = std::min(least, before[grid_index(points, p[0], p[1], p[2])]);
-        }
-      }
-    }
-  });
-}
-
 std::unique_ptr<Volume> shell_of(const Tissue& tissue) {
   auto shell = std::make_unique<Volume>();
   shell->size = tissue.points;
   shell->spacing_mm = tissue.spacing_mm;
   shell->patient_from_voxel = tissue.patient_from_grid;
   shell->patient_from_voxel.scale(tissue.spacing_mm);
-  std::vector<float> deep = tissue.occupancy;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double steps = std::ceil(kShell_mm / tissue.spacing_mm[static_cast<Eigen::Index>(axis)]);
-    for (int step = 0; step < static_cast<int>(steps); ++step) erode(deep, tissue.points, axis);
-  }
-  constexpr float kDeep = 0.9F;
-  shell->hu.resize(tissue.occupancy.size());
+  shell->hu.resize(tissue.depth_mm.size());
   for (std::size_t v = 0; v < shell->hu.size(); ++v) {
-    const double hu = deep[v] > kDeep ? 0 : kFullHu * static_cast<double>(tissue.occupancy[v]);
+    const auto depth_mm = static_cast<double>(tissue.depth_mm[v]);
+    const double hu = depth_mm > kShell_mm ? 0 : kBoundaryHu + kHuPerMm * depth_mm;
     shell->hu[v] = static_cast<std::int16_t>(std::lround(hu));
   }
   return shell;

@@ -8,12 +8,15 @@
 namespace birdseye::host {
 
 RigidMotion::RigidMotion(const Tissue& tissue) : patient_from_grid_(tissue.patient_from_grid) {
+  const double step_mm = tissue.spacing_mm.mean();
   double mass = 0, second = 0;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   for (int z = 0; z < tissue.points[2]; ++z) {
     for (int y = 0; y < tissue.points[1]; ++y) {
       for (int x = 0; x < tissue.points[0]; ++x) {
-        const auto share = static_cast<double>(tissue.occupancy[grid_index(tissue.points, x, y, z)]);
+        // A point is a cell of the grid about it, of which the boundary may leave a part outside.
+        const double steps_deep = static_cast<double>(tissue.depth_mm[grid_index(tissue.points, x, y, z)]) / step_mm;
+        const double share = std::clamp(0.5 + steps_deep, 0.0, 1.0);
         const Eigen::Vector3d p = Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm);
         mass += share;
         first += share * p;

@@ -6,16 +6,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/registration/views/point_light.hpp"
+
 namespace birdseye::host {
 
 namespace {
 
 constexpr int kBrick = 4;
-constexpr float kGone = 1e-5F;  ///< a ray ends where so little light is left
-constexpr double kGamma = 1 / 2.2;
-constexpr float kWeakGradient = 0.01F;  ///< occupancy per mm: below this there is no surface
-constexpr float kOpaque_per_mm = 4;     ///< deep inside; it grows with the square of what is over kSurface
-constexpr int kBands = 4;               ///< of a view's rays, each with sums of its own: the same for any threads
+constexpr float kGone = 1e-5F;       ///< a ray ends where so little light is left
+constexpr float kSoft_steps = 1.5F;  ///< a ray that goes straight in is stopped within twice as many of its steps
+constexpr int kBands = 4;            ///< of a view's rays, each with sums of its own: the same for any threads
 
 std::size_t at(std::int64_t value) {
   return static_cast<std::size_t>(value);
@@ -25,78 +25,13 @@ float lerp(float a, float b, float t) {
   return a + t * (b - a);
 }
 
-/// Central differences at a point, per mm along the grid's axes; one-sided at the faces.
-struct Stencil {
-  std::size_t low[3], high[3];
-  float per_mm[3];
+/// Of the light, what a ray that has been so deep has lost, and its derivative by the depth.
+struct Stopped {
+  float share, by_depth;
 };
-Stencil stencil_of(const Tissue& tissue, int x, int y, int z) {
-  const int p[3] = {x, y, z};
-  Stencil s{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    int low[3] = {x, y, z}, high[3] = {x, y, z};
-    low[axis] = std::max(0, p[axis] - 1);
-    high[axis] = std::min(tissue.points[axis] - 1, p[axis] + 1);
-    s.low[axis] = grid_index(tissue.points, low[0], low[1], low[2]);
-    s.high[axis] = grid_index(tissue.points, high[0], high[1], high[2]);
-    s.per_mm[axis] =
-        static_cast<float>(1 / ((high[axis] - low[axis]) * tissue.spacing_mm[static_cast<Eigen::Index>(axis)]));
-  }
-  return s;
-}
-
-/// Shade of a surface: ambient + (1 - ambient) |g . l| / sqrt(|g|^2 + weak^2), times the fall-off, as a camera shows
-/// it.
-struct Shading {
-  float value;
-  float by_gradient[3], by_to_lamp[3];  ///< the second at a fixed fall-off
-};
-Shading shade(const float g[3], const float l[3], float fall, float ambient) {
-  const float below = 1 / std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2] + kWeakGradient * kWeakGradient);
-  const float a = g[0] * l[0] + g[1] * l[1] + g[2] * l[2];
-  const float facing = std::abs(a) * below;
-  const float linear = ambient + (1 - ambient) * facing;
-  Shading s{};
-  s.value = fall * std::pow(linear, static_cast<float>(kGamma));
-  const float outer = static_cast<float>(kGamma) * s.value / linear * (1 - ambient);
-  const float sign = a < 0 ? -1.0F : 1.0F;
-  for (int axis = 0; axis < 3; ++axis) {
-    s.by_gradient[axis] = outer * below * (sign * l[axis] - facing * g[axis] * below);
-    s.by_to_lamp[axis] = outer * below * sign * g[axis];
-  }
-  return s;
-}
-
-/// A headlight as the grid has it.
-struct Lamp {
-  Lamp(const Headlight& light, const Eigen::Vector3d& place, double typical_mm)
-      : place_mm(place),
-        typical2(static_cast<float>(typical_mm * typical_mm)),
-        fall_power(static_cast<float>(-0.5 * kGamma * light.falloff)),
-        ambient(static_cast<float>(light.ambient)) {}
-  Eigen::Vector3d place_mm;
-  float typical2, fall_power, ambient;
-};
-
-struct LitPoint {
-  Stencil stencil;
-  Shading shading;
-  Eigen::Vector3f from_lamp_mm, direction;
-  float distance2;
-};
-LitPoint light_point(const Tissue& tissue, const std::vector<float>& occupancy, const Lamp& lamp, int x, int y, int z) {
-  LitPoint out{};
-  out.stencil = stencil_of(tissue, x, y, z);
-  const Stencil& s = out.stencil;
-  float g[3];
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    g[axis] = (occupancy[s.high[axis]] - occupancy[s.low[axis]]) * s.per_mm[axis];
-  out.from_lamp_mm = (Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm) - lamp.place_mm).cast<float>();
-  out.distance2 = std::max(1.0F, out.from_lamp_mm.squaredNorm());
-  out.direction = out.from_lamp_mm / std::sqrt(out.distance2);
-  const float fall = std::pow(out.distance2 / lamp.typical2, lamp.fall_power);
-  out.shading = shade(g, out.direction.data(), fall, lamp.ambient);
-  return out;
+Stopped stopped_at(float depth_mm, float soft_mm) {
+  const float x = std::clamp(0.5F * (depth_mm / soft_mm + 1), 0.0F, 1.0F);
+  return {x * x * (3 - 2 * x), 3 * x * (1 - x) / soft_mm};
 }
 
 }  // namespace
@@ -104,6 +39,7 @@ LitPoint light_point(const Tissue& tissue, const std::vector<float>& occupancy, 
 SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int reduction)
     : tissue_(tissue), camera_from_patient_(view.camera_from_patient) {
   step_mm_ = static_cast<float>(0.5 * tissue.spacing_mm.minCoeff());
+  soft_mm_ = kSoft_steps * step_mm_;
   const int columns = view.camera.width_px / reduction, rows = view.camera.height_px / reduction;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
@@ -137,7 +73,7 @@ SyntheticView::SyntheticView(const VideoView& view, const Tissue& tissue, int re
   for (int z = 0; z < tissue.points[2]; ++z) {
     for (int y = 0; y < tissue.points[1]; ++y) {
       for (int x = 0; x < tissue.points[0]; ++x) {
-        if (tissue.occupancy[grid_index(tissue.points, x, y, z)] <= kSurface) continue;
+        if (tissue.depth_mm[grid_index(tissue.points, x, y, z)] <= 0) continue;
         nearest_mm = std::min(nearest_mm, (Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm) - eye_mm_).norm());
       }
     }
@@ -195,7 +131,7 @@ bool SyntheticView::beside_tissue(int x, int y, int z) const {
   return false;
 }
 
-void SyntheticView::light_points(const std::vector<float>& occupancy, const Headlight& light) {
+void SyntheticView::light_points(const std::vector<float>& depth_mm, const Headlight& light) {
   light_ = light;
   const Lamp lamp(light_, eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm, typical_mm_);
   const auto& n = tissue_.points;
@@ -203,23 +139,25 @@ void SyntheticView::light_points(const std::vector<float>& occupancy, const Head
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x) {
         const std::size_t v = grid_index(n, x, y, z);
-        points_[v] = {occupancy[v], 0};
+        points_[v] = {depth_mm[v], 0};
         if (!beside_tissue(x, y, z)) continue;
-        points_[v].shade = light_point(tissue_, occupancy, lamp, x, y, z).shading.value;
+        points_[v].shade = light_point(tissue_, depth_mm, lamp, x, y, z).shading.value;
       }
     }
   });
 }
 
-void SyntheticView::find_empty_bricks(const std::vector<float>& occupancy) {
+void SyntheticView::find_empty_bricks(const std::vector<float>& depth_mm) {
+  // The sample before the first that stops light is needed too; tissue that is squeezed rises faster than 1 mm a mm.
+  const float empty_mm = -soft_mm_ - 2 * step_mm_;
   const auto& n = tissue_.points;
   bricks_.assign(grid_count(brick_count_), 0);
   tbb::parallel_for(0, brick_count_[2], [&](int bz) {
     for (int z = bz * kBrick; z <= std::min(bz * kBrick + kBrick, n[2] - 1); ++z) {
       for (int y = 0; y < n[1]; ++y) {
-        const float* const row = &occupancy[grid_index(n, 0, y, z)];
+        const float* const row = &depth_mm[grid_index(n, 0, y, z)];
         for (int x = 0; x < n[0]; ++x) {
-          if (row[x] <= kSurface) continue;
+          if (row[x] <= empty_mm) continue;
           // A point belongs to the cells on both sides of it.
           for (const int by : {std::max(0, y - 1) / kBrick, std::min(y, n[1] - 2) / kBrick}) {
             bricks_[grid_index(brick_count_, std::max(0, x - 1) / kBrick, by, bz)] = 1;
@@ -231,60 +169,87 @@ void SyntheticView::find_empty_bricks(const std::vector<float>& occupancy) {
   });
 }
 
-void SyntheticView::cast(Band& band) {
+SyntheticView::Sample SyntheticView::sample_at(const Ray& ray, int step, std::array<int, 3>& brick) const {
   const auto& n = tissue_.points;
-  const std::size_t row = at(n[0]), slice = row * at(n[1]);
+  const float s = static_cast<float>(step) * step_mm_;
+  Sample sample{};
+  int base[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float x = std::clamp(ray.origin[axis] + s * ray.direction[axis], 0.0F, static_cast<float>(n[at(axis)] - 1));
+    base[axis] = std::min(static_cast<int>(x), n[at(axis)] - 2);
+    sample.t[axis] = x - static_cast<float>(base[axis]);
+    brick[at(axis)] = base[axis] / kBrick;
+  }
+  sample.base = static_cast<std::uint32_t>(grid_index(n, base[0], base[1], base[2]));
+  return sample;
+}
+
+float SyntheticView::blend(const Sample& sample, float Point::*of) const {
+  const std::size_t row = at(tissue_.points[0]), slice = row * at(tissue_.points[1]);
+  const Point* const p = &points_[sample.base];
+  const auto along_x = [&](std::size_t offset) { return lerp(p[offset].*of, p[offset + 1].*of, sample.t[0]); };
+  return lerp(lerp(along_x(0), along_x(row), sample.t[1]), lerp(along_x(slice), along_x(slice + row), sample.t[1]),
+              sample.t[2]);
+}
+
+int SyntheticView::steps_to_leave(const Ray& ray, int step, const std::array<int, 3>& brick) const {
+  const float s = static_cast<float>(step) * step_mm_;
+  float out_mm = 1e9F;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int face = ray.direction[axis] > 0 ? brick[at(axis)] + 1 : brick[at(axis)];
+    const float x =
+        std::clamp(ray.origin[axis] + s * ray.direction[axis], 0.0F, static_cast<float>(tissue_.points[at(axis)] - 1));
+    out_mm = std::min(out_mm, (static_cast<float>(face * kBrick) - x) / ray.direction[axis]);
+  }
+  return 1 + static_cast<int>(std::max(0.0F, out_mm) / step_mm_ * (1 - 1e-5F));
+}
+
+void SyntheticView::cast(Band& band) {
   band.samples.clear();
   band.ends.clear();
-  band.left.clear();
   for (std::size_t r = band.first; r < band.last; ++r) {
     const Ray& ray = rays_[r];
-    float through = 1;
+    float stopped = 0;
     double grey = 0;
     auto step = static_cast<int>(std::ceil(ray.near_mm / step_mm_));
     const auto end = static_cast<int>(std::floor(ray.far_mm / step_mm_));
+    // The sample a step before, if there was one, and whether it is among the band's.
+    Sample before{};
+    bool follows = false, kept = false;
     while (step <= end) {
-      const float s = static_cast<float>(step) * step_mm_;
-      float x[3];
-      int base[3];
-      for (int axis = 0; axis < 3; ++axis) {
-        x[axis] = std::clamp(ray.origin[axis] + s * ray.direction[axis], 0.0F, static_cast<float>(n[at(axis)] - 1));
-        base[axis] = std::min(static_cast<int>(x[axis]), n[at(axis)] - 2);
-      }
-      const int brick[3] = {base[0] / kBrick, base[1] / kBrick, base[2] / kBrick};
+      std::array<int, 3> brick;
+      Sample sample = sample_at(ray, step, brick);
       if (bricks_[grid_index(brick_count_, brick[0], brick[1], brick[2])] == 0) {
-        float out_mm = 1e9F;
-        for (int axis = 0; axis < 3; ++axis) {
-          const int face = ray.direction[axis] > 0 ? brick[axis] + 1 : brick[axis];
-          out_mm = std::min(out_mm, (static_cast<float>(face * kBrick) - x[axis]) / ray.direction[axis]);
-        }
-        step += 1 + static_cast<int>(std::max(0.0F, out_mm) / step_mm_ * (1 - 1e-5F));
+        step += steps_to_leave(ray, step, brick);
+        follows = false;
         continue;
       }
       ++step;
-      Sample sample{};
-      sample.base = static_cast<std::uint32_t>(grid_index(n, base[0], base[1], base[2]));
-      for (int axis = 0; axis < 3; ++axis) sample.t[axis] = x[axis] - static_cast<float>(base[axis]);
-      const Point* const p = &points_[sample.base];
-      const auto blend = [&](float Point::*of) {
-        const auto along_x = [&](std::size_t offset) { return lerp(p[offset].*of, p[offset + 1].*of, sample.t[0]); };
-        return lerp(lerp(along_x(0), along_x(row), sample.t[1]),
-                    lerp(along_x(slice), along_x(slice + row), sample.t[1]), sample.t[2]);
-      };
-      sample.inside = (blend(&Point::occupancy) - kSurface) / (1 - kSurface);
-      if (sample.inside <= 0) continue;
-      sample.opacity = 1 - std::exp(-kOpaque_per_mm * sample.inside * sample.inside * step_mm_);
-      sample.shade = blend(&Point::shade);
-      sample.through = through;
-      grey += static_cast<double>(through * sample.opacity * sample.shade);
-      through *= 1 - sample.opacity;
+      const auto [share, by_depth] = stopped_at(blend(sample, &Point::depth_mm), soft_mm_);
+      if (share <= stopped) {
+        before = sample;
+        follows = true;
+        kept = false;
+        continue;
+      }
+      if (follows && !kept) {
+        before.shade = blend(before, &Point::shade);
+        band.samples.push_back(before);
+      }
+      sample.shade = blend(sample, &Point::shade);
+      sample.by_depth = by_depth;
+      sample.stops = share - stopped;
+      sample.follows = follows;
+      grey += static_cast<double>(sample.stops * (follows ? 0.5F * (before.shade + sample.shade) : sample.shade));
+      stopped = share;
       band.samples.push_back(sample);
-      if (through < kGone) break;
+      before = sample;
+      follows = kept = true;
+      if (stopped > 1 - kGone) break;
     }
     band.ends.push_back(static_cast<std::uint32_t>(band.samples.size()));
-    band.left.push_back(through);
     const double lens = std::pow(1 - light_.vignette * static_cast<double>(ray.radius2), kGamma);
-    grey_[r] = lens * grey + static_cast<double>(through) * kBackground;
+    grey_[r] = lens * grey + static_cast<double>(1 - stopped) * kBackground;
   }
 }
 
@@ -293,9 +258,9 @@ std::size_t SyntheticView::tissue_pixels() const {
       std::count_if(grey_.begin(), grey_.end(), [](double grey) { return grey > 0.5 * kBackground; }));
 }
 
-const std::vector<double>& SyntheticView::render(const std::vector<float>& occupancy, const Headlight& light) {
-  find_empty_bricks(occupancy);
-  light_points(occupancy, light);
+const std::vector<double>& SyntheticView::render(const std::vector<float>& depth_mm, const Headlight& light) {
+  find_empty_bricks(depth_mm);
+  light_points(depth_mm, light);
   tbb::parallel_for(std::size_t{0}, bands_.size(), [&](std::size_t n) { cast(bands_[n]); });
   return grey_;
 }
@@ -311,15 +276,21 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
     const std::size_t end = band.ends[r - band.first];
     const auto scale = static_cast<float>(by_grey[r]);
     const auto lens = static_cast<float>(std::pow(1 - light_.vignette * static_cast<double>(rays_[r].radius2), kGamma));
-    // What comes from behind a sample, seen from the eye.
-    float behind = band.left[r - band.first] * static_cast<float>(kBackground);
+    // What is seen where a sample lets light through that all before it let through, and what the next one wants of the
+    // shade of this one.
+    float behind = static_cast<float>(kBackground), by_shared_shade = 0;
     for (std::size_t i = end; i-- > begin;) {
       const Sample& s = band.samples[i];
-      const float lit = lens * s.through * s.shade;
-      const float by_extinction = scale * step_mm_ * ((1 - s.opacity) * lit - behind);
-      const float by_occupancy = by_extinction * kOpaque_per_mm * 2 * s.inside / (1 - kSurface);
-      const float by_shade = scale * lens * s.through * s.opacity;
-      behind += lit * s.opacity;
+      float by_depth = 0, by_shade = by_shared_shade;
+      by_shared_shade = 0;
+      if (s.stops > 0) {
+        const float lit = lens * (s.follows ? 0.5F * (band.samples[i - 1].shade + s.shade) : s.shade);
+        by_depth = scale * (lit - behind) * s.by_depth;
+        behind = lit;
+        const float by_lit = scale * lens * s.stops;
+        by_shade += s.follows ? 0.5F * by_lit : by_lit;
+        if (s.follows) by_shared_shade = 0.5F * by_lit;
+      }
       Point* const p = &band.adjoint[s.base];
       const float wx[2] = {1 - s.t[0], s.t[0]}, wy[2] = {1 - s.t[1], s.t[1]}, wz[2] = {1 - s.t[2], s.t[2]};
       for (std::size_t k = 0; k < 2; ++k) {
@@ -327,7 +298,7 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
           const float w = wy[j] * wz[k];
           Point* const q = p + k * slice + j * row;
           for (std::size_t m = 0; m < 2; ++m) {
-            q[m].occupancy += w * wx[m] * by_occupancy;
+            q[m].depth_mm += w * wx[m] * by_depth;
             q[m].shade += w * wx[m] * by_shade;
           }
         }
@@ -340,7 +311,7 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
         for (std::size_t j = 0; j < 2; ++j) {
           for (std::size_t m = 0; m < 2; ++m) {
             const Point& corner = cell[k * slice + j * row + m];
-            const float value = by_occupancy * corner.occupancy + by_shade * corner.shade;
+            const float value = by_depth * corner.depth_mm + by_shade * corner.shade;
             slope[0] += m == 1 ? wy[j] * wz[k] * value : -wy[j] * wz[k] * value;
             slope[1] += j == 1 ? wx[m] * wz[k] * value : -wx[m] * wz[k] * value;
             slope[2] += k == 1 ? wx[m] * wy[j] * value : -wx[m] * wy[j] * value;
@@ -358,8 +329,8 @@ void SyntheticView::pull_back_band(Band& band, const std::vector<double>& by_gre
   }
 }
 
-void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const std::vector<float>& by_shade,
-                                    std::vector<float>& by_occupancy, Wrench* on_lamp) const {
+void SyntheticView::pull_back_light(const std::vector<float>& depth_mm, const std::vector<float>& by_shade,
+                                    std::vector<float>& by_depth, Wrench* on_lamp) const {
   const Lamp lamp(light_, eye_mm_ + grid_from_camera_ * light_.offset_in_camera_mm, typical_mm_);
   const auto& n = tissue_.points;
   for (int z = 0; z < n[2]; ++z) {
@@ -367,11 +338,11 @@ void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const s
       for (int x = 0; x < n[0]; ++x) {
         const std::size_t v = grid_index(n, x, y, z);
         if (by_shade[v] == 0 || points_[v].shade == 0) continue;
-        const auto [s, shading, to, l, r2] = light_point(tissue_, occupancy, lamp, x, y, z);
+        const auto [s, shading, to, l, r2] = light_point(tissue_, depth_mm, lamp, x, y, z);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           const float by = by_shade[v] * shading.by_gradient[axis] * s.per_mm[axis];
-          by_occupancy[s.high[axis]] += by;
-          by_occupancy[s.low[axis]] -= by;
+          by_depth[s.high[axis]] += by;
+          by_depth[s.low[axis]] -= by;
         }
         if (on_lamp == nullptr) continue;
         // The way to the point, to, is from the lamp: it turns, and the light falls off along it.
@@ -384,21 +355,21 @@ void SyntheticView::pull_back_light(const std::vector<float>& occupancy, const s
   }
 }
 
-void SyntheticView::pull_back(const std::vector<float>& occupancy, const std::vector<double>& by_grey,
-                              std::vector<float>& by_occupancy, Wrench* on_camera) {
+void SyntheticView::pull_back(const std::vector<float>& depth_mm, const std::vector<double>& by_grey,
+                              std::vector<float>& by_depth, Wrench* on_camera) {
   tbb::parallel_for(std::size_t{0}, bands_.size(),
                     [&](std::size_t n) { pull_back_band(bands_[n], by_grey, on_camera != nullptr); });
   std::vector<float> by_shade(points_.size(), 0.0F);
   for (const Band& band : bands_) {
     for (std::size_t v = 0; v < points_.size(); ++v) {
-      by_occupancy[v] += band.adjoint[v].occupancy;
+      by_depth[v] += band.adjoint[v].depth_mm;
       by_shade[v] += band.adjoint[v].shade;
     }
   }
   if (on_camera != nullptr) {
     for (const Band& band : bands_) *on_camera += band.on_rays;
   }
-  pull_back_light(occupancy, by_shade, by_occupancy, on_camera);
+  pull_back_light(depth_mm, by_shade, by_depth, on_camera);
 }
 
 }  // namespace birdseye::host

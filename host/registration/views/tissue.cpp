@@ -11,70 +11,8 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kMostSmoothing_mm = 2.5;
-
-std::size_t at(int value) {
-  return static_cast<std::size_t>(value);
-}
-
-/// Along one axis, by a Gaussian; past the faces as at them.
-void smooth(std::vector<float>& values, const std::array<int, 3>& points, std::size_t axis, double sigma) {
-  const int reach = static_cast<int>(std::ceil(3 * sigma));
-  if (reach == 0) return;
-  std::vector<float> weights;
-  float total = 0;
-  for (int i = -reach; i <= reach; ++i) {
-    weights.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma))));
-    total += weights.back();
-  }
-  const std::vector<float> before = values;
-  tbb::parallel_for(0, points[2], [&](int k) {
-    for (int j = 0; j < points[1]; ++j) {
-      for (int i = 0; i < points[0]; ++i) {
-        float sum = 0;
-        for (int n = -reach; n <= reach; ++n) {
-          std::array<int, 3> p{i, j, k};
-          p[axis] = std::clamp(p[axis] + n, 0, points[axis] - 1);
-          sum += weights[at(n + reach)] * before[grid_index(points, p[0], p[1], p[2])];
-        }
-        values[grid_index(points, i, j, k)] = sum / total;
-      }
-    }
-  });
-}
-
-/// How much of what is round each point of the tissue's grid is tissue.
-std::vector<float> occupancy_of(const Volume& ct, const std::vector<std::uint8_t>& voxels, const Tissue& tissue) {
-  // The mean of the voxels whose centres lie within half a step of the point, or the nearest where none does.
-  std::array<std::vector<std::pair<int, int>>, 3> ranges;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double voxels_per_point = static_cast<double>(ct.size[axis] - 1) / (tissue.points[axis] - 1);
-    for (int p = 0; p < tissue.points[axis]; ++p) {
-      const double centre = p * voxels_per_point;
-      int first = static_cast<int>(std::ceil(centre - 0.5 * voxels_per_point));
-      int last = static_cast<int>(std::floor(centre + 0.5 * voxels_per_point));
-      if (last < first) first = last = static_cast<int>(std::lround(centre));
-      ranges[axis].emplace_back(std::max(first, 0), std::min(last, ct.size[axis] - 1));
-    }
-  }
-  std::vector<float> out(grid_count(tissue.points));
-  tbb::parallel_for(0, tissue.points[2], [&](int z) {
-    for (int y = 0; y < tissue.points[1]; ++y) {
-      for (int x = 0; x < tissue.points[0]; ++x) {
-        float sum = 0;
-        int count = 0;
-        for (int k = ranges[2][at(z)].first; k <= ranges[2][at(z)].second; ++k) {
-          for (int j = ranges[1][at(y)].first; j <= ranges[1][at(y)].second; ++j) {
-            for (int i = ranges[0][at(x)].first; i <= ranges[0][at(x)].second; ++i, ++count)
-              sum += voxels[ct.index(i, j, k)];
-          }
-        }
-        out[grid_index(tissue.points, x, y, z)] = sum / static_cast<float>(count);
-      }
-    }
-  });
-  return out;
-}
+/// Steps of the grid within which the depth goes on as it is about the boundary, so that splines there see no kink.
+constexpr double kReach_steps = 4;
 
 /// Weights of a uniform cubic B-spline and their derivatives, for the four points about a place t past the second.
 struct Spline {
@@ -86,26 +24,26 @@ Spline spline(float t) {
           {-u * u / 2, (3 * t - 4) * t / 2, -(3 * u - 4) * u / 2, t * t / 2}};
 }
 
-/// The tissue at a place given in steps of the grid, and its gradient there per step: by cubic B-splines with the
-/// occupancies as coefficients, which smooth a little more and have no kinks. 0 outside of the box.
+/// How deep a place is, given in steps of the grid, and the gradient there per step: by cubic B-splines, which have no
+/// kinks. -reach_mm outside of the box.
 float sample(const Tissue& tissue, const float* place, float* gradient) {
   const auto& n = tissue.points;
   int base[3];
   Spline along[3];
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!(place[axis] >= 0) || place[axis] > static_cast<float>(n[axis] - 1)) return 0;
+    if (!(place[axis] >= 0) || place[axis] > static_cast<float>(n[axis] - 1)) return -tissue.reach_mm;
     base[axis] = std::min(static_cast<int>(place[axis]), n[axis] - 2);
     along[axis] = spline(place[axis] - static_cast<float>(base[axis]));
   }
   if (tissue.level[grid_index(n, base[0], base[1], base[2])] != 0)
-    return tissue.occupancy[grid_index(n, base[0], base[1], base[2])];
+    return tissue.spline_mm[grid_index(n, base[0], base[1], base[2])];
   float sum = 0;
   for (int k = 0; k < 4; ++k) {
     const int z = std::clamp(base[2] - 1 + k, 0, n[2] - 1);
     float plane = 0, plane_x = 0, plane_y = 0;
     for (int j = 0; j < 4; ++j) {
       const int y = std::clamp(base[1] - 1 + j, 0, n[1] - 1);
-      const float* const row = &tissue.occupancy[grid_index(n, 0, y, z)];
+      const float* const row = &tissue.spline_mm[grid_index(n, 0, y, z)];
       float line = 0, line_x = 0;
       for (int i = 0; i < 4; ++i) {
         const float value = row[std::clamp(base[0] - 1 + i, 0, n[0] - 1)];
@@ -126,6 +64,28 @@ float sample(const Tissue& tissue, const float* place, float* gradient) {
   return sum;
 }
 
+/// B-splines with the depths themselves as coefficients draw a curved surface inside of where it is, for they give the
+/// depth and a sixth of its second difference along each axis; blends add a twelfth, on average over a cell.
+std::vector<float> spline_of(const Tissue& tissue) {
+  constexpr float kTooMuch = 1.0F / 6 + 1.0F / 12;
+  const auto& n = tissue.points;
+  std::vector<float> out = tissue.depth_mm;
+  tbb::parallel_for(0, n[2], [&](int z) {
+    for (int y = 0; y < n[1]; ++y) {
+      for (int x = 0; x < n[0]; ++x) {
+        const std::size_t v = grid_index(n, x, y, z);
+        const std::array<int, 3> p{x, y, z};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          if (p[axis] == 0 || p[axis] == n[axis] - 1) continue;
+          const std::size_t step = axis == 0 ? 1 : grid_index(n, 0, axis == 1 ? 1 : 0, axis == 2 ? 1 : 0);
+          out[v] -= kTooMuch * (tissue.depth_mm[v - step] - 2 * tissue.depth_mm[v] + tissue.depth_mm[v + step]);
+        }
+      }
+    }
+  });
+  return out;
+}
+
 /// Cells about which nothing changes.
 std::vector<std::uint8_t> level_cells(const Tissue& tissue) {
   const auto& n = tissue.points;
@@ -133,14 +93,14 @@ std::vector<std::uint8_t> level_cells(const Tissue& tissue) {
   tbb::parallel_for(0, n[2], [&](int z) {
     for (int y = 0; y < n[1]; ++y) {
       for (int x = 0; x < n[0]; ++x) {
-        const float here = tissue.occupancy[grid_index(n, x, y, z)];
-        bool same = here < 1e-6F || here > 1 - 1e-6F;
+        const float here = tissue.spline_mm[grid_index(n, x, y, z)];
+        bool same = std::abs(here) >= tissue.reach_mm;
         for (int k = -1; same && k < 3; ++k) {
           for (int j = -1; same && j < 3; ++j) {
             for (int i = -1; same && i < 3; ++i) {
-              const float other = tissue.occupancy[grid_index(
+              const float other = tissue.spline_mm[grid_index(
                   n, std::clamp(x + i, 0, n[0] - 1), std::clamp(y + j, 0, n[1] - 1), std::clamp(z + k, 0, n[2] - 1))];
-              same = std::abs(other - here) < 1e-6F;
+              same = other == here;
             }
           }
         }
@@ -165,31 +125,44 @@ std::vector<std::uint8_t> tissue_voxels(const Volume& ct, const Volume* labels, 
   return out;
 }
 
-Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const int> values,
-                         const TransferFunction& transfer, double spacing_mm) {
+Result<SignedDistance> organ_distance(const Volume& ct, const Volume* labels, std::span<const int> values,
+                                      const TransferFunction& transfer) {
+  constexpr double kSpacing_mm = 2, kMargin_mm = 24;
+  return signed_distance_of(ct, tissue_voxels(ct, labels, values, transfer), kSpacing_mm, kMargin_mm);
+}
+
+Tissue tissue_of(const SignedDistance& organ, const Volume& ct, double spacing_mm) {
   Tissue tissue;
-  const Eigen::Matrix3d axes = ct.patient_from_voxel.linear() * ct.spacing_mm.cwiseInverse().asDiagonal();
-  if ((axes.transpose() * axes - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3) {
-    return Error{Errc::bad_value, "the volume's axes are not at right angles; resample it"};
-  }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto n = static_cast<Eigen::Index>(axis);
-    if (ct.size[axis] < 2) return Error{Errc::bad_value, "the volume has an axis of a single voxel"};
     const double extent_mm = ct.spacing_mm[n] * (ct.size[axis] - 1);
     tissue.points[axis] = std::max(4, static_cast<int>(std::lround(extent_mm / spacing_mm)) + 1);
     tissue.spacing_mm[n] = extent_mm / (tissue.points[axis] - 1);
   }
-  tissue.patient_from_grid.linear() = axes;
+  tissue.patient_from_grid.linear() = ct.patient_from_voxel.linear() * ct.spacing_mm.cwiseInverse().asDiagonal();
   tissue.patient_from_grid.translation() = ct.patient_from_voxel.translation();
-  tissue.occupancy = occupancy_of(ct, tissue_voxels(ct, labels, values, transfer), tissue);
-  const double smoothing_mm = std::min(kMostSmoothing_mm, spacing_mm);  // a small organ keeps its shape
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    smooth(tissue.occupancy, tissue.points, axis, smoothing_mm / tissue.spacing_mm[static_cast<Eigen::Index>(axis)]);
-  }
+  tissue.reach_mm = static_cast<float>(kReach_steps * spacing_mm);
+  tissue.depth_mm.resize(grid_count(tissue.points));
+  tbb::parallel_for(0, tissue.points[2], [&](int z) {
+    for (int y = 0; y < tissue.points[1]; ++y) {
+      for (int x = 0; x < tissue.points[0]; ++x) {
+        const Eigen::Vector3d place_mm =
+            tissue.patient_from_grid * Eigen::Vector3d(x, y, z).cwiseProduct(tissue.spacing_mm);
+        tissue.depth_mm[grid_index(tissue.points, x, y, z)] =
+            std::clamp(static_cast<float>(-organ.distance_mm(place_mm)), -tissue.reach_mm, tissue.reach_mm);
+      }
+    }
+  });
+  tissue.spline_mm = spline_of(tissue);
   tissue.level = level_cells(tissue);
-  if (std::none_of(tissue.occupancy.begin(), tissue.occupancy.end(), [](float o) { return o > kSurface; }))
-    return Error{Errc::not_found, "nothing of the volume is seen; check label_values and the transfer function"};
   return tissue;
+}
+
+Result<Tissue> tissue_of(const Volume& ct, const Volume* labels, std::span<const int> values,
+                         const TransferFunction& transfer, double spacing_mm) {
+  const auto organ = organ_distance(ct, labels, values, transfer);
+  if (!organ) return organ.error();
+  return tissue_of(*organ, ct, spacing_mm);
 }
 
 void warp(const Tissue& tissue, const std::vector<float>& moves, std::vector<float>& warped) {

@@ -103,6 +103,14 @@ struct AdjustedPoses {
   std::size_t matches = 0;  ///< of places between two views, those that agree
 };
 
+/// What a deformation brings over none in views that it was not fitted to, each under the lamp that suits it: nats a
+/// pixel, the mean over the views and its standard error.
+struct HeldOutGain {
+  double nats = 0, standard_error_nats = 0;
+  /// So little that there is as good as no motion: under what more control points must bring, and in all views alike.
+  [[nodiscard]] bool nothing_moved() const;
+};
+
 struct ViewRegistration {
   std::array<int, 3> control_points{};
   std::vector<double> parameters;  ///< mm, see ControlGrid
@@ -138,6 +146,9 @@ struct ViewRegistration {
   std::optional<AdjustedPoses> adjusted;
   /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.
   std::vector<PlaceFit> touches, matched;
+  /// Of a fit of the same control points. None: it was not asked, for a start or a pose was given to be refined, or
+  /// there are fewer than three views. Where nothing moved the result is no deformation. Only with optimiser gradient.
+  std::optional<HeldOutGain> held_out_gain;
   std::string why_so_many_points;  ///< in words
   bool worse_than_start = false;   ///< the start is returned: the initial field itself, or none
   bool folded = false;             ///< the reason for that: every deformation that was found folds

@@ -48,13 +48,6 @@ TEST(RegistrationVerdict, OfACaseThatNamesNoTargetIsByTheInsideAndNotByALandmark
   EXPECT_EQ(verdict_of(none_named, found).grade, Grade::marginal);
 }
 
-TEST(RegistrationVerdict, FailsWhatFoldsHoweverWellTheTargetIsKnown) {
-  ViewRegistration found = well_found();
-  found.folded = found.worse_than_start = true;
-  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
-  EXPECT_TRUE(says(verdict_of(with_target(), found), "folds"));
-}
-
 TEST(RegistrationVerdict, SaysThatNothingMovedWhereEvidenceGainsNothingByAMotion) {
   ViewRegistration found = well_found();
   found.evidence_of_motion_nats = 2.9;
@@ -113,6 +106,48 @@ TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereTouchesMakeTheTargetKnown) 
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
   found.stereo_points = 100;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+/// By similarity, of two views that look from far apart.
+struct BySimilarity {
+  RegistrationCase given;
+  ViewRegistration found;
+
+  BySimilarity() {
+    given.similarity = "mi";
+    given.ct.size = {2, 2, 2};
+    given.views.resize(2);
+    given.views[0].camera_from_patient = {Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, 100)};
+    given.views[1].camera_from_patient = {Eigen::Matrix3d::Identity(), Eigen::Vector3d(80, 0, 100)};
+    found.per_view_before = {0.3, 0.4};
+    found.per_view_after = {0.3, 0.4};
+    found.similarity_before = found.similarity_after = 0.35;
+    found.held_out_gain = HeldOutGain{0.001, 0.002};
+    found.uncertainty_mm = 2.4;
+  }
+};
+
+TEST(RegistrationVerdict, BySimilarityPassesWhereNothingMovedBeyondWhatMayBeOff) {
+  BySimilarity by;
+  const Verdict verdict = verdict_of(by.given, by.found);
+  EXPECT_EQ(verdict.grade, Grade::pass);
+  EXPECT_TRUE(says(verdict, "nothing moved beyond 3.9 mm")) << verdict.reasons.front();
+  by.found.uncertainty_mm = 3.2;
+  EXPECT_EQ(verdict_of(by.given, by.found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(by.given, by.found), "nothing moved beyond 5.2 mm"));
+  by.found.uncertainty_mm.reset();
+  EXPECT_EQ(verdict_of(by.given, by.found).grade, Grade::marginal);
+}
+
+TEST(RegistrationVerdict, BySimilaritySaysNothingOfNoMotionWhereThereIsOne) {
+  BySimilarity by;
+  by.found.similarity_after = 0.45;
+  by.found.held_out_gain = HeldOutGain{0.08, 0.03};
+  EXPECT_EQ(verdict_of(by.given, by.found).grade, Grade::pass);
+  EXPECT_FALSE(says(verdict_of(by.given, by.found), "nothing moved"));
+  by.found.held_out_gain = HeldOutGain{0.08, 0.05};
+  EXPECT_EQ(verdict_of(by.given, by.found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(by.given, by.found), "the views do not agree that anything moved"));
 }
 
 }  // namespace

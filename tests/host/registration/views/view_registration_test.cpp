@@ -213,7 +213,7 @@ TEST(MultiView, PoseGradientAgreesWithCentralDifferences) {
         multi->set_pose(moved);
         return multi->value(p, light);
       };
-      constexpr double kStep_mm = 0.005;
+      constexpr double kStep_mm = 0.0025;
       const double slope = (at(kStep_mm) - at(-kStep_mm)) / (2 * kStep_mm);
       EXPECT_NEAR(gradient[axis], slope, 1e-3 * length) << trial << " " << axis;
     }
@@ -288,6 +288,14 @@ TEST(RegisterViews, KeepsAStartThatIsBetter) {
   EXPECT_TRUE(found->worse_than_start);
   EXPECT_EQ(found->similarity_after, found->similarity_before);
   for (std::size_t i = 0; i < moved.size(); ++i) EXPECT_NEAR(found->parameters[i], moved[i], 0.2);
+}
+
+TEST(HeldOutGain, IsOfAMotionWhereItIsWorthwhile) {
+  EXPECT_TRUE((HeldOutGain{-0.01, 0.001}.nothing_moved()));
+  EXPECT_TRUE((HeldOutGain{0.0039, 0.0001}.nothing_moved()));
+  EXPECT_FALSE((HeldOutGain{-0.012, 0.021}.nothing_moved())) << "views that are at odds";
+  // One view sees most of what moved.
+  EXPECT_FALSE((HeldOutGain{0.15, 0.12}.nothing_moved()));
 }
 
 TEST(RegisterViews, RefusesAViewThatSeesNothing) {
