@@ -44,24 +44,9 @@ Places places_of(const SignedDistance& organ) {
   return out;
 }
 
-/// The deformation and what the poses add to its error.
-struct Known {
-  const BelievedDeformation& found;
-  const std::optional<CommonPoseError>& poses;
-
-  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const {
-    Eigen::Matrix3d out = found.covariance(rest_mm);
-    if (poses) out += poses->covariance(rest_mm);
-    return out;
-  }
-  [[nodiscard]] Eigen::Matrix3d prior_covariance(const Eigen::Vector3d& rest_mm) const {
-    return found.prior_covariance(rest_mm);
-  }
-};
-
 std::vector<KnownPlace> known_surface(std::span<const Eigen::Vector3d> rest_mm, const SignedDistance& organ,
-                                      const Known& known, std::span<const PinholeView> views) {
-  const LatticeField& mean = known.found.mean;
+                                      const BelievedDeformation& found, std::span<const PinholeView> views) {
+  const LatticeField& mean = found.mean;
   const SeenSurface surface(seen_distance(organ, mean));
   const Sight sight(surface, views);
   std::vector<KnownPlace> out(rest_mm.size());
@@ -71,8 +56,8 @@ std::vector<KnownPlace> known_surface(std::span<const Eigen::Vector3d> rest_mm, 
               seen_mm,
               surface.normal(seen_mm),
               sight.seen_by(seen_mm) > 0,
-              known.covariance(rest_mm[i]),
-              known.prior_covariance(rest_mm[i])};
+              found.covariance(rest_mm[i]),
+              found.prior_covariance(rest_mm[i])};
   });
   return out;
 }
@@ -96,11 +81,11 @@ class Mean {
   int count_ = 0;
 };
 
-Mean inside_of(std::span<const Eigen::Vector3d> rest_mm, const Known& known) {
+Mean inside_of(std::span<const Eigen::Vector3d> rest_mm, const BelievedDeformation& found) {
   std::vector<Eigen::Matrix3d> each(rest_mm.size());
-  tbb::parallel_for(std::size_t{0}, each.size(), [&](std::size_t i) { each[i] = known.covariance(rest_mm[i]); });
+  tbb::parallel_for(std::size_t{0}, each.size(), [&](std::size_t i) { each[i] = found.covariance(rest_mm[i]); });
   Mean out;
-  for (std::size_t i = 0; i < each.size(); ++i) out.add(each[i], known.prior_covariance(rest_mm[i]));
+  for (std::size_t i = 0; i < each.size(); ++i) out.add(each[i], found.prior_covariance(rest_mm[i]));
   return out;
 }
 
@@ -119,11 +104,10 @@ ExpectedError expected_error(const Eigen::Matrix3d& covariance_mm2, const Eigen:
 }
 
 ExpectedErrors expected_errors(const SignedDistance& organ, const BelievedDeformation& found,
-                               std::span<const PinholeView> views, std::span<const Eigen::Vector3d> targets_at_rest_mm,
-                               const std::optional<CommonPoseError>& poses) {
-  const Known known{found, poses};
+                               std::span<const PinholeView> views,
+                               std::span<const Eigen::Vector3d> targets_at_rest_mm) {
   const Places places = places_of(organ);
-  const std::vector<KnownPlace> surface = known_surface(places.surface, organ, known, views);
+  const std::vector<KnownPlace> surface = known_surface(places.surface, organ, found, views);
   Mean all, seen, hidden;
   double moved_mm2 = 0, count = 0;
   ExpectedErrors out;
@@ -138,9 +122,9 @@ ExpectedErrors expected_errors(const SignedDistance& organ, const BelievedDeform
   out.surface = all.expected();
   out.seen = seen.expected();
   out.hidden = hidden.expected();
-  out.inside = inside_of(places.inside, known).expected();
+  out.inside = inside_of(places.inside, found).expected();
   for (const Eigen::Vector3d& target : targets_at_rest_mm)
-    out.targets.push_back(expected_error(known.covariance(target), known.prior_covariance(target)));
+    out.targets.push_back(expected_error(found.covariance(target), found.prior_covariance(target)));
   if (count > 0) out.seen_moved_mm = std::sqrt(moved_mm2 / count);
   out.open = open_sides(surface);
   return out;

@@ -19,9 +19,7 @@ ExpectedError expected_error(const Eigen::Matrix3d& covariance_mm2, const Eigen:
 
 /// Of places spread over the organ: of its surface where views see it and where none does, of its inside, and of the
 /// targets, which lay at places of the organ at rest, patient mm; how far what is seen has moved, and what is open.
-/// poses: the error that the views' poses share, where it is known.
 ExpectedErrors expected_errors(const SignedDistance& organ, const BelievedDeformation& found,
-                               std::span<const PinholeView> views, std::span<const Eigen::Vector3d> targets_at_rest_mm,
-                               const std::optional<CommonPoseError>& poses);
+                               std::span<const PinholeView> views, std::span<const Eigen::Vector3d> targets_at_rest_mm);
 
 }  // namespace birdseye::host

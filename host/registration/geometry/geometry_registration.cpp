@@ -168,12 +168,12 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                                Round{12, 4, 0.25, 5}};
   std::vector<DisplacementPrior> more = hypotheses_of(ct, organ.modes, settings.control_points);
   BelievedDeformation found(distance);
-  // Touches tell of the errors that all views share: the views are moved by what is found of these.
-  const bool told_of_common = common && !touches.empty();
+  // The errors that all views share and the organ's motion share out what the views show, by how large either is
+  // thought to be; touches tell them apart. The views are moved by what is found of these errors.
   const std::vector<PinholeView> given = seen_by;
   CommonErrors errors = CommonErrors::Zero();
   const auto move_views = [&] {
-    for (std::size_t n = 0; told_of_common && n < seen_by.size(); ++n) {
+    for (std::size_t n = 0; common && n < seen_by.size(); ++n) {
       out.adjusted->camera_from_patient[n] = common->without(errors, given[n]);
       seen_by[n] = moved(std::move(seen_by[n]), out.adjusted->camera_from_patient[n]);
     }
@@ -212,7 +212,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       more = pushed_mm ? push_hypotheses_of(*pushed_mm) : std::vector<DisplacementPrior>{};
     }
     // What the views as they were given would tell, for it is their errors that are asked for.
-    for (std::size_t i = 0; told_of_common && i + touches.size() < points.size(); ++i) {
+    for (std::size_t i = 0; common && i + touches.size() < points.size(); ++i) {
       points[i].by_common_mm = common->at(points[i].place_mm);
       points[i].place_mm += points[i].by_common_mm * errors;
     }
@@ -241,8 +241,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (!out.folded) tell_fits(settings, touches, found, surface, out);
   for (const PinholeView& view : seen_by) out.outline_off_mm.push_back(outline_off_mm(view, surface));
   if (settings.estimate_uncertainty && !out.folded) {
-    out.expected =
-        expected_errors(distance, found, seen_by, settings.targets_at_rest_mm, told_of_common ? std::nullopt : common);
+    out.expected = expected_errors(distance, found, seen_by, settings.targets_at_rest_mm);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
     out.held_out = held_out_view(distance, seen_by, found, touches, settings.matched);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,11 +17,16 @@ struct PoseAdjustment {
   CommonPoseError common;
 };
 
+/// The most that poses err by which a cart averages.
+inline constexpr PoseNoise kUsualPoseNoise{2, 0.5 * std::numbers::pi / 180};
+
 /// Moves the views until the matches agree: a bundle adjustment whose points lie on the first view's rays, with
 /// Cauchy's loss, annealed, and a prior on each pose whose width is found from how far the views have to move. An error
-/// that all poses share shows in no picture and stays. Empty where too few matches agree.
+/// that all poses share shows in no picture and stays. widest: the most that poses are thought to err by. Empty where
+/// too few matches agree.
 std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& views,
-                                             std::span<const TextureMatch> matches);
+                                             std::span<const TextureMatch> matches,
+                                             const PoseNoise& widest = kUsualPoseNoise);
 
 /// The same by matches of the surface's texture: looked for close to the rays and, where few are found there, further
 /// from them.

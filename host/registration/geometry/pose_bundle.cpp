@@ -194,7 +194,7 @@ CommonPoseError PoseBundle::common_error(const PoseNoise& noise, double scale) c
 }
 
 std::size_t PoseBundle::agreeing() const {
-  constexpr double kMost = 3;
+  constexpr double kMost = kAgrees_px / kMatch_px;
   return static_cast<std::size_t>(std::count_if(matches_.begin(), matches_.end(), [&](const TextureMatch& match) {
     Eigen::Vector2d off;
     return reprojection(views_, match)(changes_[match.view].data(), changes_[match.other_view].data(),

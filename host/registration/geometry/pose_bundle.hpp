@@ -29,6 +29,8 @@ class PoseBundle {
   /// shift, turn and scale of the eyes: that the cameras turn towards one another looks almost like another distance.
   [[nodiscard]] CommonPoseError common_error(const PoseNoise& noise, double scale) const;
 
+  /// Matches that are nearer than this to where their views have them, in pixels of a picture 768 wide.
+  static constexpr double kAgrees_px = 1.5;
   [[nodiscard]] std::size_t agreeing() const;
   [[nodiscard]] std::vector<Transform<Camera, Patient>> poses() const;
   /// Where the matched places lie, by their numbers; of a number that no match has, the origin.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "host/registration/geometry/parabola.hpp"
@@ -26,6 +27,22 @@ struct Peak {
   float score = -1;
 };
 
+/// Which matches are as far from the ray as a good part of those of the same two views.
+std::vector<bool> off_alike(std::span<const TextureMatch> matches) {
+  constexpr double kAlike_px = 6, kPart = 0.3;
+  std::vector<bool> out;
+  for (const TextureMatch& match : matches) {
+    double of_views = 0, alike = 0;
+    for (const TextureMatch& other : matches) {
+      if (other.view != match.view || other.other_view != match.other_view) continue;
+      of_views += 1;
+      if (std::abs(other.beside_px - match.beside_px) < kAlike_px) alike += 1;
+    }
+    out.push_back(alike >= kPart * of_views);
+  }
+  return out;
+}
+
 /// Scores of shifts on a grid about none.
 class Scores {
  public:
@@ -33,6 +50,11 @@ class Scores {
       : along_(along), beside_(beside), scores_(Eigen::ArrayXXf::Constant(2 * along + 1, 2 * beside + 1, -1)) {}
 
   float& at(int along, int beside) { return scores_(along + along_, beside + beside_); }
+  [[nodiscard]] std::pair<int, int> best() const {
+    Eigen::Index s = 0, b = 0;
+    scores_.maxCoeff(&s, &b);
+    return {static_cast<int>(s) - along_, static_cast<int>(b) - beside_};
+  }
   [[nodiscard]] int along() const { return along_; }
   [[nodiscard]] int beside() const { return beside_; }
 
@@ -44,13 +66,8 @@ class Scores {
 /// The highest score, if it is within the grid and none beside its own is nearly as high.
 std::optional<Peak> peak_of(Scores& scores) {
   constexpr double kOwn = 4.5;
-  Peak best;
-  for (int s = -scores.along(); s <= scores.along(); ++s) {
-    for (int b = -scores.beside(); b <= scores.beside(); ++b) {
-      if (scores.at(s, b) > best.score) best = {static_cast<double>(s), static_cast<double>(b), scores.at(s, b)};
-    }
-  }
-  const int s = static_cast<int>(best.along), b = static_cast<int>(best.beside);
+  const auto [s, b] = scores.best();
+  Peak best{static_cast<double>(s), static_cast<double>(b), scores.at(s, b)};
   if (best.score < kLeastCorrelation || std::abs(s) == scores.along() || std::abs(b) == scores.beside())
     return std::nullopt;
   for (int i = -scores.along(); i <= scores.along(); ++i) {
@@ -73,15 +90,22 @@ class Search {
     std::vector<TextureMatches> of_pixels(pixels.size());
     tbb::parallel_for(std::size_t{0}, pixels.size(), [&](std::size_t n) { of_pixels[n] = look_for(pixels[n]); });
     TextureMatches out;
-    std::size_t places = 0;
-    for (const TextureMatches& of_pixel : of_pixels) {
-      out.looked_for += of_pixel.looked_for;
-      if (of_pixel.found.empty()) continue;
-      for (TextureMatch match : of_pixel.found) {
-        match.place = places;
-        out.found.push_back(match);
+    std::vector<TextureMatch> all;
+    for (std::size_t n = 0; n < pixels.size(); ++n) {
+      out.looked_for += of_pixels[n].looked_for;
+      for (TextureMatch match : of_pixels[n].found) {
+        match.place = n;
+        all.push_back(match);
       }
-      ++places;
+    }
+    const std::vector<bool> keep = off_alike(all);
+    std::size_t places = 0, last = pixels.size();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!keep[i]) continue;
+      if (all[i].place != last) ++places;
+      last = all[i].place;
+      out.found.push_back(all[i]);
+      out.found.back().place = places - 1;
     }
     return out;
   }
@@ -129,12 +153,21 @@ class Search {
     const Eigen::Vector2d beside_px = step_px * Eigen::Vector2d(-along_px.y(), along_px.x()).normalized();
     Scores scores(static_cast<int>(settings_.span_mm / step_mm), static_cast<int>(settings_.beside_px / kStep_px));
     const PatchSeenBy seen_by(patch, other);
-    for (int s = -scores.along(); s <= scores.along(); ++s) {
+    const auto look_at = [&](int s, int b) {
       const double depth_mm = patch.depth_mm + s * step_mm;
-      if (depth_mm <= 0) continue;
-      for (int b = -scores.beside(); b <= scores.beside(); ++b) {
-        const float score = seen_by.correlation(depth_mm, b * beside_px);
-        if (std::isfinite(score)) scores.at(s, b) = score;
+      if (depth_mm <= 0) return;
+      const float score = seen_by.correlation(depth_mm, b * beside_px);
+      if (std::isfinite(score)) scores.at(s, b) = score;
+    };
+    // Every other shift along each axis, which no peak slips through, then all about the best.
+    const auto even = [](int n) { return n - n % 2; };
+    for (int s = -even(scores.along()); s <= scores.along(); s += 2) {
+      for (int b = -even(scores.beside()); b <= scores.beside(); b += 2) look_at(s, b);
+    }
+    const auto [near_s, near_b] = scores.best();
+    for (int s = std::max(-scores.along(), near_s - 2); s <= std::min(scores.along(), near_s + 2); ++s) {
+      for (int b = std::max(-scores.beside(), near_b - 2); b <= std::min(scores.beside(), near_b + 2); ++b) {
+        if (s % 2 != 0 || b % 2 != 0) look_at(s, b);
       }
     }
     const auto peak = peak_of(scores);
@@ -143,6 +176,7 @@ class Search {
     match.at_px = {patch.x_px, patch.y_px};
     match.depth_mm = patch.depth_mm + peak->along * step_mm;
     match.other_px = pixel_at(match.depth_mm) + peak->beside * beside_px;
+    match.beside_px = peak->beside * kStep_px;
     return match;
   }
 

@@ -15,6 +15,7 @@ struct TextureMatch {
   double depth_mm = 0;  ///< in the first view, by where the other view has the place along the ray
   std::size_t other_view = 0;
   Eigen::Vector2d other_px;
+  double beside_px = 0;  ///< from the ray, in pixels of a picture 768 wide
 };
 
 struct MatchSettings {
@@ -28,8 +29,8 @@ struct TextureMatches {
 };
 
 /// Looks for patches of each view in the views nearest to it, by their normalised cross-correlation, along the ray and
-/// across it: only a wrong pose takes a place off the ray. Keeps peaks that are high and alone; some of the matches are
-/// wrong.
+/// across it: only a wrong pose takes a place off the ray. Keeps peaks that are high and alone, and that are as far
+/// from the ray as others of the same two views: a pose takes all places off alike. Some of the matches are wrong.
 TextureMatches texture_matches(const std::vector<PinholeView>& views, const SeenSurface& surface,
                                const MatchSettings& settings);
 

@@ -56,7 +56,7 @@ TEST(ExpectedErrors, LeaveOpenTheSideThatNothingIsKnownOf) {
   const BelievedDeformation found = found_by(organ, seen_from_the_front({0, 3, 0}));
   const std::vector views{from_the_front()};
   const std::vector<Eigen::Vector3d> targets{{0, -30, 0}, {0, 30, 0}};
-  const ExpectedErrors expected = expected_errors(organ, found, views, targets, std::nullopt);
+  const ExpectedErrors expected = expected_errors(organ, found, views, targets);
   ASSERT_FALSE(expected.open.empty());
   EXPECT_EQ(expected.open.front().side, "back");
   EXPECT_GT(expected.open.front().share, 0.8);

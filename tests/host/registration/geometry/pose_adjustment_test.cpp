@@ -125,6 +125,21 @@ TEST(AdjustedPoses, AgreeWithWhatTheViewsShowThoughAFifthOfTheMatchesIsWrong) {
   EXPECT_GT(adjusted->poses.matches, 220U);
 }
 
+/// Of one record of a miniBIRD whose sensor is a scope's length from the lens.
+TEST(AdjustedPoses, AgreeWhereSingleRecordsPutTheViewsTensOfPixelsOff) {
+  constexpr PoseNoise kNoise{3, 0.5 * kDegree};
+  Noise noise;
+  const std::vector<PinholeView> truth = five_views();
+  for (int draw = 0; draw < 10; ++draw) {
+    std::vector<PinholeView> given;
+    for (const PinholeView& view : truth) given.push_back(noise.erring(view, kNoise));
+    const auto adjusted = adjusted_poses(given, matches_of(truth, noise, 0.4, 0.5), {5, 0.8 * kDegree});
+    ASSERT_TRUE(adjusted);
+    EXPECT_GT(disagreement_px(truth, given), 10);
+    EXPECT_LT(disagreement_px(truth, placed(given, adjusted->poses)), 0.4);
+  }
+}
+
 TEST(AdjustedPoses, LeavePosesThatAreRightWhereTheyAre) {
   Noise noise;
   const std::vector<PinholeView> truth = five_views();
