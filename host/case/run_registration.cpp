@@ -36,7 +36,7 @@ Result<CaseRegistration> run_registration(const RegistrationCase& c, const Trans
       by_gradient.progress = tell;
       auto found = register_views(views, c.ct, labels, c.label_values, transfer, by_gradient);
       if (!found) return found.error();
-      // The field is then the organ at rest, which the views did not show.
+      // The field is then the organ at rest, whose places would hold back what geometry finds.
       if (found->worse_than_start || (found->held_out_gain && found->held_out_gain->nothing_moved()))
         return Error{Errc::not_found, "similarity finds no deformation that the views bear out"};
       return std::move(found->field);

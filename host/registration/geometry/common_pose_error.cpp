@@ -20,11 +20,6 @@ ByCommonErrors CommonPoseError::at(const Eigen::Vector3d& place_mm) const {
   return moves_by(place_mm - about_mm_) * factor_;
 }
 
-Eigen::Matrix3d CommonPoseError::covariance(const Eigen::Vector3d& place_mm) const {
-  const ByCommonErrors by = at(place_mm);
-  return by * by.transpose();
-}
-
 Transform<Camera, Patient> CommonPoseError::without(const CommonErrors& errors, const PinholeView& view) const {
   const CommonErrors motion = factor_ * errors;
   const Eigen::Vector3d eye_mm = view.eye_in_patient_mm - at(view.eye_in_patient_mm) * errors;

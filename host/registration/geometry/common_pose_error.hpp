@@ -20,7 +20,6 @@ class CommonPoseError {
   CommonPoseError(Eigen::Vector3d about_mm, const Covariance& motion);
   [[nodiscard]] const Eigen::Vector3d& about_mm() const { return about_mm_; }
   [[nodiscard]] ByCommonErrors at(const Eigen::Vector3d& place_mm) const;
-  [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& place_mm) const;  ///< mm^2
   /// Where the view was taken from, if the views have these errors.
   [[nodiscard]] Transform<Camera, Patient> without(const CommonErrors& errors, const PinholeView& view) const;
 

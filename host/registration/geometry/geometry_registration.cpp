@@ -151,7 +151,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
 
   if (settings.watch.cancelled()) return called_off();
   std::optional<CommonPoseError> common;
-  if (auto adjusted = adjusted_poses(seen_by, rest)) {
+  if (auto adjusted = adjusted_poses(seen_by, rest, settings.watch)) {
     common = adjusted->common;
     for (std::size_t n = 0; n < seen_by.size(); ++n)
       seen_by[n] = moved(std::move(seen_by[n]), adjusted->poses.camera_from_patient[n]);

@@ -15,33 +15,56 @@ struct Reach {
   MatchSettings matches;
   PoseNoise widest;
 };
-/// Exact poses, those that were averaged, and single records of a tracker whose sensor is far from the lens.
-constexpr std::array kReaches{Reach{{12, 3}, kUsualPoseNoise}, Reach{{12, 12}, kUsualPoseNoise},
-                              Reach{{24, 48}, {4, 0.6 * kDegree}}};
+/// Of exact poses, of those that were averaged, and of single records of a tracker whose sensor is far from the lens.
+constexpr Reach kNear{.matches = {.span_mm = 12, .beside_px = 3, .grid_px = 36}, .widest = kUsualPoseNoise};
+constexpr Reach kFurther{.matches = {.span_mm = 12, .beside_px = 12, .grid_px = 36}, .widest = kUsualPoseNoise};
+constexpr Reach kFurthest{.matches = {.span_mm = 24, .beside_px = 48, .grid_px = 24},
+                          .widest = {.eye_mm = 4, .angle_rad = 0.6 * kDegree}};
 
 struct Adjusted {
   PoseAdjustment adjustment;
   std::size_t looked_for = 0;
-  /// How many matches more agree than would by chance: the closer to the rays they were looked for, the more would.
-  double beyond_chance = 0;
+  bool at_widest = false;  ///< the poses err by as much as was thought they might, or by more
+  double right =
+      0;  ///< about so many matches are right: of the wrong ones some agree by chance, more the nearer to rays
 };
 
 /// By matches that are looked for as the views are placed there. Of the views as they were given.
-std::optional<Adjusted> adjusted_by(const Reach& reach, const std::vector<PinholeView>& views,
-                                    const std::vector<PinholeView>& placed, const SeenSurface& surface) {
-  const TextureMatches matches = texture_matches(placed, surface, reach.matches);
-  auto found = adjusted_poses(views, matches.found, reach.widest);
+std::optional<Adjusted> adjusted_by(const MatchSettings& settings, const PoseNoise& widest,
+                                    const std::vector<PinholeView>& views, const std::vector<PinholeView>& placed,
+                                    const SeenSurface& surface) {
+  const TextureMatches matches = texture_matches(placed, surface, settings);
+  auto found = adjusted_poses(views, matches.found, widest);
   if (!found) return std::nullopt;
-  const double chance = std::min(1.0, PoseBundle::kAgrees_px / reach.matches.beside_px);
-  const double beyond_chance =
-      static_cast<double>(found->poses.matches) - chance * static_cast<double>(matches.found.size());
-  return Adjusted{*std::move(found), matches.looked_for, beyond_chance};
+  const double chance = PoseBundle::kAgrees_px / std::min(settings.beside_px, kOffAlike_px);
+  const double right =
+      (static_cast<double>(found->poses.matches) - chance * static_cast<double>(matches.found.size())) / (1 - chance);
+  const PoseNoise& noise = found->poses.noise;
+  const bool at_widest = noise.eye_mm >= widest.eye_mm || noise.angle_rad >= widest.angle_rad;
+  return Adjusted{*std::move(found), matches.looked_for, at_widest, right};
 }
 
 std::vector<PinholeView> moved_views(std::vector<PinholeView> views, const Adjusted& by) {
   for (std::size_t n = 0; n < views.size(); ++n)
     views[n] = moved(std::move(views[n]), by.adjustment.poses.camera_from_patient[n]);
   return views;
+}
+
+/// Patches overlap better once their views have moved: by matches of that reach, then by nearer ones, as long as more
+/// are right.
+std::optional<Adjusted> adjusted_within(const Reach& reach, std::span<const MatchSettings> nearer,
+                                        const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                        const RegistrationWatch& watch) {
+  constexpr int kMostTimes = 3;
+  std::optional<Adjusted> best = adjusted_by(reach.matches, reach.widest, views, views, surface);
+  for (const MatchSettings& settings : nearer) {
+    for (int times = 0; best && times < kMostTimes && !watch.cancelled(); ++times) {
+      auto again = adjusted_by(settings, reach.widest, views, moved_views(views, *best), surface);
+      if (!again || again->right <= best->right) break;
+      best = std::move(again);
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -68,26 +91,20 @@ std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& vie
   return PoseAdjustment{{bundle.poses(), noise, agreeing}, bundle.common_error(noise, kScales.back())};
 }
 
-std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& views, const SeenSurface& surface) {
+std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                             const RegistrationWatch& watch) {
   constexpr double kEnough = 0.15;
-  constexpr int kMostTimes = 3;
+  constexpr std::array kOfFurther{kNear.matches};
+  constexpr std::array kOfFurthest{kFurther.matches, kNear.matches};
   std::optional<Adjusted> best;
-  const auto take_better = [&](std::optional<Adjusted> other) {
-    if (!other || (best && other->beyond_chance <= best->beyond_chance)) return false;
-    best = std::move(other);
-    return true;
+  const auto enough = [&](std::optional<Adjusted> found) {
+    if (found && (!best || best->at_widest || found->right > best->right)) best = std::move(found);
+    return watch.cancelled() ||
+           (best && !best->at_widest && best->right >= kEnough * static_cast<double>(best->looked_for));
   };
-  for (std::size_t n = 0; n < kReaches.size(); ++n) {
-    const Reach& reach = kReaches[n];
-    if (take_better(adjusted_by(reach, views, views, surface)) && n > 0) {
-      // Patches overlap better once their views have moved.
-      const auto again = [&](const Reach& nearer) {
-        return take_better(adjusted_by({nearer.matches, reach.widest}, views, moved_views(views, *best), surface));
-      };
-      for (int times = 0; n > 1 && times < kMostTimes && again(kReaches[1]);) ++times;
-      for (int times = 0; times < kMostTimes && again(kReaches[0]);) ++times;
-    }
-    if (best && best->beyond_chance >= kEnough * static_cast<double>(best->looked_for)) break;
+  if (!enough(adjusted_within(kNear, {}, views, surface, watch)) &&
+      !enough(adjusted_within(kFurther, kOfFurther, views, surface, watch))) {
+    enough(adjusted_within(kFurthest, kOfFurthest, views, surface, watch));
   }
   if (!best) return std::nullopt;
   return std::move(best->adjustment);

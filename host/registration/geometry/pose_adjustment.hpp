@@ -30,6 +30,7 @@ std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& vie
 
 /// The same by matches of the surface's texture: looked for close to the rays and, where few are found there, further
 /// from them.
-std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& views, const SeenSurface& surface);
+std::optional<PoseAdjustment> adjusted_poses(const std::vector<PinholeView>& views, const SeenSurface& surface,
+                                             const RegistrationWatch& watch = {});
 
 }  // namespace birdseye::host

@@ -16,7 +16,6 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr double kGrid_px = 36;
 constexpr double kStep_px = 1.5;
 constexpr double kLeastAlong = 0.574;  ///< cosine of 55 degrees between the views' rays
 constexpr std::size_t kMostOthers = 2;
@@ -29,14 +28,14 @@ struct Peak {
 
 /// Which matches are as far from the ray as a good part of those of the same two views.
 std::vector<bool> off_alike(std::span<const TextureMatch> matches) {
-  constexpr double kAlike_px = 6, kPart = 0.3;
+  constexpr double kPart = 0.3;
   std::vector<bool> out;
   for (const TextureMatch& match : matches) {
     double of_views = 0, alike = 0;
     for (const TextureMatch& other : matches) {
       if (other.view != match.view || other.other_view != match.other_view) continue;
       of_views += 1;
-      if (std::abs(other.beside_px - match.beside_px) < kAlike_px) alike += 1;
+      if (std::abs(other.beside_px - match.beside_px) < kOffAlike_px) alike += 1;
     }
     out.push_back(alike >= kPart * of_views);
   }
@@ -86,7 +85,7 @@ class Search {
       : views_(views), surface_(surface), settings_(settings), sight_(surface, views, {kPatchFacing, 8, 10}) {}
 
   TextureMatches run() const {
-    const std::vector<GridPixel> pixels = patch_grid(views_, kGrid_px);
+    const std::vector<GridPixel> pixels = patch_grid(views_, settings_.grid_px);
     std::vector<TextureMatches> of_pixels(pixels.size());
     tbb::parallel_for(std::size_t{0}, pixels.size(), [&](std::size_t n) { of_pixels[n] = look_for(pixels[n]); });
     TextureMatches out;
@@ -169,6 +168,12 @@ class Search {
       for (int b = std::max(-scores.beside(), near_b - 2); b <= std::min(scores.beside(), near_b + 2); ++b) {
         if (s % 2 != 0 || b % 2 != 0) look_at(s, b);
       }
+    }
+    // The height of the peak's sides tells how far between two shifts it lies.
+    const auto [best_s, best_b] = scores.best();
+    for (const auto& [s, b] :
+         {std::pair{best_s - 1, best_b}, {best_s + 1, best_b}, {best_s, best_b - 1}, {best_s, best_b + 1}}) {
+      if (std::abs(s) <= scores.along() && std::abs(b) <= scores.beside()) look_at(s, b);
     }
     const auto peak = peak_of(scores);
     if (!peak) return std::nullopt;

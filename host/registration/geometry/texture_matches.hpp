@@ -21,12 +21,16 @@ struct TextureMatch {
 struct MatchSettings {
   double span_mm = 12;    ///< how far in front of and behind the surface a place is looked for, in depth
   double beside_px = 12;  ///< how far from the ray a place is looked for, in pixels of a picture 768 wide
+  double grid_px = 36;    ///< a patch every so many of these pixels
 };
 
 struct TextureMatches {
   std::vector<TextureMatch> found;
   std::size_t looked_for = 0;  ///< pairs of a place and another view
 };
+
+/// Of places that a pose takes off their rays, so far apart is that alike; in these pixels.
+inline constexpr double kOffAlike_px = 6;
 
 /// Looks for patches of each view in the views nearest to it, by their normalised cross-correlation, along the ray and
 /// across it: only a wrong pose takes a place off the ray. Keeps peaks that are high and alone, and that are as far

@@ -20,6 +20,8 @@ Result<HeldOutGain> gain_on_held_out_views(const std::vector<VideoView>& views, 
   // Of three views a half would leave one to fit to.
   const std::size_t parts = views.size() == 3 ? 3 : 2;
   const std::vector<double> none(control.parameters(), 0.0);
+  // A record of how the result was reached has no place for fits to some of the views.
+  const std::vector<TracePoint> trace = record.trace;
   std::vector<double> gains;
   for (std::size_t part = 0; part < parts; ++part) {
     std::vector<VideoView> fitted, held_out;
@@ -34,6 +36,7 @@ Result<HeldOutGain> gain_on_held_out_views(const std::vector<VideoView>& views, 
     judge->similarity(none, light_of_none);
     for (std::size_t n = 0; n < with.size(); ++n) gains.push_back(with[n] - judge->views().per_view()[n]);
   }
+  record.trace = trace;
   const auto count = static_cast<double>(gains.size());
   const double mean = std::accumulate(gains.begin(), gains.end(), 0.0) / count;
   double squares = 0;

@@ -152,6 +152,12 @@ Result<ViewRegistration> register_views(const std::vector<VideoView>& views, con
   const auto organ = organ_distance(ct, labels, label_values, transfer);
   if (!organ) return organ.error();
   const Tissue coarse = tissue_of(*organ, ct, spacing_mm(kCoarse, ct));
+  if (std::none_of(coarse.depth_mm.begin(), coarse.depth_mm.end(), [](float mm) { return mm > 0; })) {
+    return Error{Errc::not_found,
+                 fmt::format("the organ is thinner than the {:g} mm on which it is looked for by similarity; give "
+                             "optimiser = \"geometry\"",
+                             spacing_mm(kCoarse, ct))};
+  }
   if (settings.initial && least_determinant(*settings.initial) <= 0)
     return Error{Errc::bad_value, "the initial field folds; start from another or from none"};
 

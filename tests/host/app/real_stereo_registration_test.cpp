@@ -237,6 +237,7 @@ TEST(RealStereo, TwoEndoscopePicturesDoNotLoseThePoseBySimilarity) {
     EXPECT_LT(o.json["pose_error_after"]["deg"], 10);
   }
   std::printf("mean right %.2f -> %.2f mm\n", across_before_mm, across_after_mm);
+  EXPECT_LT(across_after_mm, 3) << "twice the motion";
 }
 
 /// The same by geometry, to which the poses are known and the organ has moved: by stereo of the two pictures. Stereo

@@ -101,6 +101,8 @@ TEST(RegisterViewsCommand, FindsItByGeometry) {
   EXPECT_GT(json["expected_error"]["target"]["radius95_mm"], json["expected_error"]["target"]["rms_mm"]);
   for (const char* kind : {"seen", "hidden", "surface", "inside"})
     EXPECT_GT(json["expected_error"][kind]["rms_mm"], 0) << kind;
+  EXPECT_TRUE(json["open"].is_array());
+  EXPECT_TRUE(fs::exists(scratch / "out" / "expected_error.png"));
 }
 
 TEST(RegisterViewsCommand, GeometryPassesNothingWhereTwoViewsHaveEachOthersPose) {

@@ -48,6 +48,13 @@ TEST(RegistrationVerdict, OfACaseThatNamesNoTargetIsByTheInsideAndNotByALandmark
   EXPECT_EQ(verdict_of(none_named, found).grade, Grade::marginal);
 }
 
+TEST(RegistrationVerdict, FailsWhatFoldsHoweverWellTheTargetIsKnown) {
+  ViewRegistration found = well_found();
+  found.folded = found.worse_than_start = true;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "folds"));
+}
+
 TEST(RegistrationVerdict, SaysThatNothingMovedWhereEvidenceGainsNothingByAMotion) {
   ViewRegistration found = well_found();
   found.evidence_of_motion_nats = 2.9;

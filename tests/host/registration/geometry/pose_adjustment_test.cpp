@@ -199,7 +199,8 @@ TEST(PoseBundle, ExpectsTheCommonMotionThatErringPosesLeave) {
     const auto motion = common_motion(exact.places_mm(), bundle.places_mm(), error.about_mm());
     found_mm2 += motion[2] * motion[2] / kSets;
     side_mm2 += motion.head<2>().squaredNorm() / kSets;
-    const Eigen::Matrix3d covariance = error.covariance(error.about_mm());
+    const ByCommonErrors by = error.at(error.about_mm());
+    const Eigen::Matrix3d covariance = by * by.transpose();
     expected_mm2 += covariance(2, 2) / kSets;
     expected_side_mm2 += covariance.topLeftCorner<2, 2>().trace() / kSets;
   }
