@@ -9,9 +9,26 @@
 
 namespace birdseye::host {
 
+namespace {
+
+/// The mean of how far points about a place are left off, mm.
+double left_off_about_mm(std::span<const LeftOff> points, const Eigen::Vector3d& seen_mm) {
+  constexpr double kTogether_mm = 15, kFew = 0.5;
+  double sum_mm = 0, weights = 0;
+  for (const LeftOff& point : points) {
+    const double weight = std::exp(-0.5 * (point.place_mm - seen_mm).squaredNorm() / (kTogether_mm * kTogether_mm));
+    sum_mm += weight * point.off_mm;
+    weights += weight;
+  }
+  return sum_mm / (weights + kFew);
+}
+
+}  // namespace
+
 Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) const {
   const Eigen::Vector3d seen_mm = seen_place(mean, rest_mm);
-  Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+  const double left_off_mm = left_off_about_mm(left_off, seen_mm);
+  Eigen::Matrix3d out = left_off_mm * left_off_mm / 3 * Eigen::Matrix3d::Identity();
   std::vector<Eigen::Vector3d> each;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < fits.size(); ++i) {
@@ -70,6 +87,13 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < out.fields.size(); ++i) u += out.beliefs[i] * out.fields[i].displacement_mm(n);
     out.mean.set(n, u);
+  }
+  constexpr double kMost_mm = 8;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double wrong = 0;
+    for (std::size_t n = 0; n < out.fits.size(); ++n) wrong += out.beliefs[n] * (1 - out.fits[n].weights()[i]);
+    const double off_mm = organ.distance_mm(points[i].place_mm + out.mean.at(points[i].place_mm));
+    out.left_off.push_back({points[i].place_mm, wrong * std::clamp(off_mm, -kMost_mm, kMost_mm)});
   }
   return out;
 }

@@ -14,6 +14,12 @@ namespace birdseye::host {
 /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md): it is divided by this.
 inline constexpr double kEvidenceTemper = 4;
 
+/// How far a seen place is left off the surface, along the normal, as far as it is thought to be wrong.
+struct LeftOff {
+  Eigen::Vector3d place_mm;
+  double off_mm = 0;
+};
+
 /// Deformations by several hypotheses, how far each is believed, and their mean.
 struct BelievedDeformation {
   explicit BelievedDeformation(const SignedDistance& organ) : mean(organ) {}
@@ -24,7 +30,10 @@ struct BelievedDeformation {
   LatticeField mean;
   std::vector<DisplacementFit> candidates;  ///< by all hypotheses that more points may yet speak for
 
-  /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, and between them.
+  std::vector<LeftOff> left_off;  ///< of all points
+
+  /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, between them, and of what none of them
+  /// follows: where points lie together that are left off to the same side, they are not wrong, the hypotheses are.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const;
   /// The same before anything was seen.
   [[nodiscard]] Eigen::Matrix3d prior_covariance(const Eigen::Vector3d& rest_mm) const;

@@ -8,7 +8,11 @@
 namespace birdseye::host {
 
 namespace {
-constexpr std::array kDents_mm{12.0, 20.0};  ///< standard deviations
+/// Standard deviations of a dent: across the way inwards, and along it. How deep a narrow push reaches shows nowhere.
+struct Dent {
+  double across_mm, deep_mm;
+};
+constexpr std::array kDents{Dent{12, 12}, Dent{20, 20}, Dent{16, 40}};
 /// Where the place is not known better than this, dents of which the middle is so far off along an axis make up for it.
 constexpr double kBeside_mm = 12;
 constexpr Eigen::Index kMiddles = 7;
@@ -52,17 +56,18 @@ Eigen::Matrix3Xd BezierBasis::at(const Eigen::Vector3d& place_in_patient_mm) con
 }
 
 Eigen::Index PushBasis::unknowns() const {
-  return 3 * kMiddles * static_cast<Eigen::Index>(kDents_mm.size());
+  return 3 * kMiddles * static_cast<Eigen::Index>(kDents.size());
 }
 
 Eigen::Matrix3Xd PushBasis::at(const Eigen::Vector3d& place_in_patient_mm) const {
   Eigen::Matrix3Xd out(3, unknowns());
   Eigen::Index column = 0;
   for (Eigen::Index n = 0; n < kMiddles; ++n) {
-    const double away_mm2 = (place_in_patient_mm - place_mm_ - middle_mm(n)).squaredNorm();
-    for (const double dent_mm : kDents_mm) {
-      out.middleCols<3>(column) =
-          sigma_mm_ * std::exp(-0.5 * away_mm2 / (dent_mm * dent_mm)) * Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d away_mm = place_in_patient_mm - place_mm_ - middle_mm(n);
+    const double deep_mm2 = std::pow(away_mm.dot(inwards_), 2), across_mm2 = away_mm.squaredNorm() - deep_mm2;
+    for (const Dent& dent : kDents) {
+      const double squared = across_mm2 / (dent.across_mm * dent.across_mm) + deep_mm2 / (dent.deep_mm * dent.deep_mm);
+      out.middleCols<3>(column) = sigma_mm_ * std::exp(-0.5 * squared) * Eigen::Matrix3d::Identity();
       column += 3;
     }
   }

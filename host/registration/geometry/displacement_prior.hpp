@@ -42,16 +42,18 @@ class BezierBasis : public DisplacementBasis {
   double sigma_mm_;
 };
 
-/// A push at one place: Gaussian dents of several widths about it, each in any direction, of sigma_mm along each axis.
+/// A push at one place: Gaussian dents of several widths and depths about it, each in any direction, of sigma_mm along
+/// each axis.
 class PushBasis : public DisplacementBasis {
  public:
-  PushBasis(const Eigen::Vector3d& place_in_patient_mm, double sigma_mm)
-      : place_mm_(place_in_patient_mm), sigma_mm_(sigma_mm) {}
+  /// inwards: from the surface there into the organ, of unit length.
+  PushBasis(const Eigen::Vector3d& place_in_patient_mm, const Eigen::Vector3d& inwards, double sigma_mm)
+      : place_mm_(place_in_patient_mm), inwards_(inwards), sigma_mm_(sigma_mm) {}
   [[nodiscard]] Eigen::Index unknowns() const override;
   [[nodiscard]] Eigen::Matrix3Xd at(const Eigen::Vector3d& place_in_patient_mm) const override;
 
  private:
-  Eigen::Vector3d place_mm_;
+  Eigen::Vector3d place_mm_, inwards_;
   double sigma_mm_;
 };
 

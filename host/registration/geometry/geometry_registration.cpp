@@ -209,7 +209,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     }
     if (!found.fits.empty()) {
       const auto pushed_mm = pushed_place_mm(distance, points, found.mean);
-      more = pushed_mm ? push_hypotheses_of(*pushed_mm) : std::vector<DisplacementPrior>{};
+      more = pushed_mm ? push_hypotheses_of(*pushed_mm, -rest.normal(*pushed_mm)) : std::vector<DisplacementPrior>{};
     }
     // What the views as they were given would tell, for it is their errors that are asked for.
     for (std::size_t i = 0; common && i + touches.size() < points.size(); ++i) {

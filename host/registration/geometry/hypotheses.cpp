@@ -75,14 +75,14 @@ std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared
   return out;
 }
 
-std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_mm) {
+std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_mm, const Eigen::Vector3d& inwards) {
   constexpr double kPush_mm = 4;
   std::vector<DisplacementPrior> out;
   for (const auto& [length_mm, sigma_mm] : {GaussianPart{85, 0.6}, {85, 2.5}, {50, 2}}) {
     DisplacementPrior prior;
     prior.name = fmt::format("{:g} mm over {:g} mm and a push", sigma_mm, length_mm);
     prior.parts.push_back({length_mm, sigma_mm});
-    prior.basis = std::make_shared<PushBasis>(place_mm, kPush_mm);
+    prior.basis = std::make_shared<PushBasis>(place_mm, inwards, kPush_mm);
     prior.log_belief = -0.5 * std::pow(std::log(sigma_mm / kUsual_mm), 2) + kFewArePushed;
     prior.unfollowed_mm = kUnfollowed_mm;
     out.push_back(std::move(prior));

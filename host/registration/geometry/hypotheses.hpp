@@ -16,7 +16,8 @@ namespace birdseye::host {
 std::vector<DisplacementPrior> hypotheses_of(const Volume& ct, const std::shared_ptr<const ElasticModes>& modes,
                                              const std::array<int, 3>& control_points);
 
-/// What may move an organ that is pushed besides at one place, at rest, patient frame.
-std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_mm);
+/// What may move an organ that is pushed besides at one place, at rest, patient frame. inwards: from the surface there,
+/// of unit length.
+std::vector<DisplacementPrior> push_hypotheses_of(const Eigen::Vector3d& place_mm, const Eigen::Vector3d& inwards);
 
 }  // namespace birdseye::host

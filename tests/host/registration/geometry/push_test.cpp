@@ -75,7 +75,8 @@ TEST(Push, ItsHypothesesAreBelievedAndLeaveLess) {
   const auto points = seen_by(dent);
   const BelievedDeformation without = believed(organ, points, {gentle_prior()});
   // Not the middle itself, which is known to some millimetres only.
-  auto with = believe(organ, points, push_hypotheses_of(kPushed_mm + Eigen::Vector3d(7, -5, 0)), without, {});
+  auto with = believe(
+      organ, points, push_hypotheses_of(kPushed_mm + Eigen::Vector3d(7, -5, 0), -kPushed_mm.normalized()), without, {});
   ASSERT_TRUE(with);
   EXPECT_GT(with->fits.front().log_evidence(), without.fits.front().log_evidence() + 50);
   // Of a ball no surface tells how far it turns about its middle, so that much is left by either.
