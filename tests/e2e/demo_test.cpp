@@ -52,7 +52,8 @@ nlohmann::json demo(const Scratch& scratch, const std::string& options) {
 
 TEST(Demo, PutsTheTumourWhereItHasMovedDespiteTheTrackersNoise) {
   const Scratch scratch;
-  const nlohmann::json report = demo(scratch, "");
+  // Of this seed the tumour moves by 7 mm with the liver.
+  const nlohmann::json report = demo(scratch, "--seed 3");
   EXPECT_LE(report.value("target_error_mm_p95", 1e9), 4.0);
   EXPECT_GT(report.value("target_error_mm_p50", 0.0), 0.0);
   // The same frames with the CT as it was taken: the liver has moved by 10 mm since.
