@@ -241,8 +241,8 @@ TEST(RealStereo, TwoEndoscopePicturesDoNotLoseThePoseBySimilarity) {
 }
 
 /// The same by geometry, to which the poses are known and the organ has moved: by stereo of the two pictures. Stereo
-/// needs no margin but a patch's. Where the organ is given where it is (seed 0), it is taken to another depth by what
-/// lenses and base of the pair are not known better; nothing can be had that is nearer.
+/// needs no margin but a patch's. Where the organ is given where it is (seed 0), stereo takes it to another
+/// depth by more than a millimetre: a pixel that lenses and base have wrong would do that.
 TEST(RealStereo, TwoEndoscopePicturesBringTheSurfaceBackByGeometry) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
