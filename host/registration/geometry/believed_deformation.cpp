@@ -11,10 +11,11 @@ namespace birdseye::host {
 
 namespace {
 
-/// The mean of how far points about a place are left off, mm.
-double left_off_about_mm(std::span<const LeftOff> points, const Eigen::Vector3d& seen_mm) {
+/// The mean of how far points about a place are left off.
+Eigen::Vector3d left_off_about_mm(std::span<const LeftOff> points, const Eigen::Vector3d& seen_mm) {
   constexpr double kTogether_mm = 15, kFew = 0.5;
-  double sum_mm = 0, weights = 0;
+  Eigen::Vector3d sum_mm = Eigen::Vector3d::Zero();
+  double weights = 0;
   for (const LeftOff& point : points) {
     const double weight = std::exp(-0.5 * (point.place_mm - seen_mm).squaredNorm() / (kTogether_mm * kTogether_mm));
     sum_mm += weight * point.off_mm;
@@ -27,8 +28,8 @@ double left_off_about_mm(std::span<const LeftOff> points, const Eigen::Vector3d&
 
 Eigen::Matrix3d BelievedDeformation::covariance(const Eigen::Vector3d& rest_mm) const {
   const Eigen::Vector3d seen_mm = seen_place(mean, rest_mm);
-  const double left_off_mm = left_off_about_mm(left_off, seen_mm);
-  Eigen::Matrix3d out = left_off_mm * left_off_mm / 3 * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d left_off_mm = left_off_about_mm(left_off, seen_mm);
+  Eigen::Matrix3d out = left_off_mm * left_off_mm.transpose();
   std::vector<Eigen::Vector3d> each;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < fits.size(); ++i) {
@@ -92,8 +93,8 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
   for (std::size_t i = 0; i < points.size(); ++i) {
     double wrong = 0;
     for (std::size_t n = 0; n < out.fits.size(); ++n) wrong += out.beliefs[n] * (1 - out.fits[n].weights()[i]);
-    const double off_mm = organ.distance_mm(points[i].place_mm + out.mean.at(points[i].place_mm));
-    out.left_off.push_back({points[i].place_mm, wrong * std::clamp(off_mm, -kMost_mm, kMost_mm)});
+    const auto at = organ.sample(points[i].place_mm + out.mean.at(points[i].place_mm));
+    out.left_off.push_back({points[i].place_mm, wrong * std::clamp(at.distance_mm, -kMost_mm, kMost_mm) * at.gradient});
   }
   return out;
 }

@@ -14,10 +14,9 @@ namespace birdseye::host {
 /// Residuals are not as independent as the evidence has them (see docs/manual/registration.md): it is divided by this.
 inline constexpr double kEvidenceTemper = 4;
 
-/// How far a seen place is left off the surface, along the normal, as far as it is thought to be wrong.
+/// How far a seen place is left off the surface, along its normal, as far as the place is thought to be wrong.
 struct LeftOff {
-  Eigen::Vector3d place_mm;
-  double off_mm = 0;
+  Eigen::Vector3d place_mm, off_mm;
 };
 
 /// Deformations by several hypotheses, how far each is believed, and their mean.
@@ -32,8 +31,9 @@ struct BelievedDeformation {
 
   std::vector<LeftOff> left_off;  ///< of all points
 
-  /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, between them, and of what none of them
-  /// follows: where points lie together that are left off to the same side, they are not wrong, the hypotheses are.
+  /// Of where tissue is seen that lay at rest_mm, mm^2: of each hypothesis, between hypotheses, and of what no
+  /// hypothesis follows. Where points that lie together are left off to the same side, not the points are wrong but the
+  /// hypotheses.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm) const;
   /// The same before anything was seen.
   [[nodiscard]] Eigen::Matrix3d prior_covariance(const Eigen::Vector3d& rest_mm) const;

@@ -23,6 +23,15 @@ using testing::small_ct;
 
 constexpr const char* kFour = "0 0 0\n100 0 0\n0 80 0\n10 20 60\n";
 
+/// The programs share no code that could hold the list.
+TEST(Commands, TheHostAndTheSimulatorKnowTheSameDeformations) {
+  const std::vector<std::string> kinds{"elastic",     "bezier", "bend",      "push",
+                                       "compression", "twist",  "breathing", "pneumoperitoneum"};
+  expect_refused("birdseye", "demo --deformation melt", kinds);
+  expect_refused("birdseye", "live --simulate --deformation melt", kinds);
+  expect_refused("birdseye-sim", "cart --phantom p --socket s --tty t --out o --deformation melt", kinds);
+}
+
 TEST(Commands, VolumeInfoWritesItsFigures) {
   const Scratch scratch;
   const std::string json_path = (scratch / "info.json").string();

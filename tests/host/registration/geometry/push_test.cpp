@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 
 #include "host/registration/geometry/believed_deformation.hpp"
@@ -81,6 +83,39 @@ TEST(Push, ItsHypothesesAreBelievedAndLeaveLess) {
   EXPECT_GT(with->fits.front().log_evidence(), without.fits.front().log_evidence() + 50);
   // Of a ball no surface tells how far it turns about its middle, so that much is left by either.
   EXPECT_LT(mean_error_mm(with->mean), 0.65 * mean_error_mm(without.mean));
+}
+
+/// Of where tissue is seen that lay there, mm rms, inwards and outwards: how far a ball turns about its middle shows
+/// nowhere.
+double expected_mm(const BelievedDeformation& found, const Eigen::Vector3d& rest_mm) {
+  const Eigen::Vector3d outwards = rest_mm.normalized();
+  return std::sqrt(outwards.dot(found.covariance(rest_mm) * outwards));
+}
+
+/// As far from the ball's middle as the pushed place, and as well seen.
+Eigen::Vector3d beside(const Eigen::Vector3d& pushed_mm) {
+  constexpr double kRight_angle = 0.5 * std::numbers::pi;
+  return Eigen::AngleAxisd(0.7 * kRight_angle, Eigen::Vector3d::UnitX()) * pushed_mm;
+}
+
+TEST(Push, ExpectsMoreWherePlacesThatLieTogetherAreLeftOff) {
+  const SignedDistance organ = testing::ball(kOrganRadius_mm);
+  const BelievedDeformation found = believed(organ, seen_by(dent), {gentle_prior()});
+  EXPECT_GT(expected_mm(found, kPushed_mm), 2 * expected_mm(found, beside(kPushed_mm)));
+  const double off_mm = (seen_place(found.mean, kPushed_mm) - (kPushed_mm - dent(kPushed_mm))).norm();
+  EXPECT_LT(off_mm, 3 * expected_mm(found, kPushed_mm)) << "three deviations";
+}
+
+TEST(Push, ExpectsMoreDeepBelowItThanAsDeepElsewhere) {
+  const SignedDistance organ = testing::ball(kOrganRadius_mm);
+  const auto points = seen_by(dent);
+  const auto with = believe(organ, points, push_hypotheses_of(kPushed_mm, -kPushed_mm.normalized()),
+                            believed(organ, points, {gentle_prior()}), {});
+  ASSERT_TRUE(with);
+  const Eigen::Vector3d deep_mm = kPushed_mm - 35 * kPushed_mm.normalized();
+  EXPECT_GT(expected_mm(*with, deep_mm), expected_mm(*with, beside(deep_mm)));
+  // A push of 12 mm that reaches 40 mm deep moves that place by 8 mm, one that reaches 20 mm by 2.6 mm.
+  EXPECT_GT(expected_mm(*with, deep_mm), 0.5 * (8.2 - 2.6));
 }
 
 TEST(Push, IsNotFoundWhereALongPriorFollowsAll) {
