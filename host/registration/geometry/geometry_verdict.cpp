@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "host/registration/geometry/pose_adjustment.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -53,6 +55,14 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
             {fmt::format("{}: the organ's outline there is {:.1f} mm off what all views together say: check its "
                          "picture and its pose",
                          views[n].name, *off_mm)},
+            {}};
+  }
+  if (found.adjusted && found.adjusted->noise.eye_mm >= kMostPoseNoise.eye_mm) {
+    return {Grade::fail,
+            {fmt::format("the tracker's poses put the eye {:.0f} mm or more off along each axis, as the views show of "
+                         "one another, and poses so far off are not corrected rightly: average more records at each "
+                         "view with the scope held still, and check hand-eye",
+                         kMostPoseNoise.eye_mm)},
             {}};
   }
   const std::optional<ExpectedErrors>& expected = found.expected;

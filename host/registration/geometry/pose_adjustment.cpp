@@ -19,7 +19,7 @@ struct Reach {
 constexpr Reach kNear{.matches = {.span_mm = 12, .beside_px = 3, .grid_px = 36}, .widest = kUsualPoseNoise};
 constexpr Reach kFurther{.matches = {.span_mm = 12, .beside_px = 12, .grid_px = 36}, .widest = kUsualPoseNoise};
 constexpr Reach kFurthest{.matches = {.span_mm = 24, .beside_px = 48, .grid_px = 24},
-                          .widest = {.eye_mm = 4, .angle_rad = 0.6 * kDegree}};
+                          .widest = kMostPoseNoise};
 
 struct Adjusted {
   PoseAdjustment adjustment;

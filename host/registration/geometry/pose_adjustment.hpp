@@ -19,6 +19,9 @@ struct PoseAdjustment {
 
 /// The most that poses err by which a cart averages.
 inline constexpr PoseNoise kUsualPoseNoise{2, 0.5 * std::numbers::pi / 180};
+/// The most that poses may err by and be corrected: those of single records of a tracker, far from the lens. Poses that
+/// seem to err by more were not corrected rightly.
+inline constexpr PoseNoise kMostPoseNoise{4, 0.6 * std::numbers::pi / 180};
 
 /// Moves the views until the matches agree: a bundle adjustment whose points lie on the first view's rays, with
 /// Cauchy's loss, annealed, and a prior on each pose whose width is found from how far the views have to move. An error

@@ -99,6 +99,16 @@ TEST(RegistrationVerdict, NamesAViewThatDoesNotBearOutTheOthers) {
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
 }
 
+TEST(RegistrationVerdict, FailsPosesThatErrByAsMuchAsIsLookedFor) {
+  ViewRegistration found = well_found();
+  found.adjusted.emplace();
+  found.adjusted->noise = {3.9, 0.01};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.adjusted->noise.eye_mm = 4;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "put the eye 4 mm or more off"));
+}
+
 TEST(RegistrationVerdict, LittleStereoPassesOnlyWhereTouchesMakeTheTargetKnown) {
   ViewRegistration found = well_found();
   found.stereo_points = 99;
