@@ -10,6 +10,7 @@
 #include "drivers/system/interrupt.hpp"
 #include "host/app/commands.hpp"
 #include "host/demo/demo_session.hpp"
+#include "host/demo/demo_verdict.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
@@ -89,43 +90,6 @@ Result<void> write_pictures(const fs::path& out, DemoSession& session, const std
   return {};
 }
 
-/// A figure with the limits up to which it passes and is marginal.
-struct Limit {
-  double value, pass, marginal;
-  std::string said;  ///< of the value
-};
-
-/// The worst of all limits is the verdict; each that is not passed is a reason.
-void judge(DemoFigures& figures) {
-  std::vector<double> mm;
-  for (const FrameError& error : figures.errors) mm.push_back(error.target_mm);
-  if (mm.empty()) {
-    figures.verdict.add(Grade::fail, "no frame carried an overlay; see birdseyed.log");
-    return;
-  }
-  const double worst_mm = *std::max_element(mm.begin(), mm.end());
-  const double p95_mm = percentile(mm, 0.95);
-  const auto shown = static_cast<double>(mm.size());
-  const double hidden_percent = 100 * figures.frames_without_overlay / (shown + figures.frames_without_overlay);
-  const double dropped_percent = 100.0 * figures.frames_dropped / std::max(1, figures.frames + figures.frames_dropped);
-  const Limit limits[] = {
-      {p95_mm, kTargetLimits.pass_mm, kTargetLimits.marginal_mm,
-       fmt::format("the tumour's centre is within {:.2f} mm in 95 % of the frames", p95_mm)},
-      {worst_mm, 6, 10, fmt::format("the tumour's centre is off by {:.2f} mm in the worst frame", worst_mm)},
-      {hidden_percent, 10, 50, fmt::format("{:.0f} % of the frames carry no overlay", hidden_percent)},
-      {dropped_percent, 5, 20, fmt::format("{:.0f} % of the frames were dropped", dropped_percent)},
-  };
-  figures.verdict.add(Grade::pass, fmt::format("{}; {} mm pass", limits[0].said, limits[0].pass));
-  if (figures.deforming && !figures.deforming->found)
-    figures.verdict.add(Grade::fail, "the CT was not deformed: " + figures.deforming->words);
-  for (const Limit& limit : limits) {
-    if (limit.value <= limit.pass) continue;
-    const bool said = &limit == &limits[0];
-    figures.verdict.add(limit.value <= limit.marginal ? Grade::marginal : Grade::fail,
-                        said ? "" : fmt::format("{}; {} pass", limit.said, limit.pass));
-  }
-}
-
 struct DemoOptions {
   SimulatedCartSettings cart;
   std::string noise = "typical";
@@ -189,7 +153,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
       !written) {
     return written.error();
   }
-  judge(session.figures);
+  session.figures.verdict = demo_verdict(session.figures);
   session.figures.drops.tell(session.figures.verdict);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();

@@ -18,8 +18,7 @@ struct Reach {
 /// Of exact poses, of those that were averaged, and of single records of a tracker whose sensor is far from the lens.
 constexpr Reach kNear{.matches = {.span_mm = 12, .beside_px = 3, .grid_px = 36}, .widest = kUsualPoseNoise};
 constexpr Reach kFurther{.matches = {.span_mm = 12, .beside_px = 12, .grid_px = 36}, .widest = kUsualPoseNoise};
-constexpr Reach kFurthest{.matches = {.span_mm = 24, .beside_px = 48, .grid_px = 24},
-                          .widest = kMostPoseNoise};
+constexpr Reach kFurthest{.matches = {.span_mm = 24, .beside_px = 48, .grid_px = 24}, .widest = kMostPoseNoise};
 
 struct Adjusted {
   PoseAdjustment adjustment;
