@@ -239,12 +239,32 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
+/// Makes the folder, and takes away what a registration before wrote there: it must not be taken for this one's.
+Result<void> make_empty_of_results(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", folder.string())};
+  std::vector<fs::path> old;
+  for (const char* name : {"field.mha", "result.json", "report.html", "expected_error.png", "trace.svg", "pose.txt"})
+    old.push_back(folder / name);
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("view") && (name.ends_with("_before.png") || name.ends_with("_after.png")))
+      old.push_back(entry.path());
+  }
+  for (const fs::path& path : old) {
+    fs::remove(path, error);
+    if (error)
+      return Error{Errc::unreadable, fmt::format("{}: is of an earlier registration and cannot be removed; "
+                                                 "choose another folder",
+                                                 path.string())};
+  }
+  return {};
+}
+
 /// The organ is not in the pictures where it should be: that is a verdict too.
 Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const Error& why) {
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", options.out.string())};
+  if (auto made = make_empty_of_results(options.out); !made) return made.error();
   const std::string text = text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}});
   if (auto written = write_files({{options.out / "result.json", text}, {options.json, text}}); !written)
     return written.error();
@@ -271,10 +291,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   const Verdict verdict = verdict_of(c, found);
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", options.out.string())};
+  if (auto made = make_empty_of_results(options.out); !made) return made.error();
   if (auto written = write_field(options.out / "field.mha", found.field); !written) return written.error();
   auto files = pictures_of(c, *transfer, found);
   if (!files) return files.error();

@@ -8,17 +8,20 @@
 
 namespace birdseye::host {
 
+bool lies_in(const Volume& ct, const Eigen::Vector3d& place_mm) {
+  const Eigen::Vector3d voxel = ct.patient_from_voxel.inverse() * place_mm;
+  const Eigen::Vector3d last(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);
+  return (voxel.array() >= 0).all() && (voxel.array() <= last.array()).all();
+}
+
 Result<NamedMatch> match_of(const LandmarkEntry& entry, const Volume& ct, const std::vector<VideoView>& views,
                             const std::vector<NamedMatch>& others) {
   for (const NamedMatch& other : others) {
     if (other.name == entry.name)
       return Error{Errc::bad_value, fmt::format("name: {} is another landmark's too; name each once", entry.name)};
   }
-  const Eigen::Vector3d voxel = ct.patient_from_voxel.inverse() * entry.place_mm;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (voxel[axis] < 0 || voxel[axis] > ct.size[static_cast<std::size_t>(axis)] - 1)
-      return Error{Errc::bad_value, "place_mm: lies outside the CT; give mm in the patient's frame, LPS"};
-  }
+  if (!lies_in(ct, entry.place_mm))
+    return Error{Errc::bad_value, "place_mm: lies outside the CT; give mm in the patient's frame, LPS"};
   std::vector<LandmarkPixel> pixels;
   for (const LandmarkEntry::Seen& seen : entry.seen) {
     const auto view = std::find_if(views.begin(), views.end(), [&](const auto& one) { return one.name == seen.view; });

@@ -11,6 +11,9 @@
 
 namespace birdseye::host {
 
+/// Whether a place, patient frame, is among the CT's voxel centres.
+bool lies_in(const Volume& ct, const Eigen::Vector3d& place_mm);
+
 /// A landmark as a case has it.
 struct LandmarkEntry {
   struct Seen {

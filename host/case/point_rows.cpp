@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -19,14 +18,18 @@ constexpr std::string_view kSurfaceHeader = "x_mm,y_mm,z_mm,sigma_mm";
 constexpr std::string_view kMatchedHeader = "x_mm,y_mm,z_mm,sigma_mm,rest_x_mm,rest_y_mm,rest_z_mm";
 constexpr std::size_t kSurfaceFields = 4, kMatchedFields = 7, kMostRows = 300;
 
-/// What stands between the commas, without blanks.
+std::string without_blanks_about(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r\v\f";
+  const auto first = text.find_first_not_of(kBlanks);
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+/// What stands between the commas, without the blanks about it.
 std::vector<std::string> fields_of(std::string line) {
-  line.erase(std::remove_if(line.begin(), line.end(), [](unsigned char c) { return std::isspace(c) != 0; }),
-             line.end());
   line += ',';  // getline leaves out an empty last one
   std::vector<std::string> out;
   std::istringstream in(line);
-  for (std::string field; std::getline(in, field, ',');) out.push_back(field);
+  for (std::string field; std::getline(in, field, ',');) out.push_back(without_blanks_about(field));
   return out;
 }
 
@@ -51,7 +54,10 @@ Result<std::vector<double>> numbers_of(std::vector<std::string> fields, std::siz
     if (!number) return Error{Errc::bad_format, fmt::format("'{}' is not a number", field)};
     out.push_back(*number);
   }
-  if (!(out[3] > 0)) return Error{Errc::bad_value, fmt::format("sigma_mm is {:g}; give one over 0", out[3])};
+  if (!(out[3] >= kLeastGivenSigma_mm && out[3] <= kMostGivenSigma_mm)) {
+    return Error{Errc::bad_value, fmt::format("sigma_mm is {:g}; give one from {} to {}", out[3], kLeastGivenSigma_mm,
+                                              kMostGivenSigma_mm)};
+  }
   return out;
 }
 

@@ -26,7 +26,8 @@ struct PointRows {
 
 /// Reads x_mm,y_mm,z_mm,sigma_mm, or these and rest_x_mm,rest_y_mm,rest_z_mm, which names them in its first line. A row
 /// whose last three are empty is a place of the surface. sigma_mm: an axis. Refuses, naming file and line, anything
-/// else, a sigma that is not over 0, no row at all and over 300, which would take minutes.
+/// else, a sigma out of kLeastGivenSigma_mm to kMostGivenSigma_mm, no row at all and over 300, which would take
+/// minutes.
 Result<PointRows> read_point_rows(const std::filesystem::path& path);
 
 }  // namespace birdseye::host

@@ -367,6 +367,8 @@ Result<RegistrationCase> read_case(const fs::path& path) {
   if (const CaseTable target = table("target"); target.has("place_mm")) {
     const auto place = read_numbers(target, "place_mm", 3, "is three numbers, mm in the patient's frame");
     if (!place) return place.error();
+    if (!lies_in(out.ct, *place))
+      return target.wrong("place_mm", "lies outside the CT; give mm in the patient's frame, LPS");
     out.target_mm = *place;
   }
   if (auto done = read_further(path, all, out); !done) return done.error();

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "host/files/picture.hpp"
@@ -67,7 +68,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
   if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
   matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient),
                    transfer = std::move(transfer), made = made_.organ,
-                   touches = std::move(touches)](const std::stop_token& stop, const auto& say) {
+                   touches = std::move(touches)](const std::stop_token& stop, const auto& say) -> Result<Matched> {
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
     GeometrySettings settings;
@@ -78,19 +79,24 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);
-    return one.execute([&]() -> Result<Matched> {
-      auto organ = made;
-      if (!organ) {
-        auto fresh =
-            organ_at_rest(patient->ct, patient->labels ? &*patient->labels : nullptr, patient->organ, *transfer);
-        if (!fresh) return fresh.error();
-        organ = *std::move(fresh);
-      }
-      auto found = register_geometry(views, pictures, patient->ct, *organ, settings);
-      if (!found) return found.error();
-      const Verdict verdict = geometry_verdict(views, *found, JudgedBy::target);
-      return Matched{*std::move(found), verdict, std::move(organ)};
-    });
+    try {
+      return one.execute([&]() -> Result<Matched> {
+        auto organ = made;
+        if (!organ) {
+          auto fresh =
+              organ_at_rest(patient->ct, patient->labels ? &*patient->labels : nullptr, patient->organ, *transfer);
+          if (!fresh) return fresh.error();
+          organ = *std::move(fresh);
+        }
+        auto found = register_geometry(views, pictures, patient->ct, *organ, settings);
+        if (!found) return found.error();
+        const Verdict verdict =
+            geometry_verdict(views, *found, patient->landmarks.empty() ? JudgedBy::inside : JudgedBy::target);
+        return Matched{*std::move(found), verdict, std::move(organ)};
+      });
+    } catch (const std::exception& problem) {  // of a library: it must not end the operation
+      return Error{Errc::io, fmt::format("the views were not matched: {}", problem.what())};
+    }
   });
 }
 

@@ -43,8 +43,8 @@ void LiveWorkflow::tick() {
     show_shape();
     matched_.organ = deformation_.organ();
     matched_.deformed = deformation_.found();
-    for (std::size_t n = 0; n < deformation_.adjusted().size(); ++n)
-      matched_.views[n].camera_from_patient = deformation_.adjusted()[n];
+    const std::size_t adjusted = std::min(deformation_.adjusted().size(), matched_.views.size());
+    for (std::size_t n = 0; n < adjusted; ++n) matched_.views[n].camera_from_patient = deformation_.adjusted()[n];
     watch_.show(matched_);
     keep();
   }

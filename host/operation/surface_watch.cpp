@@ -1,8 +1,10 @@
 #include "host/operation/surface_watch.hpp"
 
+#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #include "host/registration/geometry/organ_surface.hpp"
@@ -63,7 +65,13 @@ void SurfaceWatch::offer(const KeptView& frame, const std::optional<double>& pos
   checking_.start([shown = shown_, frame, pose_mm, now](const std::stop_token&, const auto&) {
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);
-    return one.execute([&] { return Outcome{{shown->find(frame, pose_mm), now}, shown}; });
+    try {
+      return one.execute([&] { return Outcome{{shown->find(frame, pose_mm), now}, shown}; });
+    } catch (const std::exception& problem) {  // of a library: it must not end the operation
+      SurfaceFinding none;
+      none.words = fmt::format("the check broke off: {}", problem.what());
+      return Outcome{{std::move(none), now}, shown};
+    }
   });
 }
 

@@ -70,6 +70,8 @@ std::optional<BelievedDeformation> believe(const SignedDistance& organ, std::spa
   if (!std::all_of(fits.begin(), fits.end(), [](const auto& fit) { return fit.has_value(); })) return std::nullopt;
   BelievedDeformation out(organ);
   for (std::optional<DisplacementFit>& fit : fits) out.candidates.push_back(*std::move(fit));
+  std::erase_if(out.candidates, [](const DisplacementFit& fit) { return !std::isfinite(fit.log_evidence()); });
+  if (out.candidates.empty()) return std::nullopt;
   std::stable_sort(
       out.candidates.begin(), out.candidates.end(),
       [](const DisplacementFit& a, const DisplacementFit& b) { return a.log_evidence() > b.log_evidence(); });

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace birdseye::host {
 
@@ -211,6 +212,10 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     m.diagonal() += noise;
     out.factor_.compute(m);
     out.alpha_ = out.factor_.solve(wanted);
+    if (out.factor_.info() != Eigen::Success || !out.alpha_.allFinite()) {
+      out.log_evidence_ = -std::numeric_limits<double>::infinity();
+      return out;
+    }
     out.shared_ = -(by_shared.transpose() * out.alpha_.head(of_points));
     out.weights_of_centres_ = rows.array().colwise() * out.alpha_.array();
     if (prior.basis) out.unknowns_ = out.basis_rows_.transpose() * out.alpha_;

@@ -30,7 +30,8 @@ class DisplacementFit {
   [[nodiscard]] LatticeField seen_field(const SignedDistance& organ) const;
   /// Of where tissue is seen, mm^2: of tissue seen at seen_mm, which lay at rest_mm.
   [[nodiscard]] Eigen::Matrix3d covariance(const Eigen::Vector3d& rest_mm, const Eigen::Vector3d& seen_mm) const;
-  /// Of the points under the prior, linearised where the fit ended, nats; with the prior's own belief.
+  /// Of the points under the prior, linearised where the fit ended, nats; with the prior's own belief. Minus
+  /// infinity where rows contradict one another, or are no numbers: nothing else of such a fit is to be used.
   [[nodiscard]] double log_evidence() const { return log_evidence_; }
   [[nodiscard]] std::span<const double> weights() const { return weights_; }
   [[nodiscard]] std::span<const double> matched_weights() const { return matched_weights_; }

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/registration/geometry/open_sides.hpp"
 #include "host/registration/geometry/sight.hpp"
@@ -93,7 +94,9 @@ Mean inside_of(std::span<const Eigen::Vector3d> rest_mm, const BelievedDeformati
 
 ExpectedError expected_error(const Eigen::Matrix3d& covariance_mm2, const Eigen::Matrix3d& prior_covariance_mm2) {
   const double mean = covariance_mm2.trace(), squares = (covariance_mm2 * covariance_mm2).trace();
-  if (!(mean > 0)) return {0, 0, 0};
+  if (mean == 0) return {0, 0, 0};
+  constexpr double kUnknown_mm = std::numeric_limits<double>::infinity();
+  if (!(mean > 0) || !std::isfinite(mean)) return {kUnknown_mm, kUnknown_mm, 1};
   constexpr double kQuantile95 = 1.6448536269514722;  // of the normal distribution
   const double freedom = mean * mean / squares, a = 2 / (9 * freedom);
   ExpectedError out{std::sqrt(mean), std::sqrt(mean * std::pow(1 - a + kQuantile95 * std::sqrt(a), 3)), 1};

@@ -67,8 +67,11 @@ Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const
 Result<void> check_places(const GeometrySettings& settings) {
   for (std::size_t i = 0; i < settings.touches.size(); ++i) {
     const SeenPoint& touch = settings.touches[i];
-    if (!touch.place_mm.allFinite() || !(touch.sigma_mm > 0) || !(touch.shift_mm >= 0))
-      return Error{Errc::bad_value, fmt::format("touch {}: give a place and a sigma over 0, in mm", i + 1)};
+    if (!touch.place_mm.allFinite() ||
+        !(touch.sigma_mm >= kLeastGivenSigma_mm && touch.sigma_mm <= kMostGivenSigma_mm) || !(touch.shift_mm >= 0)) {
+      return Error{Errc::bad_value, fmt::format("touch {}: give a place and a sigma from {} to {} mm", i + 1,
+                                                kLeastGivenSigma_mm, kMostGivenSigma_mm)};
+    }
   }
   for (std::size_t i = 0; i < settings.matched.size(); ++i) {
     const MatchedPoint& point = settings.matched[i];
@@ -217,12 +220,16 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
       points[i].place_mm += points[i].by_common_mm * errors;
     }
     auto believed = believe(distance, points, more, found, settings.watch, settings.matched);
-    if (!believed) return called_off();
+    if (!believed && settings.watch.cancelled()) return called_off();
+    if (!believed) {
+      return Error{Errc::degenerate,
+                   "no deformation can be worked out from what is seen: check the sigmas of points and landmarks"};
+    }
     found = *std::move(believed);
     errors.setZero();
     for (std::size_t n = 0; n < found.fits.size(); ++n) errors += found.beliefs[n] * found.fits[n].common_errors();
     move_views();
-    out.evidence_of_motion_nats = evidence_of_motion_nats(distance, points, found);
+    out.evidence_of_motion_nats = evidence_of_motion_nats(distance, points, found, settings.matched);
     ++out.evaluations;
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
                                   out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),
@@ -231,7 +238,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   if (settings.watch.cancelled()) return called_off();
   out.field = field_over(ct, found.mean);
   out.min_jacobian = least_determinant(out.field);
-  out.folded = out.min_jacobian <= 0;
+  out.folded = !(out.min_jacobian > 0);  // what is not a number folds too
   if (out.folded) {
     out.worse_than_start = true;
     out.field = no_deformation(ct, distance);

@@ -71,9 +71,17 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
     return {Grade::marginal, {"the error to be expected of the target is not known: it was not asked for"}, {}};
   const ExpectedError target = named ? expected->targets.front() : *expected->inside;
   const char* const what = named ? "the target" : "the organ's inside";
-  if (target.radius95_mm > kSure_mm) {
-    return {target.radius95_mm > kLost_mm ? Grade::fail : Grade::marginal,
+  if (!(target.radius95_mm <= kSure_mm)) {
+    return {target.radius95_mm <= kLost_mm ? Grade::marginal : Grade::fail,
             {fmt::format("{} may be {:.1f} mm off (95 %), over {} mm: {}", what, target.radius95_mm, kSure_mm,
+                         views_to_add(*expected))},
+            {}};
+  }
+  // A prior may be narrow, and wrong, about a place of which nothing else tells.
+  constexpr double kNearlyAll = 0.9;
+  if (target.left_of_prior >= kNearlyAll) {
+    return {Grade::marginal,
+            {fmt::format("{} is known by what organs do alone, for nothing that is seen tells of it: {}", what,
                          views_to_add(*expected))},
             {}};
   }

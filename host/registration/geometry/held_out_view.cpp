@@ -73,6 +73,7 @@ std::optional<HeldOutView> held_out_view(const SignedDistance& organ, const std:
   if (points.size() < kFewestPlaces) return std::nullopt;
   const DisplacementFit& best = found.fits.front();
   const DisplacementFit fit = DisplacementFit::solve(organ, points, best.prior(), &best, kGoOn_mm, matched);
+  if (!std::isfinite(fit.log_evidence())) return std::nullopt;
   const LatticeField field = fit.seen_field(organ);
   const SeenSurface without(seen_distance(organ, field));
   const std::vector<SeenPoint> own =

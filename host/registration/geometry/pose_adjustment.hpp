@@ -19,8 +19,8 @@ struct PoseAdjustment {
 
 /// The most that poses err by which a cart averages.
 inline constexpr PoseNoise kUsualPoseNoise{2, 0.5 * std::numbers::pi / 180};
-/// The most that poses may err by and be corrected: those of single records of a tracker, far from the lens. Poses that
-/// seem to err by more were not corrected rightly.
+/// The most that poses may err by and be corrected: those of single records of a tracker, far from the lens. Eyes that
+/// seem to be off by as much were not corrected rightly; of angles that was not found so.
 inline constexpr PoseNoise kMostPoseNoise{4, 0.6 * std::numbers::pi / 180};
 
 /// Moves the views until the matches agree: a bundle adjustment whose points lie on the first view's rays, with

@@ -10,6 +10,10 @@ inline constexpr int kCommonErrors = 7;
 using ByCommonErrors = Eigen::Matrix<double, 3, kCommonErrors>;  ///< how they move a place, mm
 using CommonErrors = Eigen::Matrix<double, kCommonErrors, 1>;
 
+/// What a standard deviation may be of a place that is given from outside: smaller ones contradict one another where a
+/// place is given twice, and beyond the larger a place tells nothing of an organ.
+inline constexpr double kLeastGivenSigma_mm = 0.01, kMostGivenSigma_mm = 100;
+
 /// A place that is on the organ's surface now, patient mm, known along the surface's normal.
 struct SeenPoint {
   Eigen::Vector3d place_mm;

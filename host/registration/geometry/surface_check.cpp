@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
@@ -21,6 +22,7 @@ constexpr double kChance = 0.01;              ///< of a false alarm, a check
 constexpr std::size_t kManyPatches = 40;      ///< of which a shift is always found where nothing has moved
 constexpr std::size_t kLeastOutline = 30;     ///< places by which alone it can be told
 constexpr std::size_t kLeastOutlinePart = 8;  ///< places of one part
+constexpr double kMostBound_mm = 5;           ///< a motion that none of the figures would show is not ruled out
 
 /// A figure that is nearly zero where nothing has moved.
 struct Test {
@@ -80,6 +82,13 @@ std::vector<Test> tests_of_outline(const CheckedPlaces& places, const CheckError
     out.push_back({part, std::abs(median(std::move(signed_mm))), sigma_mm, 1, 0});
     out.push_back({part, median(std::move(sizes_mm)), sigma_mm, 1, kHalfAreBelow * kOwn_mm});
   }
+  return out;
+}
+
+/// Of the figure that shows the smallest motion.
+double least_bound_mm(const std::vector<Test>& tests) {
+  double out = std::numeric_limits<double>::infinity();
+  for (const Test& test : tests) out = std::min(out, test.bound_mm);
   return out;
 }
 
@@ -148,6 +157,9 @@ SurfaceFinding judge(const CheckedPlaces& places, const CheckErrors& errors) {
     out.words = "nothing of what the kept views show is found again: smoke, an instrument, or the organ has moved far";
   } else if (!texture_told && places.outline.size() < kLeastOutline) {
     out.words = "too little of the organ is seen here that a kept view shows too, and too little of its outline";
+  } else if (const double least_mm = least_bound_mm(tests); least_mm > kMostBound_mm) {
+    out.words =
+        fmt::format("poses and surface are known so little that a motion under {:.0f} mm would not show", least_mm);
   } else {
     out.verdict = SurfaceVerdict::holds;
     return out;

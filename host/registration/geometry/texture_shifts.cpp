@@ -20,6 +20,7 @@ constexpr std::size_t kMostViews = 2;                     ///< earlier ones that
 constexpr double kLeastFacing = 0.3;                      ///< cosine
 constexpr double kLeastAlong = 0.819;                     ///< cosine of 35 degrees between the views' rays
 constexpr double kLeastUsable = 0.95;                     ///< share of a patch
+constexpr double kNearest_mm = 20;                        ///< nearer, a mm is too many pixels to look through
 
 bool shown_by(const PinholeView& view, double x_px, double y_px) {
   constexpr int kBorder_px = 2;
@@ -39,7 +40,7 @@ std::optional<Place> place_at(const PinholeView& now, const SeenSurface& surface
   if (!shown_by(now, x_px, y_px)) return std::nullopt;
   const Eigen::Vector3d ray = now.ray(x_px, y_px);
   const auto met = surface.meet(now.eye_in_patient_mm, ray);
-  if (!met || met->distance_mm != 0) return std::nullopt;
+  if (!met || met->distance_mm != 0 || met->depth_mm < kNearest_mm) return std::nullopt;
   const Eigen::Vector3d place_mm = now.eye_in_patient_mm + met->depth_mm * ray;
   const Eigen::Vector3d normal = surface.normal(place_mm);
   if (-normal.dot(ray.normalized()) < kLeastFacing) return std::nullopt;

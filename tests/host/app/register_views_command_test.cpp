@@ -169,9 +169,17 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
   const auto file = changed(scratch, "\"gradient\"", "\"geometry\"");
   for (const char* view : {"view0", "view1", "view2"})
     std::ofstream(scratch / "c" / (std::string(view) + ".txt")) << "1 0 0 0\n0 1 0 0\n0 0 1 -4000\n0 0 0 1\n";
+  // An earlier registration's results must not be taken for this one's.
+  fs::create_directories(scratch / "out");
+  for (const char* name : {"field.mha", "report.html", "view0_after.png", "notes.txt"})
+    std::ofstream(scratch / "out" / name) << "an earlier one's";
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 3) << result.output;
   EXPECT_EQ(read_json(scratch / "r.json")["verdict"], "fail");
+  for (const char* name : {"field.mha", "report.html", "view0_after.png"})
+    EXPECT_FALSE(fs::exists(scratch / "out" / name)) << name;
+  EXPECT_TRUE(fs::exists(scratch / "out/result.json"));
+  EXPECT_TRUE(fs::exists(scratch / "out/notes.txt"));
 }
 
 /// What a registration says of an organ that lies as in its CT. from and to: what of the case is changed, as changed()
@@ -250,6 +258,7 @@ TEST(RegisterViewsCommand, RefusesCasesThatCannotBeUsed) {
            {"label_values = \\[.*\\]", "label_values = []", {"label_values"}},
            {"image = \"view1.png\"", "image = \"camera.yaml\"", {"camera.yaml", "picture"}},
            {"camera_from_patient = \"view1.txt\"", "camera_from_patient = \"camera.yaml\"", {"camera.yaml"}},
+           {"place_mm = \\[.*\\]", "place_mm = [4000, 2, 3]", {"[target] place_mm", "outside the CT"}},
            {"level = ", "levle = ", {"[model] levle", "not known", "level"}},
            {"\\[truth\\]", "[turth]", {"turth", "truth"}},
            {"\\[model\\]", "[model", {"case.toml"}}}) {
@@ -363,6 +372,8 @@ TEST(RegisterViewsCommand, RefusesLandmarksAndPlacesThatCannotBe) {
            {points, header + "1,2,3,1\n1,two,3,1\n", {"points.csv: line 3", "'two'"}},
            {points, header + "1,2,nan,1\n", {"points.csv: line 2", "'nan'"}},
            {points, header + "1,2,3,0\n", {"points.csv: line 2", "sigma_mm is 0"}},
+           {points, header + "1,2,3,1e200\n", {"points.csv: line 2", "sigma_mm is 1e+200", "0.01 to 100"}},
+           {points, header + "12 5,2,3,1\n", {"points.csv: line 2", "'12 5'"}},
            {points, "x_mm,y_mm,z_mm,sigma_mm,rest_x_mm,rest_y_mm,rest_z_mm\n1,2,3,1,4,,6\n", {"line 2", "'' is not"}},
            {points, many, {"points.csv: line 302", "300"}}}) {
     std::ofstream(scratch / "c/points.csv") << csv;

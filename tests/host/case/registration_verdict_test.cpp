@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace birdseye::host {
 namespace {
 
@@ -97,6 +99,23 @@ TEST(RegistrationVerdict, NamesAViewThatDoesNotBearOutTheOthers) {
   // So little may be the lens's.
   found.held_out = HeldOutView{1, 40, 0.49, 0.1};
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+TEST(RegistrationVerdict, PassesNoTargetThatThePriorAloneTellsOf) {
+  ViewRegistration found = well_found();
+  found.expected->targets.front().left_of_prior = 0.9;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "nothing that is seen tells of it"));
+  found.expected->targets.front().left_of_prior = 0.89;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+TEST(RegistrationVerdict, FailsATargetWhoseErrorIsNoNumber) {
+  ViewRegistration found = well_found();
+  for (const double odd : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    found.expected->targets.front().radius95_mm = odd;
+    EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail) << odd;
+  }
 }
 
 TEST(RegistrationVerdict, FailsPosesThatErrByAsMuchAsIsLookedFor) {

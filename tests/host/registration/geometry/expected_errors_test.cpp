@@ -76,6 +76,42 @@ TEST(ExpectedErrors, OfWhatIsNotSeenAreThoseOfThePrior) {
   EXPECT_NEAR(one_axis.radius95_mm, 1.96 * 2, 0.05);
 }
 
+TEST(ExpectedErrors, OfWhatIsNoCovarianceAreBeyondAllLimits) {
+  const Eigen::Matrix3d prior = 16 * Eigen::Matrix3d::Identity();
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  for (const double odd : {nan, inf, -4.0}) {
+    const ExpectedError expected = expected_error(odd * Eigen::Matrix3d::Identity(), prior);
+    EXPECT_EQ(expected.radius95_mm, inf) << odd;
+    EXPECT_EQ(expected.left_of_prior, 1) << odd;
+  }
+}
+
+TEST(Believe, NoFitWhoseRowsContradictOneAnother) {
+  const SignedDistance organ = testing::ball(kOpenBall_mm);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<SeenPoint> points{{{0, -40, 0}, nan, std::nullopt}, {{0, -39, 9}, 0.2, std::nullopt}};
+  DisplacementPrior prior;
+  prior.parts = {{30, 4}};
+  const std::vector priors{prior};
+  EXPECT_FALSE(believe(organ, points, priors, BelievedDeformation(organ), {}));
+}
+
+TEST(MotionEvidence, IsHeldAgainstNoneByTheSameMatchedPoints) {
+  const SignedDistance organ = testing::ball(kOpenBall_mm);
+  DisplacementPrior prior;
+  prior.parts = {{60, 4}};
+  const std::vector priors{prior};
+  for (const double shift_mm : {0.0, 3.0}) {
+    std::vector<MatchedPoint> matched;
+    for (const Eigen::Vector3d& rest : {Eigen::Vector3d(20, 0, 0), {-20, 0, 0}, {0, 20, 0}, {0, -20, 0}, {0, 0, 20}})
+      matched.push_back({rest, rest + Eigen::Vector3d(0, shift_mm, 0), 0.01 * Eigen::Matrix3d::Identity()});
+    const auto found = believe(organ, {}, priors, BelievedDeformation(organ), {}, matched);
+    ASSERT_TRUE(found);
+    const double nats = evidence_of_motion_nats(organ, {}, *found, matched);
+    EXPECT_TRUE(shift_mm == 0 ? nats < 0 : nats > 3) << shift_mm << " mm: " << nats << " nats";
+  }
+}
+
 TEST(MotionEvidence, GrowsWithTheMotionAndIsAgainstNone) {
   const SignedDistance organ = testing::ball(kOpenBall_mm);
   double before_nats = -std::numeric_limits<double>::infinity();

@@ -91,8 +91,12 @@ TEST(SurfaceCheck, SeesTextureThatSlid) {
   const SurfaceFinding slid = judge(places, kErrors);
   EXPECT_EQ(slid.verdict, SurfaceVerdict::moved);
   EXPECT_NE(slid.words.find("at the left"), std::string::npos) << slid.words;
-  // What is not known so well is not said to have moved.
-  EXPECT_EQ(judge(places, {3, 0.3}).verdict, SurfaceVerdict::holds);
+  // What is not known so well is not said to have moved, nor to hold.
+  EXPECT_NE(judge(places, {3, 0.3}).verdict, SurfaceVerdict::moved);
+  const SurfaceFinding mute = judge(places, {0.5, 2.5});
+  EXPECT_EQ(mute.verdict, SurfaceVerdict::cannot_tell);
+  EXPECT_FALSE(mute.figure_mm.has_value());
+  EXPECT_NE(mute.words.find("would not show"), std::string::npos) << mute.words;
 }
 
 TEST(SurfaceCheck, CannotTellByTooFewPlaces) {
