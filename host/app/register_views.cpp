@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <regex>
 
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -239,7 +240,7 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   return files;
 }
 
-/// Makes the folder, and takes away what a registration before wrote there: it must not be taken for this one's.
+/// Makes the folder, and removes the results of an earlier registration from it, which nobody must take for this one's.
 Result<void> make_empty_of_results(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -248,16 +249,16 @@ Result<void> make_empty_of_results(const fs::path& folder) {
   for (const char* name : {"field.mha", "result.json", "report.html", "expected_error.png", "trace.svg", "pose.txt"})
     old.push_back(folder / name);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("view") && (name.ends_with("_before.png") || name.ends_with("_after.png")))
-      old.push_back(entry.path());
+    static const std::regex kOfAView("view[0-9]+(_difference)?_(before|after)\\.png");
+    if (std::regex_match(entry.path().filename().string(), kOfAView)) old.push_back(entry.path());
   }
   for (const fs::path& path : old) {
     fs::remove(path, error);
-    if (error)
+    if (error) {
       return Error{Errc::unreadable, fmt::format("{}: is of an earlier registration and cannot be removed; "
                                                  "choose another folder",
                                                  path.string())};
+    }
   }
   return {};
 }

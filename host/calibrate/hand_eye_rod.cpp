@@ -18,12 +18,6 @@ namespace {
 
 using calibration::HandEyeStation;
 
-std::string trimmed(const std::string& text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
 /// The name under which the angles have a picture; empty if they have none.
 std::string name_in(const RodAngles& angles, const std::string& picture) {
   if (angles.contains(picture)) return picture;
@@ -109,11 +103,12 @@ Result<RodAngles> read_rod_angles(const std::filesystem::path& path) {
   RodAngles angles;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
-    const std::string row = trimmed(line);
+    const std::string row(trimmed(line));
     if (row.empty() || row[0] == '#' || (number == 1 && row == "name,angle_deg")) continue;
     const std::size_t comma = row.rfind(',');
-    const std::string name = trimmed(row.substr(0, comma));
-    const ReadNumber angle = read_number(comma == std::string::npos ? "" : trimmed(row.substr(comma + 1)));
+    const std::string name(trimmed(std::string_view(row).substr(0, comma)));
+    const ReadNumber angle =
+        read_number(comma == std::string::npos ? "" : trimmed(std::string_view(row).substr(comma + 1)));
     if (comma == std::string::npos || name.empty() || !angle.problem.empty())
       return Error{Errc::bad_format,
                    fmt::format("{}:{}: give a picture's name and an angle, as view1.png,30", path.string(), number)};

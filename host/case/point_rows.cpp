@@ -10,6 +10,8 @@
 #include <sstream>
 #include <string_view>
 
+#include "host/files/pose_collector.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -18,18 +20,12 @@ constexpr std::string_view kSurfaceHeader = "x_mm,y_mm,z_mm,sigma_mm";
 constexpr std::string_view kMatchedHeader = "x_mm,y_mm,z_mm,sigma_mm,rest_x_mm,rest_y_mm,rest_z_mm";
 constexpr std::size_t kSurfaceFields = 4, kMatchedFields = 7, kMostRows = 300;
 
-std::string without_blanks_about(const std::string& text) {
-  constexpr const char* kBlanks = " \t\r\v\f";
-  const auto first = text.find_first_not_of(kBlanks);
-  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
 /// What stands between the commas, without the blanks about it.
 std::vector<std::string> fields_of(std::string line) {
   line += ',';  // getline leaves out an empty last one
   std::vector<std::string> out;
   std::istringstream in(line);
-  for (std::string field; std::getline(in, field, ',');) out.push_back(without_blanks_about(field));
+  for (std::string field; std::getline(in, field, ',');) out.emplace_back(trimmed(field));
   return out;
 }
 

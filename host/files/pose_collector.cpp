@@ -18,13 +18,6 @@ constexpr double kRotationTolerance = 1e-3;
 /// No tracker sees so far; what is beyond stands for "not seen", as NDI's -3.697314E28 does.
 constexpr double kFarthest_mm = 1e5;
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\n";
-  const auto first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
-
 /// What is wrong with a position, if anything.
 std::string problem_of(const Eigen::Vector3d& position_mm) {
   if (!position_mm.allFinite()) return "not finite";
@@ -36,6 +29,13 @@ std::string problem_of(const Eigen::Vector3d& position_mm) {
 }
 
 }  // namespace
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\n";
+  const auto first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
 
 ReadNumber read_number(std::string_view text) {
   text = trimmed(text);

@@ -9,6 +9,9 @@
 
 namespace birdseye::host {
 
+/// Without the blanks before and after it.
+std::string_view trimmed(std::string_view text);
+
 /// A number, or what stands in its place, in words: "missing", "\"abc\" is no number".
 struct ReadNumber {
   double value = 0;

@@ -81,7 +81,7 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
   constexpr double kNearlyAll = 0.9;
   if (target.left_of_prior >= kNearlyAll) {
     return {Grade::marginal,
-            {fmt::format("{} is known by what organs do alone, for nothing that is seen tells of it: {}", what,
+            {fmt::format("nothing that is seen tells of {}, so that its error is a guess: {}", what,
                          views_to_add(*expected))},
             {}};
   }

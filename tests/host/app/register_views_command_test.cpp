@@ -171,7 +171,7 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
     std::ofstream(scratch / "c" / (std::string(view) + ".txt")) << "1 0 0 0\n0 1 0 0\n0 0 1 -4000\n0 0 0 1\n";
   // An earlier registration's results must not be taken for this one's.
   fs::create_directories(scratch / "out");
-  for (const char* name : {"field.mha", "report.html", "view0_after.png", "notes.txt"})
+  for (const char* name : {"field.mha", "report.html", "view0_after.png", "viewpoint_after.png"})
     std::ofstream(scratch / "out" / name) << "an earlier one's";
   const auto result = run("birdseye", arguments(file, scratch) + " --json " + (scratch / "r.json").string());
   EXPECT_EQ(result.code, 3) << result.output;
@@ -179,7 +179,7 @@ TEST(RegisterViewsCommand, FailsWhereNoViewSeesTheOrgan) {
   for (const char* name : {"field.mha", "report.html", "view0_after.png"})
     EXPECT_FALSE(fs::exists(scratch / "out" / name)) << name;
   EXPECT_TRUE(fs::exists(scratch / "out/result.json"));
-  EXPECT_TRUE(fs::exists(scratch / "out/notes.txt"));
+  EXPECT_TRUE(fs::exists(scratch / "out/viewpoint_after.png")) << "is somebody's own";
 }
 
 /// What a registration says of an organ that lies as in its CT. from and to: what of the case is changed, as changed()

@@ -105,7 +105,7 @@ TEST(RegistrationVerdict, PassesNoTargetThatThePriorAloneTellsOf) {
   ViewRegistration found = well_found();
   found.expected->targets.front().left_of_prior = 0.9;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::marginal);
-  EXPECT_TRUE(says(verdict_of(with_target(), found), "nothing that is seen tells of it"));
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "nothing that is seen tells of the target"));
   found.expected->targets.front().left_of_prior = 0.89;
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
 }
