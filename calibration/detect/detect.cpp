@@ -166,6 +166,7 @@ Detection detect(const Pattern& pattern, const GreyView& picture, const std::str
   const FoundPattern found = find(pattern, picture, search);
   detection.points_seen = static_cast<int>(found.ids.size());
   detection.contrast = found.contrast;
+  detection.layout = found.layout;
   detection.glare = std::max(found.glare, glare_of(pattern, picture, found.ids, found.points_px));
   detection.area_share = area_share(found.points_px, picture);
   measure_sharpness(found.edges, detection);

@@ -9,6 +9,16 @@
 
 namespace birdseye::calibration {
 
+/// What a picture of a ChArUco board tells of the layout of its tags, which OpenCV changed in 4.6. Of the corners
+/// between two tags: how many the tags put at one place, less those that they put a square and more apart, in the
+/// layout that was told and in the other one. With an odd count of columns the two layouts differ at the ends of the
+/// rows alone: where no end is seen, both figures are alike.
+struct LayoutEvidence {
+  int joined = 0, joined_in_other = 0;
+  /// A misread tag joins or tears a corner or two.
+  [[nodiscard]] bool is_other() const { return joined_in_other >= joined + 3; }
+};
+
 /// What a picture shows of a pattern, and how well it shows it. Figures are given where they could be taken, for
 /// rejected pictures too.
 struct Detection {
@@ -23,6 +33,7 @@ struct Detection {
   double glare = 0;       ///< share of the pattern's dark places that are saturated
   double contrast = 0;    ///< light less dark of the pattern, grey levels
   double area_share = 0;  ///< of the picture, within the outline of the points
+  LayoutEvidence layout;  ///< of a ChArUco board
 };
 
 /// How much time a picture without the pattern may take. `thorough` searches again and looks for the reason why nothing

@@ -57,22 +57,19 @@ std::map<int, Predicted> predict(const Pattern& pattern, const std::vector<int>&
   return corners;
 }
 
-/// How well a layout agrees with the tags that are seen: of the corners between two tags, those where both put them
-/// within reach of each other, and those that they put a square and more apart.
-struct TagAgreement {
-  int joined = 0, torn = 0;
-};
-TagAgreement agreement_of(const std::map<int, Predicted>& corners) {
-  TagAgreement agreement;
+/// Of the corners between two tags, those that the tags put within reach of each other less those that they put a
+/// square and more apart.
+int joined_in(const std::map<int, Predicted>& corners) {
+  int joined = 0;
   for (const auto& [id, predicted] : corners) {
     if (predicted.by_tag.size() != 2) continue;
     const Cross& cross = predicted.by_tag[0];
     const double apart_px = (cross.centre_px - predicted.by_tag[1].centre_px).norm();
     const double side_px = std::sqrt(std::abs(cross.px_per_square.determinant()));
-    if (apart_px < kAgree_squares * side_px) ++agreement.joined;
-    if (apart_px > side_px) ++agreement.torn;
+    if (apart_px < kAgree_squares * side_px) ++joined;
+    if (apart_px > side_px) --joined;
   }
-  return agreement;
+  return joined;
 }
 
 /// What two tags that agree say of the corner between them.
@@ -174,15 +171,13 @@ void detect_tags(const Pattern& pattern, const cv::Mat& grey, std::vector<int>& 
   cv::aruco::detectMarkers(grey, cv::aruco::getPredefinedDictionary(pattern.dictionary), quads, ids, settings);
 }
 
-/// With an odd count of columns the other layout is the same but for a shift, which tears only the ends of the rows.
-bool is_other_layout(const Pattern& pattern, const std::map<int, Predicted>& predictions, const std::vector<int>& ids,
-                     const std::vector<std::vector<cv::Point2f>>& quads) {
-  if (pattern.rows % 2 != 0) return false;
+/// With an odd count of rows the two layouts are one.
+LayoutEvidence evidence_of(const Pattern& pattern, const std::map<int, Predicted>& predictions,
+                           const std::vector<int>& ids, const std::vector<std::vector<cv::Point2f>>& quads) {
+  if (pattern.rows % 2 != 0) return {};
   Pattern other = pattern;
   other.legacy = !pattern.legacy;
-  const TagAgreement as_told = agreement_of(predictions);
-  const TagAgreement as_other = agreement_of(predict(other, ids, quads));
-  return as_told.torn >= 2 && as_told.torn > 2 * as_other.torn && as_other.joined > as_told.joined;
+  return {joined_in(predictions), joined_in(predict(other, ids, quads))};
 }
 
 }  // namespace
@@ -193,13 +188,16 @@ FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Searc
   std::vector<std::vector<cv::Point2f>> quads;
   detect_tags(pattern, grey, ids, quads);
   const auto predictions = predict(pattern, ids, quads);
-  if (is_other_layout(pattern, predictions, ids, quads)) {
+  const LayoutEvidence layout = evidence_of(pattern, predictions, ids, quads);
+  if (layout.is_other()) {
     FoundPattern none;
+    none.layout = layout;
     none.failure = fmt::format("the tags lie as in the {} layout: {} :legacy in the pattern",
                                pattern.legacy ? "new" : "old", pattern.legacy ? "leave out" : "add");
     return none;
   }
   FoundPattern found = corners_between(pattern, picture, predictions);
+  found.layout = layout;
   const std::size_t corners = found.ids.size();
   if (corners >= kLeastCorners) return found;
   cv::Mat mirrored;

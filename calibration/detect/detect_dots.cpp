@@ -18,8 +18,8 @@ namespace {
 constexpr std::array<int, 3> kWindows = {10, 24, 4};  // of the threshold: the picture's shorter side over these
 constexpr std::size_t kLeastDots = 9;                 // the smallest grid there is
 constexpr double kLarger = 1.2;                       // times the usual diameter; a measured one is some hundredths off
-constexpr double kCovered = 0.88;         // times the usual diameter: part of the dot is hidden, its centroid moved
-constexpr int kAround = 3;                // steps; what is near a dot is what it is larger than
+constexpr double kCovered = 0.88;                     // times the usual diameter of its kind: part of the dot is hidden
+constexpr int kAround = 3;                            // steps; what is near a dot is what it is larger than
 constexpr int kMargin = 2;                // one dot misjudged must not decide between two ways to number a grid
 constexpr int kStrayRows = 2;             // beside the grid: what stands in line with its dots by chance
 constexpr double kMostStrays = 0.02;      // of the dots
@@ -165,23 +165,36 @@ std::vector<GridPoint> numbered(const Pattern& pattern, const std::vector<Dot>& 
   return points;
 }
 
+/// The median diameter of the dots around one, itself among them, in steps.
+double usual_diameter(const std::vector<GridPoint>& lattice, const std::vector<DotLook>& looks, std::size_t at) {
+  std::vector<double> around;
+  for (std::size_t k = 0; k < lattice.size(); ++k) {
+    const int apart = (lattice[k].place - lattice[at].place).cwiseAbs().maxCoeff();
+    if (apart <= kAround && looks[k].diameter_steps > 0) around.push_back(looks[k].diameter_steps);
+  }
+  return median_of(around);
+}
+
 /// Each dot against those around it, without those that are covered in part or are no dots of this grid: blur and tilt
 /// make all of them look wider or narrower than they are.
 std::vector<Dot> dots_of(const Pattern& pattern, const std::vector<GridPoint>& lattice,
                          const std::vector<DotBlob>& blobs) {
   const auto looks = look_at_dots(lattice, blobs);
+  std::vector<double> times_usual(lattice.size(), 0);  // 0: not known
+  std::vector<double> of_larger;
+  for (std::size_t i = 0; i < lattice.size(); ++i) {
+    if (looks[i].diameter_steps <= 0) continue;
+    times_usual[i] = looks[i].diameter_steps / usual_diameter(lattice, looks, i);
+    if (times_usual[i] > kLarger) of_larger.push_back(times_usual[i]);
+  }
+  const double usual_larger = of_larger.empty() ? 0 : median_of(of_larger);
   std::vector<Dot> dots;
   for (std::size_t i = 0; i < lattice.size(); ++i) {
     Dot dot{lattice[i].place, std::nullopt, looks[i].centre_px};
-    if (looks[i].diameter_steps > 0) {
-      std::vector<double> around;
-      for (std::size_t k = 0; k < lattice.size(); ++k) {
-        const int apart = (lattice[k].place - lattice[i].place).cwiseAbs().maxCoeff();
-        if (apart <= kAround && looks[k].diameter_steps > 0) around.push_back(looks[k].diameter_steps);
-      }
-      const double usual = median_of(around);
-      const bool larger = looks[i].diameter_steps > kLarger * usual;
-      if (looks[i].diameter_steps < kCovered * usual || (larger && pattern.larger_dots.empty())) continue;
+    if (times_usual[i] > 0) {
+      const bool larger = times_usual[i] > kLarger;
+      if (times_usual[i] < kCovered || (larger && pattern.larger_dots.empty())) continue;
+      if (larger && times_usual[i] < kCovered * usual_larger) continue;
       if (!pattern.larger_dots.empty()) dot.larger = larger;
     }
     dots.push_back(dot);
@@ -239,6 +252,14 @@ NumberedDots number_dots(const Pattern& pattern, const std::vector<Dot>& dots) {
   return best;
 }
 
+/// Where the dots' places, mirrored, can be numbered.
+bool is_mirrored(const Pattern& pattern, std::vector<GridPoint> lattice, const std::vector<DotBlob>& blobs) {
+  if (pattern.larger_dots.empty()) return false;
+  for (GridPoint& point : lattice) point.place.x() *= -1;
+  auto dots = dots_of(pattern, lattice, blobs);
+  return why_not_numbered(pattern, dots, numberings(pattern, dots)).empty();
+}
+
 NumberedDots number_lattice(const Pattern& pattern, const std::vector<GridPoint>& lattice,
                             const std::vector<DotBlob>& blobs) {
   std::optional<NumberedDots> first;
@@ -248,6 +269,11 @@ NumberedDots number_lattice(const Pattern& pattern, const std::vector<GridPoint>
     auto result = number_dots(pattern, dots_of(pattern, points, blobs));
     if (result.failure.empty()) return result;
     if (!first) first = std::move(result);
+    if (is_mirrored(pattern, points, blobs)) {
+      first->failure =
+          "the picture is mirrored, or the board is seen from behind: turn the mirroring off where it is made";
+      break;
+    }
   }
   return *first;
 }

@@ -22,7 +22,7 @@ constexpr int kMapReach = 2;             // steps to either side
 constexpr double kLeastOff_px = 0.7;     // noise and blur move no dot as far
 constexpr double kOffMap = 0.03;         // of a step: what a map of second order leaves of perspective
 constexpr double kOffNeighbours = 0.15;  // of a step: at a corner the neighbours, all to one side, foretell no better
-constexpr double kAreaRatio = 6;         // larger dots are up to twice as wide; beyond, it is no dot of this grid
+constexpr double kAreaRatio = 20;        // larger dots are up to 4 times as wide; beyond, it is no dot of this grid
 constexpr double kLeastSine = 0.4;       // between the two steps; a tilt of 60 degrees makes it 0.5 at worst
 constexpr double kMostStepRatio = 3;     // long over short step
 

@@ -58,15 +58,37 @@ Looked look(const calibration::Pattern& pattern, const fs::path& path) {
   return looked;
 }
 
+std::vector<Looked> look_at_all(const calibration::Pattern& pattern, const std::vector<fs::path>& pictures) {
+  std::vector<Looked> looked(pictures.size());
+  tbb::parallel_for(std::size_t{0}, looked.size(), [&](std::size_t i) { looked[i] = look(pattern, pictures[i]); });
+  return looked;
+}
+
+/// One picture may show no end of a row, which alone tells a board's layout.
+bool has_other_layout(const std::vector<Looked>& looked) {
+  calibration::LayoutEvidence all;
+  for (const Looked& one : looked) {
+    all.joined += one.detection.layout.joined;
+    all.joined_in_other += one.detection.layout.joined_in_other;
+  }
+  return all.is_other();
+}
+
 }  // namespace
 
 Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
                                         const std::vector<fs::path>& images_or_folders) {
   const auto pictures = pictures_of(images_or_folders);
   if (!pictures) return pictures.error();
-  std::vector<Looked> looked(pictures->size());
-  tbb::parallel_for(std::size_t{0}, looked.size(), [&](std::size_t i) { looked[i] = look(pattern, (*pictures)[i]); });
+  std::vector<Looked> looked = look_at_all(pattern, *pictures);
   PictureViews views;
+  if (has_other_layout(looked)) {
+    calibration::Pattern other = pattern;
+    other.legacy = !pattern.legacy;
+    looked = look_at_all(other, *pictures);
+    views.note = fmt::format("the board's tags lie as in the {} layout: it was read as {}, {} :legacy",
+                             other.legacy ? "old" : "new", pattern.spec, other.legacy ? "with" : "without");
+  }
   std::string first;
   for (std::size_t i = 0; i < looked.size(); ++i) {
     const std::string name = (*pictures)[i].filename().string();

@@ -43,7 +43,8 @@ struct Scene {
   Eigen::Vector2d middle = Eigen::Vector2d::Constant(0.5);  ///< what of the grid stands before the lens, as shares
   double ground = 200, dot = 40;
   double blur_px = 1, noise = 3;
-  bool draw_larger = true;
+  double larger_times = 1.5;    ///< the larger dots' diameter, in diameters of the others
+  double diameter_steps = 0.5;  ///< of the other dots, in steps of the pattern
   std::set<int> without = {};
 };
 
@@ -89,10 +90,9 @@ bool is_dot(const Pattern& pattern, const std::vector<double>& radius_mm, const 
 
 Picture render(const Pattern& pattern, const Scene& scene) {
   const auto points_mm = pattern_points_mm(pattern);
-  std::vector<double> radius_mm(points_mm.size(), 0.25 * pattern.spacing_mm * (pattern.asymmetric ? 1.4 : 1));
-  if (scene.draw_larger) {
-    for (const int id : pattern.larger_dots) radius_mm[static_cast<std::size_t>(id)] *= 1.5;
-  }
+  std::vector<double> radius_mm(points_mm.size(),
+                                scene.diameter_steps / 2 * pattern.spacing_mm * (pattern.asymmetric ? 1.4 : 1));
+  for (const int id : pattern.larger_dots) radius_mm[static_cast<std::size_t>(id)] *= scene.larger_times;
   for (const int id : scene.without) radius_mm[static_cast<std::size_t>(id)] = 0;
   const Eigen::Isometry3d pose = camera_from_marker(pattern, scene);
   const Eigen::Isometry3d back = pose.inverse();
@@ -209,6 +209,26 @@ TEST(DetectDots, PartsOfMarkedGridsAreNumberedByTheirLargerDots) {
   }
 }
 
+/// Plates in use have larger dots of 1.3 to 3.5 times the others' diameter; dots of a fifth of a step leave room for 4.
+TEST(DetectDots, LargerDotsAreOfAnySizeThatTheGridLeavesRoomFor) {
+  for (const double times : {1.3, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0}) {
+    Scene scene{.distance_mm = 60, .larger_times = times, .diameter_steps = std::min(0.5, 0.88 / times)};
+    const auto like = [&](const char* how) { return fmt::format("larger dots {} times as wide, {}", times, how); };
+    expect_found(kMarked, scene, 200, like("from ahead"));
+    for (const double axis_deg : {20.0, 110.0}) {
+      scene.tilt_deg = 45;
+      scene.tilt_axis_deg = axis_deg;
+      expect_found(kMarked, scene, 200, like("oblique"));
+    }
+    scene.tilt_deg = 20;
+    scene.blur_px = 2;
+    expect_found(kMarked, scene, 200, like("blurred"));
+    scene.distance_mm = 105;
+    scene.blur_px = 0.6;
+    if (times <= 3) expect_found(kMarked, scene, 440, like("from afar"));
+  }
+}
+
 std::string rejected(const std::string& spec, const Scene& scene) {
   const auto pattern = parse_pattern(spec);
   const Detection seen = detect(*pattern, view_of(render(*pattern, scene).grey), "");
@@ -226,7 +246,7 @@ TEST(DetectDots, WhatCannotBeNumberedIsRejectedInWords) {
   EXPECT_TRUE(says(why, "too few larger dots")) << why;
   why = rejected(kMarked, {.distance_mm = 105, .without = {133, 141, 308, 317}});
   EXPECT_TRUE(says(why, "too few larger dots")) << why;
-  why = rejected(kMarked, {.distance_mm = 60, .draw_larger = false});
+  why = rejected(kMarked, {.distance_mm = 60, .larger_times = 1});
   EXPECT_TRUE(says(why, "too few larger dots")) << why;
   why = rejected(kSymmetric, {.ground = 30, .dot = 5, .noise = 1});
   EXPECT_TRUE(says(why, "too dark")) << why;
@@ -234,6 +254,15 @@ TEST(DetectDots, WhatCannotBeNumberedIsRejectedInWords) {
   EXPECT_TRUE(says(why, "no dot grid")) << why;
   why = rejected(kSymmetric, {.blur_px = 11, .noise = 1});
   EXPECT_TRUE(says(why, "blurred")) << why;
+}
+
+TEST(DetectDots, AGridSeenFromBehindIsNamed) {
+  const auto pattern = parse_pattern(kMarked);
+  cv::Mat mirrored;
+  cv::flip(render(*pattern, {.tilt_deg = 20, .distance_mm = 105}).grey, mirrored, 1);
+  const Detection seen = detect(*pattern, view_of(mirrored), "");
+  EXPECT_FALSE(seen.view);
+  EXPECT_NE(seen.rejected.find("seen from behind"), std::string::npos) << seen.rejected;
 }
 
 /// Blur, noise, light, tilt and turn as they come.
@@ -251,16 +280,20 @@ Scene any_scene(cv::RNG& random, bool marked) {
 
 struct Tally {
   int found = 0, misnumbered = 0;
-  double worst_px = 0;
+  double worst_px = 0, worst_rms_px = 0;
   std::string words;
 };
 
-Tally tally(const std::string& spec, int count, const std::function<void(cv::RNG&, cv::Mat&)>& disturb) {
+Tally tally(
+    const std::string& spec, int count, const std::function<void(cv::RNG&, cv::Mat&)>& disturb,
+    const std::function<void(Scene&)>& change = [](Scene&) {}) {
   const auto pattern = parse_pattern(spec);
   cv::RNG random(3);
   Tally tally;
   for (int k = 0; k < count; ++k) {
-    Picture picture = render(*pattern, any_scene(random, !pattern->larger_dots.empty()));
+    Scene scene = any_scene(random, !pattern->larger_dots.empty());
+    change(scene);
+    Picture picture = render(*pattern, scene);
     disturb(random, picture.grey);
     const Detection seen = detect(*pattern, view_of(picture.grey), "");
     tally.words += seen.rejected.empty() ? "" : "; " + seen.rejected;
@@ -269,6 +302,7 @@ Tally tally(const std::string& spec, int count, const std::function<void(cv::RNG
     ++tally.found;
     tally.misnumbered += errors.max_px > 3;
     tally.worst_px = std::max(tally.worst_px, errors.max_px);
+    tally.worst_rms_px = std::max(tally.worst_rms_px, errors.rms_px);
   }
   if (std::getenv("DOTS_FIGURES"))
     fmt::print("{}: {} of {}, {} misnumbered, worst {:.2f} px{}\n", spec, tally.found, count, tally.misnumbered,
@@ -292,6 +326,39 @@ void clutter(cv::RNG& random, cv::Mat& grey) {
   cv::line(grey, any_px(), {0, random.uniform(0, grey.rows)}, 120, 25, cv::LINE_AA);
   cv::circle(grey, any_px(), 30, 255, -1, cv::LINE_AA);
   for (int k = 0; k < 8; ++k) cv::circle(grey, any_px(), random.uniform(3, 9), 30, -1, cv::LINE_AA);
+}
+
+/// The round picture of a scope, dark outside and falling off towards its rim; a finger over part of the grid.
+void vignette_and_finger(cv::RNG& random, cv::Mat& grey) {
+  const cv::Point2d middle(grey.cols / 2.0, grey.rows / 2.0);
+  const double radius_px = 0.52 * grey.rows;
+  for (int y = 0; y < grey.rows; ++y) {
+    for (int x = 0; x < grey.cols; ++x) {
+      const double out = std::hypot(x - middle.x, y - middle.y) / radius_px;
+      auto& pixel = grey.at<unsigned char>(y, x);
+      pixel = out > 1 ? 4 : cv::saturate_cast<unsigned char>(pixel * (1 - 0.6 * out * out));
+    }
+  }
+  const double angle_deg = random.uniform(0.0, 360.0);
+  cv::ellipse(grey,
+              {static_cast<int>(middle.x + 0.8 * radius_px * std::cos(angle_deg / 57.3)),
+               static_cast<int>(middle.y + 0.8 * radius_px * std::sin(angle_deg / 57.3))},
+              {70, 30}, angle_deg, 0, 360, 90, -1, cv::LINE_AA);
+}
+
+TEST(DetectDots, LargerDotsOfAnySizeAreReadInVignettesAndBehindFingers) {
+  for (const double times : {1.3, 2.5, 3.5}) {
+    const Tally seen = tally(kMarked, 12, vignette_and_finger, [&](Scene& scene) {
+      scene.larger_times = times;
+      scene.diameter_steps = std::min(0.5, 0.88 / times);
+      scene.distance_mm = std::min(scene.distance_mm, 70.0);
+      scene.blur_px = std::min(scene.blur_px, 1.8);
+      scene.tilt_deg = std::min(scene.tilt_deg, 40.0);
+    });
+    EXPECT_GE(seen.found, 8) << times << seen.words;
+    EXPECT_EQ(seen.misnumbered, 0) << times;
+    EXPECT_LT(seen.worst_rms_px, 0.2) << times;  // a dot that the rim cuts by a tenth is off by a pixel or two
+  }
 }
 
 TEST(DetectDots, ClutterIsNotTakenForDots) {

@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "tests/support/rendered_board.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -48,6 +49,29 @@ TEST(PictureViews, AFolderIsReadByTheNumbersInItsNames) {
   EXPECT_EQ(views->height_px, 400);
   EXPECT_TRUE(views->rejected.empty());
   for (const auto& view : views->used) EXPECT_EQ(view.ids.size(), 35U);
+}
+
+/// Close-ups of a board of an odd count of columns, of which most show no end of a row.
+TEST(PictureViews, WhichLayoutACharucoBoardHasAllPicturesDecide) {
+  const auto told = calibration::parse_pattern("charuco:19x26:5mm:4mm:DICT_4X4_250");
+  const auto drawn = calibration::parse_pattern("charuco:19x26:5mm:4mm:DICT_4X4_250:legacy");
+  ASSERT_TRUE(told && drawn);
+  const Scratch scratch;
+  const testing::BoardPainter& painter = testing::barrel_painter();
+  for (int n = 0; n < 4; ++n) {
+    const double aside_mm = n == 3 ? -42 : 8.0 * (n - 1);
+    const auto pose = testing::held(*drawn, {aside_mm, 5.0 * n, 45}, 10 + 5 * n, 40 * n, 0);
+    write(scratch, std::to_string(n) + ".png", painter.paint(*drawn, pose));
+  }
+  const auto views = read_picture_views(*told, {scratch.path()});
+  ASSERT_TRUE(views) << views.error().what;
+  EXPECT_EQ(views->used.size(), 4U);
+  EXPECT_NE(views->note.find("with :legacy"), std::string::npos) << views->note;
+  const auto as_drawn = read_picture_views(*drawn, {scratch.path()});
+  ASSERT_TRUE(as_drawn);
+  EXPECT_EQ(as_drawn->note, "");
+  ASSERT_EQ(as_drawn->used.size(), views->used.size());
+  for (std::size_t i = 0; i < views->used.size(); ++i) EXPECT_EQ(views->used[i].ids, as_drawn->used[i].ids);
 }
 
 TEST(PictureViews, FilesGivenInAnyOrderComeInOne) {
