@@ -7,7 +7,9 @@
 #include <limits>
 #include <numeric>
 
+#include "calibration/base/student95.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/camera/board_flatness.hpp"
 #include "calibration/camera/camera_bundle.hpp"
 #include "calibration/camera/camera_figures.hpp"
 #include "calibration/camera/camera_outliers.hpp"
@@ -27,6 +29,7 @@ struct ModelFit {
   double rms_px = 0;
   std::vector<double> held_out_squares_px2;  ///< per view, summed over its points
   double held_out_px = 0, held_out_angle_rad = 0;
+  std::size_t groups = 0;  ///< in which the views were held out
   CameraVector sigma_between_views = CameraVector::Zero();
   bool usable = true;  ///< a lens was found, and it does not fold inside the picture
   bool folds = false;
@@ -59,6 +62,7 @@ double angle_squares_of(const CameraModel& camera, const BundleView& view) {
 /// Fits the lens without each group of views in turn, and that group's views with it.
 void hold_out(ModelFit& fit, int folds) {
   const std::size_t groups = std::min(fit.views.size(), static_cast<std::size_t>(std::max(2, folds)));
+  fit.groups = groups;
   std::vector<CameraVector> lenses;
   double squares = 0, angle_squares = 0;
   fit.held_out_squares_px2.assign(fit.views.size(), 0);
@@ -119,25 +123,35 @@ std::vector<ModelFit> fit_models(const CameraModel& start, const SoundViews& sou
   return fits;
 }
 
-/// Whether what the other model gains on this one, view by view, is no more than its own standard error, or too little
-/// to matter.
-bool as_good(const ModelFit& fit, const ModelFit& best) {
-  constexpr double kTooLittle = 1.01;  // a held-out error 1 % larger hides a bend of a seventh of the noise
-  if (fit.held_out_px <= kTooLittle * best.held_out_px) return true;
+/// By how many of its own standard errors the other model does better, view by view, on what it was not shown.
+double gain_of(const ModelFit& other, const ModelFit& fit) {
   const auto n = static_cast<double>(fit.views.size());
   double mean = 0, squares = 0;
   for (std::size_t v = 0; v < fit.views.size(); ++v) {
-    const double gain = fit.held_out_squares_px2[v] - best.held_out_squares_px2[v];
+    const double gain = fit.held_out_squares_px2[v] - other.held_out_squares_px2[v];
     mean += gain / n;
     squares += gain * gain / n;
   }
-  return mean <= std::sqrt(std::max(0.0, squares - mean * mean) / (n - 1));
+  const double error = std::sqrt(std::max(0.0, squares - mean * mean) / (n - 1));
+  return error > 0 ? mean / error : (mean > 0 ? std::numeric_limits<double>::infinity() : 0);
 }
 
-const ModelFit& choose(const std::vector<ModelFit>& fits, std::optional<LensModel> asked) {
+/// So near to the best that the simpler model is taken: what it may leave out is then in the sigma.
+bool as_good(const ModelFit& fit, const ModelFit& best) {
+  constexpr double kStandardErrors = 1.0 / 3;
+  constexpr double kTooLittle = 1.001;  // a held-out error 0.1 % larger hides a bend of a twentieth of the noise
+  return fit.held_out_px <= kTooLittle * best.held_out_px || gain_of(best, fit) <= kStandardErrors;
+}
+
+/// So far from the best that chance is no excuse.
+bool refuted(const ModelFit& fit, const ModelFit& best) {
+  return gain_of(best, fit) > 1;
+}
+
+/// The model with the least held-out error.
+const ModelFit& best_of(const std::vector<ModelFit>& fits) {
   const ModelFit *best = nullptr, *best_folding = nullptr;
   for (const ModelFit& fit : fits) {
-    if (asked && fit.model == *asked) return fit;
     const ModelFit*& rival = fit.usable ? best : best_folding;
     if (std::isfinite(fit.held_out_px) && (rival == nullptr || fit.held_out_px < rival->held_out_px)) rival = &fit;
   }
@@ -145,8 +159,46 @@ const ModelFit& choose(const std::vector<ModelFit>& fits, std::optional<LensMode
   constexpr double kFarBetter = 0.5;
   if (best == nullptr || (best_folding != nullptr && best_folding->held_out_px < kFarBetter * best->held_out_px))
     return best_folding != nullptr ? *best_folding : fits.front();
-  return *std::find_if(fits.begin(), fits.end(),
-                       [&](const ModelFit& fit) { return fit.usable && as_good(fit, *best); });
+  return *best;
+}
+
+const ModelFit& choose(const std::vector<ModelFit>& fits, const ModelFit& best, std::optional<LensModel> asked) {
+  return *std::ranges::find_if(fits, [&](const ModelFit& fit) {
+    if (asked) return fit.model == *asked;
+    return &fit == &best || (fit.usable && best.usable && as_good(fit, best));
+  });
+}
+
+/// From the noise's: each parameter's deviation at least what the views among themselves say, their correlations kept;
+/// and the distances to the other models' lenses and to that of a bent board.
+void add_doubt(const std::vector<ModelFit>& fits, const ModelFit& best, const ModelFit& fit, CameraCalibration& out) {
+  // Few groups tell a spread badly.
+  const double few = student95(static_cast<int>(fit.groups) - 1) / kNormal95;
+  CameraVector wider = CameraVector::Ones();
+  const CameraVector noise = out.noise_sigma();
+  for (Eigen::Index i = 0; i < wider.size(); ++i) {
+    if (noise[i] > 0) wider[i] = std::max(1.0, few * fit.sigma_between_views[i] / noise[i]);
+  }
+  out.covariance = wider.asDiagonal() * out.noise_covariance * wider.asDiagonal();
+  CameraMatrix between = CameraMatrix::Zero();
+  double count = 0;
+  for (const ModelFit& other : fits) {
+    const bool believed = &other == &best || (other.usable && best.usable && !refuted(other, best));
+    if (!believed) continue;
+    const CameraVector apart = parameters_of(other.camera) - parameters_of(fit.camera);
+    between += apart * apart.transpose();
+    count += 1;
+  }
+  between /= count;
+  constexpr double kTold = 2;  // standard errors
+  const auto sag = find_board_sag(fit.camera, fit.model, fit.views);
+  if (sag && sag->standard_errors > kTold) {
+    out.board_sag_mm = sag->sag_mm;
+    between += sag->lens_change * sag->lens_change.transpose();
+  }
+  out.covariance += between;
+  out.sigma_between_models = between.diagonal().cwiseSqrt();
+  if (&fit != &best && refuted(fit, best)) out.refuted_by = best.model;
 }
 
 void add_covariance(const ModelFit& fit, CameraCalibration& out) {
@@ -169,7 +221,7 @@ void add_covariance(const ModelFit& fit, CameraCalibration& out) {
   }
   const Eigen::VectorXd inverse = eigen.values.cwiseMax(kOpen).cwiseInverse();
   const Eigen::MatrixXd root = unit.asDiagonal() * eigen.vectors;
-  out.covariance(solved, solved) =
+  out.noise_covariance(solved, solved) =
       out.noise_sigma_px * out.noise_sigma_px * (root * inverse.asDiagonal() * root.transpose());
 }
 
@@ -212,11 +264,13 @@ Result<CameraCalibration> calibrate_camera(std::span<const PatternView> views, i
     if (const auto left_out = leave_out_outliers(*start, *sound); !left_out) return left_out.error();
   }
   const std::vector<ModelFit> fits = fit_models(*start, *sound, settings.folds);
-  const ModelFit& chosen = choose(fits, settings.model);
+  const ModelFit& best = best_of(fits);
+  const ModelFit& chosen = choose(fits, best, settings.model);
   if (const auto checked = check(chosen.camera); !checked)
     return Error{Errc::degenerate,
                  "the views do not determine a camera: take more, with the board tilted to all sides"};
   CameraCalibration out = put_together(chosen, *sound, settings);
+  add_doubt(fits, best, chosen, out);
   for (const ModelFit& fit : fits) {
     out.models.push_back(
         {fit.model, fit.camera, fit.rms_px, fit.held_out_px, fit.held_out_angle_rad * out.mean_distance_mm, fit.folds});

@@ -82,12 +82,23 @@ struct CameraCalibration {
   CameraModel camera;
   LensModel model = LensModel::pinhole;
   bool folds = false;  ///< the lens of the chosen model folds inside the picture
-  /// Of the nine parameters, rows and columns of those not solved for 0: the residuals' variance times the inverse of
-  /// the normal matrix from which the boards' poses are eliminated. Holds where residuals are independent.
+  /// Of the nine parameters: what one may believe of the lens. The noise's covariance, made larger where the views
+  /// among themselves say more, and by how far the lenses of the other models that the views do not refute lie away:
+  /// a model's own residuals do not tell what the model leaves out.
   CameraMatrix covariance = CameraMatrix::Zero();
+  /// Rows and columns of parameters not solved for 0: the residuals' variance times the inverse of the normal matrix
+  /// from which the boards' poses are eliminated. Holds where residuals are independent and the model is right.
+  CameraMatrix noise_covariance = CameraMatrix::Zero();
   /// One standard deviation from how far the lens moves when groups of views are left out (grouped jackknife). Larger
-  /// than the covariance's where the points of a view err together: a board that is not flat, a view that is blurred.
+  /// than the noise's where the points of a view err together: a board that is not flat, a view that is blurred.
   CameraVector sigma_between_views = CameraVector::Zero();
+  /// Root mean square distance of the lens to those of the models that the views do not refute.
+  CameraVector sigma_between_models = CameraVector::Zero();
+  /// How far the board's middle seems to stand off its corners, mm, where the views tell it from flat; else 0. What
+  /// such a board does to the lens is in the covariance.
+  double board_sag_mm = 0;
+  /// The model with the least held-out error, where the views held out refute the one that was asked for.
+  std::optional<LensModel> refuted_by;
   std::string undetermined;  ///< what the views leave open, in words; empty where they determine all
   std::vector<Transform<Camera, Marker>> camera_from_marker;  ///< one per used view
   std::vector<FittedView> views;                              ///< used, in the order given
@@ -107,8 +118,7 @@ struct CameraCalibration {
   std::vector<double> convergence_px;  ///< rms after each step of the last refinement
 
   [[nodiscard]] CameraVector sigma() const { return covariance.diagonal().cwiseMax(0).cwiseSqrt(); }
-  /// The larger of the two sigmas, for each parameter.
-  [[nodiscard]] CameraVector careful_sigma() const { return sigma().cwiseMax(sigma_between_views); }
+  [[nodiscard]] CameraVector noise_sigma() const { return noise_covariance.diagonal().cwiseMax(0).cwiseSqrt(); }
 };
 
 /// Lens and boards' poses from views of a flat pattern (z = 0).
@@ -116,8 +126,8 @@ struct CameraCalibration {
 /// Z. Zhang's closed form (2000, through OpenCV) starts a least-squares fit over all corners (Ceres, analytic
 /// derivatives). Residuals are first weighed by Cauchy's function at a scale from their median. A point is an outlier
 /// if, by chance, the worst of so many points would lie that far out in only 1 % of cases. Views most of whose points
-/// do not fit are rejected, and the rest is fitted plainly. Each lens model is fitted and held out; of the models whose
-/// held-out error is within one standard error of the best's, the simplest is taken.
+/// do not fit are rejected, and the rest is fitted plainly. Each lens model is fitted and held out; the one with the
+/// least held-out error is taken, or a simpler one that is as good but for a third of the difference's standard error.
 ///
 /// Views that cannot be used are named in `rejected`: numbers that are not finite, points outside the picture, the same
 /// number twice, fewer than six points, the same pose as another view's. The order of views and of points in them
@@ -137,8 +147,9 @@ inline constexpr double kHeldOutPass_px = 1, kHeldOutMarginal_px = 5;
 inline constexpr std::size_t kViewsPass = 10, kViewsMarginal = 5;
 // Where no board was, distortion is extrapolated. A round picture in a wide frame covers no more than 0.5 of it.
 inline constexpr double kCoveragePass = 0.5, kCoverageMarginal = 0.25;
-// A focal length that is off by 0.5 % moves the far end of a scene from 100 to 150 mm by 0.25 mm in depth.
-inline constexpr double kFocalSigmaPass = 0.005, kFocalSigmaMarginal = 0.02;
+// A focal length that is off by 0.5 % moves the far end of a scene from 100 to 150 mm by 0.25 mm in depth; one that is
+// off by 3 %, by 1.5 mm.
+inline constexpr double kFocalSigmaPass = 0.005, kFocalSigmaMarginal = 0.03;
 inline constexpr double kCentreSigmaPass = 0.005, kCentreSigmaMarginal = 0.02;  ///< of the width
 // Focal length and distance are told apart by foreshortening alone, which goes with the sine of the tilt.
 inline constexpr double kTiltSpreadPass_deg = 25, kTiltSpreadMarginal_deg = 10;
@@ -149,8 +160,9 @@ inline constexpr double kNearest_mm = 5, kFarthest_mm = 5000;
 }  // namespace camera_limits
 
 Verdict judge_camera(const CameraCalibration& calibration);
-/// The verdict where the views determine no camera: fail, with the error's words and what to do.
-Verdict judge_no_camera(const Error& error);
+/// The verdict where the views determine no camera: fail, with the error's words, each rejected view's reason and what
+/// to do.
+Verdict judge_no_camera(const Error& error, std::span<const RejectedView> rejected = {});
 
 /// Whether some pixel of the picture, corners included, has no ray: the lens folds inside it.
 bool folds_inside(const CameraModel& camera);

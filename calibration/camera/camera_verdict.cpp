@@ -30,6 +30,15 @@ void judge_fit(const CameraCalibration& c, Verdict& verdict) {
                 scale * limits::kHeldOutMarginal_px,
                 "see in the report which views and regions are off: blur, a board that is not flat, a lens of more "
                 "terms");
+  if (c.refuted_by) {
+    const auto held_out = [&](LensModel model) {
+      return std::ranges::find(c.models, model, &LensModelFit::model)->held_out_px;
+    };
+    verdict.add(Grade::marginal,
+                fmt::format("the views refute the lens model {}: held out, it is off by {:.3g} px, and {} by {:.3g} px",
+                            name_of(c.model), held_out(c.model), name_of(*c.refuted_by), held_out(*c.refuted_by)),
+                "leave --model out, so that the views decide");
+  }
   const double share = c.points.empty() ? 0 : static_cast<double>(c.outliers) / static_cast<double>(c.points.size());
   if (c.outliers > 0) {
     const bool pass = share <= limits::kOutliersPass;
@@ -48,7 +57,12 @@ void judge_fit(const CameraCalibration& c, Verdict& verdict) {
 }
 
 void judge_lens(const CameraCalibration& c, Verdict& verdict) {
-  const CameraVector sigma = c.careful_sigma();
+  const CameraVector sigma = c.sigma();
+  if (c.board_sag_mm > 0) {
+    verdict.add(Grade::pass,
+                fmt::format("the board seems to be bent: its middle stands {:.2g} mm off its edge", c.board_sag_mm),
+                "fix the board on something flat and stiff");
+  }
   if (!c.undetermined.empty()) {
     verdict.add(Grade::fail, fmt::format("the views leave {} open: another lens fits them as well", c.undetermined),
                 "tilt the board to all sides, by 20 to 45 degrees");
@@ -71,10 +85,14 @@ void judge_lens(const CameraCalibration& c, Verdict& verdict) {
   }
 }
 
+void tell_rejected(std::span<const RejectedView> rejected, Verdict& verdict) {
+  for (const RejectedView& view : rejected) verdict.add(Grade::pass, view.name + " rejected: " + view.reason);
+}
+
 void judge_views(const CameraCalibration& c, Verdict& verdict) {
   judge_least(verdict, "views used:", static_cast<double>(c.views.size()), "", static_cast<double>(limits::kViewsPass),
               static_cast<double>(limits::kViewsMarginal), fmt::format("take at least {} views", limits::kViewsPass));
-  for (const RejectedView& view : c.rejected) verdict.add(Grade::pass, view.name + " rejected: " + view.reason);
+  tell_rejected(c.rejected, verdict);
   if (c.rejected.size() > c.views.size()) {
     verdict.add(Grade::marginal,
                 fmt::format("{} of {} views rejected", c.rejected.size(), c.rejected.size() + c.views.size()),
@@ -104,12 +122,13 @@ Verdict judge_camera(const CameraCalibration& calibration) {
   return verdict;
 }
 
-Verdict judge_no_camera(const Error& error) {
+Verdict judge_no_camera(const Error& error, std::span<const RejectedView> rejected) {
   Verdict verdict;
   verdict.add(Grade::fail, error.what,
               fmt::format("take {} or more sharp views, the board tilted by 20 to 45 degrees to all sides and brought "
                           "into all corners of the picture",
                           limits::kViewsPass));
+  tell_rejected(rejected, verdict);
   return verdict;
 }
 

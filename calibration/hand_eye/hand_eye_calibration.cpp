@@ -8,6 +8,8 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
+#include "calibration/hand_eye/hand_eye_blocks.hpp"
+#include "calibration/hand_eye/hand_eye_lens.hpp"
 #include "calibration/hand_eye/hand_eye_observability.hpp"
 #include "calibration/hand_eye/hand_eye_refinement.hpp"
 #include "calibration/hand_eye/hand_eye_robust_fit.hpp"
@@ -17,8 +19,6 @@
 namespace birdseye::calibration {
 
 namespace {
-
-constexpr double kOutsideRegion = 0.05;
 
 /// Over all corners, where there are any. Tells the answer and its covariance in the result. Empty if it does not
 /// converge.
@@ -90,11 +90,14 @@ HandEyeResult calibrate(const HandEyeInput& in) {
   }
   out.observability = observe_hand_eye(order, in.tracker_noise);
   if (!out.observability.solvable) return out;
-  auto robust = fit_robustly(in, freedom, stations, out);
+  const auto robust = fit_robustly(in, freedom, stations, out);
   const auto refined = robust ? refine(stations, freedom, *robust, out) : std::nullopt;
   if (refined) {
     out.solved = true;
-    fill_station_table(stations, freedom, *refined, *std::move(robust), out);
+    const CorrelatedStations blocks = fit_without_blocks(in, stations, freedom, *refined, *robust);
+    widen_by_blocks(blocks, *refined, out);
+    fill_station_table(stations, freedom, *refined, *robust, blocks.in_time, out);
+    add_lens_error(in, stations, freedom, *refined, *robust, out);
   } else {
     out.observability.solvable = false;
     out.observability.findings.push_back(
@@ -112,12 +115,12 @@ Eigen::Vector3d HandEyeResult::translation_sigma_mm() const {
   return covariance.diagonal().tail<3>().cwiseSqrt();
 }
 
-double HandEyeResult::sigma_at_board_mm() const {
+double HandEyeResult::sigma_at_board_mm(const Matrix6d& part) const {
   // A point p straight ahead, held by the sensor, is off by e x (p - t) + d.
   const Eigen::Vector3d ahead(0, 0, working_distance_mm);
   Eigen::Matrix<double, 3, 6> by;
   by << -cross_matrix(ahead - camera_from_sensor.translation()), Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d at_point = by * covariance * by.transpose();
+  const Eigen::Matrix3d at_point = by * part * by.transpose();
   return std::sqrt(0.5 * (at_point(0, 0) + at_point(1, 1)));
 }
 

@@ -26,12 +26,17 @@ struct HandEyeStation {
   Transform<Tracker, Sensor> tracker_from_sensor;
   std::optional<Transform<Tracker, TrackedBody>> tracker_from_body;  ///< of a board that moves and is tracked
   Motion sensor_motion, body_motion;                                 ///< needed for the time offset only
+  std::optional<double> time_s;  ///< of a stream, in which neighbours err together; none where taken one by one
 };
+
+using LensCovariance = Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters>;
 
 struct HandEyeInput {
   std::vector<HandEyeStation> stations;
   std::optional<CameraModel> camera;  ///< none is needed where stations hold camera_from_marker
   std::optional<StereoLens> right;
+  /// Of the first lens's nine parameters, in CameraModel's order; none: the lens is taken for exact.
+  std::optional<LensCovariance> camera_covariance;
   std::optional<TrackerNoise> tracker_noise;  ///< none: estimated from the residuals
   TrackerNoise view_noise;                    ///< of camera_from_marker, where that is given instead of corners
   std::optional<double> corner_sigma_px;      ///< per axis; none: estimated from the residuals
@@ -99,6 +104,7 @@ struct HandEyeResult {
   double corner_sigma_px = 0;
   TrackerNoise tracker_noise;  ///< stated, or as estimated
   bool noise_estimated = false;
+  double of_lens_at_board_mm = 0;  ///< the lens's part of sigma_at_board_mm()
   double variance_factor =
       1;              ///< of the residuals, over what the stated noise lets expect; multiplies the covariance if > 1
   double rms_px = 0;  ///< corners against the fit, in which the tracked poses may err
@@ -117,7 +123,9 @@ struct HandEyeResult {
   [[nodiscard]] Eigen::Vector3d translation_sigma_mm() const;
   /// How far off a point straight ahead at the working distance is: one sigma, root mean square over the directions
   /// across the line of sight.
-  [[nodiscard]] double sigma_at_board_mm() const;
+  [[nodiscard]] double sigma_at_board_mm() const { return sigma_at_board_mm(covariance); }
+  /// The same of a covariance that is a part of the whole.
+  [[nodiscard]] double sigma_at_board_mm(const Matrix6d& part) const;
 };
 
 /// Where the camera sits on its sensor, from stations at which scope and board were seen together. All closed forms

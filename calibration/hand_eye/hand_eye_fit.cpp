@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calibration/base/median.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
@@ -201,27 +202,33 @@ TrackerNoise estimate_noise(std::span<const SummedStation> stations, ChainFit& f
   return noise;
 }
 
-std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::size_t which, const ChainFit& fit,
-                                const TrackerNoise& noise, const ChainFreedom& freedom, bool robust) {
+std::optional<FitWithout> fit_without(std::span<const SummedStation> stations, std::span<const std::size_t> left_out,
+                                      const ChainFit& fit, const TrackerNoise& noise, const ChainFreedom& freedom,
+                                      bool robust) {
   // From the optimum of all, one step is exact to first order; a second makes it so to the third.
   constexpr int kSteps = 2;
-  std::vector<SummedStation> others(stations.begin(), stations.end());
-  others.erase(others.begin() + static_cast<std::ptrdiff_t>(which));
-  HeldOut out{fit.state, 0};
-  Eigen::MatrixXd covariance;
+  std::vector<SummedStation> others;
+  for (std::size_t i = 0; i < stations.size(); ++i) {
+    if (!std::ranges::binary_search(left_out, i)) others.push_back(stations[i]);
+  }
+  FitWithout out{fit.state, {}};
   for (int i = 0; i < kSteps; ++i) {
     const ChainNormal normal = chain_normal(others, out.state, noise, freedom, robust);
-    covariance = inverse_information(normal.information);
-    const Eigen::VectorXd step = -covariance * normal.gradient;
+    out.covariance = inverse_information(normal.information);
+    const Eigen::VectorXd step = -out.covariance * normal.gradient;
     if (!step.allFinite()) return std::nullopt;
     out.state = stepped(out.state, step, freedom);
   }
-  const LinearisedResidual left_out = linearise(stations[which], out.state, noise, freedom);
-  const Matrix6d predicted =
-      left_out.covariance + left_out.by_parameter * covariance * left_out.by_parameter.transpose();
-  out.distance_squared = left_out.residual.dot(solve_symmetric(predicted, left_out.residual));
-  if (!(out.distance_squared >= 0)) return std::nullopt;
   return out;
+}
+
+double distance_squared(const SummedStation& station, const FitWithout& without, const TrackerNoise& noise,
+                        const ChainFreedom& freedom) {
+  const LinearisedResidual left_out = linearise(station, without.state, noise, freedom);
+  const Matrix6d predicted =
+      left_out.covariance + left_out.by_parameter * without.covariance * left_out.by_parameter.transpose();
+  const double squared = left_out.residual.dot(solve_symmetric(predicted, left_out.residual));
+  return squared >= 0 ? squared : std::numeric_limits<double>::infinity();
 }
 
 double distance_limit(double exceeded_with, double freedom) {

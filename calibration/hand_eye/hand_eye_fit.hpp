@@ -67,17 +67,24 @@ inline constexpr double kNoisePriorFreedom = 6;
 /// The noise estimated from medians of the residuals: a start that a few outliers do not move.
 TrackerNoise median_noise(std::span<const Vector6d> residuals, const ChainFreedom& freedom);
 
-/// The fit without one station, by Gauss-Newton from the fit with all stations, and robust if that fit was. Empty if
-/// the other stations do not determine it.
-struct HeldOut {
+/// The fit without some of the stations (indices, ascending), by Gauss-Newton from the fit with all of them, and robust
+/// if that fit was. Empty if the other stations do not determine it.
+struct FitWithout {
   ChainState state;
-  double distance_squared = 0;  ///< of the station's residual, against its own covariance and the fit's
+  Eigen::MatrixXd covariance;  ///< as ChainFit's
 };
-std::optional<HeldOut> hold_out(std::span<const SummedStation> stations, std::size_t which, const ChainFit& fit,
-                                const TrackerNoise& noise, const ChainFreedom& freedom, bool robust);
+std::optional<FitWithout> fit_without(std::span<const SummedStation> stations, std::span<const std::size_t> left_out,
+                                      const ChainFit& fit, const TrackerNoise& noise, const ChainFreedom& freedom,
+                                      bool robust);
+
+/// Of a station's residual under a fit without it: the Mahalanobis distance, squared, against the station's own
+/// covariance and the fit's. Infinite where that is no number.
+double distance_squared(const SummedStation& station, const FitWithout& without, const TrackerNoise& noise,
+                        const ChainFreedom& freedom);
 
 /// Six times the value that an F distribution of (6, freedom) exceeds with the probability exceeded_with: the limit of
 /// a squared Mahalanobis distance in six dimensions, if the covariance rests on `freedom` degrees of freedom.
 double distance_limit(double exceeded_with, double freedom);
+inline constexpr double kOutsideRegion = 0.05;  ///< of a stated 95 % region
 
 }  // namespace birdseye::calibration

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -18,6 +19,9 @@ namespace {
 /// One station in so many may be taken for an outlier by chance.
 constexpr double kOutlierChance = 1e-4;
 constexpr std::size_t kFewest = 3;
+/// One calibration in so many may lose a station by chance where it has few.
+constexpr double kOddChance = 0.01;
+constexpr std::size_t kFew = 40;
 
 class RobustFitter {
  public:
@@ -52,6 +56,9 @@ class RobustFitter {
     } else {
       found_.noise = estimate_noise(found_.summed, found_.fit, found_.noise, freedom_);
       out_.noise_estimated = true;
+    }
+    if (out_.noise_estimated && drop_odd_one()) {
+      found_.noise = estimate_noise(found_.summed, found_.fit, found_.noise, freedom_);
     }
     out_.tracker_noise = found_.noise;
     return found_.fit.converged;
@@ -99,14 +106,42 @@ class RobustFitter {
     std::vector<std::string> reasons(stations_.used.size());
     std::size_t found = 0;
     for (std::size_t i = 0; i < stations_.used.size(); ++i) {
-      const auto held = hold_out(found_.summed, i, found_.fit, found_.noise, freedom_, true);
-      if (!held || held->distance_squared <= limit) continue;
-      HandEyeStationFit& row = out_.stations[stations_.used[i].index];
-      row.distance_squared = held->distance_squared;
-      reasons[i] = fmt::format("off by {:.1f} sigmas", std::sqrt(held->distance_squared / 6));
+      const auto without = fit_without(found_.summed, std::span(&i, 1), found_.fit, found_.noise, freedom_, true);
+      if (!without) continue;
+      const double squared = distance_squared(found_.summed[i], *without, found_.noise, freedom_);
+      if (squared <= limit) continue;
+      out_.stations[stations_.used[i].index].distance_squared = squared;
+      reasons[i] = fmt::format("off by {:.1f} sigmas", std::sqrt(squared / 6));
       ++found;
     }
     if (found == 0 || stations_.used.size() - found < kFewest + 1) return false;
+    keep_only(reasons);
+    return true;
+  }
+
+  /// Of few stations one that is off makes the noise seem larger, and hides in it. So each is judged by the noise of
+  /// the others alone, as an externally studentised residual (R. Cook and S. Weisberg, 1982). True if one was put
+  /// aside.
+  bool drop_odd_one() {
+    const std::size_t count = found_.summed.size();
+    if (count < kFewest + 2 || count > kFew) return false;
+    const double limit = distance_limit(kOddChance / static_cast<double>(count), freedom_.of_residuals(count - 1));
+    std::vector<std::string> reasons(count);
+    double farthest = limit;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::vector<SummedStation> others = found_.summed;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      ChainFit fit = found_.fit;
+      const TrackerNoise noise = estimate_noise(others, fit, found_.noise, freedom_);
+      if (!fit.converged) continue;
+      const double squared = distance_squared(found_.summed[i], {fit.state, fit.covariance}, noise, freedom_);
+      if (!(squared > farthest)) continue;
+      farthest = squared;
+      reasons.assign(count, "");
+      reasons[i] = fmt::format("off by {:.1f} sigmas of the others", std::sqrt(squared / 6));
+      out_.stations[stations_.used[i].index].distance_squared = squared;
+    }
+    if (!(farthest > limit)) return false;
     keep_only(reasons);
     return true;
   }

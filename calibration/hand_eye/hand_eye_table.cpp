@@ -32,17 +32,17 @@ void fill_row(const PreparedStation& p, const ChainState& refined, const ChainSt
 }  // namespace
 
 void fill_station_table(const HandEyeStations& stations, const ChainFreedom& freedom, const ChainState& refined,
-                        RobustFit robust, HandEyeResult& out) {
-  robust.fit.state = refined;
+                        const RobustFit& robust, const HandEyeBlocks& blocks, HandEyeResult& out) {
   double all_px = 0, all_mm = 0, all_tracked = 0, count = 0;
   std::vector<double> distances, held_out;
   for (std::size_t i = 0; i < stations.used.size(); ++i) {
     const PreparedStation& p = stations.used[i];
     HandEyeStationFit& row = out.stations[p.index];
     row.used = true;
-    const auto held = hold_out(robust.summed, i, robust.fit, robust.noise, freedom, false);
-    fill_row(p, refined, held ? held->state : refined, out);
-    row.distance_squared = held ? held->distance_squared : std::numeric_limits<double>::infinity();
+    const auto& without = blocks.without[blocks.block_of[i]];
+    fill_row(p, refined, without ? without->state : refined, out);
+    row.distance_squared =
+        without ? distance_squared(p.summed, *without, robust.noise, freedom) : std::numeric_limits<double>::infinity();
     const TrackedErrors all = tracked_errors(p, refined);
     all_px += row.held_out_px * row.held_out_px * all.count;
     all_mm += row.held_out_mm * row.held_out_mm * all.count;
@@ -56,9 +56,9 @@ void fill_station_table(const HandEyeStations& stations, const ChainFreedom& fre
   out.tracked_px = std::sqrt(all_tracked / count);
   out.working_distance_mm = median_of(distances);
   out.held_out_median_px = median_of(held_out);
-  std::sort(robust.outliers.begin(), robust.outliers.end(),
-            [](const auto& a, const auto& b) { return a.index < b.index; });
-  for (const PreparedStation& p : robust.outliers) {
+  std::vector<PreparedStation> outliers = robust.outliers;
+  std::ranges::sort(outliers, {}, &PreparedStation::index);
+  for (const PreparedStation& p : outliers) {
     fill_row(p, refined, refined, out);
     out.outliers.push_back(out.stations[p.index].name);
   }

@@ -132,6 +132,7 @@ std::vector<HandEyeStation> stations_of(std::span<const StampedSensor> sensor, s
     s.tracker_from_sensor = *pose;
     s.camera_from_marker = views[i].camera_from_marker;
     s.sensor_motion = motion_at(sensor, time_s);
+    s.time_s = time_s;
     out.push_back(std::move(s));
   }
   const std::size_t count = std::min(out.size(), kMostStreamStations);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/student95.hpp"
+
 namespace birdseye::calibration {
 
 namespace {
@@ -117,14 +119,6 @@ void find_sigmas(const TimingModel& model, const Step& step, bool find_drift, Ti
 }
 
 }  // namespace
-
-double student95(int degrees_of_freedom) {
-  // The expansion of Cornish and Fisher about the normal point (Abramowitz, Stegun 26.7.5).
-  constexpr double z = 1.959963985;
-  const double n = std::max(1, degrees_of_freedom), z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
-         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
-}
 
 TimingFit fit_timing(TimingModel& model, double offset_s, bool find_drift) {
   TimingFit fit;

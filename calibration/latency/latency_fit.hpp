@@ -46,7 +46,4 @@ TimingFit fit_timing(TimingModel& model, double offset_s, bool find_drift);
 /// By how many standard errors of its mean over parts `other` fits worse than `best`.
 double sigmas_worse(const TimingFit& best, const TimingFit& other, const std::vector<double>& times_s);
 
-/// The two-sided 95 % point of Student's distribution.
-double student95(int degrees_of_freedom);
-
 }  // namespace birdseye::calibration

@@ -37,6 +37,7 @@ struct CameraInput {
   std::vector<PatternView> views;
   std::vector<RejectedView> rejected;  ///< pictures without a view
   int width_px = 0, height_px = 0;
+  std::string note;  ///< how the pattern was read, where otherwise than told
 };
 
 /// Of a picture that lies beside the points.
@@ -62,7 +63,7 @@ Result<CameraInput> input_of_points(const fs::path& folder, const std::string& s
   if (!views) return views.error();
   const auto px = size.empty() ? size_beside(folder) : size_of(size);
   if (!px) return px.error();
-  return CameraInput{*std::move(views), {}, px->x(), px->y()};
+  return CameraInput{*std::move(views), {}, px->x(), px->y(), {}};
 }
 
 Result<CameraInput> input_of_pictures(const std::string& board, const std::vector<fs::path>& images) {
@@ -70,7 +71,7 @@ Result<CameraInput> input_of_pictures(const std::string& board, const std::vecto
   if (!pattern) return pattern.error();
   auto found = read_picture_views(*pattern, images);
   if (!found) return found.error();
-  CameraInput out{std::move(found->used), {}, found->width_px, found->height_px};
+  CameraInput out{std::move(found->used), {}, found->width_px, found->height_px, found->note};
   for (const auto& [name, reason] : found->rejected) out.rejected.push_back({0, name, reason});
   return out;
 }
@@ -95,9 +96,18 @@ Result<CameraCalibrationSettings> settings_of(const CameraOptions& options) {
   return settings;
 }
 
+void tell_note(const CameraInput& input, Verdict& verdict) {
+  if (!input.note.empty()) verdict.add(Grade::pass, input.note);
+}
+
+std::string lens_text(const CameraCalibration& found) {
+  return camera_text(found.camera) + camera_covariance_text(found.covariance);
+}
+
 /// Views that determine no camera: a verdict with its reasons, not an error.
 void finish_without(const CameraOptions& options, const Error& error, const CameraInput& input, CommandStatus& status) {
-  const Verdict verdict = judge_no_camera(error);
+  Verdict verdict = judge_no_camera(error, input.rejected);
+  tell_note(input, verdict);
   nlohmann::json json{{"views_used", 0},
                       {"views_rejected", rejected_json(input.rejected)},
                       {"image_width_px", input.width_px},
@@ -114,8 +124,7 @@ void finish_with(const CameraOptions& options, const CameraCalibration& found, n
                             enter_lens(record, {provenance, found.camera, name_of(found.model), found.covariance,
                                                 found.rms_px, found.held_out_px, options.rod_angle_deg});
                           }};
-  finish_calibration(options.paths, camera_text(found.camera), std::move(json), std::move(page), verdict, status,
-                     entry);
+  finish_calibration(options.paths, lens_text(found), std::move(json), std::move(page), verdict, status, entry);
 }
 
 void add_rejected(const CameraInput& input, CameraCalibration& found) {
@@ -130,7 +139,9 @@ void calibrate_one(const CameraOptions& options, const CameraCalibrationSettings
   add_rejected(input, *found);
   HtmlPage page("Camera calibration");
   add_camera_to(page, *found);
-  finish_with(options, *found, camera_json(*found), std::move(page), judge_camera(*found), status);
+  Verdict verdict = judge_camera(*found);
+  tell_note(input, verdict);
+  finish_with(options, *found, camera_json(*found), std::move(page), verdict, status);
 }
 
 /// All views, pictures in which nothing was found among them, that their partners may be told.
@@ -160,7 +171,8 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
   if (!found) return status.refuse(found.error());
   tell_once(left, found->left);
   tell_once(right, found->right);
-  const Verdict verdict = judge_stereo(*found);
+  Verdict verdict = judge_stereo(*found);
+  tell_note(left, verdict);
   HtmlPage page("Stereo camera calibration");
   page.table({{"pair", ""},
               {"baseline, mm", fmt::format("{:.3f}", found->baseline_mm)},
@@ -174,7 +186,7 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
   json["right"] = camera_json(found->right);
   json["stereo"] = stereo_json(*found);
   if (verdict.grade != Grade::fail) {
-    const auto written = write_files({{options.right_out, camera_text(found->right.camera)},
+    const auto written = write_files({{options.right_out, lens_text(found->right)},
                                       {options.right_from_left_out, pose_text(found->right_from_left.matrix())}});
     if (!written) return status.refuse(written.error());
   }

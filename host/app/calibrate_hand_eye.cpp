@@ -25,6 +25,7 @@ struct CalibrateHandEyeOptions {
   bool live = false;
   LivePlan plan;
   std::string unit = "mm";
+  std::vector<double> at;
   double position_sigma_mm = 0, angle_sigma_deg = 0;
   ResultPaths results;
 };
@@ -52,6 +53,8 @@ Result<void> check(const CalibrateHandEyeOptions& options) {
   if (!options.live && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
   if (const auto sound = check_right(files); !sound) return sound.error();
+  if (!options.at.empty() && files.eye_poses.empty())
+    return Error{Errc::bad_value, "--at goes with --eye-poses, in whose world it is"};
   if (!options.rod_angles.empty() && files.images.empty())
     return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
@@ -96,10 +99,16 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
   if (!session) return session.error();
   HandEyeRecording out;
   out.input = std::move(session->input);
+  if (!options.files.camera.empty()) {
+    const auto covariance = read_camera_covariance(options.files.camera);
+    if (!covariance) return covariance.error();
+    out.input.camera_covariance = *covariance;
+  }
   out.notes.push_back("ended: " + session->ended);
   if (!plan.guide.camera) {
     if (session->lens) {
       out.camera_verdict = calibration::judge_camera(*session->lens);
+      out.input.camera_covariance = session->lens->covariance;
     } else {
       out.camera_verdict.add(Grade::fail, "no lens was found: " + session->lens_fault,
                              "hold the scope still at more stations, tilted another way at each");
@@ -156,6 +165,8 @@ void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
   files.mm_per_unit = options.unit == "m" ? 1000 : 1;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
+  if (!options.at.empty())
+    files.at_mm = files.mm_per_unit * Eigen::Vector3d(options.at[0], options.at[1], options.at[2]);
   if (options.live) {
     const auto fits = check_bound_record(options.results.record, options.plan.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
@@ -202,6 +213,13 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->add_option("--eye-poses", files.eye_poses,
                    "instead of pictures, poses of the camera in the board's frame; by time if both have times")
       ->type_name("PATH");
+  command
+      ->add_option("--at", options->at,
+                   "with --eye-poses: the point of their world at which hand-eye is judged, in their unit")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::Range(-1e6, 1e6))
+      ->type_name("X,Y,Z");
   command->add_option("--unit", options->unit, "of lengths in files of poses")->check(CLI::IsMember({"mm", "m"}));
   command->add_option("--position-sigma", options->position_sigma_mm, "the tracker's noise per axis, mm")
       ->check(CLI::PositiveNumber);

@@ -40,17 +40,19 @@ nlohmann::json outliers_json(const CameraCalibration& c) {
 
 void add_tables(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
   page.heading(which + "lens");
-  std::vector<std::vector<std::string>> rows{{"parameter", "value", "sigma", "sigma between views"}};
-  const CameraVector values = parameters_of(c.camera), sigma = c.sigma();
+  std::vector<std::vector<std::string>> rows{
+      {"parameter", "value", "sigma", "of noise", "between views", "between models"}};
+  const CameraVector values = parameters_of(c.camera), sigma = c.sigma(), noise = c.noise_sigma();
   for (std::size_t i = 0; i < kCameraParameterNames.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     rows.push_back({kCameraParameterNames[i], fmt::format("{:.6g}", values[k]), fmt::format("{:.2g}", sigma[k]),
-                    fmt::format("{:.2g}", c.sigma_between_views[k])});
+                    fmt::format("{:.2g}", noise[k]), fmt::format("{:.2g}", c.sigma_between_views[k]),
+                    fmt::format("{:.2g}", c.sigma_between_models[k])});
   }
   page.table(rows);
   page.heading(which + "lens models");
   page.paragraph(
-      "Chosen is the simplest one whose held-out error is as good as the best's: a larger model always fits "
+      "Chosen is the one with the least held-out error, or a simpler one that is as good: a larger model always fits "
       "better what it was fitted to.");
   rows = {{"model", "fitted rms, px", "held out, px", "held out, mm", ""}};
   for (const LensModelFit& m : c.models) {
@@ -114,7 +116,9 @@ nlohmann::json camera_json(const CameraCalibration& c) {
                      {"camera_matrix", {{m.fx_px, 0.0, m.cx_px}, {0.0, m.fy_px, m.cy_px}, {0.0, 0.0, 1.0}}},
                      {"distortion", {m.k1, m.k2, m.p1, m.p2, m.k3}},
                      {"sigma", named(c.sigma())},
+                     {"sigma_of_noise", named(c.noise_sigma())},
                      {"sigma_between_views", named(c.sigma_between_views)},
+                     {"sigma_between_models", named(c.sigma_between_models)},
                      {"covariance", matrix_rows(c.covariance)},
                      {"rms_px", c.rms_px},
                      {"held_out_px", c.held_out_px},
@@ -124,6 +128,7 @@ nlohmann::json camera_json(const CameraCalibration& c) {
                      {"views_rejected", rejected_json(c.rejected)},
                      {"points", c.points.size()},
                      {"outliers", outliers_json(c)},
+                     {"board_sag_mm", c.board_sag_mm},
                      {"coverage", c.coverage},
                      {"tilt_spread_deg", c.tilt_spread_deg},
                      {"distance_mm", {c.least_distance_mm, c.mean_distance_mm, c.largest_distance_mm}}};

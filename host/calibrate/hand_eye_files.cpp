@@ -77,6 +77,54 @@ Transform<Camera, Marker> view_of(const TimedPose& eye) {
   return Transform<Marker, Camera>::from_matrix(eye.tracker_from_sensor.matrix()).inverse();
 }
 
+/// A line for each kind of reason: those that differ in numbers alone are of one kind.
+void tell_by_kind(const std::string& of_what, const std::vector<std::string>& rejected,
+                  std::vector<std::string>& notes) {
+  struct Kind {
+    std::string first;
+    std::size_t count = 0;
+  };
+  std::map<std::string, Kind> kinds;
+  for (const std::string& line : rejected) {
+    std::string kind = line;
+    std::erase_if(kind, [](unsigned char c) { return std::isdigit(c) != 0; });
+    Kind& of_line = kinds[kind];
+    if (of_line.count++ == 0) of_line.first = line;
+  }
+  for (const auto& [name, kind] : kinds) {
+    notes.push_back(of_what + kind.first);
+    if (kind.count > 1) notes.back() += fmt::format(" (and {} more like it)", kind.count - 1);
+  }
+}
+
+/// Whether the world's origin is what a camera looks at: ahead of nearly all of the eyes, by less than 60 degrees.
+bool look_at_origin(const std::vector<HandEyeStation>& stations) {
+  constexpr double kCosine = 0.5, kNearlyAll = 0.9;
+  const auto ahead = std::ranges::count_if(stations, [](const HandEyeStation& s) {
+    const Eigen::Vector3d& origin = s.camera_from_marker->translation();
+    return origin.z() > kCosine * origin.norm();
+  });
+  return static_cast<double>(ahead) >= kNearlyAll * static_cast<double>(stations.size());
+}
+
+/// Moves the board's origin to where hand-eye is to be judged.
+void judge_at(const std::optional<Eigen::Vector3d>& asked_mm, HandEyeRecording& out) {
+  auto& stations = out.input.stations;
+  if (stations.empty() || (!asked_mm && look_at_origin(stations))) return;
+  Eigen::Vector3d middle_mm = Eigen::Vector3d::Zero();
+  for (const HandEyeStation& s : stations)
+    middle_mm += s.camera_from_marker->inverse().translation() / static_cast<double>(stations.size());
+  out.judged_at_mm = asked_mm.value_or(middle_mm);
+  const Transform<Marker, Marker> shift(Eigen::Matrix3d::Identity(), out.judged_at_mm);
+  for (HandEyeStation& s : stations) s.camera_from_marker = *s.camera_from_marker * shift;
+  const Eigen::Vector3d& at = out.judged_at_mm;
+  out.notes.push_back(fmt::format("judged at ({:.1f}, {:.1f}, {:.1f}) mm of the world of --eye-poses{}", at.x(), at.y(),
+                                  at.z(),
+                                  asked_mm ? ""
+                                           : ", in the middle of those poses, which do not look at its "
+                                             "origin (--at X,Y,Z judges elsewhere)"));
+}
+
 Result<HandEyeRecording> read_streams(const PoseSet& sensor, const PoseSet& eye) {
   std::vector<calibration::StampedSensor> sensors;
   for (const TimedPose& pose : sensor.poses) sensors.push_back({pose.time_s, pose.tracker_from_sensor});
@@ -85,8 +133,8 @@ Result<HandEyeRecording> read_streams(const PoseSet& sensor, const PoseSet& eye)
   auto paired = calibration::pair_pose_streams(sensors, views);
   if (!paired) return paired.error();
   HandEyeRecording out;
-  for (const std::string& rejected : sensor.rejected) out.notes.push_back("of the sensor: " + rejected);
-  for (const std::string& rejected : eye.rejected) out.notes.push_back("of the camera: " + rejected);
+  tell_by_kind("of the sensor: ", sensor.rejected, out.notes);
+  tell_by_kind("of the camera: ", eye.rejected, out.notes);
   out.input.stations = std::move(paired->stations);
   out.input.estimate_time_offset = true;
   out.stream_offset_s = paired->offset_s;
@@ -103,7 +151,7 @@ Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
     if (sensor->timed) return read_streams(*sensor, *eye);
   }
   HandEyeRecording out;
-  for (const std::string& rejected : eye->rejected) out.notes.push_back("of the camera: " + rejected);
+  tell_by_kind("of the camera: ", eye->rejected, out.notes);
   std::size_t count = 0;
   for (const TimedPose& pose : eye->poses) {
     HandEyeStation s;
@@ -124,7 +172,11 @@ Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
 }  // namespace
 
 Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files) {
-  if (files.images.empty()) return read_eye_poses(files);
+  if (files.images.empty()) {
+    auto recording = read_eye_poses(files);
+    if (recording) judge_at(files.at_mm, *recording);
+    return recording;
+  }
   HandEyeRecording out;
   if (const auto read = read_hand_eye_pictures(files, out); !read) return read.error();
   if (const auto added = add_poses(files, out.input.stations, "pictures", out.notes); !added) return added.error();

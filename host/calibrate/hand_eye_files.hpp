@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -22,6 +23,7 @@ struct HandEyeFiles {
   std::filesystem::path poses, board_poses, eye_poses;
   std::string transform, board_transform;
   double mm_per_unit = 1;
+  std::optional<Eigen::Vector3d> at_mm;  ///< of eye_poses' world: where hand-eye is to be judged
 };
 
 /// The solver's input, and what to tell about how it was read.
@@ -34,12 +36,15 @@ struct HandEyeRecording {
   double stream_offset_s =
       0;  ///< offset of two streams' clocks, found from their motion; the solver's offset adds to it
   double stream_correlation = 0;  ///< 0 if there are no two streams
+  /// Where in eye_poses' world the solver's Marker frame has its origin: what hand-eye is good for is judged there.
+  Eigen::Vector3d judged_at_mm = Eigen::Vector3d::Zero();
 };
 
 /// Reads pictures and poses and pairs them in the order of their names, numbers in them by value. There must be as many
 /// pictures as poses, counting those that cannot be used. Each right picture pairs with a left one by name. eye_poses
 /// are poses of the camera in the board's frame (marker_from_camera); where they and the poses have times, they pair by
-/// time.
+/// time. Where they are no camera's before a board, for their world's origin is not ahead of them, hand-eye is judged
+/// in the middle of them instead.
 Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files);
 
 }  // namespace birdseye::host

@@ -48,6 +48,7 @@ Result<void> calibrate_lens(const PictureViews& pictures, HandEyeRecording& out)
                                   solved->rms_px, solved->camera.fx_px));
   out.lens = *std::move(solved);
   out.input.camera = out.lens->camera;
+  out.input.camera_covariance = out.lens->covariance;
   return {};
 }
 
@@ -60,6 +61,7 @@ Result<void> calibrate_lenses(const PictureViews& left_pictures, const std::vect
   out.notes.push_back(fmt::format("both lenses are calibrated from the same pictures: {:.2f} px, {:.2f} mm apart",
                                   solved->rms_px, solved->baseline_mm));
   out.input.camera = solved->left.camera;
+  out.input.camera_covariance = solved->left.covariance;
   out.input.right = calibration::StereoLens{solved->right.camera, solved->right_from_left};
   out.lens = std::move(solved->left);
   return {};
@@ -81,6 +83,12 @@ Result<void> find_lens(const HandEyeFiles& files, const PictureViews& pictures, 
   const auto camera = read_lens(files, pictures);
   if (!camera) return camera.error();
   out.input.camera = *camera;
+  const auto covariance = read_camera_covariance(files.camera);
+  if (!covariance) return covariance.error();
+  out.input.camera_covariance = *covariance;
+  if (!*covariance)
+    out.notes.push_back(fmt::format("{} does not tell how well the lens is known: hand-eye's sigma leaves it out",
+                                    files.camera.string()));
   if (!right || !right->lens) return {};
   out.input.right = right->lens;
   return check_relation(files, out.input);
@@ -93,6 +101,7 @@ Result<void> read_hand_eye_pictures(const HandEyeFiles& files, HandEyeRecording&
   if (!pattern) return pattern.error();
   const auto pictures = read_picture_views(*pattern, files.images);
   if (!pictures) return pictures.error();
+  if (!pictures->note.empty()) out.notes.push_back(pictures->note);
   for (const auto& rejected : pictures->rejected) out.notes.push_back(rejected.name + ": " + rejected.reason);
   const std::vector<PatternView> left = every_view(*pictures);
   std::optional<RightPictures> right;

@@ -7,6 +7,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "host/calibrate/camera_report.hpp"
 #include "host/calibrate/residual_picture.hpp"
 #include "host/calibrate/station_picture.hpp"
 #include "host/report/bar_chart.hpp"
@@ -97,6 +98,7 @@ json solution_json(const HandEyeResult& r) {
              {"covariance_rad_mm", rows_of(r.covariance)},
              {"region95_distance_squared", r.region_limit}}},
            {"sigma_at_board_mm", r.sigma_at_board_mm()},
+           {"of_lens_at_board_mm", r.of_lens_at_board_mm},
            {"working_distance_mm", r.working_distance_mm},
            {"tracker_noise",
             {{"position_mm", r.tracker_noise.position_sigma_mm},
@@ -219,11 +221,15 @@ json hand_eye_json(const HandEyeResult& r, const HandEyeRecording& recording) {
   if (r.solved) {
     out.update(solution_json(r));
     const bool moving = recording.input.stations.front().tracker_from_body.has_value();
-    out[moving ? "board_from_marker" : "tracker_from_marker"] = rows_of(r.body_from_marker.matrix());
+    const Transform<Marker, Marker> as_given(Eigen::Matrix3d::Identity(), -recording.judged_at_mm);
+    out[moving ? "tracked_body_from_pattern" : "tracker_from_pattern"] =
+        rows_of((r.body_from_marker * as_given).matrix());
     if (recording.input.right) out["right"] = right_json(r, recording);
   }
+  if (recording.lens) out["lens"] = camera_json(*recording.lens);
+  if (!recording.judged_at_mm.isZero(0)) out["judged_at_mm"] = json_of(recording.judged_at_mm);
   if (recording.stream_correlation > 0) {
-    out["clock_offset_ms"] = 1000 * (recording.stream_offset_s + r.time_offset_s.value_or(0));
+    out["clock_offset_ms"] = -1000 * (recording.stream_offset_s + r.time_offset_s.value_or(0));
     out["clock_offset_sigma_ms"] = 1000 * r.time_offset_sigma_s;
     out["clock_correlation"] = recording.stream_correlation;
   }

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
@@ -28,5 +30,12 @@ std::string pose_text(const Eigen::Matrix4d& matrix);
 Result<CameraModel> read_camera(const std::filesystem::path& path);
 /// The text that read_camera reads back exactly.
 std::string camera_text(const CameraModel& camera);
+
+using CameraCovariance = Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters>;
+/// From the same file: camera_covariance (9x9: fx fy cx cy in px, k1 k2 p1 p2 k3), as `calibrate camera` writes it.
+/// Empty where the file holds none; an error where it holds another matrix or one with a variance below zero.
+Result<std::optional<CameraCovariance>> read_camera_covariance(const std::filesystem::path& path);
+/// What to append to camera_text.
+std::string camera_covariance_text(const CameraCovariance& covariance);
 
 }  // namespace birdseye::host

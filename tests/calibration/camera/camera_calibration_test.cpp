@@ -52,11 +52,11 @@ TEST(CameraCalibration, NoisyViewsGiveItWithinThreeSigmaAndTheRightSigma) {
   for (int i = 0; i < 8; ++i)
     EXPECT_LT(std::abs(vector_of(found.camera)[i] - vector_of(truth)[i]), 3 * found.sigma()[i])
         << kCameraParameterNames[static_cast<std::size_t>(i)];
-  EXPECT_EQ(found.sigma()[8], 0);
+  EXPECT_EQ(found.noise_sigma()[8], 0);
   // Noise alone: both ways of telling sigma agree, up to what ten groups tell of a spread.
   for (int i = 0; i < 8; ++i) {
-    EXPECT_GT(found.sigma_between_views[i], 0.4 * found.sigma()[i]);
-    EXPECT_LT(found.sigma_between_views[i], 2.2 * found.sigma()[i]);
+    EXPECT_GT(found.sigma_between_views[i], 0.4 * found.noise_sigma()[i]);
+    EXPECT_LT(found.sigma_between_views[i], 2.2 * found.noise_sigma()[i]);
   }
   EXPECT_EQ(judge_camera(found).grade, Grade::pass);
 }
@@ -73,7 +73,7 @@ TEST(CameraCalibration, CovarianceIsWhatChanceDoes) {
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
     const auto found = calibrated(scene.views(truth, 10, 100 + seed), truth, {.model = LensModel::radial2, .folds = 2});
     const Eigen::VectorXd error = (vector_of(found.camera) - vector_of(truth)).head<kSolved>();
-    const Eigen::MatrixXd covariance = found.covariance.topLeftCorner<kSolved, kSolved>();
+    const Eigen::MatrixXd covariance = found.noise_covariance.topLeftCorner<kSolved, kSolved>();
     sum += error.dot(covariance.ldlt().solve(error));
   }
   const double tail = chi_square_tail(sum, kSeeds * kSolved);
@@ -125,13 +125,54 @@ TEST(CameraCalibration, AskedForAModelItGivesThat) {
     EXPECT_EQ(lens_model_of(name_of(model)), model);
     for (int i = 0; i < CameraModel::kParameters; ++i) {
       const bool solved = solved_by(model)[static_cast<std::size_t>(i)];
-      EXPECT_EQ(found.sigma()[i] > 0, solved);
+      EXPECT_EQ(found.noise_sigma()[i] > 0, solved);
       if (!solved) {
         EXPECT_EQ(vector_of(found.camera)[i], 0);
       }
     }
   }
   EXPECT_FALSE(lens_model_of("fisheye"));
+}
+
+TEST(CameraCalibration, WhatAModelLeavesOutIsInItsSigmaAndViewsThatRefuteItAreSaidTo) {
+  const BoardScene scene;
+  const CameraModel truth = hd_lens(-0.3, 0.12, 0.003, -0.002);
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    const auto found = calibrated(scene.views(truth, 10, 40 + seed), truth, {.model = LensModel::radial2});
+    ASSERT_TRUE(found.refuted_by);
+    EXPECT_GE(*found.refuted_by, LensModel::radial2_tangential2);
+    EXPECT_GT(found.sigma_between_models[6], 0.002);  // p1, which the model lacks
+    for (int i = 0; i < 4; ++i)
+      EXPECT_LT(std::abs(vector_of(found.camera)[i] - vector_of(truth)[i]), 3 * found.sigma()[i]) << seed << " " << i;
+    EXPECT_EQ(judge_camera(found).grade, Grade::marginal);
+  }
+}
+
+TEST(CameraCalibration, ABoardThatIsNotFlatIsNamedAndInTheSigma) {
+  const BoardScene scene;
+  const CameraModel truth = hd_lens(-0.25, 0.08);
+  const auto bent_views = [&](double sag_mm, unsigned seed) {
+    Views views = scene.views(truth, 15, seed);
+    const auto poses = scene.poses(15, seed);
+    const Eigen::Vector3d middle(27.5, 20, 0);
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      for (std::size_t i = 0; i < views[v].ids.size(); ++i) {
+        const Eigen::Vector3d flat = views[v].points_in_marker_mm[i];
+        const Eigen::Vector3d bent = flat + Eigen::Vector3d(0, 0, sag_mm * (flat - middle).squaredNorm() / (34 * 34));
+        views[v].points_px[i] += *project(truth, poses[v] * bent) - *project(truth, poses[v] * flat);
+      }
+    }
+    return views;
+  };
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    const auto flat = calibrated(bent_views(0, 60 + seed), truth);
+    EXPECT_LT(flat.board_sag_mm, 0.03);
+    const auto bent = calibrated(bent_views(0.3, 60 + seed), truth);
+    EXPECT_NEAR(bent.board_sag_mm, 0.3, 0.05);
+    const double off_px = std::abs(bent.camera.fx_px - truth.fx_px);
+    EXPECT_GT(off_px, 3 * bent.noise_sigma()[0]) << "the noise alone does not say it";
+    EXPECT_LT(off_px, 2 * bent.sigma()[0]);
+  }
 }
 
 TEST(CameraCalibration, OutliersAreNamedAndBendNothing) {

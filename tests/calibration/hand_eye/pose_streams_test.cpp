@@ -1,5 +1,6 @@
 #include "calibration/hand_eye/pose_streams.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +10,10 @@
 #include <sstream>
 
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/rotations.hpp"
+#include "calibration/hand_eye/hand_eye_fit.hpp"
 #include "tests/support/data.hpp"
+#include "tests/support/hand_eye_stream.hpp"
 
 namespace birdseye::calibration {
 namespace {
@@ -34,18 +38,26 @@ std::vector<Row> read_rows(const std::filesystem::path& path) {
   return out;
 }
 
+struct RobotArm {
+  std::vector<StampedSensor> sensor;
+  std::vector<StampedView> views;
+};
+RobotArm read_robot_arm(const std::filesystem::path& data) {
+  const std::string stem = "robot_arm_complete_bag_color_and_ir_";
+  const auto folder = data / "handeye_pose_streams";
+  RobotArm out;
+  for (const Row& r : read_rows(folder / (stem + "base_link_sr300_hinge.csv")))
+    out.sensor.push_back({r.time_s, {r.rotation, r.position_mm}});
+  for (const Row& r : read_rows(folder / (stem + "target_ir.csv")))
+    out.views.push_back({r.time_s, Transform<Marker, Camera>(r.rotation, r.position_mm).inverse()});
+  return out;
+}
+
 TEST(PoseStreams, RobotArmAsPublished) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
-  const std::string stem = "robot_arm_complete_bag_color_and_ir_";
-  const auto folder = *data / "handeye_pose_streams";
-  std::vector<StampedSensor> sensor;
-  for (const Row& r : read_rows(folder / (stem + "base_link_sr300_hinge.csv")))
-    sensor.push_back({r.time_s, {r.rotation, r.position_mm}});
-  std::vector<StampedView> views;
-  for (const Row& r : read_rows(folder / (stem + "target_ir.csv")))
-    views.push_back({r.time_s, Transform<Marker, Camera>(r.rotation, r.position_mm).inverse()});
-  const auto paired = pair_pose_streams(sensor, views);
+  const RobotArm arm = read_robot_arm(*data);
+  const auto paired = pair_pose_streams(arm.sensor, arm.views);
   ASSERT_TRUE(paired) << paired.error().what;
   HandEyeInput input;
   input.stations = paired->stations;
@@ -63,6 +75,46 @@ TEST(PoseStreams, RobotArmAsPublished) {
   EXPECT_NE(judge(*result).grade, Grade::fail);
   RecordProperty("offset_ms", std::to_string(1000 * (paired->offset_s + *result->time_offset_s)));
   RecordProperty("held_out_mm", std::to_string(result->held_out_mm));
+}
+
+/// Of two calibrations of one scope: their distance against what both state, squared.
+double apart(const HandEyeResult& a, const HandEyeResult& b) {
+  Vector6d error;
+  error << rotation_log(Eigen::Matrix3d(a.camera_from_sensor.rotation() * b.camera_from_sensor.rotation().transpose())),
+      a.camera_from_sensor.translation() - b.camera_from_sensor.translation();
+  return error.dot((a.covariance + b.covariance).ldlt().solve(error));
+}
+
+TEST(PoseStreams, PartsOfTheRobotArmsRecordingLieWithinWhatTheyState) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const RobotArm arm = read_robot_arm(*data);
+  const double limit99 = distance_limit(0.01, 14);
+  for (const std::size_t parts : {2U, 3U}) {
+    std::vector<HandEyeResult> found;
+    for (std::size_t k = 0; k < parts; ++k) {
+      const std::size_t from = k * arm.views.size() / parts, to = (k + 1) * arm.views.size() / parts;
+      const auto paired = pair_pose_streams(arm.sensor, std::span(arm.views).subspan(from, to - from));
+      ASSERT_TRUE(paired) << paired.error().what;
+      HandEyeInput input;
+      input.stations = paired->stations;
+      input.estimate_time_offset = true;
+      const auto result = calibrate_hand_eye(input);
+      ASSERT_TRUE(result && result->solved);
+      found.push_back(*result);
+    }
+    for (std::size_t a = 0; a < parts; ++a) {
+      for (std::size_t b = 0; b < a; ++b) {
+        const Eigen::Vector3d off_mm =
+            found[a].camera_from_sensor.translation() - found[b].camera_from_sensor.translation();
+        EXPECT_LT(apart(found[a], found[b]), limit99) << parts << " parts, " << a << " and " << b;
+        RecordProperty(fmt::format("of_{}_{}_and_{}", parts, a, b),
+                       fmt::format("{:.2f} mm apart, distance {:.2f} of {:.2f}; at the board {:.2f} and {:.2f} mm",
+                                   off_mm.norm(), std::sqrt(apart(found[a], found[b])), std::sqrt(limit99),
+                                   found[a].sigma_at_board_mm(), found[b].sigma_at_board_mm()));
+      }
+    }
+  }
 }
 
 /// A hand that turns this way and that, sampled by two clocks.
@@ -105,6 +157,34 @@ TEST(PoseStreams, FindsTheOffsetOfTheClocks) {
     EXPECT_NEAR(paired->offset_s + *result->time_offset_s, offset_s, 1e-4);
     EXPECT_LT((result->camera_from_sensor.translation() - Eigen::Vector3d(10, 20, -150)).norm(), 0.05);
   }
+}
+
+/// Errors that last for a second and more: taken one by one, the residuals promise far too much.
+TEST(PoseStreams, WhatErrsTogetherIsNotCountedAsManyMeasurements) {
+  int within = 0;
+  constexpr int kSeeds = 3;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    const testing::HandEyeStream stream(
+        {.seconds = 30, .sensor_hz = 25, .camera_hz = 10, .lasting_s = 3, .seed = seed});
+    const auto paired = pair_pose_streams(stream.sensor, stream.views);
+    ASSERT_TRUE(paired) << paired.error().what;
+    HandEyeInput input;
+    input.stations = paired->stations;
+    input.estimate_time_offset = true;
+    const auto found = calibrate_hand_eye(input);
+    for (HandEyeStation& s : input.stations) s.time_s.reset();
+    const auto one_by_one = calibrate_hand_eye(input);
+    ASSERT_TRUE(found && found->solved && one_by_one && one_by_one->solved);
+    EXPECT_LT((found->camera_from_sensor.translation() - one_by_one->camera_from_sensor.translation()).norm(), 1e-9);
+    EXPECT_GT(found->sigma_at_board_mm(), 1.5 * one_by_one->sigma_at_board_mm()) << seed;
+    EXPECT_GT(found->held_out_mm, one_by_one->held_out_mm) << seed;
+    Vector6d error;
+    error << rotation_log(
+        Eigen::Matrix3d(stream.camera_from_sensor.rotation() * found->camera_from_sensor.rotation().transpose())),
+        stream.camera_from_sensor.translation() - found->camera_from_sensor.translation();
+    within += error.dot(found->covariance.ldlt().solve(error)) < found->region_limit ? 1 : 0;
+  }
+  EXPECT_GE(within, kSeeds - 1);
 }
 
 TEST(PoseStreams, RefusesWhatDoesNotCorrelate) {

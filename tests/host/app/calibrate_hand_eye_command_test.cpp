@@ -1,4 +1,5 @@
 // `calibrate hand-eye`, from the outside.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +11,7 @@
 #include "tests/support/data.hpp"
 #include "tests/support/drawn_scope.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/hand_eye_stream.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
@@ -219,10 +221,49 @@ TEST(CalibrateHandEyeCommand, PairsTwoStreamsOfPoses) {
                           (scratch / "x.json").string() + " --report " + (scratch / "x.html").string());
   ASSERT_EQ(done.code, 0) << done.output;
   const auto json = read_json(scratch / "x.json");
-  EXPECT_NEAR(json["clock_offset_ms"].get<double>(), -15, 3);
+  EXPECT_NEAR(json["clock_offset_ms"].get<double>(), 15, 3);  // as latency: the pictures' times are late
   EXPECT_EQ(json["camera_from_sensor"].size(), 4U);
   EXPECT_GT(std::filesystem::file_size(scratch / "x.html"), 10'000U);
   EXPECT_TRUE(std::filesystem::exists(scratch / "x.txt"));
+}
+
+std::string row_of(double time_s, const Eigen::Matrix4d& pose) {
+  const Eigen::Quaterniond q(Eigen::Matrix3d(pose.topLeftCorner<3, 3>()));
+  return fmt::format("{},{},{},{},{},{},{},{}\n", time_s, pose(0, 3), pose(1, 3), pose(2, 3), q.x(), q.y(), q.z(),
+                     q.w());
+}
+
+/// Two trackers on one tool; the second one's world begins 1.2 m behind what it tracks.
+TEST(CalibrateHandEyeCommand, TwoTrackersAreJudgedWhereTheirPosesAre) {
+  const Scratch scratch;
+  const testing::HandEyeStream stream({.seconds = 30, .sensor_hz = 30, .camera_hz = 10, .bent_mm = 0});
+  std::string hand = "t,x,y,z,qx,qy,qz,qw\n", eye = hand;
+  for (const auto& s : stream.sensor) hand += row_of(s.time_s, s.tracker_from_sensor.matrix());
+  const Eigen::Vector3d far_mm(300, -200, -1200);
+  for (const auto& s : stream.views) {
+    Eigen::Matrix4d pose = s.camera_from_marker.inverse().matrix();
+    pose.topRightCorner<3, 1>() -= far_mm;
+    eye += row_of(s.time_s, pose);
+  }
+  const std::string command = "calibrate hand-eye --poses " + scratch.file("hand.csv", hand) + " --eye-poses " +
+                              scratch.file("eye.csv", eye) + " --json " + (scratch / "x.json").string();
+  const auto here = run("birdseye", command + " --out " + (scratch / "x.txt").string());
+  EXPECT_EQ(here.code, 0) << here.output;
+  EXPECT_THAT(here.output, HasSubstr("in the middle of those poses"));
+  EXPECT_TRUE(std::filesystem::exists(scratch / "x.txt"));
+  const auto at_poses = read_json(scratch / "x.json");
+  run("birdseye", command + " --at 0,0,0");
+  const auto at_origin = read_json(scratch / "x.json");
+  EXPECT_GT(at_origin["sigma_at_board_mm"].get<double>(), 2 * at_poses["sigma_at_board_mm"].get<double>());
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      EXPECT_NEAR(at_origin["camera_from_sensor"][i][j].get<double>(),
+                  at_poses["camera_from_sensor"][i][j].get<double>(), 0.05);
+      EXPECT_NEAR(at_origin["tracker_from_pattern"][i][j].get<double>(),
+                  at_poses["tracker_from_pattern"][i][j].get<double>(), 0.2);
+    }
+  }
+  expect_refused("birdseye", command + " --at 1,2", {"--at"});
 }
 
 TEST(CalibrateHandEyeCommand, NamesBothCountsWherePicturesAndPosesDoNotPair) {
