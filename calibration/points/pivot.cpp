@@ -8,6 +8,7 @@
 #include <random>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/student95.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 
@@ -231,29 +232,59 @@ Eigen::Matrix3d independent_covariance(const Poses& poses, const Indices& used, 
   return linear.inverse * scores * linear.inverse / kVarianceWithin;
 }
 
-/// The same where the errors of all poses of a group may be one: those of a divot, where there are divots enough, or
-/// those that lean to one side. A field that metal bends errs alike there, however many poses there are.
-Eigen::Matrix3d grouped_covariance(const Poses& poses, const Indices& used, const TipEquations& linear) {
-  const bool by_divot = linear.means.count.size() >= kLeastGroups;
-  const auto sides = sides_of(poses, linear);
-  std::vector<Eigen::Vector3d> sums(by_divot ? linear.means.count.size() : kSides, Eigen::Vector3d::Zero());
+/// Which poses may err alike: those of a divot, where there are divots enough, or those that lean to one side. A field
+/// that metal bends errs alike there, however many poses there are.
+std::vector<std::size_t> places_of(const Poses& poses, const TipEquations& linear) {
+  std::vector<std::size_t> groups;
+  if (linear.means.count.size() >= kLeastGroups) {
+    for (const PivotPose& pose : poses) groups.push_back(pose.divot);
+  } else {
+    for (const int side : sides_of(poses, linear)) groups.push_back(static_cast<std::size_t>(side));
+  }
+  return groups;
+}
+
+/// The same for neighbours in time, which a tracker's filter and a hand that leans on one side push alike. All poses in
+/// one group where they have no times.
+std::vector<std::size_t> moments_of(const Poses& poses) {
+  constexpr std::size_t kMoments = 12;
+  Indices order(poses.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return poses[i].time_s; });
+  std::vector<std::size_t> groups(poses.size(), 0);
+  if (poses[order.front()].time_s == poses[order.back()].time_s) return groups;
+  for (std::size_t k = 0; k < order.size(); ++k) groups[order[k]] = k * kMoments / order.size();
+  return groups;
+}
+
+/// The tip's variance where the errors of all poses of a group may be one, mm^2 summed over the axes, as much larger as
+/// a 95 % bound by so few groups has to be. 0 where groups are too few to tell.
+double variance_between(const Poses& poses, const Indices& used, const TipEquations& linear,
+                        const std::vector<std::size_t>& groups) {
+  std::vector<Eigen::Vector3d> sums(*std::ranges::max_element(groups) + 1, Eigen::Vector3d::Zero());
+  if (sums.size() < kLeastGroups) return 0;
   for (const std::size_t i : used) {
     const auto& pose = poses[i].tracker_from_sensor;
     const Eigen::Matrix3d swing = pose.rotation() - linear.means.rotation[poses[i].divot];
-    const std::size_t group = by_divot ? poses[i].divot : static_cast<std::size_t>(sides[i]);
-    sums[group] += swing.transpose() * (pose * linear.tip - linear.pivot(poses[i].divot));
+    sums[groups[i]] += swing.transpose() * (pose * linear.tip - linear.pivot(poses[i].divot));
   }
-  Eigen::Matrix3d scores = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& sum : sums) scores += sum * sum.transpose();
-  const auto groups = static_cast<double>(sums.size());
-  return groups / (groups - 1) * linear.inverse * scores * linear.inverse;
+  double squares = 0;
+  for (const Eigen::Vector3d& sum : sums) squares += (linear.inverse * sum).squaredNorm();
+  const auto count = static_cast<double>(sums.size());
+  const double few = student95(static_cast<int>(sums.size()) - 1) / kNormal95;
+  return few * few * count / (count - 1) * squares;
 }
 
-/// The first, as much larger as the second says that it is too small.
+/// White's, as much larger as groups by place and by time say that it is too small (two ways: A. Cameron, J. Gelbach
+/// and D. Miller, 2011).
 Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
   const Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
-  const double grouped_mm2 = grouped_covariance(poses, used, linear).trace();
-  return independent * (grouped_mm2 > independent.trace() ? grouped_mm2 / independent.trace() : 1.0);
+  const double alone_mm2 = independent.trace();
+  if (!(alone_mm2 > 0)) return independent;
+  double times = 1;
+  for (const auto& groups : {places_of(poses, linear), moments_of(poses)})
+    times += std::max(0.0, variance_between(poses, used, linear, groups) / alone_mm2 - 1);
+  return times * independent;
 }
 
 PivotTilt tilt_of(const Poses& poses, const Indices& used, const TipEquations& linear) {

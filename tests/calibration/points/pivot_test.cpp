@@ -73,6 +73,27 @@ TEST(Pivot, ErrorsThatNeighboursShareAreNotTakenForNoise) {
   EXPECT_GT(solved->tip_sigma_mm, 0.03);
 }
 
+TEST(Pivot, ErrorsThatLastAreNotTakenForNoise) {
+  // A second's worth of poses errs as one.
+  int within = 0;
+  constexpr int kTrials = 60;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    SimulatedPointer pointer{.random = std::mt19937_64(static_cast<std::uint64_t>(trial))};
+    auto poses = pointer.poses(300);
+    Eigen::Vector3d error = pointer.noise(1);
+    for (PivotPose& pose : poses) {
+      constexpr double kKept = 0.9;
+      error = kKept * error + std::sqrt(1 - kKept * kKept) * pointer.noise(1);
+      pose = moved(pose, error);
+    }
+    const auto solved = solve_pivot(poses);
+    ASSERT_TRUE(solved);
+    const Eigen::Vector3d off = solved->robust.tip_in_sensor_mm - pointer.tip_mm;
+    within += off.dot(solved->tip_covariance_mm2.inverse() * off) < 7.81 ? 1 : 0;
+  }
+  EXPECT_GE(within, kTrials * 88 / 100);
+}
+
 TEST(Pivot, TheHeldOutErrorIsThatOfPosesNotSeen) {
   SimulatedPointer pointer{.position_noise_mm = 0.5};
   const auto poses = pointer.poses(40);

@@ -41,6 +41,36 @@ TEST(RecordedPivot, TheOpticalPointerHasItsPublishedTip) {
             << " weakest " << solved->tilt.weakest_swing_deg << " slid " << solved->slid_mm << "\n";
 }
 
+/// Of the two halves of a recording by time: the tips' distance against what both state, squared; below it is 99 % of a
+/// chi-square of three.
+constexpr double kWithin99 = 11.34;
+void expect_halves_agree(const std::vector<PivotPose>& poses, bool by_divot) {
+  std::array<std::vector<PivotPose>, 2> halves;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    PivotPose pose = poses[i];
+    const bool second = by_divot ? pose.divot >= 4 : i >= poses.size() / 2;
+    if (by_divot) pose.divot %= 4;
+    halves.at(second ? 1 : 0).push_back(pose);
+  }
+  const auto one = solve_pivot(halves[0]), other = solve_pivot(halves[1]);
+  ASSERT_TRUE(one && other);
+  const Eigen::Vector3d off_mm = one->robust.tip_in_sensor_mm - other->robust.tip_in_sensor_mm;
+  const double squared = off_mm.dot((one->tip_covariance_mm2 + other->tip_covariance_mm2).inverse() * off_mm);
+  EXPECT_LT(squared, kWithin99);
+  std::cout << "[ figures  ] halves: tips " << off_mm.norm() << " mm apart, distance squared " << squared << ", sigmas "
+            << one->tip_sigma_mm << " and " << other->tip_sigma_mm << " mm\n";
+}
+
+TEST(RecordedPivot, HalvesOfTheOpticalPointersPosesAgree) {
+  const auto data = birdseye::testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto set = host::read_pose_set(*data / "pivot_optical_pointer");
+  ASSERT_TRUE(set) << set.error().what;
+  std::vector<PivotPose> poses;
+  for (const auto& pose : set->poses) poses.push_back({pose.tracker_from_sensor, 0, pose.time_s});
+  expect_halves_agree(poses, false);
+}
+
 /// First frame of each, and the one after the last. Published as approximate: medians move by kPhaseEnds_mm with the
 /// ends.
 constexpr double kPhaseEnds_mm = 0.025;
@@ -87,6 +117,10 @@ class EightDivots : public ::testing::Test {
   }
   std::vector<PivotPose> poses;
 };
+
+TEST_F(EightDivots, FourAndFourAgree) {
+  expect_halves_agree(poses, true);
+}
 
 TEST_F(EightDivots, GiveTheTipThatIsPublished) {
   const auto solved = solve_pivot(poses);
