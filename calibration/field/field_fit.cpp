@@ -90,6 +90,20 @@ struct HeldOutErrors {
   std::vector<double> variance;  ///< of the prediction there, for noise of variance 1
 };
 
+/// Where the fit without a sample's fold is extrapolated: its prediction is less sure than one measurement. Nowhere, if
+/// that were so of half of all samples: then they are too few for the map, which has to show.
+std::vector<bool> extrapolated(const HeldOutErrors& held, const MeasuredGrid& grid) {
+  std::vector<bool> out;
+  for (const double variance : held.variance) out.push_back(variance > 1);
+  std::size_t used = 0, beyond = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    used += grid.used[i] ? 1 : 0;
+    beyond += grid.used[i] && out[i] ? 1 : 0;
+  }
+  if (2 * beyond >= used) out.assign(out.size(), false);
+  return out;
+}
+
 HeldOutErrors held_out(const SmoothedBasis& basis, const FoldedNormals& normals, const MeasuredGrid& grid,
                        const Vectors& wanted, double smoothing) {
   HeldOutErrors out{Vectors(wanted.size()), std::vector<double>(wanted.size())};
@@ -167,14 +181,15 @@ Vectors coefficients(const SmoothedBasis& basis, const MatrixXd& parameters) {
 
 /// Of a new measurement: sigma^2 (1 + f^T A^-1 f) per axis, with sigma from how far held-out ones were off.
 std::vector<double> sigmas(const SmoothedBasis& basis, const MeasuredGrid& grid, const HeldOutErrors& held,
-                           const MatrixXd& inverse) {
+                           const std::vector<bool>& beyond, const MatrixXd& inverse) {
   double sum = 0, count = 0;
   Vectors places;
   for (std::size_t i = 0; i < held.errors.size(); ++i) {
     if (!grid.used[i]) continue;
+    places.push_back(grid.measured_mm[i]);
+    if (beyond[i]) continue;
     sum += held.errors[i].squaredNorm() / (1 + held.variance[i]);
     ++count;
-    places.push_back(grid.measured_mm[i]);
   }
   const double variance = sum / count;
   return detail::sigma_lattice(basis.functions, places, detail::reach_mm(basis.functions, places),
@@ -191,7 +206,8 @@ Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& b
   const auto held = held_out(basis, normals, grid, grid.wanted_mm, smoothing);
   const auto solution = normals.solve(smoothing, -1);
   FieldMapData data{basis.functions, coefficients(basis, solution.parameters), {}, {}};
-  data.sigma_mm = sigmas(basis, grid, held, solution.inverse);
+  const std::vector<bool> beyond = extrapolated(held, grid);
+  data.sigma_mm = sigmas(basis, grid, held, beyond, solution.inverse);
   const Vectors rotations = wanted_rotations(samples, grid.used, fit);
   if (!rotations.empty()) {
     const auto turning = normals_of(basis, grid, rotations);
@@ -204,7 +220,8 @@ Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& b
   if (!map) return map.error();
   fit.map = *std::move(map);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    fit.residuals.push_back({samples[i].name, grid.measured_mm[i], -grid.wanted_mm[i], held.errors[i], !grid.used[i]});
+    fit.residuals.push_back(
+        {samples[i].name, grid.measured_mm[i], -grid.wanted_mm[i], held.errors[i], !grid.used[i], beyond[i]});
   }
   detail::sum_up(fit);
   return {};

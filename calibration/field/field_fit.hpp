@@ -44,6 +44,9 @@ struct FieldResidual {
   Eigen::Vector3d before_mm;    ///< measured less true
   Eigen::Vector3d held_out_mm;  ///< the same after a map that was not shown the measurement's region
   bool outlier = false;
+  /// Without its region the map would be extrapolated here, at a corner of the volume say: held_out_mm tells then of
+  /// the extrapolation, not of the map, and is not counted.
+  bool beyond = false;
 };
 
 struct FieldFit {
@@ -55,7 +58,8 @@ struct FieldFit {
   std::vector<FieldCandidate> candidates;
   std::vector<FieldResidual> residuals;       ///< all measurements, in their order
   double before_mm = 0, before_worst_mm = 0;  ///< RMS and largest, without outliers
-  /// After correction, of regions that were left out. The noise of the measurements is in it.
+  /// After correction, of regions that were left out, as far as the map without them reaches. The noise of the
+  /// measurements is in it.
   double held_out_mm = 0, held_out_worst_mm = 0;
   std::string worst;                               ///< its name
   std::optional<double> before_deg, held_out_deg;  ///< RMS, where orientation was mapped

@@ -82,21 +82,23 @@ double rms(std::span<const Eigen::Vector3d> errors, const std::vector<bool>& use
 }
 
 void sum_up(FieldFit& fit) {
-  double before = 0, after = 0, count = 0;
+  double before = 0, after = 0, count = 0, within = 0;
   fit.before_worst_mm = fit.held_out_worst_mm = 0;
   for (const FieldResidual& r : fit.residuals) {
     if (r.outlier) continue;
     ++count;
     before += r.before_mm.squaredNorm();
-    after += r.held_out_mm.squaredNorm();
     fit.before_worst_mm = std::max(fit.before_worst_mm, r.before_mm.norm());
+    if (r.beyond) continue;
+    ++within;
+    after += r.held_out_mm.squaredNorm();
     if (r.held_out_mm.norm() >= fit.held_out_worst_mm) {
       fit.held_out_worst_mm = r.held_out_mm.norm();
       fit.worst = r.name;
     }
   }
   fit.before_mm = std::sqrt(before / std::max(1.0, count));
-  fit.held_out_mm = std::sqrt(after / std::max(1.0, count));
+  fit.held_out_mm = std::sqrt(after / std::max(1.0, within));
 }
 
 double mapped_part(const std::vector<double>& sigmas_mm) {
@@ -142,6 +144,12 @@ Verdict verdict_of(const FieldFit& fit) {
       fit.from_pairs ? kPairMarginalMm : kMapMarginalMm,
       "average each place for longer, measure more places where the report's arrows are long, and move what "
       "metal can be moved away from the transmitter");
+  const auto beyond = std::ranges::count_if(fit.residuals, [](const auto& r) { return r.beyond && !r.outlier; });
+  if (beyond > 0) {
+    verdict.add(Grade::pass, fmt::format("{} of {} places, at the volume's rim, are not counted in it: a map without "
+                                         "them would be extrapolated",
+                                         beyond, fit.residuals.size()));
+  }
   if (fit.held_out_worst_mm > kWorstFactor * fit.held_out_mm) {
     verdict.add(Grade::marginal,
                 fmt::format("{} is off by {:.1f} mm, more than {:.0f} times the rest", fit.worst, fit.held_out_worst_mm,

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/field_map_file.hpp"
@@ -81,6 +82,7 @@ nlohmann::json json_of(const Fitted& fitted) {
                       {"mapped_percent", 100 * fit.mapped_part},
                       {"orientation_mapped", fit.map.maps_orientation()},
                       {"measurements", fit.residuals.size()},
+                      {"not_counted", std::ranges::count_if(fit.residuals, [](const auto& r) { return r.beyond; })},
                       {"rejected", fitted.rejected},
                       {"candidates", nlohmann::json::array()},
                       {"outliers", nlohmann::json::array()}};
