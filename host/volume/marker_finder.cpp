@@ -1,70 +1,28 @@
 #include "host/volume/marker_finder.hpp"
 
-#include <itkBinaryImageToLabelMapFilter.h>
-#include <itkImage.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/system/process_copy.hpp"
+#include "host/volume/components.hpp"
+#include "host/volume/post_finder.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
 using Eigen::Vector3d;
-using Mask = itk::Image<unsigned char, 3>;
 
 constexpr double kExplained = 0.9;         // a marker; bones in real CTs of the abdomen come to 0.86
 constexpr double kExplainedInDoubt = 0.8;  // a marker that another one, or the border, disturbs
-constexpr double kLeastContrast_hu = 80;
-
-/// Connected voxels over a threshold.
-struct Component {
-  Eigen::Array3i low{1 << 30, 1 << 30, 1 << 30}, high{-1, -1, -1};
-  std::size_t voxels = 0;
-  Vector3d sum = Vector3d::Zero();
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
-  [[nodiscard]] Vector3d centre_voxel() const { return sum / static_cast<double>(voxels); }
-};
-
-void add_run(Component& c, const Mask::IndexType& first, int length) {
-  for (int n = 0; n < length; ++n) {
-    const Eigen::Array3i here(static_cast<int>(first[0]) + n, static_cast<int>(first[1]), static_cast<int>(first[2]));
-    const Vector3d p = here.cast<double>();
-    c.low = c.low.min(here);
-    c.high = c.high.max(here);
-    c.sum += p;
-    c.squares += p * p.transpose();
-  }
-  c.voxels += static_cast<std::size_t>(length);
-}
 
 std::vector<Component> bright_components(const Volume& ct, std::int16_t threshold) {
-  const CopiesHeldOff held;  // it runs while other files are read
-  const auto mask = Mask::New();
-  Mask::SizeType size;
-  for (unsigned axis = 0; axis < 3; ++axis) size[axis] = static_cast<itk::SizeValueType>(ct.size[axis]);
-  mask->SetRegions(size);
-  mask->Allocate();
-  std::transform(ct.hu.begin(), ct.hu.end(), mask->GetBufferPointer(),
-                 [threshold](std::int16_t hu) { return static_cast<unsigned char>(hu >= threshold ? 1 : 0); });
-  // As runs along x: an image of labels would take four times the mask, and as long to go through.
-  const auto label = itk::BinaryImageToLabelMapFilter<Mask>::New();
-  label->SetInput(mask);
-  label->SetInputForegroundValue(1);
-  label->FullyConnectedOn();
-  label->Update();
-  const auto* const map = label->GetOutput();
-  std::vector<Component> components(map->GetNumberOfLabelObjects());
-  for (std::size_t n = 0; n < components.size(); ++n) {
-    const auto* const object = map->GetNthLabelObject(n);
-    for (std::size_t line = 0; line < object->GetNumberOfLines(); ++line)
-      add_run(components[n], object->GetLine(line).GetIndex(), static_cast<int>(object->GetLine(line).GetLength()));
-  }
-  return components;
+  return components_of(ct, [&ct, threshold](unsigned char* mask) {
+    std::transform(ct.hu.begin(), ct.hu.end(), mask,
+                   [threshold](std::int16_t hu) { return static_cast<unsigned char>(hu >= threshold ? 1 : 0); });
+  });
 }
 
 bool at_border(const Volume& ct, const Component& c) {
@@ -182,9 +140,7 @@ class Finder {
   }
 
   [[nodiscard]] bool is_one(const MarkerFit& fit, double explained) const {
-    // A size that is off by a tenth, and by a part of a voxel, is the threshold's and the scanner's doing.
-    const double slack = 0.12 + 0.3 * ct_.spacing_mm.minCoeff() / shape_.diameter_mm;
-    return fit.explained >= explained && fit.contrast_hu >= kLeastContrast_hu && std::abs(std::log(fit.scale)) < slack;
+    return fit.explained >= explained && has_size(ct_, shape_, fit);
   }
   /// Whether the border of the CT runs through the marker, or so near that its edge is not seen.
   [[nodiscard]] bool cut(const MarkerFit& fit) const {
@@ -221,6 +177,7 @@ class Finder {
 }  // namespace
 
 FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop) {
+  if (search.shape.kind == MarkerKind::post) return find_hollow_posts(ct, {search.shape.diameter_mm}, stop);
   Finder finder(ct, search.shape, stop);
   std::vector<std::int16_t> thresholds{300, 700, 1500};
   if (search.threshold_hu) thresholds = {*search.threshold_hu};

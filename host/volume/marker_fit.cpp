@@ -160,6 +160,20 @@ struct Model {
   }
 };
 
+/// Of the centre per axis, from what the fit leaves. Voxels that the marker fills in part err together, so that far
+/// fewer are independent than there are; and no fit is better than kLeast_voxels.
+double centre_sigma_mm(const Model& model, const VectorXd& x, const VectorXd& residuals, const Volume& ct) {
+  constexpr double kTogether = 4, kLeast_voxels = 0.02;
+  Eigen::MatrixXd jacobian(model.values(), model.inputs());
+  Eigen::NumericalDiff<Model> differences(model, 1e-8);
+  differences.df(x, jacobian);
+  const Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
+  const Eigen::MatrixXd covariance = normal.completeOrthogonalDecomposition().pseudoInverse() *
+                                     (residuals.squaredNorm() / std::max(1, model.values() - model.inputs()));
+  return std::hypot(std::sqrt(kTogether * covariance.topLeftCorner<3, 3>().trace() / 3),
+                    kLeast_voxels * ct.spacing_mm.maxCoeff());
+}
+
 /// One round: from is what is known so far. Without moving it only weighs how well that explains the voxels.
 std::optional<MarkerFit> fit_once(const Volume& ct, const MarkerShape& shape, const MarkerFit& from, double off_mm,
                                   bool moving) {
@@ -185,9 +199,12 @@ std::optional<MarkerFit> fit_once(const Volume& ct, const MarkerShape& shape, co
   VectorXd residuals;
   model(x, residuals);
   MarkerFit fit;
+  fit.kind = shape.kind;
+  fit.sigma_mm = moving ? centre_sigma_mm(model, x, residuals, ct) : 0;
   fit.centre_in_patient_mm = from.centre_in_patient_mm + x.head<3>();
   fit.axis = model.axis_of(x);
   fit.scale = std::exp(x[3]);
+  fit.diameter_mm = fit.scale * shape.diameter_mm;
   fit.hu = model.density_hu(share);
   fit.contrast_hu = fit.hu - share.dot(around.surroundings_hu) / std::max(share.sum(), 1e-9);
   fit.explained = 1 - residuals.squaredNorm() / std::max((around.hu - around.surroundings_hu).squaredNorm(), 1e-9);
@@ -213,6 +230,13 @@ std::optional<MarkerFit> fit_marker(const Volume& ct, const MarkerShape& shape, 
     return std::nullopt;
   // Once more from where that ended, with the surroundings from closer by.
   return fit_once(ct, shape, *rough, 0, true);
+}
+
+bool has_size(const Volume& ct, const MarkerShape& shape, const MarkerFit& fit) {
+  constexpr double kLeastContrast_hu = 80;
+  // A size that is off by a tenth, and by a part of a voxel, is the threshold's and the scanner's doing.
+  const double slack = 0.12 + 0.3 * ct.spacing_mm.minCoeff() / shape.diameter_mm;
+  return fit.contrast_hu >= kLeastContrast_hu && std::abs(std::log(fit.scale)) < slack;
 }
 
 }  // namespace birdseye::host

@@ -9,12 +9,16 @@ namespace birdseye::host {
 
 /// A marker's shape laid over the voxels.
 struct MarkerFit {
+  MarkerKind kind = MarkerKind::ball;
   Eigen::Vector3d centre_in_patient_mm;
+  double sigma_mm = 0;                              ///< of the centre, per axis
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of a ring or cylinder, unit length, patient frame
-  double scale = 1;                                 ///< what was found over what was asked for
+  double diameter_mm = 0;                           ///< outer, as found
+  double scale = 1;                                 ///< what was found over what was asked for; not of a post
   double hu = 0;                                    ///< of the marker's material
-  double contrast_hu = 0;                           ///< over what is round it
-  double explained = 0;  ///< share of what differs from the surroundings that the shape explains, at most 1
+  double contrast_hu = 0;                           ///< over what is round it; of a post, over its cavity
+  /// Share of what differs from the surroundings that the shape explains, at most 1; not of a post.
+  double explained = 0;
 };
 
 /// Fits centre, axis, size, blur and density of one marker, from a centre that is right to a third of the marker. Each
@@ -23,5 +27,8 @@ struct MarkerFit {
 /// directions: first guesses of the axis, columns. Empty where too few voxels surround the place, or the fit runs away.
 std::optional<MarkerFit> fit_marker(const Volume& ct, const MarkerShape& shape,
                                     const Eigen::Vector3d& centre_in_patient_mm, const Eigen::Matrix3d& directions);
+
+/// Whether what was fitted is of the size that was asked for, and brighter than what is round it.
+bool has_size(const Volume& ct, const MarkerShape& shape, const MarkerFit& fit);
 
 }  // namespace birdseye::host

@@ -21,7 +21,7 @@ Tube tube_of(const MarkerShape& s) {
 }  // namespace
 
 double MarkerShape::outside_mm(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& axis) const {
-  if (kind == MarkerKind::ball) return point_mm.norm() - diameter_mm / 2;
+  if (kind == MarkerKind::ball || kind == MarkerKind::post) return point_mm.norm() - diameter_mm / 2;
   const double along = point_mm.dot(axis);
   const double from_axis = (point_mm - along * axis).norm();
   if (kind == MarkerKind::ring) {
@@ -39,6 +39,7 @@ double MarkerShape::half_extent_mm(const Eigen::Vector3d& direction, const Eigen
   const double across = std::sqrt(std::max(0.0, 1 - along * along));
   switch (kind) {
     case MarkerKind::ball:
+    case MarkerKind::post:
       return diameter_mm / 2;
     case MarkerKind::ring:
       return tube_of(*this).around_mm * across + tube_of(*this).radius_mm;
@@ -52,6 +53,7 @@ double MarkerShape::volume_mm3() const {
   constexpr double kPi = std::numbers::pi;
   switch (kind) {
     case MarkerKind::ball:
+    case MarkerKind::post:
       return kPi / 6 * std::pow(diameter_mm, 3);
     case MarkerKind::ring:
       return 2 * kPi * kPi * tube_of(*this).around_mm * std::pow(tube_of(*this).radius_mm, 2);
@@ -64,6 +66,7 @@ double MarkerShape::volume_mm3() const {
 double MarkerShape::thinnest_mm() const {
   switch (kind) {
     case MarkerKind::ball:
+    case MarkerKind::post:
       return diameter_mm;
     case MarkerKind::ring:
       return 2 * tube_of(*this).radius_mm;
@@ -79,7 +82,7 @@ double MarkerShape::widest_mm() const {
 
 Result<void> check(const MarkerShape& s) {
   constexpr double kMost_mm = 100;
-  const bool hollow = s.kind != MarkerKind::ball;
+  const bool hollow = s.kind == MarkerKind::ring || s.kind == MarkerKind::cylinder;
   if (!(s.diameter_mm > 0) || s.diameter_mm > kMost_mm)
     return Error{Errc::bad_value, fmt::format("a marker {} mm across: give its outer diameter in mm", s.diameter_mm)};
   if (hollow && !(s.hole_mm > 0 && s.hole_mm < s.diameter_mm)) {

@@ -6,9 +6,11 @@
 
 namespace birdseye::host {
 
-enum class MarkerKind { ball, ring, cylinder };
+/// post: an air cavity in a thin wall, on a stalk (post_finder.hpp). The others are solid.
+enum class MarkerKind { ball, ring, cylinder, post };
 
-/// What a fiducial marker looks like in a CT: brighter than what is round it, of one density.
+/// What a fiducial marker looks like in a CT: brighter than what is round it, of one density. Of a post the ball that
+/// it fits in.
 struct MarkerShape {
   MarkerKind kind = MarkerKind::ball;
   double diameter_mm = 8;  ///< from outside to outside

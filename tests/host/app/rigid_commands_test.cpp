@@ -1,4 +1,5 @@
 // `volume markers` and `register fiducials`, from the outside.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -6,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "host/files/text_files.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
@@ -69,6 +71,24 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
     EXPECT_LT(nearest, 0.15);
   }
   EXPECT_GT(fs::file_size(scratch / "m.png"), 10'000U);
+
+  // Pointed at, a few mm off, in an order of one's own.
+  std::string near;
+  const Points pointed(truth->fiducials_mm.rbegin(), truth->fiducials_mm.rbegin() + 3);
+  for (const Eigen::Vector3d& p : pointed)
+    near += fmt::format(" --near {:.1f},{:.1f},{:.1f}", p.x() + 3, p.y(), p.z() - 4);
+  const std::string own = (scratch / "own.txt").string();
+  const auto refined =
+      run("birdseye", "volume markers " + ct + near + " --out " + own + " --json " + (scratch / "own.json").string());
+  ASSERT_EQ(refined.code, 0) << refined.output;
+  const auto places = host::read_points(own);
+  ASSERT_TRUE(places);
+  ASSERT_EQ(places->size(), pointed.size());
+  for (std::size_t i = 0; i < pointed.size(); ++i) EXPECT_LT(((*places)[i] - pointed[i]).norm(), 0.15);
+  EXPECT_EQ(read_json(scratch / "own.json")["markers"][0]["kind"], "ball");
+  const auto none = run("birdseye", "volume markers " + ct + near + " --near 0,0,0 --out " + own);
+  EXPECT_EQ(none.code, 3) << none.output;
+  EXPECT_NE(none.output.find("no marker within 10 mm of (0.0, 0.0, 0.0) mm"), std::string::npos) << none.output;
 
   // Five of six touched, in another order.
   Points five(truth->fiducials_mm.rbegin(), truth->fiducials_mm.rbegin() + 5);
@@ -152,7 +172,7 @@ TEST(RigidCommands, ARealAbdomenWithoutMarkersHasNone) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
   const Scratch scratch;
-  for (const char* shape : {"ball --diameter 8", "ring --diameter 15 --hole 5"}) {
+  for (const char* shape : {"ball --diameter 8", "ring --diameter 15 --hole 5", "post --diameter 10"}) {
     const auto result =
         run("birdseye", "volume markers " + (*data / "ct_abdomen/example_ct.nii.gz").string() + " --shape " + shape +
                             " --out " + (scratch / "m.txt").string() + " --json " + (scratch / "m.json").string());
@@ -183,7 +203,13 @@ TEST(RigidCommands, RefuseBadInputInOneLine) {
         {markers + "--shape ball --diameter 0", "outer diameter"},
         {markers + "--shape ring --diameter 8", "hole"},
         {markers + "--shape cylinder --diameter 8 --hole 3", "height"},
-        {markers + "--shape ball --diameter 8 --threshold 99999", "--threshold"}}) {
+        {markers + "--shape ball --diameter 8 --threshold 99999", "--threshold"},
+        {markers + "--diameter 8", "--shape"},
+        {markers + "--shape post", "outer diameter"},
+        {markers + "--near 1,2", "X,Y,Z"},
+        {markers + "--near 1,2,nan", "X,Y,Z"},
+        {markers + "--near 1,2,3,4", "X,Y,Z"},
+        {markers + "--near 1,2,3 --near 1:2:3", "X,Y,Z"}}) {
     const auto result = run("birdseye", arguments);
     EXPECT_EQ(result.code, 2) << arguments << result.output;
     EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
