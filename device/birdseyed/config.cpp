@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 #include <optional>
+#include <set>
 
 #include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/config_section.hpp"
@@ -173,6 +174,14 @@ void read_wire(ConfigSection& section, Config& config) {
   section.integer("port", config.wire.port, 0, 65535);
   if (!wire::is_address(config.wire.bind))
     section.fail("bind", fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", config.wire.bind));
+  section.flag("transforms", config.core.transforms);
+  std::set<std::string> devices;
+  for (const std::string& bird : config.core.bird_names) {
+    if (!config.core.transforms || devices.insert(wire::transform_device(bird)).second) continue;
+    section.fail("transforms", fmt::format("two birds' TRANSFORMs would both be called {}: give the birds names that "
+                                           "differ in their first 11 letters, or set transforms = false",
+                                           wire::transform_device(bird)));
+  }
 }
 
 void read_pose(ConfigSection& section, Config& config) {

@@ -135,7 +135,7 @@ void Core::publish(const Measurement& measurement) {
     if (i == 0) scope_.push(measurement.acquired, measurement.acquired_sigma, pose);
     birds.birds.push_back({settings_.bird_names[i], pose});
   }
-  if (!birds.birds.empty()) out_.push_back(wire::pack(birds, measurement.arrived));
+  if (!birds.birds.empty()) out_.push_back(wire::pack(birds, measurement.arrived, settings_.transforms));
 }
 
 void Core::note(const FrameCame& came) {

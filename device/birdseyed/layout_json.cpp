@@ -65,6 +65,7 @@ static void from_json(const nlohmann::json& json, FrameClock::Settings& settings
 }
 void to_json(nlohmann::json& json, const CoreSettings& settings) {
   json = {{"bird_names", settings.bird_names},
+          {"transforms", settings.transforms},
           {"pose", settings.pose},
           {"pose_wait", settings.pose_wait},
           {"frame_clock", settings.frame_clock},
@@ -73,6 +74,7 @@ void to_json(nlohmann::json& json, const CoreSettings& settings) {
 }
 void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("bird_names").get_to(settings.bird_names);
+  settings.transforms = json.value("transforms", false);  // recordings from before there were any replay without
   json.at("pose").get_to(settings.pose);
   json.at("pose_wait").get_to(settings.pose_wait);
   json.at("frame_clock").get_to(settings.frame_clock);

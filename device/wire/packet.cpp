@@ -79,6 +79,23 @@ void append_image_heads(std::vector<std::uint8_t>& out, const VideoFrame& frame)
   out.insert(out.end(), image_bytes.begin(), image_bytes.end());
 }
 
+/// Column by column, the position last.
+void put_columns(const Eigen::Matrix4d& matrix, igtl_float32* numbers) {
+  const Eigen::Matrix<float, 3, 4> columns = matrix.topRows<3>().cast<float>();
+  std::copy_n(columns.data(), 12, numbers);
+}
+
+/// By hand, as the library's is.
+void append_transform(std::vector<std::uint8_t>& out, const std::string& device, const Eigen::Matrix4d& matrix,
+                      DeviceTime time) {
+  std::array<igtl_float32, 12> numbers{};
+  put_columns(matrix, numbers.data());
+  igtl_transform_convert_byte_order(numbers.data());
+  const std::span body(reinterpret_cast<const std::uint8_t*>(numbers.data()), sizeof numbers);
+  append_header(out, "TRANSFORM", device.c_str(), time, body.size(), checksum(body));
+  out.insert(out.end(), body.begin(), body.end());
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> Packet::bytes() const {
@@ -95,16 +112,14 @@ Packet pack(const VideoFrame& frame) {
 }
 
 /// By hand: the library leaves a byte of each element as memory happens to be.
-Packet pack(const Birds& birds, DeviceTime arrived) {
+Packet pack(const Birds& birds, DeviceTime arrived, bool transforms) {
   std::vector<igtl_tdata_element> elements(birds.birds.size());
   for (std::size_t i = 0; i < elements.size(); ++i) {
     const Bird& bird = birds.birds[i];
     igtl_tdata_element& element = elements[i];
     bird.name.copy(element.name, sizeof element.name);
     element.type = IGTL_TDATA_TYPE_6D;
-    // Column by column, the position last.
-    const Eigen::Matrix<float, 3, 4> columns = bird.tracker_from_sensor.matrix().topRows<3>().cast<float>();
-    std::copy_n(columns.data(), 12, element.transform);
+    put_columns(bird.tracker_from_sensor.matrix(), element.transform);
   }
   igtl_tdata_convert_byte_order(elements.data(), static_cast<int>(elements.size()));
   const std::span body(reinterpret_cast<const std::uint8_t*>(elements.data()),
@@ -112,7 +127,25 @@ Packet pack(const Birds& birds, DeviceTime arrived) {
   auto out = std::make_shared<std::vector<std::uint8_t>>();
   append_header(*out, "TDATA", kBirdsDevice, birds.acquired, body.size(), checksum(body));
   out->insert(out->end(), body.begin(), body.end());
+  if (transforms) {
+    for (const Bird& bird : birds.birds)
+      append_transform(*out, transform_device(bird.name), bird.tracker_from_sensor.matrix(), birds.acquired);
+  }
   return {Packet::Kind::tracking, std::move(out), nullptr, arrived};
+}
+
+std::string transform_device(const std::string& bird) {
+  constexpr std::string_view kTo = "ToTracker";
+  constexpr std::size_t kRoom = sizeof(igtl_header::device_name) - kTo.size();
+  std::string name = bird;
+  if (name.size() > kRoom) {
+    std::size_t end = kRoom;
+    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0U) == 0x80U) --end;  // no letter of UTF-8 is cut
+    name.resize(end);
+  }
+  if (!name.empty() && name.front() >= 'a' && name.front() <= 'z')
+    name.front() = static_cast<char>(name.front() - 'a' + 'A');
+  return name.append(kTo);
 }
 
 Packet pack(const Doubt& doubt) {
@@ -154,16 +187,9 @@ Packet pack(const Calibration& calibration, DeviceTime time) {
   return packet;
 }
 
-/// By hand, as the library's is: twelve numbers, column by column, the position last.
 Packet pack(const PublishedTransform& transform) {
-  std::array<igtl_float32, 12> numbers{};
-  const Eigen::Matrix<float, 3, 4> columns = transform.matrix.topRows<3>().cast<float>();
-  std::copy_n(columns.data(), 12, numbers.begin());
-  igtl_transform_convert_byte_order(numbers.data());
-  const std::span body(reinterpret_cast<const std::uint8_t*>(numbers.data()), sizeof numbers);
   auto out = std::make_shared<std::vector<std::uint8_t>>();
-  append_header(*out, "TRANSFORM", transform.name.c_str(), transform.time, body.size(), checksum(body));
-  out->insert(out->end(), body.begin(), body.end());
+  append_transform(*out, transform.name, transform.matrix, transform.time);
   return {Packet::Kind::tracking, std::move(out), nullptr, {}};
 }
 

@@ -25,8 +25,11 @@ struct Packet {
 };
 
 Packet pack(const VideoFrame& frame);
-/// arrived: of the measurement's last byte.
-Packet pack(const Birds& birds, DeviceTime arrived = {});
+/// TDATA; with transforms also a TRANSFORM for each bird behind it, in the same packet, so that a client gets both or
+/// neither. arrived: of the measurement's last byte.
+Packet pack(const Birds& birds, DeviceTime arrived = {}, bool transforms = false);
+/// The device of a bird's TRANSFORMs: "scope" gives "ScopeToTracker". Of a long name what the protocol has room for.
+std::string transform_device(const std::string& bird);
 Packet pack(const Doubt& doubt);
 Packet pack(const ClockChange& change);
 Packet pack(const Pedal& pedal);

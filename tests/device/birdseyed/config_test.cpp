@@ -76,6 +76,21 @@ TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
   EXPECT_EQ(config->wire.bind, "127.0.0.1");
   EXPECT_EQ(config->core.pose.smoothing.ns, 40'000'000);
   EXPECT_EQ(config->camera.width_px, 768);
+  EXPECT_TRUE(config->core.transforms);
+  EXPECT_FALSE(read(replaced("[wire]", "[wire]\ntransforms = false"))->core.transforms);
+}
+
+TEST(Config, TwoBirdsMayNotHaveTransformsOfOneName) {
+  const std::string alike = "\"laparoscope_left\", \"laparoscope_right\"";
+  const auto config = read(replaced("\"scope\", \"pointer\"", alike));
+  ASSERT_FALSE(config);
+  EXPECT_NE(
+      config.error().what.find("[wire] transforms: two birds' TRANSFORMs would both be called LaparoscopeToTracker"),
+      std::string::npos)
+      << config.error().what;
+  std::string without = replaced("\"scope\", \"pointer\"", alike);
+  without.replace(without.find("[wire]"), 6, "[wire]\ntransforms = false");
+  EXPECT_TRUE(read(without));
 }
 
 TEST(Config, AllMistakesAreToldAtOnceWithTheirLines) {

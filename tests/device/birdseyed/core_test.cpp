@@ -8,6 +8,7 @@
 
 #include "device/birdseyed/event_queue.hpp"
 #include "device/birdseyed/recording.hpp"
+#include "device/wire/foreign_messages.hpp"
 #include "drivers/system/clock.hpp"
 #include "tests/support/core_session.hpp"
 #include "tests/support/scratch.hpp"
@@ -76,6 +77,38 @@ TEST(Core, PosesWhoseTimeIsInDoubtAreNotPublished) {
   EXPECT_EQ(core.counters().tracker.lost_measurements, 10U);
   EXPECT_GE(core.counters().clock_events, 1U);
   EXPECT_NE(core.counters().tracker_drift_ppm, 0);
+}
+
+TEST(Core, BesideTdataEachBirdHasATransformUnlessSwitchedOff) {
+  for (const bool transforms : {true, false}) {
+    CoreSettings settings;
+    settings.transforms = transforms;
+    Core core(settings);
+    wire::Unpacker unpacker;
+    int poses = 0;
+    for (const RawEvent& event : session(3, 1)) {
+      for (const wire::Packet& packet : core.take(event)) {
+        if (packet.kind != wire::Packet::Kind::tracking) continue;
+        ++poses;
+        const auto messages = birdseye::testing::messages_of(packet);
+        const auto first = *unpacker.push(messages.at(0));
+        const auto birds = std::get<wire::Birds>(std::get<wire::Event>(*first));
+        ASSERT_EQ(messages.size(), transforms ? 1 + birds.birds.size() : 1);
+        if (!transforms) continue;
+        const std::span message(messages.at(1));
+        const auto header = *wire::read_header(message, wire::kLargestBody);
+        EXPECT_EQ(header.type, "TRANSFORM");
+        EXPECT_EQ(header.device, "ScopeToTracker");
+        EXPECT_EQ(header.time.ns, birds.acquired.ns);
+        const auto read = wire::read_foreign(header, message.subspan(wire::kHeaderBytes));
+        ASSERT_TRUE(read) << read.error().what;
+        const auto& told = std::get<wire::ForeignPoses>(*read);
+        ASSERT_EQ(told.birds.size(), 1U);
+        EXPECT_EQ(told.birds[0].tracker_from_sensor.matrix(), birds.birds[0].tracker_from_sensor.matrix());
+      }
+    }
+    EXPECT_GT(poses, 200);
+  }
 }
 
 TEST(Core, TheSameEventsGiveTheSameBytes) {

@@ -75,7 +75,7 @@ TEST(OpenIgtLinkPeer, AReceiverReadsPosesFramesStatusAndStrings) {
   wait_for_client(*server);
   Health health;
   health.tracker_rate_hz = 103.25;
-  server->publish(pack(birds()));
+  server->publish(pack(birds(), {}, true));
   server->publish(pack(frame(320, 200)));
   server->publish(pack(Status{false, "the tracker has gone"}, {1}));
   server->publish(pack(health, {1'234'567'890'000}));
@@ -91,6 +91,10 @@ TEST(OpenIgtLinkPeer, AReceiverReadsPosesFramesStatusAndStrings) {
   EXPECT_THAT(said, HasSubstr(" Name       : pointer\n"));
   EXPECT_LT((matrix_in(said, 0) - kScope.matrix()).cwiseAbs().maxCoeff(), 1e-3);  // six digits are printed
   EXPECT_LT((matrix_in(said, 1) - kPointer.matrix()).cwiseAbs().maxCoeff(), 1e-3);
+  // Each bird again as a TRANSFORM, after TDATA.
+  EXPECT_THAT(said, HasSubstr("Receiving TRANSFORM data type."));
+  EXPECT_LT((matrix_in(said, 2) - kScope.matrix()).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_LT((matrix_in(said, 3) - kPointer.matrix()).cwiseAbs().maxCoeff(), 1e-3);
   EXPECT_THAT(said, HasSubstr("Device Name           : Laparoscope\nScalar Type           : 3\n"
                               "Dimensions            : (320, 200, 1)\n"));
   EXPECT_THAT(said, HasSubstr(" Code      : 13\n"));  // not ready

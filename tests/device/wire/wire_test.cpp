@@ -102,6 +102,23 @@ TEST(Wire, BirdsStatusAndHealth) {
   EXPECT_EQ(std::get<Health>(**ends.client->next(Deadline::after(Duration::from_ms(5000)))).phase_errors, 2U);
 }
 
+TEST(Wire, ATransformIsNamedByItsBirdWithinWhatTheProtocolHasRoomFor) {
+  EXPECT_EQ(transform_device("scope"), "ScopeToTracker");
+  EXPECT_EQ(transform_device("bird2"), "Bird2ToTracker");
+  EXPECT_EQ(transform_device("Stylus"), "StylusToTracker");
+  EXPECT_EQ(transform_device("laparoscope_left"), "LaparoscopeToTracker");
+  EXPECT_EQ(transform_device("0123456789\u00e9"), "0123456789ToTracker");  // its last letter has two bytes
+}
+
+TEST(Wire, TransformsWaitAndGoWithTheirTdata) {
+  const auto plain = pack(Birds{{5}, {{"scope", {}}, {"pointer", {}}}});
+  const auto both = pack(Birds{{5}, {{"scope", {}}, {"pointer", {}}}}, {}, true);
+  constexpr std::size_t kTransformBytes = 58 + 48;
+  EXPECT_EQ(both.size(), plain.size() + 2 * kTransformBytes);
+  EXPECT_EQ(both.kind, Packet::Kind::tracking);
+  EXPECT_TRUE(std::equal(plain.head->begin(), plain.head->end(), both.head->begin()));
+}
+
 TEST(Wire, AMeasurementWithoutAnyPoseComesEmpty) {
   const Ends ends = connected();
   ends.server->publish(pack(Birds{{7'000'000'000}, {}}));
