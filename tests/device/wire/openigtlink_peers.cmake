@@ -20,3 +20,8 @@ foreach(peer Receiver/ReceiveClient TrackingData/TrackingDataClient Status/Statu
   target_link_libraries(${name} PRIVATE birdseye_openigtlink Threads::Threads)
   list(APPEND openigtlink_peers ${name})
 endforeach()
+
+# The manual's example of a client.
+add_executable(poses ${CMAKE_SOURCE_DIR}/docs/manual/examples/poses.cpp)
+set_target_properties(poses PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/peers)
+target_link_libraries(poses PRIVATE birdseye_openigtlink birdseye_options Threads::Threads)
