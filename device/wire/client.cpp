@@ -132,6 +132,7 @@ void Client::ask() {
   if (appliance_ || asked_for_poses_ || (!foreign_ && silent < kPosesAskedAfter)) return;
   asked_for_poses_ = true;
   (void)send(pack_tracking_request(), host_now());
+  (void)send(pack_status_request(), host_now());
 }
 
 Result<void> Client::drain() {

@@ -19,7 +19,7 @@ constexpr Duration kSilence = Duration::from_ms(2000);
 /// No tracker measures the same to the last digit for so long: what repeats itself is no measurement.
 constexpr Duration kFrozen = Duration::from_ms(1000);
 constexpr Duration kWayBack = Duration::from_ms(1000);
-constexpr std::size_t kMostWaiting = 4, kMostNames = 32;
+constexpr std::size_t kMostWaiting = 4, kMostNames = 32, kMostWords = 200;
 
 /// Trackers that others speak for are slower than ours; what a hole of this width hides is in the pose's sigma.
 PoseHistory::Settings history_settings() {
@@ -78,6 +78,10 @@ void ForeignFeed::push(const Header& received, std::span<const std::uint8_t> bod
     take(header, std::move(*picture), arrived);
   } else if (const auto* poses = std::get_if<ForeignPoses>(&*read)) {
     take(header, *poses, arrived);
+  } else if (const auto* status = std::get_if<ForeignStatus>(&*read)) {
+    server_says_ = status->words.substr(0, kMostWords);
+  } else if (std::holds_alternative<ForeignAnswer>(*read)) {
+    return;
   } else if (std::holds_alternative<ForeignVolume>(*read)) {
     pass_over("IMAGE of several slices");
   } else {
@@ -268,6 +272,7 @@ std::optional<RelatedTime<HostTime>> ForeignFeed::host_from_device(DeviceTime ti
 std::string ForeignFeed::words() const {
   std::string words = "an OpenIGTLink server that is no appliance of Birdseye";
   if (!passed_over_.empty()) words += fmt::format("; passed over: {}", fmt::join(passed_over_, ", "));
+  if (!server_says_.empty()) words += fmt::format("; it says: {}", server_says_);
   if (damaged_ > 0) words += fmt::format("; {} damaged messages, the last: {}", damaged_, damage_);
   return words;
 }

@@ -81,7 +81,7 @@ class ForeignFeed {
   std::deque<Event> events_;
   std::optional<HostTime> pictured_;
   bool pictures_stamped_ = true;
-  std::string picture_fault_, damage_, told_;
+  std::string picture_fault_, damage_, told_, server_says_;
   std::uint64_t pictures_ = 0, damaged_ = 0;
 };
 

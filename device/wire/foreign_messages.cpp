@@ -149,6 +149,15 @@ Result<ForeignMessage> read_image(const Header& header, ByteView content) {
   return ForeignMessage(ForeignPicture{image.size[0], image.size[1], std::move(rgb)});
 }
 
+Result<ForeignMessage> read_status(const Header& header, ByteView body) {
+  constexpr unsigned kOk = 1;
+  const auto status = status_of(header, body);
+  if (!status) return damaged(header, "is cut short");
+  if (status->code == kOk) return ForeignMessage(ForeignStatus{});
+  return ForeignMessage(ForeignStatus{
+      fmt::format("status {}{}{}", status->code, status->text.empty() ? "" : ": ", readable(status->text))});
+}
+
 }  // namespace
 
 std::string readable(std::string name) {
@@ -162,11 +171,14 @@ Result<ForeignMessage> read_foreign(const Header& header, ByteView body) {
   const std::string& type = header.type;
   const bool image = type == "IMAGE", transform = type == "TRANSFORM", tdata = type == "TDATA";
   const bool qtdata = type == "QTDATA", position = type == "POSITION" || type == "QTRANS";
-  if (!image && !transform && !tdata && !qtdata && !position) return ForeignMessage(ForeignOther{});
+  const bool status = type == "STATUS";
+  if (type == "RTS_TDATA") return ForeignMessage(ForeignAnswer{});
+  if (!image && !transform && !tdata && !qtdata && !position && !status) return ForeignMessage(ForeignOther{});
   if (checksum(body) != header.crc) return damaged(header, "has a wrong checksum");
   const auto content = content_of(header, body);
   if (!content) return damaged(header, "has an extended header that lies");
   if (image) return read_image(header, *content);
+  if (status) return read_status(header, body);
   const auto meta_data = meta_data_of(header, body);
   if (!meta_data) return damaged(header, "has meta data that lie");
   auto poses = tdata      ? read_list(header, *content, IGTL_TDATA_ELEMENT_SIZE)

@@ -29,10 +29,19 @@ struct ForeignPoses {
   std::vector<std::string> no_poses;
 };
 
+/// STATUS, which some send to keep the connection alive too. words: what is wrong; empty: nothing.
+struct ForeignStatus {
+  std::string words;
+};
+
+/// The answer to what our client asks: nothing to tell.
+struct ForeignAnswer {};
+
 /// A message of a type that is not read here.
 struct ForeignOther {};
 
-using ForeignMessage = std::variant<ForeignPicture, ForeignVolume, ForeignPoses, ForeignOther>;
+using ForeignMessage =
+    std::variant<ForeignPicture, ForeignVolume, ForeignPoses, ForeignStatus, ForeignAnswer, ForeignOther>;
 
 /// A name as it may be shown and written: whatever is no printable ASCII becomes a question mark.
 std::string readable(std::string name);

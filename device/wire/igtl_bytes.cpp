@@ -51,6 +51,15 @@ Result<Header> read_header(std::span<const std::uint8_t> bytes, std::uint64_t mo
   return header;
 }
 
+std::optional<StatusBody> status_of(const Header& header, std::span<const std::uint8_t> body) {
+  constexpr std::size_t kFixed = 30;  // code, subcode, name of the error
+  const auto content = content_of(header, body);
+  if (!content || content->size() < kFixed) return std::nullopt;
+  const auto text = content->subspan(kFixed);
+  const unsigned code = static_cast<unsigned>((*content)[0]) << 8U | (*content)[1];
+  return StatusBody{code, {text.begin(), std::find(text.begin(), text.end(), 0)}};
+}
+
 std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body) {
   if (header.version < 2) return body.size();
   const std::size_t extended = body.size() < 2 ? body.size() : static_cast<std::size_t>(big_endian(body.first(2)));

@@ -35,6 +35,14 @@ Result<Header> read_header(std::span<const std::uint8_t> bytes, std::uint64_t mo
 /// The text of a STRING's body; empty where its lengths lie.
 std::optional<std::string> text_of_string(const Header& header, std::span<const std::uint8_t> body);
 
+/// What a STATUS says: 1 is OK.
+struct StatusBody {
+  unsigned code = 0;
+  std::string text;
+};
+/// Empty where it is cut short. By hand: the library's reads on until a zero byte, which nobody may have sent.
+std::optional<StatusBody> status_of(const Header& header, std::span<const std::uint8_t> body);
+
 /// Size of the content in bytes. In version 2 an extended header precedes the content, and begins with its own size.
 std::size_t content_bytes(const Header& header, std::span<const std::uint8_t> body);
 /// The content alone, without the meta data that follows it in version 2; empty where their lengths lie.

@@ -45,9 +45,9 @@ Packet string_packet(const char* device, const nlohmann::json& json, DeviceTime 
 }
 
 void append_header(std::vector<std::uint8_t>& out, const char* type, const char* device, DeviceTime time,
-                   std::uint64_t body_bytes, std::uint64_t crc) {
+                   std::uint64_t body_bytes, std::uint64_t crc, std::uint16_t version = 1) {
   igtl_header header{};
-  header.version = 1;
+  header.version = version;
   std::string_view(type).copy(header.name, sizeof header.name);
   std::string_view(device).copy(header.device_name, sizeof header.device_name);
   header.timestamp = stamp_from(time);
@@ -240,6 +240,16 @@ Packet pack_tracking_request() {
   auto out = std::make_shared<std::vector<std::uint8_t>>();
   append_header(*out, "STT_TDATA", "", {}, body.size(), checksum(body));
   out->insert(out->end(), body.begin(), body.end());
+  return {Packet::Kind::other, std::move(out), nullptr, {}};
+}
+
+Packet pack_status_request() {
+  // An extended header of 12 bytes: its size, that of the meta data's index, that of the meta data, a number. No
+  // content; of the index only its count, none.
+  constexpr std::array<std::uint8_t, 14> kBody{0, 12, 0, 2};
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_header(*out, "GET_STATUS", "", {}, kBody.size(), checksum(kBody), 2);
+  out->insert(out->end(), kBody.begin(), kBody.end());
   return {Packet::Kind::other, std::move(out), nullptr, {}};
 }
 

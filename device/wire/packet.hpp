@@ -76,6 +76,9 @@ Packet pack(const Subscription& subscription);
 Packet pack(const CameraLock& lock);
 /// STT_TDATA: poses are wanted, as often as there are any.
 Packet pack_tracking_request();
+/// GET_STATUS with a header of version 2. PLUS answers each client by the highest version that it has heard of it, and
+/// only from version 2 on says with a pose whether it is valid.
+Packet pack_status_request();
 /// The answer to STT_TDATA and STP_TDATA: RTS_TDATA, with the status 0 (done) or 1.
 Packet pack_tracking_reply(bool done);
 

@@ -90,15 +90,10 @@ std::optional<Birds> birds_of(igtl::TrackingDataMessage& message, DeviceTime tim
   return birds;
 }
 
-/// By hand: the library's reads on until a zero byte, which nobody may have sent.
-Result<MaybeTold> status_of(const Header& header, std::span<const std::uint8_t> body) {
-  constexpr std::size_t kFixed = 30;  // code, subcode, name of the error
-  const std::size_t content = content_bytes(header, body);
-  if (content < kFixed) return unpack_failed("STATUS");
-  const auto at = body.subspan(body.size() - content);
-  const auto text = at.subspan(kFixed);
-  const bool ok = at[0] == 0 && at[1] == igtl::StatusMessage::STATUS_OK;
-  return MaybeTold(Event(Status{ok, {text.begin(), std::find(text.begin(), text.end(), 0)}}));
+Result<MaybeTold> event_of_status(const Header& header, std::span<const std::uint8_t> body) {
+  auto status = status_of(header, body);
+  if (!status) return unpack_failed("STATUS");
+  return MaybeTold(Event(Status{status->code == igtl::StatusMessage::STATUS_OK, std::move(status->text)}));
 }
 
 }  // namespace
@@ -164,7 +159,7 @@ Result<MaybeTold> Unpacker::push(std::span<const std::uint8_t> bytes) {
     if (!found) return unpack_failed(type);
     return MaybeTold(Event(*std::move(found)));
   }
-  return status_of(*header, body);
+  return event_of_status(*header, body);
 }
 
 }  // namespace birdseye::wire

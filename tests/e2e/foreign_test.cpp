@@ -9,6 +9,7 @@
 #include "tests/support/display.hpp"
 #include "tests/support/foreign_server.hpp"
 #include "tests/support/json_file.hpp"
+#include "tests/support/plus_server.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -57,6 +58,22 @@ TEST(ForeignCommands, LiveGoesOnOnlyOnceTheScopeIsNamed) {
   ASSERT_EQ(named.code, 0) << named.output;
   const nlohmann::json json = read_json(scratch / "live.json");
   EXPECT_GT(json["frames"].get<int>(), 10);
+}
+
+TEST(ForeignCommands, LiveRunsAtAServerThatBehavesAsPlus) {
+  testing::PlusServer server;
+  const Scratch scratch;
+  const testing::Display display("1280x720");
+  const std::string script = scratch.file("script.txt", "wait connect 15\nsleep 1\nend\n");
+  const auto result =
+      run("birdseye",
+          "live --server 127.0.0.1:" + std::to_string(server.port()) + " --ct " + testing::small_ct(scratch) +
+              " --scope-device ProbeToTracker --video-device Image_Reference --pointer StylusToTracker"
+              " --script " +
+              script + " --json " + (scratch / "live.json").string(),
+          display.env());
+  ASSERT_EQ(result.code, 0) << result.output;
+  EXPECT_GT(read_json(scratch / "live.json")["frames"].get<int>(), 10);
 }
 
 }  // namespace

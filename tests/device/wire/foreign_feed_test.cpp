@@ -506,14 +506,35 @@ TEST(ForeignFeed, ItIsToldWhatDoesNotCome) {
 TEST(ForeignFeed, OtherTypesAreNamedOnce) {
   FeedLink link;
   for (int i = 0; i < 3; ++i) {
-    for (const char* type : {"POLYDATA", "STATUS", "VIDEO", "STRING"})
+    for (const char* type : {"POLYDATA", "VIDEO", "STRING", "RTS_TDATA"})
       link.push(testing::foreign_message(type, "Any", FeedLink::at(i), {1, 2, 3}), i);
     link.push(image_message("CT", FeedLink::at(i), {.slices = 4, .components = 1}), i);
   }
   EXPECT_TRUE(link.events(10).empty());
   EXPECT_EQ(link.feed.words(),
             "an OpenIGTLink server that is no appliance of Birdseye; passed over: IMAGE of several slices, POLYDATA, "
-            "STATUS, STRING, VIDEO");
+            "STRING, VIDEO")
+      << "the answer to what is asked is nothing to tell";
+}
+
+TEST(ForeignFeed, AServersOwnStatusIsToldWhereItIsNotWell) {
+  FeedLink link;
+  const auto status = [](unsigned code, const std::string& text) {
+    testing::Bytes content;
+    testing::put(content, code, 2);
+    testing::put(content, 0, 8);
+    testing::put_text(content, "", 20);
+    testing::put_text(content, text, text.size());  // with no zero at its end
+    return testing::foreign_message("STATUS", "", FeedLink::at(1), content);
+  };
+  link.push(status(1, "fine"), 1);
+  EXPECT_EQ(link.feed.words(), "an OpenIGTLink server that is no appliance of Birdseye");
+  link.push(status(13, "no\ttracker"), 2);
+  EXPECT_THAT(link.feed.words(), HasSubstr("; it says: status 13: no?tracker"));
+  link.push(status(1, ""), 3);
+  EXPECT_EQ(link.feed.words(), "an OpenIGTLink server that is no appliance of Birdseye");
+  link.push(testing::foreign_message("STATUS", "", FeedLink::at(4), {0, 1}), 4);
+  EXPECT_THAT(link.feed.words(), HasSubstr("1 damaged messages"));
 }
 
 TEST(ForeignFeed, AClockThatIsMovedBackStartsAnew) {

@@ -10,6 +10,7 @@
 #include "device/wire/client.hpp"
 #include "drivers/system/clock.hpp"
 #include "tests/support/foreign_server.hpp"
+#include "tests/support/plus_server.hpp"
 
 namespace birdseye::wire {
 namespace {
@@ -80,6 +81,7 @@ TEST(ForeignServer, ASilentOneIsAskedWithinOneLongWait) {
     asked.append(bytes.data(), static_cast<std::size_t>(got));
   EXPECT_THAT(asked, HasSubstr("STRING")) << "the time";
   EXPECT_THAT(asked, HasSubstr("STT_TDATA")) << "poses";
+  EXPECT_THAT(asked, HasSubstr("GET_STATUS")) << "by which it learns that headers of version 2 are read";
   ::close(peer);
   ::close(listening);
 }
@@ -95,6 +97,58 @@ TEST(ForeignServer, TheScopeIsChosenByName) {
   const Eigen::Matrix4d error =
       frames.back().info.pose.tracker_from_sensor->matrix() - ForeignServer::pose_at(at_s).inverse().matrix();
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 1e-3);
+}
+
+TEST(PlusServer, ItsFramesHaveThePosesOfTheTransformThatIsNamed) {
+  testing::PlusServer server;
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)),
+                                       {"ProbeToTracker", "Image_Reference", "StylusToTracker"});
+  const auto frames = frames_from(*client, 60);
+  ASSERT_EQ(frames.size(), 60U);
+  for (const VideoFrame& frame : frames) {
+    EXPECT_EQ(frame.width_px, 64);
+    ASSERT_TRUE(frame.info.pose.tracker_from_sensor) << frame.info.pose.reason;
+    const double at_s = static_cast<double>(frame.info.acquired.ns) * 1e-9;
+    const Eigen::Matrix4d error =
+        frame.info.pose.tracker_from_sensor->matrix() - testing::PlusServer::pose_at(at_s).matrix();
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 0.05);  // 30 mm/s where a pose is predicted by a moment
+  }
+  EXPECT_GE(server.version(), 2U) << "else it would not say which poses are valid";
+  EXPECT_EQ(client->peer_words(), "an OpenIGTLink server that is no appliance of Birdseye; passed over: STRING");
+  // Its clock is an hour ahead of the time of day here.
+  const auto related = client->host_from_device(frames.back().info.acquired);
+  ASSERT_TRUE(related);
+  const Duration ahead = Duration::from_ms(static_cast<std::int64_t>(testing::PlusServer::kAhead_s * 1e3));
+  const std::int64_t truth_ns = frames.back().info.acquired.ns - ahead.ns - wall_minus_monotonic().ns;
+  EXPECT_LE(std::abs(related->time.ns - truth_ns), Duration::from_ms(60).ns);
+}
+
+TEST(PlusServer, AToolOutOfViewHasNoPoseThoughItsLastMatrixComes) {
+  testing::PlusServer server;
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)),
+                                       {"ProbeToTracker", "Image_Reference", "StylusToTracker"});
+  ASSERT_EQ(frames_from(*client, 50).size(), 50U);  // by then it has been asked
+  ASSERT_GE(server.version(), 2U);
+  server.lose_probe();
+  // A prediction bridges a moment; what comes thereafter is the last matrix again and again, and no pose.
+  const auto frames = frames_from(*client, 20);
+  ASSERT_EQ(frames.size(), 20U);
+  for (std::size_t i = 10; i < frames.size(); ++i) EXPECT_FALSE(frames[i].info.pose.tracker_from_sensor) << i;
+}
+
+TEST(PlusServer, WhatOnlyKeepsTheConnectionAliveIsNoVideoAndNoDamage) {
+  testing::PlusServer server;
+  server.go_idle();
+  const auto client = *Client::connect("127.0.0.1", server.port(), Deadline::after(Duration::from_ms(5000)));
+  const auto deadline = Deadline::after(Duration::from_ms(20'000));
+  std::string told;
+  while (told.empty() && !deadline.passed()) {
+    const auto event = client->next(deadline);
+    ASSERT_TRUE(event) << event.error().what;
+    if (const auto* status = *event ? std::get_if<Status>(&**event) : nullptr) told = status->text;
+  }
+  EXPECT_EQ(told, "the server sends neither video nor poses");
+  EXPECT_EQ(client->peer_words(), "an OpenIGTLink server that is no appliance of Birdseye");
 }
 
 TEST(ForeignServer, OneThatEndsInTheMiddleOfAMessageHasGone) {
