@@ -22,3 +22,15 @@ target_compile_definitions(birdseye_itk INTERFACE ITK_USE_SYSTEM_EIGEN)
 target_compile_options(birdseye_itk INTERFACE
   "$<$<CXX_COMPILER_ID:Clang>:SHELL:-include ${CMAKE_SOURCE_DIR}/cmake/itk_with_clang.h>")
 target_link_libraries(birdseye_itk INTERFACE ${ITK_LIBRARIES})
+# DICOM files: DCMTK, and of GDCM the JPEG 2000 that Debian's DCMTK does not decode.
+find_package(DCMTK REQUIRED)
+add_library(birdseye_dcmtk INTERFACE)
+target_include_directories(birdseye_dcmtk SYSTEM INTERFACE ${DCMTK_INCLUDE_DIRS})
+target_link_libraries(birdseye_dcmtk INTERFACE DCMTK::dcmjpls DCMTK::dcmjpeg DCMTK::dcmdata)
+# Not by its package file, which asks for parts that Debian packs elsewhere.
+find_path(GDCM_INCLUDE_DIR gdcmJPEG2000Codec.h PATH_SUFFIXES gdcm-3.0 REQUIRED)
+find_library(GDCM_MSFF_LIBRARY gdcmMSFF REQUIRED)
+find_library(GDCM_DSED_LIBRARY gdcmDSED REQUIRED)
+add_library(birdseye_gdcm INTERFACE)
+target_include_directories(birdseye_gdcm SYSTEM INTERFACE ${GDCM_INCLUDE_DIR})
+target_link_libraries(birdseye_gdcm INTERFACE ${GDCM_MSFF_LIBRARY} ${GDCM_DSED_LIBRARY})

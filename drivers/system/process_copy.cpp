@@ -28,8 +28,16 @@ std::shared_mutex& copying() {
   return mutex;
 }
 
+/// Whether this process is a copy. Its mutex above is as the fork left it, held by a thread that is not here, and it
+/// needs none: it has one thread.
+bool& is_copy() {
+  static bool is = false;
+  return is;
+}
+
 /// The copy's part: never returns.
 [[noreturn]] void run_copy(int fd, pid_t parent, const std::function<void(const ProcessCopy::Send&)>& work) {
+  is_copy() = true;
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);  // it has ended already, which no signal tells any more
   const rlimit no_core{0, 0};
@@ -58,7 +66,8 @@ std::shared_mutex& copying() {
 
 }  // namespace
 
-CopiesHeldOff::CopiesHeldOff() : held_(copying()) {}
+CopiesHeldOff::CopiesHeldOff()
+    : held_(is_copy() ? std::shared_lock<std::shared_mutex>() : std::shared_lock(copying())) {}
 
 Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& work) {
   auto pipe = Pipe::open();
@@ -68,7 +77,8 @@ Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& w
   (void)::fcntl(pipe->out.get(), F_SETFL, O_NONBLOCK);
   const pid_t parent = ::getpid();
   const pid_t child = [] {
-    const std::unique_lock alone(copying());
+    std::unique_lock alone(copying(), std::defer_lock);
+    if (!is_copy()) alone.lock();
     return ::fork();
   }();
   if (child < 0) {

@@ -33,7 +33,8 @@ class ProcessCopy {
   /// Sends bytes to the process that asked for the work.
   using Send = std::function<void(const void* data, std::size_t size)>;
 
-  /// work: must not use threads of this process, and what it throws ends the copy.
+  /// work: must not use threads of this process, and what it throws ends the copy. It may start further copies, which
+  /// end with it.
   static Result<ProcessCopy> start(const std::function<void(const Send&)>& work);
   ProcessCopy(ProcessCopy&& other) noexcept : process_(std::exchange(other.process_, -1)), fd_(std::move(other.fd_)) {}
   ProcessCopy& operator=(ProcessCopy&&) = delete;

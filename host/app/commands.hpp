@@ -32,6 +32,7 @@ void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `regi
 void add_render(CLI::App& app, CommandStatus& status);
 void add_replay(CLI::App& app, CommandStatus& status);
 void add_volume(CLI::App& app, CommandStatus& status);
+void add_volume_info(CLI::App& volume, CommandStatus& status);          ///< under `volume`
 void add_volume_from_surface(CLI::App& volume, CommandStatus& status);  ///< under `volume`
 void add_volume_markers(CLI::App& volume, CommandStatus& status);       ///< under `volume`
 

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/files/write_files.hpp"
 #include "host/report/slice_picture.hpp"
 #include "host/volume/import.hpp"
@@ -23,7 +24,8 @@ namespace {
 using Eigen::Vector3d;
 
 struct VolumeMarkersOptions {
-  std::filesystem::path path, out, picture, json;
+  VolumeSource source;
+  std::filesystem::path out, picture, json;
   std::optional<MarkerKind> kind;
   double diameter_mm = 0, hole_mm = 0, height_mm = 0;
   std::vector<std::string> near;
@@ -215,17 +217,19 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
     if (!place) return place.error();
     places.push_back(*place);
   }
-  const auto ct = import_volume(options.path);
-  if (!ct) return ct.error();
+  const auto imported = import_with_notes(options.source);
+  if (!imported) return imported.error();
+  print_notes(imported->notes);
+  const Volume& ct = imported->volume;
   Findings findings;
   if (places.empty()) {
-    findings = search_whole(*ct, options, *shape);
+    findings = search_whole(ct, options, *shape);
   } else {
-    auto near = search_near(*ct, places, shape);
+    auto near = search_near(ct, places, shape);
     if (!near) return near.error();
     findings = *std::move(near);
   }
-  if (auto written = write_findings(options, *ct, findings); !written) return written.error();
+  if (auto written = write_findings(options, ct, findings); !written) return written.error();
   for (std::size_t i = 0; i < findings.found.markers.size(); ++i) {
     const MarkerFit& m = findings.found.markers[i];
     const Vector3d& c = m.centre_in_patient_mm;
@@ -243,7 +247,8 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
 void add_volume_markers(CLI::App& volume, CommandStatus& status) {
   const auto options = std::make_shared<VolumeMarkersOptions>();
   CLI::App& markers = *volume.add_subcommand("markers", "the centres of fiducial markers in a CT");
-  markers.add_option("path", options->path, "the CT")->required();
+  markers.add_option("path", options->source.path, "the CT")->required();
+  add_ct_options(markers, options->source);
   markers
       .add_option("--shape", options->kind, "ball, ring, cylinder (hollow) or post (a cavity in a wall, on a stalk)")
       ->transform(CLI::CheckedTransformer(kKinds, CLI::ignore_case));

@@ -1,24 +1,27 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <string>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/dicom_tree.hpp"
+#include "host/dicom/refused.hpp"
+#include "host/dicom/series.hpp"
 #include "host/volume/image_file.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
-/// Told each file's path before a decoder touches it.
-using Announce = std::function<void(const std::filesystem::path&)>;
+// Only a decoder's process may call these (decoder_process.hpp): a decoder may end its process on a damaged file.
 
-// Only read_image's copy of the process may call these: a decoder may end its process on a damaged file.
-bool is_dicom(const std::filesystem::path& path);
-Result<ImageFile> decode_dicom_folder(const std::filesystem::path& folder, const Announce& announce);
-Result<ImageFile> decode_dicom_file(const std::filesystem::path& path, const Announce& announce);
+/// What a folder of DICOM files, or one of them, holds.
+struct DicomScan {
+  DicomTree tree;
+  std::vector<Series> series;
+};
+/// A directory file stands for its folder. Errc::not_found where there is no DICOM file.
+Result<DicomScan> scan_dicom(const VolumeSource& source, const Announce& announce);
+/// copies: how many processes may decode at the same time.
+Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, int copies);
 Result<ImageFile> decode_image_file(const std::filesystem::path& path, int components);
-
-/// The Error "path: why".
-Error refused(Errc code, const std::filesystem::path& path, const std::string& why);
 
 }  // namespace birdseye::host

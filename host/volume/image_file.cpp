@@ -1,15 +1,14 @@
 #include "host/volume/image_file.hpp"
 
-#include <fmt/format.h>
+#include <tbb/info.h>
 
 #include <cmath>
-#include <fstream>
-#include <new>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "host/volume/decode.hpp"
-#include "host/volume/isolated.hpp"
+#include "host/volume/decoder_process.hpp"
 
 namespace birdseye::host {
 
@@ -17,43 +16,40 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the copy of this process sends of itself: the file it is about to read, how it failed, or the image.
-enum class MessageKind : std::uint8_t { reading = 'r', error = 'e', image = 'i' };
-
-void send_text(const Send& send, MessageKind kind, std::int32_t code, const std::string& text) {
-  const auto length = static_cast<std::uint32_t>(text.size());
-  send(&kind, sizeof kind);
-  send(&code, sizeof code);
-  send(&length, sizeof length);
-  send(text.data(), text.size());
-}
-
 void send_image(const Send& send, const ImageFile& image) {
-  const MessageKind kind = MessageKind::image;
-  send(&kind, sizeof kind);
   send(image.size.data(), sizeof image.size);
   send(image.spacing_mm.data(), 3 * sizeof(double));
   send(image.origin_mm.data(), 3 * sizeof(double));
   send(image.axes.data(), 9 * sizeof(double));
   send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
   send(image.values.data(), image.values.size() * sizeof image.values[0]);
+  const std::size_t notes = image.notes.size();
+  send(&notes, sizeof notes);
+  for (const std::string& note : image.notes) send_long_text(send, note);
 }
 
-Result<ImageFile> decode(const fs::path& path, int components, const Announce& announce) {
+Result<ImageFile> decode(const VolumeSource& source, int components, const Announce& announce, int copies) {
   std::error_code error;
-  if (fs::is_directory(path, error)) return decode_dicom_folder(path, announce);
+  const fs::path& path = source.path;
+  if (fs::is_directory(path, error)) return decode_dicom(source, announce, copies);
   announce(path);
-  return is_dicom(path) ? decode_dicom_file(path, announce) : decode_image_file(path, components);
+  if (begins_as_dicom(path)) return decode_dicom(source, announce, copies);
+  if (!source.series.empty())
+    return refused(Errc::bad_value, path, "is one volume, of which --series cannot choose; leave it out");
+  return decode_image_file(path, components);
 }
 
-std::optional<Error> receive_text(const Receive& receive) {
-  constexpr std::uint32_t kLongest = 1 << 16;
-  std::int32_t code = 0;
-  std::uint32_t length = 0;
-  if (!receive(&code, sizeof code) || !receive(&length, sizeof length) || length > kLongest) return std::nullopt;
-  Error told{static_cast<Errc>(code), std::string(length, ' ')};
-  if (!receive(told.what.data(), length)) return std::nullopt;
-  return told;
+/// Adds to notes.
+bool receive_notes(const Receive& receive, std::vector<std::string>& notes) {
+  constexpr std::size_t kMost = 1'000'000;
+  std::size_t count = 0;
+  if (!receive(&count, sizeof count) || count > kMost) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto note = receive_long_text(receive);
+    if (!note) return false;
+    notes.push_back(*std::move(note));
+  }
+  return true;
 }
 
 std::optional<ImageFile> receive_image(const Receive& receive, int components) {
@@ -78,6 +74,7 @@ std::optional<ImageFile> receive_image(const Receive& receive, int components) {
     if (!values) return std::nullopt;
     image.values = *std::move(values);
   }
+  if (!receive_notes(receive, image.notes)) return std::nullopt;
   return image;
 }
 
@@ -102,70 +99,25 @@ Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
 
 }  // namespace
 
-Error refused(Errc code, const fs::path& path, const std::string& why) {
-  return {code, fmt::format("{}: {}", path.string(), why)};
-}
-
-Result<ImageFile> read_image(const fs::path& path, int components, const std::stop_token& stop) {
-  std::error_code error;
-  if (!fs::exists(path, error)) return refused(Errc::not_found, path, "no such file or folder");
-  if (!fs::is_directory(path, error)) {
-    if (!fs::is_regular_file(path, error)) {
-      return refused(Errc::unsupported, path, "is neither a file nor a folder; save it as a file first");
-    }
-    if (!std::ifstream(path)) return refused(Errc::unreadable, path, "cannot be opened; check its permissions");
-  }
-  constexpr Duration kLongest = Duration::from_ms(300'000);
-  const auto work = [&](const Send& send) {
-    const auto image = decode(
-        path, components, [&send](const fs::path& file) { send_text(send, MessageKind::reading, 0, file.string()); });
-    if (image && image->components != components) {
-      const Error other = refused(Errc::unsupported, path, "is a CT; give a displacement field");
-      send_text(send, MessageKind::error, static_cast<std::int32_t>(other.code), other.what);
-    } else if (image) {
-      send_image(send, *image);
-    } else {
-      send_text(send, MessageKind::error, static_cast<std::int32_t>(image.error().code), image.error().what);
-    }
+Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop) {
+  if (auto there = check_can_be_opened(source.path); !there) return there.error();
+  const int copies = tbb::info::default_concurrency();
+  const auto work = [&](const Announce& announce) -> Result<SendDecoded> {
+    auto image = decode(source, components, announce, copies);
+    if (!image) return image.error();
+    if (image->components != components)
+      return refused(Errc::unsupported, source.path, "is a CT; give a displacement field");
+    return SendDecoded(
+        [sent = std::make_shared<ImageFile>(*std::move(image))](const Send& send) { send_image(send, *sent); });
   };
-  fs::path reading = path;
-  std::optional<Result<ImageFile>> read;
+  std::optional<ImageFile> image;
   const auto take = [&](const Receive& receive) {
-    MessageKind kind{};
-    while (!read && receive(&kind, sizeof kind)) {
-      if (kind == MessageKind::image) {
-        if (auto image = receive_image(receive, components)) read = *std::move(image);
-        return;
-      }
-      auto told = receive_text(receive);
-      if (!told) return;
-      if (kind == MessageKind::error) {
-        read = *std::move(told);
-      } else {
-        reading = told->what;
-      }
-    }
+    image = receive_image(receive, components);
+    return image.has_value();
   };
-  try {
-    const auto ran = run_isolated(work, take, kLongest, stop);
-    if (stop.stop_requested()) return refused(Errc::disconnected, path, "was not read: cancelled");
-    if (!read) {
-      if (!ran && ran.error().code == Errc::io) return refused(Errc::io, path, ran.error().what);
-      if (!ran && ran.error().code == Errc::timeout) {
-        return refused(Errc::timeout, reading,
-                       fmt::format("its decoder {} after {:.0f} s; copy it again, to a disk of this machine",
-                                   ran.error().what, kLongest.seconds()));
-      }
-      return refused(Errc::bad_format, reading,
-                     fmt::format("is cut short, damaged, or too large to decode{}; copy it again",
-                                 ran ? "" : fmt::format(" (its decoder {})", ran.error().what)));
-    }
-    if (!*read) return read->error();
-    if (auto sound = check_geometry(path, **read); !sound) return sound.error();
-    return *std::move(*read);
-  } catch (const std::bad_alloc&) {
-    return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
-  }
+  if (auto ran = run_decoder(source.path, work, take, stop); !ran) return ran.error();
+  if (auto sound = check_geometry(source.path, *image); !sound) return sound.error();
+  return *std::move(image);
 }
 
 }  // namespace birdseye::host

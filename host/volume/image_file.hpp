@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
@@ -19,14 +21,16 @@ struct ImageFile {
   std::vector<float> values;              ///< with more values a voxel: those of a voxel side by side
   Eigen::Vector3d spacing_mm, origin_mm;  ///< origin: the centre of the first voxel
   Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
+  std::vector<std::string> notes;         ///< what was passed over, and what resampling cost, a line each
 };
 
-/// Reads a folder of one DICOM series, a DICOM file, or a NIfTI, NRRD, MHA or MHD file, with `components` values a
-/// voxel. The decoders run in a process of their own (docs/decisions/0012-isolated-import.md), for no longer than five
-/// minutes. Refuses, in one line that names the path, a file that is missing, unreadable or cut short, one without a
-/// sound geometry, and (with one value a voxel) values that are not finite or beyond 16 bits. Once stop is requested,
-/// the decoders are ended before the next of their files, and nothing is read.
-Result<ImageFile> read_image(const std::filesystem::path& path, int components, const std::stop_token& stop = {});
+/// Reads one of the series of a folder of DICOM files and of those below it, a DICOM file, or a NIfTI, NRRD, MHA or MHD
+/// file, with `components` values a voxel. The decoders run in processes of their own
+/// (docs/decisions/0012-isolated-import.md), for no longer than five minutes. Refuses, in one line that names the path,
+/// a file that is missing, unreadable or cut short, one without a sound geometry, and (with one value a voxel) values
+/// that are not finite or beyond 16 bits. Once stop is requested, the decoders are ended before the next of their
+/// files, and nothing is read.
+Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop = {});
 
 enum class StoredAs { uint8, int16, float32 };
 /// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha.

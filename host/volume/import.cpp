@@ -6,16 +6,24 @@
 
 namespace birdseye::host {
 
-Result<Volume> import_volume(const std::filesystem::path& path, const std::stop_token& stop) {
-  auto image = read_image(path, 1, stop);
+Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::stop_token& stop) {
+  auto image = read_image(source, 1, stop);
   if (!image) return image.error();
-  Volume volume;
+  ImportedVolume imported;
+  Volume& volume = imported.volume;
   volume.size = image->size;
   volume.spacing_mm = image->spacing_mm;
   volume.patient_from_voxel.linear() = image->axes * image->spacing_mm.asDiagonal();
   volume.patient_from_voxel.translation() = image->origin_mm;
   volume.hu = std::move(image->hu);
-  return volume;
+  imported.notes = std::move(image->notes);
+  return imported;
+}
+
+Result<Volume> import_volume(const VolumeSource& source, const std::stop_token& stop) {
+  auto imported = import_with_notes(source, stop);
+  if (!imported) return imported.error();
+  return std::move(imported->volume);
 }
 
 }  // namespace birdseye::host

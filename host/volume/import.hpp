@@ -1,18 +1,29 @@
 #pragma once
 
-#include <filesystem>
 #include <stop_token>
+#include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "host/volume/volume.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
-/// Reads a CT: a folder of one DICOM series, one DICOM file (a volume of one slice), or a NIfTI, NRRD, MHA or MHD file.
-/// Refuses, with the reason and the remedy in one line that names the path: what is missing, unreadable, cut short or
-/// no image; folders of several series, or with a file that is no slice of it (texts and the like beside them are
-/// passed over); slices that are doubled, missing, unevenly spaced or sheared by a tilted gantry; voxels that are not
-/// finite or beyond 16 bits; images that are not three-dimensional. Ends by itself once stop is requested (read_image).
-Result<Volume> import_volume(const std::filesystem::path& path, const std::stop_token& stop = {});
+/// Reads a CT: a series of a folder of DICOM files and of the folders below it, a DICOM file (of one slice, or of many
+/// frames), or a NIfTI, NRRD, MHA or MHD file. Localizers, other modalities and files that are no image are passed
+/// over. Refuses, with the reason and the remedy in one line that names the path: what is missing, unreadable, cut
+/// short or no image; folders of several series of which none is named; a file that cannot be read beside the slices;
+/// slices that are doubled, missing or unevenly spaced, or sheared by a tilted gantry where resampling is not asked
+/// for; voxels that are not finite or beyond 16 bits; images that are not three-dimensional. Ends by itself once stop
+/// is requested (read_image).
+Result<Volume> import_volume(const VolumeSource& source, const std::stop_token& stop = {});
+
+/// A CT, and what its reader should know: what was passed over, and what resampling cost, a line each.
+struct ImportedVolume {
+  Volume volume;
+  std::vector<std::string> notes;
+};
+Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::stop_token& stop = {});
 
 }  // namespace birdseye::host

@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "host/volume/decode.hpp"
+#include "host/dicom/refused.hpp"
 
 namespace birdseye::host {
 

@@ -103,6 +103,24 @@ TEST(ProcessCopy, IsNoMoreWhenItsOwnerGoes) {
   EXPECT_TRUE(is_gone(process));
 }
 
+TEST(ProcessCopy, ACopyHasCopiesOfItsOwn) {
+  auto copy = ProcessCopy::start([](const ProcessCopy::Send& send) {
+    const CopiesHeldOff held;  // of no use in a copy, and no hindrance
+    int sum = 0;
+    for (int i = 1; i <= 3; ++i) {
+      auto inner = ProcessCopy::start([i](const ProcessCopy::Send& inner_send) { inner_send(&i, sizeof i); });
+      int came = 0;
+      if (inner && inner->receive(&came, sizeof came, Deadline::after(Duration::from_ms(10'000)))) sum += came;
+    }
+    send(&sum, sizeof sum);
+  });
+  ASSERT_TRUE(copy) << copy.error().what;
+  int sum = 0;
+  const auto came = copy->receive(&sum, sizeof sum, Deadline::after(Duration::from_ms(30'000)));
+  ASSERT_TRUE(came) << came.error().what;
+  EXPECT_EQ(sum, 6);
+}
+
 TEST(ProcessCopy, NoneIsMadeWhileCopiesAreHeldOff) {
   std::atomic<bool> made = false;
   std::optional<CopiesHeldOff> held(std::in_place);

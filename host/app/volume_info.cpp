@@ -1,0 +1,150 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+
+#include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
+#include "host/dicom/series_choice.hpp"
+#include "host/files/write_files.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/series_list.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InfoOptions {
+  VolumeSource source;
+  fs::path json;
+};
+
+std::string orientation_of(const SeriesInfo& info) {
+  Eigen::Affine3d axes = Eigen::Affine3d::Identity();
+  axes.linear() = info.axes;
+  return info.axes.isZero() ? "" : orientation_letters(axes);
+}
+
+/// "2021-05-03" of "20210503"; as it is where it is no such date.
+std::string date_of(const SeriesInfo& info) {
+  const std::string& d = info.date;
+  if (d.size() != 8 || d.find_first_not_of("0123456789") != std::string::npos) return d;
+  return fmt::format("{}-{}-{}", d.substr(0, 4), d.substr(4, 2), d.substr(6, 2));
+}
+
+/// One line: what is not known is "-".
+std::string line_of(const SeriesInfo& info) {
+  std::string name = info.description;
+  if (!info.part.empty()) name += fmt::format("{}{}", name.empty() ? "" : ", ", info.part);
+  std::string size = "-", contrast = info.agent;
+  if (info.size[2] > 0) {
+    size = fmt::format("{} slice{} of {} x {}, {:.3g} x {:.3g} x {:.3g} mm", info.size[2], info.size[2] == 1 ? "" : "s",
+                       info.size[0], info.size[1], info.spacing_mm.x(), info.spacing_mm.y(), info.spacing_mm.z());
+  }
+  if (!info.phase.empty()) contrast += fmt::format("{}{}", contrast.empty() ? "" : ", ", info.phase);
+  const auto known = [](const std::string& text) { return text.empty() ? std::string("-") : text; };
+  std::string line =
+      fmt::format("series {:<5} {:<28}  {:<2}  {:<10}  {}  {}  {}", info.id, known(name), known(info.modality),
+                  known(date_of(info)), size, known(orientation_of(info)), known(contrast));
+  if (!info.problem.empty()) line += fmt::format("  no volume: {}", info.problem);
+  return line;
+}
+
+nlohmann::json json_of(const SeriesInfo& info) {
+  nlohmann::json json{{"id", info.id}, {"uid", info.uid}, {"readable", info.problem.empty()}};
+  const auto put = [&json](const char* key, const std::string& text) {
+    if (!text.empty()) json[key] = text;
+  };
+  put("description", info.description);
+  put("part", info.part);
+  put("modality", info.modality);
+  put("date", date_of(info));
+  put("time", info.time);
+  put("contrast_agent", info.agent);
+  put("phase", info.phase);
+  put("transfer_syntax", info.syntax);
+  put("orientation", orientation_of(info));
+  put("problem", info.problem);
+  if (info.size[2] > 0) {
+    json["size"] = info.size;
+    json["spacing_mm"] = {info.spacing_mm.x(), info.spacing_mm.y(), info.spacing_mm.z()};
+  }
+  return json;
+}
+
+void print_volume(const Volume& volume, nlohmann::json& json) {
+  const auto [low, high] = std::minmax_element(volume.hu.begin(), volume.hu.end());
+  const double mean = std::accumulate(volume.hu.begin(), volume.hu.end(), 0.0) / static_cast<double>(volume.hu.size());
+  const auto& size = volume.size;
+  const Eigen::Vector3d& spacing = volume.spacing_mm;
+  const Eigen::Matrix4d m = volume.patient_from_voxel.matrix();
+  const std::string letters = orientation_letters(volume.patient_from_voxel);
+  fmt::print("size         {} x {} x {} voxels\n", size[0], size[1], size[2]);
+  fmt::print("spacing      {:.4f} x {:.4f} x {:.4f} mm\n", spacing.x(), spacing.y(), spacing.z());
+  fmt::print("extent       {:.1f} x {:.1f} x {:.1f} mm\n", size[0] * spacing.x(), size[1] * spacing.y(),
+             size[2] * spacing.z());
+  fmt::print("orientation  {} (voxel axes point to the patient's)\n", letters);
+  fmt::print("first voxel  ({:.3f}, {:.3f}, {:.3f}) mm, patient LPS\n", m(0, 3), m(1, 3), m(2, 3));
+  fmt::print("HU           {} to {}, mean {:.1f}\n", *low, *high, mean);
+  json["size"] = {size[0], size[1], size[2]};
+  json["spacing_mm"] = {spacing.x(), spacing.y(), spacing.z()};
+  for (int i = 0; i < 4; ++i) json["patient_from_voxel"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
+  json["orientation"] = letters;
+  json["hu_min"] = *low;
+  json["hu_max"] = *high;
+  json["hu_mean"] = mean;
+}
+
+/// Prints the series; false where none of several is chosen. An error where the one that is named is not there.
+Result<bool> list_of_series(const VolumeSource& source, nlohmann::json& json) {
+  const auto list = list_series(source);
+  if (!list) return list.error();
+  json["series"] = nlohmann::json::array();
+  for (const SeriesInfo& info : list->series) {
+    fmt::print("{}\n", line_of(info));
+    json["series"].push_back(json_of(info));
+  }
+  for (const std::string& unreadable : list->unreadable) fmt::print("passed over  {}\n", unreadable);
+  if (!list->unreadable.empty()) json["unreadable"] = list->unreadable;
+  const auto chosen = choose_series(list->series, source.series);
+  if (!chosen && source.series.empty() && chosen.error().code == Errc::unsupported) {
+    fmt::print("{} series or volumes: name one with --series to look at it\n", list->series.size());
+    return false;
+  }
+  if (!chosen) return chosen.error().with_context(source.path.string());
+  return true;
+}
+
+Result<void> volume_info(const InfoOptions& options) {
+  nlohmann::json json;
+  if (holds_dicom(options.source.path)) {
+    const auto chosen = list_of_series(options.source, json);
+    if (!chosen) return chosen.error();
+    if (!*chosen) return write_file(options.json, text_of(json));
+  }
+  const auto imported = import_with_notes(options.source);
+  if (!imported) return imported.error();
+  print_volume(imported->volume, json);
+  if (!imported->notes.empty()) json["notes"] = imported->notes;
+  for (const std::string& note : imported->notes) fmt::print("note         {}\n", note);
+  return write_file(options.json, text_of(json));
+}
+
+}  // namespace
+
+void add_volume_info(CLI::App& volume, CommandStatus& status) {
+  const auto options = std::make_shared<InfoOptions>();
+  CLI::App& info = *volume.add_subcommand("info", "the series of a folder; size, geometry and values of a CT");
+  info.add_option("path", options->source.path, "DICOM folder or file, NIfTI, NRRD, MHA or MHD")->required();
+  add_ct_options(info, options->source);
+  info.add_option("--json", options->json, "write the figures to this file");
+  info.callback([options, &status] { status.take(volume_info(*options)); });
+}
+
+}  // namespace birdseye::host

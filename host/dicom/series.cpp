@@ -1,0 +1,158 @@
+#include "host/dicom/series.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+#include <map>
+
+#include "host/dicom/phase_words.hpp"
+#include "host/dicom/slice_volumes.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Files = std::vector<const DicomFile*>;
+
+std::string slice_name(const DicomFile& file, const DicomSlice& slice) {
+  const std::string name = file.path.filename().string();
+  return file.slices.size() > 1 ? fmt::format("frame {} of {}", slice.frame + 1, name) : name;
+}
+
+SeriesInfo info_of(const Files& files) {
+  const DicomFile& first = *files.front();
+  SeriesInfo info;
+  info.uid = first.series_uid;
+  info.modality = first.modality;
+  info.description = first.description;
+  info.date = first.date;
+  info.time = first.time;
+  info.agent = first.agent;
+  info.syntax = first.syntax;
+  return info;
+}
+
+/// A series of files that are no slices, or one of which has a fault.
+Series without_volume(const Files& files) {
+  Series series;
+  series.info = info_of(files);
+  const DicomFile& first = *files.front();
+  if (first.kind == DicomFile::Kind::labels) {
+    series.info.problem = "a segmentation, no CT; give it as --labels";
+  } else if (first.kind == DicomFile::Kind::no_image) {
+    series.info.problem = fmt::format("no image ({})", first.what);
+  }
+  // Pictures of a screen, as dose reports, are of modality CT too.
+  series.info.passed_over =
+      first.kind != DicomFile::Kind::slices || first.modality != "CT" || first.localizer || !first.of_ct_class;
+  const auto bad = std::find_if(files.begin(), files.end(), [](const DicomFile* file) { return !file->fault.empty(); });
+  if (bad != files.end()) {
+    series.bad = (*bad)->path;
+    series.fault = (*bad)->fault;
+    series.info.problem = fmt::format("{} {}", (*bad)->path.filename().string(), (*bad)->fault);
+  }
+  return series;
+}
+
+void describe(const DicomSlice& slice, SeriesInfo& info) {
+  if (!slice.key(SliceKey::description).empty()) info.description = slice.key(SliceKey::description);
+  for (const std::string& text :
+       {slice.key(SliceKey::contrast_phase), info.description, slice.key(SliceKey::comments)}) {
+    if (info.phase.empty()) info.phase = phase_named_in(text);
+  }
+}
+
+Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVolume volume, bool untilt) {
+  Series series;
+  const DicomSlice first = volume.slices.front();
+  series.info = info_of(files);
+  series.info.part = std::move(volume.part);
+  describe(first, series.info);
+  series.stack = stack_slices(std::move(volume.slices),
+                              [&all](const DicomSlice& slice) { return slice_name(all[slice.file], slice); });
+  const auto count = static_cast<int>(series.stack.slices.size());
+  series.info.size = {first.columns, first.rows, count};
+  series.info.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), series.stack.step_mm};
+  series.info.axes << first.row, first.column, first.row.cross(first.column).normalized();
+  const bool localizer = all[first.file].localizer;
+  series.info.problem = why_no_volume(series.stack, untilt);
+  if (count == 1) series.info.problem = "one slice";
+  if (localizer) series.info.problem = "a localizer";
+  series.info.passed_over = localizer;
+  return series;
+}
+
+/// Of the slices that files of one series hold. A localizer that lies in a series is no slice of its volume.
+void add_volumes(const Files& files, const std::vector<DicomFile>& all, bool untilt, std::vector<Series>& out) {
+  std::vector<DicomSlice> slices, localizers;
+  for (const DicomFile* file : files) {
+    auto& to = file->localizer ? localizers : slices;
+    for (DicomSlice slice : file->slices) {
+      slice.file = static_cast<std::size_t>(file - all.data());
+      to.push_back(std::move(slice));
+    }
+  }
+  std::vector<Series> volumes;
+  for (const auto& some : {slices, localizers}) {
+    if (some.empty()) continue;
+    for (SliceVolume& volume : part_into_volumes(some))
+      volumes.push_back(of_volume(files, all, std::move(volume), untilt));
+  }
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    if (volumes.size() > 1) volumes[i].info.id = fmt::format(".{}", i + 1);
+    out.push_back(std::move(volumes[i]));
+  }
+}
+
+/// A number for people: that of the series, which several studies may have, so with a letter from the second on.
+std::string id_of(const std::optional<int>& number, std::map<std::string, int>& used) {
+  const std::string base = number ? fmt::format("{}", *number) : "none";
+  const int before = used[base]++;
+  if (before == 0) return base;
+  return before < 26 ? fmt::format("{}{}", base, static_cast<char>('a' + before))
+                     : fmt::format("{}-{}", base, before + 1);
+}
+
+}  // namespace
+
+std::vector<Series> sort_into_series(const std::vector<DicomFile>& files, bool untilt) {
+  std::map<std::pair<int, std::string>, Files> sorted;
+  for (const DicomFile& file : files) {
+    if (file.kind == DicomFile::Kind::directory) continue;
+    // Without identifiers, as some anonymisers leave files, those of a folder belong together.
+    const std::string uid = file.series_uid.empty() ? file.path.parent_path().string() : file.series_uid;
+    sorted[{file.series_number.value_or(std::numeric_limits<int>::max()), uid}].push_back(&file);
+  }
+  std::vector<Series> out;
+  std::map<std::string, int> used;
+  for (const auto& [key, of_series] : sorted) {
+    const std::string id = id_of(of_series.front()->series_number, used);
+    const bool whole = std::all_of(of_series.begin(), of_series.end(),
+                                   [](const DicomFile* file) { return !file->slices.empty() && file->fault.empty(); });
+    const std::size_t had = out.size();
+    if (whole) {
+      add_volumes(of_series, files, untilt, out);
+    } else {
+      out.push_back(without_volume(of_series));
+    }
+    for (std::size_t i = had; i < out.size(); ++i) out[i].info.id.insert(0, id);
+  }
+  return out;
+}
+
+void blame_neighbours(std::vector<Series>& series, const std::vector<DicomFile>& files,
+                      const std::filesystem::path& unreadable, const std::string& why) {
+  for (Series& one : series) {
+    const bool beside = std::any_of(one.stack.slices.begin(), one.stack.slices.end(), [&](const DicomSlice& slice) {
+      return files[slice.file].path.parent_path() == unreadable.parent_path();
+    });
+    if (!beside || one.info.passed_over || !one.bad.empty()) continue;
+    one.bad = unreadable;
+    one.fault = why;
+    one.info.problem = fmt::format("{} {}", unreadable.filename().string(), why);
+  }
+}
+
+}  // namespace birdseye::host

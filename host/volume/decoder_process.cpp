@@ -1,0 +1,139 @@
+#include "host/volume/decoder_process.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <new>
+#include <optional>
+#include <string>
+
+#include "host/dicom/refused.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What the copy of this process sends: the file it is about to read, how it failed, or that the outcome follows.
+enum class MessageKind : std::uint8_t { reading = 'r', error = 'e', decoded = 'd' };
+
+constexpr Duration kLongest = Duration::from_ms(300'000);
+
+void send_text(const Send& send, MessageKind kind, std::int32_t code, const std::string& text) {
+  const auto length = static_cast<std::uint32_t>(text.size());
+  send(&kind, sizeof kind);
+  send(&code, sizeof code);
+  send(&length, sizeof length);
+  send(text.data(), text.size());
+}
+
+std::optional<Error> receive_text(const Receive& receive) {
+  constexpr std::uint32_t kLongestText = 1 << 16;
+  std::int32_t code = 0;
+  std::uint32_t length = 0;
+  if (!receive(&code, sizeof code) || !receive(&length, sizeof length) || length > kLongestText) return std::nullopt;
+  Error told{static_cast<Errc>(code), std::string(length, ' ')};
+  if (!receive(told.what.data(), length)) return std::nullopt;
+  return told;
+}
+
+/// A file may claim any size, and a deflated one grow to it: this much more than the process has is a volume of 2048 x
+/// 2048 x 600 with room to work in.
+void bound_memory() {
+  constexpr rlim_t kMore = rlim_t{12} << 30U;
+  rlim_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMore;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur <= most) return;
+  limit.rlim_cur = most;
+  ::setrlimit(RLIMIT_AS, &limit);
+}
+
+Error not_decoded(const fs::path& reading, const Result<void>& ran) {
+  if (!ran && ran.error().code == Errc::timeout) {
+    return refused(Errc::timeout, reading,
+                   fmt::format("its decoder {} after {:.0f} s; copy it again, to a disk of this machine",
+                               ran.error().what, kLongest.seconds()));
+  }
+  return refused(Errc::bad_format, reading,
+                 fmt::format("is cut short, damaged, or too large to decode{}; copy it again",
+                             ran ? "" : fmt::format(" (its decoder {})", ran.error().what)));
+}
+
+}  // namespace
+
+Result<void> run_decoder(const fs::path& path, const std::function<Result<SendDecoded>(const Announce&)>& decode,
+                         const std::function<bool(const Receive&)>& take, const std::stop_token& stop) {
+  const auto work = [&](const Send& send) {
+    bound_memory();
+    const auto decoded =
+        decode([&send](const fs::path& file) { send_text(send, MessageKind::reading, 0, file.string()); });
+    if (!decoded) {
+      send_text(send, MessageKind::error, static_cast<std::int32_t>(decoded.error().code), decoded.error().what);
+      return;
+    }
+    const MessageKind kind = MessageKind::decoded;
+    send(&kind, sizeof kind);
+    (*decoded)(send);
+  };
+  fs::path reading = path;
+  std::optional<Error> failed;
+  bool came = false;
+  const auto receive_all = [&](const Receive& receive) {
+    MessageKind kind{};
+    while (!failed && receive(&kind, sizeof kind)) {
+      if (kind == MessageKind::decoded) {
+        came = take(receive);
+        return;
+      }
+      auto told = receive_text(receive);
+      if (!told) return;
+      if (kind == MessageKind::error) {
+        failed = *std::move(told);
+      } else {
+        reading = told->what;
+      }
+    }
+  };
+  try {
+    const auto ran = run_isolated(work, receive_all, kLongest, stop);
+    if (stop.stop_requested()) return refused(Errc::disconnected, path, "was not read: cancelled");
+    if (failed) return *failed;
+    if (came) return {};
+    if (!ran && ran.error().code == Errc::io) return refused(Errc::io, path, ran.error().what);
+    return not_decoded(reading, ran);
+  } catch (const std::bad_alloc&) {
+    return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
+  }
+}
+
+Result<void> check_can_be_opened(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return refused(Errc::not_found, path, "no such file or folder");
+  if (fs::is_directory(path, error)) return {};
+  if (!fs::is_regular_file(path, error))
+    return refused(Errc::unsupported, path, "is neither a file nor a folder; save it as a file first");
+  if (!std::ifstream(path)) return refused(Errc::unreadable, path, "cannot be opened; check its permissions");
+  return {};
+}
+
+void send_long_text(const Send& send, const std::string& text) {
+  const std::uint64_t length = text.size();
+  send(&length, sizeof length);
+  send(text.data(), text.size());
+}
+
+std::optional<std::string> receive_long_text(const Receive& receive) {
+  constexpr std::uint64_t kLongestText = 1 << 28;
+  std::uint64_t length = 0;
+  if (!receive(&length, sizeof length) || length > kLongestText) return std::nullopt;
+  const auto text = receive_values<char>(receive, length);
+  if (!text) return std::nullopt;
+  return std::string(text->begin(), text->end());
+}
+
+}  // namespace birdseye::host
