@@ -146,4 +146,50 @@ inline void write_directory_file(const std::filesystem::path& path) {
                   .good());
 }
 
+/// An item appended to a sequence.
+inline DcmItem& add_item(DcmItem& item, const DcmTagKey& sequence) {
+  DcmItem* added = nullptr;
+  EXPECT_TRUE(item.findOrCreateSequenceItem(sequence, added, -2).good());
+  return *added;
+}
+
+/// A frame of an enhanced CT of 4 x 3 pixels; its stored values count up from `first`.
+struct CtFrame {
+  Eigen::Vector3d place_mm{0, 0, 0};
+  int first = 1000;
+  double intercept = -1000, slope = 1;
+  int temporal = 1;
+};
+
+/// An enhanced CT of these frames, in their order: places and scales per frame, orientation and spacing shared.
+inline void write_enhanced_ct(const std::filesystem::path& path, const std::vector<CtFrame>& frames,
+                              const Elements& more = {}, E_TransferSyntax syntax = EXS_LittleEndianExplicit) {
+  DcmFileFormat file;
+  DcmDataset& dataset = *file.getDataset();
+  put_object(dataset, UID_EnhancedCTImageStorage, "2.25.50", 5, 1, "CT");
+  put(dataset, DCM_ImageType, "ORIGINAL\\PRIMARY\\VOLUME\\NONE");
+  put(dataset, DCM_NumberOfFrames, std::to_string(frames.size()));
+  DcmItem& shared = add_item(dataset, DCM_SharedFunctionalGroupsSequence);
+  DcmItem& measures = add_item(shared, DCM_PixelMeasuresSequence);
+  put(measures, DCM_PixelSpacing, "0.75\\0.5");
+  put(measures, DCM_SliceThickness, "2");
+  put(add_item(shared, DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+  std::vector<Uint16> pixels;
+  for (const CtFrame& frame : frames) {
+    DcmItem& own = add_item(dataset, DCM_PerFrameFunctionalGroupsSequence);
+    DcmItem& content = add_item(own, DCM_FrameContentSequence);
+    put(content, DCM_StackID, "1");
+    EXPECT_TRUE(content.putAndInsertUint32(DCM_TemporalPositionIndex, static_cast<Uint32>(frame.temporal)).good());
+    put(add_item(own, DCM_PlanePositionSequence), DCM_ImagePositionPatient, numbers(frame.place_mm));
+    DcmItem& scale = add_item(own, DCM_PixelValueTransformationSequence);
+    put(scale, DCM_RescaleIntercept, fmt::format("{:g}", frame.intercept));
+    put(scale, DCM_RescaleSlope, fmt::format("{:g}", frame.slope));
+    put(scale, DCM_RescaleType, "HU");
+    for (int i = 0; i < kSliceColumns * kSliceRows; ++i) pixels.push_back(static_cast<Uint16>(frame.first + i));
+  }
+  put_pixels(dataset, kSliceColumns, kSliceRows, pixels);
+  if (more) more(dataset);
+  save_dicom(file, path, syntax);
+}
+
 }  // namespace birdseye::testing
