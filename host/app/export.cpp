@@ -7,6 +7,7 @@
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
 #include "host/files/text_files.hpp"
@@ -21,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ExportOptions {
-  fs::path registration, views, deformation, model_pose, volume, out, json;
+  VolumeSource volume;
+  fs::path registration, views, deformation, model_pose, out, json;
   std::string frame = "tracker";
 };
 
@@ -59,10 +61,11 @@ Result<Registered> read_registered(ExportOptions options) {
     if (!field) return field.error();
     read.field = *std::move(field);
   }
-  if (!options.volume.empty()) {
-    auto volume = import_volume(options.volume);
-    if (!volume) return volume.error();
-    read.volume = *std::move(volume);
+  if (!options.volume.path.empty()) {
+    auto imported = import_with_notes(options.volume);
+    if (!imported) return imported.error();
+    print_notes(imported->notes);
+    read.volume = std::move(imported->volume);
   }
   if (read.field && read.volume) {
     if (auto covers = check_covers(*read.field, *read.volume); !covers)
@@ -199,7 +202,8 @@ void add_export(CLI::App& app, CommandStatus& status) {
   CLI::Option* const views = command.add_option("--views", options->views, "folder of register views");
   command.add_option("--deformation", options->deformation, "a displacement field by itself, LPS mm")->excludes(views);
   command.add_option("--model-pose", options->model_pose, "patient_from_model, a 4x4 matrix")->excludes(views);
-  command.add_option("--volume", options->volume, "the CT: exported as it is seen");
+  command.add_option("--volume", options->volume.path, "the CT: exported as it is seen");
+  add_ct_options(command, options->volume);
   command.add_option("--frame", options->frame, "where the CT is brought: tracker (default) or patient")
       ->check(CLI::IsMember({"tracker", "patient"}));
   command.add_option("--out", options->out, "folder")->required();

@@ -7,6 +7,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/app/foreign_options.hpp"
 #include "host/demo/demo_report.hpp"
 #include "host/files/text_files.hpp"
@@ -102,10 +103,11 @@ Result<void> prepare(LiveOptions& options) {
     std::error_code error;
     fs::create_directories(options.live.out, error);
     if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
-  } else if (options.live.patient.ct.empty()) {
+  } else if (options.live.patient.ct.path.empty()) {
     return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
-  } else if (std::error_code ignored; !fs::exists(options.live.patient.ct, ignored)) {
-    return Error{Errc::not_found, fmt::format("--ct {}: no such file or folder", options.live.patient.ct.string())};
+  } else if (std::error_code ignored; !fs::exists(options.live.patient.ct.path, ignored)) {
+    return Error{Errc::not_found,
+                 fmt::format("--ct {}: no such file or folder", options.live.patient.ct.path.string())};
   } else if (auto named = check_labels_named(options.live.patient); !named) {
     return named;
   }
@@ -261,9 +263,12 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--look-s", options->cart.look_s, "with --simulate: how long the operation lasts")
       ->check(CLI::Range(1.0, 86400.0));
   PatientFiles& patient = options->live.patient;
-  command->add_option("--ct", patient.ct, "the patient's CT")->type_name("PATH");
-  command->add_option("--labels", patient.labels, "its segmentation")->type_name("FILE");
-  command->add_option("--show", patient.shown, "labels to show; without them, all of the CT")->delimiter(',');
+  command->add_option("--ct", patient.ct.path, "the patient's CT")->type_name("PATH");
+  add_ct_options(*command, patient.ct);
+  command->add_option("--labels", patient.labels, "its segmentation: DICOM SEG, or labels on the CT's grid")
+      ->type_name("FILE");
+  command->add_option("--show", patient.shown, "labels to show, by name or number; without them, all of the CT")
+      ->delimiter(',');
   command
       ->add_option("--organ", patient.organ,
                    "labels of the organ that the video shows, to match it with; needed with --labels")

@@ -6,6 +6,7 @@
 
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/case/fiducial_registration.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -75,8 +76,9 @@ void add_register(CLI::App& app, CommandStatus& status) {
   fiducials.add_option("--fle", options->files.localisation_mm,
                        "how well a marker is found and touched, mm rms, if known (default: from the residuals)");
   fiducials.add_option("--targets", options->files.targets, "points to predict the error at, patient frame");
-  fiducials.add_option("--volume", options->files.volume,
+  fiducials.add_option("--volume", options->files.volume.path,
                        "the CT: predicts the error over it, and shows it in the map");
+  add_ct_options(fiducials, options->files.volume);
   fiducials.add_option("--map", options->map, "a PNG of the predicted error, in slices through the first target");
   CLI::Option* surface = fiducials.add_option(
       "--surface", options->files.surface, "refine by this surface: VTK polygons, PLY, STL or OBJ, patient frame, mm");

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -25,8 +26,9 @@ namespace {
 constexpr const char* kDisplays[] = {"distorted", "undistorted", "undistorted-whole"};
 
 struct RenderOptions {
-  std::filesystem::path volume, labels, camera, pose, path, deformation, over, out, movie, json;
-  std::vector<int> keep;
+  VolumeSource volume;
+  std::filesystem::path labels, camera, pose, path, deformation, over, out, movie, json;
+  std::vector<LabelChoice> keep;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
   double clip = 0.5;
   double step_mm = 0.7, seconds = 4, opacity = 1;
@@ -87,7 +89,8 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   RenderScene scene;
   auto volume = read_shown(options.volume, options.labels, options.keep);
   if (!volume) return volume.error();
-  scene.volume = *std::move(volume);
+  print_notes(volume->notes);
+  scene.volume = std::move(volume->volume);
   if (auto looked = look(scene, options); !looked) return looked.error();
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
@@ -104,7 +107,7 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   if (options.deformation.empty()) return scene;
   if (*std::min_element(scene.volume.size.begin(), scene.volume.size.end()) < 2) {
     return Error{Errc::unsupported,
-                 fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.string())};
+                 fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.path.string())};
   }
   auto field = read_field(options.deformation);
   if (!field) return field.error();
@@ -174,7 +177,7 @@ Result<void> render(const RenderOptions& options) {
   if (!scene) return scene.error();
   std::unique_ptr<Window> window;  // outlives the engine that draws with it
   if (options.window) {
-    auto opened = Window::open("Birdseye: " + options.volume.filename().string(), scene->camera.width_px,
+    auto opened = Window::open("Birdseye: " + options.volume.path.filename().string(), scene->camera.width_px,
                                scene->camera.height_px);
     if (!opened) return opened.error();
     window = *std::move(opened);
@@ -195,7 +198,7 @@ Result<void> render(const RenderOptions& options) {
 void add_render(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<RenderOptions>();
   CLI::App& command = *app.add_subcommand("render", "render a CT to a PNG");
-  command.add_option("--volume", options->volume, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
+  command.add_option("--volume", options->volume.path, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
   CLI::Option* const camera = command.add_option("--camera", options->camera,
                                                  "lens, OpenCV YAML; without it a view that shows the whole volume");
   command
@@ -241,8 +244,11 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--frames", options->frames, "close the window after so many pictures")
       ->check(CLI::Range(1, 1'000'000))
       ->needs(window);
-  CLI::Option* const labels = command.add_option("--labels", options->labels, "label volume on the CT's grid");
-  CLI::Option* const keep = command.add_option("--keep", options->keep, "the labels to show")->delimiter(',');
+  add_ct_options(command, options->volume);
+  CLI::Option* const labels =
+      command.add_option("--labels", options->labels, "its segmentation: DICOM SEG, or labels on the CT's grid");
+  CLI::Option* const keep =
+      command.add_option("--keep,--show", options->keep, "the labels to show, by name or number")->delimiter(',');
   labels->needs(keep);
   keep->needs(labels);
   CLI::Option* const json = command.add_option("--json", options->json, "write the figures to this file");

@@ -12,6 +12,7 @@
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/replay_player.hpp"
@@ -26,8 +27,9 @@ namespace {
 namespace fs = std::filesystem;
 struct ReplayOptions {
   ReplayInputs inputs;
-  fs::path volume, labels, deformation, out, json;
-  std::vector<int> keep;
+  VolumeSource volume;
+  fs::path labels, deformation, out, json;
+  std::vector<LabelChoice> keep;
   std::string transfer = "tumour-and-vessels", engine = "cpu";
   double step_mm = 1.2, film_hz = 0;
   int every = 10;
@@ -90,8 +92,10 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (!reader) return reader.error();
   const auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
-  const auto volume = read_shown(options.volume, options.labels, options.keep);
-  if (!volume) return volume.error();
+  const auto shown = read_shown(options.volume, options.labels, options.keep);
+  if (!shown) return shown.error();
+  print_notes(shown->notes);
+  const Volume* const volume = &shown->volume;
   const auto transfer = load_transfer_function(options.transfer);
   if (!transfer) return transfer.error();
   const auto engine = make_engine(options.engine, *volume, *transfer);
@@ -161,9 +165,12 @@ void add_replay(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<ReplayOptions>();
   CLI::App& command = *app.add_subcommand("replay", "draw the CT over a recording, the same to the bit each time");
   add_inputs(command, options->inputs);
-  command.add_option("--volume", options->volume, "the CT")->required();
-  CLI::Option* const labels = command.add_option("--labels", options->labels, "label volume on the CT's grid");
-  CLI::Option* const keep = command.add_option("--keep", options->keep, "the labels to show")->delimiter(',');
+  command.add_option("--volume", options->volume.path, "the CT")->required();
+  add_ct_options(command, options->volume);
+  CLI::Option* const labels =
+      command.add_option("--labels", options->labels, "its segmentation: DICOM SEG, or labels on the CT's grid");
+  CLI::Option* const keep =
+      command.add_option("--keep,--show", options->keep, "the labels to show, by name or number")->delimiter(',');
   labels->needs(keep);
   keep->needs(labels);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default tumour-and-vessels)");

@@ -101,20 +101,25 @@ void print_volume(const Volume& volume, nlohmann::json& json) {
   json["hu_mean"] = mean;
 }
 
-/// Prints the series; false where none of several is chosen. An error where the one that is named is not there.
-Result<bool> list_of_series(const VolumeSource& source, nlohmann::json& json) {
-  const auto list = list_series(source);
-  if (!list) return list.error();
+void print_series(const SeriesList& list, nlohmann::json& json) {
   json["series"] = nlohmann::json::array();
-  for (const SeriesInfo& info : list->series) {
+  for (const SeriesInfo& info : list.series) {
     fmt::print("{}\n", line_of(info));
     json["series"].push_back(json_of(info));
   }
-  for (const std::string& unreadable : list->unreadable) fmt::print("passed over  {}\n", unreadable);
-  if (!list->unreadable.empty()) json["unreadable"] = list->unreadable;
+  for (const std::string& unreadable : list.unreadable) fmt::print("passed over  {}\n", unreadable);
+  if (!list.unreadable.empty()) json["unreadable"] = list.unreadable;
+}
+
+/// Prints the series; false where none of several is chosen. An error where the one that is named is not there. Of a
+/// single series that is no volume the error says all.
+Result<bool> list_of_series(const VolumeSource& source, nlohmann::json& json) {
+  const auto list = list_series(source);
+  if (!list) return list.error();
   const auto chosen = choose_series(list->series, source.series);
+  if (list->series.size() > 1 || list->series.front().problem.empty()) print_series(*list, json);
   if (!chosen && source.series.empty() && chosen.error().code == Errc::unsupported) {
-    fmt::print("{} series or volumes: name one with --series to look at it\n", list->series.size());
+    fmt::print("name one with --series to look at it\n");
     return false;
   }
   if (!chosen) return chosen.error().with_context(source.path.string());

@@ -56,7 +56,7 @@ Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
     if (!read) return read.error();
     *points = *std::move(read);
   }
-  if (!files.volume.empty()) {
+  if (!files.volume.path.empty()) {
     auto volume = import_volume(files.volume);
     if (!volume) return volume.error();
     input.volume = *std::move(volume);

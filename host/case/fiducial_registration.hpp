@@ -16,13 +16,15 @@
 #include "host/registration/rigid/surface_refinement.hpp"
 #include "host/report/target_error_map.hpp"
 #include "host/volume/volume.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
 /// Where the markers lie, and what else is said of them.
 struct FiducialFiles {
-  std::filesystem::path ct, tracker;                               ///< the markers, and the same as touched
-  std::filesystem::path targets, volume, surface, surface_points;  ///< empty: none
+  std::filesystem::path ct, tracker;                       ///< the markers, and the same as touched
+  std::filesystem::path targets, surface, surface_points;  ///< empty: none
+  VolumeSource volume;                                     ///< the CT; without a path: none
   std::optional<double> localisation_mm;  ///< how well a marker is found and touched, rms; none: from the residuals
   bool match = false;                     ///< touched in any order, of markers that may be more
 };

@@ -16,6 +16,7 @@
 #include "host/registration/similarity/overlap_mask.hpp"
 #include "host/registration/similarity/similarity.hpp"
 #include "host/volume/import.hpp"
+#include "host/volume/label_names.hpp"
 #include "host/volume/labels.hpp"
 
 namespace birdseye::host {
@@ -72,7 +73,7 @@ class CaseTable {
 Result<void> only_known_keys(const fs::path& file, const std::string& table, const toml::value& content) {
   static const std::map<std::string, std::vector<std::string>> kKnown = {
       {"", {"volume", "model", "view", "target", "landmark", "points", "truth"}},
-      {"volume", {"path", "label", "label_values", "transfer"}},
+      {"volume", {"path", "series", "untilt", "label", "label_values", "transfer"}},
       {"model",
        {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
         "most_evaluations"}},
@@ -103,10 +104,26 @@ Result<void> only_known_keys(const fs::path& file, const std::string& table, con
   return {};
 }
 
+/// Numbers, or names.
+Result<std::vector<LabelChoice>> read_labels_wanted(const CaseTable& table) {
+  const auto numbers = table.get<std::vector<int>>("label_values");
+  if (numbers) return std::vector<LabelChoice>(numbers->begin(), numbers->end());
+  const auto names = table.get<std::vector<std::string>>("label_values");
+  if (names) return std::vector<LabelChoice>(names->begin(), names->end());
+  return numbers.error();
+}
+
 Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   const auto path = table.path("path");
   if (!path) return path.error();
-  auto ct = import_volume(*path);
+  VolumeSource source(*path);
+  const auto series = table.get<std::string>("series", "");
+  if (!series) return series.error();
+  source.series = *series;
+  const auto untilt = table.get<bool>("untilt", false);
+  if (!untilt) return untilt.error();
+  source.untilt = *untilt;
+  auto ct = import_volume(source);
   if (!ct) return ct.error();
   out.ct = *std::move(ct);
   const auto transfer = table.get<std::string>("transfer", "liver");
@@ -115,11 +132,13 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   if (!table.has("label")) return {};
   const auto label = table.path("label");
   if (!label) return label.error();
-  auto labels = import_labels(*label, out.ct);
+  auto labels = import_named_labels(*label, out.ct);
   if (!labels) return labels.error();
-  out.labels = *std::move(labels);
-  const auto values = table.get<std::vector<int>>("label_values");
-  if (!values) return values.error();
+  const auto wanted = read_labels_wanted(table);
+  if (!wanted) return wanted.error();
+  const auto values = values_of_labels(labels->names, *wanted);
+  if (!values) return values.error().with_context(label->string());
+  out.labels = std::move(labels->volume);
   out.label_values = *values;
   if (values->empty()) return table.wrong("label_values", "is empty; name the labels to keep");
   return {};

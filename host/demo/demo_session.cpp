@@ -26,7 +26,7 @@ Result<PatientPlan> read_with_fiducials(const std::filesystem::path& folder, int
   if (!patient) return patient;
   std::vector<Eigen::Vector3d> markers_in_patient_mm = find_fiducials(patient->ct, {});
   if (static_cast<int>(markers_in_patient_mm.size()) < fiducials) {
-    return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", files.ct.string(),
+    return Error{Errc::not_found, fmt::format("{}: {} markers found where there are {}", files.ct.path.string(),
                                               markers_in_patient_mm.size(), fiducials)};
   }
   markers_in_patient_mm.resize(static_cast<std::size_t>(fiducials));

@@ -13,6 +13,9 @@
 
 namespace birdseye::host {
 
+/// What is believed of a file's claims, along a row or column: a CT has 512 pixels, some 2048.
+inline constexpr int kMostPixels = 8192;
+
 /// A DICOM file's elements. Long values stay in the file until they are asked for. Errc::bad_format where it is none,
 /// or is cut short.
 Result<std::unique_ptr<DcmFileFormat>> load_dicom(const std::filesystem::path& path);

@@ -16,7 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostPixels = 8192;    // along a row or column: a CT has 512, some 2048
 constexpr int kMostFrames = 100000;  // of one file
 
 struct KeyTag {
@@ -199,7 +198,9 @@ std::string read_slices(DcmDataset& dataset, DicomFile& file) {
 DicomFile::Kind kind_of(DcmDataset& dataset, const std::string& sop_class) {
   if (sop_class == UID_MediaStorageDirectoryStorage || dataset.tagExists(DCM_DirectoryRecordSequence))
     return DicomFile::Kind::directory;
-  if (sop_class == UID_SegmentationStorage) return DicomFile::Kind::labels;
+  constexpr std::string_view kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66.7";  // younger than the library
+  if (sop_class == UID_SegmentationStorage || sop_class == kLabelMapStorage || dataset.tagExists(DCM_SegmentSequence))
+    return DicomFile::Kind::labels;
   // A file of an image that was cut before its pixels still says how many there should be.
   return dataset.tagExists(DCM_PixelData) || dataset.tagExists(DCM_Rows) ? DicomFile::Kind::slices
                                                                          : DicomFile::Kind::no_image;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 
@@ -77,10 +78,14 @@ Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVol
   series.info.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), series.stack.step_mm};
   series.info.axes << first.row, first.column, first.row.cross(first.column).normalized();
   const bool localizer = all[first.file].localizer;
+  const auto& slices = series.stack.slices;
+  const Eigen::Vector3d whole = slices.back().position_mm - slices.front().position_mm;
+  const bool at_one_place = count > 2 && std::abs(whole.dot(series.info.axes.col(2))) < 0.01;
   series.info.problem = why_no_volume(series.stack, untilt);
   if (count == 1) series.info.problem = "one slice";
+  if (at_one_place) series.info.problem = "all its slices lie at one place, as when a bolus is watched";
   if (localizer) series.info.problem = "a localizer";
-  series.info.passed_over = localizer;
+  series.info.passed_over = localizer || at_one_place;
   return series;
 }
 

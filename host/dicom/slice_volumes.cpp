@@ -135,7 +135,8 @@ std::vector<SliceVolume> part_repeats(const Slices& slices) {
   const std::size_t most = most_at_a_place(slices);
   const std::vector<SliceVolume> whole{{slices, ""}};
   const bool even = most == 1 && stack_slices(slices, [](const DicomSlice&) { return std::string(); }).problem.empty();
-  if (even) return whole;
+  // A bolus is watched at one place: many pictures, and no volume.
+  if (even || most == slices.size()) return whole;
   for (std::size_t k = 0; k < kSliceKeys; ++k) {
     auto volumes = by_key(slices, static_cast<SliceKey>(k));
     // A key that changes from slice to slice, as a time does, tells no volumes apart.

@@ -18,7 +18,7 @@ LiveWorkflow::LiveWorkflow(LiveSettings settings)
     : settings_(std::move(settings)),
       patient_(settings_.transfer, settings_.engine),
       keeper_(settings_.out, settings_.resume) {
-  if (!settings_.patient.ct.empty()) load(settings_.patient);
+  if (!settings_.patient.ct.path.empty()) load(settings_.patient);
 }
 
 void LiveWorkflow::tick() {

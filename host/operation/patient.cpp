@@ -1,7 +1,6 @@
 #include "host/operation/patient.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -17,29 +16,42 @@ namespace birdseye::host {
 
 namespace {
 
+/// The values of labels, or why not, naming the file.
+Result<std::vector<int>> values_in(const LabelVolume& labels, const PatientFiles& files,
+                                   const std::vector<LabelChoice>& wanted) {
+  return values_of_labels(labels.names, wanted).with_context(files.labels.string());
+}
+
 Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std::stop_token& stop) {
-  const auto labels = import_labels(files.labels, plan.ct, stop);
+  const auto labels = import_named_labels(files.labels, plan.ct, stop);
   if (!labels) return labels.error();
+  const Volume& volume = labels->volume;
   if (!files.shown.empty()) {
-    auto kept = keep_labels(plan.ct, *labels, files.shown);
+    const auto shown = values_in(*labels, files, files.shown);
+    if (!shown) return shown.error();
+    auto kept = keep_labels(plan.ct, volume, *shown);
     if (!kept) return kept.error();
     plan.shown = *std::move(kept);
   }
-  for (const int target : files.targets) {
-    const auto centre = label_centroid_mm(*labels, target);
+  for (const LabelChoice& target : files.targets) {
+    const auto values = values_in(*labels, files, {target});
+    if (!values) return values.error();
+    const auto centre = label_centroid_mm(volume, *values);
     if (!centre) return centre.error();
-    plan.landmarks.push_back({fmt::format("middle of label {}", target), *centre});
+    plan.landmarks.push_back({fmt::format("middle of label {}", target.text), *centre});
   }
-  const auto of_organ = [&files](std::int16_t label) {
-    return std::find(files.organ.begin(), files.organ.end(), label) != files.organ.end();
+  auto organ = values_in(*labels, files, files.organ);
+  if (!organ) return organ.error();
+  const auto of_organ = [&organ](std::int16_t label) {
+    return std::find(organ->begin(), organ->end(), label) != organ->end();
   };
-  if (std::none_of(labels->hu.begin(), labels->hu.end(), of_organ)) {
+  if (std::none_of(volume.hu.begin(), volume.hu.end(), of_organ)) {
     return Error{Errc::not_found,
                  fmt::format("{}: --organ {}: the file holds none of these labels; give those of the organ",
-                             files.labels.string(), fmt::join(files.organ, ","))};
+                             files.labels.string(), joined(files.organ, ","))};
   }
-  plan.labels = *labels;
-  plan.organ = files.organ;
+  plan.labels = volume;
+  plan.organ = *std::move(organ);
   return {};
 }
 

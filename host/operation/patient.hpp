@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/volume/label_names.hpp"
 #include "host/volume/volume.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
@@ -19,12 +21,13 @@ struct NamedPoint {
 
 /// Where to read what is known of the patient before the operation.
 struct PatientFiles {
-  std::filesystem::path ct, labels;
-  std::vector<int> shown;           ///< the labels to show; empty: all of the CT
-  std::vector<int> targets;         ///< labels whose middles are landmarks to check by
-  std::vector<int> organ;           ///< labels of the organ that the video shows; without labels: all of the CT
-  std::filesystem::path fiducials;  ///< points of the CT; empty: found in it
-  std::filesystem::path landmarks;  ///< a table name, x, y, z; or empty
+  VolumeSource ct;
+  std::filesystem::path labels;
+  std::vector<LabelChoice> shown;    ///< the labels to show; empty: all of the CT
+  std::vector<LabelChoice> targets;  ///< labels whose middles are landmarks to check by
+  std::vector<LabelChoice> organ;    ///< labels of the organ that the video shows; without labels: all of the CT
+  std::filesystem::path fiducials;   ///< points of the CT; empty: found in it
+  std::filesystem::path landmarks;   ///< a table name, x, y, z; or empty
 };
 
 /// The simulated cart's patient: its liver's vessels and tumour are shown, and the tumour's middle is the landmark.
@@ -35,7 +38,7 @@ struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
   std::optional<Volume> labels;
-  std::vector<int> organ;  ///< labels of what the views show: it is matched with them
+  std::vector<int> organ;  ///< values in labels of what the views show: it is matched with them
   std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given
   std::vector<NamedPoint> landmarks;
 };

@@ -1,7 +1,6 @@
 #include "host/operation/snapshot.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 
@@ -23,14 +22,16 @@ std::string number(double value) {
 std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot& snapshot) {
   std::error_code ignored;
   const auto whole = [&ignored](const fs::path& path) { return fs::absolute(path, ignored).string(); };
-  std::vector<std::string> out{"render", "--volume", whole(snapshot.patient.ct)};
+  std::vector<std::string> out{"render", "--volume", whole(snapshot.patient.ct.path)};
   const auto add = [&out](const char* option, const std::string& value) {
     out.emplace_back(option);
     out.push_back(value);
   };
+  if (!snapshot.patient.ct.series.empty()) add("--series", snapshot.patient.ct.series);
+  if (snapshot.patient.ct.untilt) out.emplace_back("--untilt");
   if (!snapshot.patient.shown.empty()) {
     add("--labels", whole(snapshot.patient.labels));
-    add("--keep", fmt::format("{}", fmt::join(snapshot.patient.shown, ",")));
+    add("--keep", joined(snapshot.patient.shown, ","));
   }
   add("--camera", whole(folder / "camera.yaml"));
   add("--pose", whole(folder / "camera_from_patient.txt"));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
 namespace birdseye::host {
@@ -28,15 +27,18 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
 
 }  // namespace
 
-Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
-                          const std::vector<int>& keep) {
-  auto ct = import_volume(volume);
+Result<ImportedVolume> read_shown(const VolumeSource& volume, const std::filesystem::path& labels,
+                                  const std::vector<LabelChoice>& keep) {
+  auto ct = import_with_notes(volume);
   if (!ct || labels.empty()) return ct;
-  const auto label_of = import_labels(labels, *ct);
+  const auto label_of = import_named_labels(labels, ct->volume);
   if (!label_of) return label_of.error();
-  auto kept = keep_labels(*ct, *label_of, keep);
+  const auto values = values_of_labels(label_of->names, keep, &ct->notes);
+  if (!values) return values.error().with_context(labels.string());
+  auto kept = keep_labels(ct->volume, label_of->volume, *values);
   if (!kept) return kept.error().with_context(labels.string());
-  return kept;
+  ct->volume = *std::move(kept);
+  return ct;
 }
 
 Eigen::Vector3d middle_of(const Volume& volume) {

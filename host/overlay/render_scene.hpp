@@ -16,6 +16,8 @@
 #include "host/overlay/frame_painter.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
+#include "host/volume/import.hpp"
+#include "host/volume/label_names.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
@@ -33,9 +35,9 @@ struct RenderScene {
   std::optional<FrameUndistorter> straighten;  ///< where the camera is a straight one in place of that of the video
 };
 
-/// A CT; with labels, a label volume on its grid, of it what has one of those to keep.
-Result<Volume> read_shown(const std::filesystem::path& volume, const std::filesystem::path& labels,
-                          const std::vector<int>& keep);
+/// A CT; with labels, a segmentation on its grid, of it what has one of those to keep, by name or number.
+Result<ImportedVolume> read_shown(const VolumeSource& volume, const std::filesystem::path& labels,
+                                  const std::vector<LabelChoice>& keep);
 
 /// Without lens and pose: from in front of the patient, head up; of a scan thinner than half its height or width, from
 /// the feet as radiologists look at a slice. The volume fills the picture; what lies before share `clip` of its depth

@@ -16,6 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kMostTexts = 1'000'000;
+
+void send_texts(const Send& send, const std::vector<std::string>& texts) {
+  const std::size_t count = texts.size();
+  send(&count, sizeof count);
+  for (const std::string& text : texts) send_long_text(send, text);
+}
+
 void send_image(const Send& send, const ImageFile& image) {
   send(image.size.data(), sizeof image.size);
   send(image.spacing_mm.data(), 3 * sizeof(double));
@@ -23,9 +31,16 @@ void send_image(const Send& send, const ImageFile& image) {
   send(image.axes.data(), 9 * sizeof(double));
   send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
   send(image.values.data(), image.values.size() * sizeof image.values[0]);
-  const std::size_t notes = image.notes.size();
-  send(&notes, sizeof notes);
-  for (const std::string& note : image.notes) send_long_text(send, note);
+  send_texts(send, image.notes);
+  const std::size_t labels = image.label_names.size();
+  send(&labels, sizeof labels);
+  for (const NamedLabel& label : image.label_names) {
+    send_long_text(send, label.name);
+    send(&label.number, sizeof label.number);
+    const std::size_t values = label.values.size();
+    send(&values, sizeof values);
+    send(label.values.data(), values * sizeof label.values[0]);
+  }
 }
 
 Result<ImageFile> decode(const VolumeSource& source, int components, const Announce& announce, int copies) {
@@ -39,15 +54,33 @@ Result<ImageFile> decode(const VolumeSource& source, int components, const Annou
   return decode_image_file(path, components);
 }
 
-/// Adds to notes.
-bool receive_notes(const Receive& receive, std::vector<std::string>& notes) {
-  constexpr std::size_t kMost = 1'000'000;
+bool receive_texts(const Receive& receive, std::vector<std::string>& texts) {
   std::size_t count = 0;
-  if (!receive(&count, sizeof count) || count > kMost) return false;
+  if (!receive(&count, sizeof count) || count > kMostTexts) return false;
   for (std::size_t i = 0; i < count; ++i) {
-    auto note = receive_long_text(receive);
-    if (!note) return false;
-    notes.push_back(*std::move(note));
+    auto text = receive_long_text(receive);
+    if (!text) return false;
+    texts.push_back(*std::move(text));
+  }
+  return true;
+}
+
+bool receive_label_names(const Receive& receive, std::vector<NamedLabel>& names) {
+  std::size_t count = 0;
+  if (!receive(&count, sizeof count) || count > kMostTexts) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    NamedLabel label;
+    std::size_t values = 0;
+    auto name = receive_long_text(receive);
+    if (!name || !receive(&label.number, sizeof label.number) || !receive(&values, sizeof values) ||
+        values > kMostTexts) {
+      return false;
+    }
+    auto received = receive_values<int>(receive, values);
+    if (!received) return false;
+    label.name = *std::move(name);
+    label.values = *std::move(received);
+    names.push_back(std::move(label));
   }
   return true;
 }
@@ -74,7 +107,7 @@ std::optional<ImageFile> receive_image(const Receive& receive, int components) {
     if (!values) return std::nullopt;
     image.values = *std::move(values);
   }
-  if (!receive_notes(receive, image.notes)) return std::nullopt;
+  if (!receive_texts(receive, image.notes) || !receive_label_names(receive, image.label_names)) return std::nullopt;
   return image;
 }
 
@@ -97,16 +130,14 @@ Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
   return {};
 }
 
-}  // namespace
-
-Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop) {
-  if (auto there = check_can_be_opened(source.path); !there) return there.error();
-  const int copies = tbb::info::default_concurrency();
+/// What decode gives, from a process of its own.
+Result<ImageFile> read_apart(const fs::path& path, int components, const std::stop_token& stop,
+                             const std::function<Result<ImageFile>(const Announce&)>& decode_file) {
+  if (auto there = check_can_be_opened(path); !there) return there.error();
   const auto work = [&](const Announce& announce) -> Result<SendDecoded> {
-    auto image = decode(source, components, announce, copies);
+    auto image = decode_file(announce);
     if (!image) return image.error();
-    if (image->components != components)
-      return refused(Errc::unsupported, source.path, "is a CT; give a displacement field");
+    if (image->components != components) return refused(Errc::unsupported, path, "is a CT; give a displacement field");
     return SendDecoded(
         [sent = std::make_shared<ImageFile>(*std::move(image))](const Send& send) { send_image(send, *sent); });
   };
@@ -115,9 +146,22 @@ Result<ImageFile> read_image(const VolumeSource& source, int components, const s
     image = receive_image(receive, components);
     return image.has_value();
   };
-  if (auto ran = run_decoder(source.path, work, take, stop); !ran) return ran.error();
-  if (auto sound = check_geometry(source.path, *image); !sound) return sound.error();
+  if (auto ran = run_decoder(path, work, take, stop); !ran) return ran.error();
+  if (auto sound = check_geometry(path, *image); !sound) return sound.error();
   return *std::move(image);
+}
+
+}  // namespace
+
+Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop) {
+  const int copies = tbb::info::default_concurrency();
+  return read_apart(source.path, components, stop,
+                    [&](const Announce& announce) { return decode(source, components, announce, copies); });
+}
+
+Result<ImageFile> read_labels_file(const fs::path& path, const std::stop_token& stop) {
+  const int copies = tbb::info::default_concurrency();
+  return read_apart(path, 1, stop, [&](const Announce& announce) { return decode_labels(path, announce, copies); });
 }
 
 }  // namespace birdseye::host

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/dicom_labels.hpp"
 #include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
@@ -21,6 +22,7 @@ struct ImageFile {
   std::vector<float> values;              ///< with more values a voxel: those of a voxel side by side
   Eigen::Vector3d spacing_mm, origin_mm;  ///< origin: the centre of the first voxel
   Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
+  std::vector<NamedLabel> label_names;    ///< of a segmentation
   std::vector<std::string> notes;         ///< what was passed over, and what resampling cost, a line each
 };
 
@@ -31,6 +33,10 @@ struct ImageFile {
 /// that are not finite or beyond 16 bits. Once stop is requested, the decoders are ended before the next of their
 /// files, and nothing is read.
 Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop = {});
+
+/// Reads a segmentation as read_image reads a CT, with the names of its labels: a DICOM segmentation, or a folder that
+/// holds one, on the least grid that holds its frames; or what read_image reads.
+Result<ImageFile> read_labels_file(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 enum class StoredAs { uint8, int16, float32 };
 /// Writes, compressed, what read_image reads back: .nii.gz, .nrrd or .mha.

@@ -3,14 +3,27 @@
 #include <filesystem>
 #include <span>
 #include <stop_token>
+#include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/dicom_labels.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
-/// Reads a label volume of any format that import_volume reads, and stops as it does. An error where it is not on the
-/// same grid as ct.
+/// A segmentation on the grid of a CT.
+struct LabelVolume {
+  Volume volume;                  ///< a value a voxel, 0 where nothing is
+  std::vector<NamedLabel> names;  ///< of its labels; without names where its file gives none
+};
+
+/// Reads a DICOM segmentation (the file, or a folder that holds one), or a label volume of any format that
+/// import_volume reads, and stops as it does. Its voxels must be the CT's, though it may have fewer of them, and its
+/// axes another order or direction; an error where they are not, or where it lies outside of the CT.
+Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const Volume& ct,
+                                        const std::stop_token& stop = {});
+/// Without the names.
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct, const std::stop_token& stop = {});
 
 /// The CT at voxels whose label is one of values and at their 26 neighbours, -1024 HU elsewhere: the neighbours keep
@@ -18,7 +31,8 @@ Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct
 /// differs from ct's. Errc::not_found where no voxel has one of values.
 Result<Volume> keep_labels(const Volume& ct, const Volume& labels, std::span<const int> values);
 
-/// The mean position of the voxels with this label, patient LPS mm; Errc::not_found where there are none.
+/// The mean position of the voxels with one of these labels, patient LPS mm; Errc::not_found where there are none.
+Result<Eigen::Vector3d> label_centroid_mm(const Volume& labels, std::span<const int> values);
 Result<Eigen::Vector3d> label_centroid_mm(const Volume& labels, int value);
 
 }  // namespace birdseye::host

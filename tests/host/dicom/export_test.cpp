@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <random>
 
 #include "host/dicom/phase_words.hpp"
 #include "host/volume/import.hpp"
@@ -199,6 +200,18 @@ TEST(DicomPhases, TwoWithTwoKernelsEachAreFourVolumes) {
   for (int i = 0; i < 4; ++i) expect_ct(one_of(scratch / "ct", fmt::format("1.{}", i + 1)), 4, 1000 * i);
 }
 
+TEST(DicomPhases, ABolusThatIsWatchedIsNoVolumeAndPassedOver) {
+  const Scratch scratch;
+  write_ct_series(scratch / "ct", {}, 4);
+  CtSlice watched{"2.25.8", 8, 1, 500, {0, 0, 4}, "Monitoring"};
+  for (; watched.instance <= 10; ++watched.instance) {
+    write_ct_slice(scratch / fmt::format("m/{}.dcm", watched.instance), watched,
+                   [&](DcmDataset& dataset) { put(dataset, DCM_AcquisitionNumber, std::to_string(watched.instance)); });
+  }
+  expect_ct(scratch.path(), 4, 0);
+  expect_error(one_of(scratch.path(), "8"), "same place");
+}
+
 TEST(DicomPhases, OneSliceTwiceStaysAnError) {
   const Scratch scratch;
   CtSlice slice;
@@ -294,6 +307,51 @@ TEST(DicomHostile, ClaimsOfSizeAreRefused) {
   expect_error(scratch / "some", "several frames without their places");
   write_ct_series(scratch / "bits", {}, 2, [](DcmDataset& d) { put(d, DCM_BitsStored, 99), put(d, DCM_HighBit, 200); });
   expect_error(scratch / "bits", "cannot be decoded");
+}
+
+/// A file with these bytes after its meta header, as explicit little-endian elements.
+void write_elements(const fs::path& path, const std::string& elements) {
+  write_ct_slice(path, {});
+  std::string bytes = testing::contents_of(path);
+  const std::size_t first = bytes.find(std::string("\x08\0\x08\0", 4), 132);  // Image Type, the first of write_ct_slice
+  ASSERT_NE(first, std::string::npos);
+  std::ofstream(path, std::ios::binary) << bytes.substr(0, first) << elements;
+}
+
+TEST(DicomHostile, WhatIsNestedWithoutEndOrClaimsMoreThanThereIsIsNamed) {
+  const Scratch scratch;
+  // A private sequence in an item of a private sequence, and so on; none of them ends.
+  const std::string sequence("\x09\0\x10\x10SQ\0\0\xFF\xFF\xFF\xFF\xFE\xFF\0\xE0\xFF\xFF\xFF\xFF", 20);
+  std::string nested;
+  for (int i = 0; i < 300'000; ++i) nested += sequence;
+  write_elements(scratch / "nested/1.dcm", nested);
+  expect_error(scratch / "nested", "1.dcm");
+  write_elements(scratch / "long/1.dcm", std::string("\xE0\x7F\x10\0OW\0\0\xF0\xFF\xFF\xFF", 12) + "four");
+  expect_error(scratch / "long", "1.dcm");
+  write_elements(scratch / "odd/1.dcm", std::string("\x08\0\x60\0CS\xFF\xFF", 8) + "CT");
+  expect_error(scratch / "odd", "1.dcm");
+  std::string noise = "DICM";
+  std::mt19937 random(3);
+  for (int i = 0; i < 5000; ++i) noise += static_cast<char>(random());
+  fs::create_directory(scratch / "noise");
+  std::ofstream(scratch / "noise/1.dcm", std::ios::binary) << std::string(128, '\0') << noise;
+  expect_error(scratch / "noise", "1.dcm");
+}
+
+TEST(DicomHostile, ChangedBytesAreAnErrorOrAVolumeAndNothingHangs) {
+  const Scratch scratch;
+  write_ct_series(scratch / "ct", {}, 3, {}, EXS_RLELossless);
+  const std::string whole = testing::contents_of(scratch / "ct/2.dcm");
+  std::mt19937 random(11);
+  for (int i = 0; i < 60; ++i) {
+    std::string bytes = whole;
+    for (int k = 0; k < 4; ++k) bytes[132 + random() % (bytes.size() - 132)] = static_cast<char>(random());
+    std::ofstream(scratch / "ct/2.dcm", std::ios::binary) << bytes;
+    const auto ct = import_volume(scratch / "ct");
+    if (!ct) {
+      EXPECT_EQ(ct.error().what.find('\n'), std::string::npos) << ct.error().what;
+    }
+  }
 }
 
 TEST(DicomHostile, LinksInACircleEnd) {

@@ -1,0 +1,268 @@
+#include "host/dicom/dicom_labels.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "host/dicom/dicom_dataset.hpp"
+#include "host/dicom/refused.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kHighestValue = std::numeric_limits<std::int16_t>::max();
+constexpr std::size_t kMostLabelVoxels = std::size_t{1} << 31U;
+
+/// Where a frame lies, and which segment it shows; 0: its pixels say.
+struct LabelFrame {
+  Eigen::Vector3d place_mm;
+  int segment = 0;
+};
+
+/// How the pixels of all frames are to be taken.
+struct LabelPixels {
+  int columns = 0, rows = 0;
+  int bits = 8;      ///< of a pixel: 1, 8 or 16
+  int at_least = 1;  ///< for the pixel to belong to the frame's segment
+  std::vector<std::uint8_t> bytes;
+
+  [[nodiscard]] std::size_t per_frame() const {
+    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  }
+  /// The i-th pixel of all. Bits lie packed without gaps between frames, from the lowest of a byte.
+  [[nodiscard]] int at(std::size_t i) const {
+    if (bits == 1) return bytes[i / 8] >> (i % 8) & 1;
+    if (bits == 8) return bytes[i];
+    return bytes[2 * i] | bytes[2 * i + 1] << 8;
+  }
+};
+
+/// Gives voxels that belong to several segments values of their own.
+class SharedValues {
+ public:
+  explicit SharedValues(int highest_number) : next_(highest_number + 1) {}
+
+  /// The value of a voxel that had `had` and is of a further segment; empty where there are too many.
+  std::optional<int> with(int had, int segment) {
+    if (had == 0) return segment;
+    const auto known = values_.find({had, segment});
+    if (known != values_.end()) return known->second;
+    std::vector<int> both = segments_of(had);
+    if (std::binary_search(both.begin(), both.end(), segment)) return values_[{had, segment}] = had;
+    both.insert(std::upper_bound(both.begin(), both.end(), segment), segment);
+    for (const auto& [value, segments] : shared_) {
+      if (segments == both) return values_[{had, segment}] = value;
+    }
+    if (next_ > kHighestValue) return std::nullopt;
+    shared_[next_] = both;
+    return values_[{had, segment}] = next_++;
+  }
+
+  /// The values of voxels of this segment beside its number.
+  [[nodiscard]] std::vector<int> shared_by(int segment) const {
+    std::vector<int> values;
+    for (const auto& [value, segments] : shared_) {
+      if (std::binary_search(segments.begin(), segments.end(), segment)) values.push_back(value);
+    }
+    return values;
+  }
+
+ private:
+  [[nodiscard]] std::vector<int> segments_of(int value) const {
+    const auto shared = shared_.find(value);
+    return shared == shared_.end() ? std::vector<int>{value} : shared->second;
+  }
+
+  int next_;
+  std::map<std::pair<int, int>, int> values_;
+  std::map<int, std::vector<int>> shared_;
+};
+
+std::vector<NamedLabel> read_names(DcmDataset& dataset) {
+  std::vector<NamedLabel> names;
+  for (DcmItem* segment : items_of(dataset, DCM_SegmentSequence)) {
+    NamedLabel label;
+    label.number = integer_of(*segment, DCM_SegmentNumber).value_or(0);
+    label.name = words_of(dataset, text_of(*segment, DCM_SegmentLabel));
+    if (DcmItem* const type = item_of(*segment, DCM_SegmentedPropertyTypeCodeSequence);
+        label.name.empty() && type != nullptr) {
+      label.name = words_of(dataset, text_of(*type, DCM_CodeMeaning));
+    }
+    names.push_back(std::move(label));
+  }
+  return names;
+}
+
+/// The pixels of all frames as they are stored; empty, or why not.
+std::string read_pixels(DcmDataset& dataset, int frames, LabelPixels& pixels) {
+  pixels.columns = integer_of(dataset, DCM_Columns).value_or(0);
+  pixels.rows = integer_of(dataset, DCM_Rows).value_or(0);
+  pixels.bits = integer_of(dataset, DCM_BitsAllocated).value_or(0);
+  if (pixels.columns < 1 || pixels.rows < 1 || pixels.columns > kMostPixels || pixels.rows > kMostPixels ||
+      (pixels.bits != 1 && pixels.bits != 8 && pixels.bits != 16)) {
+    return "says it has a size that no segmentation has; export it again";
+  }
+  if (dataset.chooseRepresentation(EXS_LittleEndianExplicit, nullptr).bad())
+    return "is compressed in a way that is not read; export it again, uncompressed";
+  const std::size_t bits =
+      pixels.per_frame() * static_cast<std::size_t>(frames) * static_cast<std::size_t>(pixels.bits);
+  const std::size_t due = (bits + 7) / 8;
+  DcmElement* element = nullptr;
+  if (dataset.findAndGetElement(DCM_PixelData, element).bad() || element == nullptr || element->getLength() < due)
+    return "is cut short; copy it again";
+  Uint8* bytes = nullptr;
+  Uint16* words = nullptr;
+  if (element->getUint8Array(bytes).good() && bytes != nullptr) {
+    pixels.bytes.assign(bytes, bytes + due);
+  } else if (element->getUint16Array(words).good() && words != nullptr) {
+    const auto* const first = reinterpret_cast<const std::uint8_t*>(words);
+    pixels.bytes.assign(first, first + due);
+  } else {
+    return "holds no pixels that can be read; export it again";
+  }
+  return {};
+}
+
+/// Places, segments, spacing and axes; empty, or what is wrong.
+std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, std::vector<LabelFrame>& frames) {
+  DcmItem* const shared = item_of(dataset, DCM_SharedFunctionalGroupsSequence);
+  std::vector<double> axes, spacing, thickness;
+  for (DcmItem* own : items_of(dataset, DCM_PerFrameFunctionalGroupsSequence)) {
+    const FrameElements elements(dataset, own, shared);
+    const auto place = elements.numbers(DCM_ImagePositionPatient);
+    if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
+    const auto number = elements.numbers(DCM_ReferencedSegmentNumber);
+    if (!by_pixels && (number.size() != 1 || number[0] < 1 || number[0] > kHighestValue))
+      return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
+    if (frames.empty()) {
+      axes = elements.numbers(DCM_ImageOrientationPatient);
+      spacing = elements.numbers(DCM_PixelSpacing);
+      thickness = elements.numbers(DCM_SpacingBetweenSlices);
+      if (thickness.empty()) thickness = elements.numbers(DCM_SliceThickness);
+    } else if (elements.numbers(DCM_ImageOrientationPatient) != axes) {
+      return "has frames that are turned against one another; export it on the grid of the CT";
+    }
+    frames.push_back({{place[0], place[1], place[2]}, by_pixels ? 0 : static_cast<int>(number[0])});
+  }
+  if (frames.empty()) return "has no frames with a place; export it again";
+  if (axes.size() != 6 || spacing.size() != 2 || !(spacing[0] > 0) || !(spacing[1] > 0))
+    return "has no sound orientation and spacing; export it again";
+  const Eigen::Vector3d row(axes[0], axes[1], axes[2]), column(axes[3], axes[4], axes[5]);
+  if (std::abs(row.norm() - 1) > 0.01 || std::abs(column.norm() - 1) > 0.01 || std::abs(row.dot(column)) > 0.01)
+    return "has no sound orientation and spacing; export it again";
+  out.axes << row.normalized(), (column - column.dot(row) * row).normalized(), row.cross(column).normalized();
+  out.spacing_mm = {spacing[1], spacing[0], !thickness.empty() && thickness[0] > 0 ? thickness[0] : 0};
+  return {};
+}
+
+/// The least distance between frames that do not lie at the same place, mm; 0 where all do.
+double least_step_mm(const std::vector<double>& along) {
+  std::vector<double> sorted = along;
+  std::sort(sorted.begin(), sorted.end());
+  double least = 0;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    const double step = sorted[i] - sorted[i - 1];
+    if (step > 0.01 && (least == 0 || step < least)) least = step;
+  }
+  return least;
+}
+
+/// The slice of each frame, from 0, in a stack from the first place to the last; empty, or what is wrong.
+std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out, std::vector<int>& slice_of) {
+  const Eigen::Vector3d normal = out.axes.col(2);
+  std::vector<double> along;
+  for (const LabelFrame& frame : frames) along.push_back(frame.place_mm.dot(normal));
+  const auto [low, high] = std::minmax_element(along.begin(), along.end());
+  const double least = least_step_mm(along);
+  // What files say of the step is the thickness at times, which may be more, or less.
+  const double said = out.spacing_mm.z();
+  const auto fits = [&along, low = *low](double step) {
+    return step > 0 && std::all_of(along.begin(), along.end(), [&](double at) {
+             const double slices = (at - low) / step;
+             return std::abs(slices - std::round(slices)) < 0.2;
+           });
+  };
+  const double step = fits(said) ? said : fits(least) ? least : 0;
+  if (step == 0 && *high - *low > 0.01) return "has frames at uneven distances; export it on the grid of the CT";
+  out.spacing_mm.z() = step > 0 ? step : 1;
+  const Eigen::Vector3d first = frames[static_cast<std::size_t>(low - along.begin())].place_mm;
+  int last = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double slices = (along[i] - *low) / out.spacing_mm.z();
+    if (slices > 65000) return "reaches further than any CT; export it again";
+    slice_of.push_back(static_cast<int>(std::lround(slices)));
+    last = std::max(last, slice_of.back());
+    const Eigen::Vector3d aside = frames[i].place_mm - first - (along[i] - *low) * normal;
+    if (aside.norm() > 0.2 * out.spacing_mm.head<2>().minCoeff())
+      return "has frames that lie beside one another; export it on the grid of the CT";
+  }
+  out.origin_mm = first;
+  out.size[2] = last + 1;
+  return {};
+}
+
+/// Into out.labels, out.size being known; empty, or what is wrong.
+std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<int>& slice_of,
+                       const LabelPixels& pixels, DicomLabels& out) {
+  int highest = 0;
+  for (const NamedLabel& label : out.names) highest = std::max(highest, label.number);
+  for (const LabelFrame& frame : frames) highest = std::max(highest, frame.segment);
+  if (highest > kHighestValue) return "numbers its segments too high; export it again";
+  SharedValues values(highest);
+  const std::size_t plane = pixels.per_frame();
+  out.labels.assign(plane * static_cast<std::size_t>(out.size[2]), 0);
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    std::int16_t* const slice = out.labels.data() + static_cast<std::size_t>(slice_of[f]) * plane;
+    for (std::size_t i = 0; i < plane; ++i) {
+      const int pixel = pixels.at(f * plane + i);
+      if (pixel < pixels.at_least) continue;
+      const auto value = values.with(slice[i], frames[f].segment == 0 ? pixel : frames[f].segment);
+      if (!value || *value > kHighestValue) return "has too many segments that share voxels; export fewer of them";
+      slice[i] = static_cast<std::int16_t>(*value);
+    }
+  }
+  for (NamedLabel& label : out.names) {
+    label.values = values.shared_by(label.number);
+    label.values.insert(label.values.begin(), label.number);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<DicomLabels> read_dicom_labels(const fs::path& path) {
+  const auto loaded = load_dicom(path);
+  if (!loaded) return loaded.error();
+  DcmDataset& dataset = *(*loaded)->getDataset();
+  const std::string type = text_of(dataset, DCM_SegmentationType);
+  if (type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP") {
+    return refused(Errc::unsupported, path,
+                   fmt::format("is a segmentation of type '{}'; export it as a binary one", words_of(dataset, type)));
+  }
+  DicomLabels out;
+  out.names = read_names(dataset);
+  std::vector<LabelFrame> frames;
+  std::vector<int> slice_of;
+  LabelPixels pixels;
+  std::string wrong = read_frames(dataset, type == "LABELMAP", out, frames);
+  if (wrong.empty()) wrong = stack_frames(frames, out, slice_of);
+  if (wrong.empty()) wrong = read_pixels(dataset, static_cast<int>(frames.size()), pixels);
+  if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);
+  out.size = {pixels.columns, pixels.rows, out.size[2]};
+  if (pixels.per_frame() * static_cast<std::size_t>(out.size[2]) > kMostLabelVoxels)
+    return refused(Errc::unsupported, path, "has more voxels than any CT; export it on the grid of the CT");
+  if (type == "FRACTIONAL")
+    pixels.at_least = std::max(1, (integer_of(dataset, DCM_MaximumFractionalValue).value_or(255) + 1) / 2);
+  wrong = lay_frames(frames, slice_of, pixels, out);
+  if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);
+  return out;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include "host/dicom/dicom_labels.hpp"
+#include "host/volume/decode.hpp"
+#include "host/volume/nifti_label_names.hpp"
+#include "host/volume/series_list.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<ImageFile> image_of_labels(const fs::path& path) {
+  auto labels = read_dicom_labels(path);
+  if (!labels) return labels.error();
+  ImageFile image;
+  image.size = labels->size;
+  image.spacing_mm = labels->spacing_mm;
+  image.origin_mm = labels->origin_mm;
+  image.axes = labels->axes;
+  image.hu = std::move(labels->labels);
+  image.label_names = std::move(labels->names);
+  return image;
+}
+
+}  // namespace
+
+Result<ImageFile> decode_labels(const fs::path& path, const Announce& announce, int copies) {
+  announce(path);
+  if (!holds_dicom(path)) {
+    auto image = decode_image_file(path, 1);
+    if (image) image->label_names = nifti_label_names(path);
+    return image;
+  }
+  const auto scan = scan_dicom(path, announce);
+  if (!scan) return scan.error();
+  const DicomFile* found = nullptr;
+  for (const DicomFile& file : scan->tree.files) {
+    if (file.kind != DicomFile::Kind::labels) continue;
+    if (found != nullptr) {
+      return refused(Errc::unsupported, path,
+                     fmt::format("holds several segmentations ({}, {}); give the file of one",
+                                 found->path.filename().string(), file.path.filename().string()));
+    }
+    found = &file;
+  }
+  if (found == nullptr) return decode_dicom(path, announce, copies);
+  announce(found->path);
+  return image_of_labels(found->path);
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/dicom/dicom_labels.hpp"
+
+namespace birdseye::host {
+
+/// A label as somebody asks for it: its number or its name.
+struct LabelChoice {
+  std::string text;
+
+  LabelChoice(int number) : text(std::to_string(number)) {}   // NOLINT(google-explicit-constructor)
+  LabelChoice(std::string named) : text(std::move(named)) {}  // NOLINT(google-explicit-constructor)
+  LabelChoice(const char* named) : text(named) {}             // NOLINT(google-explicit-constructor)
+  LabelChoice() = default;
+};
+
+/// "1, liver".
+std::string joined(std::span<const LabelChoice> labels, std::string_view between = ", ");
+
+/// The values of the voxels that belong to one of these. Of names, capitals count as small
+/// letters, blanks and hyphens as underscores. Where a segmentation names none of its labels, names are those of
+/// TotalSegmentator 2 (totalsegmentator_names). Errc::not_found names the first that is none, and some that are.
+/// notes: gets a line where names were taken to be TotalSegmentator's.
+Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, std::span<const LabelChoice> wanted,
+                                          std::vector<std::string>* notes = nullptr);
+
+}  // namespace birdseye::host

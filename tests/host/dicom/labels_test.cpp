@@ -1,0 +1,319 @@
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+#include <set>
+
+#include "host/volume/import.hpp"
+#include "host/volume/label_names.hpp"
+#include "host/volume/labels.hpp"
+#include "tests/support/dicom_files.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::add_item;
+using testing::put;
+using testing::Scratch;
+
+/// A frame of a segmentation of 5 x 3 pixels: 15 bits, so that frames do not begin at whole bytes.
+struct SegFrame {
+  int segment = 1;
+  Eigen::Vector3d place_mm{0, 0, 0};
+  std::vector<int> pixels;  ///< along rows
+};
+
+constexpr int kColumns = 5, kRows = 3;
+
+struct Segmentation {
+  std::string type = "BINARY";
+  std::vector<std::string> names{"Liver", "Portal vein"};
+  std::vector<SegFrame> frames;
+  std::string axes = "1\\0\\0\\0\\1\\0";
+};
+
+void put_seg_pixels(DcmDataset& dataset, const Segmentation& seg) {
+  const bool bits = seg.type == "BINARY";
+  put(dataset, DCM_SamplesPerPixel, 1);
+  put(dataset, DCM_PhotometricInterpretation, "MONOCHROME2");
+  put(dataset, DCM_Rows, kRows);
+  put(dataset, DCM_Columns, kColumns);
+  put(dataset, DCM_BitsAllocated, bits ? 1 : 8);
+  put(dataset, DCM_BitsStored, bits ? 1 : 8);
+  put(dataset, DCM_HighBit, bits ? 0 : 7);
+  put(dataset, DCM_PixelRepresentation, 0);
+  std::vector<Uint8> bytes;
+  std::size_t at = 0;
+  for (const SegFrame& frame : seg.frames) {
+    for (const int pixel : frame.pixels) {
+      if (!bits) {
+        bytes.push_back(static_cast<Uint8>(pixel));
+        continue;
+      }
+      if (at % 8 == 0) bytes.push_back(0);
+      if (pixel != 0) bytes.back() = static_cast<Uint8>(bytes.back() | 1U << at % 8);
+      ++at;
+    }
+  }
+  if (bytes.size() % 2 != 0) bytes.push_back(0);
+  EXPECT_TRUE(dataset.putAndInsertUint8Array(DCM_PixelData, bytes.data(), bytes.size()).good());
+}
+
+void write_segmentation(const fs::path& path, const Segmentation& seg, const testing::Elements& more = {},
+                        E_TransferSyntax syntax = EXS_LittleEndianExplicit) {
+  DcmFileFormat file;
+  DcmDataset& dataset = *file.getDataset();
+  testing::put_object(dataset, UID_SegmentationStorage, "2.25.60", 60, 1, "SEG");
+  put(dataset, DCM_SegmentationType, seg.type);
+  if (seg.type == "FRACTIONAL") put(dataset, DCM_MaximumFractionalValue, 200);
+  put(dataset, DCM_NumberOfFrames, std::to_string(seg.frames.size()));
+  for (std::size_t i = 0; i < seg.names.size(); ++i) {
+    DcmItem& segment = add_item(dataset, DCM_SegmentSequence);
+    put(segment, DCM_SegmentNumber, static_cast<int>(i) + 1);
+    put(segment, DCM_SegmentLabel, seg.names[i]);
+  }
+  DcmItem& shared = add_item(dataset, DCM_SharedFunctionalGroupsSequence);
+  DcmItem& measures = add_item(shared, DCM_PixelMeasuresSequence);
+  put(measures, DCM_PixelSpacing, "0.75\\0.5");
+  put(measures, DCM_SliceThickness, "2");
+  put(measures, DCM_SpacingBetweenSlices, "2");
+  put(add_item(shared, DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient, seg.axes);
+  for (const SegFrame& frame : seg.frames) {
+    DcmItem& own = add_item(dataset, DCM_PerFrameFunctionalGroupsSequence);
+    put(add_item(own, DCM_PlanePositionSequence), DCM_ImagePositionPatient, testing::numbers(frame.place_mm));
+    if (frame.segment > 0)
+      put(add_item(own, DCM_SegmentIdentificationSequence), DCM_ReferencedSegmentNumber, frame.segment);
+  }
+  put_seg_pixels(dataset, seg);
+  if (more) more(dataset);
+  testing::save_dicom(file, path, syntax);
+}
+
+/// A CT of 9 x 7 x 6 voxels of the segmentations' spacing; the first at (-1, -1.5, -4).
+Volume ct_around() {
+  Volume ct;
+  ct.size = {9, 7, 6};
+  ct.spacing_mm = {0.5, 0.75, 2};
+  ct.patient_from_voxel.linear() = ct.spacing_mm.asDiagonal();
+  ct.patient_from_voxel.translation() = Eigen::Vector3d(-1, -1.5, -4);
+  ct.hu.assign(grid_count(ct.size), 40);
+  return ct;
+}
+
+using Places = std::set<std::array<int, 3>>;
+
+/// The voxels of these labels.
+Places places_of(const LabelVolume& labels, const std::vector<LabelChoice>& wanted) {
+  const auto values = values_of_labels(labels.names, wanted);
+  EXPECT_TRUE(values) << values.error().what;
+  Places places;
+  if (!values) return places;
+  for (int k = 0; k < labels.volume.size[2]; ++k) {
+    for (int j = 0; j < labels.volume.size[1]; ++j) {
+      for (int i = 0; i < labels.volume.size[0]; ++i) {
+        if (std::count(values->begin(), values->end(), labels.volume.at(i, j, k)) > 0) places.insert({i, j, k});
+      }
+    }
+  }
+  return places;
+}
+
+/// Random frames of two segments that overlap, in random order with some left out; and where the voxels of each lie in
+/// ct_around, of which the segmentation's first is (2, 2, 2).
+Segmentation random_frames(unsigned seed, std::array<Places, 2>& truth) {
+  std::mt19937 random(seed);
+  Segmentation seg;
+  for (int k = 0; k < 3; ++k) {
+    for (int segment = 1; segment <= 2; ++segment) {
+      if (k == 1 && segment == 2) continue;  // an empty frame is left out
+      SegFrame frame{segment, {0, 0, 2.0 * k}, {}};
+      for (int j = 0; j < kRows; ++j) {
+        for (int i = 0; i < kColumns; ++i) {
+          frame.pixels.push_back(static_cast<int>(random() % 2));
+          if (frame.pixels.back() != 0) truth[static_cast<std::size_t>(segment - 1)].insert({i + 2, j + 2, k + 2});
+        }
+      }
+      seg.frames.push_back(frame);
+    }
+  }
+  std::shuffle(seg.frames.begin(), seg.frames.end(), random);
+  return seg;
+}
+
+TEST(DicomSeg, FramesLieWhereTheirPlacesSayAndSegmentsMayOverlap) {
+  const Scratch scratch;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    std::array<Places, 2> truth;
+    const Segmentation seg = random_frames(seed, truth);
+    for (const E_TransferSyntax syntax :
+         {EXS_LittleEndianExplicit, EXS_LittleEndianImplicit, EXS_DeflatedLittleEndianExplicit}) {
+      write_segmentation(scratch / "seg.dcm", seg, {}, syntax);
+      const auto labels = import_named_labels(scratch / "seg.dcm", ct_around());
+      ASSERT_TRUE(labels) << labels.error().what;
+      EXPECT_EQ(places_of(*labels, {"liver"}), truth[0]);
+      EXPECT_EQ(places_of(*labels, {2}), truth[1]);
+      Places both = truth[0];
+      both.insert(truth[1].begin(), truth[1].end());
+      EXPECT_EQ(places_of(*labels, {"Liver", "portal_vein"}), both);
+    }
+  }
+}
+
+TEST(DicomSeg, FractionsBelongFromHalfOn) {
+  const Scratch scratch;
+  Segmentation seg;
+  seg.type = "FRACTIONAL";  // of at most 200
+  seg.frames = {{1, {0, 0, 0}, {0, 1, 99, 100, 101, 200, 0, 0, 0, 0, 0, 0, 0, 0, 150}}};
+  write_segmentation(scratch / "seg.dcm", seg);
+  const auto labels = import_named_labels(scratch / "seg.dcm", ct_around());
+  ASSERT_TRUE(labels) << labels.error().what;
+  EXPECT_EQ(places_of(*labels, {"liver"}), (Places{{5, 2, 2}, {6, 2, 2}, {2, 3, 2}, {6, 4, 2}}));
+}
+
+TEST(DicomSeg, AxesThatPointTheOtherWayAreTurned) {
+  const Scratch scratch;
+  Segmentation seg;
+  seg.axes = "-1\\0\\0\\0\\-1\\0";  // the first pixel lies at the other corner
+  SegFrame frame{1, {2, 1.5, 2}, std::vector<int>(15, 0)};
+  frame.pixels[0] = 1;
+  frame.pixels[1] = 1;
+  seg.frames = {frame};
+  write_segmentation(scratch / "seg.dcm", seg);
+  const auto labels = import_named_labels(scratch / "seg.dcm", ct_around());
+  ASSERT_TRUE(labels) << labels.error().what;
+  EXPECT_EQ(places_of(*labels, {1}), (Places{{6, 4, 3}, {5, 4, 3}}));
+}
+
+TEST(DicomSeg, IsFoundBesideItsCt) {
+  const Scratch scratch;
+  testing::write_ct_series(scratch / "export/ct", {}, 4);
+  Segmentation seg;
+  seg.frames = {{1, {-0.5, 0, 2}, std::vector<int>(15, 1)}};  // reaches over the CT's edge by one voxel
+  write_segmentation(scratch / "export/seg", seg);
+  const auto ct = import_volume(scratch / "export");
+  ASSERT_TRUE(ct) << ct.error().what;
+  const auto labels = import_named_labels(scratch / "export", *ct);
+  ASSERT_TRUE(labels) << labels.error().what;
+  EXPECT_EQ(places_of(*labels, {"liver"}).size(), 12U);
+  write_segmentation(scratch / "export/other", seg);
+  EXPECT_NE(import_named_labels(scratch / "export", *ct).error().what.find("several segmentations"), std::string::npos);
+}
+
+void expect_no_labels(const fs::path& path, const std::string& why) {
+  const auto labels = import_named_labels(path, ct_around());
+  ASSERT_FALSE(labels) << "read, where it should say: " << why;
+  EXPECT_NE(labels.error().what.find(why), std::string::npos) << labels.error().what;
+  EXPECT_NE(labels.error().what.find(path.string()), std::string::npos) << labels.error().what;
+  EXPECT_EQ(labels.error().what.find('\n'), std::string::npos) << labels.error().what;
+}
+
+TEST(DicomSeg, WhatDoesNotFitIsRefused) {
+  const Scratch scratch;
+  const fs::path path = scratch / "seg.dcm";
+  Segmentation seg;
+  const auto write_at = [&](std::vector<Eigen::Vector3d> places, const testing::Elements& more = {}) {
+    seg.frames.clear();
+    for (const auto& place : places) seg.frames.push_back({1, place, std::vector<int>(15, 1)});
+    write_segmentation(path, seg, more);
+  };
+  write_at({{0.2, 0, 0}});
+  expect_no_labels(path, "not on the grid");
+  write_at({{100, 0, 0}});
+  expect_no_labels(path, "outside of the CT");
+  write_at({{0, 0, 0}, {0, 0, 2}, {0, 0, 4.9}});
+  expect_no_labels(path, "uneven distances");
+  write_at({{0, 0, 0}, {0.5, 0, 2}});
+  expect_no_labels(path, "beside one another");
+  write_at({{0, 0, 0}, {0, 0, 1e9}});
+  expect_no_labels(path, "further than any CT");
+  write_at({{0, 0, 0}}, [](DcmDataset& dataset) { put(dataset, DCM_Rows, 4000), put(dataset, DCM_Columns, 4000); });
+  expect_no_labels(path, "cut short");
+  write_at({{0, 0, 0}}, [](DcmDataset& dataset) { put(dataset, DCM_SegmentationType, "SURFACE"); });
+  expect_no_labels(path, "type 'SURFACE'");
+  write_at({{0, 0, 0}});
+  const auto ct = import_volume(path);
+  ASSERT_FALSE(ct);
+  EXPECT_NE(ct.error().what.find("--labels"), std::string::npos) << ct.error().what;
+}
+
+TEST(LabelNames, AreChosenWhateverTheirCapitalsAndBlanks) {
+  const std::vector<NamedLabel> names{{1, "Liver", {1, 4}}, {2, "Portal Vein", {2, 4}}, {3, "Tumour", {3}}};
+  const std::vector<LabelChoice> wanted{"liver", "portal_vein", 3, 9};
+  EXPECT_EQ(*values_of_labels(names, wanted), (std::vector<int>{1, 4, 2, 4, 3, 9}));
+  const auto none = values_of_labels(names, std::vector<LabelChoice>{"spleen"});
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().what.find("has no label 'spleen'; it has Liver, Portal Vein, Tumour"), std::string::npos);
+}
+
+TEST(LabelNames, AreTotalSegmentatorsWhereTheFileHasNone) {
+  std::vector<std::string> notes;
+  const std::vector<LabelChoice> wanted{"liver", "portal_vein_and_splenic_vein", "spleen", "costal_cartilages"};
+  EXPECT_EQ(*values_of_labels({}, wanted, &notes), (std::vector<int>{5, 64, 1, 117}));
+  ASSERT_EQ(notes.size(), 4U);
+  EXPECT_NE(notes[0].find("'liver' is taken for 5, as TotalSegmentator 2 counts"), std::string::npos) << notes[0];
+  EXPECT_FALSE(values_of_labels({}, std::vector<LabelChoice>{"tumour"}));
+}
+
+/// A NIfTI file of 9 x 7 x 6 labels on the grid of ct_around, all `label` but for a border, with this extension.
+void write_nifti(const fs::path& path, std::uint8_t label, const std::string& extension) {
+  std::array<char, 352> header{};
+  const auto put_at = [&header](std::size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof value); };
+  const std::size_t esize = extension.empty() ? 0 : (extension.size() + 8 + 15) / 16 * 16;
+  put_at(0, std::int32_t{348});
+  for (std::size_t i = 0; i < 4; ++i) put_at(40 + 2 * i, std::array<std::int16_t, 4>{3, 9, 7, 6}[i]);
+  put_at(70, std::int16_t{2});
+  put_at(72, std::int16_t{8});
+  for (std::size_t i = 0; i < 4; ++i) put_at(76 + 4 * i, std::array<float, 4>{1, 0.5F, 0.75F, 2}[i]);
+  put_at(108, static_cast<float>(352 + esize));
+  put_at(254, std::int16_t{1});  // sform: RAS, so x and y are turned
+  for (std::size_t row = 0; row < 3; ++row) {
+    const std::array<std::array<float, 4>, 3> rows{{{-0.5F, 0, 0, 1}, {0, -0.75F, 0, 1.5F}, {0, 0, 2, -4}}};
+    for (std::size_t i = 0; i < 4; ++i) put_at(280 + 16 * row + 4 * i, rows[row][i]);
+  }
+  std::memcpy(header.data() + 344, "n+1", 4);
+  header[348] = extension.empty() ? 0 : 1;
+  std::string bytes(header.data(), header.size());
+  if (esize > 0) {
+    const std::array<std::int32_t, 2> head{static_cast<std::int32_t>(esize), 0};
+    bytes.append(reinterpret_cast<const char*>(head.data()), 8);
+    bytes += extension;
+    bytes.resize(352 + esize, '\0');
+  }
+  for (int i = 0; i < 9 * 7 * 6; ++i) bytes += static_cast<char>(i % 9 == 4 ? label : 0);
+  const gzFile file = gzopen(path.c_str(), "wb");
+  ASSERT_EQ(gzwrite(file, bytes.data(), static_cast<unsigned>(bytes.size())), static_cast<int>(bytes.size()));
+  gzclose(file);
+}
+
+TEST(LabelNames, OfANiftiFileAreItsOwnBeforeAnybodyElses) {
+  const Scratch scratch;
+  write_nifti(scratch / "plain.nii.gz", 5, "");
+  const auto plain = import_named_labels(scratch / "plain.nii.gz", ct_around());
+  ASSERT_TRUE(plain) << plain.error().what;
+  EXPECT_EQ(places_of(*plain, {"liver"}).size(), 42U);
+  write_nifti(scratch / "named.nii.gz", 2,
+              "<?xml version=\"1.0\" encoding=\"UTF-8\"?> <CaretExtension><VolumeInformation Index=\"0\"><LabelTable>\n"
+              "<Label Key=\"1\" Red=\"0.0\" Green=\"1\" Blue=\"0\" Alpha=\"1\"><![CDATA[liver_vessels]]></Label>\n"
+              "<Label Key=\"2\" Red=\"0.0\" Green=\"1\" Blue=\"0\" Alpha=\"1\">liver_tumor</Label>\n"
+              "</LabelTable></VolumeInformation></CaretExtension>");
+  const auto named = import_named_labels(scratch / "named.nii.gz", ct_around());
+  ASSERT_TRUE(named) << named.error().what;
+  EXPECT_EQ(places_of(*named, {"liver_tumor"}).size(), 42U);
+  EXPECT_TRUE(places_of(*named, {"liver_vessels"}).empty());
+  EXPECT_FALSE(values_of_labels(named->names, std::vector<LabelChoice>{"liver"}));
+  // What is no table of names is none, and hurts nobody.
+  for (const char* odd : {"<Label Key=\"", "<Label Key=\"x\">y</Label>", "<Label ><![CDATA[", "</Label><Label "}) {
+    write_nifti(scratch / "odd.nii.gz", 5, odd);
+    const auto labels = import_named_labels(scratch / "odd.nii.gz", ct_around());
+    ASSERT_TRUE(labels) << labels.error().what;
+    EXPECT_TRUE(labels->names.empty()) << odd;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::host
