@@ -44,8 +44,11 @@ std::string line_of(const SeriesInfo& info) {
   if (!info.part.empty()) name += fmt::format("{}{}", name.empty() ? "" : ", ", info.part);
   std::string size = "-", contrast = info.agent;
   if (info.size[2] > 0) {
-    size = fmt::format("{} slice{} of {} x {}, {:.3g} x {:.3g} x {:.3g} mm", info.size[2], info.size[2] == 1 ? "" : "s",
-                       info.size[0], info.size[1], info.spacing_mm.x(), info.spacing_mm.y(), info.spacing_mm.z());
+    size = fmt::format("{} slice{} of {} x {}", info.size[2], info.size[2] == 1 ? "" : "s", info.size[0], info.size[1]);
+  }
+  if (!info.spacing_mm.isZero()) {
+    const Eigen::Vector3d& mm = info.spacing_mm;
+    size += fmt::format(", {:.3g} x {:.3g} x {:.3g} mm", mm.x(), mm.y(), mm.z());
   }
   if (!info.phase.empty()) contrast += fmt::format("{}{}", contrast.empty() ? "" : ", ", info.phase);
   const auto known = [](const std::string& text) { return text.empty() ? std::string("-") : text; };
@@ -73,8 +76,8 @@ nlohmann::json json_of(const SeriesInfo& info) {
   put("problem", info.problem);
   if (info.size[2] > 0) {
     json["size"] = info.size;
-    json["spacing_mm"] = {info.spacing_mm.x(), info.spacing_mm.y(), info.spacing_mm.z()};
   }
+  if (!info.spacing_mm.isZero()) json["spacing_mm"] = {info.spacing_mm.x(), info.spacing_mm.y(), info.spacing_mm.z()};
   return json;
 }
 

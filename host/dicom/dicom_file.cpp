@@ -257,6 +257,9 @@ Result<DicomFile> read_dicom_file(const fs::path& path) {
   if (DcmItem* const agent = item_of(dataset, DCM_ContrastBolusAgentSequence); file.agent.empty() && agent != nullptr)
     file.agent = words_of(dataset, text_of(*agent, DCM_CodeMeaning));
   file.series_number = integer_of(dataset, DCM_SeriesNumber);
+  file.columns = std::max(0, integer_of(dataset, DCM_Columns).value_or(0));
+  file.rows = std::max(0, integer_of(dataset, DCM_Rows).value_or(0));
+  file.frames = file.rows > 0 ? frame_count(dataset) : 0;
   const DcmXfer syntax(dataset.getOriginalXfer());
   file.syntax = syntax.getXferName();
   const std::string syntax_uid = text_of(*(*loaded)->getMetaInfo(), DCM_TransferSyntaxUID);

@@ -61,6 +61,7 @@ struct DicomFile {
   std::string what;  ///< its kind in words: the SOP class
   std::string instance_uid, series_uid, modality, description, date, time, agent, syntax;
   std::optional<int> series_number;
+  int columns = 0, rows = 0, frames = 0;  ///< as it says; 0 where it does not
   bool localizer = false;
   bool of_ct_class = false;  ///< CT Image Storage, one of its enhanced kinds, or not said; no picture of a screen
   bool compressed = false;

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 
@@ -48,6 +49,10 @@ Series without_volume(const Files& files) {
   // Pictures of a screen, as dose reports, are of modality CT too.
   series.info.passed_over =
       first.kind != DicomFile::Kind::slices || first.modality != "CT" || first.localizer || !first.of_ct_class;
+  std::int64_t frames = 0;
+  for (const DicomFile* file : files) frames += file->frames;
+  constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+  series.info.size = {first.columns, first.rows, static_cast<int>(std::min(frames, kMost))};
   const auto bad = std::find_if(files.begin(), files.end(), [](const DicomFile* file) { return !file->fault.empty(); });
   if (bad != files.end()) {
     series.bad = (*bad)->path;

@@ -29,6 +29,14 @@ double tilt_of(const std::vector<DicomSlice>& slices, const Eigen::Vector3d& nor
   return 0;
 }
 
+/// Whether each slice reaches to the next; not where they do not say how thick they are.
+bool touch(const std::vector<DicomSlice>& slices, const std::vector<double>& steps) {
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (steps[i] > 1.02 * std::max(slices[i].thickness_mm, slices[i + 1].thickness_mm) + 0.01) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 SliceStack stack_slices(std::vector<DicomSlice> slices, const SliceName& name) {
@@ -63,6 +71,7 @@ SliceStack stack_slices(std::vector<DicomSlice> slices, const SliceName& name) {
                                       [&](double a, double b) { return std::abs(a - usual) < std::abs(b - usual); });
   if (std::abs(*worst - usual) > 0.02 * usual + 0.01) {
     const auto at = static_cast<std::size_t>(worst - steps.begin());
+    if (touch(s, steps)) stack.usual_step_mm = usual;
     stack.problem = fmt::format(
         "the step from {} to {} is {:.2f} mm where {:.2f} is usual: slices are missing or unevenly spaced; export the "
         "whole series",
@@ -77,7 +86,8 @@ std::string why_no_volume(const SliceStack& stack, bool untilt) {
         "the gantry was tilted by {:.1f} degrees, so the slices do not stack straight; --untilt resamples them",
         stack.tilt_deg);
   }
-  return stack.problem;
+  const bool evened_out = untilt && stack.tilt_deg > 0 && stack.usual_step_mm > 0;
+  return evened_out ? std::string() : stack.problem;
 }
 
 }  // namespace birdseye::host

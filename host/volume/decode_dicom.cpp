@@ -100,12 +100,18 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   image.hu = *std::move(hu);
   image.notes = notes_of(*scan, *chosen);
   if (source.untilt && series.stack.tilt_deg > 0) {
-    const UntiltCost cost = untilt(slices, image);
+    const UntiltCost cost = untilt(series.stack, image);
     image.notes.push_back(fmt::format(
         "untilted by {:.1f} degrees: each slice was shifted in its plane by linear interpolation, which blurs "
         "it along the shift by {:.2f} mm (standard deviation; {:.2f} mm in the worst slice), and what lies "
         "outside of the slices is -1024 HU",
         series.stack.tilt_deg, cost.blur_mm, cost.worst_blur_mm));
+    if (cost.worst_across_mm > 0) {
+      image.notes.push_back(fmt::format(
+          "slices at uneven distances were interpolated to {:.2f} mm, which blurs them along their normal by "
+          "{:.2f} mm (standard deviation; {:.2f} mm in the worst)",
+          image.spacing_mm.z(), cost.across_mm, cost.worst_across_mm));
+    }
   }
   return image;
 }

@@ -61,9 +61,41 @@ void lay(const std::int16_t* slice, int columns, int rows, const Shift& shift, s
   }
 }
 
+/// Two points with weights 1 - s and s, one apart, spread by the root of s (1 - s).
+double spread(double share) {
+  return std::sqrt(share * (1 - share));
+}
+
+/// Interpolates planes at these places, mm from the first, to even ones.
+void even_out(const std::vector<double>& along_mm, double step_mm, ImageFile& image, UntiltCost& cost) {
+  const auto planes = static_cast<std::size_t>(std::floor(along_mm.back() / step_mm + 1e-6)) + 1;
+  const std::size_t plane = static_cast<std::size_t>(image.size[0]) * static_cast<std::size_t>(image.size[1]);
+  std::vector<std::int16_t> hu(plane * planes);
+  std::size_t below = 0;
+  for (std::size_t k = 0; k < planes; ++k) {
+    const double at_mm = step_mm * static_cast<double>(k);
+    while (below + 2 < along_mm.size() && along_mm[below + 1] <= at_mm) ++below;
+    const double apart_mm = along_mm[below + 1] - along_mm[below];
+    const double share = std::clamp((at_mm - along_mm[below]) / apart_mm, 0.0, 1.0);
+    const std::int16_t* low = image.hu.data() + below * plane;
+    for (std::size_t i = 0; i < plane; ++i) {
+      const double value = (1 - share) * low[i] + share * low[i + plane];
+      hu[k * plane + i] = static_cast<std::int16_t>(value + std::copysign(0.5, value));
+    }
+    const double blur_mm = apart_mm * spread(share);
+    cost.across_mm += blur_mm * blur_mm / static_cast<double>(planes);
+    cost.worst_across_mm = std::max(cost.worst_across_mm, blur_mm);
+  }
+  cost.across_mm = std::sqrt(cost.across_mm);
+  image.size[2] = static_cast<int>(planes);
+  image.spacing_mm.z() = step_mm;
+  image.hu = std::move(hu);
+}
+
 }  // namespace
 
-UntiltCost untilt(const std::vector<DicomSlice>& slices, ImageFile& image) {
+UntiltCost untilt(const SliceStack& stack, ImageFile& image) {
+  const std::vector<DicomSlice>& slices = stack.slices;
   const auto shifts = shifts_px(slices, image);
   Eigen::Vector2d most = Eigen::Vector2d::Zero();
   Eigen::Vector2d first = shifts.front();
@@ -78,17 +110,22 @@ UntiltCost untilt(const std::vector<DicomSlice>& slices, ImageFile& image) {
   for (std::size_t k = 0; k < slices.size(); ++k) {
     const Shift shift = parted(shifts[k]);
     lay(image.hu.data() + k * had, columns, rows, shift, hu.data() + k * plane, wide, tall);
-    // Two points with weights 1 - s and s, one spacing apart, spread by s (1 - s) of its square.
-    const Eigen::Vector2d spread =
-        (shift.share.array() * (1 - shift.share.array())).sqrt() * image.spacing_mm.head<2>().array();
-    cost.blur_mm += spread.squaredNorm() / static_cast<double>(slices.size());
-    cost.worst_blur_mm = std::max(cost.worst_blur_mm, spread.norm());
+    const Eigen::Vector2d blur_mm(spread(shift.share.x()) * image.spacing_mm.x(),
+                                  spread(shift.share.y()) * image.spacing_mm.y());
+    cost.blur_mm += blur_mm.squaredNorm() / static_cast<double>(slices.size());
+    cost.worst_blur_mm = std::max(cost.worst_blur_mm, blur_mm.norm());
   }
   cost.blur_mm = std::sqrt(cost.blur_mm);
   image.size = {wide, tall, image.size[2]};
   image.origin_mm = slices.front().position_mm - image.axes.col(0) * first.x() * image.spacing_mm.x() -
                     image.axes.col(1) * first.y() * image.spacing_mm.y();
   image.hu = std::move(hu);
+  if (stack.usual_step_mm > 0) {
+    std::vector<double> along_mm;
+    for (const DicomSlice& slice : slices)
+      along_mm.push_back((slice.position_mm - slices.front().position_mm).dot(image.axes.col(2)));
+    even_out(along_mm, stack.usual_step_mm, image, cost);
+  }
   return cost;
 }
 

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -5,6 +6,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "hw-sim/phantom/dicom_series.hpp"
+#include "hw-sim/phantom/grid.hpp"
+#include "hw-sim/phantom/image_files.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/json_file.hpp"
@@ -52,6 +56,69 @@ TEST(Commands, VolumeInfoRefusesBadInputInOneLine) {
   fs::create_directory(scratch / "empty");
   expect_refused("birdseye", "volume info " + (scratch / "empty").string(), {"empty"});
   expect_refused("birdseye", "volume info " + scratch.file("a.nii", "no"), {"a.nii"});
+}
+
+TEST(Commands, VolumeInfoListsSeriesAndLooksAtTheOneThatIsNamed) {
+  const Scratch scratch;
+  hw_sim::Grid grid;
+  grid.size = {4, 3, 5};
+  for (const int seed : {1, 2}) {
+    const std::vector<std::int16_t> hu(grid.voxels(), static_cast<std::int16_t>(10 * seed));
+    ASSERT_TRUE(hw_sim::write_dicom_series(scratch / fmt::format("export/S{}", seed), grid, hu,
+                                           static_cast<std::uint64_t>(seed)));
+  }
+  const std::string folder = (scratch / "export").string(), json_path = (scratch / "info.json").string();
+  const auto list = run("birdseye", "volume info " + folder + " --json " + json_path);
+  EXPECT_EQ(list.code, 0) << list.output;
+  EXPECT_EQ(std::count(list.output.begin(), list.output.end(), '\n'), 3) << list.output;
+  const nlohmann::json json = read_json(json_path);
+  ASSERT_EQ(json["series"].size(), 2U);
+  EXPECT_EQ(json["series"][1]["id"], "1b");
+  EXPECT_EQ(json["series"][1]["size"], nlohmann::json({4, 3, 5}));
+  EXPECT_EQ(json["series"][1]["readable"], true);
+  EXPECT_FALSE(json.contains("hu_max"));
+  const auto second = run("birdseye", "volume info " + folder + " --series 1b --json " + json_path);
+  EXPECT_EQ(second.code, 0) << second.output;
+  EXPECT_EQ(read_json(json_path)["hu_max"], 20);
+  const auto none = run("birdseye", "volume info " + folder + " --series portal");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.output.find("--series portal fits none of 1, 1b"), std::string::npos) << none.output;
+  expect_refused("birdseye", "volume segment " + folder + " --hu 0,50 --out " + (scratch / "a.nii.gz").string(),
+                 {"holds 2 series", "--series"}, scratch / "a.nii.gz");
+  const auto segmented =
+      run("birdseye", "volume segment " + folder + " --series 1b --hu 15,25 --out " + (scratch / "a.nii.gz").string());
+  EXPECT_EQ(segmented.code, 0) << segmented.output;
+}
+
+TEST(Commands, ShowLabelsByName) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  hw_sim::Grid grid;
+  grid.size = {20, 20, 20};
+  grid.spacing_mm = {2, 2, 2};
+  grid.origin_mm = {-20, -20, -20};
+  std::vector<std::uint8_t> labels(grid.voxels(), 0);
+  for (int k = 0; k < 20; ++k) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i) labels[grid.index(i, j, k)] = grid.point(i, j, k).norm() < 8 ? 5 : 64;
+    }
+  }
+  ASSERT_TRUE(hw_sim::write_labels(scratch / "labels.nii.gz", grid, labels));
+  const auto render = [&](const std::string& shown, const std::string& out) {
+    return run("birdseye", "render --volume " + ct + " --labels " + (scratch / "labels.nii.gz").string() + " --show " +
+                               shown + " --size 64x64 --transfer liver --out " + (scratch / out).string());
+  };
+  const auto named = render("liver", "named.png"), numbered = render("5", "numbered.png");
+  EXPECT_EQ(named.code, 0) << named.output;
+  EXPECT_NE(named.output.find("'liver' is taken for 5, as TotalSegmentator 2 counts"), std::string::npos)
+      << named.output;
+  EXPECT_EQ(numbered.code, 0) << numbered.output;
+  EXPECT_EQ(testing::contents_of(scratch / "named.png"), testing::contents_of(scratch / "numbered.png"));
+  EXPECT_EQ(render("liver,portal_vein_and_splenic_vein", "both.png").code, 0);
+  EXPECT_NE(testing::contents_of(scratch / "both.png"), testing::contents_of(scratch / "named.png"));
+  const auto none = render("lever", "none.png");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.output.find("labels.nii.gz: names none of its labels, and 'lever'"), std::string::npos) << none.output;
 }
 
 TEST(Commands, RegisterFiducialsOnThePelvisPhantom) {

@@ -249,6 +249,51 @@ TEST(Untilt, BlursAnEdgeAsItSays) {
   EXPECT_NE(read->notes.back().find("0.25 mm in the worst slice"), std::string::npos) << read->notes.back();
 }
 
+/// Tilted slices that show a plane which rises in all directions, at these places along z and as thick as this.
+void write_tilted(const fs::path& folder, const std::vector<double>& places_mm, const std::vector<const char*>& thick) {
+  constexpr int kSize = 24;
+  for (std::size_t k = 0; k < places_mm.size(); ++k) {
+    testing::CtSlice slice;
+    slice.instance = static_cast<int>(k) + 1;
+    slice.place_mm = {-5, -0.2 * places_mm[k], places_mm[k]};
+    testing::write_ct_slice(folder / fmt::format("{}.dcm", k), slice, [&](DcmDataset& dataset) {
+      put(dataset, DCM_SliceThickness, thick[k]);
+      std::vector<Uint16> pixels;
+      for (int i = 0; i < kSize * kSize; ++i) {
+        const Eigen::Vector3d p = slice.place_mm + Eigen::Vector3d(0.5 * (i % kSize), 0.75 * (i / kSize), 0);
+        pixels.push_back(static_cast<Uint16>(std::lround(rising(p) + 1000)));
+      }
+      testing::put_pixels(dataset, kSize, kSize, pixels);
+    });
+  }
+}
+
+TEST(Untilt, EvensOutStepsThatLeaveNoHole) {
+  const Scratch scratch;
+  write_tilted(scratch / "ct", {0, 2, 4, 6, 7, 10.5, 14}, {"2", "2", "2", "2", "3.5", "3.5", "3.5"});
+  VolumeSource source(scratch / "ct");
+  source.untilt = true;
+  const auto read = import_with_notes(source);
+  ASSERT_TRUE(read) << read.error().what;
+  const Volume& ct = read->volume;
+  EXPECT_EQ(ct.size[2], 8);
+  EXPECT_NEAR(ct.spacing_mm.z(), 2, 1e-6);
+  for (int k = 0; k < 8; ++k) {
+    const Eigen::Vector3d p = ct.patient_from_voxel * Eigen::Vector3d(10, 12, k);
+    EXPECT_NEAR(p.z(), 2 * k, 1e-9);
+    EXPECT_NEAR(ct.at(10, 12, k), rising(p), 1.6) << k;
+  }
+  EXPECT_NE(read->notes.back().find("interpolated to 2.00 mm"), std::string::npos) << read->notes.back();
+  // At 12 mm, between 10.5 and 14: 3.5 sqrt(0.43 0.57); at 8, between 7 and 10.5, 3.5 sqrt(0.29 0.71).
+  EXPECT_NE(read->notes.back().find("1.73 mm in the worst"), std::string::npos) << read->notes.back();
+
+  write_tilted(scratch / "hole", {0, 2, 4, 6, 10, 12, 14}, {"2", "2", "2", "2", "2", "2", "2"});
+  source.path = scratch / "hole";
+  const auto hole = import_volume(source);
+  ASSERT_FALSE(hole);
+  EXPECT_NE(hole.error().what.find("missing or unevenly spaced"), std::string::npos) << hole.error().what;
+}
+
 TEST(Untilt, LeavesAStraightStackAsItIs) {
   const Scratch scratch;
   testing::write_ct_series(scratch / "ct", {}, 5);

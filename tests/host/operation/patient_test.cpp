@@ -40,8 +40,14 @@ TEST(Patient, LabelsNeedThoseOfTheOrgan) {
   files.organ = {1, 5};
   const auto read = read_patient(files);
   ASSERT_TRUE(read) << read.error().what;
-  EXPECT_EQ(read->organ, files.organ) << "a liver without a tumour is one all the same";
+  EXPECT_EQ(read->organ, (std::vector<int>{1, 5})) << "a liver without a tumour is one all the same";
   EXPECT_TRUE(read->labels.has_value());
+  files.organ = {"liver"};  // of labels without names: TotalSegmentator's 5
+  const auto named = read_patient(files);
+  ASSERT_TRUE(named) << named.error().what;
+  EXPECT_EQ(named->organ, (std::vector<int>{5}));
+  files.organ = {"lever"};
+  EXPECT_NE(read_patient(files).error().what.find("'lever' is none of TotalSegmentator's"), std::string::npos);
 }
 
 TEST(Patient, LabelsThatAreNamedNeedTheirFile) {
@@ -49,7 +55,7 @@ TEST(Patient, LabelsThatAreNamedNeedTheirFile) {
   PatientFiles files;
   files.ct = small_ct(scratch);
   EXPECT_TRUE(read_patient(files)) << "without labels, all of the CT is the organ";
-  for (std::vector<int> PatientFiles::*const named :
+  for (std::vector<LabelChoice> PatientFiles::*const named :
        {&PatientFiles::shown, &PatientFiles::targets, &PatientFiles::organ}) {
     PatientFiles one = files;
     one.*named = {1};
