@@ -6,6 +6,7 @@
 
 #include "calibration/base/units.hpp"
 #include "host/app/calibrate_commands.hpp"
+#include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/hand_eye_files.hpp"
 #include "host/calibrate/hand_eye_report.hpp"
@@ -24,7 +25,7 @@ struct CalibrateHandEyeOptions {
   std::filesystem::path rod_angles;
   bool live = false;
   LivePlan plan;
-  std::string unit = "mm";
+  PoseOptions poses_are;
   std::vector<double> at;
   double position_sigma_mm = 0, angle_sigma_deg = 0;
   ResultPaths results;
@@ -57,8 +58,25 @@ Result<void> check(const CalibrateHandEyeOptions& options) {
     return Error{Errc::bad_value, "--at goes with --eye-poses, in whose world it is"};
   if (!options.rod_angles.empty() && files.images.empty())
     return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
+  if (options.live && !options.poses_are.field.empty())
+    return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
     return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
+  return {};
+}
+
+/// How the files of poses are to be read. What the camera saw is not the tracker's, and no map of its field corrects
+/// it.
+Result<void> read_how(CalibrateHandEyeOptions& options) {
+  const auto how = pose_reading(options.poses_are);
+  if (!how) return how.error();
+  HandEyeFiles& files = options.files;
+  for (PoseReading* tracked : {&files.of_sensor, &files.of_board}) {
+    tracked->mm_per_unit = how->mm_per_unit;
+    tracked->field = how->field;
+    tracked->most_error_mm = how->most_error_mm;
+  }
+  files.of_eye.mm_per_unit = how->mm_per_unit;
   return {};
 }
 
@@ -162,11 +180,11 @@ void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& reco
 
 void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
   HandEyeFiles& files = options.files;
-  files.mm_per_unit = options.unit == "m" ? 1000 : 1;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
+  if (const auto read = read_how(options); !read) return status.refuse(read.error());
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
   if (!options.at.empty())
-    files.at_mm = files.mm_per_unit * Eigen::Vector3d(options.at[0], options.at[1], options.at[2]);
+    files.at_mm = files.of_eye.mm_per_unit * Eigen::Vector3d(options.at[0], options.at[1], options.at[2]);
   if (options.live) {
     const auto fits = check_bound_record(options.results.record, options.plan.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
@@ -196,10 +214,12 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--board", files.board, "pattern in the pictures, as chessboard:14x10:3mm")->type_name("SPEC");
   command->add_option("--images", files.images, "pictures of the board, or folders of them")->type_name("PATH");
   command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
-  command->add_option("--transform", files.transform, "which of a sequence's transforms that is");
+  command->add_option("--transform,--tool", files.of_sensor.transform,
+                      "which of a sequence's transforms, or of an NDI log's tools, that is");
   command->add_option("--board-poses", files.board_poses, "tracked poses of what carries the board, if it moves")
       ->type_name("PATH");
-  command->add_option("--board-transform", files.board_transform, "which of a sequence's transforms that is");
+  command->add_option("--board-transform,--board-tool", files.of_board.transform,
+                      "which of a sequence's transforms, or of an NDI log's tools, that is");
   command->add_option("--camera", files.camera, "lens (OpenCV YAML); without it, calibrated from the pictures")
       ->type_name("FILE");
   command->add_option("--right-images", files.right_images, "the right camera's, which pair with --images by name")
@@ -220,7 +240,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->expected(3)
       ->check(CLI::Range(-1e6, 1e6))
       ->type_name("X,Y,Z");
-  command->add_option("--unit", options->unit, "of lengths in files of poses")->check(CLI::IsMember({"mm", "m"}));
+  add_pose_options(*command, options->poses_are);
   command->add_option("--position-sigma", options->position_sigma_mm, "the tracker's noise per axis, mm")
       ->check(CLI::PositiveNumber);
   command->add_option("--angle-sigma", options->angle_sigma_deg, "the tracker's noise per axis, degrees")

@@ -7,6 +7,7 @@
 
 #include "calibration/latency/latency.hpp"
 #include "host/app/calibrate_commands.hpp"
+#include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/latency_report.hpp"
 #include "host/calibrate/latency_streams.hpp"
@@ -22,7 +23,8 @@ using calibration::Latency;
 
 struct CalibrateLatencyOptions {
   fs::path recording, poses, eye_poses;
-  std::string server, transform, eye_transform, unit = "mm";
+  std::string server, transform, eye_transform;
+  PoseOptions poses_are;
   std::optional<double> delay_ms;
   LatencySource source;
   calibration::LatencySettings settings;
@@ -88,9 +90,9 @@ Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progre
   return found;
 }
 
-Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& path, const std::string& transform,
-                                                               double mm_per_unit, Verdict& odd) {
-  const auto set = read_pose_set(path, transform, mm_per_unit);
+Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& path, const PoseReading& how,
+                                                               Verdict& odd) {
+  const auto set = read_pose_set(path, how);
   if (!set) return set.error();
   if (!set->timed)
     return Error{Errc::bad_value,
@@ -106,10 +108,15 @@ Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& p
 }
 
 Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& odd) {
-  const double mm_per_unit = options.unit == "m" ? 1000 : 1;
-  const auto a = read_rotations(options.poses, options.transform, mm_per_unit, odd);
+  auto how = pose_reading(options.poses_are);
+  if (!how) return how.error();
+  how->transform = options.transform;
+  const auto a = read_rotations(options.poses, *how, odd);
   if (!a) return a.error();
-  const auto b = read_rotations(options.eye_poses, options.eye_transform, mm_per_unit, odd);
+  how->transform = options.eye_transform;
+  how->field.reset();
+  how->most_error_mm.reset();  // what the camera saw is not the tracker's
+  const auto b = read_rotations(options.eye_poses, *how, odd);
   if (!b) return b.error();
   auto latency = calibration::find_latency(*a, *b, options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
@@ -198,9 +205,8 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
       ->needs(poses);
   command.add_option("--transform", options->transform, "which transform of --poses, of a PLUS sequence")->needs(poses);
   command.add_option("--eye-transform", options->eye_transform, "the same of --eye-poses")->needs(poses);
-  command.add_option("--unit", options->unit, "of lengths in both files")
-      ->check(CLI::IsMember({"mm", "m"}))
-      ->needs(poses);
+  add_pose_options(command, options->poses_are);
+  command.get_option("--field")->needs(poses);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
   command.callback([options, &status] {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "host/app/calibrate_commands.hpp"
+#include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/tip_calibration.hpp"
 #include "host/calibrate/tip_phases.hpp"
@@ -22,22 +23,27 @@ using calibration::Pivot;
 
 struct CalibrateTipOptions {
   std::filesystem::path poses, spin;
-  std::string transform, reference, phases, unit = "mm";
+  std::string transform, reference, phases;
+  PoseOptions poses_are;
   std::string server, bird = "pointer";
   double seconds = 20;
   ResultPaths results;
 };
 
 Result<PoseSet> read_set(const CalibrateTipOptions& options, const std::filesystem::path& path) {
-  const double mm_per_unit = options.unit == "m" ? 1000 : 1;
-  return options.reference.empty() ? read_pose_set(path, options.transform, mm_per_unit)
-                                   : read_relative_pose_set(path, options.transform, options.reference, mm_per_unit);
+  auto how = pose_reading(options.poses_are);
+  if (!how) return how.error();
+  how->transform = options.transform;
+  how->reference = options.reference;
+  return read_pose_set(path, *how);
 }
 
 Result<TipInput> read_input(const CalibrateTipOptions& options) {
   if (options.poses.empty() == options.server.empty())
     return Error{Errc::bad_value, "calibrate tip: give one of --poses and --server"};
   if (!options.server.empty()) {
+    if (!options.poses_are.field.empty())
+      return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
     if (const auto fits = check_bound_record(options.results.record, options.server, {"tracker"}); !fits)
       return fits.error();
   }
@@ -108,14 +114,14 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   tip.add_option("--bird", options->bird, "the pointer's bird, as the appliance names it (default: pointer)");
   tip.add_option("--seconds", options->seconds, "how long to take poses from it (default: 20)")
       ->check(CLI::Range(2.0, 600.0));
-  tip.add_option("--transform", options->transform, "the pointer's, in a sequence of several, as StylusToTracker");
+  tip.add_option("--transform,--tool", options->transform,
+                 "the pointer's, in a sequence or NDI log of several, as StylusToTracker");
   tip.add_option("--reference", options->reference,
                  "what the divot is fixed to, where it moves too, as ReferenceToTracker");
   tip.add_option("--phases", options->phases,
                  "which frames were in which divot, first-last of each, as 77-162,172-253 (default: all in one)");
   tip.add_option("--spin", options->spin, "poses while the pointer is spun about its shaft: gives its axis, too");
-  tip.add_option("--unit", options->unit, "of the lengths in the poses (default: mm)")
-      ->check(CLI::IsMember({"mm", "m"}));
+  add_pose_options(tip, options->poses_are);
   add_result_options(tip, options->results, "the tip, x y z in the sensor's frame, mm");
   tip.callback([options, &status] {
     const auto input = read_input(*options);

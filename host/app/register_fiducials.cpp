@@ -21,6 +21,7 @@ struct RegisterFiducialsOptions {
 };
 
 void print(const FiducialInput& input, const FiducialsFound& out, const Verdict& verdict) {
+  for (const std::string& note : input.notes) fmt::print("{}\n", note);
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
     fmt::print("fiducial {:2}", i + 1);
     if (!input.ct_of_touch.empty()) fmt::print(" is CT marker {:2}", input.ct_of_touch[i] + 1);
@@ -84,6 +85,10 @@ void add_register(CLI::App& app, CommandStatus& status) {
       "--surface", options->files.surface, "refine by this surface: VTK polygons, PLY, STL or OBJ, patient frame, mm");
   CLI::Option* surface_points =
       fiducials.add_option("--surface-points", options->files.surface_points, "points touched on it, tracker frame");
+  fiducials
+      .add_option("--field", options->files.field,
+                  "correct touched points by this map of the tracker's field (birdseye calibrate field)")
+      ->type_name("MAP");
   surface->needs(surface_points);
   surface_points->needs(surface);
   fiducials.add_option("--out", options->out, "patient_from_tracker, a 4x4 matrix")->required();

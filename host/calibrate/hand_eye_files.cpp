@@ -22,9 +22,9 @@ struct PosesByPlace {
   std::size_t count = 0;
 };
 
-Result<PosesByPlace> read_by_place(const std::filesystem::path& path, const std::string& transform, double mm_per_unit,
+Result<PosesByPlace> read_by_place(const std::filesystem::path& path, const PoseReading& how,
                                    std::vector<std::string>& notes) {
-  auto set = read_pose_set(path, transform, mm_per_unit);
+  auto set = read_pose_set(path, how);
   if (!set) return set.error();
   PosesByPlace out;
   for (const TimedPose& pose : set->poses) {
@@ -32,7 +32,9 @@ Result<PosesByPlace> read_by_place(const std::filesystem::path& path, const std:
     out.count = std::max(out.count, pose.index + 1);
   }
   out.count = std::max(out.count, set->poses.size() + set->rejected.size());
-  for (const std::string& rejected : set->rejected) notes.push_back(path.string() + ": " + rejected);
+  for (const auto* told : {&set->rejected, &set->notes}) {
+    for (const std::string& words : *told) notes.push_back(path.string() + ": " + words);
+  }
   return out;
 }
 
@@ -45,12 +47,12 @@ Error count_error(const char* what, std::size_t count, std::size_t poses) {
 /// Stations whose poses are missing are told, and left out.
 Result<void> add_poses(const HandEyeFiles& files, std::vector<HandEyeStation>& stations, const char* what,
                        std::vector<std::string>& notes) {
-  const auto sensor = read_by_place(files.poses, files.transform, files.mm_per_unit, notes);
+  const auto sensor = read_by_place(files.poses, files.of_sensor, notes);
   if (!sensor) return sensor.error();
   if (sensor->count != stations.size()) return count_error(what, stations.size(), sensor->count);
   PosesByPlace board;
   if (!files.board_poses.empty()) {
-    auto read = read_by_place(files.board_poses, files.board_transform, files.mm_per_unit, notes);
+    auto read = read_by_place(files.board_poses, files.of_board, notes);
     if (!read) return read.error();
     board = *std::move(read);
     if (board.count != sensor->count) return count_error("poses of the board", board.count, sensor->count);
@@ -135,6 +137,8 @@ Result<HandEyeRecording> read_streams(const PoseSet& sensor, const PoseSet& eye)
   HandEyeRecording out;
   tell_by_kind("of the sensor: ", sensor.rejected, out.notes);
   tell_by_kind("of the camera: ", eye.rejected, out.notes);
+  for (const std::string& note : sensor.notes) out.notes.push_back("of the sensor: " + note);
+  for (const std::string& note : eye.notes) out.notes.push_back("of the camera: " + note);
   out.input.stations = std::move(paired->stations);
   out.input.estimate_time_offset = true;
   out.stream_offset_s = paired->offset_s;
@@ -143,10 +147,10 @@ Result<HandEyeRecording> read_streams(const PoseSet& sensor, const PoseSet& eye)
 }
 
 Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
-  auto eye = read_pose_set(files.eye_poses, {}, files.mm_per_unit);
+  auto eye = read_pose_set(files.eye_poses, files.of_eye);
   if (!eye) return eye.error();
   if (eye->timed && files.board_poses.empty()) {
-    const auto sensor = read_pose_set(files.poses, files.transform, files.mm_per_unit);
+    const auto sensor = read_pose_set(files.poses, files.of_sensor);
     if (!sensor) return sensor.error();
     if (sensor->timed) return read_streams(*sensor, *eye);
   }

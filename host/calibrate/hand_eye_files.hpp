@@ -21,9 +21,8 @@ struct HandEyeFiles {
   std::vector<std::filesystem::path> right_images;      ///< of a stereo scope's second camera
   std::filesystem::path right_camera, right_from_left;  ///< both, or neither: calibrated from the images
   std::filesystem::path poses, board_poses, eye_poses;
-  std::string transform, board_transform;
-  double mm_per_unit = 1;
-  std::optional<Eigen::Vector3d> at_mm;  ///< of eye_poses' world: where hand-eye is to be judged
+  PoseReading of_sensor, of_board, of_eye;  ///< how the three are read
+  std::optional<Eigen::Vector3d> at_mm;     ///< of eye_poses' world: where hand-eye is to be judged
 };
 
 /// The solver's input, and what to tell about how it was read.

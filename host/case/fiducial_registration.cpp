@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "calibration/base/units.hpp"
+#include "host/files/field_files.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/registration/rigid/point_matching.hpp"
@@ -43,6 +44,28 @@ nlohmann::json rows_of(const Eigen::Matrix4d& m) {
   return rows;
 }
 
+Result<void> correct_by_field(const FiducialFiles& files, FiducialInput& input) {
+  const auto field = read_field_map(files.field);
+  if (!field) return field.error();
+  CorrectedPlaces touched = corrected_places(field->map, input.touched_mm);
+  if (!touched.unmapped.empty()) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: {} of {} points lie where the field was not mapped ({}): take them out, and their "
+                             "markers of the CT unless --match finds those, or touch markers where it was mapped",
+                             files.tracker.string(), touched.unmapped.size(), input.touched_mm.size(),
+                             touched.unmapped.front())};
+  }
+  CorrectedPlaces surface = corrected_places(field->map, input.surface_points_mm);
+  if (!surface.unmapped.empty()) {
+    input.notes.push_back(fmt::format("{}: {} of {} points lie where the field was not mapped, and are left out",
+                                      files.surface_points.string(), surface.unmapped.size(),
+                                      input.surface_points_mm.size()));
+  }
+  input.touched_mm = std::move(touched.places_mm);
+  input.surface_points_mm = std::move(surface.places_mm);
+  return {};
+}
+
 }  // namespace
 
 Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
@@ -55,6 +78,9 @@ Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
     auto read = read_points(*path);
     if (!read) return read.error();
     *points = *std::move(read);
+  }
+  if (!files.field.empty()) {
+    if (const auto done = correct_by_field(files, input); !done) return done.error();
   }
   if (!files.volume.path.empty()) {
     auto volume = import_volume(files.volume);
@@ -111,6 +137,7 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
   json["fre_rms_mm"] = out.fit.fre_rms_mm;
   json["residuals_mm"] = out.fit.residuals_mm;
   json["leave_one_out_mm"] = out.fit.leave_one_out_mm;
+  json["notes"] = input.notes;
   json["fle_rms_mm"] = out.localisation.rms_mm;
   json["fle_upper95_mm"] = out.localisation.upper95_mm;
   if (!input.ct_of_touch.empty()) {

@@ -25,6 +25,7 @@ struct FiducialFiles {
   std::filesystem::path ct, tracker;                       ///< the markers, and the same as touched
   std::filesystem::path targets, surface, surface_points;  ///< empty: none
   VolumeSource volume;                                     ///< the CT; without a path: none
+  std::filesystem::path field;            ///< map that corrects what was touched; empty: it is as measured
   std::optional<double> localisation_mm;  ///< how well a marker is found and touched, rms; none: from the residuals
   bool match = false;                     ///< touched in any order, of markers that may be more
 };
@@ -36,6 +37,7 @@ struct FiducialInput {
   std::optional<Volume> volume;
   std::optional<Surface> surface;
   std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order holds
+  std::vector<std::string> notes;        ///< what was done to the points, to be told
 };
 
 /// All that was found out.
@@ -51,6 +53,8 @@ struct FiducialsFound {
   }
 };
 
+/// With a map of the field, touched points are corrected by it. A fiducial where it maps nothing is refused, by name;
+/// points of the surface there are left out and counted in a note.
 Result<FiducialInput> read_fiducials(const FiducialFiles& files);
 
 /// Brings CT and tracker together by the markers, then by the surface if there is one. Brings ct_mm of the input into

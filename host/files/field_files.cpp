@@ -210,6 +210,18 @@ Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
   return map;
 }
 
+CorrectedPlaces corrected_places(const calibration::FieldMap& map, std::span<const Eigen::Vector3d> measured_mm) {
+  CorrectedPlaces out;
+  for (std::size_t i = 0; i < measured_mm.size(); ++i) {
+    if (const auto correction_mm = map.correction_mm(measured_mm[i])) {
+      out.places_mm.push_back(measured_mm[i] + *correction_mm);
+    } else {
+      out.unmapped.push_back(fmt::format("point {}: {}", i + 1, map.why_not(measured_mm[i])));
+    }
+  }
+  return out;
+}
+
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const fs::path& path) {
   const auto table = read_table(path, {"name", "x", "y", "z"});
   if (!table) return table.error();

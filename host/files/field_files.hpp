@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,13 @@ Result<FieldPairs> read_field_pairs(const std::filesystem::path& a, const std::f
 
 /// Reads a field map that `birdseye calibrate field` wrote; an error names the file.
 Result<calibration::FieldMapFile> read_field_map(const std::filesystem::path& path);
+
+/// Places in the tracker's frame as a map corrects them, in their order, and why others could not be: "point 3: at ..".
+struct CorrectedPlaces {
+  std::vector<Eigen::Vector3d> places_mm;
+  std::vector<std::string> unmapped;
+};
+CorrectedPlaces corrected_places(const calibration::FieldMap& map, std::span<const Eigen::Vector3d> measured_mm);
 
 /// Reads a table name,x,y,z: a plate's places, true or touched.
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const std::filesystem::path& path);

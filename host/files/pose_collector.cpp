@@ -8,6 +8,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "host/files/text_rows.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -39,9 +41,7 @@ std::string_view trimmed(std::string_view text) {
 
 ReadNumber read_number(std::string_view text) {
   text = trimmed(text);
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  const std::string lower = lower_case(text);
   for (const std::string_view word : {"", "missing", "invalid", "na", "n/a", "none", "null"}) {
     if (lower == word) return {0, lower == "invalid" ? "INVALID" : "missing"};
   }
@@ -114,10 +114,25 @@ ReadPose read_matrix(std::string_view text, double mm_per_unit) {
   return checked_pose(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), mm_per_unit);
 }
 
+ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& field) {
+  if (!field || !pose.problem.empty()) return pose;
+  if (const auto by_map = field->correct(pose.tracker_from_sensor)) {
+    pose.tracker_from_sensor = by_map->tracker_from_sensor;
+  } else {
+    pose.problem = field->why_not(pose.tracker_from_sensor.translation());
+    pose.unmapped = true;
+  }
+  return pose;
+}
+
 void PoseCollector::add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose) {
+  if (pose.unmapped) ++unmapped_;
   if (!pose.problem.empty()) return reject(name, pose.problem);
   if (!std::isfinite(time_s) || !std::isfinite(unfiltered_time_s)) return reject(name, "has no time");
-  set_.poses.push_back({name, next_index_++, time_s, unfiltered_time_s, pose.tracker_from_sensor});
+  if (pose.error_mm) errors_mm_.push_back(*pose.error_mm);
+  if (pose.error_mm && most_error_mm_ && !(*pose.error_mm <= *most_error_mm_))
+    return reject(name, fmt::format("its error of {:.3g} mm is over {:.3g} mm", *pose.error_mm, *most_error_mm_));
+  set_.poses.push_back({name, next_index_++, time_s, unfiltered_time_s, pose.tracker_from_sensor, pose.error_mm});
 }
 
 void PoseCollector::reject(const std::string& name, const std::string& why) {
@@ -159,9 +174,33 @@ void PoseCollector::note_repeated_poses() {
   }
 }
 
+void PoseCollector::note_unmapped_poses() {
+  if (unmapped_ == 0) return;
+  set_.notes.push_back(fmt::format("{} of {} poses lie where the field was not mapped, and are left out", unmapped_,
+                                   set_.poses.size() + set_.rejected.size()));
+}
+
+void PoseCollector::note_errors() {
+  if (errors_mm_.empty()) return;
+  std::sort(errors_mm_.begin(), errors_mm_.end());
+  std::string words = fmt::format("errors of its poses: median {:.3g} mm, largest {:.3g} mm",
+                                  errors_mm_[errors_mm_.size() / 2], errors_mm_.back());
+  if (most_error_mm_) {
+    const auto over = errors_mm_.end() - std::upper_bound(errors_mm_.begin(), errors_mm_.end(), *most_error_mm_);
+    words += fmt::format("; {} of {} are over {:.3g} mm, and left out", over, errors_mm_.size(), *most_error_mm_);
+  }
+  set_.notes.push_back(std::move(words));
+}
+
 Result<PoseSet> PoseCollector::finish(const std::filesystem::path& path) && {
   if (set_.timed) sort_by_time();
   note_repeated_poses();
+  note_unmapped_poses();
+  note_errors();
+  if (most_error_mm_ && errors_mm_.empty() && !set_.poses.empty()) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: tells no errors of its poses: leave --max-error out", path.string())};
+  }
   if (!set_.poses.empty()) return std::move(set_);
   if (set_.rejected.empty()) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path.string())};
   return Error{Errc::bad_value, fmt::format("{}: none of {} poses can be used; {}", path.string(), set_.rejected.size(),

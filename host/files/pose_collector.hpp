@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,8 @@ ReadNumber read_number(std::string_view text);
 struct ReadPose {
   Transform<Tracker, Sensor> tracker_from_sensor;
   std::string problem;
+  bool unmapped = false;                ///< the problem is that it lies where the field was not mapped
+  std::optional<double> error_mm = {};  ///< as TimedPose has it
 };
 /// matrix: 4x4, lengths in units of mm_per_unit.
 ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit);
@@ -31,24 +34,36 @@ ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3
 /// text: 16 numbers, row by row, separated by blanks.
 ReadPose read_matrix(std::string_view text, double mm_per_unit);
 
+/// As the map of the field corrects it, or the problem that it lies where the field was not mapped. No map: as it is.
+ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& field);
+
 /// Gathers what a reader finds, in the order in which it was recorded.
 class PoseCollector {
  public:
-  explicit PoseCollector(bool timed) { set_.timed = timed; }
+  /// most_error_mm: poses that tell a larger error are rejected.
+  explicit PoseCollector(bool timed, std::optional<double> most_error_mm = {}) : most_error_mm_(most_error_mm) {
+    set_.timed = timed;
+  }
 
   /// Keeps the pose, or names what is wrong with it.
   void add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose);
   void reject(const std::string& name, const std::string& why);
+  /// Keeps words on what is odd and harmless.
+  void note(std::string words) { set_.notes.push_back(std::move(words)); }
   /// For files that number their poses: sets the number of the pose that is added or rejected next.
   void set_next_index(std::size_t index) { next_index_ = index; }
-  /// All poses in the order of time. An error where path held no pose.
+  /// All poses in the order of time. An error where path held no pose, or no errors and a most was given.
   Result<PoseSet> finish(const std::filesystem::path& path) &&;
 
  private:
   void sort_by_time();
   void note_repeated_poses();
+  void note_unmapped_poses();
+  void note_errors();
   PoseSet set_;
-  std::size_t next_index_ = 0;
+  std::optional<double> most_error_mm_;
+  std::vector<double> errors_mm_;  ///< of all poses that tell one
+  std::size_t next_index_ = 0, unmapped_ = 0;
 };
 
 }  // namespace birdseye::host

@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "calibration/geometry/field_map.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::host {
@@ -19,6 +21,8 @@ struct TimedPose {
   /// The stamp as the pose arrived, with its jitter, where the file holds that too; otherwise time_s.
   double unfiltered_time_s = 0;
   Transform<Tracker, Sensor> tracker_from_sensor;
+  /// RMS, as the program that wrote the file or the fit of a body's points tells it.
+  std::optional<double> error_mm = {};
 };
 
 struct PoseSet {
@@ -28,20 +32,30 @@ struct PoseSet {
   bool timed = false;                 ///< times are seconds of a clock, not counts
 };
 
-/// Poses from any of: a folder of 4x4 text matrices (its .txt files in the order of their names, numbers in them by
-/// value; names that are whole numbers of nanoseconds since 1970 are times; the last part of the path may hold a *, as
-/// folder/device.*.txt), a CSV with columns t,x,y,z,qx,qy,qz,qw (s, lengths, Hamilton; a header may give them another
-/// order), or a PLUS sequence (.igs.mha, .mha, .nrrd), of which `transform` names the one to read, as "StylusToTracker"
-/// (may be left empty where there is one only). mm_per_unit: 1000 for files in metres. Rows that are invalid, missing,
-/// not finite, sentinels such as -3.697314E28, no rotation or that repeat a stamp are rejected by name, never used; a
-/// file that yields no pose is an error. Rotations are passed on as recorded (to 1e-3).
-Result<PoseSet> read_pose_set(const std::filesystem::path& path, const std::string& transform = {},
-                              double mm_per_unit = 1);
+/// How poses are to be read.
+struct PoseReading {
+  /// Which of a sequence's transforms, as "StylusToTracker", or of an NDI log's tools; empty where there is one only.
+  std::string transform = {};
+  /// Of a sequence: the poses are taken against this other tracked one, as "ReferenceToTracker":
+  /// reference_from_sensor = tracker_from_reference^-1 * tracker_from_sensor, frame by frame and only where both are
+  /// sound. In TimedPose the reference then takes the tracker's place.
+  std::string reference = {};
+  double mm_per_unit = 1;  ///< 1000 for files in metres
+  /// Corrects each pose as birdseyed does; what it does not map is rejected.
+  std::optional<calibration::FieldMap> field = {};
+  /// Poses of which the file, or the fit of a body, tells a larger error are rejected.
+  std::optional<double> most_error_mm = {};
+  /// The points of a rigid body in its own frame: the file of poses then holds where they were tracked, row by row.
+  std::filesystem::path body = {};
+};
 
-/// Reads from a PLUS sequence, frame by frame, the pose of one sensor against another tracked one:
-/// reference_from_sensor = tracker_from_reference^-1 * tracker_from_sensor. In TimedPose the reference takes the place
-/// of the tracker. A frame counts only where both poses are sound. reference: as "ReferenceToTracker".
-Result<PoseSet> read_relative_pose_set(const std::filesystem::path& path, const std::string& transform,
-                                       const std::string& reference, double mm_per_unit = 1);
+/// Poses from any of: a folder of 4x4 text matrices (its .txt files in the order of their names, numbers in them by
+/// value; names that are whole numbers of nanoseconds since 1970 are times; the last part of the path may hold * and ?,
+/// as folder/device.*.txt), a table with columns t,x,y,z,qx,qy,qz,qw (s, lengths, Hamilton; a header may give them
+/// another order, a time is not needed), a PLUS sequence (.igs.mha, .mha, .nrrd), an NDI log, or a table of a body's
+/// tracked points. Rows that are invalid, missing, not finite, sentinels such as -3.697314E28, no rotation or that
+/// repeat a stamp are rejected by name, never used; a file that yields no pose is an error. Rotations are passed on as
+/// recorded (to 1e-3).
+Result<PoseSet> read_pose_set(const std::filesystem::path& path, const PoseReading& how = {});
 
 }  // namespace birdseye::host

@@ -41,22 +41,22 @@ Result<std::string> find_transform(const SequenceHeader& sequence, const fs::pat
                fmt::format("{}: say by name which transform is the sensor's (--transform); {}", path.string(), held)};
 }
 
-ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transform, double mm_per_unit) {
+ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transform, const PoseReading& how) {
   const std::string key = transform + std::string(kTransformField);
   const std::string_view status = value_of(frame, transform + std::string(kTransformStatusField));
   // A sequence without states has only what was seen.
   if (!status.empty() && status != kStatusOk) return {{}, std::string(status)};
   if (!frame.contains(key)) return {{}, "missing"};
-  return read_matrix(value_of(frame, key), mm_per_unit);
+  return corrected(read_matrix(value_of(frame, key), how.mm_per_unit), how.field);
 }
 
 /// reference_from_sensor, or which of both is not there.
 ReadPose relative_pose_of(const SequenceHeader::Fields& frame, const std::string& transform,
-                          const std::string& reference, double mm_per_unit) {
-  ReadPose sensor = pose_of(frame, transform, mm_per_unit);
-  if (!sensor.problem.empty()) return {{}, transform + " " + sensor.problem};
-  const ReadPose base = pose_of(frame, reference, mm_per_unit);
-  if (!base.problem.empty()) return {{}, reference + " " + base.problem};
+                          const std::string& reference, const PoseReading& how) {
+  ReadPose sensor = pose_of(frame, transform, how);
+  if (!sensor.problem.empty()) return {{}, transform + " " + sensor.problem, sensor.unmapped};
+  const ReadPose base = pose_of(frame, reference, how);
+  if (!base.problem.empty()) return {{}, reference + " " + base.problem, base.unmapped};
   const auto tracker_from_reference = Transform<Tracker, Marker>::from_matrix(base.tracker_from_sensor.matrix());
   const Transform<Marker, Sensor> relative = tracker_from_reference.inverse() * sensor.tracker_from_sensor;
   sensor.tracker_from_sensor = Transform<Tracker, Sensor>(relative.rotation(), relative.translation());
@@ -74,7 +74,8 @@ bool is_sequence(const fs::path& path) {
   return first.starts_with("ObjectType") || first.starts_with("NRRD000");
 }
 
-Result<PoseSet> read_sequence(const fs::path& path, std::string transform, std::string reference, double mm_per_unit) {
+Result<PoseSet> read_sequence(const fs::path& path, const PoseReading& how) {
+  std::string transform = how.transform, reference = how.reference;
   const auto sequence = read_header(path);
   if (!sequence) return sequence.error();
   const bool relative = !reference.empty();
@@ -92,11 +93,11 @@ Result<PoseSet> read_sequence(const fs::path& path, std::string transform, std::
   }
   const bool timed = std::any_of(sequence->frames.begin(), sequence->frames.end(),
                                  [](const auto& item) { return item.second.contains(kTimestampField); });
-  PoseCollector collector(timed);
+  PoseCollector collector(timed, how.most_error_mm);
   for (const auto& [number, frame] : sequence->frames) {
     const std::string name = fmt::format("frame {}", number);
     const ReadPose pose =
-        relative ? relative_pose_of(frame, transform, reference, mm_per_unit) : pose_of(frame, transform, mm_per_unit);
+        relative ? relative_pose_of(frame, transform, reference, how) : pose_of(frame, transform, how);
     ReadNumber time =
         timed ? read_number(value_of(frame, kTimestampField)) : ReadNumber{static_cast<double>(number), {}};
     ReadNumber unfiltered =
@@ -109,13 +110,6 @@ Result<PoseSet> read_sequence(const fs::path& path, std::string transform, std::
     }
   }
   return std::move(collector).finish(path);
-}
-
-Result<PoseSet> read_relative_pose_set(const fs::path& path, const std::string& transform, const std::string& reference,
-                                       double mm_per_unit) {
-  if (reference.empty())
-    return Error{Errc::bad_value, fmt::format("{}: name the reference's transform (--reference)", path.string())};
-  return read_sequence(path, transform, reference, mm_per_unit);
 }
 
 }  // namespace birdseye::host

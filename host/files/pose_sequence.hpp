@@ -7,8 +7,7 @@ namespace birdseye::host {
 /// Whether the file is a PLUS sequence, by its name or its first bytes.
 bool is_sequence(const std::filesystem::path& path);
 
-/// What read_pose_set does for a PLUS sequence; with a reference, what read_relative_pose_set does.
-Result<PoseSet> read_sequence(const std::filesystem::path& path, std::string transform, std::string reference,
-                              double mm_per_unit);
+/// What read_pose_set does for a PLUS sequence.
+Result<PoseSet> read_sequence(const std::filesystem::path& path, const PoseReading& how);
 
 }  // namespace birdseye::host

@@ -78,7 +78,7 @@ TEST(RecordCommand, OfTheSimulatedCart) {
   EXPECT_EQ(sheet["why"], "4 s are over");
   EXPECT_EQ(sheet["instruments"][0]["identity"]["bird1_unit_serial"], "1001") << sheet["instruments"];
   // What calibrations read, and Slicer and PLUS open.
-  const auto poses = host::read_pose_set(scratch / "timed/tracker.igs.mha", "ScopeToTracker");
+  const auto poses = host::read_pose_set(scratch / "timed/tracker.igs.mha", {"ScopeToTracker"});
   ASSERT_TRUE(poses) << poses.error().what;
   EXPECT_EQ(poses->poses.size(), json["poses"]["scope"].get<std::size_t>());
   const Played video = play(scratch / "timed/video.igs.mha");

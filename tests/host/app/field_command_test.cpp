@@ -11,6 +11,7 @@
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/simulated_field.hpp"
+#include "tests/support/simulated_pointer.hpp"
 
 namespace birdseye {
 namespace {
@@ -146,6 +147,75 @@ TEST(FieldCommand, InputThatCannotBeUsedIsRefused) {
   refused("--grid " + scratch.file("b.csv", "true_x,true_y,true_z,x,y,z\n1,2,3,4,5,6\n"), {"b.csv", "1 samples"});
   refused("--grid " + scratch.file("c.csv", "true_x,true_y,true_z,x,y,z\n1,2,3,nan,5,6\n"), {"c.csv", "no row"});
   refused("--kind spline --grid x", {"spline"});
+}
+
+/// A bent field, and the map that `calibrate field` makes of it.
+class MappedByCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto made = run("birdseye", "calibrate field --grid " +
+                                          scratch.file("grid.csv", grid_csv(testing::grid_samples(field, {}, 6))) +
+                                          " --held-alike --out " + map);
+    ASSERT_EQ(made.code, 0) << made.output;
+  }
+  [[nodiscard]] Transform<Tracker, Sensor> bent(const Transform<Tracker, Sensor>& truth) const {
+    const hw_sim::BirdPose out = field.apply({truth.rotation(), truth.translation()});
+    return {out.rotation, out.position_mm};
+  }
+  [[nodiscard]] Eigen::Vector3d bent_place(const Eigen::Vector3d& truth) const {
+    return bent(Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), truth)).translation();
+  }
+  const Scratch scratch;
+  const hw_sim::FieldDistortion field{10, 6};
+  const std::string map = (scratch / "field.json").string();
+};
+
+TEST_F(MappedByCommand, APointersTipIsFoundByCorrectedPoses) {
+  calibration::SimulatedPointer pointer;
+  std::string poses = "x,y,z,qx,qy,qz,qw\n";
+  for (const auto& pose : pointer.poses(60)) poses += pose_row(bent(pose.tracker_from_sensor)) + "\n";
+  poses += "1900,0,0,0,0,0,1\n";
+  const auto off_mm = [&](const std::string& more) {
+    const auto done = run("birdseye", "calibrate tip --poses " + scratch.file("p.csv", poses) + more + " --json " +
+                                          (scratch / "tip.json").string());
+    EXPECT_NE(done.code, 2) << done.output;
+    const auto tip = read_json(scratch / "tip.json")["tip_in_sensor_mm"].get<std::vector<double>>();
+    return std::pair((Eigen::Vector3d(tip[0], tip[1], tip[2]) - pointer.tip_mm).norm(), done.output);
+  };
+  const auto [raw_mm, raw] = off_mm("");
+  const auto [corrected_mm, corrected] = off_mm(" --field " + map);
+  EXPECT_LT(corrected_mm, 0.5 * raw_mm);
+  EXPECT_NE(corrected.find("1 of 61 poses lie where the field was not mapped"), std::string::npos) << corrected;
+  expect_refused("birdseye", "calibrate tip --server 127.0.0.1:1 --field " + map, {"--field goes with --poses"});
+  expect_refused("birdseye",
+                 "calibrate tip --poses " + scratch.file("p.csv", poses) + " --field " + scratch.file("no.json", "{}"),
+                 {"no.json"});
+}
+
+TEST_F(MappedByCommand, TouchedFiducialsAreCorrectedAndThoseBeyondTheMapRefused) {
+  const std::vector<Eigen::Vector3d> markers{{200, -150, -90}, {500, -120, 60},  {350, 140, -40},
+                                             {250, 90, 120},   {560, 160, -110}, {420, -10, 20}};
+  std::string ct, touched;
+  for (const Eigen::Vector3d& m : markers) {
+    const Eigen::Vector3d seen = bent_place(m);
+    ct += fmt::format("{} {} {}\n", m.x(), m.y(), m.z());
+    touched += fmt::format("{} {} {}\n", seen.x(), seen.y(), seen.z());
+  }
+  const std::string common = "register fiducials --out " + (scratch / "p.txt").string() + " --json " +
+                             (scratch / "r.json").string() + " --ct " + scratch.file("ct.txt", ct) + " --tracker ";
+  const std::string tracker = scratch.file("touched.txt", touched);
+  const auto fre_mm = [&](const std::string& more) {
+    const auto done = run("birdseye", common + tracker + more);
+    EXPECT_NE(done.code, 2) << done.output;
+    return read_json(scratch / "r.json")["fre_rms_mm"].get<double>();
+  };
+  const double raw_mm = fre_mm("");
+  EXPECT_LT(fre_mm(" --field " + map), 0.3 * raw_mm);
+  expect_refused(
+      "birdseye",
+      common + scratch.file("far.txt", touched.substr(0, touched.rfind('\n', touched.size() - 2)) + "\n900 0 0\n") +
+          " --field " + map,
+      {"far.txt: 1 of 6 points lie where the field was not mapped (point 6: at 900, 0, 0 mm"});
 }
 
 std::string places_csv(double bend_mm, unsigned seed) {

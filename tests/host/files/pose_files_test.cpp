@@ -53,7 +53,8 @@ TEST(PoseFiles, AFolderOfMatricesIsReadInTheOrderOfItsNumbers) {
   EXPECT_NE(all_of(some->notes).find("2 of 3 poses repeat"), std::string::npos);
   EXPECT_EQ(read_pose_set(scratch.path())->poses.size(), 4U);
   // Metres.
-  EXPECT_EQ(read_pose_set(scratch.path(), {}, 1000)->poses[0].tracker_from_sensor.translation().x(), 10000);
+  EXPECT_EQ(read_pose_set(scratch.path(), {.mm_per_unit = 1000})->poses[0].tracker_from_sensor.translation().x(),
+            10000);
 }
 
 TEST(PoseFiles, NamesOfNanosecondsAreTimes) {
@@ -186,13 +187,13 @@ TEST(PoseFiles, OneSensorAgainstAnother) {
                          "0000_ReferenceToTrackerTransform = 0 -1 0 9 1 0 0 20 0 0 1 30 0 0 0 1",
                          "0001_StylusToTrackerTransform = " + kPose, "0001_ReferenceToTrackerTransform = " + kPose,
                          "0001_ReferenceToTrackerTransformStatus = INVALID"}));
-  const auto set = read_relative_pose_set(path, "StylusToTracker", "ReferenceToTrackerTransform");
+  const auto set = read_pose_set(path, {"StylusToTracker", "ReferenceToTrackerTransform"});
   ASSERT_TRUE(set) << set.error().what;
   ASSERT_EQ(set->poses.size(), 1U);
   EXPECT_EQ(set->poses[0].tracker_from_sensor.translation(), Eigen::Vector3d(0, -1, 0));
   EXPECT_EQ(all_of(set->rejected), "frame 1: ReferenceToTracker INVALID\n");
-  EXPECT_TRUE(read_relative_pose_set(path, "", "ReferenceToTracker"));
-  EXPECT_FALSE(read_relative_pose_set(path, "StylusToTracker", "StylusToTracker"));
+  EXPECT_TRUE(read_pose_set(path, {"", "ReferenceToTracker"}));
+  EXPECT_FALSE(read_pose_set(path, {"StylusToTracker", "StylusToTracker"}));
 }
 
 TEST(PoseFiles, RefusalsSayWhatToDo) {
@@ -209,7 +210,7 @@ TEST(PoseFiles, RefusalsSayWhatToDo) {
         {scratch.file("b.csv", "0,1\n"), std::string(), "none of 1 poses can be used; line 1: 2 numbers"},
         {(scratch / "no.csv").string(), std::string(), "no such file"},
         {(scratch / "empty").string(), std::string(), "has no files *.txt"}}) {
-    const auto set = read_pose_set(path, transform);
+    const auto set = read_pose_set(path, {transform});
     ASSERT_FALSE(set) << path;
     EXPECT_NE(set.error().what.find(words), std::string::npos) << set.error().what;
     EXPECT_EQ(set.error().what.find(path), 0U) << set.error().what;
@@ -228,19 +229,19 @@ class RecordedPoses : public ::testing::Test {
 
 TEST_F(RecordedPoses, AnInvalidFrameOfARealSequenceIsNamed) {
   const fs::path path = data / "em_tracker_sequences/TransformInterpolationTest.igs.mha";
-  const auto probe = read_pose_set(path, "ProbeToTracker");
+  const auto probe = read_pose_set(path, {"ProbeToTracker"});
   ASSERT_TRUE(probe) << probe.error().what;
   EXPECT_EQ(probe->poses.size(), 499U);
   EXPECT_EQ(all_of(probe->rejected), "frame 7: INVALID\n");
-  EXPECT_EQ(read_pose_set(path, "ReferenceToTracker")->poses.size(), 500U);
-  const auto relative = read_relative_pose_set(path, "ProbeToTracker", "ReferenceToTracker");
+  EXPECT_EQ(read_pose_set(path, {"ReferenceToTracker"})->poses.size(), 500U);
+  const auto relative = read_pose_set(path, {"ProbeToTracker", "ReferenceToTracker"});
   EXPECT_EQ(relative->poses.size(), 499U);
   EXPECT_EQ(all_of(relative->rejected), "frame 7: ProbeToTracker INVALID\n");
 }
 
 TEST_F(RecordedPoses, JitteredStampsAreKeptBesideTheFilteredOnes) {
   const auto set = read_pose_set(data / "em_tracker_sequences/WaterTankBottomTranslationTrackerBuffer-trimmed.igs.mha",
-                                 "StylusToTracker");
+                                 {"StylusToTracker"});
   ASSERT_TRUE(set) << set.error().what;
   ASSERT_EQ(set->poses.size(), 801U);
   double least_s = 1, least_unfiltered_s = 1, most_unfiltered_s = 0;
@@ -257,8 +258,9 @@ TEST_F(RecordedPoses, JitteredStampsAreKeptBesideTheFilteredOnes) {
 
 TEST_F(RecordedPoses, OthersAreReadWhole) {
   EXPECT_EQ(read_pose_set(data / "pivot_optical_pointer")->poses.size(), 57U);
-  const auto arm = read_pose_set(
-      data / "handeye_pose_streams/robot_arm_complete_bag_color_and_ir_base_link_sr300_hinge.csv", {}, 1000);
+  const auto arm =
+      read_pose_set(data / "handeye_pose_streams/robot_arm_complete_bag_color_and_ir_base_link_sr300_hinge.csv",
+                    {.mm_per_unit = 1000});
   ASSERT_TRUE(arm) << arm.error().what;
   EXPECT_EQ(arm->poses.size(), 2817U);
   EXPECT_TRUE(arm->rejected.empty());

@@ -13,7 +13,7 @@ namespace birdseye::calibration {
 namespace {
 
 using Phantom = Patient;    ///< the frame of its drawing
-using Reference = Tracker;  ///< what read_relative_pose_set puts in the tracker's place
+using Reference = Tracker;  ///< what read_pose_set puts in the tracker's place
 
 TEST(RecordedPivot, TheOpticalPointerHasItsPublishedTip) {
   const auto data = birdseye::testing::data_dir();
@@ -84,9 +84,9 @@ class EightDivots : public ::testing::Test {
   void SetUp() override {
     const auto data = birdseye::testing::data_dir();
     if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
-    const auto set = host::read_relative_pose_set(
-        *data / "em_tracker_sequences/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha", "StylusToTracker",
-        "ReferenceToTracker");
+    const auto set =
+        host::read_pose_set(*data / "em_tracker_sequences/EightLandmarkPointsTrackedForPhantomRegistration.igs.mha",
+                            {"StylusToTracker", "ReferenceToTracker"});
     ASSERT_TRUE(set) << set.error().what;
     ASSERT_EQ(set->poses.size(), 1000U);
     for (const auto& pose : set->poses) {

@@ -75,7 +75,7 @@ TEST(SequenceFiles, WhatIsWrittenIsReadBackAsAPairAndAsOneFile) {
   EXPECT_FALSE(fs::exists(scratch / "video.raw"));
   expect_frames(writer.path(), 4);
   // The reader of the calibrations finds the same poses, to the last digit, and passes over what was not seen.
-  const auto poses = read_pose_set(writer.path(), "ScopeToTracker");
+  const auto poses = read_pose_set(writer.path(), {"ScopeToTracker"});
   ASSERT_TRUE(poses) << poses.error().what;
   ASSERT_EQ(poses->poses.size(), 3U);
   EXPECT_EQ(poses->rejected, std::vector<std::string>{"frame 1: INVALID"});

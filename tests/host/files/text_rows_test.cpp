@@ -1,0 +1,66 @@
+#include "host/files/text_rows.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using testing::Scratch;
+using Fields = std::vector<std::string>;
+
+/// All rows of a text, and whether its numbers had decimal commas.
+std::pair<std::vector<Fields>, bool> rows_of(const std::string& text) {
+  const Scratch scratch;
+  auto rows = TextRows::open(scratch.file("t.csv", text));
+  EXPECT_TRUE(rows);
+  std::vector<Fields> out;
+  while (const auto row = rows->next()) out.push_back(row->fields);
+  return {out, rows->decimal_commas()};
+}
+
+TEST(TextRows, SeparatorsAreThoseOfTheLine) {
+  for (const char* text : {"1,2.5,x y", "1;2.5;x y", "1\t2.5\tx y", "1, 2.5 , x y\r\n", "\"1\",\"2.5\",\"x y\"",
+                           "1,\t2.5,\tx y", "\n\n1;2,5;x y"}) {
+    const auto [rows, commas] = rows_of(text);
+    ASSERT_EQ(rows.size(), 1U) << text;
+    EXPECT_EQ(rows[0], (Fields{"1", "2.5", "x y"})) << text;
+  }
+  EXPECT_EQ(rows_of("  1   2.5\t").first[0], (Fields{"1   2.5", ""}));
+  EXPECT_EQ(rows_of("  1   2.5  ").first[0], (Fields{"1", "2.5"}));
+  EXPECT_EQ(rows_of("1,,2,").first[0], (Fields{"1", "", "2", ""}));
+}
+
+TEST(TextRows, DecimalCommasAreReadWhereNoCommaSeparates) {
+  EXPECT_TRUE(rows_of("1,5;-2,5e3;x").second);
+  EXPECT_EQ(rows_of("1,5;-2,5e3;x").first[0], (Fields{"1.5", "-2.5e3", "x"}));
+  EXPECT_EQ(rows_of("\"1,5\",\"2,25\"").first[0], (Fields{"1.5", "2.25"}));
+  EXPECT_EQ(rows_of("1,5;1,2,3;a,b;3.5,2").first[0], (Fields{"1.5", "1,2,3", "a,b", "3.5,2"}));
+  EXPECT_FALSE(rows_of("1,5\n").second);
+}
+
+TEST(TextRows, RemarksKeepTheirFieldsAndTheMarkOfUtf8IsPassedOver) {
+  const Scratch scratch;
+  auto rows = TextRows::open(scratch.file("t.csv", "\xEF\xBB\xBF# a,b\r\n1,2\r\n"));
+  ASSERT_TRUE(rows);
+  const auto remark = rows->next();
+  EXPECT_TRUE(remark->remark);
+  EXPECT_EQ(remark->fields, (Fields{"a", "b"}));
+  const auto row = rows->next();
+  EXPECT_EQ(row->line, 2U);
+  EXPECT_EQ(row->fields, (Fields{"1", "2"}));
+  EXPECT_FALSE(rows->next());
+}
+
+TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {
+  const Scratch scratch;
+  const auto wide = TextRows::open(scratch.file("w.csv", "\xFF\xFEt\0"));
+  ASSERT_FALSE(wide);
+  EXPECT_NE(wide.error().what.find("UTF-8"), std::string::npos);
+  EXPECT_FALSE(TextRows::open(scratch / "no.csv"));
+  EXPECT_FALSE(TextRows::open(scratch.path()));
+}
+
+}  // namespace
+}  // namespace birdseye::host
