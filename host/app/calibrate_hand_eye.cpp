@@ -216,6 +216,12 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
   command->add_option("--transform,--tool", files.of_sensor.transform,
                       "which of a sequence's transforms, or of an NDI log's tools, that is");
+  command
+      ->add_option("--body", files.of_sensor.body,
+                   "points of a body in place of a sensor, name,x,y,z a line: --poses is a table of where these were "
+                   "tracked")
+      ->type_name("FILE");
+  command->add_option("--board-body", files.of_board.body, "the same of --board-poses")->type_name("FILE");
   command->add_option("--board-poses", files.board_poses, "tracked poses of what carries the board, if it moves")
       ->type_name("PATH");
   command->add_option("--board-transform,--board-tool", files.of_board.transform,

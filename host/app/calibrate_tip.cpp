@@ -22,7 +22,7 @@ namespace {
 using calibration::Pivot;
 
 struct CalibrateTipOptions {
-  std::filesystem::path poses, spin;
+  std::filesystem::path poses, spin, body;
   std::string transform, reference, phases;
   PoseOptions poses_are;
   std::string server, bird = "pointer";
@@ -35,6 +35,7 @@ Result<PoseSet> read_set(const CalibrateTipOptions& options, const std::filesyst
   if (!how) return how.error();
   how->transform = options.transform;
   how->reference = options.reference;
+  how->body = options.body;
   return read_pose_set(path, *how);
 }
 
@@ -44,6 +45,7 @@ Result<TipInput> read_input(const CalibrateTipOptions& options) {
   if (!options.server.empty()) {
     if (!options.poses_are.field.empty())
       return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
+    if (!options.body.empty()) return Error{Errc::bad_value, "--body goes with --poses"};
     if (const auto fits = check_bound_record(options.results.record, options.server, {"tracker"}); !fits)
       return fits.error();
   }
@@ -116,6 +118,9 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
       ->check(CLI::Range(2.0, 600.0));
   tip.add_option("--transform,--tool", options->transform,
                  "the pointer's, in a sequence or NDI log of several, as StylusToTracker");
+  tip.add_option("--body", options->body,
+                 "the pointer's points, name,x,y,z a line: the poses are then tables of where these were tracked")
+      ->type_name("FILE");
   tip.add_option("--reference", options->reference,
                  "what the divot is fixed to, where it moves too, as ReferenceToTracker");
   tip.add_option("--phases", options->phases,

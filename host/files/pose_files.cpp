@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "calibration/base/units.hpp"
+#include "host/files/body_points.hpp"
 #include "host/files/name_order.hpp"
 #include "host/files/name_pattern.hpp"
 #include "host/files/ndi_log.hpp"
@@ -57,17 +58,20 @@ Result<PoseSet> read_pose_set(const fs::path& path, const PoseReading& how) {
   std::error_code ignored;
   const bool folder = fs::is_directory(path, ignored);
   const std::string name = path.filename().string();
-  const bool pattern = !folder && is_pattern(name);
-  if (!folder && !pattern && !fs::is_regular_file(path, ignored))
+  const bool many = folder || is_pattern(name);
+  if (!many && !fs::is_regular_file(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such file or folder", path.string())};
-  if (!folder && !pattern && is_sequence(path)) return read_sequence(path, how);
+  if (!how.body.empty() && many)
+    return Error{Errc::bad_value, fmt::format("{}: --body needs a table of the body's tracked points", path.string())};
+  if (!how.body.empty()) return read_body_poses(path, how);
+  if (!many && is_sequence(path)) return read_sequence(path, how);
   if (!how.reference.empty()) {
     return Error{Errc::bad_value, fmt::format("{}: holds no transforms, of which --reference needs two: give a "
                                               "PLUS sequence",
                                               path.string())};
   }
   if (folder) return read_folder(path, "*.txt", how);
-  if (pattern) return read_folder(path.has_parent_path() ? path.parent_path() : fs::path("."), name, how);
+  if (many) return read_folder(path.has_parent_path() ? path.parent_path() : fs::path("."), name, how);
   return is_ndi_log(path) ? read_ndi_log(path, how) : read_pose_table(path, how);
 }
 
