@@ -230,6 +230,7 @@ CameraCalibration put_together(const ModelFit& fit, const SoundViews& sound,
   CameraCalibration out;
   out.camera = fit.camera;
   out.model = fit.model;
+  out.pixel_aspect = settings.pixel_aspect;
   out.folds = fit.folds;
   out.sigma_between_views = fit.sigma_between_views;
   out.rms_px = fit.rms_px;
@@ -258,7 +259,7 @@ Result<CameraCalibration> calibrate_camera(std::span<const PatternView> views, i
   auto sound = sort_out(views, width_px, height_px);
   if (!sound) return sound.error();
   if (sound->views.size() < kLeastViews) return too_few_views(sound->views.size(), sound->rejected);
-  auto start = start_camera(*sound, width_px, height_px, settings.robust);
+  auto start = start_camera(*sound, width_px, height_px, settings.pixel_aspect, settings.robust);
   if (!start) return start.error();
   if (settings.robust) {
     if (const auto left_out = leave_out_outliers(*start, *sound); !left_out) return left_out.error();

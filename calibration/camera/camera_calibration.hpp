@@ -38,6 +38,8 @@ struct CameraCalibrationSettings {
   bool robust = true;
   int folds = 10;             ///< the views are held out in at most so many groups; one by one where there are fewer
   int columns = 8, rows = 6;  ///< cells of the picture, for coverage and regions
+  /// Width of a pixel over its height, as fy over fx is to be: 0.5 where pixels are twice as tall as wide.
+  double pixel_aspect = 1;
 };
 
 struct RejectedView {
@@ -99,6 +101,7 @@ struct CameraCalibration {
   double board_sag_mm = 0;
   /// The model with the least held-out error, where the views held out refute the one that was asked for.
   std::optional<LensModel> refuted_by;
+  double pixel_aspect = 1;   ///< as it was given
   std::string undetermined;  ///< what the views leave open, in words; empty where they determine all
   std::vector<Transform<Camera, Marker>> camera_from_marker;  ///< one per used view
   std::vector<FittedView> views;                              ///< used, in the order given

@@ -75,13 +75,15 @@ void judge_lens(const CameraCalibration& c, Verdict& verdict) {
   verdict.judge("picture centre known to", centre, "% of the width", 100 * limits::kCentreSigmaPass,
                 100 * limits::kCentreSigmaMarginal,
                 "turn the camera by quarter turns between views, with the board tilted");
-  const double aspect = c.camera.fx_px / c.camera.fy_px;
+  const double aspect = c.camera.fx_px / c.camera.fy_px, expected = 1 / c.pixel_aspect;
   // A pixel that is narrow has the larger focal length in pixels: alike for 1.2 and 1 / 1.2.
-  const double stretch = std::max(aspect, 1 / aspect) - 1;
+  const double stretch = std::max(aspect / expected, expected / aspect) - 1;
   if (!(stretch <= limits::kAspectPass)) {
     verdict.add(stretch <= limits::kAspectMarginal ? Grade::marginal : Grade::fail,
-                fmt::format("wrong aspect: fx is {:.2f} of fy, where square pixels have 1", aspect),
-                "check that the board's pitch is the same both ways and that the grabber does not stretch the picture");
+                fmt::format("wrong aspect: fx is {:.2f} of fy, where {} pixels have {:.3g}", aspect,
+                            expected == 1 ? "square" : "these", expected),
+                "check that the board's pitch is the same both ways; where the grabber stretches or squeezes the "
+                "picture, give --pixel-aspect");
   }
 }
 

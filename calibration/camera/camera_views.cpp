@@ -139,21 +139,22 @@ FlatView flat_part(const SoundView& view, int width_px, bool robust) {
   return 2 * flat.board.size() > all.board.size() && flat.board.size() >= kLeastPoints ? flat : FlatView{};
 }
 
-CameraModel first_lens(const std::vector<FlatView>& flat, int width_px, int height_px) {
+CameraModel first_lens(const std::vector<FlatView>& flat, int width_px, int height_px, double pixel_aspect) {
   std::vector<std::vector<cv::Point3f>> boards;
   std::vector<std::vector<cv::Point2f>> pixels;
   for (const FlatView& view : flat) {
     boards.push_back(view.board);
     pixels.push_back(view.pixels);
   }
-  const cv::Mat matrix = cv::initCameraMatrix2D(boards, pixels, cv::Size(width_px, height_px), 1.0);
+  const cv::Mat matrix = cv::initCameraMatrix2D(boards, pixels, cv::Size(width_px, height_px), 1 / pixel_aspect);
   CameraModel camera;
   camera.width_px = width_px;
   camera.height_px = height_px;
   const double focal = matrix.at<double>(0, 0);
   // Boards that all face the camera leave the closed form without an answer, or with one far off.
   const bool likely = focal > 0.1 * width_px && focal < 50.0 * width_px;
-  camera.fx_px = camera.fy_px = likely ? focal : width_px;
+  camera.fx_px = likely ? focal : width_px;
+  camera.fy_px = pixel_aspect * camera.fx_px;
   camera.cx_px = (width_px - 1) / 2.0;
   camera.cy_px = (height_px - 1) / 2.0;
   return camera;
@@ -207,7 +208,7 @@ Result<SoundViews> sort_out(std::span<const PatternView> views, int width_px, in
   return out;
 }
 
-Result<CameraModel> start_camera(SoundViews& sound, int width_px, int height_px, bool robust) {
+Result<CameraModel> start_camera(SoundViews& sound, int width_px, int height_px, double pixel_aspect, bool robust) {
   try {
     std::vector<SoundView> kept;
     std::vector<FlatView> flat;
@@ -222,7 +223,7 @@ Result<CameraModel> start_camera(SoundViews& sound, int width_px, int height_px,
       kept.push_back(std::move(view));
     }
     if (kept.size() < kLeastViews) return too_few_views(kept.size(), sound.rejected);
-    const CameraModel camera = first_lens(flat, width_px, height_px);
+    const CameraModel camera = first_lens(flat, width_px, height_px, pixel_aspect);
     sound.views.clear();
     for (std::size_t v = 0; v < kept.size(); ++v) {
       const auto pose = first_pose(flat[v], camera);

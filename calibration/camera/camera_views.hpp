@@ -28,9 +28,9 @@ struct SoundViews {
 /// views were handed over, so that results are the same to the bit.
 Result<SoundViews> sort_out(std::span<const PatternView> views, int width_px, int height_px);
 
-/// A first lens without distortion, and each view's pose with it. A view whose points lie on no flat board is moved to
-/// `rejected` if robust. Errc::degenerate with fewer than three views.
-Result<CameraModel> start_camera(SoundViews& views, int width_px, int height_px, bool robust);
+/// A first lens without distortion, whose fy is pixel_aspect of fx, and each view's pose with it. A view whose points
+/// lie on no flat board is moved to `rejected` if robust. Errc::degenerate with fewer than three views.
+Result<CameraModel> start_camera(SoundViews& views, int width_px, int height_px, double pixel_aspect, bool robust);
 
 /// The error where too few views are usable: how many there are, and what was wrong with the others.
 Error too_few_views(std::size_t usable, const std::vector<RejectedView>& rejected);

@@ -10,8 +10,8 @@
 #include "host/calibrate/camera_report.hpp"
 #include "host/calibrate/picture_views.hpp"
 #include "host/calibrate/view_pairs.hpp"
-#include "host/files/picture.hpp"
-#include "host/files/point_files.hpp"
+#include "host/files/camera_covariance.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 
@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using namespace calibration;
 
 struct CameraOptions {
-  std::string board, model = "auto", size;
+  std::string board, model = "auto", size, pixel_aspect = "1";
   std::vector<fs::path> images, right_images;
   fs::path points, right_points;
   bool plain = false;
@@ -40,52 +40,33 @@ struct CameraInput {
   std::string note;  ///< how the pattern was read, where otherwise than told
 };
 
-/// Of a picture that lies beside the points.
-Result<Eigen::Vector2i> size_beside(const fs::path& folder) {
-  std::error_code failed;
-  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
-    if (const std::string ending = at->path().extension().string(); ending != ".png" && ending != ".jpg") continue;
-    if (const auto picture = read_picture(at->path())) return Eigen::Vector2i(picture->width_px, picture->height_px);
-  }
-  return Error{Errc::bad_value, folder.string() + ": no picture there tells its size: give --size WIDTHxHEIGHT"};
-}
-
-Result<Eigen::Vector2i> size_of(const std::string& text) {
-  Eigen::Vector2i size(0, 0);
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &size.x(), &size.y(), &rest) != 2 || size.minCoeff() <= 0)
-    return Error{Errc::bad_value, fmt::format("--size {}: give it as 1920x1080", text)};
-  return size;
-}
-
-Result<CameraInput> input_of_points(const fs::path& folder, const std::string& size) {
-  auto views = read_point_views(folder);
-  if (!views) return views.error();
-  const auto px = size.empty() ? size_beside(folder) : size_of(size);
-  if (!px) return px.error();
-  return CameraInput{*std::move(views), {}, px->x(), px->y(), {}};
-}
-
-Result<CameraInput> input_of_pictures(const std::string& board, const std::vector<fs::path>& images) {
-  const auto pattern = parse_pattern(board);
-  if (!pattern) return pattern.error();
-  auto found = read_picture_views(*pattern, images);
-  if (!found) return found.error();
-  CameraInput out{std::move(found->used), {}, found->width_px, found->height_px, found->note};
-  for (const auto& [name, reason] : found->rejected) out.rejected.push_back({0, name, reason});
+CameraInput input_of_views(PictureViews views) {
+  CameraInput out{std::move(views.used), {}, views.width_px, views.height_px, views.note};
+  for (const auto& [name, reason] : views.rejected) out.rejected.push_back({0, name, reason});
   return out;
 }
 
-Result<CameraInput> input_of(const CameraOptions& options, bool right) {
+Result<PictureViews> views_of(const CameraOptions& options, bool right, double pixel_aspect) {
   const fs::path& points = right ? options.right_points : options.points;
-  if (!points.empty()) return input_of_points(points, options.size);
+  if (!points.empty()) return read_found_views(points, options.size);
   if (options.board.empty()) return Error{Errc::bad_value, "--images: give --board too, as chessboard:14x10:3mm"};
-  return input_of_pictures(options.board, right ? options.right_images : options.images);
+  const auto pattern = parse_pattern(options.board);
+  if (!pattern) return pattern.error();
+  return read_picture_views(*pattern, right ? options.right_images : options.images, pixel_aspect);
+}
+
+Result<CameraInput> input_of(const CameraOptions& options, bool right, double pixel_aspect) {
+  auto views = views_of(options, right, pixel_aspect);
+  if (!views) return views.error();
+  return input_of_views(*std::move(views));
 }
 
 Result<CameraCalibrationSettings> settings_of(const CameraOptions& options) {
   CameraCalibrationSettings settings;
   settings.robust = !options.plain;
+  const auto aspect = parse_pixel_aspect(options.pixel_aspect);
+  if (!aspect) return aspect.error();
+  settings.pixel_aspect = *aspect;
   if (options.model == "auto") return settings;
   settings.model = lens_model_of(options.model);
   if (!settings.model) {
@@ -118,8 +99,12 @@ void finish_without(const CameraOptions& options, const Error& error, const Came
 void finish_with(const CameraOptions& options, const CameraCalibration& found, nlohmann::json json, HtmlPage page,
                  const Verdict& verdict, CommandStatus& status) {
   if (options.rod_angle_deg) json["rod_angle_deg"] = *options.rod_angle_deg;
-  const std::string made_from =
+  std::string made_from =
       fmt::format("{}, {} views", options.board.empty() ? options.points.string() : options.board, found.views.size());
+  if (found.pixel_aspect != 1) {
+    json["pixel_aspect"] = found.pixel_aspect;
+    made_from += fmt::format(", pixel aspect {:.4g}", found.pixel_aspect);
+  }
   const RecordEntry entry{made_from, [&](CalibrationRecord& record, const Provenance& provenance) {
                             enter_lens(record, {provenance, found.camera, name_of(found.model), found.covariance,
                                                 found.rms_px, found.held_out_px, options.rod_angle_deg});
@@ -198,11 +183,11 @@ void run_camera(const CameraOptions& options, CommandStatus& status) {
   if (!settings) return status.refuse(settings.error());
   if (options.points.empty() == options.images.empty())
     return status.refuse({Errc::bad_value, "give either --images or --points"});
-  const auto left = input_of(options, false);
+  const auto left = input_of(options, false, settings->pixel_aspect);
   if (!left) return status.refuse(left.error());
   if (options.right_points.empty() && options.right_images.empty())
     return calibrate_one(options, *settings, *left, status);
-  const auto right = input_of(options, true);
+  const auto right = input_of(options, true, settings->pixel_aspect);
   if (!right) return status.refuse(right.error());
   calibrate_two(options, *settings, *left, *right, status);
 }
@@ -228,6 +213,10 @@ void add_calibrate_camera(CLI::App& calibrate, CommandStatus& status) {
       ->add_option("--model", options->model,
                    "auto, pinhole, radial1, radial2, radial2_tangential2 or radial3_tangential2")
       ->type_name("NAME");
+  command
+      ->add_option("--pixel-aspect", options->pixel_aspect,
+                   "a pixel's width over its height: 0.5 (or 1:2) of field-squeezed video, as 1920x540")
+      ->type_name("RATIO");
   command->add_flag("--plain", options->plain, "plain least squares: nothing that does not fit is left out");
   command->add_option("--rod-angle-deg", options->rod_angle_deg,
                       "of an oblique scope: at what the rod stood against the camera head (kept with the result)");

@@ -12,6 +12,9 @@
 #include "host/calibrate/hand_eye_report.hpp"
 #include "host/calibrate/hand_eye_rod.hpp"
 #include "host/calibrate/hand_eye_solution.hpp"
+#include "host/calibrate/picture_views.hpp"
+#include "host/files/camera_covariance.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/guide/live_hand_eye.hpp"
 #include "host/link/appliance_hardware.hpp"
@@ -27,6 +30,7 @@ struct CalibrateHandEyeOptions {
   LivePlan plan;
   PoseOptions poses_are;
   std::vector<double> at;
+  std::string pixel_aspect = "1";
   double position_sigma_mm = 0, angle_sigma_deg = 0;
   ResultPaths results;
 };
@@ -34,11 +38,14 @@ struct CalibrateHandEyeOptions {
 Result<void> check_right(const HandEyeFiles& files) {
   if (files.right_camera.empty() != files.right_from_left.empty())
     return Error{Errc::bad_value, "give --right-camera and --right-from-left together"};
-  if (files.right_images.empty()) {
+  if (files.right_images.empty() && files.right_points.empty()) {
     if (files.right_camera.empty()) return {};
     return Error{Errc::bad_value, "--right-images is missing: which pictures are the right camera's?"};
   }
-  if (files.images.empty()) return Error{Errc::bad_value, "--right-images goes with --images, the left camera's"};
+  if (files.points.empty() != files.right_points.empty() || !files.right_images.empty() == !files.right_points.empty())
+    return Error{Errc::bad_value, "--right-points goes with --points, the left camera's"};
+  if (files.images.empty() && files.points.empty())
+    return Error{Errc::bad_value, "--right-images goes with --images, the left camera's"};
   if (files.camera.empty() == files.right_camera.empty()) return {};
   return Error{Errc::bad_value,
                "with --right-images give --camera, --right-camera and --right-from-left, or none of them: both lenses "
@@ -47,17 +54,21 @@ Result<void> check_right(const HandEyeFiles& files) {
 
 Result<void> check(const CalibrateHandEyeOptions& options) {
   const HandEyeFiles& files = options.files;
-  const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.eye_poses.empty() ? 0 : 1);
-  if (sources != 1) return Error{Errc::bad_value, "give one of --images (with --board), --eye-poses and --live"};
-  if (files.eye_poses.empty() && files.board.empty())
+  const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.points.empty() ? 0 : 1) +
+                      (files.eye_poses.empty() ? 0 : 1);
+  if (sources != 1)
+    return Error{Errc::bad_value, "give one of --images (with --board), --points, --eye-poses and --live"};
+  if (files.eye_poses.empty() && files.points.empty() && files.board.empty())
     return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
   if (!options.live && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
   if (const auto sound = check_right(files); !sound) return sound.error();
   if (!options.at.empty() && files.eye_poses.empty())
     return Error{Errc::bad_value, "--at goes with --eye-poses, in whose world it is"};
-  if (!options.rod_angles.empty() && files.images.empty())
+  if (!options.rod_angles.empty() && files.images.empty() && files.points.empty())
     return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
+  if (files.pixel_aspect != 1 && files.images.empty() && files.points.empty())
+    return Error{Errc::bad_value, "--pixel-aspect goes with --images"};
   if (options.live && !options.poses_are.field.empty())
     return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
@@ -139,8 +150,11 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
 /// Hand-eye, and the lens it was found with where that is new.
 RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording,
                      const HandEyeFound& found) {
-  const std::string what =
-      options.files.board.empty() ? options.files.eye_poses.filename().string() : options.files.board;
+  const HandEyeFiles& files = options.files;
+  std::string what = !files.board.empty()    ? files.board
+                     : !files.points.empty() ? files.points.filename().string()
+                                             : files.eye_poses.filename().string();
+  if (files.pixel_aspect != 1) what += fmt::format(", pixel aspect {:.4g}", files.pixel_aspect);
   return {fmt::format("{}, {} stations", what, recording.input.stations.size()),
           [&](calibration::CalibrationRecord& record, const calibration::Provenance& provenance) {
             if (const auto& lens = recording.lens) {
@@ -169,6 +183,7 @@ void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& reco
                std::abs(late_ms), 1000 * result.time_offset_sigma_s, late_ms > 0 ? "late" : "early");
   }
   nlohmann::json json = hand_eye_json(result, recording);
+  if (options.files.pixel_aspect != 1) json["pixel_aspect"] = options.files.pixel_aspect;
   HtmlPage page = hand_eye_page(result, recording);
   if (found.rod) {
     json["rod"] = rod_json(*found.rod);
@@ -180,6 +195,9 @@ void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& reco
 
 void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
   HandEyeFiles& files = options.files;
+  const auto aspect = parse_pixel_aspect(options.pixel_aspect);
+  if (!aspect) return status.refuse(aspect.error());
+  files.pixel_aspect = *aspect;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
   if (const auto read = read_how(options); !read) return status.refuse(read.error());
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
@@ -213,6 +231,13 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   CLI::App* command = calibrate.add_subcommand("hand-eye", "where the camera sits on its sensor");
   command->add_option("--board", files.board, "pattern in the pictures, as chessboard:14x10:3mm")->type_name("SPEC");
   command->add_option("--images", files.images, "pictures of the board, or folders of them")->type_name("PATH");
+  command->add_option("--points", files.points, "a folder of points that were found before, in place of pictures")
+      ->type_name("FOLDER");
+  command->add_option("--size", files.size, "of the pictures that --points come from, as 1920x1080")->type_name("WxH");
+  command
+      ->add_option("--pixel-aspect", options->pixel_aspect,
+                   "a pixel's width over its height: 0.5 (or 1:2) of field-squeezed video, as 1920x540")
+      ->type_name("RATIO");
   command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
   command->add_option("--transform,--tool", files.of_sensor.transform,
                       "which of a sequence's transforms, or of an NDI log's tools, that is");
@@ -226,10 +251,13 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("PATH");
   command->add_option("--board-transform,--board-tool", files.of_board.transform,
                       "which of a sequence's transforms, or of an NDI log's tools, that is");
-  command->add_option("--camera", files.camera, "lens (OpenCV YAML); without it, calibrated from the pictures")
+  command
+      ->add_option("--camera", files.camera,
+                   "lens (of OpenCV, ROS or Kalibr); without it, calibrated from the pictures")
       ->type_name("FILE");
   command->add_option("--right-images", files.right_images, "the right camera's, which pair with --images by name")
       ->type_name("PATH");
+  command->add_option("--right-points", files.right_points, "the right camera's points, likewise")->type_name("FOLDER");
   command->add_option("--right-camera", files.right_camera, "the right lens, as --camera")->type_name("FILE");
   command
       ->add_option("--right-from-left", files.right_from_left,

@@ -11,6 +11,7 @@
 #include "host/app/commands.hpp"
 #include "host/demo/demo_session.hpp"
 #include "host/demo/demo_verdict.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"

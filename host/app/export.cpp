@@ -8,6 +8,7 @@
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/app/export_lens.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
 #include "host/files/text_files.hpp"
@@ -206,9 +207,12 @@ void add_export(CLI::App& app, CommandStatus& status) {
   add_ct_options(command, options->volume);
   command.add_option("--frame", options->frame, "where the CT is brought: tracker (default) or patient")
       ->check(CLI::IsMember({"tracker", "patient"}));
-  command.add_option("--out", options->out, "folder")->required();
+  command.add_option("--out", options->out, "folder");
   command.add_option("--json", options->json, "write the figures to this file too");
-  command.callback([options, &status] {
+  const CLI::App* const lens = add_export_lens(command, status);
+  command.callback([options, &command, lens, &status] {
+    if (command.got_subcommand(lens)) return;
+    if (options->out.empty()) return status.refuse({Errc::bad_value, "export: give --out, a folder"});
     const auto done = run(*options);
     done ? void(status.code = *done) : status.refuse(done.error());
   });

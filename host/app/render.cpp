@@ -9,6 +9,7 @@
 
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -199,8 +200,8 @@ void add_render(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<RenderOptions>();
   CLI::App& command = *app.add_subcommand("render", "render a CT to a PNG");
   command.add_option("--volume", options->volume.path, "DICOM folder, NIfTI, NRRD, MHA or MHD")->required();
-  CLI::Option* const camera = command.add_option("--camera", options->camera,
-                                                 "lens, OpenCV YAML; without it a view that shows the whole volume");
+  CLI::Option* const camera = command.add_option(
+      "--camera", options->camera, "lens (of OpenCV, ROS or Kalibr); without it a view that shows the whole volume");
   command
       .add_option("--display", options->display,
                   "distorted, as the lens took it (default), undistorted, the centre to scale, or undistorted-whole")

@@ -142,7 +142,8 @@ void add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("recording", inputs.recording, "a session recording (a folder), or a .igs.mha")->required();
   command.add_option("--transform", inputs.transform, "of a .igs.mha: which transform is the scope's");
   command.add_option("--calibration", inputs.calibration, "the calibration record (default: the recording's own)");
-  command.add_option("--camera", inputs.camera, "lens, OpenCV YAML, in place of the calibration record's");
+  command.add_option("--camera", inputs.camera,
+                     "lens (of OpenCV, ROS or Kalibr), in place of the calibration record's");
   command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm");
   command.add_option("--registration", inputs.patient_from_tracker, "patient_from_tracker, of register fiducials");
   command.add_option("--tracker-from-patient", inputs.tracker_from_patient, "its inverse, as the demo writes it");

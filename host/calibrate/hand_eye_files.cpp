@@ -176,14 +176,16 @@ Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
 }  // namespace
 
 Result<HandEyeRecording> read_hand_eye_stations(const HandEyeFiles& files) {
-  if (files.images.empty()) {
+  if (files.images.empty() && files.points.empty()) {
     auto recording = read_eye_poses(files);
     if (recording) judge_at(files.at_mm, *recording);
     return recording;
   }
   HandEyeRecording out;
   if (const auto read = read_hand_eye_pictures(files, out); !read) return read.error();
-  if (const auto added = add_poses(files, out.input.stations, "pictures", out.notes); !added) return added.error();
+  if (const auto added = add_poses(files, out.input.stations, files.points.empty() ? "pictures" : "views", out.notes);
+      !added)
+    return added.error();
   return out;
 }
 

@@ -16,7 +16,10 @@ namespace birdseye::host {
 /// Where the stations of a hand-eye calibration lie.
 struct HandEyeFiles {
   std::string board;                                    ///< SPEC
-  std::vector<std::filesystem::path> images;            ///< none: eye_poses
+  std::vector<std::filesystem::path> images;            ///< none: points or eye_poses
+  std::filesystem::path points, right_points;           ///< folders of points found before, in place of images
+  std::string size;                                     ///< of the pictures that these come from, as "1920x1080"
+  double pixel_aspect = 1;                              ///< width of a pixel over its height
   std::filesystem::path camera;                         ///< empty: calibrated from the images
   std::vector<std::filesystem::path> right_images;      ///< of a stereo scope's second camera
   std::filesystem::path right_camera, right_from_left;  ///< both, or neither: calibrated from the images

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host/calibrate/view_pairs.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -22,7 +23,7 @@ Result<StereoLens> read_stereo_lens(const HandEyeFiles& files, const PictureView
     return Error{Errc::bad_value,
                  fmt::format("{}: a camera of {}x{} for right pictures of {}x{}", files.right_camera.string(),
                              camera->width_px, camera->height_px, pictures.width_px, pictures.height_px)};
-  const auto matrix = read_pose(files.right_from_left);
+  const auto matrix = read_camera_relation(files.right_from_left);
   if (!matrix) return matrix.error();
   return StereoLens{*camera, Transform<RightCamera, Camera>::from_matrix(*matrix)};
 }
@@ -40,9 +41,10 @@ std::vector<double> distances_px(const StereoLens& right, const Transform<Camera
 
 }  // namespace
 
-Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const calibration::Pattern& pattern,
+Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const std::optional<calibration::Pattern>& pattern,
                                           const std::vector<PatternView>& left, std::vector<std::string>& notes) {
-  auto pictures = read_picture_views(pattern, files.right_images);
+  auto pictures = files.right_points.empty() ? read_picture_views(*pattern, files.right_images, files.pixel_aspect)
+                                             : read_found_views(files.right_points, files.size);
   if (!pictures) return pictures.error();
   RightPictures out{std::move(pictures->used), pictures->width_px, pictures->height_px, std::nullopt};
   for (const auto& rejected : pictures->rejected) {

@@ -5,7 +5,8 @@
 
 namespace birdseye::host {
 
-/// The second camera's pictures, and its lens where that is given: files.right_images and what goes with them.
+/// The second camera's pictures, and its lens where that is given: files.right_images or right_points, and what goes
+/// with them.
 struct RightPictures {
   std::vector<calibration::PatternView> views;  ///< [i] shows the moment of left[i]; without points: not found
   int width_px = 0, height_px = 0;
@@ -13,7 +14,7 @@ struct RightPictures {
 };
 
 /// Reads the right pictures, which pair with the left ones by name. Notes tell in which the board is not found.
-Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const calibration::Pattern& pattern,
+Result<RightPictures> read_right_pictures(const HandEyeFiles& files, const std::optional<calibration::Pattern>& pattern,
                                           const std::vector<calibration::PatternView>& left,
                                           std::vector<std::string>& notes);
 

@@ -6,10 +6,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "calibration/detect/detect.hpp"
 #include "host/files/name_order.hpp"
+#include "host/files/name_pattern.hpp"
+#include "host/files/picture.hpp"
+#include "host/files/point_files.hpp"
 
 namespace birdseye::host {
 
@@ -19,7 +25,7 @@ namespace fs = std::filesystem;
 
 bool is_picture(const fs::path& path) {
   const std::string ending = path.extension().string();
-  return std::ranges::any_of(std::array{".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"},
+  return std::ranges::any_of(std::array{".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm"},
                              [&](const char* known) { return ::strcasecmp(ending.c_str(), known) == 0; });
 }
 
@@ -27,6 +33,14 @@ Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or
   std::vector<fs::path> pictures;
   for (const fs::path& path : images_or_folders) {
     std::error_code failure;
+    if (!fs::exists(path, failure) && is_pattern(path.filename().string())) {
+      const auto found =
+          files_matching(path.has_parent_path() ? path.parent_path() : fs::path("."), path.filename().string());
+      if (!found) return found.error();
+      if (found->empty()) return Error{Errc::not_found, path.string() + ": no file matches"};
+      pictures.insert(pictures.end(), found->begin(), found->end());
+      continue;
+    }
     if (!fs::is_directory(path, failure)) {
       if (!fs::exists(path, failure)) return Error{Errc::not_found, path.string() + ": no such file or folder"};
       pictures.push_back(path);
@@ -48,19 +62,41 @@ struct Looked {
   calibration::Detection detection;
 };
 
-Looked look(const calibration::Pattern& pattern, const fs::path& path) {
+/// The picture as square pixels would show it: the axis along which pixels are longer gets more of them.
+cv::Mat with_square_pixels(const cv::Mat& grey, double pixel_aspect) {
+  if (pixel_aspect == 1) return grey;
+  const double wider = std::max(1.0, pixel_aspect), taller = std::max(1.0, 1 / pixel_aspect);
+  const cv::Size size(static_cast<int>(std::lround(wider * grey.cols)),
+                      static_cast<int>(std::lround(taller * grey.rows)));
+  cv::Mat out;
+  cv::resize(grey, out, size, 0, 0, cv::INTER_CUBIC);
+  return out;
+}
+
+/// Where points of the stretched picture are in the one it was made of: pixel centres are whole numbers in both.
+void bring_back(const cv::Mat& stretched, const cv::Mat& grey, calibration::PatternView& view) {
+  const Eigen::Array2d per_px(static_cast<double>(grey.cols) / stretched.cols,
+                              static_cast<double>(grey.rows) / stretched.rows);
+  for (Eigen::Vector2d& p : view.points_px) p = (p.array() + 0.5) * per_px - 0.5;
+}
+
+Looked look(const calibration::Pattern& pattern, const fs::path& path, double pixel_aspect) {
   Looked looked;
   const cv::Mat grey = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;
-  looked.detection = detect(pattern, {{grey.data, grey.total()}, grey.cols, grey.rows}, path.filename().string());
+  const cv::Mat square = with_square_pixels(grey, pixel_aspect);
+  looked.detection =
+      detect(pattern, {{square.data, square.total()}, square.cols, square.rows}, path.filename().string());
+  if (looked.detection.view) bring_back(square, grey, *looked.detection.view);
   return looked;
 }
 
-std::vector<Looked> look_at_all(const calibration::Pattern& pattern, const std::vector<fs::path>& pictures) {
+std::vector<Looked> look_at_all(const calibration::Pattern& pattern, const std::vector<fs::path>& pictures,
+                                double pixel_aspect) {
   std::vector<Looked> looked(pictures.size());
-  tbb::parallel_for(std::size_t{0}, looked.size(), [&](std::size_t i) { looked[i] = look(pattern, pictures[i]); });
+  tbb::parallel_for(std::size_t{0}, looked.size(), [&](std::size_t i) { looked[i] = look(pattern, pictures[i], pixel_aspect); });
   return looked;
 }
 
@@ -74,18 +110,36 @@ bool has_other_layout(const std::vector<Looked>& looked) {
   return all.is_other();
 }
 
+/// Of a picture that lies beside the points.
+Result<Eigen::Vector2i> size_beside(const fs::path& folder) {
+  std::error_code failed;
+  for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
+    if (!is_picture(at->path())) continue;
+    if (const auto picture = read_picture(at->path())) return Eigen::Vector2i(picture->width_px, picture->height_px);
+  }
+  return Error{Errc::bad_value, folder.string() + ": no picture there tells its size: give --size WIDTHxHEIGHT"};
+}
+
+Result<Eigen::Vector2i> size_of(const std::string& text) {
+  Eigen::Vector2i size(0, 0);
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%c", &size.x(), &size.y(), &rest) != 2 || size.minCoeff() <= 0)
+    return Error{Errc::bad_value, fmt::format("--size {}: give it as 1920x1080", text)};
+  return size;
+}
+
 }  // namespace
 
 Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
-                                        const std::vector<fs::path>& images_or_folders) {
+                                        const std::vector<fs::path>& images_or_folders, double pixel_aspect) {
   const auto pictures = pictures_of(images_or_folders);
   if (!pictures) return pictures.error();
-  std::vector<Looked> looked = look_at_all(pattern, *pictures);
+  std::vector<Looked> looked = look_at_all(pattern, *pictures, pixel_aspect);
   PictureViews views;
   if (has_other_layout(looked)) {
     calibration::Pattern other = pattern;
     other.legacy = !pattern.legacy;
-    looked = look_at_all(other, *pictures);
+    looked = look_at_all(other, *pictures, pixel_aspect);
     views.note = fmt::format("the board's tags lie as in the {} layout: it was read as {}, {} :legacy",
                              other.legacy ? "old" : "new", pattern.spec, other.legacy ? "with" : "without");
   }
@@ -113,6 +167,27 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
     }
   }
   return views;
+}
+
+Result<PictureViews> read_found_views(const fs::path& folder, const std::string& size) {
+  auto views = read_point_views(folder);
+  if (!views) return views.error();
+  const auto px = size.empty() ? size_beside(folder) : size_of(size);
+  if (!px) return px.error();
+  return PictureViews{*std::move(views), {}, px->x(), px->y()};
+}
+
+Result<double> parse_pixel_aspect(const std::string& text) {
+  constexpr double kMost = 8;
+  double width = 0, height = 1;
+  char rest = 0;
+  const bool ratio = std::sscanf(text.c_str(), "%lf:%lf%c", &width, &height, &rest) == 2;
+  const bool number = !ratio && std::sscanf(text.c_str(), "%lf%c", &width, &rest) == 1;
+  if (!ratio) height = 1;
+  const double aspect = width / height;
+  if ((ratio || number) && aspect >= 1 / kMost && aspect <= kMost) return aspect;
+  return Error{Errc::bad_value,
+               fmt::format("--pixel-aspect {}: give a pixel's width over its height, as 0.5 or 1:2", text)};
 }
 
 }  // namespace birdseye::host

@@ -12,6 +12,7 @@
 #include <toml.hpp>
 
 #include "host/case/named_landmarks.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
 #include "host/registration/similarity/similarity.hpp"

@@ -1,4 +1,5 @@
 #include "host/operation/operation.hpp"
+#include "host/files/camera_files.hpp"
 
 #include <fmt/format.h>
 

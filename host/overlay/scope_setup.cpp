@@ -1,4 +1,5 @@
 #include "host/overlay/scope_setup.hpp"
+#include "host/files/camera_files.hpp"
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "calibration/record/calibration_record.hpp"

@@ -280,7 +280,7 @@ TEST(CalibrateHandEyeCommand, NamesBothCountsWherePicturesAndPosesDoNotPair) {
 TEST(CalibrateHandEyeCommand, RefusesUsageThatMakesNoSense) {
   const auto neither = run("birdseye", "calibrate hand-eye --poses .");
   EXPECT_EQ(neither.code, 2);
-  EXPECT_THAT(neither.output, HasSubstr("give one of --images (with --board), --eye-poses and --live"));
+  EXPECT_THAT(neither.output, HasSubstr("give one of --images (with --board), --points, --eye-poses and --live"));
   const auto no_board = run("birdseye", "calibrate hand-eye --poses . --images .");
   EXPECT_EQ(no_board.code, 2);
   EXPECT_THAT(no_board.output, HasSubstr("--board is missing"));

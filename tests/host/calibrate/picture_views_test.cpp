@@ -82,6 +82,79 @@ TEST(PictureViews, FilesGivenInAnyOrderComeInOne) {
   EXPECT_EQ(views->used[0].name, "3.png");
 }
 
+TEST(PictureViews, PortablePixmapsAndPatternsInNames) {
+  const Scratch scratch;
+  for (const char* name : {"left1.ppm", "left10.PGM", "left2.pgm", "right1.png"}) {
+    const bool colour = std::string(name).ends_with("ppm");
+    cv::Mat picture = board(480, 400);
+    if (colour) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
+    write(scratch, name, picture);
+  }
+  const auto names_of = [](const Result<PictureViews>& views) {
+    std::vector<std::string> names;
+    for (const auto& view : views->used) names.push_back(view.name);
+    return names;
+  };
+  const auto folder = read_picture_views(pattern(), {scratch.path()});
+  ASSERT_TRUE(folder) << folder.error().what;
+  EXPECT_EQ(folder->used.size(), 4U);
+  EXPECT_EQ(names_of(read_picture_views(pattern(), {scratch / "left*"})),
+            (std::vector<std::string>{"left1.ppm", "left2.pgm", "left10.PGM"}));
+  EXPECT_EQ(names_of(read_picture_views(pattern(), {scratch / "left?.p?m"})),
+            (std::vector<std::string>{"left1.ppm", "left2.pgm"}));
+  const auto none = read_picture_views(pattern(), {scratch / "middle*"});
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().what.find("middle*: no file matches"), std::string::npos);
+}
+
+/// Rows of a picture in pairs, as a field of interlaced video has them.
+cv::Mat squeezed(const cv::Mat& picture) {
+  cv::Mat out;
+  cv::resize(picture, out, {picture.cols, picture.rows / 2}, 0, 0, cv::INTER_AREA);
+  return out;
+}
+
+TEST(PictureViews, PointsOfASqueezedPictureAreThoseOfThePictureAsItIs) {
+  const Scratch scratch;
+  write(scratch, "whole.png", board(480, 400));
+  write(scratch, "field.png", squeezed(board(480, 400)));
+  const auto whole = read_picture_views(pattern(), {scratch / "whole.png"});
+  const auto field = read_picture_views(pattern(), {scratch / "field.png"}, 0.5);
+  ASSERT_TRUE(whole && field);
+  ASSERT_EQ(field->used.size(), 1U) << field->rejected[0].reason;
+  EXPECT_EQ(field->height_px, 200);
+  for (std::size_t i = 0; i < 35; ++i) {
+    const Eigen::Vector2d p = whole->used[0].points_px[i];
+    EXPECT_EQ(field->used[0].ids[i], whole->used[0].ids[i]);
+    EXPECT_LT((field->used[0].points_px[i] - Eigen::Vector2d(p.x(), (p.y() + 0.5) / 2 - 0.5)).norm(), 0.05) << i;
+  }
+}
+
+TEST(PictureViews, SqueezedDotsAreFoundByTheAspectOnly) {
+  const Scratch scratch;
+  cv::Mat dots(480, 640, CV_8U, cv::Scalar(220));
+  for (int i = 0; i < 9 * 7; ++i) cv::circle(dots, {80 + 60 * (i % 9), 60 + 60 * (i / 9)}, 14, 30, cv::FILLED);
+  cv::GaussianBlur(dots, dots, {0, 0}, 0.8);
+  write(scratch, "field.png", squeezed(dots));
+  const auto grid = *calibration::parse_pattern("dots:9x7:4mm");
+  const auto field = read_picture_views(grid, {scratch / "field.png"}, 0.5);
+  ASSERT_TRUE(field);
+  ASSERT_EQ(field->used.size(), 1U) << field->rejected[0].reason;
+  for (std::size_t i = 0; i < 63; ++i) {
+    const auto& view = field->used[0];
+    const Eigen::Vector2d p(80 + 60.0 * (view.ids[i] % 9), 60 + 60.0 * (view.ids[i] / 9));
+    EXPECT_LT((view.points_px[i] - Eigen::Vector2d(p.x(), (p.y() + 0.5) / 2 - 0.5)).norm(), 0.05) << i;
+  }
+}
+
+TEST(PictureViews, AnAspectIsANumberOrARatio) {
+  EXPECT_EQ(*parse_pixel_aspect("0.5"), 0.5);
+  EXPECT_EQ(*parse_pixel_aspect("1:2"), 0.5);
+  EXPECT_EQ(*parse_pixel_aspect("2"), 2);
+  for (const char* text : {"", "half", "1:0", "0", "-1", "nan", "0.5x", "1:2:3", "100"})
+    EXPECT_FALSE(parse_pixel_aspect(text)) << text;
+}
+
 TEST(PictureViews, TwoSizesAreAnErrorThatNamesBoth) {
   const Scratch scratch;
   write(scratch, "a1.png", board(480, 400));

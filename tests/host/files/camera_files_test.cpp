@@ -1,0 +1,129 @@
+#include "host/files/camera_files.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+
+#include "calibration/geometry/rotations.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::Scratch;
+
+const CameraModel kLens{1920, 1080, 1234.5678901234567, 1233.25, 955.125, 540.75, -0.31, 0.105, 0.0011, -0.00052, 0.02};
+
+CameraModel without_k3() {
+  CameraModel out = kLens;
+  out.k3 = 0;
+  return out;
+}
+
+Result<CameraModel> read_lens_text(const std::string& text, const std::string& camera = {}) {
+  const Scratch scratch;
+  return read_camera(scratch.file("lens.yaml", text) + camera);
+}
+
+TEST(CameraFiles, WhatIsWrittenIsReadBackExactly) {
+  EXPECT_EQ(*read_lens_text(camera_text(kLens)), kLens);
+  EXPECT_EQ(*read_lens_text(ros_camera_text(kLens, "scope: \"left\" #1")), kLens);
+  const auto kalibr = kalibr_text(without_k3());
+  ASSERT_TRUE(kalibr);
+  EXPECT_EQ(*read_lens_text(*kalibr), without_k3());
+  const auto none = kalibr_text(kLens);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().what, HasSubstr("k3 = 0.02"));
+}
+
+TEST(CameraFiles, APairOfKalibrIsReadCameraByCameraAndInMm) {
+  CameraModel right = without_k3();
+  right.fx_px = 1200;
+  const Transform<RightCamera, Camera> right_from_left(rotation_exp({0.01, -0.03, 0.002}),
+                                                       Eigen::Vector3d(-4.4, 0.1, 0.05));
+  const Scratch scratch;
+  const std::string path = scratch.file("chain.yaml", *kalibr_text(without_k3(), right, right_from_left));
+  EXPECT_EQ(*read_camera(path + ":cam0"), without_k3());
+  EXPECT_EQ(*read_camera(path + ":cam1"), right);
+  for (const char* camera : {"", ":cam1"}) {
+    const auto relation = read_camera_relation(path + camera);
+    ASSERT_TRUE(relation) << relation.error().what;
+    EXPECT_LT((*relation - right_from_left.matrix()).norm(), 1e-12);
+  }
+  const auto which = read_camera(path);
+  ASSERT_FALSE(which);
+  EXPECT_THAT(which.error().what, HasSubstr("say which of its cameras; it holds cam0, cam1"));
+  EXPECT_THAT(read_camera(path + ":cam7").error().what, HasSubstr("has no camera cam7"));
+  EXPECT_THAT(read_camera_relation(path + ":cam0").error().what, HasSubstr("lacks T_cn_cnm1"));
+}
+
+/// A chain as Kalibr writes it, of the EuRoC data set's kind.
+const std::string kChain =
+    "cam0:\n  T_cam_imu:\n  - [0.01, -0.99, 0.004, 0.02]\n  - [0.99, 0.01, 0.02, -0.06]\n"
+    "  - [-0.02, 0.003, 0.99, 0.009]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: []\n  camera_model: pinhole\n"
+    "  distortion_coeffs: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n  distortion_model: radtan\n"
+    "  intrinsics: [458.654, 457.296, 367.215, 248.375]\n  resolution: [752, 480]\n  rostopic: /cam0/image_raw\n"
+    "  timeshift_cam_imu: 0.002\n";
+const std::string kRos =
+    "# from a calibrator\r\nimage_width: 752\r\nimage_height: 480\r\ncamera_name: narrow_stereo/left\r\n"
+    "camera_matrix:\r\n  rows: 3\r\n  cols: 3\r\n  data: [458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1]\r\n"
+    "distortion_model: plumb_bob\r\ndistortion_coefficients:\r\n  rows: 1\r\n  cols: 5\r\n"
+    "  data: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0]\r\n";
+const std::string kMessage =
+    "header:\n  seq: 1\n  frame_id: left\nheight: 480\nwidth: 752\ndistortion_model: rational_polynomial\n"
+    "d: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0, 0.0, 0.0, 0.0]\n"
+    "k: [458.654, 0.0, 367.215, 0.0, 457.296, 248.375, 0.0, 0.0, 1.0]\nbinning_x: 0\n---\n";
+
+TEST(CameraFiles, FilesOfOtherProgramsProjectAsOpenCvDoes) {
+  const cv::Mat k = (cv::Mat_<double>(3, 3) << 458.654, 0, 367.215, 0, 457.296, 248.375, 0, 0, 1);
+  const cv::Mat d = (cv::Mat_<double>(1, 4) << -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05);
+  const std::vector<cv::Point3d> places{{10, -20, 100}, {-35, 12, 90}, {0, 0, 50}, {30, 25, 120}};
+  std::vector<cv::Point2d> pixels;
+  cv::projectPoints(places, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), k, d, pixels);
+  for (const std::string& text : {kChain, kRos, kMessage}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_TRUE(camera) << camera.error().what;
+    EXPECT_EQ(camera->width_px, 752);
+    EXPECT_EQ(camera->height_px, 480);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto pixel = project(*camera, Eigen::Vector3d(places[i].x, places[i].y, places[i].z));
+      ASSERT_TRUE(pixel);
+      EXPECT_NEAR(pixel->x(), pixels[i].x, 1e-9);
+      EXPECT_NEAR(pixel->y(), pixels[i].y, 1e-9);
+    }
+  }
+}
+
+TEST(CameraFiles, WhatCannotBeSaidIsRefusedByName) {
+  const auto changed = [](std::string text, const std::string& what, const std::string& by) {
+    return text.replace(text.find(what), what.size(), by);
+  };
+  for (const auto& [text, words] :
+       {std::pair{changed(kChain, "radtan", "equidistant"), "its distortion_model equidistant cannot be said"},
+        {changed(kChain, "pinhole", "omni"), "its camera_model omni cannot be said"},
+        {changed(kChain, ", 1.76187114e-05", ""), "has not 2 numbers of resolution, 4 of intrinsics and 4"},
+        {changed(kChain, "458.654", "nan"), "lens.yaml: "},
+        {changed(kChain, "458.654", "many"), "is no camera file of OpenCV, ROS or Kalibr"},
+        {changed(kRos, "plumb_bob", "equidistant"), "its distortion_model equidistant"},
+        {changed(kRos, "image_width: 752", "image_width: -1"), "lens.yaml: "},
+        {changed(kRos, "image_width: 752\r\n", ""), "lacks image_width"},
+        {changed(kRos, "[458.654, 0,", "[458.654, 2,"), "has a skew"},
+        {changed(kMessage, "0.0]\nk", "0.1]\nk"), "distortion coefficient 8 of 8 is 0.1"},
+        {changed(kMessage, "binning_x: 0", "binning_x: 2"), "binning_x is over 1"},
+        {std::string("- 1\n- 2\n"), "is no camera file"},
+        {std::string(), "is no camera file"},
+        {std::string("a: [1, 2\n"), "is no camera file"},
+        {std::string("%YAML:1.0\n---\nimage_width: 3\n"), "lacks image_width and image_height"}}) {
+    const auto camera = read_lens_text(text);
+    ASSERT_FALSE(camera) << text;
+    EXPECT_THAT(camera.error().what, HasSubstr(words));
+    EXPECT_EQ(camera.error().what.find('\n'), std::string::npos);
+  }
+  EXPECT_THAT(read_camera("/no/lens.yaml").error().what, HasSubstr("no such file"));
+}
+
+}  // namespace
+}  // namespace birdseye::host
