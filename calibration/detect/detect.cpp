@@ -10,6 +10,7 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/detect/detect_inset.hpp"
 #include "calibration/detect/grid_points.hpp"
 #include "calibration/detect/picture_edges.hpp"
 
@@ -163,11 +164,12 @@ Detection detect(const Pattern& pattern, const GreyView& picture, const std::str
     detection.rejected = fmt::format("overexposed: {:.0f} % of it is saturated", 100 * exposure.saturated);
     return detection;
   }
-  const FoundPattern found = find(pattern, picture, search);
+  FoundPattern found = find(pattern, picture, search);
+  detection.glare = std::max(found.glare, glare_of(pattern, picture, found.ids, found.points_px));
+  if (pattern.inset_columns > 0) add_inset(pattern, picture, found);
   detection.points_seen = static_cast<int>(found.ids.size());
   detection.contrast = found.contrast;
   detection.layout = found.layout;
-  detection.glare = std::max(found.glare, glare_of(pattern, picture, found.ids, found.points_px));
   detection.area_share = area_share(found.points_px, picture);
   measure_sharpness(found.edges, detection);
   // Where too little is found to tell, or edges are wider than corners are looked at, the whole picture says more.

@@ -9,6 +9,7 @@
 #include <opencv2/aruco/dictionary.hpp>
 #include <optional>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 namespace birdseye::calibration {
@@ -22,7 +23,8 @@ constexpr double kLeastMm = 0.05;  // a printed spacing is neither below this ..
 constexpr double kMostMm = 1000;   // .. nor above this: a wrong unit
 
 constexpr const char* kExamples =
-    "give chessboard:14x10:3mm (inner corners), charuco:19x26:5mm:4mm:DICT_4X4_250[:legacy] (squares), dots:11x9:4mm, "
+    "give chessboard:14x10:3mm (inner corners), charuco:19x26:5mm:4mm:DICT_4X4_250[:legacy][:inset=8x13:3mm] (squares; "
+    "inner corners of a chessboard in its middle), dots:11x9:4mm, "
     "dots:4x11:5mm:asymmetric or dots:25x18:3mm:markers=133,141,308,317";
 
 /// The predefined dictionaries, in the order of OpenCV's numbers.
@@ -66,15 +68,13 @@ Error wrong(const std::string& spec, const std::string& why) {
   return {Errc::bad_value, fmt::format("pattern \"{}\": {}; {}", spec, why, kExamples)};
 }
 
-Result<void> read_counts(Pattern& pattern, string_view text) {
+Result<std::pair<int, int>> read_counts(const Pattern& pattern, string_view text) {
   const auto counts = split(text, 'x');
   const auto columns = counts.size() == 2 ? number_of<int>(counts[0]) : std::nullopt;
   const auto rows = counts.size() == 2 ? number_of<int>(counts[1]) : std::nullopt;
   if (!columns || !rows || *columns < 3 || *rows < 3 || *columns > kMostCount || *rows > kMostCount)
     return wrong(pattern.spec, fmt::format("\"{}\" is not COLUMNSxROWS of 3 to {} each", text, kMostCount));
-  pattern.columns = *columns;
-  pattern.rows = *rows;
-  return {};
+  return std::pair(*columns, *rows);
 }
 
 Result<double> read_length(const Pattern& pattern, string_view text) {
@@ -86,7 +86,25 @@ Result<double> read_length(const Pattern& pattern, string_view text) {
   return *mm;
 }
 
-Result<Pattern> read_charuco(Pattern pattern, const std::vector<string_view>& parts) {
+/// Takes `inset=8x13:3mm` off the end, where it is.
+Result<void> take_inset(Pattern& pattern, std::vector<string_view>& parts) {
+  constexpr string_view kInset = "inset=";
+  if (parts.size() < 2 || !parts[parts.size() - 2].starts_with(kInset)) return {};
+  const auto counts = read_counts(pattern, parts[parts.size() - 2].substr(kInset.size()));
+  if (!counts) return counts.error();
+  const auto side = read_length(pattern, parts.back());
+  if (!side) return side.error();
+  std::tie(pattern.inset_columns, pattern.inset_rows) = *counts;
+  pattern.inset_mm = *side;
+  const double width_mm = (pattern.inset_columns + 1) * *side, height_mm = (pattern.inset_rows + 1) * *side;
+  if (width_mm > (pattern.columns - 2) * pattern.spacing_mm || height_mm > (pattern.rows - 2) * pattern.spacing_mm)
+    return wrong(pattern.spec, fmt::format("an inset of {:g}x{:g} mm leaves no tags around it", width_mm, height_mm));
+  parts.resize(parts.size() - 2);
+  return {};
+}
+
+Result<Pattern> read_charuco(Pattern pattern, std::vector<string_view> parts) {
+  if (const auto taken = take_inset(pattern, parts); !taken) return taken.error();
   if (parts.size() < 5 || parts.size() > 6 || (parts.size() == 6 && parts[5] != "legacy"))
     return wrong(pattern.spec, "a ChArUco board needs squares, their side, the tags' side and the dictionary");
   const auto tag = read_length(pattern, parts[3]);
@@ -183,7 +201,9 @@ Result<Pattern> parse_pattern(const std::string& spec) {
     return wrong(spec, fmt::format("\"{}\" is no kind of pattern", parts[0]));
   }
   if (parts.size() < 3) return wrong(spec, "counts and lengths are missing");
-  if (const auto read = read_counts(pattern, parts[1]); !read) return read.error();
+  const auto counts = read_counts(pattern, parts[1]);
+  if (!counts) return counts.error();
+  std::tie(pattern.columns, pattern.rows) = *counts;
   const auto spacing = read_length(pattern, parts[2]);
   if (!spacing) return spacing.error();
   pattern.spacing_mm = *spacing;
@@ -206,6 +226,13 @@ std::vector<Eigen::Vector3d> pattern_points_mm(const Pattern& pattern) {
     for (int column = 0; column < pattern.columns - less; ++column) {
       const int x = pattern.asymmetric ? 2 * column + row % 2 : column + less;
       points.emplace_back(x * pattern.spacing_mm, (row + less) * pattern.spacing_mm, 0);
+    }
+  }
+  const Eigen::Vector2d middle = 0.5 * pattern.spacing_mm * Eigen::Vector2d(pattern.columns, pattern.rows);
+  for (int row = 0; row < pattern.inset_rows; ++row) {
+    for (int column = 0; column < pattern.inset_columns; ++column) {
+      points.emplace_back(middle.x() + (column - 0.5 * (pattern.inset_columns - 1)) * pattern.inset_mm,
+                          middle.y() + (row - 0.5 * (pattern.inset_rows - 1)) * pattern.inset_mm, 0);
     }
   }
   return points;

@@ -56,7 +56,19 @@ BoardArt::BoardArt(const Pattern& pattern) : pattern_(pattern) {
 double BoardArt::at(double x_mm, double y_mm) const {
   const double x = x_mm / pattern_.spacing_mm;
   const double y = y_mm / pattern_.spacing_mm;
+  if (const double within = inset(x_mm, y_mm); within >= 0) return within;
   return pattern_.kind == PatternKind::charuco ? charuco(x, y) : chessboard(x, y);
+}
+
+double BoardArt::inset(double x_mm, double y_mm) const {
+  constexpr double kBorder = 0.7;  // squares
+  if (pattern_.inset_columns == 0) return -1;
+  const int columns = pattern_.inset_columns + 1, rows = pattern_.inset_rows + 1;
+  const double x = (x_mm - 0.5 * pattern_.columns * pattern_.spacing_mm) / pattern_.inset_mm + 0.5 * columns;
+  const double y = (y_mm - 0.5 * pattern_.rows * pattern_.spacing_mm) / pattern_.inset_mm + 0.5 * rows;
+  if (x < -kBorder || y < -kBorder || x > columns + kBorder || y > rows + kBorder) return -1;
+  if (x < 0 || y < 0 || x >= columns || y >= rows) return 1;
+  return (static_cast<int>(x) + static_cast<int>(y)) % 2 == 0 ? 1 : 0;
 }
 
 double BoardArt::chessboard(double x, double y) const {

@@ -46,6 +46,8 @@ class BoardArt {
  private:
   [[nodiscard]] double chessboard(double x, double y) const;
   [[nodiscard]] double charuco(double x, double y) const;
+  /// Of the chessboard in the middle, its first square light, and of the white about it; less than 0 beyond.
+  [[nodiscard]] double inset(double x_mm, double y_mm) const;
 
   calibration::Pattern pattern_;
   std::vector<cv::Mat> tags_;       ///< a pixel for each of a tag's modules, its black border among them

@@ -94,6 +94,34 @@ TEST(DetectViews, LegacyCharucoCornersLieWhereTheCameraSeesThem) {
   expect_accurate("charuco:11x8:6mm:4.5mm:DICT_4X4_50:legacy", 0.9);
 }
 
+TEST(DetectViews, CornersOfAnInsetLieWhereTheCameraSeesThem) {
+  expect_accurate("charuco:11x8:6mm:4.5mm:DICT_4X4_50:inset=4x3:3.5mm", 0.4);  // what the inset covers is not seen
+}
+
+TEST(DetectViews, PartOfAnInsetAndOfItsBoardIsEnough) {
+  const auto pattern = parse_pattern("charuco:15x11:5mm:4mm:DICT_4X4_250:inset=7x4:4mm");
+  ASSERT_TRUE(pattern);
+  const auto pose = held(*pattern, {2, 1, 110}, 25, 60, 10);
+  cv::Mat picture = barrel_painter().paint(*pattern, pose);
+  picture(cv::Rect(0, 0, picture.cols / 2, picture.rows)) = 60;  // something lies over the left half
+  const Detection seen = detect(*pattern, view_of(picture), "x");
+  ASSERT_TRUE(seen.view) << seen.rejected;
+  EXPECT_LT(errors_of(*seen.view, *pattern, pose).most_px, kMost_px);
+  const auto of_inset =
+      std::count_if(seen.view->ids.begin(), seen.view->ids.end(), [](int id) { return id >= 14 * 10; });
+  EXPECT_GE(of_inset, 8);
+  EXPECT_LT(of_inset, 28);
+}
+
+TEST(DetectViews, AnInsetThatIsNotThereGivesNoCorners) {
+  const auto board = parse_pattern("charuco:15x11:5mm:4mm:DICT_4X4_250");
+  const auto with = parse_pattern("charuco:15x11:5mm:4mm:DICT_4X4_250:inset=7x4:4mm");
+  const auto pose = held(*board, {0, 0, 110}, 20, 60, 10);
+  const Detection seen = detect(*with, view_of(barrel_painter().paint(*board, pose)), "x");
+  ASSERT_TRUE(seen.view) << seen.rejected;
+  for (const int id : seen.view->ids) EXPECT_LT(id, 14 * 10);
+}
+
 TEST(DetectViews, OddRowsAreTheSameBoardInBothLayouts) {
   const auto now = parse_pattern("charuco:8x9:5mm:4mm:DICT_5X5_50");
   const auto then = parse_pattern("charuco:8x9:5mm:4mm:DICT_5X5_50:legacy");
