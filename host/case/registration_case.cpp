@@ -231,10 +231,10 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   view.name = fs::relative(*image, folder.empty() ? "." : folder).string();
   const cv::Mat bgr = cv::imread(image->string(), cv::IMREAD_COLOR);
   if (bgr.empty()) return table.wrong("image", image->string() + " is no picture that can be read");
-  const auto camera = table.path("camera");
+  const auto camera = table.get<std::string>("camera");  // which may name one of several behind a colon
   if (!camera) return camera.error();
-  const auto model = read_camera(*camera);
-  if (!model) return model.error();
+  const auto model = read_camera(folder / *camera);
+  if (!model) return table.wrong("camera", model.error().what);
   view.camera = *model;
   if (bgr.cols != model->width_px || bgr.rows != model->height_px) {
     return table.wrong("camera", fmt::format("is for pictures of {}x{} and {} is of {}x{}; calibrate at this size",

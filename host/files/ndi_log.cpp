@@ -23,9 +23,13 @@ constexpr std::size_t kLinesToHeader = 10;
 constexpr std::size_t kFieldsOfMarker = 4;  ///< State,Tx,Ty,Tz
 constexpr std::array<std::string_view, 7> kToolNumbers{"q0", "qx", "qy", "qz", "tx", "ty", "tz"};
 
-Fields lower_cases(const Fields& fields) {
+/// Lower case, without units behind them: "Tx (mm)" is tx.
+Fields plain_names(const Fields& fields) {
   Fields out;
-  for (const std::string& field : fields) out.push_back(lower_case(field));
+  for (const std::string& field : fields) {
+    const std::string name = lower_case(field);
+    out.emplace_back(trimmed(std::string_view(name).substr(0, name.find_first_of("[("))));
+  }
   return out;
 }
 
@@ -34,7 +38,7 @@ bool is_state(const std::string& name) {
 }
 
 bool is_ndi_header(const Fields& fields) {
-  const Fields names = lower_cases(fields);
+  const Fields names = plain_names(fields);
   return std::find(names.begin(), names.end(), "q0") != names.end() &&
          std::any_of(names.begin(), names.end(), is_state);
 }
@@ -94,7 +98,7 @@ std::optional<ToolColumns> tool_columns(const Fields& header, const Fields& name
 }
 
 Result<std::vector<ToolColumns>> tools_of(const Fields& header) {
-  const Fields names = lower_cases(header);
+  const Fields names = plain_names(header);
   std::vector<std::size_t> starts;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == kToolNumbers[0]) starts.push_back(i);
@@ -219,6 +223,12 @@ class NdiLog {
     }
     return Error{Errc::bad_value, fmt::format("has no tool {}; it holds {}", wanted, fmt::join(titles, ", "))};
   }
+  /// Whether all tools have a record in each row.
+  [[nodiscard]] bool side_by_side() const {
+    return std::all_of(tools_.begin(), tools_.end(),
+                       [&](const LoggedTool& tool) { return tool.records.size() == tools_[0].records.size(); }) &&
+           side_by_side_ > 1;
+  }
   [[nodiscard]] bool empty() const { return tools_.empty(); }
   [[nodiscard]] bool decimal_commas() const { return decimal_commas_; }
 
@@ -285,6 +295,13 @@ std::optional<double> time_of(const ToolRecord& record) {
   return s.value + ns.value / kNsPerSecond;
 }
 
+/// The pose of a record; with a reference, against that of the reference in the same row.
+ReadPose pose_in_row(const LoggedTool& tool, const LoggedTool* reference, std::size_t row, const PoseReading& how) {
+  const ReadPose pose = corrected(pose_of_tool(tool.records[row]), how.field);
+  if (reference == nullptr) return pose;
+  return against(pose, tool.title, corrected(pose_of_tool(reference->records[row]), how.field), reference->title);
+}
+
 /// "Port 1 (8700339): of 500 records 460 are OK, 33 Missing, 7 Disabled".
 std::string count_of_states(const LoggedTool& tool) {
   std::map<std::string, std::size_t> states;
@@ -313,12 +330,21 @@ Result<PoseSet> read_ndi_log(const fs::path& path, const PoseReading& how) {
   const auto found = log->find(how.transform);
   if (!found) return found.error().with_context(path.string());
   const LoggedTool& tool = **found;
+  const LoggedTool* reference = nullptr;
+  if (!how.reference.empty()) {
+    const auto other = log->find(how.reference);
+    if (!other) return other.error().with_context(path.string());
+    reference = *other;
+    if (!log->side_by_side() || reference == &tool) {
+      return Error{Errc::bad_value, fmt::format("{}: {} against {} needs two tools that stand in one row",
+                                                path.string(), tool.title, reference->title)};
+    }
+  }
   const bool timed = std::all_of(tool.records.begin(), tool.records.end(), [](const auto& r) { return time_of(r); });
   PoseCollector collector(timed, how.most_error_mm);
   for (std::size_t i = 0; i < tool.records.size(); ++i) {
     const double time_s = timed ? *time_of(tool.records[i]) : static_cast<double>(i);
-    collector.add(fmt::format("line {}", tool.records[i].line), time_s, time_s,
-                  corrected(pose_of_tool(tool.records[i]), how.field));
+    collector.add(fmt::format("line {}", tool.records[i].line), time_s, time_s, pose_in_row(tool, reference, i, how));
   }
   collector.note(count_of_states(tool));
   if (log->decimal_commas()) collector.note("its numbers have decimal commas, and are read so");

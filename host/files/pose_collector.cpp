@@ -125,6 +125,18 @@ ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& fi
   return pose;
 }
 
+ReadPose against(const ReadPose& sensor, const std::string& sensor_name, const ReadPose& reference,
+                 const std::string& reference_name) {
+  if (!sensor.problem.empty()) return {{}, sensor_name + " " + sensor.problem, sensor.unmapped};
+  if (!reference.problem.empty()) return {{}, reference_name + " " + reference.problem, reference.unmapped};
+  const auto tracker_from_reference = Transform<Tracker, Marker>::from_matrix(reference.tracker_from_sensor.matrix());
+  const Transform<Marker, Sensor> relative = tracker_from_reference.inverse() * sensor.tracker_from_sensor;
+  ReadPose out = sensor;
+  out.tracker_from_sensor = Transform<Tracker, Sensor>(relative.rotation(), relative.translation());
+  if (sensor.error_mm && reference.error_mm) out.error_mm = std::max(*sensor.error_mm, *reference.error_mm);
+  return out;
+}
+
 void PoseCollector::add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose) {
   if (pose.unmapped) ++unmapped_;
   if (!pose.problem.empty()) return reject(name, pose.problem);

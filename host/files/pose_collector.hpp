@@ -37,6 +37,10 @@ ReadPose read_matrix(std::string_view text, double mm_per_unit);
 /// As the map of the field corrects it, or the problem that it lies where the field was not mapped. No map: as it is.
 ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& field);
 
+/// reference_from_sensor, or which of both is not there. The reference takes the tracker's place.
+ReadPose against(const ReadPose& sensor, const std::string& sensor_name, const ReadPose& reference,
+                 const std::string& reference_name);
+
 /// Gathers what a reader finds, in the order in which it was recorded.
 class PoseCollector {
  public:

@@ -65,14 +65,15 @@ Result<PoseSet> read_pose_set(const fs::path& path, const PoseReading& how) {
     return Error{Errc::bad_value, fmt::format("{}: --body needs a table of the body's tracked points", path.string())};
   if (!how.body.empty()) return read_body_poses(path, how);
   if (!many && is_sequence(path)) return read_sequence(path, how);
+  if (!many && is_ndi_log(path)) return read_ndi_log(path, how);
   if (!how.reference.empty()) {
     return Error{Errc::bad_value, fmt::format("{}: holds no transforms, of which --reference needs two: give a "
-                                              "PLUS sequence",
+                                              "PLUS sequence or an NDI log",
                                               path.string())};
   }
   if (folder) return read_folder(path, "*.txt", how);
   if (many) return read_folder(path.has_parent_path() ? path.parent_path() : fs::path("."), name, how);
-  return is_ndi_log(path) ? read_ndi_log(path, how) : read_pose_table(path, how);
+  return read_pose_table(path, how);
 }
 
 }  // namespace birdseye::host

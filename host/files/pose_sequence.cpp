@@ -50,19 +50,6 @@ ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transfo
   return corrected(read_matrix(value_of(frame, key), how.mm_per_unit), how.field);
 }
 
-/// reference_from_sensor, or which of both is not there.
-ReadPose relative_pose_of(const SequenceHeader::Fields& frame, const std::string& transform,
-                          const std::string& reference, const PoseReading& how) {
-  ReadPose sensor = pose_of(frame, transform, how);
-  if (!sensor.problem.empty()) return {{}, transform + " " + sensor.problem, sensor.unmapped};
-  const ReadPose base = pose_of(frame, reference, how);
-  if (!base.problem.empty()) return {{}, reference + " " + base.problem, base.unmapped};
-  const auto tracker_from_reference = Transform<Tracker, Marker>::from_matrix(base.tracker_from_sensor.matrix());
-  const Transform<Marker, Sensor> relative = tracker_from_reference.inverse() * sensor.tracker_from_sensor;
-  sensor.tracker_from_sensor = Transform<Tracker, Sensor>(relative.rotation(), relative.translation());
-  return sensor;
-}
-
 }  // namespace
 
 bool is_sequence(const fs::path& path) {
@@ -97,7 +84,8 @@ Result<PoseSet> read_sequence(const fs::path& path, const PoseReading& how) {
   for (const auto& [number, frame] : sequence->frames) {
     const std::string name = fmt::format("frame {}", number);
     const ReadPose pose =
-        relative ? relative_pose_of(frame, transform, reference, how) : pose_of(frame, transform, how);
+        relative ? against(pose_of(frame, transform, how), transform, pose_of(frame, reference, how), reference)
+                 : pose_of(frame, transform, how);
     ReadNumber time =
         timed ? read_number(value_of(frame, kTimestampField)) : ReadNumber{static_cast<double>(number), {}};
     ReadNumber unfiltered =

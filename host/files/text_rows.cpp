@@ -100,6 +100,7 @@ std::optional<TextRow> TextRows::next() {
     ++line_;
     std::string_view line = text;
     if (trimmed(line).empty()) continue;
+    if (line_ == 1 && trimmed(line).starts_with("sep=")) continue;  // what spreadsheets say of the separator
     TextRow row;
     row.line = line_;
     row.remark = trimmed(line).front() == '#';

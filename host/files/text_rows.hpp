@@ -21,7 +21,8 @@ struct TextRow {
 
 /// Reads a table of text line by line, as programs of all kinds write them: fields are separated by tabs or semicolons,
 /// else by commas, else by blanks, whichever the line has. Where tabs, semicolons or quotes separate, 1,5 is a number
-/// with a decimal comma: it comes as 1.5. Ends of lines as DOS has them and a byte order mark are passed over.
+/// with a decimal comma: it comes as 1.5. Ends of lines as DOS has them, a byte order mark and a first line "sep=;" are
+/// passed over.
 class TextRows {
  public:
   /// Refuses, naming the file, what cannot be opened, is larger than 1 GB or is written in UTF-16.

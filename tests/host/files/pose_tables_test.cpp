@@ -135,6 +135,15 @@ TEST(NdiLogs, AToolIsFoundByPortOrNameAndWhatIsLostIsAbsentAndCounted) {
   EXPECT_EQ(other->poses[3].tracker_from_sensor.translation(), Eigen::Vector3d(7, 8, 9));
 }
 
+TEST(NdiLogs, AToolAgainstAnother) {
+  const auto set = read(ndi_log(), {.transform = "Port 1", .reference = "Port 2"});
+  ASSERT_TRUE(set) << set.error().what;
+  ASSERT_EQ(set->poses.size(), 2U);
+  EXPECT_EQ(set->poses[1].tracker_from_sensor.translation(), Eigen::Vector3d(-3, -3, -3));
+  EXPECT_EQ(set->rejected[0], "line 4: Port 1 (8700339) Missing");
+  EXPECT_FALSE(read(ndi_log(), {.transform = "Port 1", .reference = "8700339"}));
+}
+
 TEST(NdiLogs, AnErrorIsABound) {
   const auto set = read(ndi_log(), {.transform = "Port 1", .most_error_mm = 0.5});
   ASSERT_TRUE(set) << set.error().what;
@@ -166,6 +175,16 @@ TEST(NdiLogs, RowsOfOneToolEachAndMoreMarkersThanTheHeaderHas) {
       {.transform = "B"});
   ASSERT_TRUE(both) << both.error().what;
   EXPECT_EQ(both->poses[0].tracker_from_sensor.translation(), Eigen::Vector3d(4, 5, 6));
+}
+
+TEST(NdiLogs, UnitsInTheHeaderAndDecimalCommas) {
+  const auto set = read(
+      "Tool;Frame;State;Q0;Qx;Qy;Qz;Tx [mm];Ty [mm];Tz [mm];RMS Error (mm)\n"
+      "probe;1;OK;1,0;0,0;0,0;0,0;1,5;-2,5;3;0,12\n");
+  ASSERT_TRUE(set) << set.error().what;
+  EXPECT_EQ(set->poses[0].tracker_from_sensor.translation(), Eigen::Vector3d(1.5, -2.5, 3));
+  EXPECT_EQ(set->poses[0].error_mm, 0.12);
+  EXPECT_NE(joined(set->notes).find("decimal commas"), std::string::npos);
 }
 
 TEST(NdiLogs, RefusalsNameTheTools) {

@@ -22,7 +22,7 @@ std::pair<std::vector<Fields>, bool> rows_of(const std::string& text) {
 
 TEST(TextRows, SeparatorsAreThoseOfTheLine) {
   for (const char* text : {"1,2.5,x y", "1;2.5;x y", "1\t2.5\tx y", "1, 2.5 , x y\r\n", "\"1\",\"2.5\",\"x y\"",
-                           "1,\t2.5,\tx y", "\n\n1;2,5;x y"}) {
+                           "1,\t2.5,\tx y", "\n\n1;2,5;x y", "sep=;\r\n1;2,5;x y"}) {
     const auto [rows, commas] = rows_of(text);
     ASSERT_EQ(rows.size(), 1U) << text;
     EXPECT_EQ(rows[0], (Fields{"1", "2.5", "x y"})) << text;
