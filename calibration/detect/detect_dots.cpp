@@ -51,8 +51,9 @@ int id_at(const Pattern& pattern, const Eigen::Vector2i& place) {
   const int per_column = pattern.asymmetric ? 2 : 1;
   const int x = pattern.asymmetric ? place.x() - (place.y() & 1) : place.x();
   if (place.y() < 0 || place.y() >= pattern.rows || x < 0 || x % per_column != 0) return -1;
-  const int column = x / per_column;
-  return column < pattern.columns ? place.y() * pattern.columns + column : -1;
+  const int column = x / per_column, id = place.y() * pattern.columns + column;
+  if (column >= pattern.columns || std::ranges::binary_search(pattern.under_bars, id)) return -1;
+  return id;
 }
 
 /// From the lattice's count to the pattern's steps, by quarter turns. The nearest neighbours in an asymmetric grid
@@ -130,13 +131,19 @@ bool same_but_for_turns(const Pattern& pattern, const std::vector<Numbering>& al
 
 std::string why_not_numbered(const Pattern& pattern, const std::vector<Dot>& dots, const std::vector<Numbering>& all) {
   const auto seen = static_cast<int>(dots.size());
-  const int of_pattern = pattern.columns * pattern.rows;
+  const int of_pattern = pattern.columns * pattern.rows - static_cast<int>(pattern.under_bars.size());
   if (pattern.larger_dots.empty()) {
     if (all[0].strays > kMostStrays * seen + kStrayRows) {
       return fmt::format("{} dots in rows and columns do not fit a grid of {}x{}: is it another pattern?", seen,
                          pattern.columns, pattern.rows);
     }
-    if (!same_but_for_turns(pattern, all) || seen - all[0].strays < (1 - kMostDotsCovered) * of_pattern) {
+    const bool barred = !pattern.under_bars.empty();
+    if (barred && !same_but_for_turns(pattern, all)) {
+      return fmt::format("part of the grid, {} of {} dots, and too little of its bars to number it",
+                         seen - all[0].strays, of_pattern);
+    }
+    const bool whole = seen - all[0].strays >= (1 - kMostDotsCovered) * of_pattern;
+    if (!barred && (!whole || !same_but_for_turns(pattern, all))) {
       return fmt::format("part of the grid, {} of {} dots, and no larger dots to number it: it must be seen whole",
                          seen - all[0].strays, of_pattern);
     }

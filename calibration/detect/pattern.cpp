@@ -25,7 +25,7 @@ constexpr double kMostMm = 1000;   // .. nor above this: a wrong unit
 constexpr const char* kExamples =
     "give chessboard:14x10:3mm (inner corners), charuco:19x26:5mm:4mm:DICT_4X4_250[:legacy][:inset=8x13:3mm] (squares; "
     "inner corners of a chessboard in its middle), dots:11x9:4mm, "
-    "dots:4x11:5mm:asymmetric or dots:25x18:3mm:markers=133,141,308,317";
+    "dots:4x11:5mm:asymmetric, dots:25x18:3mm:markers=133,141,308,317 or dots:19x15:2mm:bars=142-146,105-181";
 
 /// The predefined dictionaries, in the order of OpenCV's numbers.
 constexpr std::array<const char*, 21> kDictionaries = {
@@ -125,10 +125,10 @@ Result<Pattern> read_charuco(Pattern pattern, std::vector<string_view> parts) {
   return pattern;
 }
 
-/// The larger dots, turned by a quarter `quarters` times about the grid's middle.
-std::vector<int> turned(const Pattern& pattern, int quarters) {
+/// Dots, turned with the grid by a quarter `quarters` times about its middle.
+std::vector<int> turned(const Pattern& pattern, const std::vector<int>& dots, int quarters) {
   std::vector<int> ids;
-  for (const int id : pattern.larger_dots) {
+  for (const int id : dots) {
     int column = id % pattern.columns;
     int row = id / pattern.columns;
     int columns = pattern.columns;
@@ -145,6 +145,12 @@ std::vector<int> turned(const Pattern& pattern, int quarters) {
   return ids;
 }
 
+/// Whether a turn brings larger dots onto larger dots and bars onto bars.
+bool same_turned(const Pattern& pattern, int quarters) {
+  return turned(pattern, pattern.larger_dots, quarters) == pattern.larger_dots &&
+         turned(pattern, pattern.under_bars, quarters) == pattern.under_bars;
+}
+
 void note_symmetry(Pattern& pattern) {
   const bool square = pattern.columns == pattern.rows;
   switch (pattern.kind) {
@@ -157,33 +163,71 @@ void note_symmetry(Pattern& pattern) {
       return;
     case PatternKind::dots:
       // The first row of an asymmetric grid is to the left; half a turn puts the last one to the right.
-      pattern.half_turn_ambiguous =
-          pattern.asymmetric ? pattern.rows % 2 == 0 : turned(pattern, 2) == pattern.larger_dots;
-      pattern.quarter_turn_ambiguous = square && !pattern.asymmetric && turned(pattern, 1) == pattern.larger_dots;
+      pattern.half_turn_ambiguous = pattern.asymmetric ? pattern.rows % 2 == 0 : same_turned(pattern, 2);
+      pattern.quarter_turn_ambiguous = square && !pattern.asymmetric && same_turned(pattern, 1);
       return;
   }
 }
 
-Result<Pattern> read_dots(Pattern pattern, const std::vector<string_view>& parts) {
-  constexpr string_view kMarkers = "markers=";
-  if (parts.size() == 3) return pattern;
-  if (parts.size() == 4 && parts[3] == "asymmetric") {
-    pattern.asymmetric = true;
-    return pattern;
-  }
-  if (parts.size() != 4 || !parts[3].starts_with(kMarkers))
-    return wrong(pattern.spec, "after a dot grid's spacing comes asymmetric or markers=ID,ID,.. or nothing");
-  for (const string_view text : split(parts[3].substr(kMarkers.size()), ',')) {
-    const auto id = number_of<int>(text);
-    if (!id || *id < 0 || *id >= pattern.columns * pattern.rows)
-      return wrong(pattern.spec,
-                   fmt::format("\"{}\" is no dot's number, 0 to {}", text, pattern.columns * pattern.rows - 1));
+Result<int> read_dot(const Pattern& pattern, string_view text) {
+  const auto id = number_of<int>(text);
+  if (id && *id >= 0 && *id < pattern.columns * pattern.rows) return *id;
+  return wrong(pattern.spec,
+               fmt::format("\"{}\" is no dot's number, 0 to {}", text, pattern.columns * pattern.rows - 1));
+}
+
+Result<void> read_markers(Pattern& pattern, string_view list) {
+  for (const string_view text : split(list, ',')) {
+    const auto id = read_dot(pattern, text);
+    if (!id) return id.error();
     pattern.larger_dots.push_back(*id);
   }
   auto& ids = pattern.larger_dots;
   std::sort(ids.begin(), ids.end());
   if (std::adjacent_find(ids.begin(), ids.end()) != ids.end() || ids.size() < Pattern::kLeastLargerDots)
     return wrong(pattern.spec, fmt::format("{} or more different dots must be larger", Pattern::kLeastLargerDots));
+  return {};
+}
+
+Result<void> read_bars(Pattern& pattern, string_view list) {
+  for (const string_view text : split(list, ',')) {
+    const auto ends = split(text, '-');
+    if (ends.size() != 2) return wrong(pattern.spec, fmt::format("\"{}\" is no bar, as 142-146", text));
+    const auto first = read_dot(pattern, ends[0]), last = read_dot(pattern, ends[1]);
+    if (!first) return first.error();
+    if (!last) return last.error();
+    const bool along = *first / pattern.columns == *last / pattern.columns;
+    const bool down = *first % pattern.columns == *last % pattern.columns;
+    if (*first >= *last || (!along && !down))
+      return wrong(pattern.spec, fmt::format("the bar \"{}\" runs along no row or column from left or top", text));
+    for (int id = *first; id <= *last; id += along ? 1 : pattern.columns) pattern.under_bars.push_back(id);
+  }
+  auto& ids = pattern.under_bars;
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  if (ids.size() < Pattern::kLeastUnderBars)
+    return wrong(pattern.spec, fmt::format("bars must cover {} places or more", Pattern::kLeastUnderBars));
+  return {};
+}
+
+Result<Pattern> read_dots(Pattern pattern, const std::vector<string_view>& parts) {
+  constexpr string_view kMarkers = "markers=", kBars = "bars=";
+  for (std::size_t i = 3; i < parts.size(); ++i) {
+    Result<void> read;
+    if (parts[i] == "asymmetric" && parts.size() == 4) {
+      pattern.asymmetric = true;
+    } else if (parts[i].starts_with(kMarkers) && pattern.larger_dots.empty()) {
+      read = read_markers(pattern, parts[i].substr(kMarkers.size()));
+    } else if (parts[i].starts_with(kBars) && pattern.under_bars.empty()) {
+      read = read_bars(pattern, parts[i].substr(kBars.size()));
+    } else {
+      return wrong(pattern.spec,
+                   "after a dot grid's spacing comes asymmetric, markers=ID,ID,.., bars=ID-ID,ID-ID,.. or nothing");
+    }
+    if (!read) return read.error();
+  }
+  const auto under_bar = [&](int id) { return std::ranges::binary_search(pattern.under_bars, id); };
+  if (std::ranges::any_of(pattern.larger_dots, under_bar)) return wrong(pattern.spec, "a larger dot lies under a bar");
   return pattern;
 }
 

@@ -14,6 +14,7 @@ enum class PatternKind { chessboard, charuco, dots };
 /// the rows, both as one reads the pattern from its front (x right, y down), z = 0 on it and positive behind it.
 struct Pattern {
   static constexpr int kLeastLargerDots = 3;  ///< two leave the side from which a grid is seen open
+  static constexpr int kLeastUnderBars = 4;   ///< so many dots stand where bars should, if a grid is numbered wrongly
 
   PatternKind kind = PatternKind::chessboard;
   std::string spec;           ///< what it was read from, for messages
@@ -26,6 +27,7 @@ struct Pattern {
   int inset_rows = 0;
   double inset_mm = 0;           ///< side of one of its squares
   bool asymmetric = false;       ///< dots: every second row moved by half the distance along a row
+  std::vector<int> under_bars;   ///< dots: ids of places that bars cover, ascending; no dot is there
   std::vector<int> larger_dots;  ///< dots: ids of those that are larger, ascending; empty where all are alike
   /// Turned by half a turn the pattern looks the same: which end is the first is then a guess, made afresh in each
   /// view. No matter to the lens; hand-eye must allow for it.
@@ -37,7 +39,7 @@ struct Pattern {
 /// `chessboard:14x10:3mm` (inner corners), `charuco:19x26:5mm:4mm:DICT_4X4_250[:legacy]` (squares, side of a square and
 /// of a tag), with `:inset=8x13:3mm` behind it where a chessboard of so many inner corners lies in its middle,
 /// `dots:11x9:4mm`, `dots:4x11:5mm:asymmetric`, `dots:25x18:3mm:markers=133,141,308,317` (larger dots by id, row by row
-/// from 0). Lengths in mm, cm or m.
+/// from 0), `dots:19x15:2mm:bars=142-146,105-181` (bars in place of dots, from id to id). Lengths in mm, cm or m.
 Result<Pattern> parse_pattern(const std::string& spec);
 
 /// In the frame Marker, by id: corners or dots row by row, the first at the origin; of a ChArUco board the inner

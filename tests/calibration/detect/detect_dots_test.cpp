@@ -22,6 +22,7 @@ using testing::view_of;
 
 constexpr const char* kSymmetric = "dots:11x9:4mm";
 constexpr const char* kAsymmetric = "dots:4x11:5mm:asymmetric";
+constexpr const char* kBarred = "dots:19x15:3mm:bars=142-146,105-181";
 constexpr const char* kMarked = "dots:25x18:3mm:markers=133,141,308,317";
 
 const CameraModel kCamera{.width_px = 800,
@@ -76,7 +77,21 @@ const std::vector<Eigen::Vector3d>& corner_rays() {
   return rays;
 }
 
-/// Whether there is a dot at a place of the pattern, mm.
+/// Whether a bar as wide as a dot lies off a place of the grid, by so many steps: from place to place that it covers.
+bool is_bar(const Pattern& pattern, const Eigen::Vector2i& place, const Eigen::Vector2d& off) {
+  const auto covered = [&](int x, int y) {
+    return x >= 0 && y >= 0 && x < pattern.columns && y < pattern.rows &&
+           std::ranges::binary_search(pattern.under_bars, y * pattern.columns + x);
+  };
+  constexpr double kHalf = 0.25;
+  if (!covered(place.x(), place.y())) return false;
+  const bool beside = covered(place.x() + (off.x() > 0 ? 1 : -1), place.y());
+  const bool below = covered(place.x(), place.y() + (off.y() > 0 ? 1 : -1));
+  return (std::abs(off.y()) < kHalf && (beside || std::abs(off.x()) < kHalf)) ||
+         (std::abs(off.x()) < kHalf && (below || std::abs(off.y()) < kHalf));
+}
+
+/// Whether there is a dot, or a bar, at a place of the pattern, mm.
 bool is_dot(const Pattern& pattern, const std::vector<double>& radius_mm, const Eigen::Vector2d& mm) {
   const int row = static_cast<int>(std::lround(mm.y() / pattern.spacing_mm));
   if (row < 0 || row >= pattern.rows) return false;
@@ -85,6 +100,7 @@ bool is_dot(const Pattern& pattern, const std::vector<double>& radius_mm, const 
   const int column = static_cast<int>(std::lround((mm.x() - moved_mm) / step_mm));
   if (column < 0 || column >= pattern.columns) return false;
   const Eigen::Vector2d centre(column * step_mm + moved_mm, row * pattern.spacing_mm);
+  if (is_bar(pattern, {column, row}, (mm - centre) / pattern.spacing_mm)) return true;
   return (mm - centre).norm() < radius_mm[static_cast<std::size_t>(row * pattern.columns + column)];
 }
 
@@ -93,6 +109,7 @@ Picture render(const Pattern& pattern, const Scene& scene) {
   std::vector<double> radius_mm(points_mm.size(),
                                 scene.diameter_steps / 2 * pattern.spacing_mm * (pattern.asymmetric ? 1.4 : 1));
   for (const int id : pattern.larger_dots) radius_mm[static_cast<std::size_t>(id)] *= scene.larger_times;
+  for (const int id : pattern.under_bars) radius_mm[static_cast<std::size_t>(id)] = 0;
   for (const int id : scene.without) radius_mm[static_cast<std::size_t>(id)] = 0;
   const Eigen::Isometry3d pose = camera_from_marker(pattern, scene);
   const Eigen::Isometry3d back = pose.inverse();
@@ -227,6 +244,24 @@ TEST(DetectDots, LargerDotsAreOfAnySizeThatTheGridLeavesRoomFor) {
     scene.blur_px = 0.6;
     if (times <= 3) expect_found(kMarked, scene, 440, like("from afar"));
   }
+}
+
+TEST(DetectDots, BarsNumberAGridWholeOrInPart) {
+  const auto pattern = parse_pattern(kBarred);
+  ASSERT_TRUE(pattern);
+  const int dots = 19 * 15 - static_cast<int>(pattern->under_bars.size());
+  EXPECT_EQ(dots, 19 * 15 - 9);  // the bars cross
+  EXPECT_FALSE(pattern->half_turn_ambiguous);
+  for (const double turn_deg : {0.0, 90.0, 180.0, 270.0}) {
+    expect_found(kBarred, {.tilt_deg = 20, .tilt_axis_deg = 40, .turn_deg = turn_deg, .distance_mm = 105}, dots - 2,
+                 fmt::format("bars, turned by {}", turn_deg));
+    expect_found(kBarred, {.tilt_deg = 25, .tilt_axis_deg = 40, .turn_deg = turn_deg, .distance_mm = 45}, 60,
+                 fmt::format("part with bars, turned by {}", turn_deg));
+  }
+  const Picture corner = render(*pattern, {.distance_mm = 25, .middle = {0.05, 0.05}});
+  const Detection seen = detect(*pattern, view_of(corner.grey), "");
+  EXPECT_FALSE(seen.view);
+  EXPECT_NE(seen.rejected.find("too little of its bars"), std::string::npos) << seen.rejected;
 }
 
 std::string rejected(const std::string& spec, const Scene& scene) {

@@ -22,12 +22,26 @@ TEST(Pattern, ReadsItsSpecsAndRefusesNonsense) {
   EXPECT_FALSE(parse_pattern("dots:4x11:5mm:asymmetric")->half_turn_ambiguous);
   EXPECT_TRUE(parse_pattern("dots:25x18:3mm:markers=133,141,308,316")->half_turn_ambiguous);
   EXPECT_FALSE(parse_pattern("dots:25x18:3mm:markers=133,141,308,317")->half_turn_ambiguous);
-  for (const char* wrong :
-       {"chessboard", "chessboard:14x10:3", "chessboard:2x5:3mm", "chessboard:14x10:nanmm", "charuco:5x7:5mm:4mm",
-        "charuco:5x7:5mm:5mm:DICT_4X4_50", "charuco:50x70:5mm:4mm:DICT_4X4_50", "dots:5x5:3mm:markers=1,2,99",
-        "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x13", "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8:3mm",
-        "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x40:3mm", "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x13:3mm:legacy",
-        "chessboard:14x10:3mm:inset=3x3:1mm"})
+  for (const char* wrong : {"chessboard",
+                            "chessboard:14x10:3",
+                            "chessboard:2x5:3mm",
+                            "chessboard:14x10:nanmm",
+                            "charuco:5x7:5mm:4mm",
+                            "charuco:5x7:5mm:5mm:DICT_4X4_50",
+                            "charuco:50x70:5mm:4mm:DICT_4X4_50",
+                            "dots:5x5:3mm:markers=1,2,99",
+                            "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x13",
+                            "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8:3mm",
+                            "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x40:3mm",
+                            "charuco:19x26:5mm:4mm:DICT_4X4_250:inset=8x13:3mm:legacy",
+                            "chessboard:14x10:3mm:inset=3x3:1mm",
+                            "dots:19x15:2mm:bars=142",
+                            "dots:19x15:2mm:bars=142-160",
+                            "dots:19x15:2mm:bars=142-144",
+                            "dots:19x15:2mm:bars=146-142",
+                            "dots:19x15:2mm:bars=142-999",
+                            "dots:19x15:2mm:asymmetric:bars=142-146",
+                            "dots:19x15:2mm:bars=142-146:markers=1,2,143"})
     EXPECT_FALSE(parse_pattern(wrong)) << wrong;
   const auto inset = parse_pattern("charuco:19x26:5mm:4mm:DICT_4X4_250:legacy:inset=8x13:3mm");
   ASSERT_TRUE(inset);
