@@ -32,7 +32,8 @@ struct VolumeMarkersOptions {
   std::optional<int> threshold_hu;
 };
 
-constexpr double kWithin95 = 2.795;  // sigmas per axis, of the distance in space
+constexpr double kLeastShown_mm = 8;  // of the CT round a marker, in the picture: three times as much
+constexpr double kWithin95 = 2.795;   // sigmas per axis, of the distance in space
 const std::map<std::string, MarkerKind> kKinds{{"ball", MarkerKind::ball},
                                                {"ring", MarkerKind::ring},
                                                {"cylinder", MarkerKind::cylinder},
@@ -195,7 +196,8 @@ Result<void> write_findings(const VolumeMarkersOptions& options, const Volume& c
   json["reasons"] = findings.reasons;
   std::string png;
   if (!options.picture.empty()) {
-    const Picture picture = picture_of(ct, found, std::max({widest_mm, options.diameter_mm, options.height_mm}));
+    const Picture picture =
+        picture_of(ct, found, std::max({widest_mm, options.diameter_mm, options.height_mm, kLeastShown_mm}));
     png = png_of(picture.view());
   }
   return write_files({{options.out, points}, {options.picture, std::move(png)}, {options.json, text_of(json)}});
@@ -252,7 +254,7 @@ void add_volume_markers(CLI::App& volume, CommandStatus& status) {
   markers
       .add_option("--shape", options->kind, "ball, ring, cylinder (hollow) or post (a cavity in a wall, on a stalk)")
       ->transform(CLI::CheckedTransformer(kKinds, CLI::ignore_case));
-  markers.add_option("--diameter", options->diameter_mm, "from outside to outside, mm");
+  markers.add_option("--diameter", options->diameter_mm, "from outside to outside, mm; of posts any if it is left out");
   markers.add_option("--hole", options->hole_mm, "of a ring or cylinder: the hole's diameter, mm");
   markers.add_option("--height", options->height_mm, "of a cylinder, mm");
   markers

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 namespace birdseye::host {
@@ -21,6 +22,7 @@ constexpr double kPlateau_mm = 3;  // behind the edge; a wall that has not thinn
 constexpr double kLeastContrast_hu = 250;
 constexpr double kDensest = 0.95;
 constexpr double kLeastFree = 0.1;
+constexpr double kLikeAir_hu = 60;
 constexpr double kRimSigma_mm = 0.025;  // of the centre of an open cavity
 constexpr double kLeastOpen = 0.02;     // of the directions; less is a channel, or a wall too thin to be seen
 
@@ -108,14 +110,16 @@ void measure(Ray& ray, double air_hu, double widest_mm) {
   ray.edge_mm = crossing(hu, 0, top + 1, half, true);
   ray.outside_mm = crossing(hu, top, step_at(ray.edge_mm + kThickest_mm), half, false);
   if (std::isnan(ray.outside_mm)) return;
-  const std::size_t from = step_at(ray.outside_mm + 1);
-  const std::size_t to = std::min(hu.size(), step_at(ray.outside_mm + kBeyond_mm));
-  ray.air_beyond = from < to && std::none_of(hu.begin() + static_cast<std::ptrdiff_t>(from),
-                                             hu.begin() + static_cast<std::ptrdiff_t>(to),
-                                             [half](double value) { return value > half; });
+  const auto from = hu.begin() + static_cast<std::ptrdiff_t>(std::min(hu.size(), step_at(ray.outside_mm + 1)));
+  const auto to = hu.begin() + static_cast<std::ptrdiff_t>(std::min(hu.size(), step_at(ray.outside_mm + kBeyond_mm)));
+  if (from >= to) return;
+  // As thin as the air inside: lung, round a bronchus, is not.
+  const double mean = std::accumulate(from, to, 0.0) / static_cast<double>(to - from);
+  ray.air_beyond = mean < air_hu + std::max(kLikeAir_hu, 0.1 * (hu[top] - air_hu)) &&
+                   std::none_of(from, to, [half](double value) { return value > half; });
 }
 
-/// The mean of a share of the values, from low to high (0 to 1).
+/// The value below which a share of the values lies.
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return NAN;
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -132,6 +136,11 @@ class Cavity {
         directions_(directions_of(directions)) {}
 
   [[nodiscard]] double widest_mm() const { return widest_mm_; }
+  /// The share of the directions in which a wall is followed by open air.
+  [[nodiscard]] double free() const {
+    const auto count = std::count_if(rays_.begin(), rays_.end(), [](const Ray& ray) { return ray.air_beyond; });
+    return static_cast<double>(count) / static_cast<double>(rays_.size());
+  }
 
   /// Looks about from a place. False where that is in no cavity.
   bool look(const Vector3d& centre) {
@@ -205,6 +214,7 @@ class Cavity {
     post.cavity_mm = std::cbrt(6 / std::numbers::pi * std::max(0.0, volume_mm3));
     post.wall_hu = wall_hu_;
     post.contrast_hu = wall_hu_ - air_hu_;
+    post.free = free();
     post.cut = cut_;
     post.endless = endless_;
     std::vector<double> widths;
@@ -213,7 +223,6 @@ class Cavity {
     const auto share = 1 / static_cast<double>(rays_.size());
     for (std::size_t d = 0; d < rays_.size(); ++d) {
       post.open += std::isnan(rays_[d].edge_mm) ? share : 0;
-      post.free += rays_[d].air_beyond ? share : 0;
       if (d % 2 == 1) continue;
       const double width = rays_[d].outside_mm + rays_[d + 1].outside_mm;
       if (!std::isnan(width)) widths.push_back(width);
@@ -304,7 +313,8 @@ std::optional<HollowPost> settle(Cavity& cavity, const Vector3d& place, double s
   Vector3d centre = place;
   double volume = 0;
   for (int round = 0; round < kRounds; ++round) {
-    if (!cavity.look(centre)) return std::nullopt;
+    // Hardly any cavity of a body comes further.
+    if (!cavity.look(centre) || cavity.free() < kLeastFree) return std::nullopt;
     const auto [off, missing_mm3] = cavity.missing();
     volume = missing_mm3;
     if (off.norm() < settled_mm) break;
@@ -319,8 +329,7 @@ std::optional<HollowPost> settle(Cavity& cavity, const Vector3d& place, double s
 std::optional<HollowPost> fit_hollow_post(const Volume& ct, const Vector3d& place_in_patient_mm, double widest_mm) {
   Cavity coarse(ct, widest_mm, kFewDirections);
   const auto rough = settle(coarse, place_in_patient_mm, 0.1);
-  // Hardly any cavity of a body comes further.
-  if (!rough || rough->free < kLeastFree) return std::nullopt;
+  if (!rough) return std::nullopt;
   Cavity fine(ct, widest_mm, kDirections);
   return settle(fine, rough->centre_in_patient_mm, 0.01);
 }

@@ -22,7 +22,8 @@ struct HollowPost {
 };
 
 /// Measures the cavity round a place inside of it. widest_mm: the post's outer diameter, beyond which no wall is looked
-/// for. Empty where the place is in no air, in no cavity of such a size, or in one that has open air on hardly any side.
+/// for. Empty where the place is in no air, in no cavity of such a size, or in one that has open air on hardly any
+/// side.
 ///
 /// The centre is the centroid of the missing density, summed along rays out to the ridge of the wall. There the blur
 /// has carried as much of the outer air inwards as of the cavity outwards, so that a thin wall does not pull it.

@@ -177,7 +177,7 @@ class Finder {
 }  // namespace
 
 FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop) {
-  if (search.shape.kind == MarkerKind::post) return find_hollow_posts(ct, {search.shape.diameter_mm}, stop);
+  if (search.shape.kind == MarkerKind::post) return find_hollow_posts(ct, post_search(search.shape), stop);
   Finder finder(ct, search.shape, stop);
   std::vector<std::int16_t> thresholds{300, 700, 1500};
   if (search.threshold_hu) thresholds = {*search.threshold_hu};

@@ -95,8 +95,7 @@ class NearSearch {
     const Volume part = part_of(ct_, place_, kPickReach_mm + 2 * widest_mm + 8);
     FoundMarkers found;
     if (post) {
-      PostSearch search;
-      if (shape.diameter_mm > 0) search.diameter_mm = shape.diameter_mm;
+      PostSearch search = post_search(shape);
       search.pointed_at = true;
       found = find_hollow_posts(part, search);
     } else {

@@ -83,6 +83,7 @@ double MarkerShape::widest_mm() const {
 Result<void> check(const MarkerShape& s) {
   constexpr double kMost_mm = 100;
   const bool hollow = s.kind == MarkerKind::ring || s.kind == MarkerKind::cylinder;
+  if (s.kind == MarkerKind::post && s.diameter_mm == 0) return {};  // of any size
   if (!(s.diameter_mm > 0) || s.diameter_mm > kMost_mm)
     return Error{Errc::bad_value, fmt::format("a marker {} mm across: give its outer diameter in mm", s.diameter_mm)};
   if (hollow && !(s.hole_mm > 0 && s.hole_mm < s.diameter_mm)) {

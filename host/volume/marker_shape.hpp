@@ -13,7 +13,7 @@ enum class MarkerKind { ball, ring, cylinder, post };
 /// it fits in.
 struct MarkerShape {
   MarkerKind kind = MarkerKind::ball;
-  double diameter_mm = 8;  ///< from outside to outside
+  double diameter_mm = 8;  ///< from outside to outside; of a post 0: any
   double hole_mm = 0;      ///< ring and cylinder: of the hole
   double height_mm = 0;    ///< cylinder: along its axis
 

@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 
 constexpr double kNarrowestCavity_mm = 3, kNarrowestPost_mm = 4;
 // Of the walls, how many have open air behind them. Posts have 0.75 and more, cavities of the body hardly any.
-constexpr double kFree = 0.6, kFreeInDoubt = 0.45, kFreeAsPointedAt = 0.25;
+constexpr double kFree = 0.6, kFreeInDoubt = 0.5, kFreeAsPointedAt = 0.25;
 constexpr double kAlike = 0.12;  // in size, of the posts of one set
 constexpr double kMostOpen = 0.35;
 constexpr double kMostUneven = 0.25;
@@ -106,7 +106,7 @@ class PostFinder {
     const double volume_mm3 = static_cast<double>(c.voxels) * ct_.spacing_mm.prod();
     const Eigen::Array3d extent_mm = (c.high - c.low + 1).cast<double>() * ct_.spacing_mm.array();
     // At a low threshold the blur leaves little of a small cavity.
-    return volume_mm3 > 0.15 * std::numbers::pi / 6 * std::pow(kNarrowestCavity_mm, 3) &&
+    return volume_mm3 > 0.3 * std::numbers::pi / 6 * std::pow(kNarrowestCavity_mm, 3) &&
            (extent_mm <= widest_mm_ + 2 * ct_.spacing_mm.array()).all();
   }
   /// Whether, as coarse rays have it, open air lies round it: what holds for few cavities of a body, and saves their

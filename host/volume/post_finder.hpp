@@ -15,6 +15,10 @@ struct PostSearch {
   bool pointed_at = false;
 };
 inline constexpr double kWidestPost_mm = 16;
+/// For posts of a shape.
+inline PostSearch post_search(const MarkerShape& shape) {
+  return {shape.diameter_mm > 0 ? std::optional(shape.diameter_mm) : std::nullopt, false};
+}
 
 /// Finds hollow posts: a cavity of air in a thin wall that stands in the open, held by a stalk. The cavity may have one
 /// or two open ends. Cavities of the body (sinuses, ear canals, bowel, airways) have tissue or other cavities round

@@ -172,7 +172,7 @@ TEST(RigidCommands, ARealAbdomenWithoutMarkersHasNone) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
   const Scratch scratch;
-  for (const char* shape : {"ball --diameter 8", "ring --diameter 15 --hole 5", "post --diameter 10"}) {
+  for (const char* shape : {"ball --diameter 8", "ring --diameter 15 --hole 5", "post"}) {
     const auto result =
         run("birdseye", "volume markers " + (*data / "ct_abdomen/example_ct.nii.gz").string() + " --shape " + shape +
                             " --out " + (scratch / "m.txt").string() + " --json " + (scratch / "m.json").string());
@@ -205,7 +205,7 @@ TEST(RigidCommands, RefuseBadInputInOneLine) {
         {markers + "--shape cylinder --diameter 8 --hole 3", "height"},
         {markers + "--shape ball --diameter 8 --threshold 99999", "--threshold"},
         {markers + "--diameter 8", "--shape"},
-        {markers + "--shape post", "outer diameter"},
+        {markers + "--shape post --diameter -1", "outer diameter"},
         {markers + "--near 1,2", "X,Y,Z"},
         {markers + "--near 1,2,nan", "X,Y,Z"},
         {markers + "--near 1,2,3,4", "X,Y,Z"},
