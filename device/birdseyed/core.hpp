@@ -18,7 +18,7 @@ namespace birdseye::device {
 
 struct CoreSettings {
   std::vector<std::string> bird_names = {"scope"};  ///< by address; the first is the scope's
-  bool transforms = true;  ///< a TRANSFORM for each bird beside TDATA
+  bool transforms = true;                           ///< a TRANSFORM for each bird beside TDATA
   PoseHistory::Settings pose;
   /// How long a frame may wait for measurements from after it, from its arrival on; 0: it goes at once, with a pose
   /// that may be predicted.

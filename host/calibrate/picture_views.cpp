@@ -96,7 +96,8 @@ Looked look(const calibration::Pattern& pattern, const fs::path& path, double pi
 std::vector<Looked> look_at_all(const calibration::Pattern& pattern, const std::vector<fs::path>& pictures,
                                 double pixel_aspect) {
   std::vector<Looked> looked(pictures.size());
-  tbb::parallel_for(std::size_t{0}, looked.size(), [&](std::size_t i) { looked[i] = look(pattern, pictures[i], pixel_aspect); });
+  tbb::parallel_for(std::size_t{0}, looked.size(),
+                    [&](std::size_t i) { looked[i] = look(pattern, pictures[i], pixel_aspect); });
   return looked;
 }
 
@@ -174,7 +175,7 @@ Result<PictureViews> read_found_views(const fs::path& folder, const std::string&
   if (!views) return views.error();
   const auto px = size.empty() ? size_beside(folder) : size_of(size);
   if (!px) return px.error();
-  return PictureViews{*std::move(views), {}, px->x(), px->y()};
+  return PictureViews{*std::move(views), {}, px->x(), px->y(), {}};
 }
 
 Result<double> parse_pixel_aspect(const std::string& text) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "host/dicom/phase_words.hpp"
+#include "calibration/base/lower_case.hpp"
 #include "host/dicom/refused.hpp"
 
 namespace birdseye::host {

@@ -6,6 +6,8 @@
 #include <array>
 #include <set>
 
+#include "calibration/base/lower_case.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -90,13 +92,6 @@ std::string parted(std::string_view text) {
 }
 
 }  // namespace
-
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return out;
-}
 
 std::string phase_named_in(std::string_view text) {
   const std::string words = parted(text);

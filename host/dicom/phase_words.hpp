@@ -9,7 +9,4 @@ namespace birdseye::host {
 /// "native", "arterial", "portal venous" or "delayed". Empty where it names none, or more than one.
 std::string phase_named_in(std::string_view text);
 
-/// With ASCII letters in lower case.
-std::string lower_case(std::string_view text);
-
 }  // namespace birdseye::host

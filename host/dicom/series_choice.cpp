@@ -6,6 +6,7 @@
 #include <functional>
 #include <set>
 
+#include "calibration/base/lower_case.hpp"
 #include "host/dicom/phase_words.hpp"
 
 namespace birdseye::host {

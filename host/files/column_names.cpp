@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "calibration/base/lower_case.hpp"
 #include "host/files/text_rows.hpp"
 
 namespace birdseye::host {

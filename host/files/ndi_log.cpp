@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "calibration/base/lower_case.hpp"
 #include "calibration/base/units.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/text_rows.hpp"

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "calibration/base/lower_case.hpp"
 #include "host/files/text_rows.hpp"
 
 namespace birdseye::host {

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <set>
 
+#include "calibration/base/lower_case.hpp"
 #include "calibration/points/point_fit.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/text_rows.hpp"

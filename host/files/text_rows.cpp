@@ -35,13 +35,6 @@ std::string_view separators_of(std::string_view line) {
 
 }  // namespace
 
-std::string lower_case(std::string_view text) {
-  std::string out(text);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return out;
-}
-
 void drop_empty_ends(std::vector<std::string>& fields, std::size_t count) {
   while (fields.size() > count && fields.back().empty()) fields.pop_back();
 }

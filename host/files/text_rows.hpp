@@ -42,9 +42,6 @@ class TextRows {
   bool decimal_commas_ = false;
 };
 
-/// With A to Z as a to z.
-std::string lower_case(std::string_view text);
-
 /// Takes away empty fields at the end beyond so many: what a separator at the end of a line makes.
 void drop_empty_ends(std::vector<std::string>& fields, std::size_t count);
 

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <optional>
 
-#include "host/dicom/phase_words.hpp"
+#include "calibration/base/lower_case.hpp"
 #include "host/volume/totalsegmentator_names.hpp"
 
 namespace birdseye::host {
