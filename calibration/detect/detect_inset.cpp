@@ -1,5 +1,6 @@
 #include "calibration/detect/detect_inset.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>

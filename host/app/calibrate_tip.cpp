@@ -109,8 +109,9 @@ RecordEntry entry_of(const TipFound& found, const TipInput& input) {
 void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   const auto options = std::make_shared<CalibrateTipOptions>();
   CLI::App& tip = *calibrate.add_subcommand("tip", "where a pointer's tip is on its sensor, by a pivot");
-  tip.add_option("--poses", options->poses,
-                 "poses while the tip stands in a divot: a folder of 4x4 matrices, a CSV or a PLUS sequence");
+  tip.add_option(
+      "--poses", options->poses,
+      "poses while the tip stands in a divot: a folder of 4x4 matrices, a table, an NDI log or a PLUS sequence");
   tip.add_option("--server", options->server, "an appliance that runs: take the poses from it, now")
       ->type_name("HOST:PORT");
   tip.add_option("--bird", options->bird, "the pointer's bird, as the appliance names it (default: pointer)");

@@ -14,7 +14,7 @@ void add_pose_options(CLI::App& command, PoseOptions& options) {
   command
       .add_option("--max-error", options.most_error_mm,
                   "leave out poses whose file (an NDI log), or whose fit (of --body), tells a larger error, mm")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.001, 1000.0));
 }
 
 Result<PoseReading> pose_reading(const PoseOptions& options) {

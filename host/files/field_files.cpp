@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "host/files/pose_files.hpp"
+#include "host/files/text_rows.hpp"
 
 namespace birdseye::host {
 
@@ -23,34 +24,20 @@ using Row = std::vector<std::string>;
 
 struct TextTable {
   Row columns;
-  std::vector<std::pair<int, Row>> rows;  ///< with their lines
+  std::vector<std::pair<std::size_t, Row>> rows;  ///< with their lines
 };
 
-Row row_of(const std::string& line) {
-  Row fields(1);
-  for (const char c : line) {
-    if (c == ',' || c == ';' || c == '\t') {
-      fields.emplace_back();
-    } else if (c != ' ' && c != '\r' && c != '"') {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
-
 Result<TextTable> read_table(const fs::path& path, const Row& needed) {
-  std::error_code ignored;
-  std::ifstream in(path);
-  if (!in || fs::is_directory(path, ignored))
-    return Error{Errc::not_found, path.string() + ": no such file, or not to be read"};
+  auto rows = TextRows::open(path);
+  if (!rows) return rows.error();
   TextTable table;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
+  while (auto row = rows->next()) {
+    if (row->remark) continue;
     if (table.columns.empty()) {
-      table.columns = row_of(line);
+      drop_empty_ends(row->fields, 1);
+      table.columns = std::move(row->fields);
     } else {
-      table.rows.emplace_back(number, row_of(line));
+      table.rows.emplace_back(row->line, std::move(row->fields));
     }
   }
   for (const std::string& name : needed) {

@@ -298,7 +298,7 @@ std::optional<double> time_of(const ToolRecord& record) {
 
 /// The pose of a record; with a reference, against that of the reference in the same row.
 ReadPose pose_in_row(const LoggedTool& tool, const LoggedTool* reference, std::size_t row, const PoseReading& how) {
-  const ReadPose pose = corrected(pose_of_tool(tool.records[row]), how.field);
+  ReadPose pose = corrected(pose_of_tool(tool.records[row]), how.field);
   if (reference == nullptr) return pose;
   return against(pose, tool.title, corrected(pose_of_tool(reference->records[row]), how.field), reference->title);
 }
@@ -308,6 +308,7 @@ std::string count_of_states(const LoggedTool& tool) {
   std::map<std::string, std::size_t> states;
   for (const ToolRecord& record : tool.records) ++states[record.state.empty() ? "without a state" : record.state];
   std::vector<std::string> words;
+  words.reserve(states.size());
   for (const auto& [state, count] : states) words.push_back(fmt::format("{} {}", count, state));
   return fmt::format("{}: {} records, {}", tool.title, tool.records.size(), fmt::join(words, ", "));
 }

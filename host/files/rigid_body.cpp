@@ -144,7 +144,8 @@ Result<RigidBody> read_rigid_body(const std::filesystem::path& path, double mm_p
 }
 
 std::string explain_misfit(const RigidBody& body, const SeenPoints& seen) {
-  const auto [own, places] = seen_pairs(body.points_mm, seen);
+  const auto pairs = seen_pairs(body.points_mm, seen);
+  const Points &own = pairs.first, &places = pairs.second;
   const auto as_given = rms_of_fit(own, places);
   if (!as_given) return {};
   // A fifth is less than chance makes of points that do not belong together.

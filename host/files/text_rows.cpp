@@ -41,9 +41,10 @@ void drop_empty_ends(std::vector<std::string>& fields, std::size_t count) {
 
 Result<TextRows> TextRows::open(const std::filesystem::path& path) {
   std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored))
+    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   std::ifstream file(path, std::ios::binary);
-  if (!file || !std::filesystem::is_regular_file(path, ignored))
-    return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
+  if (!file) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   if (std::filesystem::file_size(path, ignored) > kMostBytes)
     return Error{Errc::unsupported, fmt::format("{}: is larger than 1 GB; give a part of it", path.string())};
   std::string mark(3, '\0');
