@@ -57,9 +57,9 @@ class RobustFitter {
       found_.noise = estimate_noise(found_.summed, found_.fit, found_.noise, freedom_);
       out_.noise_estimated = true;
     }
-    if (out_.noise_estimated && drop_odd_one()) {
+    constexpr int kMostOdd = 3;  // more are no exceptions
+    for (int n = 0; n < kMostOdd && out_.noise_estimated && drop_odd_one(); ++n)
       found_.noise = estimate_noise(found_.summed, found_.fit, found_.noise, freedom_);
-    }
     out_.tracker_noise = found_.noise;
     return found_.fit.converged;
   }

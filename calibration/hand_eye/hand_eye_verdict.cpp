@@ -71,6 +71,21 @@ void judge_stations(const HandEyeResult& r, Verdict& verdict) {
       part > kManyOutliers ? "hold the scope still at each station, away from metal, and take those again" : "");
 }
 
+/// Stations that are used and stand out all the same. Of errors across the line of sight, one in 500 does so by chance.
+void name_odd(const HandEyeResult& r, Verdict& verdict) {
+  constexpr double kTimesMedian = 3, kLeastPx = 5;
+  std::vector<std::string> odd;
+  for (const HandEyeStationFit& s : r.stations) {
+    if (!s.used || s.held_out_px < std::max(kLeastPx, kTimesMedian * r.held_out_median_px)) continue;
+    odd.push_back(fmt::format("{} ({:.0f} px)", s.name, s.held_out_px));
+  }
+  if (odd.empty()) return;
+  verdict.add(Grade::pass,
+              fmt::format("odd: off by more than {:.0f} times the usual {:.1f} px, by the hand-eye of the others: {}",
+                          kTimesMedian, r.held_out_median_px, joined(odd)),
+              "look at those pictures and poses, and take those stations again");
+}
+
 void judge_noise(const HandEyeResult& r, Verdict& verdict) {
   if (r.noise_estimated) {
     verdict.add(Grade::pass,
@@ -112,6 +127,7 @@ Verdict judge(const HandEyeResult& r) {
                 "give --unit m for poses in metres, and the board's squares in mm");
   }
   judge_stations(r, verdict);
+  if (r.held_out_median_px > 0) name_odd(r, verdict);
   judge_noise(r, verdict);
   const std::string more = "take more stations, and turn the scope more between them";
   verdict.judge("hand-eye's part of the error at the board (one sigma)", r.sigma_at_board_mm(), "mm", kFineSigmaMm,

@@ -278,7 +278,7 @@ double variance_between(const Poses& poses, const Indices& used, const TipEquati
 /// White's, as much larger as groups by place and by time say that it is too small (two ways: A. Cameron, J. Gelbach
 /// and D. Miller, 2011).
 Eigen::Matrix3d covariance_of(const Poses& poses, const Indices& used, const TipEquations& linear) {
-  const Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
+  Eigen::Matrix3d independent = independent_covariance(poses, used, linear);
   const double alone_mm2 = independent.trace();
   if (!(alone_mm2 > 0)) return independent;
   double times = 1;

@@ -267,7 +267,11 @@ class Cavity {
       if (count < kLeastOpen * static_cast<double>(rays_.size())) continue;
       const Vector3d outwards = open.normalized();
       const double height_mm = rim_height_mm(centre, outwards);
-      std::isnan(height_mm) ? void(endless_ = true) : rims_.push_back({outwards, height_mm});
+      if (std::isnan(height_mm)) {
+        endless_ = true;
+      } else {
+        rims_.push_back({outwards, height_mm});
+      }
     }
   }
   /// Where the middle of the wall ends, on the way outwards.

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/median.hpp"
@@ -248,12 +249,11 @@ int run(int trials, const std::string& only) {
   }
   if (wanted("hand-eye stream")) {
     const std::vector<std::string> figures{"all six", "at the board", "clock offset"};
-    for (const double lasting_s : {0.1, 1.5, 5.0}) {
-      for (const double bent_mm : {0.0, 2.0}) {
-        study(fmt::format("hand-eye stream, errors last {} s, field bent by {} mm", lasting_s, bent_mm), figures,
-              trials,
-              [&](unsigned s) { return stream_trial({.lasting_s = lasting_s, .bent_mm = bent_mm, .seed = s}); });
-      }
+    for (const auto& [lasting_s, bent_mm] : {std::pair(0.1, 0.0), {1.5, 0.0}, {1.5, 2.0}, {5.0, 2.0}}) {
+      study(fmt::format("hand-eye stream, errors last {} s, field bent by {} mm", lasting_s, bent_mm), figures, trials,
+            [lasting_s = lasting_s, bent_mm = bent_mm](unsigned s) {
+              return stream_trial({.lasting_s = lasting_s, .bent_mm = bent_mm, .seed = s});
+            });
     }
   }
   if (wanted("tip")) {

@@ -174,6 +174,32 @@ TEST(HandEyeCalibration, NamesTheStationsThatDoNotFit) {
   EXPECT_THAT(judge(*result).reasons, ::testing::Contains(::testing::HasSubstr("station 17")));
 }
 
+TEST(HandEyeCalibration, OfFewStationsTheOddOneIsNamed) {
+  HandEyeScene scene = mini_bird(8);
+  scene.stations = 7;
+  scene.position_mm = 0.2;
+  scene.angle_deg = 0.08;
+  HandEyeBench bench(scene);
+  auto& stations = bench.input.stations;
+  Vector6d off;
+  off << 0, 0.35 * kRadPerDeg, 0, 0.5, 0, 0.3;  // four times the noise
+  stations[3].tracker_from_sensor = moved(stations[3].tracker_from_sensor, off);
+  const auto result = calibrate_hand_eye(bench.input);
+  ASSERT_TRUE(result && result->solved);
+  EXPECT_THAT(result->outliers, ::testing::ElementsAre("station 3"));
+}
+
+TEST(HandEyeCalibration, AStationThatStandsOutIsTold) {
+  HandEyeBench bench(mini_bird(8));
+  auto result = calibrate_hand_eye(bench.input);
+  ASSERT_TRUE(result && result->solved);
+  EXPECT_THAT(judge(*result).reasons, ::testing::Not(::testing::Contains(::testing::HasSubstr("odd: "))));
+  result->stations[6].held_out_px = 4 * result->held_out_median_px;
+  const Verdict verdict = judge(*result);
+  EXPECT_THAT(verdict.reasons,
+              ::testing::Contains(::testing::AllOf(::testing::HasSubstr("odd: "), ::testing::HasSubstr("station 6"))));
+}
+
 TEST(HandEyeCalibration, BadCornersDoNotMoveIt) {
   HandEyeBench bench({.stations = 12, .corner_px = 0.2, .position_mm = 0.1, .angle_deg = 0.02, .seed = 8});
   const auto clean = calibrate_hand_eye(bench.input);
