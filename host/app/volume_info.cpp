@@ -11,6 +11,7 @@
 #include "host/app/ct_options.hpp"
 #include "host/dicom/series_choice.hpp"
 #include "host/files/write_files.hpp"
+#include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/series_list.hpp"
 
@@ -114,31 +115,51 @@ void print_series(const SeriesList& list, nlohmann::json& json) {
   if (!list.unreadable.empty()) json["unreadable"] = list.unreadable;
 }
 
-/// Prints the series; false where none of several is chosen. An error where the one that is named is not there. Of a
-/// single series that is no volume the error says all.
-Result<bool> list_of_series(const VolumeSource& source, nlohmann::json& json) {
-  const auto list = list_series(source);
-  if (!list) return list.error();
-  const auto chosen = choose_series(list->series, source.series);
-  if (list->series.size() > 1 || list->series.front().problem.empty()) print_series(*list, json);
-  if (!chosen && source.series.empty() && chosen.error().code == Errc::unsupported) {
-    fmt::print("name one with --series to look at it\n");
-    return false;
+void print_labels(const std::vector<NamedLabel>& labels, nlohmann::json& json) {
+  for (const NamedLabel& label : labels) {
+    fmt::print("label        {:<4} {}\n", label.number, label.name.empty() ? "-" : label.name);
+    json["labels"].push_back({{"number", label.number}, {"name", label.name}});
   }
-  if (!chosen) return chosen.error().with_context(source.path.string());
-  return true;
+}
+
+/// Of a segmentation, which is no CT: on what grid it is, and what it shows.
+Result<void> segmentation_info(const InfoOptions& options, nlohmann::json& json) {
+  const auto image = read_labels_file(options.source.path);
+  if (!image) return image.error();
+  fmt::print("segmentation of {} x {} x {} voxels, {:.4f} x {:.4f} x {:.4f} mm\n", image->size[0], image->size[1],
+             image->size[2], image->spacing_mm.x(), image->spacing_mm.y(), image->spacing_mm.z());
+  print_labels(image->label_names, json);
+  return write_file(options.json, text_of(json));
+}
+
+/// Whether to look at one of the series: not where none of several is named. An error where the one that is named is
+/// not there.
+Result<bool> look_at_one(const SeriesList& list, const VolumeSource& source) {
+  const auto chosen = choose_series(list.series, source.series);
+  if (chosen) return true;
+  if (!source.series.empty() || chosen.error().code != Errc::unsupported)
+    return chosen.error().with_context(source.path.string());
+  fmt::print("name one with --series to look at it\n");
+  return false;
 }
 
 Result<void> volume_info(const InfoOptions& options) {
   nlohmann::json json;
   if (holds_dicom(options.source.path)) {
-    const auto chosen = list_of_series(options.source, json);
-    if (!chosen) return chosen.error();
-    if (!*chosen) return write_file(options.json, text_of(json));
+    const auto list = list_series(options.source);
+    if (!list) return list.error();
+    const SeriesInfo& first = list->series.front();
+    // Of a single series that is no volume the error says all.
+    if (list->series.size() > 1 || first.problem.empty()) print_series(*list, json);
+    if (list->series.size() == 1 && first.modality == "SEG") return segmentation_info(options, json);
+    const auto look = look_at_one(*list, options.source);
+    if (!look) return look.error();
+    if (!*look) return write_file(options.json, text_of(json));
   }
   const auto imported = import_with_notes(options.source);
   if (!imported) return imported.error();
   print_volume(imported->volume, json);
+  print_labels(imported->label_names, json);
   if (!imported->notes.empty()) json["notes"] = imported->notes;
   for (const std::string& note : imported->notes) fmt::print("note         {}\n", note);
   return write_file(options.json, text_of(json));

@@ -33,7 +33,6 @@ struct VolumeMarkersOptions {
 };
 
 constexpr double kLeastShown_mm = 8;  // of the CT round a marker, in the picture: three times as much
-constexpr double kWithin95 = 2.795;   // sigmas per axis, of the distance in space
 const std::map<std::string, MarkerKind> kKinds{{"ball", MarkerKind::ball},
                                                {"ring", MarkerKind::ring},
                                                {"cylinder", MarkerKind::cylinder},
@@ -169,7 +168,7 @@ nlohmann::json place_json(const Vector3d& v) {
 
 nlohmann::json marker_json(const MarkerFit& m) {
   nlohmann::json json{{"kind", name_of(m.kind)},      {"centre_mm", place_json(m.centre_in_patient_mm)},
-                      {"sigma_mm", m.sigma_mm},       {"within_95_mm", kWithin95 * m.sigma_mm},
+                      {"sigma_mm", m.sigma_mm},       {"within_95_mm", kSigmasOf95 * m.sigma_mm},
                       {"diameter_mm", m.diameter_mm}, {"hu", m.hu},
                       {"contrast_hu", m.contrast_hu}};
   if (m.kind != MarkerKind::post) json["explained"] = m.explained;
@@ -236,7 +235,7 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
     const MarkerFit& m = findings.found.markers[i];
     const Vector3d& c = m.centre_in_patient_mm;
     fmt::print("marker {:2}  ({:8.2f}, {:8.2f}, {:8.2f}) mm +- {:.2f}  {} {:.1f} mm across, {:.0f} HU{}{}\n", i + 1,
-               c.x(), c.y(), c.z(), kWithin95 * m.sigma_mm, name_of(m.kind), m.diameter_mm, m.hu,
+               c.x(), c.y(), c.z(), kSigmasOf95 * m.sigma_mm, name_of(m.kind), m.diameter_mm, m.hu,
                options.near.empty() ? "" : ", ", options.near.empty() ? "" : findings.of_picks[i]);
   }
   for (const std::string& reason : findings.reasons) fmt::print("{}\n", reason);

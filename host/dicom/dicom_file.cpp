@@ -21,6 +21,7 @@ constexpr int kMostFrames = 100000;  // of one file
 struct KeyTag {
   const char* name;
   DcmTagKey tag;
+  const char* unit = "";
 };
 
 /// By SliceKey.
@@ -31,8 +32,8 @@ const std::array<KeyTag, kSliceKeys>& key_tags() {
       {"description", DCM_SeriesDescription},
       {"stack", DCM_StackID},
       {"acquisition", DCM_AcquisitionNumber},
-      {"trigger time, ms,", DCM_TriggerTime},
-      {"percent of the heart's cycle", DCM_NominalPercentageOfCardiacPhase},
+      {"trigger time", DCM_TriggerTime, " ms"},
+      {"phase of the heart", DCM_NominalPercentageOfCardiacPhase, " %"},
       {"comments", DCM_ImageComments},
       {"image type", DCM_ImageType},
       {"kernel", DCM_ConvolutionKernel},
@@ -71,15 +72,15 @@ std::string read_place_and_scale(const FrameElements& elements, DicomSlice& slic
   const auto place = elements.numbers(DCM_ImagePositionPatient);
   if (place.size() != 3) return "has no sound Image Position (0020,0032); export it again";
   const auto axes = elements.numbers(DCM_ImageOrientationPatient);
-  const std::string no_axes = "has no sound Image Orientation (0020,0037); export it again";
-  if (axes.size() != 6) return no_axes;
+  constexpr const char* kNoAxes = "has no sound Image Orientation (0020,0037); export it again";
+  if (axes.size() != 6) return kNoAxes;
   slice.spacing_mm = {spacing[1], spacing[0]};  // of a file: between rows, between columns
   slice.position_mm = {place[0], place[1], place[2]};
   slice.row = {axes[0], axes[1], axes[2]};
   slice.column = {axes[3], axes[4], axes[5]};
   if (std::abs(slice.row.norm() - 1) > 0.01 || std::abs(slice.column.norm() - 1) > 0.01 ||
       std::abs(slice.row.dot(slice.column)) > 0.01) {
-    return no_axes;
+    return kNoAxes;
   }
   // Files round these numbers: the axes of what is read are at right angles.
   slice.row.normalize();
@@ -208,8 +209,9 @@ DicomFile::Kind kind_of(DcmDataset& dataset, const std::string& sop_class) {
 
 }  // namespace
 
-const char* slice_key_name(SliceKey key) {
-  return key_tags()[static_cast<std::size_t>(key)].name;
+std::string slice_key_words(SliceKey key, const std::string& value) {
+  const KeyTag& known = key_tags()[static_cast<std::size_t>(key)];
+  return value.empty() ? fmt::format("{} none", known.name) : fmt::format("{} {}{}", known.name, value, known.unit);
 }
 
 bool begins_as_dicom(const fs::path& path) {

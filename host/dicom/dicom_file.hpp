@@ -13,7 +13,7 @@
 namespace birdseye::host {
 
 /// What may tell slices at one place from one another, in the order in which it is asked: the phases of a contrast
-/// medium, the times of a perfusion, kernels. Its names for people: slice_key_name.
+/// medium, the times of a perfusion, kernels.
 enum class SliceKey {
   temporal_position,
   contrast_phase,
@@ -30,7 +30,8 @@ enum class SliceKey {
   content_time
 };
 inline constexpr std::size_t kSliceKeys = static_cast<std::size_t>(SliceKey::content_time) + 1;
-const char* slice_key_name(SliceKey key);
+/// "trigger time 350 ms".
+std::string slice_key_words(SliceKey key, const std::string& value);
 
 /// One slice of a CT, a frame of a file, as the file's header has it. Patient frame (LPS), mm.
 struct DicomSlice {

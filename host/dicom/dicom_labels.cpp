@@ -178,6 +178,7 @@ double least_step_mm(const std::vector<double>& along) {
 std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out, std::vector<int>& slice_of) {
   const Eigen::Vector3d normal = out.axes.col(2);
   std::vector<double> along;
+  along.reserve(frames.size());
   for (const LabelFrame& frame : frames) along.push_back(frame.place_mm.dot(normal));
   const auto [low, high] = std::minmax_element(along.begin(), along.end());
   const double least = least_step_mm(along);

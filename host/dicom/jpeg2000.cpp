@@ -14,11 +14,11 @@ std::optional<std::vector<std::uint8_t>> decode_jpeg2000(std::span<const std::ui
   std::vector<char> bytes(stream.begin(), stream.end());
   if (bytes.size() % 2 != 0) bytes.push_back(0);
   fragment.SetByteValue(bytes.data(), gdcm::VL(static_cast<std::uint32_t>(bytes.size())));
-  const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = gdcm::SequenceOfFragments::New();
-  fragments->AddFragment(fragment);
   gdcm::DataElement packed(gdcm::Tag(0x7FE0, 0x0010)), plain;
   packed.SetVR(gdcm::VR::OB);
-  packed.SetValue(*fragments);
+  auto* const fragments = new gdcm::SequenceOfFragments;
+  packed.SetValue(*fragments);  // and owns them from here: it counts references
+  fragments->AddFragment(fragment);
 
   gdcm::JPEG2000Codec codec;
   const unsigned size[] = {static_cast<unsigned>(columns), static_cast<unsigned>(rows), 1};

@@ -94,6 +94,19 @@ Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVol
   return series;
 }
 
+/// Without the files that lie in another folder too, as where an export was copied into itself. Two of one folder stay:
+/// that is no copy of a whole.
+Files without_copies(const Files& files) {
+  std::map<std::string, std::filesystem::path> folder_of;
+  Files once;
+  for (const DicomFile* file : files) {
+    const auto folder = file->path.parent_path();
+    const auto [known, is_new] = folder_of.try_emplace(file->instance_uid, folder);
+    if (file->instance_uid.empty() || is_new || known->second == folder) once.push_back(file);
+  }
+  return once;
+}
+
 /// Of the slices that files of one series hold. A localizer that lies in a series is no slice of its volume.
 void add_volumes(const Files& files, const std::vector<DicomFile>& all, bool untilt, std::vector<Series>& out) {
   std::vector<DicomSlice> slices, localizers;
@@ -118,7 +131,7 @@ void add_volumes(const Files& files, const std::vector<DicomFile>& all, bool unt
 
 /// A number for people: that of the series, which several studies may have, so with a letter from the second on.
 std::string id_of(const std::optional<int>& number, std::map<std::string, int>& used) {
-  const std::string base = number ? fmt::format("{}", *number) : "none";
+  std::string base = number ? fmt::format("{}", *number) : "none";
   const int before = used[base]++;
   if (before == 0) return base;
   return before < 26 ? fmt::format("{}{}", base, static_cast<char>('a' + before))
@@ -143,7 +156,7 @@ std::vector<Series> sort_into_series(const std::vector<DicomFile>& files, bool u
                                    [](const DicomFile* file) { return !file->slices.empty() && file->fault.empty(); });
     const std::size_t had = out.size();
     if (whole) {
-      add_volumes(of_series, files, untilt, out);
+      add_volumes(without_copies(of_series), files, untilt, out);
     } else {
       out.push_back(without_volume(of_series));
     }

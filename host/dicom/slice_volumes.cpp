@@ -86,9 +86,8 @@ std::vector<SliceVolume> by_key(const Slices& slices, SliceKey key) {
   std::map<std::string, Slices, decltype(&comes_before)> groups(&comes_before);
   for (const DicomSlice& slice : slices) groups[slice.key(key)].push_back(slice);
   std::vector<SliceVolume> volumes;
-  for (auto& [value, group] : groups) {
-    volumes.push_back({std::move(group), fmt::format("{} {}", slice_key_name(key), value.empty() ? "none" : value)});
-  }
+  volumes.reserve(groups.size());
+  for (auto& [value, group] : groups) volumes.push_back({std::move(group), slice_key_words(key, value)});
   return volumes;
 }
 
@@ -133,7 +132,7 @@ std::vector<SliceVolume> by_several_keys(const Slices& slices, std::size_t most)
 /// Slices of one shape.
 std::vector<SliceVolume> part_repeats(const Slices& slices) {
   const std::size_t most = most_at_a_place(slices);
-  const std::vector<SliceVolume> whole{{slices, ""}};
+  std::vector<SliceVolume> whole{{slices, ""}};
   const bool even = most == 1 && stack_slices(slices, [](const DicomSlice&) { return std::string(); }).problem.empty();
   // A bolus is watched at one place: many pictures, and no volume.
   if (even || most == slices.size()) return whole;
@@ -142,6 +141,7 @@ std::vector<SliceVolume> part_repeats(const Slices& slices) {
     // A key that changes from slice to slice, as a time does, tells no volumes apart.
     if (volumes.size() < 2 || volumes.size() > std::max<std::size_t>(2 * most, 4)) continue;
     std::vector<Slices> groups;
+    groups.reserve(volumes.size());
     for (const SliceVolume& volume : volumes) groups.push_back(volume.slices);
     const bool parted =
         std::all_of(groups.begin(), groups.end(), [](const Slices& group) { return most_at_a_place(group) == 1; });

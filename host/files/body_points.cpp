@@ -206,6 +206,10 @@ class BodyTable {
     if (const std::string why = why_misfit(); !why.empty())
       return Error{Errc::bad_value, fmt::format("{}, {}: {}", how_.body.string(), path_.string(), why)};
     if (decimal_commas) collector_->note("its numbers have decimal commas, and are read so");
+    if (unmapped_ > 0) {
+      collector_->note(fmt::format("{} of {} points lie where the field was not mapped, and count as not seen",
+                                   unmapped_, measured_));
+    }
     if (few_ > 0) collector_->note(fmt::format("{} of {} rows show fewer than three points of the body", few_, count_));
     if (!columns_->time) collector_->note("it has no times: its poses count by their order, row by row");
     return std::move(*collector_).finish(path_);
@@ -232,13 +236,18 @@ class BodyTable {
     collector_->add(name, time_s, time_s, pose);
   }
 
-  [[nodiscard]] SeenPoints seen_in(const Fields& fields) const {
+  /// Each point is corrected by the map of the field, where one is given; what it does not map counts as not seen.
+  SeenPoints seen_in(const Fields& fields) {
     SeenPoints seen;
     for (const auto& columns : columns_->of_point) {
-      seen.push_back(seen_place(fields, columns, columns_->mm_per.value_or(how_.mm_per_unit)));
-      if (!how_.field || !seen.back()) continue;
-      const auto correction_mm = how_.field->correction_mm(*seen.back());
-      seen.back() = correction_mm ? std::optional<Eigen::Vector3d>(*seen.back() + *correction_mm) : std::nullopt;
+      auto place = seen_place(fields, columns, columns_->mm_per.value_or(how_.mm_per_unit));
+      if (place && how_.field) {
+        ++measured_;
+        const auto correction_mm = how_.field->correction_mm(*place);
+        if (!correction_mm) ++unmapped_;
+        place = correction_mm ? std::optional<Eigen::Vector3d>(*place + *correction_mm) : std::nullopt;
+      }
+      seen.push_back(place);
     }
     return seen;
   }
@@ -268,6 +277,7 @@ class BodyTable {
   std::optional<PointColumns> columns_;
   std::optional<PoseCollector> collector_;
   std::size_t count_ = 0, few_ = 0, fitting_ = 0, misfitting_ = 0;
+  std::size_t measured_ = 0, unmapped_ = 0;  ///< points, with a map of the field
   SeenPoints misfit_;
 };
 

@@ -22,8 +22,8 @@ struct DicomScan {
 Result<DicomScan> scan_dicom(const VolumeSource& source, const Announce& announce);
 /// copies: how many processes may decode at the same time.
 Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, int copies);
-/// A DICOM segmentation, a folder that holds one, or labels in any form that a CT may have.
-Result<ImageFile> decode_labels(const std::filesystem::path& path, const Announce& announce, int copies);
+/// A DICOM segmentation, a folder that holds one, or a series whose values are labels.
+Result<ImageFile> decode_dicom_labels(const std::filesystem::path& path, const Announce& announce, int copies);
 Result<ImageFile> decode_image_file(const std::filesystem::path& path, int components);
 
 }  // namespace birdseye::host

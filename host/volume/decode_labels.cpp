@@ -2,8 +2,6 @@
 
 #include "host/dicom/dicom_labels.hpp"
 #include "host/volume/decode.hpp"
-#include "host/volume/nifti_label_names.hpp"
-#include "host/volume/series_list.hpp"
 
 namespace birdseye::host {
 
@@ -26,13 +24,7 @@ Result<ImageFile> image_of_labels(const fs::path& path) {
 
 }  // namespace
 
-Result<ImageFile> decode_labels(const fs::path& path, const Announce& announce, int copies) {
-  announce(path);
-  if (!holds_dicom(path)) {
-    auto image = decode_image_file(path, 1);
-    if (image) image->label_names = nifti_label_names(path);
-    return image;
-  }
+Result<ImageFile> decode_dicom_labels(const fs::path& path, const Announce& announce, int copies) {
   const auto scan = scan_dicom(path, announce);
   if (!scan) return scan.error();
   const DicomFile* found = nullptr;

@@ -40,13 +40,13 @@ std::optional<Error> receive_text(const Receive& receive) {
   return told;
 }
 
-/// A file may claim any size, and a deflated one grow to it: this much more than the process has is a volume of 2048 x
-/// 2048 x 600 with room to work in.
+/// A file may claim any size, and a deflated one grow to it: half of the machine's memory is more than any CT needs.
 void bound_memory() {
-  constexpr rlim_t kMore = rlim_t{12} << 30U;
   rlim_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  const rlim_t most = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMore;
+  const long all_pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGESIZE);
+  if (pages == 0 || all_pages <= 0 || page_bytes <= 0) return;
+  const rlim_t most = (pages + static_cast<rlim_t>(all_pages) / 2) * static_cast<rlim_t>(page_bytes);
   rlimit limit{};
   if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur <= most) return;
   limit.rlim_cur = most;

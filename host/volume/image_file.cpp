@@ -9,6 +9,8 @@
 
 #include "host/volume/decode.hpp"
 #include "host/volume/decoder_process.hpp"
+#include "host/volume/nifti_label_names.hpp"
+#include "host/volume/series_list.hpp"
 
 namespace birdseye::host {
 
@@ -44,14 +46,14 @@ void send_image(const Send& send, const ImageFile& image) {
 }
 
 Result<ImageFile> decode(const VolumeSource& source, int components, const Announce& announce, int copies) {
-  std::error_code error;
   const fs::path& path = source.path;
-  if (fs::is_directory(path, error)) return decode_dicom(source, announce, copies);
+  if (holds_dicom(path)) return decode_dicom(source, announce, copies);
   announce(path);
-  if (begins_as_dicom(path)) return decode_dicom(source, announce, copies);
   if (!source.series.empty())
     return refused(Errc::bad_value, path, "is one volume, of which --series cannot choose; leave it out");
-  return decode_image_file(path, components);
+  auto image = decode_image_file(path, components);
+  if (image && components == 1) image->label_names = nifti_label_names(path);
+  return image;
 }
 
 bool receive_texts(const Receive& receive, std::vector<std::string>& texts) {
@@ -161,7 +163,9 @@ Result<ImageFile> read_image(const VolumeSource& source, int components, const s
 
 Result<ImageFile> read_labels_file(const fs::path& path, const std::stop_token& stop) {
   const int copies = tbb::info::default_concurrency();
-  return read_apart(path, 1, stop, [&](const Announce& announce) { return decode_labels(path, announce, copies); });
+  return read_apart(path, 1, stop, [&](const Announce& announce) {
+    return holds_dicom(path) ? decode_dicom_labels(path, announce, copies) : decode(path, 1, announce, copies);
+  });
 }
 
 }  // namespace birdseye::host

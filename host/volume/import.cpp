@@ -17,6 +17,7 @@ Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::
   volume.patient_from_voxel.translation() = image->origin_mm;
   volume.hu = std::move(image->hu);
   imported.notes = std::move(image->notes);
+  imported.label_names = std::move(image->label_names);
   return imported;
 }
 

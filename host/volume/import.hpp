@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/dicom_labels.hpp"
 #include "host/volume/volume.hpp"
 #include "host/volume/volume_source.hpp"
 
@@ -19,10 +20,11 @@ namespace birdseye::host {
 /// is requested (read_image).
 Result<Volume> import_volume(const VolumeSource& source, const std::stop_token& stop = {});
 
-/// A CT, and what its reader should know: what was passed over, and what resampling cost, a line each.
+/// A CT, and what its reader should know.
 struct ImportedVolume {
   Volume volume;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes;       ///< what was passed over, and what resampling cost, a line each
+  std::vector<NamedLabel> label_names;  ///< where the file says that its values are labels
 };
 Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::stop_token& stop = {});
 

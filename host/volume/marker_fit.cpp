@@ -163,7 +163,7 @@ struct Model {
 /// Of the centre per axis, from what the fit leaves. Voxels that the marker fills in part err together, so that far
 /// fewer are independent than there are; and no fit is better than kLeast_voxels.
 double centre_sigma_mm(const Model& model, const VectorXd& x, const VectorXd& residuals, const Volume& ct) {
-  constexpr double kTogether = 4, kLeast_voxels = 0.02;
+  constexpr double kTogether = 4, kLeast_voxels = 0.03;
   Eigen::MatrixXd jacobian(model.values(), model.inputs());
   Eigen::NumericalDiff<Model> differences(model, 1e-8);
   differences.df(x, jacobian);

@@ -21,6 +21,9 @@ struct MarkerFit {
   double explained = 0;
 };
 
+/// So many sigmas per axis off in space a centre is in 5 of 100 cases.
+inline constexpr double kSigmasOf95 = 2.795;
+
 /// Fits centre, axis, size, blur and density of one marker, from a centre that is right to a third of the marker. Each
 /// voxel is taken for a mixture: the share that the shape fills has the marker's density, the rest has the density of
 /// the surroundings beside it. Air on one side and skin on the other thus do not pull the centre.

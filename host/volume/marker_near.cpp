@@ -88,7 +88,11 @@ class NearSearch {
  public:
   NearSearch(const Volume& ct, const Vector3d& place) : ct_(ct), place_(place) {}
 
-  void look_for(const MarkerShape& shape, double least_explained) {
+  /// named: a person has said that markers are so. Else what hangs together with others has to stand out as bone among
+  /// cells and pores does not.
+  void look_for(const MarkerShape& shape, bool named) {
+    constexpr double kLeastUnnamed = 0.95, kLeastAsNamed = 0.8;  // where cells meet, bone comes to 0.91
+    constexpr double kLeastShare = 0.35;                         // of its density over air, over what is round it
     const bool post = shape.kind == MarkerKind::post;
     const double widest_mm = post ? kWidestPost_mm : shape.widest_mm();
     // So much beyond the reach that the part's border disturbs no marker within.
@@ -102,7 +106,8 @@ class NearSearch {
       found = find_markers(part, {shape, std::nullopt});
       for (const Vector3d& start : bright_places(part, place_, 0.5 * shape.widest_mm())) {
         const auto fit = fit_marker(part, shape, start, Eigen::Matrix3d::Identity());
-        if (fit && fit->explained >= least_explained && has_size(part, shape, *fit)) found.markers.push_back(*fit);
+        if (!fit || fit->explained < (named ? kLeastAsNamed : kLeastUnnamed) || !has_size(part, shape, *fit)) continue;
+        if (named || fit->contrast_hu > kLeastShare * (fit->hu + 1000)) found.markers.push_back(*fit);
       }
     }
     for (const MarkerFit& fit : found.markers) {
@@ -163,12 +168,11 @@ Result<MarkerFit> find_marker_near(const Volume& ct, const Vector3d& place_in_pa
                              "(LPS, mm)",
                              place_in_patient_mm.x(), place_in_patient_mm.y(), place_in_patient_mm.z())};
   }
-  constexpr double kExplained = 0.95, kExplainedAsNamed = 0.8;  // where cells meet, bone comes to 0.91
   NearSearch search(ct, place_in_patient_mm);
   if (shape) {
-    search.look_for(*shape, kExplainedAsNamed);
+    search.look_for(*shape, true);
   } else {
-    for (const MarkerShape& usual : usual_shapes()) search.look_for(usual, kExplained);
+    for (const MarkerShape& usual : usual_shapes()) search.look_for(usual, false);
   }
   return search.nearest();
 }

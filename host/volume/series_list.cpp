@@ -59,6 +59,7 @@ std::optional<SeriesList> list_from(const std::string& text) {
     const auto json = nlohmann::json::parse(text);
     SeriesList list;
     for (const auto& one : json.at("series")) list.series.push_back(info_from(one));
+    if (list.series.empty()) return std::nullopt;
     list.unreadable = json.at("unreadable").get<std::vector<std::string>>();
     return list;
   } catch (const nlohmann::json::exception&) {

@@ -12,7 +12,7 @@ namespace birdseye::host {
 
 /// What a folder of DICOM files, with what lies below it, holds.
 struct SeriesList {
-  std::vector<SeriesInfo> series;
+  std::vector<SeriesInfo> series;       ///< at least one
   std::vector<std::string> unreadable;  ///< files that are no DICOM, or are cut short: an error's text each
 };
 

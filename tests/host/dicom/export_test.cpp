@@ -114,6 +114,13 @@ TEST(DicomExport, ListsTheSeriesOfATree) {
   expect_error(one_of(scratch.path(), "20"), "no image");
 }
 
+TEST(DicomExport, ACopyOfAWholeSeriesInAnotherFolderIsTheSameSeries) {
+  const Scratch scratch;
+  write_ct_series(scratch / "cd/DICOM", {}, 4);
+  fs::copy(scratch / "cd/DICOM", scratch / "cd/DICOM (copy)");
+  expect_ct(scratch / "cd", 4, 0);
+}
+
 TEST(DicomExport, SeriesWithoutIdentifiersAreToldApartByTheirFolders) {
   const Scratch scratch;
   const auto anonymous = [](DcmDataset& dataset) {
@@ -156,7 +163,7 @@ void expect_two_phases(const DcmTagKey& tag, const std::string& first, const std
 
 TEST(DicomPhases, OfOneSeriesAreToldApart) {
   expect_two_phases(DCM_AcquisitionNumber, "2", "10", "acquisition 10");
-  expect_two_phases(DCM_TriggerTime, "350", "1200", "trigger time, ms, 1200");
+  expect_two_phases(DCM_TriggerTime, "350", "1200", "trigger time 1200 ms");
   expect_two_phases(DCM_TemporalPositionIdentifier, "1", "2", "temporal position 2");
   expect_two_phases(DCM_AcquisitionTime, "101500", "101600", "acquisition time 101600");
 }

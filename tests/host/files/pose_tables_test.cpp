@@ -255,6 +255,28 @@ TEST_F(MappedField, BothPosesOfAPairAreCorrectedBeforeOneIsTakenAgainstTheOther)
   EXPECT_LT((set->poses[0].tracker_from_sensor.matrix() - expected).norm(), 1e-4);
 }
 
+TEST_F(MappedField, EachPointOfABodyIsCorrectedBeforeTheFit) {
+  const std::vector<Eigen::Vector3d> body{{0, 0, 0}, {120, 0, 0}, {0, 110, 10}, {60, 50, 90}};
+  std::string points, body_file;
+  const Eigen::Vector3d at(300, -30, -20);
+  for (const Eigen::Vector3d& p : body) {
+    const Eigen::Vector3d seen = field.apply({Eigen::Matrix3d::Identity(), Eigen::Vector3d(at + p)}).position_mm;
+    points += fmt::format("{}{},{},{}", points.empty() ? "" : ",", seen.x(), seen.y(), seen.z());
+    body_file += fmt::format("{},{},{}\n", p.x(), p.y(), p.z());
+  }
+  const Scratch scratch;
+  PoseReading how{.most_error_mm = 50, .body = scratch.file("body.csv", body_file)};
+  const std::string lost = "900,0,0,1020,0,0,900,110,10,300,0,0\n";
+  const auto raw = read(points + "\n", how);
+  how.field = map;
+  const auto corrected = read(points + "\n" + lost, how);
+  ASSERT_TRUE(raw && corrected) << corrected.error().what;
+  EXPECT_LT(*corrected->poses.at(0).error_mm, 0.5 * *raw->poses.at(0).error_mm);
+  EXPECT_EQ(corrected->poses.size(), 1U);
+  EXPECT_NE(joined(corrected->notes).find("3 of 8 points lie where the field was not mapped"), std::string::npos)
+      << joined(corrected->notes);
+}
+
 TEST_F(MappedField, PlacesAreCorrectedAndThoseBeyondAreNamed) {
   const std::vector<Eigen::Vector3d> places{{300, 20, 30}, {900, 0, 0}, {500, -100, -90}};
   const CorrectedPlaces out = corrected_places(map, places);
