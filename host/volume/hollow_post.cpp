@@ -30,8 +30,9 @@ constexpr double kLeastOpen = 0.02;     // of the directions; less is a channel,
 std::vector<Vector3d> directions_of(int count) {
   std::vector<Vector3d> out;
   const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
-  for (int n = 0; n < count / 2; ++n) {
-    const double up = (n + 0.5) / (count / 2);  // a hemisphere
+  const int half = count / 2;
+  for (int n = 0; n < half; ++n) {
+    const double up = (n + 0.5) / half;  // a hemisphere
     const double across = std::sqrt(1 - up * up);
     out.emplace_back(across * std::cos(n * turn), across * std::sin(n * turn), up);
     out.emplace_back(-out.back());
@@ -287,8 +288,9 @@ class Cavity {
     const Vector3d side = outwards.unitOrthogonal();
     const Vector3d other = outwards.cross(side);
     std::vector<double> wall;
-    for (double height = 0; height < widest_mm_; height += kStep_mm) {
+    for (std::size_t step = 0; step < step_at(widest_mm_); ++step) {
       constexpr int kRound = 48;
+      const double height = static_cast<double>(step) * kStep_mm;
       double sum = 0;
       for (int n = 0; n < kRound; ++n) {
         const double angle = 2 * std::numbers::pi * n / kRound;
