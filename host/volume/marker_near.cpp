@@ -57,7 +57,8 @@ std::vector<Vector3d> bright_places(const Volume& part, const Vector3d& place, d
   std::vector<Vector3d> places;
   for (int start = 0; start < 27; ++start) {
     constexpr int kRounds = 12;
-    Vector3d at = place + 0.5 * kPickReach_mm * Vector3d(start % 3 - 1, start / 3 % 3 - 1, start / 9 - 1);
+    const Eigen::Vector3i from(start % 3 - 1, start / 3 % 3 - 1, start / 9 - 1);
+    Vector3d at = place + 0.5 * kPickReach_mm * from.cast<double>();
     for (int round = 0; round < kRounds; ++round) {
       Vector3d sum = Vector3d::Zero();
       double weights = 1e-9;
@@ -79,8 +80,9 @@ std::vector<MarkerShape> usual_shapes() {
   std::vector<MarkerShape> shapes{
       {MarkerKind::post, 0, 0, 0}, {MarkerKind::ring, 15, 5, 0}, {MarkerKind::cylinder, 15, 5, 4}};
   // A size that is off by a tenth is still taken for a ball.
-  for (double diameter_mm = 4; diameter_mm < 17; diameter_mm *= 1.25)
-    shapes.push_back({MarkerKind::ball, diameter_mm, 0, 0});
+  constexpr double kLeast_mm = 4, kTimes = 1.25;
+  constexpr int kSizes = 7;
+  for (int n = 0; n < kSizes; ++n) shapes.push_back({MarkerKind::ball, kLeast_mm * std::pow(kTimes, n), 0, 0});
   return shapes;
 }
 

@@ -117,17 +117,19 @@ class PostFinder {
     const double step_mm = 0.5 * ct_.spacing_mm.minCoeff();
     int free = 0;
     for (int n = 0; n < 27; ++n) {
-      const Vector3d direction(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      const Eigen::Vector3i direction(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
       if (direction.isZero()) continue;
-      const Vector3d step = voxel_from_patient.linear() * direction.normalized() * step_mm;
+      const Vector3d step = voxel_from_patient.linear() * direction.cast<double>().normalized() * step_mm;
       Vector3d voxel = voxel_from_patient * place;
       double last_wall_mm = 0;
       double length_mm = 0;
-      for (; length_mm < 2 * widest_mm_ + kRing_mm; length_mm += step_mm, voxel += step) {
+      while (length_mm < 2 * widest_mm_ + kRing_mm) {
         const Eigen::Array3i at = voxel.array().round().cast<int>();
         if ((at < 0).any() || (at >= Eigen::Array3i(ct_.size[0], ct_.size[1], ct_.size[2])).any()) break;
         if (ct_.at(at.x(), at.y(), at.z()) >= kAir_hu) last_wall_mm = length_mm;
         if (length_mm - last_wall_mm > kRing_mm && length_mm > widest_mm_) break;
+        length_mm += step_mm;
+        voxel += step;
       }
       free += last_wall_mm < widest_mm_ && length_mm - last_wall_mm > 3 ? 1 : 0;
     }

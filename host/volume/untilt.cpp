@@ -122,6 +122,7 @@ UntiltCost untilt(const SliceStack& stack, ImageFile& image) {
   image.hu = std::move(hu);
   if (stack.usual_step_mm > 0) {
     std::vector<double> along_mm;
+    along_mm.reserve(slices.size());
     for (const DicomSlice& slice : slices)
       along_mm.push_back((slice.position_mm - slices.front().position_mm).dot(image.axes.col(2)));
     even_out(along_mm, stack.usual_step_mm, image, cost);

@@ -255,8 +255,8 @@ TEST(CalibrateHandEyeCommand, TwoTrackersAreJudgedWhereTheirPosesAre) {
   run("birdseye", command + " --at 0,0,0");
   const auto at_origin = read_json(scratch / "x.json");
   EXPECT_GT(at_origin["sigma_at_board_mm"].get<double>(), 2 * at_poses["sigma_at_board_mm"].get<double>());
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
       EXPECT_NEAR(at_origin["camera_from_sensor"][i][j].get<double>(),
                   at_poses["camera_from_sensor"][i][j].get<double>(), 0.05);
       EXPECT_NEAR(at_origin["tracker_from_pattern"][i][j].get<double>(),
