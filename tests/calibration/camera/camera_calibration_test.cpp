@@ -5,7 +5,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iostream>
 
 #include "calibration/points/point_error.hpp"
 #include "tests/support/board_views.hpp"
@@ -278,6 +280,31 @@ TEST(CameraCalibration, TheBoardsUnitChangesNoLens) {
   EXPECT_EQ(verdict.grade, Grade::fail);
   EXPECT_TRUE(std::any_of(verdict.reasons.begin(), verdict.reasons.end(),
                           [](const std::string& r) { return r.find("other units?") != std::string::npos; }));
+}
+
+TEST(CameraCalibration, HalvesOfTheRealWebcamsViewsLieWithinWhatTheyState) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  for (const bool alternate : {true, false}) {
+    std::array<Views, 2> halves;
+    for (int i = 0; i < 12; ++i) {
+      const int half = alternate ? i % 2 : i / 6;
+      halves.at(static_cast<std::size_t>(half)).push_back(testing::read_view(*data / "camera_chessboard_webcam", i));
+    }
+    CameraModel size = hd_lens();
+    size.width_px = 640;
+    size.height_px = 480;
+    const auto one = calibrated(halves[0], size), other = calibrated(halves[1], size);
+    constexpr double kWithin99 = 2.576;
+    for (int k = 0; k < 4; ++k) {
+      const double off_px = std::abs(vector_of(one.camera)[k] - vector_of(other.camera)[k]);
+      const double sigma_px = std::hypot(one.sigma()[k], other.sigma()[k]);
+      EXPECT_LT(off_px, kWithin99 * sigma_px) << kCameraParameterNames[static_cast<std::size_t>(k)];
+      std::cout << "[ figures  ] " << (alternate ? "every second view: " : "six and six: ")
+                << kCameraParameterNames[static_cast<std::size_t>(k)] << " " << off_px << " px apart, sigma "
+                << sigma_px << " px\n";
+    }
+  }
 }
 
 TEST(CameraCalibration, RealWebcamAsPublishedByPlainLeastSquares) {
