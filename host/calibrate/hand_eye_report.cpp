@@ -157,7 +157,8 @@ void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, Htm
              "Each corner, from where the tracker and the hand-eye of all the other stations put it to where it was "
              "seen. The arrows of one station point one way: that is the tracker's error at that moment.");
   constexpr std::size_t kMostBars = 60;
-  const char* const caption = "Each station, with the hand-eye of all the others.";
+  const char* const caption =
+      "Each station, with the hand-eye of all the others; of a stream, of those outside its own block of time.";
   if (bars.size() <= kMostBars) {
     page.svg(bars_svg(bars, "held-out error at the board, mm"), caption);
     return;
