@@ -49,7 +49,4 @@ CameraMatrix lens_information(const CameraModel& camera, std::span<const BundleV
 Eigen::Matrix<double, 2, 6> pixel_by_pose(const Eigen::Matrix<double, 2, 3>& pixel_by_point,
                                           const Eigen::Vector3d& turned_point_mm);
 
-CameraVector parameters_of(const CameraModel& camera);
-void set_parameters(CameraModel& camera, const double* parameters);
-
 }  // namespace birdseye::calibration

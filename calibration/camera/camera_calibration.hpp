@@ -12,6 +12,7 @@
 #include "calibration/base/verdict.hpp"
 #include "calibration/detect/pattern_view.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {
@@ -26,8 +27,6 @@ std::optional<LensModel> lens_model_of(std::string_view name);
 /// Which of CameraModel's nine parameters the model solves for.
 std::array<bool, CameraModel::kParameters> solved_by(LensModel model);
 
-using CameraVector = Eigen::Matrix<double, CameraModel::kParameters, 1>;
-using CameraMatrix = Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters>;
 /// The names of the nine, in CameraModel's order, with their units: "fx_px" .. "k3".
 inline constexpr std::array kCameraParameterNames{"fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
 

@@ -9,6 +9,7 @@
 #include "calibration/base/verdict.hpp"
 #include "calibration/detect/pattern_view.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "calibration/hand_eye/board_symmetry.hpp"
@@ -29,14 +30,12 @@ struct HandEyeStation {
   std::optional<double> time_s;  ///< of a stream, in which neighbours err together; none where taken one by one
 };
 
-using LensCovariance = Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters>;
-
 struct HandEyeInput {
   std::vector<HandEyeStation> stations;
   std::optional<CameraModel> camera;  ///< none is needed where stations hold camera_from_marker
   std::optional<StereoLens> right;
   /// Of the first lens's nine parameters, in CameraModel's order; none: the lens is taken for exact.
-  std::optional<LensCovariance> camera_covariance;
+  std::optional<CameraMatrix> camera_covariance;
   std::optional<TrackerNoise> tracker_noise;  ///< none: estimated from the residuals
   TrackerNoise view_noise;                    ///< of camera_from_marker, where that is given instead of corners
   std::optional<double> corner_sigma_px;      ///< per axis; none: estimated from the residuals

@@ -1,6 +1,5 @@
 #include "calibration/hand_eye/hand_eye_lens.hpp"
 
-#include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -12,10 +11,9 @@ namespace birdseye::calibration {
 
 namespace {
 
-CameraModel moved_lens(CameraModel lens, const Eigen::VectorXd& step) {
-  const std::array parameters{&lens.fx_px, &lens.fy_px, &lens.cx_px, &lens.cy_px, &lens.k1,
-                              &lens.k2,    &lens.p1,    &lens.p2,    &lens.k3};
-  for (std::size_t i = 0; i < parameters.size(); ++i) *parameters.at(i) += step[static_cast<Eigen::Index>(i)];
+CameraModel moved_lens(CameraModel lens, const CameraVector& step) {
+  const CameraVector moved = parameters_of(lens) + step;
+  set_parameters(lens, moved.data());
   return lens;
 }
 
@@ -53,7 +51,7 @@ void add_lens_error(const HandEyeInput& in, const HandEyeStations& stations, con
   for (Eigen::Index k = 0; k < eigen.values.size(); ++k) {
     constexpr double kNothing = 1e-6;  // of one parameter's own variance
     if (!(eigen.values[k] > kNothing)) continue;
-    const Eigen::VectorXd step = std::sqrt(eigen.values[k]) * unit.cwiseProduct(eigen.vectors.col(k));
+    const CameraVector step = std::sqrt(eigen.values[k]) * unit.cwiseProduct(eigen.vectors.col(k));
     const auto moved =
         solved_with(moved_lens(*in.camera, step), stations, freedom, *as_is, robust, out.corner_sigma_px);
     if (!moved) continue;

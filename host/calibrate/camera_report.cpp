@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
-#include "calibration/camera/camera_bundle.hpp"
 #include "host/calibrate/residual_picture.hpp"
 #include "host/report/bar_chart.hpp"
 #include "host/report/line_plot.hpp"

@@ -9,20 +9,20 @@ namespace birdseye::host {
 
 namespace fs = std::filesystem;
 
-Result<std::optional<CameraCovariance>> read_camera_covariance(const fs::path& path) {
+Result<std::optional<CameraMatrix>> read_camera_covariance(const fs::path& path) {
   cv::Mat matrix;
   try {
     const cv::FileStorage file(path.string(), cv::FileStorage::READ);
-    if (file["camera_covariance"].empty()) return std::optional<CameraCovariance>();
+    if (file["camera_covariance"].empty()) return std::optional<CameraMatrix>();
     file["camera_covariance"] >> matrix;
     matrix.convertTo(matrix, CV_64F);
   } catch (const cv::Exception&) {
-    return std::optional<CameraCovariance>();  // ROS's or Kalibr's
+    return std::optional<CameraMatrix>();  // ROS's or Kalibr's
   }
   if (matrix.rows != CameraModel::kParameters || matrix.cols != CameraModel::kParameters)
     return Error{Errc::bad_format, fmt::format("{}: camera_covariance is {}x{}, of 9x9; take it out to work without",
                                                path.string(), matrix.rows, matrix.cols)};
-  CameraCovariance out;
+  CameraMatrix out;
   for (int i = 0; i < out.rows(); ++i) {
     for (int j = 0; j < out.cols(); ++j) out(i, j) = matrix.at<double>(i, j);
   }
@@ -34,7 +34,7 @@ Result<std::optional<CameraCovariance>> read_camera_covariance(const fs::path& p
   return std::optional(out);
 }
 
-std::string camera_covariance_text(const CameraCovariance& covariance) {
+std::string camera_covariance_text(const CameraMatrix& covariance) {
   std::vector<double> numbers(covariance.data(), covariance.data() + covariance.size());
   return fmt::format("camera_covariance: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {:.17g} ]\n",
                      covariance.rows(), covariance.cols(), fmt::join(numbers, ", "));

@@ -12,8 +12,8 @@ using testing::Scratch;
 
 TEST(LensFile, HoldsHowWellTheLensIsKnown) {
   const Scratch scratch;
-  CameraCovariance covariance = CameraCovariance::Random();
-  covariance = CameraCovariance(covariance * covariance.transpose());
+  CameraMatrix covariance = CameraMatrix::Random();
+  covariance = CameraMatrix(covariance * covariance.transpose());
   const std::string lens = camera_text(testing::wide_lens());
   const std::string path = scratch.file("lens.yaml", lens + camera_covariance_text(covariance));
   const auto camera = read_camera(path);
