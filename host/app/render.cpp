@@ -9,10 +9,12 @@
 
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/app/overlay_options.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/overlay/margins.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
@@ -28,13 +30,14 @@ constexpr const char* kDisplays[] = {"distorted", "undistorted", "undistorted-wh
 
 struct RenderOptions {
   VolumeSource volume;
-  std::filesystem::path labels, camera, pose, path, deformation, over, out, movie, json;
-  std::vector<LabelChoice> keep;
+  ShownChoice shown;
+  OverlayLook look;  ///< but for its render settings
+  std::filesystem::path camera, pose, path, deformation, over, out, movie, json;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
   double clip = 0.5;
-  double step_mm = 0.7, seconds = 4, opacity = 1;
+  double step_mm = 0.7, seconds = 4;
   std::vector<double> clip_plane;
-  bool window = false, surface_in_front = false;
+  bool window = false;
   int frames = 0;
 };
 
@@ -88,10 +91,11 @@ void straighten(RenderScene& scene, const std::string& display) {
 
 Result<RenderScene> scene_of(const RenderOptions& options) {
   RenderScene scene;
-  auto volume = read_shown(options.volume, options.labels, options.keep);
+  auto volume = read_shown(options.volume, options.shown);
   if (!volume) return volume.error();
   print_notes(volume->notes);
   scene.volume = std::move(volume->volume);
+  scene.margins = std::move(volume->margins);
   if (auto looked = look(scene, options); !looked) return looked.error();
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
@@ -115,6 +119,7 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   if (auto covers = check_covers(*field, scene.volume); !covers)
     return covers.error().with_context(options.deformation.string());
   scene.deformation = *std::move(field);
+  if (scene.margins) scene.margins = deformed(*scene.margins, *scene.deformation);
   return scene;
 }
 
@@ -130,7 +135,8 @@ std::string transparent_png_of(ImageRgba image) {
 }
 
 Result<void> write_still(const RenderOptions& options, const RenderScene& scene, Engine& engine) {
-  const OverlayLook look{scene.settings, options.opacity, options.surface_in_front};
+  OverlayLook look = options.look;
+  look.render = scene.settings;
   const PaintedStill painted = draw(engine, scene, scene.camera_from_patient, look);
   const ImageRgba& image = painted.volume;
   const double ms = painted.rendered_in.seconds() * 1e3;
@@ -211,13 +217,7 @@ void add_render(CLI::App& app, CommandStatus& status) {
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
   CLI::Option* const over =
       command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
-  command.add_option("--opacity", options->opacity, "of what is drawn --over a picture (default 1)")
-      ->check(CLI::Range(0.0, 1.0))
-      ->needs(over);
-  command
-      .add_flag("--surface-in-front", options->surface_in_front,
-                "its edges and highlights stay before what is drawn, which so reads as inside")
-      ->needs(over);
+  for (CLI::Option* const option : add_look_options(command, options->look)) option->needs(over);
   command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over");
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");
@@ -246,12 +246,7 @@ void add_render(CLI::App& app, CommandStatus& status) {
       ->check(CLI::Range(1, 1'000'000))
       ->needs(window);
   add_ct_options(command, options->volume);
-  CLI::Option* const labels =
-      command.add_option("--labels", options->labels, "its segmentation: DICOM SEG, or labels on the CT's grid");
-  CLI::Option* const keep =
-      command.add_option("--keep,--show", options->keep, "the labels to show, by name or number")->delimiter(',');
-  labels->needs(keep);
-  keep->needs(labels);
+  add_shown_options(command, options->shown);
   CLI::Option* const json = command.add_option("--json", options->json, "write the figures to this file");
   window->excludes(movie)->excludes(json);
   command.callback([options, &status] { status.take(render(*options)); });

@@ -13,10 +13,12 @@
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/app/overlay_options.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/replay_player.hpp"
 #include "host/operation/replay_setup.hpp"
+#include "host/overlay/margins.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/recording/recording_reader.hpp"
 
@@ -28,10 +30,11 @@ namespace fs = std::filesystem;
 struct ReplayOptions {
   ReplayInputs inputs;
   VolumeSource volume;
-  fs::path labels, deformation, out, json;
-  std::vector<LabelChoice> keep;
+  ShownChoice shown;
+  OverlayLook look;
+  fs::path deformation, out, json;
   std::string transfer = "tumour-and-vessels", engine = "cpu";
-  double step_mm = 1.2, film_hz = 0;
+  double film_hz = 0;
   int every = 10;
 };
 
@@ -92,12 +95,13 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (!reader) return reader.error();
   const auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
-  const auto shown = read_shown(options.volume, options.labels, options.keep);
+  const auto shown = read_shown(options.volume, options.shown);
   if (!shown) return shown.error();
   print_notes(shown->notes);
   const Volume* const volume = &shown->volume;
   const auto transfer = load_transfer_function(options.transfer);
   if (!transfer) return transfer.error();
+  std::optional<Margins> margins = shown->margins;
   const auto engine = make_engine(options.engine, *volume, *transfer);
   if (!engine) return engine.error();
   if (!(*engine)->choice().empty()) fmt::print(stderr, "{}\n", (*engine)->choice());
@@ -107,6 +111,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
     if (auto covers = check_covers(*field, *volume); !covers)
       return covers.error().with_context(options.deformation.string());
     (*engine)->deform(*field);
+    if (margins) margins = deformed(*margins, *field);
   }
   std::error_code error;
   fs::create_directories(options.out, error);
@@ -116,8 +121,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  ReplayPlayer player({options.out, options.every, options.film_hz, options.step_mm}, setup->setup(), trust.figures,
-                      **engine);
+  ReplayPlayer player({options.out, options.every, options.film_hz, options.look}, setup->setup(), trust.figures,
+                      **engine, std::move(margins));
   if (auto played = play(**reader, player, progress); !played) return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
@@ -164,21 +169,19 @@ void add_inputs(CLI::App& command, ReplayInputs& inputs) {
 
 void add_replay(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<ReplayOptions>();
+  options->look.render.step_mm = 1.2;
   CLI::App& command = *app.add_subcommand("replay", "draw the CT over a recording, the same to the bit each time");
   add_inputs(command, options->inputs);
   command.add_option("--volume", options->volume.path, "the CT")->required();
   add_ct_options(command, options->volume);
-  CLI::Option* const labels =
-      command.add_option("--labels", options->labels, "its segmentation: DICOM SEG, or labels on the CT's grid");
-  CLI::Option* const keep =
-      command.add_option("--keep,--show", options->keep, "the labels to show, by name or number")->delimiter(',');
-  labels->needs(keep);
-  keep->needs(labels);
+  add_shown_options(command, options->shown);
+  add_look_options(command, options->look);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default tumour-and-vessels)");
   command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm");
   command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));
-  command.add_option("--step-mm", options->step_mm, "between samples along a ray")->check(CLI::Range(0.05, 20.0));
+  command.add_option("--step-mm", options->look.render.step_mm, "between samples along a ray")
+      ->check(CLI::Range(0.05, 20.0));
   command.add_option("--out", options->out, "folder for pictures, frames.csv and replay.json")->required();
   command.add_option("--every", options->every, "writes one frame in so many as a picture (default 10)")
       ->check(CLI::Range(1, 1'000'000));

@@ -27,6 +27,7 @@ void LiveWorkflow::tick() {
     picture_.set_engine(nullptr);
     if (patient_.engine() && deformation_.found()) patient_.engine()->deform(deformation_.found()->field);
     picture_.set_engine(patient_.engine());
+    show_margins();
   }
   if (news.patient) {
     ++shapes_;
@@ -181,7 +182,18 @@ void LiveWorkflow::show_shape() {
   } else {
     patient_.engine()->undeform();
   }
-  picture_.redraw();
+  show_margins();
+}
+
+/// As the CT is shown. Has the picture drawn anew.
+void LiveWorkflow::show_margins() {
+  std::shared_ptr<const Margins> shown;
+  if (patient_.plan() && patient_.plan()->margins) {
+    const Margins& margins = *patient_.plan()->margins;
+    const auto& found = deformation_.found();
+    shown = std::make_shared<const Margins>(found ? deformed(margins, found->field) : margins);
+  }
+  picture_.set_margins(std::move(shown));
 }
 
 void LiveWorkflow::update_setup() {
@@ -277,7 +289,7 @@ void LiveWorkflow::primary() {
       update_setup();
       return go_on();
     case LiveStep::run:
-      return freeze_or_let_go();
+      return frozen_ ? freeze_or_let_go() : hide_or_show_overlay();
   }
 }
 

@@ -60,6 +60,7 @@ class LiveWorkflow {
   void go_on();    ///< to the next step, where this one is done
   void go_to(LiveStep step);
   void freeze_or_let_go() { frozen_ = !frozen_; }
+  void hide_or_show_overlay() { picture_.hide(!picture_.hidden()); }
   void set_transfer(const TransferFunction& transfer) { patient_.set_transfer(transfer); }
   void set_look(const OverlayLook& look) { picture_.set_look(look); }
 
@@ -80,6 +81,7 @@ class LiveWorkflow {
   void fit();
   void forget_views(const std::string& why);
   void show_shape();
+  void show_margins();
   void update_setup();
   void set_picture_up();
   void watch_surface(HostTime now);

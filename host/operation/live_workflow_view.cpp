@@ -20,6 +20,7 @@ OperationView LiveWorkflow::view() const {
     line += fmt::format("{}{} places touched", line.empty() ? "" : ", ", out.touched_places);
   }
   out.frozen = frozen_;
+  out.overlay_hidden = picture_.hidden();
   for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
     if (out.fault.empty()) out.fault = *fault;
   }

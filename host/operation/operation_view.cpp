@@ -20,7 +20,9 @@ std::string primary_words(const OperationView& operation) {
     case LiveStep::check:
       return operation.unconfirmed ? "the landmarks fit: go on" : "go on";
     case LiveStep::run:
-      return operation.frozen ? "let the picture go" : "freeze the picture";
+      return operation.frozen           ? "let the picture go"
+             : operation.overlay_hidden ? "show the overlay"
+                                        : "hide the overlay";
   }
   return {};
 }

@@ -23,6 +23,7 @@ namespace birdseye::host {
 struct OperationView {
   LiveStep step = LiveStep::connect;
   bool frozen = false;
+  bool overlay_hidden = false;  ///< a person has switched it off
   bool board_named = false;  ///< there is a board to calibrate with
   bool guiding = false;
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds

@@ -40,6 +40,13 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std
     if (!centre) return centre.error();
     plan.landmarks.push_back({fmt::format("middle of label {}", target.text), *centre});
   }
+  if (!files.margins_mm.empty()) {
+    const auto targets = values_in(*labels, files, files.targets);
+    if (!targets) return targets.error();
+    auto margins = margins_about(volume, *targets, files.margins_mm);
+    if (!margins) return margins.error().with_context(files.labels.string());
+    plan.margins = *std::move(margins);
+  }
   auto organ = values_in(*labels, files, files.organ);
   if (!organ) return organ.error();
   const auto of_organ = [&organ](std::int16_t label) {
@@ -83,6 +90,8 @@ Result<void> check_labels_named(const PatientFiles& files) {
                                               "--organ, as --organ 1,2,3",
                                               files.labels.string())};
   }
+  if (!files.margins_mm.empty() && files.targets.empty())
+    return Error{Errc::bad_value, "--margins: about what? Give --labels and --targets, the labels of the tumour"};
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/overlay/margins.hpp"
 #include "host/volume/label_names.hpp"
 #include "host/volume/volume.hpp"
 #include "host/volume/volume_source.hpp"
@@ -28,6 +29,7 @@ struct PatientFiles {
   std::vector<LabelChoice> organ;    ///< labels of the organ that the video shows; without labels: all of the CT
   std::filesystem::path fiducials;   ///< points of the CT; empty: found in it
   std::filesystem::path landmarks;   ///< a table name, x, y, z; or empty
+  std::vector<double> margins_mm;    ///< shells to draw about the targets; empty: none
 };
 
 /// The simulated cart's patient: its liver's vessels and tumour are shown, and the tumour's middle is the landmark.
@@ -41,6 +43,7 @@ struct PatientPlan {
   std::vector<int> organ;  ///< values in labels of what the views show: it is matched with them
   std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given
   std::vector<NamedPoint> landmarks;
+  std::optional<Margins> margins;  ///< about all targets
 };
 
 /// What is taken for the target where no landmark is given; patient frame, mm.

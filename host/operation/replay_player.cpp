@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -30,10 +31,11 @@ std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& d
 
 }  // namespace
 
-ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine)
+ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
+                           std::optional<Margins> margins)
     : output_(std::move(output)), engine_(engine) {
-  look_.render.step_mm = output_.step_mm;
   painter_.set_setup(setup, figures);
+  if (margins) painter_.set_margins(std::make_shared<const Margins>(*std::move(margins)));
 }
 
 Result<void> ReplayPlayer::take(const wire::VideoFrame& frame) {
@@ -43,7 +45,7 @@ Result<void> ReplayPlayer::take(const wire::VideoFrame& frame) {
     return {};
   }
   const OverlayGate::Decision decision = painter_.decide(frame);
-  const auto painted = painter_.paint(frame, decision, engine_, look_);
+  const auto painted = painter_.paint(frame, decision, engine_, output_.look);
   const std::vector<std::uint8_t>& rgb = painted ? painted->rgb : *frame.rgb;
   if (painted) ++done_.overlaid;
   if (decision.strength >= 1) ++done_.whole;

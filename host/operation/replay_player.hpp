@@ -18,7 +18,7 @@ struct ReplayOutput {
   std::filesystem::path folder;
   int every = 10;      ///< of the frames, one in so many is written as a picture
   double film_hz = 0;  ///< 0: no film
-  double step_mm = 1.2;
+  OverlayLook look;
 };
 
 /// What became of the frames so far.
@@ -32,7 +32,9 @@ struct Replayed {
 /// Draws every frame of a recording, writes some as pictures and, where asked, all as a film.
 class ReplayPlayer {
  public:
-  ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine);
+  /// margins: as the engine has the CT deformed; empty: there are none.
+  ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
+               std::optional<Margins> margins = std::nullopt);
 
   /// Fails where a picture or the film cannot be written.
   Result<void> take(const wire::VideoFrame& frame);
@@ -44,7 +46,6 @@ class ReplayPlayer {
  private:
   ReplayOutput output_;
   Engine& engine_;
-  OverlayLook look_;
   FramePainter painter_;
   std::optional<Film> film_;
   Replayed done_;

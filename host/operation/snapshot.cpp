@@ -2,6 +2,7 @@
 #include "host/files/camera_files.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <nlohmann/json.hpp>
 
@@ -34,6 +35,11 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
     add("--labels", whole(snapshot.patient.labels));
     add("--keep", joined(snapshot.patient.shown, ","));
   }
+  if (!snapshot.patient.margins_mm.empty()) {
+    if (snapshot.patient.shown.empty()) add("--labels", whole(snapshot.patient.labels));
+    add("--margins", fmt::format("{}", fmt::join(snapshot.patient.margins_mm, ",")));
+    add("--margin-of", joined(snapshot.patient.targets, ","));
+  }
   add("--camera", whole(folder / "camera.yaml"));
   add("--pose", whole(folder / "camera_from_patient.txt"));
   add("--transfer", whole(folder / "transfer.json"));
@@ -43,6 +49,8 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   add("--opacity", number(snapshot.look.opacity * snapshot.shown.strength));
   add("--engine", snapshot.engine);
   if (snapshot.look.surface_in_front) out.emplace_back("--surface-in-front");
+  if (snapshot.look.style == OverlayStyle::outlines) out.emplace_back("--outlines");
+  if (snapshot.look.hole_radius) add("--hole", number(*snapshot.look.hole_radius));
   if (const auto& clip = snapshot.look.render.clip) {
     out.emplace_back("--clip-plane");
     for (const double value : {clip->normal.x(), clip->normal.y(), clip->normal.z(), clip->offset_mm})

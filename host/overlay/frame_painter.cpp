@@ -1,37 +1,22 @@
 #include "host/overlay/frame_painter.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "drivers/system/clock.hpp"
-#include "host/overlay/surface_cues.hpp"
+#include "host/overlay/hole.hpp"
+#include "host/overlay/outlines.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
-/// A rendered overlay over a picture: out = overlay * strength + video * (1 - alpha * strength). strength: as the gate
-/// decided, in [0, 1]. An overlay of another size than the picture's would lie somewhere else, and is not drawn.
-std::vector<std::uint8_t> lay_over(std::span<const std::uint8_t> video, const ImageRgba& overlay, double strength,
-                                   const OverlayLook& look) {
-  std::vector<std::uint8_t> out(video.begin(), video.end());
-  const std::size_t pixels = overlay.rgba.size() / 4;
-  if (video.size() != 3 * pixels) return out;
-  std::vector<std::uint8_t> in_front;
-  if (look.surface_in_front) in_front = surface_cues({video, overlay.width_px, overlay.height_px});
-  // Eight bits of fraction: 256 is all of it.
-  const int whole = static_cast<int>(std::lround(std::clamp(strength * look.opacity, 0.0, 1.0) * 256));
-  for (std::size_t i = 0; i < pixels; ++i) {
-    const std::uint8_t* const rgba = &overlay.rgba[4 * i];
-    if (rgba[3] == 0) continue;
-    const int w = in_front.size() == pixels ? whole * (255 - in_front[i]) / 255 : whole;
-    const int keep = 255 * 256 - rgba[3] * w;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const int value = rgba[c] * w * 255 + video[3 * i + c] * keep;
-      out[3 * i + c] = static_cast<std::uint8_t>(std::min(255, (value + 255 * 128) / (255 * 256)));
-    }
-  }
-  return out;
+/// The CT and the margins, in the style and through the hole that are asked for.
+ImageRgba draw_ct(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient, Engine& engine,
+                  const Margins* margins, const OverlayLook& look) {
+  ImageRgba picture = engine.render(camera, camera_from_patient, look.render);
+  if (look.style == OverlayStyle::outlines) picture = outlines_of(picture);
+  if (margins != nullptr && look.margins) draw_margins(*margins, camera, camera_from_patient, picture);
+  return look.hole_radius ? in_hole(picture, *look.hole_radius) : picture;
 }
 
 }  // namespace
@@ -39,7 +24,7 @@ std::vector<std::uint8_t> lay_over(std::span<const std::uint8_t> video, const Im
 PaintedStill paint_still(const Still& still, Engine& engine, const OverlayLook& look, const TrustFigures& figures) {
   PaintedStill out;
   const HostTime began = host_now();
-  out.volume = engine.render(still.camera, still.camera_from_patient, look.render);
+  out.volume = draw_ct(still.camera, still.camera_from_patient, engine, still.margins, look);
   out.rendered_in = host_now() - began;
   if (still.straightened_by != nullptr) still.straightened_by->hide_unseen(out.volume);
   out.rgb = lay_over(still.video, out.volume, decide_still(figures).strength, look);
@@ -85,7 +70,7 @@ std::optional<FramePainter::Painted> FramePainter::paint(const wire::VideoFrame&
   if (!from) return std::nullopt;
   Painted out;
   out.camera_from_patient = *from;
-  const ImageRgba overlay = engine.render(setup_->camera(), out.camera_from_patient, look.render);
+  const ImageRgba overlay = draw_ct(setup_->camera(), out.camera_from_patient, engine, margins_.get(), look);
   out.rgb = lay_over(*frame.rgb, overlay, decision.strength, look);
   return out;
 }

@@ -1,24 +1,21 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "device/wire/messages.hpp"
 #include "host/overlay/gate.hpp"
+#include "host/overlay/margins.hpp"
+#include "host/overlay/overlay_look.hpp"
 #include "host/overlay/scope_setup.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 
 namespace birdseye::host {
-
-/// How an overlay is drawn, as whoever looks at it chooses.
-struct OverlayLook {
-  RenderSettings render;
-  double opacity = 1;             ///< in [0, 1]
-  bool surface_in_front = false;  ///< the surface's edges and highlights stay before it, so that it reads as inside
-};
 
 /// A picture of which somebody gives lens and pose.
 struct Still {
@@ -27,6 +24,7 @@ struct Still {
   Transform<Camera, Patient> camera_from_patient;
   /// By which it was made of what the lens took; what that lens did not see stays bare.
   const FrameUndistorter* straightened_by = nullptr;
+  const Margins* margins = nullptr;
 };
 struct PaintedStill {
   ImageRgba volume;               ///< alone, transparent where nothing of it is drawn
@@ -48,6 +46,9 @@ class FramePainter {
   void set_setup(std::optional<Setup> setup, const TrustFigures& figures);
   [[nodiscard]] const std::optional<Setup>& setup() const { return setup_; }
   [[nodiscard]] const TrustFigures& figures() const { return figures_; }
+
+  /// As the CT is shown: deformed, where it is. Null: there are none.
+  void set_margins(std::shared_ptr<const Margins> margins) { margins_ = std::move(margins); }
 
   /// Whether the frame may bear an overlay. Of every frame, in their order; a clock that goes back is another clock.
   OverlayGate::Decision decide(const wire::VideoFrame& frame);
@@ -75,6 +76,7 @@ class FramePainter {
   OverlayGate gate_;
   std::optional<Setup> setup_;
   TrustFigures figures_;
+  std::shared_ptr<const Margins> margins_;
   std::optional<DeviceTime> newest_;
 };
 

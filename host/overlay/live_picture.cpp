@@ -41,13 +41,13 @@ void LivePicture::draw() {
   overlaid_.clear();
   stopped_.clear();
   kind_ = -1;
-  if (engine_ == nullptr) return;
+  if (engine_ == nullptr || hidden_) return;
   auto painted = painter_.paint(*frame_, decision_, *engine_, look_);
   if (painted) overlaid_ = std::move(painted->rgb);
 }
 
 std::optional<Transform<Camera, Patient>> LivePicture::camera_from_patient() const {
-  return frame_ && engine_ ? painter_.camera_from_patient(*frame_, decision_) : std::nullopt;
+  return frame_ && engine_ && !hidden_ ? painter_.camera_from_patient(*frame_, decision_) : std::nullopt;
 }
 
 std::optional<Transform<Camera, Patient>> LivePicture::seen_from() const {
@@ -70,6 +70,8 @@ ShownPicture LivePicture::at(HostTime now) {
     out.reason = why_no_setup_;
   } else if (engine_ == nullptr) {
     out.reason = "the CT is not ready";
+  } else if (hidden_) {
+    out.reason = "it is switched off";
   } else if (!fresh.why_too_old.empty()) {
     out.reason = fresh.why_too_old;
   } else if (!painter_.fits(*frame_)) {

@@ -52,6 +52,17 @@ class LivePicture {
     redraw();
   }
   [[nodiscard]] const OverlayLook& look() const { return look_; }
+  /// As the CT is shown: deformed, where it is. Null: there are none.
+  void set_margins(std::shared_ptr<const Margins> margins) {
+    painter_.set_margins(std::move(margins));
+    redraw();
+  }
+  /// Shows the video alone, or the overlay over it again. Whoever asks for it wants to see the organ at once.
+  void hide(bool hidden) {
+    hidden_ = hidden;
+    redraw();
+  }
+  [[nodiscard]] bool hidden() const { return hidden_; }
   void set_look(const OverlayLook& look) {
     look_ = look;
     redraw();
@@ -90,7 +101,7 @@ class LivePicture {
   OverlayGate::Decision decision_;
   std::vector<std::uint8_t> overlaid_, stopped_;
   std::uint64_t changes_ = 0, skipped_ = 0;
-  bool dirty_ = false;
+  bool dirty_ = false, hidden_ = false;
   int kind_ = -1;
 };
 

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "host/volume/labels.hpp"
-
 namespace birdseye::host {
 
 namespace {
@@ -26,20 +24,6 @@ std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
 }
 
 }  // namespace
-
-Result<ImportedVolume> read_shown(const VolumeSource& volume, const std::filesystem::path& labels,
-                                  const std::vector<LabelChoice>& keep) {
-  auto ct = import_with_notes(volume);
-  if (!ct || labels.empty()) return ct;
-  const auto label_of = import_named_labels(labels, ct->volume);
-  if (!label_of) return label_of.error();
-  const auto values = values_of_labels(label_of->names, keep, &ct->notes);
-  if (!values) return values.error().with_context(labels.string());
-  auto kept = keep_labels(ct->volume, label_of->volume, *values);
-  if (!kept) return kept.error().with_context(labels.string());
-  ct->volume = *std::move(kept);
-  return ct;
-}
 
 Eigen::Vector3d middle_of(const Volume& volume) {
   const auto [low, high] = bounds(volume);
@@ -80,7 +64,7 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
 PaintedStill draw(Engine& engine, const RenderScene& scene, const Transform<Camera, Patient>& camera_from_patient,
                   const OverlayLook& look) {
   const Still still{scene.behind.rgb, scene.camera, camera_from_patient,
-                    scene.straighten ? &*scene.straighten : nullptr};
+                    scene.straighten ? &*scene.straighten : nullptr, scene.margins ? &*scene.margins : nullptr};
   return paint_still(still, engine, look, vouched_for({}));
 }
 

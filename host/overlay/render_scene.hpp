@@ -14,10 +14,9 @@
 #include "host/deform/displacement_field.hpp"
 #include "host/files/picture.hpp"
 #include "host/overlay/frame_painter.hpp"
+#include "host/overlay/margins.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
-#include "host/volume/import.hpp"
-#include "host/volume/label_names.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
@@ -25,6 +24,7 @@ namespace birdseye::host {
 /// What `birdseye render` draws, once all is read.
 struct RenderScene {
   Volume volume;
+  std::optional<Margins> margins;  ///< as deformation, where there is one, has them
   std::optional<DisplacementField> deformation;
   CameraModel camera;
   Transform<Camera, Patient> camera_from_patient;
@@ -34,10 +34,6 @@ struct RenderScene {
   Picture behind;                              ///< of the camera's size: a frame of video, or black
   std::optional<FrameUndistorter> straighten;  ///< where the camera is a straight one in place of that of the video
 };
-
-/// A CT; with labels, a segmentation on its grid, of it what has one of those to keep, by name or number.
-Result<ImportedVolume> read_shown(const VolumeSource& volume, const std::filesystem::path& labels,
-                                  const std::vector<LabelChoice>& keep);
 
 /// Without lens and pose: from in front of the patient, head up; of a scan thinner than half its height or width, from
 /// the feet as radiologists look at a slice. The volume fills the picture; what lies before share `clip` of its depth

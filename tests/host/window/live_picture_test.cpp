@@ -147,6 +147,29 @@ TEST(LivePicture, ShowsTheOverlayWhileAllIsWell) {
   EXPECT_EQ(overlaid, 240);
 }
 
+TEST(LivePicture, AnOverlayThatIsSwitchedOffIsGoneAtOnceAndSaysSo) {
+  const auto engine = std::make_shared<Magenta>();
+  LivePicture picture;
+  picture.set_engine(engine);
+  picture.set_setup(setup(), kGood);
+  for (std::int64_t ms = 0; ms < 400; ms += 40) {
+    picture.take(frame_at(ms, good_pose()), HostTime{ms * kMs});
+    picture.draw();
+  }
+  const HostTime now{370 * kMs};
+  ASSERT_TRUE(picture.at(now).overlaid);
+  picture.hide(true);
+  picture.draw();
+  EXPECT_FALSE(picture.at(now).overlaid);
+  EXPECT_EQ(magenta_in(*picture.at(now).rgb), 0);
+  EXPECT_EQ(picture.at(now).reason, "it is switched off");
+  EXPECT_FALSE(picture.camera_from_patient());
+  EXPECT_TRUE(picture.seen_from()) << "views can be kept meanwhile";
+  picture.hide(false);
+  picture.draw();
+  EXPECT_TRUE(picture.at(now).overlaid);
+}
+
 TEST(LivePicture, NoStaleOverlayStaysLongerThan150MsUnderAnyFault) {
   for (const Named& one : faults()) {
     SCOPED_TRACE(one.name);

@@ -1,0 +1,38 @@
+#include "host/overlay/shown_ct.hpp"
+
+#include <utility>
+
+#include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
+
+namespace birdseye::host {
+
+Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice) {
+  if (choice.margins_mm.empty() != choice.margin_of.empty())
+    return Error{Errc::bad_value, "--margins and --margin-of go together: how many mm, about which labels"};
+  if (!choice.labels.empty() && choice.keep.empty() && choice.margins_mm.empty())
+    return Error{Errc::bad_value, "--labels: what of it? Give --show, or --margins and --margin-of"};
+  auto ct = import_with_notes(source);
+  if (!ct) return ct.error();
+  ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};
+  if (choice.labels.empty()) return shown;
+  const std::string file = choice.labels.string();
+  const auto labels = import_named_labels(choice.labels, shown.volume);
+  if (!labels) return labels.error();
+  if (!choice.margins_mm.empty()) {
+    const auto values = values_of_labels(labels->names, choice.margin_of, &shown.notes);
+    if (!values) return values.error().with_context(file);
+    auto margins = margins_about(labels->volume, *values, choice.margins_mm);
+    if (!margins) return margins.error().with_context(file);
+    shown.margins = *std::move(margins);
+  }
+  if (choice.keep.empty()) return shown;
+  const auto values = values_of_labels(labels->names, choice.keep, &shown.notes);
+  if (!values) return values.error().with_context(file);
+  auto kept = keep_labels(shown.volume, labels->volume, *values);
+  if (!kept) return kept.error().with_context(file);
+  shown.volume = *std::move(kept);
+  return shown;
+}
+
+}  // namespace birdseye::host

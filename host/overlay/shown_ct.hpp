@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "host/overlay/margins.hpp"
+#include "host/volume/label_names.hpp"
+#include "host/volume/volume.hpp"
+#include "host/volume/volume_source.hpp"
+
+namespace birdseye::host {
+
+/// What of a CT is to be drawn.
+struct ShownChoice {
+  std::filesystem::path labels;        ///< a segmentation on the CT's grid; empty: all of the CT is drawn
+  std::vector<LabelChoice> keep;       ///< labels to draw, by name or number; empty: all of the CT is drawn
+  std::vector<LabelChoice> margin_of;  ///< labels about which shells are drawn
+  std::vector<double> margins_mm;      ///< how far the shells lie from them; empty: none are drawn
+};
+
+/// A CT to draw.
+struct ShownCt {
+  Volume volume;
+  std::optional<Margins> margins;
+  std::vector<std::string> notes;  ///< what its reader should know, a line each
+};
+
+/// Errors name the file. Errc::bad_value where a choice needs a segmentation and none is named.
+Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice);
+
+}  // namespace birdseye::host
