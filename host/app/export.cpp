@@ -13,6 +13,7 @@
 #include "host/deform/transform_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/identity_json.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 
@@ -26,6 +27,7 @@ struct ExportOptions {
   VolumeSource volume;
   fs::path registration, views, deformation, model_pose, out, json;
   std::string frame = "tracker";
+  bool identify = false;
 };
 
 /// What registrations found, and the CT.
@@ -34,6 +36,7 @@ struct Registered {
   Transform<Patient, Patient> patient_from_model;
   std::optional<DisplacementField> field;
   std::optional<Volume> volume;
+  PatientIdentity identity;  ///< of the volume
 };
 
 Result<Registered> read_registered(ExportOptions options) {
@@ -67,6 +70,7 @@ Result<Registered> read_registered(ExportOptions options) {
     if (!imported) return imported.error();
     print_notes(imported->notes);
     read.volume = std::move(imported->volume);
+    read.identity = std::move(imported->patient);
   }
   if (read.field && read.volume) {
     if (auto covers = check_covers(*read.field, *read.volume); !covers)
@@ -179,11 +183,12 @@ Result<ExitCode> run(const ExportOptions& options) {
   Verdict verdict;
   verdict.judge("the files, read back by ITK, take places from where they should by", worst_mm, "mm", 1e-3, 1e-3,
                 "report this with the files");
-  const nlohmann::json json = {{"frame", options.frame},
-                               {"files", files},
-                               {"difference_mm_max", worst_mm},
-                               {"verdict", name_of(verdict.grade)},
-                               {"reasons", verdict.reasons}};
+  nlohmann::json json = {{"frame", options.frame},
+                         {"files", files},
+                         {"difference_mm_max", worst_mm},
+                         {"verdict", name_of(verdict.grade)},
+                         {"reasons", verdict.reasons}};
+  if (options.identify) json["patient"] = json_of(registered->identity);
   if (auto written = write_files({{options.out / "export.json", text_of(json)}, {options.json, text_of(json)}});
       !written)
     return written.error();
@@ -207,6 +212,8 @@ void add_export(CLI::App& app, CommandStatus& status) {
   add_ct_options(command, options->volume);
   command.add_option("--frame", options->frame, "where the CT is brought: tracker (default) or patient")
       ->check(CLI::IsMember({"tracker", "patient"}));
+  command.add_flag("--identify", options->identify,
+                   "name the patient in export.json (default: nothing that is written does)");
   command.add_option("--out", options->out, "folder");
   command.add_option("--json", options->json, "write the figures to this file too");
   const CLI::App* const lens = add_export_lens(command, status);

@@ -9,12 +9,14 @@
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/foreign_options.hpp"
+#include "host/app/overlay_options.hpp"
 #include "host/demo/demo_report.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/patient.hpp"
+#include "host/texts/texts.hpp"
 #include "host/window/live_app.hpp"
 
 namespace birdseye::host {
@@ -33,6 +35,9 @@ struct LiveOptions {
   LiveWindow::Settings window;
   fs::path tip, script, json, recording;
   double speed = 1;
+  OverlayLook look;  ///< to begin with
+  bool light_room = false, identify = false;
+  fs::path language, list_texts;
   std::string size = "1280x720", video = "512x384", publish;
 };
 
@@ -100,6 +105,7 @@ Result<void> prepare(LiveOptions& options) {
     if (options.live.out.empty()) options.live.out = free_folder();
     options.cart.folder = options.live.out;
     options.simulated = simulated_patient(options.live.out);
+    options.simulated.margins_mm = options.live.patient.margins_mm;
     std::error_code error;
     fs::create_directories(options.live.out, error);
     if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
@@ -174,6 +180,13 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
 
 Result<ExitCode> run(LiveOptions& options) {
   const HostTime asked = host_now();
+  if (!options.language.empty()) {
+    if (auto spoken = speak(options.language); !spoken) return spoken.error();
+  }
+  if (!options.list_texts.empty()) {
+    if (auto written = write_file(options.list_texts, language_text()); !written) return written.error();
+    return ExitCode::success;
+  }
   if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<LiveScript> script;
   if (!options.script.empty()) {
@@ -206,6 +219,7 @@ Result<ExitCode> run(LiveOptions& options) {
   }
   LiveApp app(*std::move(window), std::move(source), options.live, options.simulated, std::move(script), std::move(log),
               std::move(publisher));
+  app.begin_with(options.look, options.light_room ? Room::light : Room::dark, options.identify);
   const auto ran = app.run(asked);
   nlohmann::json json = json_of(app.figures(), app.operation());
   Verdict verdict;
@@ -274,6 +288,14 @@ void add_live(CLI::App& app, CommandStatus& status) {
                    "labels of the organ that the video shows, to match it with; needed with --labels")
       ->delimiter(',');
   command->add_option("--targets", patient.targets, "labels whose middles are landmarks to check by")->delimiter(',');
+  command->add_option("--margins", patient.margins_mm, "shells so many mm from the targets, up to four: 5,10")
+      ->delimiter(',')
+      ->type_name("MM");
+  command
+      ->add_option("--patient-id", options->live.patient_id,
+                   "the ID of the patient on the table, where another system knows it: a CT of another ID is refused, "
+                   "and nobody is asked")
+      ->type_name("ID");
   command->add_option("--fiducials", patient.fiducials, "the fiducials' places in the CT; without it, they are found")
       ->type_name("FILE");
   command->add_option("--fiducial-count", options->live.fiducials, "how many of them are to be touched");
@@ -290,6 +312,14 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--size", options->size, "of the window (default 1280x720)")->type_name("WxH");
   command->add_option("--scale", options->window.scale, "of text and panels; without it, as the screen asks for")
       ->check(CLI::Range(0.5, 4.0));
+  add_look_options(*command, options->look);
+  command->add_flag("--light-room", options->light_room, "colours for a light room (default: a dark one)");
+  command->add_flag("--identify", options->identify, "name the patient in snapshots (default: do not)");
+  command->add_option("--language", options->language, "the window's words in another language")->type_name("FILE");
+  command
+      ->add_option("--list-texts", options->list_texts,
+                   "write all of the window's words to a file, to translate, and end")
+      ->type_name("FILE");
   command->add_option("--script", options->script, "keys to press and pictures to take")->type_name("FILE");
   command->add_option("--out", options->live.out, "a folder for snapshots and the log of frames")->type_name("FOLDER");
   command->add_option("--resume", options->live.resume, "the --out folder of a window that was closed: go on from it")

@@ -33,17 +33,10 @@ struct VolumeMarkersOptions {
 };
 
 constexpr double kLeastShown_mm = 8;  // of the CT round a marker, in the picture: three times as much
-const std::map<std::string, MarkerKind> kKinds{{"ball", MarkerKind::ball},
-                                               {"ring", MarkerKind::ring},
-                                               {"cylinder", MarkerKind::cylinder},
-                                               {"post", MarkerKind::post}};
-
-std::string name_of(MarkerKind kind) {
-  for (const auto& [name, named] : kKinds) {
-    if (named == kind) return name;
-  }
-  return {};
-}
+const std::map<std::string, MarkerKind> kKinds{{name_of(MarkerKind::ball), MarkerKind::ball},
+                                               {name_of(MarkerKind::ring), MarkerKind::ring},
+                                               {name_of(MarkerKind::cylinder), MarkerKind::cylinder},
+                                               {name_of(MarkerKind::post), MarkerKind::post}};
 
 constexpr Colour kFound{90, 255, 120}, kDoubtful{255, 90, 80}, kText{255, 255, 255};
 

@@ -255,6 +255,12 @@ Result<DicomFile> read_dicom_file(const fs::path& path) {
   for (const DcmTagKey& tag : {DCM_AcquisitionTime, DCM_SeriesTime, DCM_ContentTime}) {
     if (file.time.empty()) file.time = words(tag).substr(0, 6);
   }
+  file.patient.name = person_name(words(DCM_PatientName));
+  file.patient.id = words(DCM_PatientID);
+  file.patient.birth_date = dashed_date(words(DCM_PatientBirthDate));
+  for (const DcmTagKey& tag : {DCM_AcquisitionDate, DCM_SeriesDate, DCM_StudyDate, DCM_ContentDate}) {
+    if (file.patient.ct_date.empty()) file.patient.ct_date = dashed_date(words(tag));
+  }
   file.agent = words(DCM_ContrastBolusAgent);
   if (DcmItem* const agent = item_of(dataset, DCM_ContrastBolusAgentSequence); file.agent.empty() && agent != nullptr)
     file.agent = words_of(dataset, text_of(*agent, DCM_CodeMeaning));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/patient_identity.hpp"
 
 namespace birdseye::host {
 
@@ -62,6 +63,7 @@ struct DicomFile {
   std::string what;  ///< its kind in words: the SOP class
   std::string instance_uid, series_uid, modality, description, date, time, agent, syntax;
   std::optional<int> series_number;
+  PatientIdentity patient;
   int columns = 0, rows = 0, frames = 0;  ///< as it says; 0 where it does not
   bool localizer = false;
   bool of_ct_class = false;  ///< CT Image Storage, one of its enhanced kinds, or not said; no picture of a screen

@@ -9,7 +9,8 @@ Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm, const Deforme
 }
 
 CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const RegisteredPatient& registered,
-                                const PatientPlan& plan, const std::vector<Eigen::Vector3d>& markers_in_patient_mm,
+                                std::span<const NamedPoint> landmarks,
+                                const std::vector<Eigen::Vector3d>& markers_in_patient_mm,
                                 const DeformedOrgan* deformed) {
   CheckReading reading;
   reading.tip_in_patient_mm = registered.tracker_from_patient.inverse() * tip_in_tracker_mm;
@@ -19,7 +20,7 @@ CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const 
     reading.nearest = name;
     reading.distance_mm = distance_mm;
   };
-  for (const NamedPoint& landmark : plan.landmarks) consider(landmark.name, landmark.place_mm);
+  for (const NamedPoint& landmark : landmarks) consider(landmark.name, landmark.place_mm);
   for (std::size_t i = 0; i < markers_in_patient_mm.size(); ++i)
     consider(fmt::format("fiducial {}", i + 1), markers_in_patient_mm[i]);
   return reading;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "host/operation/findings.hpp"
@@ -12,7 +13,8 @@ namespace birdseye::host {
 Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm, const DeformedOrgan* deformed);
 
 CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const RegisteredPatient& registered,
-                                const PatientPlan& plan, const std::vector<Eigen::Vector3d>& markers_in_patient_mm,
+                                std::span<const NamedPoint> landmarks,
+                                const std::vector<Eigen::Vector3d>& markers_in_patient_mm,
                                 const DeformedOrgan* deformed);
 
 }  // namespace birdseye::host

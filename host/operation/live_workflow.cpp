@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -32,14 +34,18 @@ void LiveWorkflow::tick() {
   if (news.patient) {
     ++shapes_;
     resume_fault_.clear();
+    pick_line_.clear();
+    const std::string& id = patient_.plan()->identity.id;
+    patient_confirmed_ = simulated_ || (!settings_.patient_id.empty() && settings_.patient_id == id);
     fit();
     // What was touched meanwhile counts more than what is taken up, and is fitted first.
-    if (patient_.markers_in_patient_mm() || fiducials_.touches().empty()) take_up();
+    if (fiducials_.touches().empty() || (patient_.markers_in_patient_mm() && patient_confirmed_)) take_up();
   }
   if (news.markers) {
     if (!fiducials_.touches().empty()) fit();
-    take_up();
+    if (fiducials_.touches().empty() || patient_confirmed_) take_up();
   }
+  if (const auto picked = picks_.tick()) take(*picked);
   if (deformation_.tick()) {
     show_shape();
     matched_.organ = deformation_.organ();
@@ -66,6 +72,7 @@ void LiveWorkflow::set_link(bool connected, const std::string& words) {
 
 void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::Vector3d& tip_in_pointer_mm,
                              std::size_t fiducials) {
+  simulated_ = true;
   settings_.pattern = pattern;
   settings_.tip_in_pointer_mm = tip_in_pointer_mm;
   settings_.fiducials = fiducials;
@@ -154,7 +161,12 @@ void LiveWorkflow::take(const CheckedSurface& checked) {
 }
 
 void LiveWorkflow::fit() {
-  fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials);
+  // Nothing is registered with a CT of which nobody has said whose it is.
+  if (patient_confirmed_ || !patient_.plan()) {
+    fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials);
+  } else {
+    fiducials_.fit(std::nullopt, settings_.fiducials);
+  }
   forget_views("the fiducials were touched anew: keep views again");
   update_setup();
   if (fiducials_.note().done && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
@@ -205,6 +217,7 @@ void LiveWorkflow::set_picture_up() {
   const auto& scope = calibration_.found();
   const auto& registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
+  if (patient_.plan() && !patient_confirmed_) return picture_.set_setup(std::nullopt, {}, words("patient_unconfirmed"));
   if (!may) return picture_.set_setup(std::nullopt, {}, fiducials_.confirmed() ? kUnregistered : kUnconfirmed);
   TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   figures.moved_mm = motion_.moved_mm();
@@ -258,6 +271,7 @@ void LiveWorkflow::go_on() {
 }
 
 void LiveWorkflow::primary() {
+  if (asks_for_patient()) return confirm_patient();
   const auto& setup = picture_.setup();
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
                      step_ == LiveStep::deform;
@@ -309,6 +323,7 @@ void LiveWorkflow::undo() {
     keep();
   }
   if (step_ == LiveStep::views && !strokes_.undo(views_.views().size())) views_.undo();
+  if (step_ == LiveStep::check) patient_.undo_landmark();
   if (step_ == LiveStep::deform && deformation_.found() && !deformation_.running()) {
     deformation_.undo();
     show_shape();

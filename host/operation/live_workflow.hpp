@@ -14,6 +14,7 @@
 #include "host/operation/organ_motion.hpp"
 #include "host/operation/organ_strokes.hpp"
 #include "host/operation/patient_step.hpp"
+#include "host/operation/place_picks.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
@@ -29,8 +30,9 @@ struct LiveSettings {
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
   std::size_t fiducials = 0;                         ///< how many to touch; 0: as many as are wanted
-  std::filesystem::path out;                         ///< where results go; empty: none are kept
-  std::filesystem::path resume;                      ///< out of an earlier window, to go on from; or empty
+  std::string patient_id;        ///< of the patient on the table, where another system knows it; else a person is asked
+  std::filesystem::path out;     ///< where results go; empty: none are kept
+  std::filesystem::path resume;  ///< out of an earlier window, to go on from; or empty
 };
 
 /// The order of the operation, from the first connection to the running overlay; knows nothing of windows. It gives the
@@ -54,6 +56,11 @@ class LiveWorkflow {
   void load(const PatientFiles& files) { patient_.load(files); }
 
   // What a person does.
+  void confirm_patient();  ///< the CT is of the patient on the table; nothing is registered before
+  /// Looks for a marker at a place of the CT, to be one more fiducial, or a landmark: its centre, or the place itself.
+  void pick(PlacePicks::Kind kind, const Eigen::Vector3d& place_in_patient_mm);
+  /// The fiducial of the CT that is nearest to a place is not used any more.
+  void drop_marker(const Eigen::Vector3d& place_in_patient_mm);
   void primary();  ///< the space bar and the pedal
   void undo();     ///< the last thing of the present step
   void stroke();   ///< of the pointer over the organ: begins one, or ends it
@@ -79,6 +86,8 @@ class LiveWorkflow {
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
   void fit();
+  void take(const PlacePicks::Picked& picked);
+  [[nodiscard]] bool asks_for_patient() const;
   void forget_views(const std::string& why);
   void show_shape();
   void show_margins();
@@ -97,6 +106,10 @@ class LiveWorkflow {
   ConnectionStep connection_;
   CalibrationStep calibration_;
   PatientStep patient_;
+  bool simulated_ = false;  ///< nobody lies there
+  bool patient_confirmed_ = false;
+  PlacePicks picks_;
+  std::string pick_line_;
   PointerTip pointer_;
   FiducialStep fiducials_;
   ViewStep views_;

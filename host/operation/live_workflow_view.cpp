@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "host/operation/landmark_check.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -24,6 +25,11 @@ OperationView LiveWorkflow::view() const {
   for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
     if (out.fault.empty()) out.fault = *fault;
   }
+  if (const auto& plan = patient_.plan(); plan && !settings_.patient_id.empty()) {
+    const std::string& id = plan->identity.id;
+    if (id != settings_.patient_id) out.patient_fault = words("patient_wrong", id, settings_.patient_id);
+  }
+  out.asks_for_patient = asks_for_patient();
   out.link = connection_.link();
   out.board_named = settings_.pattern.has_value();
   out.guiding = calibration_.guiding();
@@ -34,7 +40,13 @@ OperationView LiveWorkflow::view() const {
   }
   out.fiducials_wanted = settings_.fiducials;
   const auto& markers = patient_.markers_in_patient_mm();
-  if (markers) out.markers_seen = markers->size();
+  if (markers) {
+    out.markers_seen = markers->size();
+    out.markers_in_patient_mm = *markers;
+  }
+  out.landmarks = patient_.landmarks();
+  out.looking_for_marker = picks_.looking();
+  out.pick_line = pick_line_;
   out.touches = fiducials_.touches();
   const auto& registered = fiducials_.registered();
   if (registered) out.fre_mm = registered->fre_mm;
@@ -48,6 +60,7 @@ OperationView LiveWorkflow::view() const {
     out.surface_check =
         watch_.watches() ? motion_.line() : "the surface is not checked: the views it was found by are not kept";
   out.patient = patient_.plan();
+  out.patient_confirmed = patient_confirmed_;
   out.patient_files = patient_.files();
   out.engine_asked = settings_.engine;
   if (patient_.engine()) out.engine_name = patient_.engine()->name();
@@ -57,7 +70,7 @@ OperationView LiveWorkflow::view() const {
   if (!out.patient) return out;
   const DeformedOrgan* const deformed = out.deformed.get();
   if (const auto tip_mm = pointer_.in_tracker_mm(); tip_mm && registered) {
-    out.check = check_by_landmarks(*tip_mm, *registered, *out.patient,
+    out.check = check_by_landmarks(*tip_mm, *registered, patient_.landmarks(),
                                    markers ? *markers : std::vector<Eigen::Vector3d>(), deformed);
   }
   const auto& setup = picture_.setup();

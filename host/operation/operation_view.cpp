@@ -1,28 +1,29 @@
 #include "host/operation/operation_view.hpp"
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 std::string primary_words(const OperationView& operation) {
+  if (operation.asks_for_patient) return words("do_confirm_patient");
   const bool done = operation.note(operation.step).done;
   switch (operation.step) {
     case LiveStep::connect:
-      return "wait for the appliance";
+      return words("do_wait");
     case LiveStep::calibrate:
-      if (done) return "go on";
-      return operation.guiding ? "end with the stations so far" : "begin";
+      if (done) return words("do_go_on");
+      return operation.guiding ? words("do_end_stations") : words("do_begin");
     case LiveStep::fiducials:
-      return done ? "go on" : "take this point";
+      return done ? words("do_go_on") : words("do_take_point");
     case LiveStep::views:
-      return done ? "go on" : "keep this view";
+      return done ? words("do_go_on") : words("do_keep_view");
     case LiveStep::deform:
-      if (done && !operation.organ_moved) return "go on";
-      return operation.deforming ? "cancel" : "match the CT with the views";
+      if (done && !operation.organ_moved) return words("do_go_on");
+      return operation.deforming ? words("do_cancel") : words("do_match");
     case LiveStep::check:
-      return operation.unconfirmed ? "the landmarks fit: go on" : "go on";
+      return operation.unconfirmed ? words("do_landmarks_fit") : words("do_go_on");
     case LiveStep::run:
-      return operation.frozen           ? "let the picture go"
-             : operation.overlay_hidden ? "show the overlay"
-                                        : "hide the overlay";
+      return operation.frozen ? words("do_let_go") : operation.overlay_hidden ? words("do_show") : words("do_hide");
   }
   return {};
 }

@@ -24,7 +24,7 @@ struct OperationView {
   LiveStep step = LiveStep::connect;
   bool frozen = false;
   bool overlay_hidden = false;  ///< a person has switched it off
-  bool board_named = false;  ///< there is a board to calibrate with
+  bool board_named = false;     ///< there is a board to calibrate with
   bool guiding = false;
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
   bool deforming = false;
@@ -37,8 +37,12 @@ struct OperationView {
   std::vector<std::string> guide_lines;
   std::optional<Verdict> calibration_verdict;
 
-  std::size_t fiducials_wanted = 0;         ///< 0: as many as come
-  std::optional<std::size_t> markers_seen;  ///< fiducials in the CT; empty as long as they are looked for
+  std::size_t fiducials_wanted = 0;                    ///< 0: as many as come
+  std::optional<std::size_t> markers_seen;             ///< fiducials in the CT; empty as long as they are looked for
+  std::vector<Eigen::Vector3d> markers_in_patient_mm;  ///< fiducials in the CT, those that a person has picked too
+  std::vector<NamedPoint> landmarks;                   ///< in the CT as it was taken
+  bool looking_for_marker = false;                     ///< where a person has pointed at the CT
+  std::string pick_line;                               ///< what came of that; empty: nothing yet
   std::vector<TouchedFiducial> touches;
   std::optional<double> fre_mm;
   std::string registration_fault;
@@ -61,6 +65,9 @@ struct OperationView {
   std::optional<TargetMark> target;
 
   std::shared_ptr<const PatientPlan> patient;  ///< null: it is not read yet
+  std::string patient_fault;                   ///< why this CT cannot be that of the patient on the table
+  bool asks_for_patient = false;               ///< and waits for it before anything is registered
+  bool patient_confirmed = false;  ///< a person has compared name, ID and date with the patient on the table
   PatientFiles patient_files;
   std::string engine_asked;  ///< as it was named: "auto" too
   std::string engine_name;   ///< what runs, in words; empty: the CT cannot be drawn yet

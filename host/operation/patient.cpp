@@ -98,9 +98,10 @@ Result<void> check_labels_named(const PatientFiles& files) {
 Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_token& stop) {
   if (auto named = check_labels_named(files); !named) return named.error();
   PatientPlan plan;
-  auto ct = import_volume(files.ct, stop);
+  auto ct = import_with_notes(files.ct, stop);
   if (!ct) return ct.error();
-  plan.ct = *std::move(ct);
+  plan.ct = std::move(ct->volume);
+  plan.identity = std::move(ct->patient);
   plan.checksum = ct_checksum(plan.ct);
   if (!files.labels.empty()) {
     if (auto read = read_labels(files, plan, stop); !read) return read.error();

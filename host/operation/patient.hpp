@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "host/dicom/patient_identity.hpp"
 #include "host/overlay/margins.hpp"
 #include "host/volume/label_names.hpp"
 #include "host/volume/volume.hpp"
@@ -39,6 +40,7 @@ PatientFiles simulated_patient(const std::filesystem::path& folder);
 struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
+  PatientIdentity identity;
   std::optional<Volume> labels;
   std::vector<int> organ;  ///< values in labels of what the views show: it is matched with them
   std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given

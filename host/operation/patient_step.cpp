@@ -1,5 +1,7 @@
 #include "host/operation/patient_step.hpp"
 
+#include <algorithm>
+
 #include "host/render/engine_thread.hpp"
 
 namespace birdseye::host {
@@ -45,6 +47,7 @@ PatientStep::News PatientStep::tick() {
       if (transfer_) fault_.clear();
       use(**loaded);
       markers_ = plan_->fiducials_in_patient_mm;
+      landmarks_ = plan_->landmarks;
       news.patient = news.engine = true;
       // The search may take seconds, and the CT can be shown meanwhile.
       if (!markers_) {
@@ -63,6 +66,27 @@ PatientStep::News PatientStep::tick() {
   if (auto made = recolouring_.take(); made && made->plan == plan_) news.engine = use(*made) || news.engine;
   recolour();
   return news;
+}
+
+std::optional<std::size_t> PatientStep::add_marker(const Eigen::Vector3d& place_in_patient_mm) {
+  if (!markers_) return std::nullopt;
+  markers_->push_back(place_in_patient_mm);
+  return markers_->size() - 1;
+}
+
+std::optional<std::size_t> PatientStep::drop_marker(const Eigen::Vector3d& place_in_patient_mm) {
+  if (!markers_ || markers_->empty()) return std::nullopt;
+  const auto nearest = std::min_element(markers_->begin(), markers_->end(), [&](const auto& a, const auto& b) {
+    return (a - place_in_patient_mm).norm() < (b - place_in_patient_mm).norm();
+  });
+  if ((*nearest - place_in_patient_mm).norm() > kMarkerReach_mm) return std::nullopt;
+  const auto which = static_cast<std::size_t>(nearest - markers_->begin());
+  markers_->erase(nearest);
+  return which;
+}
+
+void PatientStep::undo_landmark() {
+  if (plan_ && landmarks_.size() > plan_->landmarks.size()) landmarks_.pop_back();
 }
 
 bool PatientStep::use(const Loaded& loaded) {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/system/background.hpp"
@@ -35,6 +36,16 @@ class PatientStep {
   [[nodiscard]] const std::shared_ptr<const PatientPlan>& plan() const { return plan_; }
   /// The fiducials in the CT; empty as long as they are looked for.
   [[nodiscard]] const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm() const { return markers_; }
+  /// One more, or one less: the nearest within reach of a place. Which it is, from 0; empty: none is there, or they are
+  /// still looked for.
+  std::optional<std::size_t> add_marker(const Eigen::Vector3d& place_in_patient_mm);
+  std::optional<std::size_t> drop_marker(const Eigen::Vector3d& place_in_patient_mm);
+  static constexpr double kMarkerReach_mm = 10;
+  /// Those of the plan, and those that a person has picked; of the CT as it was taken.
+  [[nodiscard]] const std::vector<NamedPoint>& landmarks() const { return landmarks_; }
+  void add_landmark(NamedPoint landmark) { landmarks_.push_back(std::move(landmark)); }
+  /// Takes the last one back that a person has picked.
+  void undo_landmark();
   /// Draws what is shown of the plan, which it holds. Null: there is none yet.
   [[nodiscard]] const std::shared_ptr<Engine>& engine() const { return engine_; }
   /// Null where the name that was given is none.
@@ -63,6 +74,7 @@ class PatientStep {
   bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::shared_ptr<const PatientPlan> plan_;
   std::optional<std::vector<Eigen::Vector3d>> markers_;
+  std::vector<NamedPoint> landmarks_;
   std::shared_ptr<Engine> engine_;
   Background<Result<Loaded>> loading_;
   Background<std::vector<Eigen::Vector3d>> finding_;

@@ -9,6 +9,7 @@
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/identity_json.hpp"
 
 namespace birdseye::host {
 
@@ -75,6 +76,7 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
                        {"age_ms", shown.age_ms},          {"overlaid", shown.overlaid},
                        {"strength", shown.strength},      {"reason", shown.reason}};
   if (snapshot.fre_mm) sheet["fre_mm"] = *snapshot.fre_mm;
+  if (snapshot.identity) sheet["patient"] = json_of(*snapshot.identity);
   if (shown.overlaid && snapshot.setup && snapshot.camera_from_patient && snapshot.transfer) {
     files.push_back({folder / "camera.yaml", camera_text(snapshot.setup->camera())});
     files.push_back({folder / "camera_from_patient.txt", pose_text(snapshot.camera_from_patient->matrix())});

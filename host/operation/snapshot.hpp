@@ -27,6 +27,7 @@ struct Snapshot {
   PatientFiles patient;
   std::shared_ptr<const DeformedOrgan> deformed;  ///< null: the CT as it was taken
   std::optional<double> fre_mm;
+  std::optional<PatientIdentity> identity;  ///< empty: the snapshot is not to name the patient
 };
 
 /// In folder, which it makes: video.png as it came, picture.png as it was shown, and, where the CT was drawn, what it

@@ -95,14 +95,15 @@ void draw_text(Picture& picture, const Eigen::Vector2d& at_px, const std::string
               cv::LINE_AA);
 }
 
-void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int radius_px, const Colour& colour) {
+void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int radius_px, const Colour& colour,
+                     double open) {
   cv::Mat image = view_of(picture);
   const cv::Scalar ink(colour[0], colour[1], colour[2]);
   constexpr int kFractionBits = 4;  // a centre is known to a part of a pixel
   const auto fixed = [](double px) { return static_cast<int>(std::lround((px - 0.5) * (1 << kFractionBits))); };
   for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-    const double open = 0.25 * radius_px;
-    cv::line(image, cv::Point(fixed(centre_px.x() + dx * open), fixed(centre_px.y() + dy * open)),
+    const double open_px = open * radius_px;
+    cv::line(image, cv::Point(fixed(centre_px.x() + dx * open_px), fixed(centre_px.y() + dy * open_px)),
              cv::Point(fixed(centre_px.x() + dx * radius_px), fixed(centre_px.y() + dy * radius_px)), ink, 1,
              cv::LINE_AA, kFractionBits);
   }

@@ -36,8 +36,9 @@ Picture draw_brightest(const Volume& ct, const SlicePlane& plane, double depth_m
 
 using Colour = std::array<std::uint8_t, 3>;
 void draw_text(Picture& picture, const Eigen::Vector2d& at_px, const std::string& text, const Colour& colour);
-/// A cross hair one pixel thin with its middle left open, so that it hides nothing.
-void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int radius_px, const Colour& colour);
+/// A cross hair one pixel thin with its middle left open, so that it hides nothing. open: the part of the radius.
+void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int radius_px, const Colour& colour,
+                     double open = 0.25);
 void paste(Picture& onto, const Picture& what, int x_px, int y_px);
 
 }  // namespace birdseye::host

@@ -90,6 +90,15 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   if (auto sound = check_volume(source.path, series, source.untilt); !sound) return sound.error();
   const auto& slices = series.stack.slices;
   const bool compressed = scan->tree.files[slices.front().file].compressed;
+  const PatientIdentity& patient = scan->tree.files[slices.front().file].patient;
+  for (const DicomSlice& slice : slices) {
+    const PatientIdentity& other = scan->tree.files[slice.file].patient;
+    if (other.name != patient.name || other.id != patient.id) {
+      return refused(Errc::bad_value, source.path,
+                     fmt::format("holds slices of two patients, {} (ID {}) and {} (ID {}); give those of one",
+                                 patient.name, patient.id, other.name, other.id));
+    }
+  }
   auto hu = decode_slices(scan->tree.files, slices, compressed ? copies : 1, announce);
   if (!hu) return hu.error();
   ImageFile image;
@@ -98,6 +107,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   image.origin_mm = slices.front().position_mm;
   image.axes = series.info.axes;
   image.hu = *std::move(hu);
+  image.patient = patient;
   image.notes = notes_of(*scan, *chosen);
   if (source.untilt && series.stack.tilt_deg > 0) {
     const UntiltCost cost = untilt(series.stack, image);

@@ -33,6 +33,9 @@ void send_image(const Send& send, const ImageFile& image) {
   send(image.axes.data(), 9 * sizeof(double));
   send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
   send(image.values.data(), image.values.size() * sizeof image.values[0]);
+  const PatientIdentity& patient = image.patient;
+  for (const std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date})
+    send_long_text(send, *text);
   send_texts(send, image.notes);
   const std::size_t labels = image.label_names.size();
   send(&labels, sizeof labels);
@@ -108,6 +111,12 @@ std::optional<ImageFile> receive_image(const Receive& receive, int components) {
     auto values = receive_values<float>(receive, count);
     if (!values) return std::nullopt;
     image.values = *std::move(values);
+  }
+  PatientIdentity& patient = image.patient;
+  for (std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date}) {
+    auto received = receive_long_text(receive);
+    if (!received) return std::nullopt;
+    *text = *std::move(received);
   }
   if (!receive_texts(receive, image.notes) || !receive_label_names(receive, image.label_names)) return std::nullopt;
   return image;

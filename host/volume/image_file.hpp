@@ -10,6 +10,7 @@
 
 #include "calibration/base/result.hpp"
 #include "host/dicom/dicom_labels.hpp"
+#include "host/dicom/patient_identity.hpp"
 #include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
@@ -23,6 +24,7 @@ struct ImageFile {
   Eigen::Vector3d spacing_mm, origin_mm;  ///< origin: the centre of the first voxel
   Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
   std::vector<NamedLabel> label_names;    ///< of a segmentation
+  PatientIdentity patient;
   std::vector<std::string> notes;         ///< what was passed over, and what resampling cost, a line each
 };
 

@@ -16,6 +16,7 @@ Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::
   volume.patient_from_voxel.linear() = image->axes * image->spacing_mm.asDiagonal();
   volume.patient_from_voxel.translation() = image->origin_mm;
   volume.hu = std::move(image->hu);
+  imported.patient = std::move(image->patient);
   imported.notes = std::move(image->notes);
   imported.label_names = std::move(image->label_names);
   return imported;

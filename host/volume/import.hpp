@@ -6,6 +6,7 @@
 
 #include "calibration/base/result.hpp"
 #include "host/dicom/dicom_labels.hpp"
+#include "host/dicom/patient_identity.hpp"
 #include "host/volume/volume.hpp"
 #include "host/volume/volume_source.hpp"
 
@@ -23,6 +24,7 @@ Result<Volume> import_volume(const VolumeSource& source, const std::stop_token& 
 /// A CT, and what its reader should know.
 struct ImportedVolume {
   Volume volume;
+  PatientIdentity patient;              ///< whose it is, where the files say
   std::vector<std::string> notes;       ///< what was passed over, and what resampling cost, a line each
   std::vector<NamedLabel> label_names;  ///< where the file says that its values are labels
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -19,6 +20,11 @@ Tube tube_of(const MarkerShape& s) {
 }
 
 }  // namespace
+
+const char* name_of(MarkerKind kind) {
+  constexpr std::array<const char*, 4> kNames{"ball", "ring", "cylinder", "post"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
 
 double MarkerShape::outside_mm(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& axis) const {
   if (kind == MarkerKind::ball || kind == MarkerKind::post) return point_mm.norm() - diameter_mm / 2;

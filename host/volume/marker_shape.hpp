@@ -8,6 +8,7 @@ namespace birdseye::host {
 
 /// post: an air cavity in a thin wall, on a stalk (post_finder.hpp). The others are solid.
 enum class MarkerKind { ball, ring, cylinder, post };
+const char* name_of(MarkerKind kind);
 
 /// What a fiducial marker looks like in a CT: brighter than what is round it, of one density. Of a post the ball that
 /// it fits in.

@@ -21,6 +21,16 @@ constexpr Duration kRedraw = Duration::from_ms(50);  // for hands and figures, w
 
 constexpr double kStepMm = 1.2;  // what two cores draw in time
 
+/// Fiducials and landmarks, as the slices mark them.
+std::vector<SliceMark> slice_marks(const OperationView& operation) {
+  constexpr Colour kFiducial{240, 228, 66}, kLandmark{0, 200, 150};
+  std::vector<SliceMark> marks;
+  for (std::size_t i = 0; i < operation.markers_in_patient_mm.size(); ++i)
+    marks.push_back({operation.markers_in_patient_mm[i], fmt::format("{}", i + 1), kFiducial});
+  for (const NamedPoint& landmark : operation.landmarks) marks.push_back({landmark.place_mm, landmark.name, kLandmark});
+  return marks;
+}
+
 }  // namespace
 
 LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
@@ -35,8 +45,19 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
       publisher_(std::move(publisher)) {
   facts_.ages = &figures_.ages;
   facts_.recorded = !source_->live();
-  look_.render.step_mm = kStepMm;
-  workflow_.set_look(look_);
+  facts_.look.render.step_mm = kStepMm;
+  facts_.editor = &editor_;
+  workflow_.set_look(facts_.look);
+}
+
+void LiveApp::begin_with(const OverlayLook& look, Room room, bool identify) {
+  identify_ = identify;
+  const RenderSettings render = facts_.look.render;
+  facts_.look = look;
+  facts_.look.render = render;
+  facts_.room = room;
+  window_->set_room(room);
+  workflow_.set_look(facts_.look);
 }
 
 Result<void> LiveApp::run(HostTime asked) {
@@ -59,6 +80,7 @@ Result<void> LiveApp::run(HostTime asked) {
     }
     draw();
     draw_inset();
+    draw_slices();
     if (!window_->fault().empty())
       return Error{Errc::io, "window: " + window_->fault() + "; the driver of the graphics card is at fault"};
     const auto ended = follow_script();
@@ -110,8 +132,22 @@ void LiveApp::draw_inset() {
   const auto ct =
       workflow_.ct_seen_from(inset_->camera(), inset_->outside_from_patient(), InsetView::render_settings());
   if (!ct) return;
-  const Picture picture = inset_->draw(*ct, workflow_.picture().camera_from_patient());
+  const Picture picture = inset_->draw(*ct, workflow_.picture().seen_from());
   window_->set_picture(LiveWindow::Slot::inset, {picture.rgb, picture.width_px, picture.height_px});
+}
+
+/// On a thread of its own, the newest wish next.
+void LiveApp::draw_slices() {
+  if (const auto picture = slicing_.take())
+    window_->set_picture(LiveWindow::Slot::slices, {picture->rgb, picture->width_px, picture->height_px});
+  if (!facts_.slices) return;
+  std::vector<SliceMark> marks = slice_marks(operation_);
+  if (marks != marks_) slices_changed_ = true;
+  if (!slices_changed_ || slicing_.running()) return;
+  slices_changed_ = false;
+  marks_ = std::move(marks);
+  slicing_.start(
+      [view = *facts_.slices, marks = marks_](const std::stop_token&, const auto&) { return view.draw(marks); });
 }
 
 void LiveApp::draw() {
@@ -124,6 +160,7 @@ void LiveApp::draw() {
   if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
   drawn_ = began;
   operation_ = workflow_.view();
+  facts_.pseudonymised = !shot_.empty() && !identify_;
   const PanelWishes wishes = draw_window(shown);
   figures_.picture_says = shown.reason;
   if (!shot_.empty()) snapshot(shot_, shown);
@@ -181,41 +218,38 @@ PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
   }
   window_->begin_frame(again);
   facts_.frames_skipped = workflow_.picture().frames_skipped();
-  PanelWishes wishes = draw_panels(*window_, operation_, shown, facts_, editor_);
+  PanelWishes wishes = draw_panels(*window_, operation_, shown, facts_);
   window_->end_frame();
   return wishes;
 }
 
+/// What a key of the script asks for comes on top of what a hand asks for.
+PanelWishes LiveApp::with_scripted(PanelWishes wishes) {
+  for (const std::string& key : scripted_) add_key(key, facts_, wishes);
+  if (place_) {
+    SliceView view = wishes.slice_view.value_or(*facts_.slices);
+    view.go_to(*place_);
+    wishes.slice_view = view;
+  }
+  scripted_.clear();
+  place_.reset();
+  return wishes;
+}
+
 void LiveApp::grant(const PanelWishes& asked) {
-  PanelWishes wishes = asked;
-  if (scripted_.primary) wishes.primary = true;
-  if (scripted_.next) wishes.next = true;
-  if (scripted_.undo) wishes.undo = true;
-  if (scripted_.stroke) wishes.stroke = true;
-  if (scripted_.freeze) wishes.freeze = true;
-  if (scripted_.snapshot) wishes.snapshot = true;
-  if (scripted_.step) wishes.step = scripted_.step;
-  if (scripted_.opacity) wishes.opacity = scripted_.opacity;
-  if (scripted_.clip) wishes.clip = scripted_.clip;
-  if (scripted_.surface_in_front) wishes.surface_in_front = scripted_.surface_in_front;
-  scripted_ = {};
-  key_waits_ = false;
+  const PanelWishes wishes = with_scripted(asked);
   if (wishes.primary) workflow_.primary();
   if (wishes.next) workflow_.go_on();
   if (wishes.undo) workflow_.undo();
   if (wishes.stroke) workflow_.stroke();
   if (wishes.freeze) workflow_.freeze_or_let_go();
+  if (wishes.hide_or_show) workflow_.hide_or_show_overlay();
   if (wishes.step) workflow_.go_to(*wishes.step);
-  if (wishes.opacity) look_.opacity = facts_.opacity = *wishes.opacity;
-  if (wishes.clip) facts_.clip = *wishes.clip;
-  if (wishes.surface_in_front) look_.surface_in_front = facts_.surface_in_front = *wishes.surface_in_front;
-  if (wishes.plane) facts_.plane = *wishes.plane;
-  const bool cut = (wishes.clip || wishes.plane) && operation_.patient != nullptr;
-  if (cut) {
-    look_.render.clip.reset();
-    if (facts_.clip) look_.render.clip = clip_plane(facts_.plane, operation_.patient->shown);
-  }
-  if (cut || wishes.opacity || wishes.surface_in_front) workflow_.set_look(look_);
+  if (wishes.keys) facts_.keys = !facts_.keys;
+  if (wishes.room) window_->set_room(facts_.room = *wishes.room);
+  if (wishes.inset_corner) facts_.inset_corner = *wishes.inset_corner;
+  grant_look(wishes);
+  grant_slices(wishes);
   if (wishes.transfer) workflow_.set_transfer(TransferFunction(*wishes.transfer));
   if (const auto preset = load_transfer_function(wishes.preset); !wishes.preset.empty() && preset) {
     workflow_.set_transfer(*preset);
@@ -224,14 +258,45 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
 }
 
+void LiveApp::grant_look(const PanelWishes& wishes) {
+  if (wishes.look) facts_.look = *wishes.look;
+  if (wishes.clip) facts_.clip = *wishes.clip;
+  if (wishes.plane) facts_.plane = *wishes.plane;
+  if ((wishes.clip || wishes.plane) && operation_.patient != nullptr) {
+    facts_.look.render.clip.reset();
+    if (facts_.clip) facts_.look.render.clip = clip_plane(facts_.plane, operation_.patient->shown);
+  }
+  if (wishes.look || wishes.clip || wishes.plane) workflow_.set_look(facts_.look);
+}
+
+void LiveApp::grant_slices(const PanelWishes& wishes) {
+  if (wishes.slices && facts_.slices) {
+    facts_.slices.reset();
+  } else if (const auto& patient = operation_.patient; wishes.slices && patient) {
+    facts_.slices.emplace(std::shared_ptr<const Volume>(patient, &patient->ct));
+    if (!operation_.markers_in_patient_mm.empty()) facts_.slices->go_to(operation_.markers_in_patient_mm.front());
+    slices_changed_ = true;
+  }
+  if (!facts_.slices) return;
+  if (wishes.slice_view) {
+    facts_.slices = *wishes.slice_view;
+    slices_changed_ = true;
+  }
+  const Eigen::Vector3d& place_mm = facts_.slices->place_mm();
+  if (wishes.pick_marker) workflow_.pick(PlacePicks::Kind::fiducial, place_mm);
+  if (wishes.pick_landmark) workflow_.pick(PlacePicks::Kind::landmark, place_mm);
+  if (wishes.drop_marker) workflow_.drop_marker(place_mm);
+}
+
 Result<bool> LiveApp::follow_script() {
   // One after the other, as a hand would.
-  if (!script_ || key_waits_ || !shot_.empty() || saving_.running()) return false;
+  if (!script_ || !scripted_.empty() || place_ || !shot_.empty() || saving_.running()) return false;
   const auto act = script_->next(workflow_.view(), host_now());
   if (!act) return act.error();
-  if (!act->key.empty()) {
-    add_key(act->key, facts_, scripted_);
-    key_waits_ = true;
+  if (!act->key.empty()) scripted_.push_back(act->key);
+  if (act->place_mm) {
+    if (!facts_.slices) return Error{Errc::bad_value, "the script points at the slices, which are closed: key v first"};
+    place_ = act->place_mm;
   }
   if (!act->shot.empty()) shot_ = act->shot;
   return act->end;
@@ -258,6 +323,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->patient = operation_.patient_files;
     parts->deformed = operation_.deformed;
     parts->fre_mm = operation_.fre_mm;
+    if (identify_ && operation_.patient) parts->identity = operation_.patient->identity;
   }
   saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {
     auto written = write_file(path, png_of(RgbView{shot.rgb, shot.width_px, shot.height_px}));

@@ -39,6 +39,9 @@ class LiveApp {
           PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
           std::unique_ptr<Publisher> publisher);
 
+  /// How the overlay is drawn, and the window, before anybody asks for something else. identify: snapshots name the
+  /// patient.
+  void begin_with(const OverlayLook& look, Room room, bool identify);
   /// Until the window is closed, the program is interrupted or the script ends.
   /// asked: when the program was started.
   Result<void> run(HostTime asked);
@@ -56,6 +59,10 @@ class LiveApp {
   void grant(const PanelWishes& wishes);
   Result<bool> follow_script();
   void draw_inset();
+  void draw_slices();
+  PanelWishes with_scripted(PanelWishes wishes);
+  void grant_look(const PanelWishes& wishes);
+  void grant_slices(const PanelWishes& wishes);
   void publish(const ShownPicture& shown);
   void note_patient();
   void snapshot(const std::filesystem::path& path, const ShownPicture& shown);
@@ -65,7 +72,6 @@ class LiveApp {
   std::unique_ptr<LiveSource> source_;
   LiveWorkflow workflow_;
   OperationView operation_;  ///< as it stood when it was last looked at
-  OverlayLook look_;
   PatientFiles simulated_;
   std::optional<LiveScript> script_;
   std::optional<LiveLog> log_;
@@ -73,18 +79,21 @@ class LiveApp {
   LiveFigures figures_;
   PanelFacts facts_;
   HostTime asked_;
-  PanelWishes scripted_;
-  bool key_waits_ = false;  ///< scripted_ has not been granted yet
+  std::vector<std::string> scripted_;     ///< keys that have not been granted yet
+  std::optional<Eigen::Vector3d> place_;  ///< that the script points at, likewise
   TransferEditor editor_;
   std::optional<HuHistogram> histogram_;
   std::optional<InsetView> inset_;
+  Background<Picture> slicing_;
+  std::vector<SliceMark> marks_;
+  bool slices_changed_ = false;
   HostTime inset_drawn_, drawn_;
   Duration to_draw_;  ///< what the window last took, until it was shown
   std::filesystem::path shot_;
   std::uint64_t drawn_changes_ = 0;
   std::optional<std::uint64_t> drawn_sequence_;
   std::deque<HostTime> swaps_;  ///< of the last second's new frames
-  bool sheet_read_ = false;
+  bool sheet_read_ = false, identify_ = false;
   int shots_ = 0;
   Background<std::string> saving_;  ///< a snapshot; what to say of it
 };

@@ -1,22 +1,33 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "host/operation/operation_view.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/appearance.hpp"
 #include "host/window/live_window.hpp"
+#include "host/window/slice_view.hpp"
+#include "host/window/theme.hpp"
 
 namespace birdseye::host {
 
 /// What a person asked for in a frame of the window.
 struct PanelWishes {
   bool primary = false, next = false, undo = false, stroke = false, freeze = false, snapshot = false;
+  bool hide_or_show = false;                                             ///< the overlay
+  bool slices = false;                                                   ///< opened, or closed
+  bool keys = false;                                                     ///< all of them shown, or not any more
+  bool pick_marker = false, pick_landmark = false, drop_marker = false;  ///< at the slices' cross-hair
   std::optional<LiveStep> step;
-  std::optional<double> opacity;
-  std::optional<bool> clip, surface_in_front;
+  std::optional<OverlayLook> look;  ///< but for its cutting plane
+  std::optional<bool> clip;
   std::optional<CuttingPlane> plane;
+  std::optional<Room> room;
+  std::optional<SliceView> slice_view;  ///< with another place, zoom or window
+  std::optional<int> inset_corner;      ///< where it lies now
   std::optional<std::vector<TransferPoint>> transfer;
   std::string preset;
 };
@@ -26,21 +37,27 @@ struct PanelFacts {
   const AgeStrip* ages = nullptr;
   double frames_per_s = 0;
   std::uint64_t frames_skipped = 0;
-  double opacity = 1;
-  bool clip = false, surface_in_front = false;
+  OverlayLook look;
+  bool clip = false;
   CuttingPlane plane;
   const HuHistogram* histogram = nullptr;
-  bool recorded = false;   ///< the source is a recording
-  bool simulated = false;  ///< it is the simulated cart, whose operator touches the fiducials and nothing else
-  std::string said;        ///< a remark of the window's own: where a snapshot went
+  TransferEditor* editor = nullptr;
+  bool recorded = false;       ///< the source is a recording
+  bool simulated = false;      ///< it is the simulated cart, whose operator touches the fiducials and nothing else
+  bool keys = false;           ///< all keys are shown
+  bool pseudonymised = false;  ///< the patient's name and ID are not shown: the picture is to be kept
+  std::string said;            ///< a remark of the window's own: where a snapshot went
+  Room room = Room::dark;
+  std::optional<SliceView> slices;  ///< empty: closed
+  int inset_corner = 0;
 };
 
 /// How wide the workflow beside the video is.
 int side_px(float scale);
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.
 PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
-                        const PanelFacts& facts, TransferEditor& editor);
-/// The wish that a key stands for: "space", "enter", "backspace", "t", "f", "s", "1" to "7", "+", "-", "c", "g".
+                        const PanelFacts& facts);
+/// The wish that a key stands for, as LiveWindow::keys names it; the window's texts name all of them ("all_keys").
 void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);
 
 }  // namespace birdseye::host

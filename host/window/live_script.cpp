@@ -35,12 +35,14 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
       sound = static_cast<bool>(words >> line.what >> line.every_s >> line.step >> line.seconds);
     if (line.verb == "sleep") sound = static_cast<bool>(words >> line.seconds);
     if (line.verb == "key" || line.verb == "shot") sound = static_cast<bool>(words >> line.what);
+    if (line.verb == "look")
+      sound = static_cast<bool>(words >> line.place_mm.x() >> line.place_mm.y() >> line.place_mm.z());
     if (line.verb == "end") sound = true;
     sound = sound && line.seconds >= 0 && line.every_s >= 0 && (line.step.empty() || step_of(line.step));
     if (!sound) {
       return Error{Errc::bad_format,
                    fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"press NAME SECONDS STEP SECONDS\", \"sleep "
-                               "SECONDS\", \"key NAME\", \"shot FILE\" or \"end\"",
+                               "SECONDS\", \"key NAME\", \"look X Y Z\", \"shot FILE\" or \"end\"",
                                path.string(), number)};
     }
     script.lines_.push_back(std::move(line));
@@ -62,13 +64,14 @@ Result<LiveScript::Act> LiveScript::next(const OperationView& operation, HostTim
     const bool due = line.verb == "press" && (!pressed_ || Duration{now.ns - pressed_->ns}.seconds() >= line.every_s);
     if (!note.done && due) {
       pressed_ = now;
-      return Act{line.what, {}, false};
+      return Act{line.what, {}, {}, false};
     }
     if (!note.done) return Act{};
   }
   if (line.verb == "sleep" && waited_s < line.seconds) return Act{};
   Act act;
   if (line.verb == "key") act.key = line.what;
+  if (line.verb == "look") act.place_mm = line.place_mm;
   if (line.verb == "shot") act.shot = line.what;
   act.end = line.verb == "end";
   lines_.pop_front();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <deque>
 #include <filesystem>
 #include <optional>
@@ -16,6 +17,7 @@ namespace birdseye::host {
 ///   press NAME SECONDS STEP SECONDS   that key every so often until that step is done; fails after so long
 ///   sleep SECONDS
 ///   key NAME                          as draw_panels' keys: space, enter, backspace, a letter
+///   look X Y Z                        the slices' cross-hair at that place of the CT, patient frame, mm
 ///   shot FILE                         the window as a PNG
 ///   end
 /// and remarks after #.
@@ -27,6 +29,7 @@ class LiveScript {
   struct Act {
     std::string key;
     std::filesystem::path shot;
+    std::optional<Eigen::Vector3d> place_mm;  ///< of the CT, for the slices' cross-hair
     bool end = false;
   };
   /// What is to be done now; at most one act a call. An error where something was waited for in vain.
@@ -38,6 +41,7 @@ class LiveScript {
     std::string verb, what;
     std::string step;  ///< that is waited for
     double seconds = 0, every_s = 0;
+    Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
   };
   std::string name_;
   std::deque<Line> lines_;

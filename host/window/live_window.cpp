@@ -11,6 +11,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/texts/texts.hpp"
 #include "host/window/glfw_window.hpp"
 
 // GLFW's header of it would want those of Xlib and Xrandr, and a GLFW without X11 does not have it.
@@ -27,19 +28,21 @@ constexpr float kFontPx = 16;
 void use_font(float scale) {
   ImGuiIO& io = ImGui::GetIO();
   if (std::filesystem::exists(kFont)) {
-    io.Fonts->AddFontFromFileTTF(kFont, std::round(kFontPx * scale));
+    // Of all letters that the texts and the signs have, and patients' names in Europe; ImGui keeps the pointer.
+    static ImVector<ImWchar> ranges;
+    ranges.clear();
+    ImFontGlyphRangesBuilder glyphs;
+    static constexpr std::array<ImWchar, 3> kLatinExtended{0x0100, 0x024F, 0}, kGreek{0x0370, 0x03FF, 0};
+    for (const ImWchar* letters :
+         {io.Fonts->GetGlyphRangesDefault(), io.Fonts->GetGlyphRangesCyrillic(), kGreek.data(), kLatinExtended.data()})
+      glyphs.AddRanges(letters);
+    glyphs.AddText(language_text().c_str());
+    for (const char* sign : {kGoodSign, kWarnSign, kBadSign}) glyphs.AddText(sign);
+    glyphs.BuildRanges(&ranges);
+    io.Fonts->AddFontFromFileTTF(kFont, std::round(kFontPx * scale), nullptr, ranges.Data);
   } else {
     io.FontGlobalScale = scale;
   }
-}
-
-void use_style(float scale) {
-  ImGui::StyleColorsDark();
-  ImGuiStyle& style = ImGui::GetStyle();
-  style.WindowRounding = 0;
-  style.FrameRounding = 3;
-  style.WindowBorderSize = 0;
-  style.ScaleAllSizes(scale);
 }
 
 }  // namespace
@@ -60,7 +63,7 @@ Result<std::unique_ptr<LiveWindow>> LiveWindow::open(const Settings& settings) {
   made->layout_ = settings.layout.string();
   io.IniFilename = made->layout_.empty() ? nullptr : made->layout_.c_str();
   use_font(made->scale_);
-  use_style(made->scale_);
+  use_theme(made->room_, made->scale_);
   // ImGui's own state of keys misses those that are let go before it looks, as a pedal may. It calls this one too.
   glfwSetWindowUserPointer(made->window_, made.get());
   glfwSetKeyCallback(made->window_, [](GLFWwindow* at, int key, int /*scancode*/, int action, int /*mods*/) {
@@ -98,7 +101,8 @@ void LiveWindow::end_frame() {
   int wide = 0, high = 0;
   glfwGetFramebufferSize(window_, &wide, &high);
   glViewport(0, 0, wide, high);
-  glClearColor(0.09F, 0.10F, 0.11F, 1);
+  const Eigen::Vector3f& ground = theme_of(room_).background;
+  glClearColor(ground.x(), ground.y(), ground.z(), 1);
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
   glFinish();
@@ -120,6 +124,11 @@ void LiveWindow::cover_when_still(int left_px, const RgbView& picture) {
   cover_ = StallCover::over(window, left_px, picture);
 }
 
+void LiveWindow::set_room(Room room) {
+  room_ = room;
+  use_theme(room, scale_);
+}
+
 bool LiveWindow::closed() const {
   return glfwWindowShouldClose(window_) == GLFW_TRUE;
 }
@@ -127,14 +136,16 @@ bool LiveWindow::closed() const {
 std::vector<std::string> LiveWindow::keys() const {
   std::vector<std::string> pressed;
   if (ImGui::GetIO().WantTextInput) return pressed;
-  constexpr std::array<std::pair<int, const char*>, 8> kNamed{{{GLFW_KEY_SPACE, "space"},
-                                                               {GLFW_KEY_ENTER, "enter"},
-                                                               {GLFW_KEY_KP_ENTER, "enter"},
-                                                               {GLFW_KEY_BACKSPACE, "backspace"},
-                                                               {GLFW_KEY_EQUAL, "+"},
-                                                               {GLFW_KEY_KP_ADD, "+"},
-                                                               {GLFW_KEY_MINUS, "-"},
-                                                               {GLFW_KEY_KP_SUBTRACT, "-"}}};
+  constexpr std::array<std::pair<int, const char*>, 10> kNamed{{{GLFW_KEY_SPACE, "space"},
+                                                                {GLFW_KEY_ENTER, "enter"},
+                                                                {GLFW_KEY_KP_ENTER, "enter"},
+                                                                {GLFW_KEY_BACKSPACE, "backspace"},
+                                                                {GLFW_KEY_EQUAL, "+"},
+                                                                {GLFW_KEY_KP_ADD, "+"},
+                                                                {GLFW_KEY_MINUS, "-"},
+                                                                {GLFW_KEY_SLASH, "?"},
+                                                                {GLFW_KEY_F1, "?"},
+                                                                {GLFW_KEY_KP_SUBTRACT, "-"}}};
   for (const int code : pressed_) {
     for (const auto& [named, name] : kNamed) {
       if (code == named) pressed.emplace_back(name);

@@ -13,6 +13,7 @@
 #include "host/render/gl/gl_context.hpp"
 #include "host/render/scene/scene.hpp"
 #include "host/window/stall_cover.hpp"
+#include "host/window/theme.hpp"
 
 struct GLFWwindow;
 struct ImGuiContext;
@@ -50,14 +51,16 @@ class LiveWindow final : public GlContext {
   [[nodiscard]] int stood_still() const { return cover_ ? cover_->covered() : 0; }
   [[nodiscard]] bool closed() const;
   /// Keys that were pressed before begin_frame(), unless into a field of text: "space", "enter", "backspace", "+", "-",
-  /// small letters and digits.
+  /// "?", small letters and digits.
   [[nodiscard]] std::vector<std::string> keys() const;
 
   /// Of any size from call to call. One that is not whole is left out.
-  enum class Slot { video, inset };
+  enum class Slot { video, inset, slices };
   void set_picture(Slot slot, const RgbView& picture);
   /// The picture's texture for ImGui::Image; 0 before the first.
   [[nodiscard]] std::uintptr_t picture(Slot slot) const { return textures_[static_cast<std::size_t>(slot)].name; }
+  /// The colours of its panels, from the next frame on.
+  void set_room(Room room);
   /// Of text and panels, against a screen of usual density.
   [[nodiscard]] float scale() const { return scale_; }
   /// What end_frame() drew, before swap(): RGB, rows from the top.
@@ -79,8 +82,9 @@ class LiveWindow final : public GlContext {
     std::uint32_t name = 0;
     int width_px = 0, height_px = 0;
   };
-  std::array<Texture, 2> textures_;
+  std::array<Texture, 3> textures_;
   float scale_ = 1;
+  Room room_ = Room::dark;
 };
 
 }  // namespace birdseye::host

@@ -38,12 +38,18 @@ inline LiveSettings operation_settings(const Scratch& scratch) {
 }
 
 /// Waits for the CT, which another thread reads.
-inline void load(LiveWorkflow& workflow) {
+inline void read_ct(LiveWorkflow& workflow) {
   for (int i = 0; i < 1000 && workflow.view().patient == nullptr && workflow.view().fault.empty(); ++i) {
     sleep_for(Duration::from_ms(10));
     workflow.tick();
   }
   ASSERT_NE(workflow.view().patient, nullptr) << workflow.view().fault;
+}
+
+/// And it is the patient's on the table.
+inline void load(LiveWorkflow& workflow) {
+  read_ct(workflow);
+  workflow.confirm_patient();
 }
 
 /// The pointer's tip at places of the patient, one after the other.

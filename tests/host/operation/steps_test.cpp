@@ -460,7 +460,7 @@ TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {
   plan.landmarks = {{"tumour", {30, 30, 20}}};
   const RegisteredPatient registered{kTrackerFromPatient, 0.3, kFiducials};
   const auto at = [&](const Eigen::Vector3d& in_patient_mm, const DeformedOrgan* deformed) {
-    return check_by_landmarks(kTrackerFromPatient * in_patient_mm, registered, plan, kFiducials, deformed);
+    return check_by_landmarks(kTrackerFromPatient * in_patient_mm, registered, plan.landmarks, kFiducials, deformed);
   };
   EXPECT_EQ(at({30, 30, 22}, nullptr).nearest, "tumour");
   EXPECT_NEAR(at({30, 30, 22}, nullptr).distance_mm, 2, 1e-9);

@@ -314,7 +314,6 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
   ASSERT_TRUE(window) << window.error().what;
   const AgeStrip ages;
   PanelFacts facts;
-  TransferEditor editor;
   facts.ages = &ages;
   const OperationView operation;
   for (const Named& one : faults()) {
@@ -331,7 +330,7 @@ TEST_F(LiveWindowTest, OnTheScreenTooNoStaleOverlayStays) {
         (*window)->set_picture(LiveWindow::Slot::video, {*shown.rgb, shown.width_px, shown.height_px});
       changes = shown.changes;
       (*window)->begin_frame();
-      draw_panels(**window, operation, shown, facts, editor);
+      draw_panels(**window, operation, shown, facts);
       (*window)->end_frame();
       const double magenta = magenta_in((*window)->shot().rgb);
       (*window)->swap();

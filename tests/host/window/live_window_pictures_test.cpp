@@ -99,6 +99,7 @@ class LiveWindowPictures : public ::testing::Test {
     if (workflow.view().patient != nullptr && !workflow.view().engine_name.empty()) {
       histogram_ = HuHistogram(workflow.view().patient->shown);
       facts_.histogram = &histogram_;
+      facts_.editor = &editor_;
       editor_.set_points(workflow.view().transfer->points());
       const InsetView view(workflow.view().patient->shown);
       const auto ct = workflow.ct_seen_from(view.camera(), view.outside_from_patient(), InsetView::render_settings());
@@ -108,7 +109,7 @@ class LiveWindowPictures : public ::testing::Test {
     }
     for (int i = 0; i < 3; ++i) {
       window_->begin_frame();
-      draw_panels(*window_, workflow.view(), shown, facts_, editor_);
+      draw_panels(*window_, workflow.view(), shown, facts_);
       window_->end_frame();
       if (i < 2) window_->swap();
     }
@@ -137,12 +138,12 @@ class LiveWindowPictures : public ::testing::Test {
                        << name << "-got.png";
   }
 
+  std::unique_ptr<birdseye::testing::Display> display_;
+  std::unique_ptr<LiveWindow> window_;
   AgeStrip ages_;
   PanelFacts facts_;
 
  private:
-  std::unique_ptr<birdseye::testing::Display> display_;
-  std::unique_ptr<LiveWindow> window_;
   TransferEditor editor_;
   HuHistogram histogram_;
 };
@@ -184,6 +185,21 @@ TEST_F(LiveWindowPictures, FiducialsWithTheirResiduals) {
   workflow.take(tissue(1, looking_at_the_ball()), HostTime{0}, ClockGap{});
   workflow.draw();
   expect_looks("fiducials-1280x720", workflow, HostTime{45'000'000});
+}
+
+TEST_F(LiveWindowPictures, ALightRoomWithSlicesAndAPatientNobodyHasConfirmed) {
+  ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  birdseye::testing::read_ct(workflow);
+  connect_and_calibrate(workflow);
+  const auto patient = workflow.view().patient;
+  facts_.room = Room::light;
+  window_->set_room(Room::light);
+  facts_.slices.emplace(std::shared_ptr<const Volume>(patient, &patient->ct));
+  const Picture slices = facts_.slices->draw({{{30, 30, 20}, "tumour", {0, 200, 150}}});
+  window_->set_picture(LiveWindow::Slot::slices, slices.view());
+  expect_looks("light-slices-1280x720", workflow, std::nullopt);
 }
 
 TEST_F(LiveWindowPictures, TheOverlayRunsAndOnADenseScreenTheVideoHasStopped) {

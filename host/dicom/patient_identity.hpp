@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+namespace birdseye::host {
+
+/// Whose CT it is, as its files say. UTF-8, one line each; empty where the files do not say.
+struct PatientIdentity {
+  std::string name;        ///< "Phantom, Abdomen"
+  std::string id;          ///< of the hospital that made the CT
+  std::string birth_date;  ///< 1970-01-31
+  std::string ct_date;     ///< when the CT was taken
+
+  /// Whether the files say whose CT it is.
+  [[nodiscard]] bool known() const { return !name.empty() || !id.empty(); }
+  bool operator==(const PatientIdentity&) const = default;
+};
+
+/// A person's name (DICOM PS3.5, value representation PN) as people write it: "Family, Prefix Given Middle Suffix", of
+/// the first of its spellings.
+std::string person_name(const std::string& dicom_name);
+/// A date (value representation DA) with dashes; empty where it is none.
+std::string dashed_date(const std::string& dicom_date);
+
+}  // namespace birdseye::host

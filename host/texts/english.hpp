@@ -1,0 +1,169 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+
+namespace birdseye::host {
+
+/// A text of the window: its key, by which programs and languages name it, and what it is in English. {} is where a
+/// figure or a name goes; a language may put them in another order, as {1} {0}.
+struct EnglishText {
+  std::string_view key, english;
+};
+
+/// All that the window says in its own words, by what shows it. What an instrument, a file or another program says
+/// comes as it is.
+inline constexpr std::array kEnglish{
+    // The patient
+    EnglishText{"patient_name", "{}"},
+    EnglishText{"patient_id", "ID {}"},
+    EnglishText{"patient_born", "born {}"},
+    EnglishText{"patient_ct_date", "CT of {}"},
+    EnglishText{"patient_no_name", "The CT names no patient."},
+    EnglishText{"patient_no_ct_date", "The CT has no date."},
+    EnglishText{"patient_file", "File: {}"},
+    EnglishText{"patient_none", "No CT has been read yet."},
+    EnglishText{"patient_ask", "Is this the patient on the table? Compare name, ID and date, then press Space."},
+    EnglishText{"patient_confirmed", "confirmed"},
+    EnglishText{"patient_pseudonym", "patient not named; CT {}"},
+    EnglishText{"patient_unconfirmed", "nobody has confirmed the patient: compare name, ID and date, then press Space"},
+    EnglishText{"patient_wrong", "this CT is of ID {}, and the patient on the table has ID {}"},
+
+    // The steps
+    EnglishText{"step_connect", "connect"},
+    EnglishText{"step_calibrate", "calibrate"},
+    EnglishText{"step_fiducials", "fiducials"},
+    EnglishText{"step_views", "views"},
+    EnglishText{"step_deform", "deform"},
+    EnglishText{"step_check", "check"},
+    EnglishText{"step_run", "run"},
+    EnglishText{"keys", "Space or the pedal: this. Enter: go on. 1 to 7: a step. F1: all keys."},
+    EnglishText{
+        "all_keys",
+        "O: overlay on or off. U: outlines. H: hole. M: margins. G: surface in front. C: cutting plane. + and -: "
+        "opacity. V: slices. F: freeze. S: snapshot. T: stroke. L: light or dark. Backspace: take back."},
+
+    // What Space and the pedal do
+    EnglishText{"do_confirm_patient", "this is the patient"},
+    EnglishText{"do_wait", "wait for the appliance"},
+    EnglishText{"do_go_on", "go on"},
+    EnglishText{"do_begin", "begin"},
+    EnglishText{"do_end_stations", "end with the stations so far"},
+    EnglishText{"do_take_point", "take this point"},
+    EnglishText{"do_keep_view", "keep this view"},
+    EnglishText{"do_match", "match the CT with the views"},
+    EnglishText{"do_cancel", "cancel"},
+    EnglishText{"do_landmarks_fit", "the landmarks fit: go on"},
+    EnglishText{"do_hide", "hide the overlay"},
+    EnglishText{"do_show", "show the overlay"},
+    EnglishText{"do_let_go", "let the picture go"},
+
+    // Connect
+    EnglishText{"instrument", "{}: {}"},
+
+    // Calibrate
+    EnglishText{"stations_taken", "{} stations taken"},
+    EnglishText{"covered_picture", "Parts of the picture:"},
+    EnglishText{"covered_tilts", "Tilts, small above and large below:"},
+    EnglishText{"covered_turns", "Turns about the scope's length:"},
+    EnglishText{"held_out_so_far", "So far {}: {:.2f} mm held out."},
+    EnglishText{"verdict", "Verdict: {}."},
+    EnglishText{"no_board", "No board is named. Start with --board, or give the appliance the scope's record."},
+
+    // Fiducials
+    EnglishText{"touch_each", "Touch each fiducial with the pointer. Rest there for half a second."},
+    EnglishText{"touch_simulated", "The simulated operator touches each fiducial with the pointer: wait."},
+    EnglishText{"markers_seen", "The CT shows {}."},
+    EnglishText{"markers_wanted", "The CT shows {}; {} are wanted."},
+    EnglishText{"markers_searched", "Markers are looked for in the CT."},
+    EnglishText{"touch_residual", "{}: residual {:.2f} mm"},
+    EnglishText{"touch_scatter", "{}: touched, scatter {:.2f} mm"},
+    EnglishText{"fre", "FRE {:.2f} mm"},
+    EnglishText{"undo_touch", "Backspace takes the last one back."},
+
+    // Views
+    EnglishText{"keep_views", "Keep five views or more of the organ, from different sides. Enter goes on without."},
+    EnglishText{"stroke_begin", "stroke the organ with the pointer (T)"},
+    EnglishText{"stroke_end", "end the stroke (T)"},
+    EnglishText{"no_view_now", "No overlay now: a view cannot be kept."},
+    EnglishText{"view_gain", "This view would shrink what is open by {:.0f} %, the best in reach by {:.0f} %."},
+    EnglishText{"undo_view", "Backspace takes the last view or stroke back."},
+
+    // Deform
+    EnglishText{"match_views", "Match the CT with the kept views. Enter goes on without."},
+    EnglishText{"undo_deform", "Backspace undoes it."},
+
+    // Check
+    EnglishText{"point_at_landmark",
+                "Point at a landmark, and hold the pointer's tip to it. The distance should be near 0."},
+    EnglishText{"point_simulated", "Nobody points at anything over the simulated cart: go on."},
+    EnglishText{"no_pointer", "No pointer is seen, or the patient is not registered."},
+    EnglishText{"tip_at", "The tip is at ({:.1f}, {:.1f}, {:.1f}) mm of the CT."},
+    EnglishText{"from_nearest", "{:.1f} mm from {}"},
+
+    // Run, and how the overlay is drawn
+    EnglishText{"overlay_shown", "overlay (O)"},
+    EnglishText{"opacity", "opacity"},
+    EnglishText{"outlines", "outlines only (U)"},
+    EnglishText{"hole", "round hole (H)"},
+    EnglishText{"hole_radius", "radius"},
+    EnglishText{"margins", "margins (M)"},
+    EnglishText{"margin", "{:g} mm"},
+    EnglishText{"no_margins", "No margins: start with --margins 5,10 and --targets."},
+    EnglishText{"surface_in_front", "surface in front (G)"},
+    EnglishText{"cutting_plane", "cutting plane (C)"},
+    EnglishText{"left_to_right", "left to right"},
+    EnglishText{"front_to_back", "front to back"},
+    EnglishText{"feet_to_head", "feet to head"},
+    EnglishText{"cut_at", "at {:.2f} of the CT"},
+    EnglishText{"colours", "colours"},
+    EnglishText{"presets", "presets"},
+    EnglishText{"snapshot", "snapshot (S)"},
+    EnglishText{"light_room", "light room (L)"},
+    EnglishText{"dark_room", "dark room (L)"},
+
+    // Slices
+    EnglishText{"slices", "slices of the CT (V)"},
+    EnglishText{"slices_close", "close the slices (V)"},
+    EnglishText{"axial", "axial"},
+    EnglishText{"coronal", "coronal"},
+    EnglishText{"sagittal", "sagittal"},
+    EnglishText{"slice_place", "({:.1f}, {:.1f}, {:.1f}) mm, {} HU"},
+    EnglishText{"slice_outside", "({:.1f}, {:.1f}, {:.1f}) mm, outside of the CT"},
+    EnglishText{"slice_help", "Click: the cross-hair goes there. Wheel: through the slices."},
+    EnglishText{"slice_zoom", "zoom"},
+    EnglishText{"slice_window", "window"},
+    EnglishText{"soft_tissue", "soft tissue"},
+    EnglishText{"bone_and_markers", "bone and markers"},
+    EnglishText{"pick_marker", "fiducial here (P, or a double click)"},
+    EnglishText{"drop_marker", "no fiducial here (X)"},
+    EnglishText{"pick_landmark", "landmark here (K, or a double click)"},
+    EnglishText{"pick_wait", "A marker is looked for there."},
+    EnglishText{"picked_marker", "Fiducial {}: {} at ({:.1f}, {:.1f}, {:.1f}) mm, {:.1f} mm from where you pointed."},
+    EnglishText{"picked_twice", "Fiducial {} is there already."},
+    EnglishText{"picked_landmark", "{}: at ({:.1f}, {:.1f}, {:.1f}) mm."},
+    EnglishText{"picked_landmark_marker", "{}: at the {}'s centre, {:.1f} mm from where you pointed."},
+    EnglishText{"pick_too_soon", "Wait: markers are still looked for in the CT."},
+    EnglishText{"dropped_marker", "Fiducial {} of the CT is not used any more."},
+    EnglishText{"drop_none", "No fiducial lies within {:.0f} mm of there."},
+    EnglishText{"landmark_name", "landmark {}"},
+
+    // Over the picture
+    EnglishText{"banner_frozen", "FROZEN: this is no live picture"},
+    EnglishText{"banner_stale", "NOT LIVE: {}"},
+    EnglishText{"banner_whole", "overlay; FRE {:.1f} mm"},
+    EnglishText{"banner_fades", "overlay fades: {}"},
+    EnglishText{"banner_none", "no overlay: {}"},
+    EnglishText{"banner_recording", "RECORDING, not live - {}"},
+    EnglishText{"target_error", "±{:.1f} mm"},
+    EnglishText{"target_error_unmoved", "±{:.1f} mm, if it has not moved since the CT"},
+
+    // The strip
+    EnglishText{"ages", "Exposure to screen, ms: p50 {:.0f}, p95 {:.0f}, max {:.0f}"},
+    EnglishText{"ages_up_to", "up to {:.0f} ms"},
+    EnglishText{"rates", "{:.1f} frames/s, {} skipped; engine {}"},
+    EnglishText{"tracker_rate", "Tracker {:.0f} Hz, {} doubted"},
+    EnglishText{"saved", "Snapshot: {}"},
+};
+
+}  // namespace birdseye::host

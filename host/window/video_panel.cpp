@@ -1,0 +1,121 @@
+// The picture, what of it may be believed, and where the target is in it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "host/texts/texts.hpp"
+#include "host/window/inset_place.hpp"
+#include "host/window/inset_view.hpp"
+#include "host/window/panel_context.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr ImU32 kGround = IM_COL32(0, 0, 0, 235);
+constexpr float kBannerPx = 28;
+
+/// The safety of the picture, in words, sign and colour, over its upper edge.
+void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
+  const ShownPicture& shown = context.shown;
+  const float scale = context.at.scale;
+  std::string text;
+  Grade grade = Grade::marginal;
+  if (context.operation.frozen) {
+    text = words("banner_frozen");
+  } else if (shown.stale || !shown.any) {
+    text = shown.any ? words("banner_stale", shown.reason) : shown.reason;
+    grade = Grade::fail;
+  } else if (shown.overlaid && shown.reason.empty()) {
+    text = words("banner_whole", context.operation.fre_mm.value_or(0));
+    grade = Grade::pass;
+  } else {
+    text = shown.overlaid ? words("banner_fades", shown.reason) : words("banner_none", shown.reason);
+  }
+  if (context.facts.recorded) text = words("banner_recording", text);
+  text = fmt::format("{} {}", sign_of(grade), text);
+  const ImU32 ink = ImGui::GetColorU32(colour(colour_of(grade, theme_over_video())));
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const float high = kBannerPx * scale;
+  list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), kGround);
+  list->AddRectFilled(from, ImVec2(from.x + 6 * scale, from.y + high), ink);
+  list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ink, text.c_str());
+}
+
+/// Where the target is drawn, and how far from there it may be. Gives what that takes of the screen.
+ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) {
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const ImVec2 middle(corner.x + fit * static_cast<float>(mark.at_px.x() + 0.5),
+                      corner.y + fit * static_cast<float>(mark.at_px.y() + 0.5));
+  const float radius = fit * static_cast<float>(mark.radius_px);
+  const Theme& theme = theme_over_video();
+  const ImU32 ink = ImGui::GetColorU32(colour(mark.motion_counted ? theme.good : theme.warn));
+  list->AddCircle(middle, radius, IM_COL32(0, 0, 0, 160), 0, 3.5F * scale);
+  list->AddCircle(middle, radius, ink, 0, 1.5F * scale);
+  const std::string text =
+      mark.motion_counted ? words("target_error", mark.radius_mm) : words("target_error_unmoved", mark.radius_mm);
+  const ImVec2 wide = ImGui::CalcTextSize(text.c_str());
+  const float beside = radius + 6 * scale, right = ImGui::GetWindowPos().x + ImGui::GetWindowSize().x;
+  const bool fits = middle.x + beside + wide.x < right;
+  const ImVec2 from(fits ? middle.x + beside : middle.x - beside - wide.x, middle.y - wide.y / 2);
+  const ImVec2 to(from.x + wide.x, from.y + wide.y);
+  list->AddRectFilled(ImVec2(from.x - 3 * scale, from.y - 2 * scale), ImVec2(to.x + 3 * scale, to.y + 2 * scale),
+                      IM_COL32(0, 0, 0, 150));
+  list->AddText(from, ink, text.c_str());
+  return {{std::min(from.x, middle.x - radius), std::min(from.y, middle.y - radius)},
+          {std::max(to.x, middle.x + radius), std::max(to.y, middle.y + radius)}};
+}
+
+/// The CT from outside, in a corner that leaves the target free.
+void draw_inset(PanelContext& context, const ScreenBox& area, const std::optional<ScreenBox>& target) {
+  const std::uintptr_t inset = context.window.picture(LiveWindow::Slot::inset);
+  if (inset == 0) return;
+  const float size = context.at.scale * 0.75F;
+  const auto place =
+      place_inset(area, {size * InsetView::kWidthPx, size * InsetView::kHeightPx}, target, context.facts.inset_corner);
+  if (!place) return;
+  context.wishes.inset_corner = place->corner;
+  ImGui::SetCursorScreenPos(ImVec2(place->box.from.x(), place->box.from.y()));
+  ImGui::Image(texture(inset), ImVec2(size * InsetView::kWidthPx, size * InsetView::kHeightPx));
+}
+
+void draw_picture(PanelContext& context, ImVec2 from, ImVec2 size) {
+  const ShownPicture& shown = context.shown;
+  const float scale = context.at.scale, gap = 8 * scale;
+  std::optional<ScreenBox> target;
+  if (shown.any) {
+    const float fit =
+        std::min(size.x / static_cast<float>(shown.width_px), size.y / static_cast<float>(shown.height_px));
+    const ImVec2 shape(fit * static_cast<float>(shown.width_px), fit * static_cast<float>(shown.height_px));
+    const ImVec2 corner(from.x + (size.x - shape.x) / 2, from.y + (size.y - shape.y) / 2);
+    ImGui::SetCursorScreenPos(corner);
+    ImGui::Image(texture(context.window.picture(LiveWindow::Slot::video)), shape);
+    if (context.operation.target && shown.overlaid) target = draw_target(*context.operation.target, corner, fit, scale);
+  }
+  draw_banner(context, from, size.x);
+  const ScreenBox area{{from.x + gap, from.y + kBannerPx * scale + gap},
+                       {from.x + size.x - gap, from.y + size.y - gap}};
+  draw_inset(context, area, target);
+}
+
+}  // namespace
+
+void draw_video(PanelContext& context) {
+  const PanelLayout& at = context.at;
+  const ImVec2 size(at.wide - at.side, at.high - at.strip);
+  // Slices share the room with the video, which stays in sight.
+  const float slices_high =
+      context.facts.slices ? std::min(0.5F * size.y, size.x * SliceView::kHeightPx / SliceView::kWidthPx) : 0;
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
+  ImGui::SetNextWindowPos(ImVec2(at.side, 0));
+  ImGui::SetNextWindowSize(ImVec2(size.x, size.y - slices_high));
+  ImGui::Begin("video", nullptr, kPanel | ImGuiWindowFlags_NoInputs);
+  draw_picture(context, ImVec2(at.side, 0), ImVec2(size.x, size.y - slices_high));
+  ImGui::End();
+  ImGui::PopStyleVar();
+  if (context.facts.slices) draw_slices(context, ImVec2(at.side, size.y - slices_high), ImVec2(size.x, slices_high));
+}
+
+}  // namespace birdseye::host
