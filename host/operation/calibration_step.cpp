@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "drivers/system/clock.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -18,7 +19,7 @@ void CalibrationStep::begin(const std::string& bird, const std::optional<calibra
     return;
   }
   verdict_.reset();
-  note_ = {false, "hold the scope over the board"};
+  note_ = {false, words("note_over_board")};
   guide_.start(std::move(plan));
 }
 
@@ -60,7 +61,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   if (found_ && found_->by_board && made_utc <= found_->made_utc) return Adopted::no;
   const bool anew = found_ && made_utc != found_->made_utc;
   found_ = {*std::move(scope), made_utc, false};
-  note_ = {true, fmt::format("by the scope's record of {}", made_utc)};
+  note_ = {true, words("note_record_of", made_utc)};
   return anew ? Adopted::anew : Adopted::again;
 }
 
@@ -72,7 +73,7 @@ void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
   if (found_ && kept.made_utc <= found_->made_utc) return;
   if (!kept.scope.figures().held_out_px) {
     // As 0.1.0 kept it: nothing could be drawn by it.
-    if (!found_) note_.line = "what was kept does not say how far hand-eye is off: calibrate anew";
+    if (!found_) note_.line = words("note_kept_unknown");
     return;
   }
   guide_.give_up();

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 void ConnectionStep::set_link(bool connected, const std::string& words, bool video) {
@@ -14,7 +16,7 @@ void ConnectionStep::set_link(bool connected, const std::string& words, bool vid
   const auto& health = link_.health;
   note_.done = connected && (health ? health->state == "ready" : video && link_.appliance_says.empty());
   note_.line = words;
-  if (connected && health && !note_.done) note_.line = fmt::format("the appliance is {}", health->state);
+  if (connected && health && !note_.done) note_.line = host::words("note_appliance_is", health->state);
   if (connected && !health && !link_.appliance_says.empty()) note_.line = link_.appliance_says;
 }
 

@@ -11,6 +11,7 @@
 #include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/geometry/geometry_verdict.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -49,7 +50,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
                             std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches) {
   if (running()) return;
   if (kept.size() < (touches.empty() ? kFewestViews : kFewestBesideTouches)) {
-    note_.line = fmt::format("{} views are too few: keep {} or more, from different sides", kept.size(), kEnoughViews);
+    note_.line = words("note_few_views", kept.size(), kEnoughViews);
     return;
   }
   std::vector<VideoView> views;
@@ -63,7 +64,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     views.push_back(*std::move(view));
     frames.push_back(one.frame);
   }
-  note_ = {false, "matching"};
+  note_ = {false, words("note_matching")};
   dropped_ = false;
   if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
   matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient),
@@ -111,14 +112,15 @@ bool DeformationStep::tick() {
   made_.organ = std::move((*matched)->organ);
   const Verdict& verdict = (*matched)->verdict;
   if (registration.worse_than_start) {
-    note_ = {false, "what explains the views folds the organ: keep other views, or go on without"};
+    note_ = {false, words("note_folds")};
     return false;
   }
   if (verdict.grade == Grade::fail) {
     note_ = {false, verdict.reasons.front() + words_of(registration.touches)};
     return false;
   }
-  note_ = {true, verdict.grade == Grade::marginal ? "with care: " + verdict.reasons.front() : verdict.reasons.front()};
+  note_ = {true, verdict.grade == Grade::marginal ? words("note_with_care", verdict.reasons.front())
+                                                  : verdict.reasons.front()};
   note_.line += words_of(registration.touches);
   DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt};
   if (const auto& expected = registration.expected) {
@@ -134,7 +136,7 @@ bool DeformationStep::tick() {
 
 void DeformationStep::undo() {
   found_.reset();
-  note_ = {false, "undone: the CT is shown as it was taken"};
+  note_ = {false, words("note_undone")};
 }
 
 bool DeformationStep::forget() {

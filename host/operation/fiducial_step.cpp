@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -29,7 +31,7 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   registered_.reset();
   fault_.clear();
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
-  note_ = {false, fmt::format("{} touched", touches_.size())};
+  note_ = {false, words("note_touched", touches_.size())};
   if (!markers_in_patient_mm || touches_.size() < kFewestFiducials) return;
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());
@@ -41,7 +43,7 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   }
   for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
   registered_ = found->registered;
-  note_.line = fmt::format("{} touched, FRE {:.2f} mm", touches_.size(), registered_->fre_mm);
+  note_.line = words("note_touched_fre", touches_.size(), registered_->fre_mm);
   note_.done = touches_.size() >= std::max(kFewestFiducials + 1, wanted);
 }
 
@@ -51,7 +53,7 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
   if (!kept) return true;
   registered_ = kept;
   confirmed_ = false;
-  note_ = {true, fmt::format("{}, FRE {:.2f} mm", when, kept->fre_mm)};
+  note_ = {true, words("note_taken_up_fre", when, kept->fre_mm)};
   return true;
 }
 

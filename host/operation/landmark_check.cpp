@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 Eigen::Vector3d as_shown_mm(const Eigen::Vector3d& place_in_ct_mm, const DeformedOrgan* deformed) {
@@ -22,7 +24,7 @@ CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const 
   };
   for (const NamedPoint& landmark : landmarks) consider(landmark.name, landmark.place_mm);
   for (std::size_t i = 0; i < markers_in_patient_mm.size(); ++i)
-    consider(fmt::format("fiducial {}", i + 1), markers_in_patient_mm[i]);
+    consider(words("fiducial_name", i + 1), markers_in_patient_mm[i]);
   return reading;
 }
 

@@ -8,6 +8,7 @@
 #include "drivers/system/wait.hpp"
 #include "host/link/appliance_link.hpp"
 #include "host/recording/recording_reader.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -19,7 +20,7 @@ constexpr Duration kConnectAgain = Duration::from_ms(1000);
 }  // namespace
 
 LiveSource::LiveSource(std::string name, Connect::Work connect)
-    : name_(std::move(name)), words_("connecting to " + name_), connect_(std::move(connect)) {
+    : name_(std::move(name)), words_(host::words("note_connecting", name_)), connect_(std::move(connect)) {
   if (connect_) connecting_.start(connect_);
 }
 
@@ -35,10 +36,10 @@ std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address,
 std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings settings) {
   const auto connect = [settings = std::move(settings)](const std::stop_token& stop,
                                                         const Connect::Say& say) -> Result<Connection> {
-    say("making the patient");
+    say(host::words("note_making"));
     if (auto made = SimulatedCart::make_patient(settings); !made) return made.error();
     if (stop.stop_requested()) return Error{Errc::disconnected, "cancelled"};
-    say("starting tracker, camera and appliance");
+    say(host::words("note_starting"));
     auto cart = SimulatedCart::start(settings);
     if (!cart) return cart.error();
     auto client = wire::Client::connect("127.0.0.1", (*cart)->port(), Deadline::after(Duration::from_ms(20'000)));
@@ -59,7 +60,7 @@ void LiveSource::take_link(Result<Connection> link) {
   auto stream = std::make_unique<EventStream>(std::move(link->client), kMostFramesWaiting);
   stream_ = stream.get();
   events_ = std::move(stream);
-  words_ = "connected to " + name_;
+  words_ = host::words("note_connected", name_);
 }
 
 Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed) {
@@ -71,7 +72,7 @@ Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesyst
   source->recording_ = reader->get();
   source->events_ = *std::move(reader);
   source->live_ = false;
-  source->words_ = "playing " + path.string();
+  source->words_ = host::words("note_playing", path.string());
   return source;
 }
 

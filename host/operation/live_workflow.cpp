@@ -9,10 +9,10 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr const char* kUnregistered = "the patient is not registered yet";
-constexpr const char* kUnconfirmed =
-    "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space";
-constexpr const char* kCalibratedAnew = "the scope was calibrated anew: keep views again";
+/// Why there is no overlay by what the fiducials give.
+const std::string& why_unregistered(const FiducialStep& fiducials) {
+  return fiducials.confirmed() ? words("why_unregistered") : words("why_unconfirmed");
+}
 
 }  // namespace
 
@@ -57,7 +57,7 @@ void LiveWorkflow::tick() {
   }
   if (const auto checked = watch_.tick()) take(*checked);
   if (!calibration_.tick()) return;
-  forget_views(kCalibratedAnew);
+  forget_views(words("note_calibrated_anew"));
   update_setup();
   keep();
   if (step_ != LiveStep::calibrate) return;
@@ -133,7 +133,7 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
   }
   const auto adopted = calibration_.adopt(*record);
   if (adopted == CalibrationStep::Adopted::no) return;
-  if (adopted == CalibrationStep::Adopted::anew) forget_views(kCalibratedAnew);
+  if (adopted == CalibrationStep::Adopted::anew) forget_views(words("note_calibrated_anew"));
   update_setup();
 }
 
@@ -154,7 +154,7 @@ void LiveWorkflow::watch_surface(HostTime now) {
 void LiveWorkflow::take(const CheckedSurface& checked) {
   if (!deformation_.found() || !motion_.take(checked)) return;
   if (motion_.moved_mm()) {
-    views_.forget("the organ has moved since: keep views anew");
+    views_.forget(words("note_views_organ_moved"));
     strokes_.forget();
   }
   set_picture_up();
@@ -167,7 +167,7 @@ void LiveWorkflow::fit() {
   } else {
     fiducials_.fit(std::nullopt, settings_.fiducials);
   }
-  forget_views("the fiducials were touched anew: keep views again");
+  forget_views(words("note_views_touched_anew"));
   update_setup();
   if (fiducials_.note().done && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
 }
@@ -218,7 +218,7 @@ void LiveWorkflow::set_picture_up() {
   const auto& registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
   if (patient_.plan() && !patient_confirmed_) return picture_.set_setup(std::nullopt, {}, words("patient_unconfirmed"));
-  if (!may) return picture_.set_setup(std::nullopt, {}, fiducials_.confirmed() ? kUnregistered : kUnconfirmed);
+  if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_));
   TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   figures.moved_mm = motion_.moved_mm();
   picture_.set_setup(scope->scope.registered(registered->tracker_from_patient), figures);
@@ -242,7 +242,7 @@ void LiveWorkflow::take_up() {
   }
   const auto& kept = *operation;
   if (!kept) return;
-  const std::string when = "taken up from " + kept->made_utc;
+  const std::string when = words("note_taken_up", kept->made_utc);
   // A record that the appliance sent meanwhile may be newer.
   if (kept->calibrated) calibration_.take_up(*kept->calibrated, when);
   if (fiducials_.take_up(kept->registered, when) && kept->deformed) {
@@ -259,7 +259,7 @@ void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
   if (step != LiveStep::views) strokes_.end();
   if (step == LiveStep::calibrate && !calibration_.note().done) calibration_.begin(settings_.scope, settings_.pattern);
-  if (step == LiveStep::run) run_ = {true, "the overlay runs"};
+  if (step == LiveStep::run) run_ = {true, words("note_runs")};
 }
 
 void LiveWorkflow::go_on() {
@@ -310,9 +310,9 @@ void LiveWorkflow::primary() {
 void LiveWorkflow::stroke() {
   if (step_ != LiveStep::views) return;
   if (strokes_.stroking()) return strokes_.end();
-  if (!settings_.tip_in_pointer_mm) return strokes_.refuse("no stroke: where the pointer's tip is, is not known");
+  if (!settings_.tip_in_pointer_mm) return strokes_.refuse(words("note_no_tip"));
   if (!fiducials_.registered() || !fiducials_.confirmed()) {
-    return strokes_.refuse(std::string("no stroke: ") + (fiducials_.confirmed() ? kUnregistered : kUnconfirmed));
+    return strokes_.refuse(words("note_no_stroke", why_unregistered(fiducials_)));
   }
   strokes_.begin(views_.views().size());
 }

@@ -56,9 +56,7 @@ OperationView LiveWorkflow::view() const {
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();
   out.organ_moved = motion_.moved_mm().has_value();
-  if (out.deformed)
-    out.surface_check =
-        watch_.watches() ? motion_.line() : "the surface is not checked: the views it was found by are not kept";
+  if (out.deformed) out.surface_check = watch_.watches() ? motion_.line() : words("note_not_watched");
   out.patient = patient_.plan();
   out.patient_confirmed = patient_confirmed_;
   out.patient_files = patient_.files();

@@ -29,7 +29,7 @@ void OperationKeeper::keep(Operation operation) {
   if (out_.empty() || !resume_.empty()) return;
   operation.made_utc = utc_now();
   const auto written = write_operation(out_, operation);
-  fault_ = written ? "" : "not kept: " + written.error().what;
+  fault_ = written ? "" : words("note_not_kept", written.error().what);
 }
 
 }  // namespace birdseye::host

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 bool OrganMotion::take(const CheckedSurface& checked) {
@@ -11,13 +13,11 @@ bool OrganMotion::take(const CheckedSurface& checked) {
   if (finding.verdict == SurfaceVerdict::cannot_tell) {
     if (!untold_since_) untold_since_ = checked.at;
     const Duration untold = checked.at - *untold_since_;
-    if (untold >= kTold)
-      line_ = fmt::format("for {:.0f} s it cannot be told whether the organ has moved: {}", untold.seconds(),
-                          finding.words);
+    if (untold >= kTold) line_ = words("note_cannot_tell", untold.seconds(), finding.words);
     return false;
   }
   untold_since_.reset();
-  line_ = "surface: " + finding.words;
+  line_ = words("note_surface", finding.words);
   const bool moved = finding.verdict == SurfaceVerdict::moved;
   if (moved == moved_mm_.has_value()) {
     against_ = 0;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -65,7 +67,7 @@ void OrganStrokes::end() {
   line_.clear();
   if (!strokes_.back().places.empty()) return;
   strokes_.pop_back();
-  line_ = "nothing was touched: the pointer was not seen, or moved faster than a stroke";
+  line_ = words("note_nothing_touched");
 }
 
 void OrganStrokes::take(DeviceTime acquired, const Eigen::Vector3d& tip_in_patient_mm) {
@@ -149,8 +151,7 @@ std::vector<SeenPoint> OrganStrokes::touches(double shift_mm) const {
 
 void OrganStrokes::tell() {
   const bool full = places() >= kMostTouchedPlaces;
-  line_ = full ? fmt::format("{} places are the most: end the stroke (T)", kMostTouchedPlaces)
-               : "stroking: T ends the stroke";
+  line_ = full ? words("note_most_places", kMostTouchedPlaces) : words("note_stroking");
 }
 
 double tip_shift_mm(std::optional<double> tip_rms_mm, std::optional<double> hand_eye_mm) {

@@ -8,6 +8,7 @@
 #include "host/files/text_files.hpp"
 #include "host/operation/operation.hpp"
 #include "host/simulated/simulated_patient.hpp"
+#include "host/texts/texts.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
@@ -38,7 +39,7 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std
     if (!values) return values.error();
     const auto centre = label_centroid_mm(volume, *values);
     if (!centre) return centre.error();
-    plan.landmarks.push_back({fmt::format("middle of label {}", target.text), *centre});
+    plan.landmarks.push_back({words("label_name", target.text), *centre});
   }
   if (!files.margins_mm.empty()) {
     const auto targets = values_in(*labels, files, files.targets);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "host/registration/geometry/organ_surface.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -38,8 +39,7 @@ struct SurfaceWatch::Shown {
   SurfaceFinding find(const KeptView& frame, const std::optional<double>& pose_mm) {
     SurfaceFinding out;
     if (!surface.deformed->seen_rms_mm || !pose_mm) {
-      out.words = pose_mm ? "how well the deformed surface is known was not estimated"
-                          : "how far hand-eye is off in mm is not known";
+      out.words = pose_mm ? words("check_unknown_surface") : words("check_unknown_hand_eye");
       return out;
     }
     if (!check) check = check_of(surface);
@@ -69,7 +69,7 @@ void SurfaceWatch::offer(const KeptView& frame, const std::optional<double>& pos
       return one.execute([&] { return Outcome{{shown->find(frame, pose_mm), now}, shown}; });
     } catch (const std::exception& problem) {  // of a library: it must not end the operation
       SurfaceFinding none;
-      none.words = fmt::format("the check broke off: {}", problem.what());
+      none.words = words("check_broke_off", problem.what());
       return Outcome{{std::move(none), now}, shown};
     }
   });

@@ -6,6 +6,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -37,23 +38,22 @@ ViewStep::ViewStep() : scope_(averaging()) {}
 void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
                     const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
   if (views_.size() >= kMostViews) {
-    note_.line = fmt::format("not kept: {} views are the most; undo the last one, or go on", kMostViews);
+    note_.line = words("note_most_views", kMostViews);
     return;
   }
   if (!frame || !camera_from_patient) {
-    note_.line = "not kept: there is no overlay on this frame, so that where its camera was is not sure";
+    note_.line = words("note_no_overlay");
     return;
   }
   const auto there = std::find_if(views_.begin(), views_.end(), [&](const KeptView& view) {
     return same_place(view.camera_from_patient, *camera_from_patient);
   });
   if (there != views_.end()) {
-    note_.line = fmt::format("not kept: view {} was kept from here: move the scope by {:.0f} mm or more",
-                             there - views_.begin() + 1, kApartMm);
+    note_.line = words("note_same_place", there - views_.begin() + 1, kApartMm);
     return;
   }
   views_.push_back({*frame, *camera_from_patient});
-  note_ = {views_.size() >= kEnoughViews, fmt::format("{} views kept", views_.size())};
+  note_ = {views_.size() >= kEnoughViews, words("note_views_kept", views_.size())};
 }
 
 void ViewStep::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
@@ -75,7 +75,7 @@ void ViewStep::average(const Setup& setup) {
 void ViewStep::undo() {
   if (!views_.empty()) views_.pop_back();
   averaged_ = std::min(averaged_, views_.size());
-  note_ = {views_.size() >= kEnoughViews, fmt::format("{} views kept", views_.size())};
+  note_ = {views_.size() >= kEnoughViews, words("note_views_kept", views_.size())};
 }
 
 void ViewStep::forget(const std::string& why) {

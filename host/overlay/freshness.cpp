@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 Freshness freshness_at(HostTime now, HostTime exposed, Duration pose_age, const FreshnessLimits& limits) {
@@ -12,11 +14,11 @@ Freshness freshness_at(HostTime now, HostTime exposed, Duration pose_age, const 
   out.age = age;
   out.stopped = age > limits.stopped;
   if (out.stopped) {
-    out.why_too_old = fmt::format("the video has stopped, {:.1f} s ago", age.seconds());
+    out.why_too_old = words("why_stopped", age.seconds());
   } else if (age > limits.most_age) {
-    out.why_too_old = fmt::format("the picture is {:.0f} ms old", age.seconds() * 1e3);
+    out.why_too_old = words("why_old_picture", age.seconds() * 1e3);
   } else if (pose_age > Duration{} && age + pose_age > limits.most_age) {
-    out.why_too_old = fmt::format("the newest pose is {:.0f} ms old", (age + pose_age).seconds() * 1e3);
+    out.why_too_old = words("why_old_pose", (age + pose_age).seconds() * 1e3);
   }
   out.overlaid_until = exposed + (limits.most_age - std::max(pose_age, Duration{})) + limits.late;
   out.bare_until = exposed + limits.stopped + limits.late;

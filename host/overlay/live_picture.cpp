@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -57,7 +59,7 @@ std::optional<Transform<Camera, Patient>> LivePicture::seen_from() const {
 ShownPicture LivePicture::at(HostTime now) {
   ShownPicture out;
   if (!frame_) {
-    out.reason = "no video has come yet";
+    out.reason = words("why_no_video");
     return out;
   }
   out.any = true;
@@ -69,14 +71,14 @@ ShownPicture LivePicture::at(HostTime now) {
   if (!setup()) {
     out.reason = why_no_setup_;
   } else if (engine_ == nullptr) {
-    out.reason = "the CT is not ready";
+    out.reason = words("why_no_ct");
   } else if (hidden_) {
-    out.reason = "it is switched off";
+    out.reason = words("why_hidden");
   } else if (!fresh.why_too_old.empty()) {
     out.reason = fresh.why_too_old;
   } else if (!painter_.fits(*frame_)) {
-    out.reason = fmt::format("the video is {} x {} and the camera was calibrated at {} x {}", frame_->width_px,
-                             frame_->height_px, setup()->camera().width_px, setup()->camera().height_px);
+    out.reason = words("why_other_size", frame_->width_px, frame_->height_px, setup()->camera().width_px,
+                       setup()->camera().height_px);
   } else {
     out.reason = decision_.reason;
     out.overlaid = !overlaid_.empty();
