@@ -12,6 +12,7 @@
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 #include "host/volume/marker_finder.hpp"
+#include "host/volume/post_finder.hpp"
 
 namespace birdseye::host {
 
@@ -103,6 +104,7 @@ Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_toke
   if (!ct) return ct.error();
   plan.ct = std::move(ct->volume);
   plan.identity = std::move(ct->patient);
+  plan.notes = std::move(ct->notes);
   plan.checksum = ct_checksum(plan.ct);
   if (!files.labels.empty()) {
     if (auto read = read_labels(files, plan, stop); !read) return read.error();
@@ -122,8 +124,14 @@ Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_toke
 }
 
 std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop) {
+  constexpr std::size_t kFewest = 3;  // that a patient can be registered by
+  std::vector<MarkerFit> markers = find_markers(ct, {}, stop).markers;
+  if (markers.size() < kFewest && !stop.stop_requested()) {
+    std::vector<MarkerFit> posts = find_hollow_posts(ct, post_search({MarkerKind::post, 0, 0, 0}), stop).markers;
+    if (posts.size() > markers.size()) markers = std::move(posts);
+  }
   std::vector<Eigen::Vector3d> places_mm;
-  for (const MarkerFit& marker : find_markers(ct, {}, stop).markers) places_mm.push_back(marker.centre_in_patient_mm);
+  for (const MarkerFit& marker : markers) places_mm.push_back(marker.centre_in_patient_mm);
   return places_mm;
 }
 

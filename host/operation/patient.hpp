@@ -41,6 +41,7 @@ struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
   PatientIdentity identity;
+  std::vector<std::string> notes;  ///< of the CT's reader: what it passed over, what resampling cost
   std::optional<Volume> labels;
   std::vector<int> organ;  ///< values in labels of what the views show: it is matched with them
   std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given
@@ -59,7 +60,8 @@ Result<void> check_labels_named(const PatientFiles& files);
 /// An error names the file. Where no fiducials are given, they are left to find_fiducials. Once stop is requested, what
 /// is still to be read is not.
 Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_token& stop = {});
-/// The markers that the CT shows, the brightest first.
+/// The markers that the CT shows, the brightest first: balls of 8 mm, or where these are too few to register by, hollow
+/// posts, if there are more of them.
 std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_token& stop);
 
 }  // namespace birdseye::host

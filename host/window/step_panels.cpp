@@ -170,6 +170,9 @@ void draw_patient_card(PanelContext& context) {
     if (!who.known()) say(theme.quiet, words("patient_file", operation.patient_files.ct.path.filename().string()));
     if (operation.patient_confirmed) say(theme.good, fmt::format("{} {}", kGoodSign, words("patient_confirmed")));
   }
+  if (plan != nullptr && operation.asks_for_patient) {
+    for (const std::string& note : plan->notes) say(theme.quiet, note);
+  }
   if (!operation.patient_fault.empty() && !context.facts.pseudonymised) {
     say(theme.bad, fmt::format("{} {}", kBadSign, operation.patient_fault));
   } else if (operation.asks_for_patient) {

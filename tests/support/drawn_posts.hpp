@@ -99,4 +99,25 @@ inline DrawnCt drawn_head(const Eigen::Vector3d& spacing_mm, const Eigen::Matrix
   return head;
 }
 
+/// Posts all over a head, each on a stalk to the bone, tilted from it by up to 40 degrees.
+inline std::vector<DrawnPost> posts_on(DrawnCt& head, std::mt19937& rng) {
+  using Eigen::Vector3d;
+  std::vector<DrawnPost> posts;
+  const DrawnPost one = any_post(rng, DrawnPost::Top::cone);
+  for (const Vector3d& direction :
+       {Vector3d(0.9, 0.5, 0.6), Vector3d(-0.9, 0.6, 0.5), Vector3d(0.5, -0.8, 0.8), Vector3d(-0.5, 0.9, -0.4)}) {
+    DrawnPost post = one;
+    post.top = posts.size() % 2 == 0 ? DrawnPost::Top::cone : DrawnPost::Top::flat;
+    const Vector3d outwards = direction.normalized();
+    const Vector3d bone = outwards / outwards.cwiseQuotient(Vector3d(46, 60, 54)).norm();
+    const Vector3d away = bone.cwiseQuotient(Vector3d(46, 60, 54).cwiseAbs2()).normalized();
+    post.axis = (away + 0.6 * any_direction(rng)).normalized();
+    post.stalk = 9;
+    post.centre = bone + (post.height / 2 + post.wall + post.stalk) * post.axis;
+    post.draw(head, kHeadBlur_mm);
+    posts.push_back(post);
+  }
+  return posts;
+}
+
 }  // namespace birdseye::testing

@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <random>
+
 #include "host/volume/import.hpp"
 #include "host/volume/segmentation.hpp"
+#include "tests/support/drawn_posts.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
 
@@ -63,6 +67,36 @@ TEST(Patient, LabelsThatAreNamedNeedTheirFile) {
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().what.find("give --labels"), std::string::npos) << refused.error().what;
   }
+}
+
+TEST(Patient, PostsAreFiducialsWhereThereAreNoBalls) {
+  std::mt19937 rng(7);
+  auto head = birdseye::testing::drawn_head({0.7, 0.7, 1}, Eigen::Matrix3d::Identity());
+  const auto posts = birdseye::testing::posts_on(head, rng);
+  head.finish(30, rng);
+  const auto found = find_fiducials(head.ct, {});
+  ASSERT_EQ(found.size(), posts.size());
+  for (const auto& post : posts) {
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), [&post](const Eigen::Vector3d& place_mm) {
+      return (place_mm - post.centre).norm() < 0.5;
+    }));
+  }
+}
+
+TEST(Patient, MarginsAreAboutTheTargets) {
+  const Scratch scratch;
+  PatientFiles files = ball(scratch);
+  files.organ = {5};
+  files.margins_mm = {10, 5};
+  const auto about_what = check_labels_named(files);
+  ASSERT_FALSE(about_what);
+  EXPECT_NE(about_what.error().what.find("--targets"), std::string::npos) << about_what.error().what;
+  files.targets = {5};
+  const auto read = read_patient(files);
+  ASSERT_TRUE(read) << read.error().what;
+  ASSERT_TRUE(read->margins.has_value());
+  EXPECT_EQ(read->margins->size(), 2U);
+  EXPECT_EQ(read->margins->front().mm, 5);
 }
 
 }  // namespace

@@ -17,32 +17,13 @@ using birdseye::testing::between;
 using birdseye::testing::drawn_head;
 using birdseye::testing::DrawnCt;
 using birdseye::testing::DrawnPost;
+using birdseye::testing::posts_on;
 using Eigen::Vector3d;
 
 const Vector3d kPostSpacings[] = {{0.914, 0.914, 0.5}, {0.5, 0.5, 0.5}, {0.7, 0.7, 1}, {0.9, 0.9, 2}};
 
 Eigen::Matrix3d turned(const Vector3d& by) {
   return Eigen::AngleAxisd(by.norm(), by.normalized()).toRotationMatrix();
-}
-
-/// Posts all over a head, each on a stalk to the bone, tilted from it by up to 40 degrees.
-std::vector<DrawnPost> posts_on(DrawnCt& head, std::mt19937& rng) {
-  std::vector<DrawnPost> posts;
-  const DrawnPost one = any_post(rng, DrawnPost::Top::cone);
-  for (const Vector3d& direction :
-       {Vector3d(0.9, 0.5, 0.6), Vector3d(-0.9, 0.6, 0.5), Vector3d(0.5, -0.8, 0.8), Vector3d(-0.5, 0.9, -0.4)}) {
-    DrawnPost post = one;
-    post.top = posts.size() % 2 == 0 ? DrawnPost::Top::cone : DrawnPost::Top::flat;
-    const Vector3d outwards = direction.normalized();
-    const Vector3d bone = outwards / outwards.cwiseQuotient(Vector3d(46, 60, 54)).norm();
-    const Vector3d away = bone.cwiseQuotient(Vector3d(46, 60, 54).cwiseAbs2()).normalized();
-    post.axis = (away + 0.6 * any_direction(rng)).normalized();
-    post.stalk = 9;
-    post.centre = bone + (post.height / 2 + post.wall + post.stalk) * post.axis;
-    post.draw(head, birdseye::testing::kHeadBlur_mm);
-    posts.push_back(post);
-  }
-  return posts;
 }
 
 TEST(HollowPosts, OfAHeadAreFoundAndItsCavitiesAreNot) {
