@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "drivers/gpio/debouncer.hpp"
+#include "drivers/gpio/gpio_chip.hpp"
 #include "drivers/gpio/kernel_stamps.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
@@ -25,13 +26,7 @@ constexpr std::size_t kKernelQueue = 16;  // edges that the kernel keeps of a li
 /// A line that fills that queue at once is none of a strobe or a pedal (a loose wire picks up anything): it is read no
 /// oftener than this, and what the kernel drops meanwhile is no loss.
 constexpr Duration kFloodPause = Duration::from_ms(2);
-constexpr std::size_t kMostNamed = 8;
 static_assert(2 * (kKernelQueue + 1) <= GpioLines::kMostEdges);
-
-struct ChipCloser {
-  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // and gives back its lines
-};
-using GpioChip = std::unique_ptr<gpiod_chip, ChipCloser>;
 
 struct InputLine {
   GpioInput input = GpioInput::strobe;
@@ -43,35 +38,6 @@ struct InputLine {
 bool is_number(const std::string& text) {
   return !text.empty() && text.size() < 5 &&
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
-}
-
-/// What the chip calls its lines, for who has misnamed one.
-std::string names_of(gpiod_chip* chip) {
-  std::string text;
-  std::size_t named = 0;
-  const unsigned count = std::min(gpiod_chip_num_lines(chip), 1024U);
-  for (unsigned i = 0; i < count && named < kMostNamed; ++i) {
-    gpiod_line* line = gpiod_chip_get_line(chip, i);
-    const char* name = line == nullptr ? nullptr : gpiod_line_name(line);
-    if (name != nullptr) text += fmt::format("{}{}", named++ == 0 ? "" : ", ", name);
-  }
-  return fmt::format("{} lines{}{}", gpiod_chip_num_lines(chip), named == 0 ? ", none with a name" : ": ", text);
-}
-
-Result<GpioChip> open_chip(const std::string& name) {
-  if (name.empty()) return Error{Errc::bad_value, "[gpio] chip: give /dev/gpiochipN, its name or its label"};
-  if (GpioChip chip{gpiod_chip_open_lookup(name.c_str())}) return chip;
-  switch (errno) {
-    case EACCES:
-    case EPERM:
-      return Error{Errc::unreadable, fmt::format("{}: may not be opened; add this user to the group gpio", name)};
-    case ENOENT:
-    case ENODEV:
-    case ENXIO:
-      return Error{Errc::not_found, fmt::format("{}: no such GPIO chip; see [gpio] chip and gpiodetect", name)};
-    default:
-      return Error{Errc::unsupported, fmt::format("{}: is no GPIO chip; see [gpio] chip and gpiodetect", name)};
-  }
 }
 
 class KernelGpioLines final : public GpioLines {
@@ -127,7 +93,7 @@ Result<gpiod_line*> KernelGpioLines::find(const char* purpose, const std::string
   }
   if (line != nullptr) return line;
   return Error{Errc::not_found, fmt::format("{}: has no line \"{}\" for [gpio] {}; it has {}", name_, wanted, purpose,
-                                            names_of(chip_.get()))};
+                                            line_names_of(chip_.get()))};
 }
 
 Result<void> KernelGpioLines::request_line(gpiod_line* line, const char* purpose, const std::string& wanted, int type,
@@ -278,7 +244,7 @@ Result<std::unique_ptr<GpioLines>> GpioLines::open(const GpioSettings& settings)
                  fmt::format("Linux {}: its edges are not stamped with CLOCK_MONOTONIC; 5.7 or later is needed",
                              kernel.release)};
   }
-  auto chip = open_chip(settings.chip);
+  auto chip = open_gpio_chip(settings.chip);
   if (!chip) return chip.error();
   auto lines = std::make_unique<KernelGpioLines>(*std::move(chip), settings);
   if (auto got = lines->request(settings); !got) return got.error();
