@@ -24,6 +24,7 @@ void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_calibrate(CLI::App& app, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
+void add_doctor(CLI::App& app, CommandStatus& status);
 void add_export(CLI::App& app, CommandStatus& status);
 void add_live(CLI::App& app, CommandStatus& status);
 void add_record(CLI::App& app, CommandStatus& status);

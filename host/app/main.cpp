@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   add_bench(app, status);
   add_calibrate(app, status);
   add_demo(app, status);
+  add_doctor(app, status);
   add_export(app, status);
   add_live(app, status);
   add_record(app, status);

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/record/calibration_record.hpp"
+#include "device/wire/messages.hpp"
+#include "host/doctor/question.hpp"
+
+namespace birdseye::host {
+
+/// What a server said of itself in some seconds.
+struct ApplianceTold {
+  std::optional<wire::Status> status;
+  std::optional<wire::Health> health;
+  std::optional<wire::Calibration> calibration;
+  std::string peer;  ///< what it is, where it is no appliance
+};
+
+/// What it comes to. address: as it was named.
+std::vector<Check> appliance_checks(const std::string& address, const ApplianceTold& told);
+
+/// Connects to the server, listens for some seconds without asking for video, and leaves.
+Question appliance_question(const std::string& address);
+
+/// "lens pass, hand-eye marginal, no tip, no latency"
+std::string record_words(const calibration::CalibrationRecord& record);
+
+}  // namespace birdseye::host

@@ -1,0 +1,63 @@
+#include "host/doctor/inputs.hpp"
+
+#include <fmt/format.h>
+
+#include "host/doctor/appliance.hpp"
+#include "host/files/record_file.hpp"
+#include "host/volume/import.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr const char* kInputs = "files";
+constexpr Duration kCtWithin = Duration::from_ms(320'000);  // the decoder's own deadline is five minutes
+
+std::vector<Check> check_ct(const VolumeSource& ct) {
+  Check check{kInputs, "CT", CheckState::good, "", ""};
+  const auto imported = import_with_notes(ct);
+  if (!imported) {
+    check.state = CheckState::bad;
+    check.found = imported.error().what;
+    check.remedy = "docs/manual/volumes.md says what is read; \"birdseye volume info PATH\" lists a folder's series";
+    return {check};
+  }
+  const Volume& volume = imported->volume;
+  check.found = fmt::format("{}: can be read, {} x {} x {} voxels of {:.2f} x {:.2f} x {:.2f} mm", ct.path.string(),
+                            volume.size[0], volume.size[1], volume.size[2], volume.spacing_mm.x(),
+                            volume.spacing_mm.y(), volume.spacing_mm.z());
+  std::vector<Check> checks{check};
+  for (const std::string& note : imported->notes)
+    checks.push_back({kInputs, "CT", CheckState::good, "note: " + note, ""});
+  return checks;
+}
+
+std::vector<Check> check_record(const std::filesystem::path& path) {
+  Check check{kInputs, "calibration record", CheckState::good, "", ""};
+  const auto record = read_record(path);
+  if (!record) {
+    check.state = CheckState::bad;
+    check.found = record.error().what;
+    check.remedy = "take a copy that is whole, or calibrate: docs/manual/calibration.md";
+    return {check};
+  }
+  check.found = fmt::format("{}: is sound, of {}: {}", path.string(),
+                            record->scope.empty() ? "a scope without a name" : record->scope, record_words(*record));
+  if (!record->lens || !record->hand_eye) {
+    check.state = CheckState::could_be_better;
+    check.remedy = "an overlay takes lens and hand-eye: calibrate what is not there";
+  }
+  return {check};
+}
+
+}  // namespace
+
+Question ct_question(const VolumeSource& ct) {
+  return {.area = kInputs, .name = ct.path.string(), .within = kCtWithin, .ask = [ct] { return check_ct(ct); }};
+}
+
+Question record_question(const std::filesystem::path& record) {
+  return {.area = kInputs, .name = record.string(), .ask = [record] { return check_record(record); }};
+}
+
+}  // namespace birdseye::host
