@@ -11,12 +11,14 @@
 #include "host/app/foreign_options.hpp"
 #include "host/app/overlay_options.hpp"
 #include "host/demo/demo_report.hpp"
+#include "host/doctor/first_run.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/patient.hpp"
 #include "host/texts/texts.hpp"
+#include "host/window/first_run_page.hpp"
 #include "host/window/live_app.hpp"
 
 namespace birdseye::host {
@@ -72,21 +74,52 @@ Result<void> refuse_operation_in(const LiveSettings& live) {
                            live.out.string())};
 }
 
-Result<void> prepare(LiveOptions& options) {
-  const int sources = static_cast<int>(options.simulate) + static_cast<int>(!options.server.empty()) +
-                      static_cast<int>(!options.recording.empty());
-  if (sources != 1) return Error{Errc::bad_value, "give one of --server HOST:PORT, --recording PATH and --simulate"};
+constexpr const char* kOneSource = "give one of --server HOST:PORT, --recording PATH and --simulate";
+constexpr const char* kNoCt = "--ct is missing: name the CT that is to be shown";
+
+Result<void> prepare_window(LiveOptions& options) {
   LiveWindow::Settings& window = options.window;
   if (std::sscanf(options.size.c_str(), "%dx%d", &window.width_px, &window.height_px) != 2 || window.width_px < 640 ||
       window.height_px < 480) {
     return Error{Errc::bad_value, fmt::format("--size: \"{}\" is no size of at least 640x480", options.size)};
   }
+  window.title = "Birdseye";
+  window.layout = layout_file();
+  return {};
+}
+
+/// Without a source or a CT: a window whose page says so and offers the simulated cart, where there is a display. Null
+/// where nothing is lacking; the error says what is, unless that cart is taken.
+Result<std::unique_ptr<LiveWindow>> offer_simulated_cart(LiveOptions& options, std::optional<LiveScript>& script) {
+  const bool source = !options.server.empty() || !options.recording.empty(), ct = !options.live.patient.ct.path.empty();
+  if (options.simulate || (source && ct)) return std::unique_ptr<LiveWindow>();
+  if (auto prepared = prepare_window(options); !prepared) return prepared.error();
+  const Error lacks{Errc::bad_value,
+                    fmt::format("{}; birdseye doctor says what this machine has", source ? kNoCt : kOneSource)};
+  auto window = LiveWindow::open(options.window);
+  if (!window) return lacks;
+  FirstRun given{options.server.empty() ? options.recording.string() : options.server, options.live.patient.ct.path,
+                 options.live.patient.labels, !options.live.patient.organ.empty(), options.board};
+  const char* lacking = source ? "without a CT" : ct ? "without a source of video" : "with neither video nor a CT";
+  const auto chosen = show_first_run_page(**window, fmt::format("It was started {}.", lacking),
+                                          first_run_questions(this_machine(), given), script);
+  if (!chosen) return chosen.error();
+  if (*chosen == FirstRunChoice::close) return lacks;
+  options.simulate = true;
+  options.server.clear();
+  options.recording.clear();
+  return window;
+}
+
+Result<void> prepare(LiveOptions& options) {
+  const int sources = static_cast<int>(options.simulate) + static_cast<int>(!options.server.empty()) +
+                      static_cast<int>(!options.recording.empty());
+  if (sources != 1) return Error{Errc::bad_value, kOneSource};
+  if (auto prepared = prepare_window(options); !prepared) return prepared;
   if (std::sscanf(options.video.c_str(), "%dx%d", &options.cart.width_px, &options.cart.height_px) != 2)
     return Error{Errc::bad_value, fmt::format("--video: \"{}\" is no size, as 768x576", options.video)};
   options.foreign.scope_bird = options.live.scope;
   options.foreign.not_scope = options.live.pointer;
-  window.title = "Birdseye";
-  window.layout = layout_file();
   if (!options.board.empty()) {
     auto pattern = calibration::parse_pattern(options.board);
     if (!pattern) return pattern.error();
@@ -109,8 +142,6 @@ Result<void> prepare(LiveOptions& options) {
     std::error_code error;
     fs::create_directories(options.live.out, error);
     if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
-  } else if (options.live.patient.ct.path.empty()) {
-    return Error{Errc::bad_value, "--ct is missing: which CT is to be shown?"};
   } else if (std::error_code ignored; !fs::exists(options.live.patient.ct.path, ignored)) {
     return Error{Errc::not_found,
                  fmt::format("--ct {}: no such file or folder", options.live.patient.ct.path.string())};
@@ -179,7 +210,6 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
 }
 
 Result<ExitCode> run(LiveOptions& options) {
-  const HostTime asked = host_now();
   if (!options.language.empty()) {
     if (auto spoken = speak(options.language); !spoken) return spoken.error();
   }
@@ -187,13 +217,16 @@ Result<ExitCode> run(LiveOptions& options) {
     if (auto written = write_file(options.list_texts, language_text()); !written) return written.error();
     return ExitCode::success;
   }
-  if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<LiveScript> script;
   if (!options.script.empty()) {
     auto read = LiveScript::read(options.script);
     if (!read) return read.error();
     script = *std::move(read);
   }
+  auto window = offer_simulated_cart(options, script);
+  if (!window) return window.error();
+  const HostTime asked = host_now();
+  if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<LiveLog> log;
   if (!options.live.out.empty()) {
     auto opened = LiveLog::open(options.live.out);
@@ -206,7 +239,7 @@ Result<ExitCode> run(LiveOptions& options) {
     if (!listening) return listening.error();
     publisher = *std::move(listening);
   }
-  auto window = LiveWindow::open(options.window);
+  if (*window == nullptr) window = LiveWindow::open(options.window);
   if (!window) return window.error();
   std::unique_ptr<LiveSource> source;
   if (!options.recording.empty()) {

@@ -75,7 +75,7 @@ std::vector<Check> display_checks(const DisplayFacts& facts) {
   Check drawn{kDisplay, "graphics", CheckState::good, facts.renderer, ""};
   if (draws_in_software(facts.renderer)) {
     drawn.state = CheckState::could_be_better;
-    drawn.found += ": the processor draws";
+    drawn.found = fmt::format("the processor draws, by {}", facts.renderer);
     drawn.remedy = "if there is a graphics card, install its driver; without one it works, and --engine gl is slow";
   }
   checks.push_back(drawn);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/command.hpp"
@@ -69,10 +70,33 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
   EXPECT_GT(cv::norm(shown, video, cv::NORM_INF), 20) << "nothing was drawn";
 }
 
+TEST(Live, WithoutASourceAPageOffersTheSimulatedCart) {
+  const Scratch scratch;
+  const testing::Display display("1280x720");
+  const auto shot = [&](const char* name) { return (scratch / name).string(); };
+  const std::string closing = scratch.file("closing.txt", "shot " + shot("page.png") + "\nkey q\n");
+  testing::expect_refused("birdseye", "live --script " + closing, {"--recording PATH"}, "", display.env());
+  const cv::Mat page = cv::imread(shot("page.png"));
+  ASSERT_EQ(page.size(), cv::Size(1280, 720));
+  // The buttons are in view, whose colour nothing else on the page has.
+  cv::Mat blue;
+  cv::inRange(page, cv::Scalar(100, 60, 30), cv::Scalar(140, 90, 55), blue);
+  EXPECT_GT(cv::countNonZero(blue), 10'000);
+
+  const std::string starting =
+      scratch.file("starting.txt", "key space\nwait connect 90\nshot " + shot("cart.png") + "\nend\n");
+  const auto started =
+      run("birdseye", "live --script " + starting + " --out " + (scratch / "out").string(), display.env());
+  EXPECT_EQ(started.code, 3) << started.output;  // for no overlay was reached yet
+  EXPECT_EQ(cv::imread(shot("cart.png")).size(), cv::Size(1280, 720)) << started.output;
+}
+
 TEST(Live, SaysWhatIsMissing) {
   const Scratch scratch;
-  testing::expect_refused("birdseye", "live", {"--server HOST:PORT, --recording PATH and --simulate"});
-  testing::expect_refused("birdseye", "live --server 127.0.0.1:1", {"--ct is missing"});
+  const char* nowhere = "env -u DISPLAY -u WAYLAND_DISPLAY";
+  testing::expect_refused("birdseye", "live",
+                          {"--server HOST:PORT, --recording PATH and --simulate", "birdseye doctor"}, "", nowhere);
+  testing::expect_refused("birdseye", "live --server 127.0.0.1:1", {"--ct is missing", "birdseye doctor"}, "", nowhere);
   testing::expect_refused("birdseye", "live --server 127.0.0.1:1 --ct /no/such/ct", {"--ct /no/such/ct: no such file"});
   const std::string ct = "live --server 127.0.0.1:1 --ct " + scratch.path().string();
   testing::expect_refused("birdseye", ct + " --labels liver.nii.gz --show 2,3", {"--labels liver.nii.gz", "--organ"});
@@ -83,7 +107,7 @@ TEST(Live, SaysWhatIsMissing) {
   testing::expect_refused("birdseye", "live --simulate --size 3x4", {"--size: \"3x4\""});
   testing::expect_refused("birdseye", "live --simulate --script " + (scratch / "none").string(), {"none"});
   testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(), {"there is no display"}, "",
-                          "env -u DISPLAY -u WAYLAND_DISPLAY");
+                          nowhere);
   const testing::Display display;
   testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(),
                           {"OpenGL 4.5", "libgl1-mesa-dri"}, "", display.env() + " MESA_GL_VERSION_OVERRIDE=3.3");

@@ -15,6 +15,7 @@
 #include "host/doctor/cameras.hpp"
 #include "host/doctor/configured.hpp"
 #include "host/doctor/display.hpp"
+#include "host/doctor/first_run.hpp"
 #include "host/doctor/lines.hpp"
 #include "host/doctor/service.hpp"
 #include "tests/support/scratch.hpp"
@@ -337,6 +338,42 @@ TEST(DoctorAppliance, WhatSaysNothingOfBirdseyedIsNone) {
   ApplianceTold other;
   other.peer = "an OpenIGTLink server";
   EXPECT_EQ(only(appliance_checks("a", other)).state, CheckState::good);
+}
+
+TEST(DoctorFirstRun, SaysWhatThisMachineHasForWhatWasNotNamed) {
+  const Folder folder;
+  const auto rows = [&](const FirstRun& given) { return ask_all(first_run_questions(folder.machine(), given)); };
+  for (const char* name : {"Appliance", "CT"}) EXPECT_EQ(named(rows({}), name).state, CheckState::missing);
+  EXPECT_THAT(named(rows({}), "Appliance").found, HasSubstr("no tracker and no camera"));
+  folder.serial_port("ttyUSB0");
+  folder.file("/dev/video0", "");
+  EXPECT_THAT(named(rows({}), "Appliance").found, HasSubstr("/dev/ttyUSB0, /dev/video0"));
+  folder.file("/proc/net/tcp", "   0: 0100007F:4A00 00000000:0000 0A 00000000:00000000\n");
+  EXPECT_THAT(named(rows({}), "Appliance").remedy, HasSubstr("--server 127.0.0.1:18944"));
+}
+
+TEST(DoctorFirstRun, WhatWasNamedIsLookedAt) {
+  const Folder folder;
+  FirstRun given{"cart:18944", folder.machine().at("/proc/locks"), "liver.nii.gz", false, "chessboard:14x10:3mm"};
+  auto rows = ask_all(first_run_questions(folder.machine(), given));
+  EXPECT_EQ(named(rows, "Appliance").state, CheckState::not_known);  // it is not called
+  EXPECT_EQ(named(rows, "CT").state, CheckState::good);
+  EXPECT_EQ(named(rows, "Segmentation").state, CheckState::bad);
+  EXPECT_THAT(named(rows, "Segmentation").remedy, HasSubstr("--organ"));
+  EXPECT_EQ(named(rows, "Board").state, CheckState::good);
+  given.ct = folder.machine().at("/no/such/ct");
+  given.organ_named = true;
+  rows = ask_all(first_run_questions(folder.machine(), given));
+  EXPECT_EQ(named(rows, "CT").state, CheckState::bad);
+  EXPECT_EQ(named(rows, "Segmentation").state, CheckState::good);
+}
+
+TEST(DoctorFirstRun, TheDisplaysRowIsItsWorstCheckInSentences) {
+  const DisplayFacts facts{true, "", "4.5", "llvmpipe", 1920, 1080, 1};
+  const Check row = display_row(display_checks(facts));
+  EXPECT_EQ(row.state, CheckState::could_be_better);
+  EXPECT_EQ(row.found, "The processor draws, by llvmpipe.");
+  EXPECT_EQ(display_row({}).state, CheckState::not_known);
 }
 
 TEST(DoctorText, ALineStaysOneLineAndNumbersAreAllThere) {
