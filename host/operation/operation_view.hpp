@@ -28,6 +28,8 @@ struct OperationView {
   bool guiding = false;
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
   bool deforming = false;
+  bool stroking = false;     ///< the pointer, over the organ
+  bool organ_moved = false;  ///< since the views that the deformation was found by
   std::array<StepNote, kLiveSteps> notes;
   std::string fault;
 
@@ -47,7 +49,6 @@ struct OperationView {
   std::optional<double> fre_mm;
   std::string registration_fault;
 
-  bool stroking = false;           ///< the pointer, over the organ
   std::size_t touched_places = 0;  ///< by strokes
   std::string stroke_line;         ///< of them, in words; empty: nothing is to be said
 
@@ -55,7 +56,6 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
-  bool organ_moved = false;   ///< since the views that it was found by
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
