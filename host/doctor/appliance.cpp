@@ -95,9 +95,11 @@ Check calibration_check(const wire::Calibration& calibration) {
 std::vector<Check> ask_appliance(const std::string& address) {
   const auto client = connect_appliance(address);
   if (!client) {
-    return {
-        {kAppliance, address, CheckState::bad, client.error().what,
-         "see its power, the cable, the address and the firewall; at the appliance: \"systemctl status birdseyed\""}};
+    const char* remedy = client.error().code == Errc::bad_value
+                             ? "give it as 192.168.1.20:18944"
+                             : "see its power, the cable, the address and the firewall; at the appliance: \"systemctl "
+                               "status birdseyed\"";
+    return {{kAppliance, "connection", CheckState::bad, client.error().what, remedy}};
   }
   return appliance_checks(address, listen_to(**client));
 }
@@ -131,7 +133,8 @@ std::vector<Check> appliance_checks(const std::string& address, const ApplianceT
 }
 
 Question appliance_question(const std::string& address) {
-  return {.area = kAppliance, .name = address, .within = kWithin, .ask = [address] { return ask_appliance(address); }};
+  return {
+      .area = kAppliance, .name = "connection", .within = kWithin, .ask = [address] { return ask_appliance(address); }};
 }
 
 std::string record_words(const calibration::CalibrationRecord& record) {

@@ -53,11 +53,11 @@ std::vector<Check> check_record(const std::filesystem::path& path) {
 }  // namespace
 
 Question ct_question(const VolumeSource& ct) {
-  return {.area = kInputs, .name = ct.path.string(), .within = kCtWithin, .ask = [ct] { return check_ct(ct); }};
+  return {.area = kInputs, .name = "CT", .within = kCtWithin, .ask = [ct] { return check_ct(ct); }};
 }
 
 Question record_question(const std::filesystem::path& record) {
-  return {.area = kInputs, .name = record.string(), .ask = [record] { return check_record(record); }};
+  return {.area = kInputs, .name = "calibration record", .ask = [record] { return check_record(record); }};
 }
 
 }  // namespace birdseye::host

@@ -88,6 +88,18 @@ std::string user_name(const Machine& machine) {
   return "USER";
 }
 
+/// How the device comes to a group that may open it. Debian's own rules do it for serial ports, unless others undo it.
+std::string group_rule(const std::string& device) {
+  if (device.starts_with("/dev/tty")) {
+    return fmt::format(
+        "write SUBSYSTEM==\"tty\", KERNEL==\"{}\", GROUP=\"dialout\", MODE=\"0660\" into "
+        "/etc/udev/rules.d/61-line.rules and start the machine again",
+        device.substr(5));
+  }
+  return "install packaging/60-birdseye.rules as /etc/udev/rules.d/60-birdseye.rules, run \"sudo udevadm control "
+         "--reload\" and plug the device in again";
+}
+
 }  // namespace
 
 Machine this_machine() {
@@ -160,9 +172,7 @@ std::optional<Refusal> refusal(const Machine& machine, const std::string& device
   refused.found = fmt::format("this user may not open it (group {}, mode {:04o})", name, node.st_mode & 07777U);
   const std::string user = user_name(machine);
   if (!group_may) {
-    refused.remedy =
-        "install packaging/60-birdseye.rules as /etc/udev/rules.d/60-birdseye.rules, run \"sudo udevadm control "
-        "--reload\" and plug the device in again";
+    refused.remedy = group_rule(device);
   } else if (group && group->members.find("," + user + ",") != std::string::npos) {
     refused.remedy = fmt::format("{} has been put into the group {} since this login: log in again", user, name);
   } else {

@@ -22,8 +22,9 @@ std::vector<Check> ask_all(const std::vector<Question>& questions, const std::fu
       }
     });
     const auto late = [&] {
-      return unknown(fmt::format("no answer within {:g} s", question.within.seconds()),
-                     "what it asks hangs: unplug the device and plug it in again, or start the machine again");
+      return unknown(
+          fmt::format("no answer within {:g} s", question.within.seconds()),
+          "what it asks hangs: unplug a device and plug it in again; of a file or a server, see the network");
     };
     for (const Check& check : given ? *given : late()) {
       if (told) told(check);

@@ -100,7 +100,9 @@ std::vector<Check> check_listener(const Machine& machine) {
 std::vector<Check> check_config(const Machine& machine, const fs::path& config) {
   const std::string name = config.string();
   const auto checked = output_of({beside_us("birdseyed"), "--config", name, "--check"}, Deadline::after(kProgramEnds));
-  if (!checked) return {{kService, name, CheckState::not_known, checked.error().what, "install birdseyed here"}};
+  if (!checked)
+    return {{kService, name, CheckState::not_known, checked.error().what,
+             checked.error().code == Errc::not_found ? "install birdseyed here" : "see whether it is a file"}};
   if (checked->code == 0) {
     std::vector<Check> checks{{kService, name, CheckState::good, "is sound", ""}};
     const std::vector<Check> named = check_configured(machine, config);

@@ -161,7 +161,18 @@ TEST(DoctorRights, WhatToDoDependsOnWhatStandsInTheWay) {
   EXPECT_THAT(refusal(folder.machine(), "/dev/ttyUSB0")->remedy, Not(HasSubstr("usermod")));
   // No group helps where the group may not.
   folder.file("/dev/ttyUSB0", "", 0600);
-  EXPECT_THAT(refusal(folder.machine(), "/dev/ttyUSB0")->remedy, HasSubstr("60-birdseye.rules"));
+  EXPECT_THAT(refusal(folder.machine(), "/dev/ttyUSB0")->remedy, HasSubstr("KERNEL==\"ttyUSB0\", GROUP=\"dialout\""));
+  folder.file("/dev/video0", "", 0600);
+  EXPECT_THAT(refusal(folder.machine(), "/dev/video0")->remedy, HasSubstr("60-birdseye.rules"));
+}
+
+TEST(DoctorRights, APortOfTheBoardMayHaveNothingOnIt) {
+  Folder folder;
+  folder.serial_port("ttyS0");
+  folder.refuse();
+  const Check check = only(ask_all(line_questions(folder.machine())));
+  EXPECT_EQ(check.state, CheckState::could_be_better);
+  EXPECT_THAT(check.remedy, HasSubstr("only if the tracker is on it: "));
 }
 
 TEST(DoctorLines, AnAdapterWithoutAKernelDriverIsFound) {
