@@ -29,7 +29,7 @@ ApplianceTold listen_to(wire::Client& client) {
 }
 
 Check status_check(const wire::Status& status) {
-  if (status.ok) return {kAppliance, "status", CheckState::good, status.text, ""};
+  if (status.ok) return {kAppliance, "status", CheckState::good, status.text.empty() ? "all is well" : status.text, ""};
   return {kAppliance, "status", CheckState::bad, status.text, "see the instruments below"};
 }
 

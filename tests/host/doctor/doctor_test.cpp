@@ -323,6 +323,7 @@ TEST(DoctorAppliance, EachInstrumentIsJudgedByItsState) {
                               {"gpio", "starting", "", 0, {}}};
   told.calibration = wire::Calibration{false, "the camera is another one", ""};
   const auto checks = appliance_checks("cart:18944", told);
+  for (const Check& check : appliance_checks("a", {wire::Status{true, ""}, {}, {}, ""})) EXPECT_NE(check.found, "");
   EXPECT_EQ(named(checks, "connection").state, CheckState::good);
   EXPECT_EQ(named(checks, "status").state, CheckState::bad);
   EXPECT_EQ(named(checks, "tracker").state, CheckState::good);
