@@ -100,9 +100,9 @@ Result<std::unique_ptr<LiveWindow>> offer_simulated_cart(LiveOptions& options, s
   if (!window) return lacks;
   FirstRun given{options.server.empty() ? options.recording.string() : options.server, options.live.patient.ct.path,
                  options.live.patient.labels, !options.live.patient.organ.empty(), options.board};
-  const char* lacking = source ? "without a CT" : ct ? "without a source of video" : "with neither video nor a CT";
-  const auto chosen = show_first_run_page(**window, fmt::format("It was started {}.", lacking),
-                                          first_run_questions(this_machine(), given), script);
+  (*window)->set_room(options.light_room ? Room::light : Room::dark);
+  const std::string lacking = source ? words("first_no_ct") : ct ? words("first_no_video") : words("first_neither");
+  const auto chosen = show_first_run_page(**window, lacking, first_run_questions(this_machine(), given), script);
   if (!chosen) return chosen.error();
   if (*chosen == FirstRunChoice::close) return lacks;
   options.simulate = true;

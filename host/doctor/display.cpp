@@ -15,7 +15,6 @@ namespace {
 
 constexpr const char* kDisplay = "display";
 constexpr int kWidthPx = 1280, kHeightPx = 720;  // of the window, at the usual density
-constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
 
 /// Mesa's drivers that draw with the processor, by how they call themselves.
 bool draws_in_software(std::string renderer) {
@@ -54,7 +53,7 @@ std::vector<Check> check_real_time() {
 
 std::vector<Check> check_font(const Machine& machine) {
   std::error_code ignored;
-  if (std::filesystem::exists(machine.at(kFont), ignored)) {
+  if (std::filesystem::exists(machine.at(kWindowFont), ignored)) {
     return {{kDisplay, "font", CheckState::good, "DejaVu Sans is installed", ""}};
   }
   return {{kDisplay, "font", CheckState::could_be_better, "DejaVu Sans is not installed: letters are coarse",

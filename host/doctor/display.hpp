@@ -8,6 +8,9 @@
 
 namespace birdseye::host {
 
+/// The letters of the window; without it Dear ImGui's own, which are coarse.
+inline constexpr const char* kWindowFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+
 /// What a window at this display has. Who opens windows finds it out.
 struct DisplayFacts {
   bool named = false;               ///< the environment names a display

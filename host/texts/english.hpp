@@ -14,6 +14,19 @@ struct EnglishText {
 /// All that the window says in its own words, by what shows it. What an instrument, a file or another program says
 /// comes as it is.
 inline constexpr std::array kEnglish{
+    // The page before the first operation
+    EnglishText{"first_more", "Birdseye needs a little more to begin."},
+    EnglishText{"first_no_ct", "It was started without a CT."},
+    EnglishText{"first_no_video", "It was started without a source of video."},
+    EnglishText{"first_neither", "It was started with neither video nor a CT."},
+    EnglishText{"first_asking", "This machine is asked what it has ..."},
+    EnglishText{"first_all", "All at once: {}"},
+    EnglishText{"first_doctor", "More about this machine: {}"},
+    EnglishText{"first_simulated",
+                "The simulated cart needs none of this: it brings a patient, a tracker and a scope of its own."},
+    EnglishText{"first_start", "Start the simulated cart (Space)"},
+    EnglishText{"first_close", "Close (Q)"},
+
     // The patient
     EnglishText{"patient_name", "{}"},
     EnglishText{"patient_id", "ID {}"},

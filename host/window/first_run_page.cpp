@@ -11,7 +11,9 @@
 #include "host/doctor/first_run.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/write_files.hpp"
+#include "host/texts/texts.hpp"
 #include "host/window/ask_display.hpp"
+#include "host/window/panel_context.hpp"
 
 namespace birdseye::host {
 
@@ -20,31 +22,28 @@ namespace {
 constexpr Duration kPageEvery = Duration::from_ms(30);
 constexpr const char* kSimulateKey = "space";
 constexpr const char* kCloseKey = "q";
-const ImVec4 kPageText(0.92F, 0.93F, 0.94F, 1), kPageQuiet(0.62F, 0.66F, 0.70F, 1);
 
-ImVec4 colour_of(CheckState state) {
+struct Seen {
+  Eigen::Vector3f colour;
+  const char* sign;
+};
+Seen seen_as(CheckState state, const Theme& theme) {
   switch (state) {
     case CheckState::good:
-      return {0.45F, 0.80F, 0.45F, 1};
+      return {theme.good, kGoodSign};
     case CheckState::could_be_better:
-      return {0.96F, 0.74F, 0.30F, 1};
+      return {theme.warn, kWarnSign};
     case CheckState::missing:
     case CheckState::bad:
-      return {0.96F, 0.38F, 0.34F, 1};
+      return {theme.bad, kBadSign};
     case CheckState::not_known:
       break;
   }
-  return kPageQuiet;
-}
-
-void write_wrapped(const ImVec4& colour, const std::string& text) {
-  ImGui::PushStyleColor(ImGuiCol_Text, colour);
-  ImGui::TextWrapped("%s", text.c_str());
-  ImGui::PopStyleColor();
+  return {theme.quiet, "?"};
 }
 
 /// State, name, and what was found over what to do.
-void draw_rows(const std::vector<Check>& checks, float scale) {
+void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale) {
   if (!ImGui::BeginTable("checks", 3)) return;
   ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 125 * scale);
   ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 155 * scale);
@@ -52,12 +51,13 @@ void draw_rows(const std::vector<Check>& checks, float scale) {
   for (const Check& check : checks) {
     ImGui::TableNextRow();
     ImGui::TableNextColumn();
-    write_wrapped(colour_of(check.state), name_of(check.state));
+    const Seen seen = seen_as(check.state, theme);
+    say(seen.colour, fmt::format("{} {}", seen.sign, name_of(check.state)));
     ImGui::TableNextColumn();
-    write_wrapped(kPageText, check.name);
+    say(theme.text, check.name);
     ImGui::TableNextColumn();
-    write_wrapped(kPageText, check.found);
-    if (!check.remedy.empty()) write_wrapped(kPageQuiet, check.remedy);
+    say(theme.text, check.found);
+    if (!check.remedy.empty()) say(theme.quiet, check.remedy);
     ImGui::Dummy(ImVec2(0, 12 * scale));
   }
   ImGui::EndTable();
@@ -67,20 +67,21 @@ void draw_rows(const std::vector<Check>& checks, float scale) {
 std::optional<FirstRunChoice> draw_buttons(float scale) {
   std::optional<FirstRunChoice> asked;
   const float high = 44 * scale;
-  if (ImGui::Button("Start the simulated cart  (Space)", ImVec2(330 * scale, high))) asked = FirstRunChoice::simulate;
+  if (ImGui::Button(label_of(words("first_start"), "start").c_str(), ImVec2(330 * scale, high)))
+    asked = FirstRunChoice::simulate;
   ImGui::SameLine(0, 16 * scale);
-  if (ImGui::Button("Close  (Q)", ImVec2(150 * scale, high))) asked = FirstRunChoice::close;
+  if (ImGui::Button(label_of(words("first_close"), "close").c_str(), ImVec2(150 * scale, high)))
+    asked = FirstRunChoice::close;
   return asked;
 }
 
-std::optional<FirstRunChoice> draw_foot(float scale) {
+std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale) {
   ImGui::Separator();
   ImGui::Dummy(ImVec2(0, 6 * scale));
-  write_wrapped(kPageQuiet,
-                "All at once:  birdseye live --server HOST:PORT --ct PATH --labels FILE --organ NAMES --board SPEC");
-  write_wrapped(kPageQuiet, "More about this machine:  birdseye doctor");
-  write_wrapped(kPageQuiet,
-                "The simulated cart needs none of this: it brings a patient, a tracker and a scope of its own.");
+  say(theme.quiet,
+      words("first_all", "birdseye live --server HOST:PORT --ct PATH --labels FILE --organ NAMES --board SPEC"));
+  say(theme.quiet, words("first_doctor", "birdseye doctor"));
+  say(theme.quiet, words("first_simulated"));
   ImGui::Dummy(ImVec2(0, 8 * scale));
   return draw_buttons(scale);
 }
@@ -95,6 +96,7 @@ struct Page {
 
 std::optional<FirstRunChoice> draw_page(const LiveWindow& window, Page& page) {
   const float scale = window.scale();
+  const Theme& theme = theme_of(window.room());
   const ImGuiViewport* const view = ImGui::GetMainViewport();
   const float margin = std::max(24 * scale, (view->Size.x - 1100 * scale) / 2);
   const float top = std::max(12 * scale, (view->Size.y - 620 * scale) / 3);
@@ -103,19 +105,19 @@ std::optional<FirstRunChoice> draw_page(const LiveWindow& window, Page& page) {
   ImGui::Begin("first run", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                    ImGuiWindowFlags_NoBackground | ImGuiWindowFlags_NoScrollWithMouse);
-  write_wrapped(kPageText, "Birdseye needs a little more to begin.");
-  write_wrapped(kPageQuiet, page.lacking);
+  say(theme.text, words("first_more"));
+  say(theme.quiet, page.lacking);
   ImGui::Dummy(ImVec2(0, 4 * scale));
   ImGui::Separator();
   const float room = ImGui::GetContentRegionAvail().y - page.foot_high;
   ImGui::BeginChild("rows", ImVec2(0, std::max(40 * scale, std::min(page.rows_high, room))));
   ImGui::Dummy(ImVec2(0, 8 * scale));
-  if (page.checks.empty()) write_wrapped(kPageQuiet, "This machine is asked what it has ...");
-  draw_rows(page.checks, scale);
+  if (page.checks.empty()) say(theme.quiet, words("first_asking"));
+  draw_rows(page.checks, theme, scale);
   page.rows_high = ImGui::GetCursorPosY();
   ImGui::EndChild();
   const float above = ImGui::GetCursorPosY();
-  const auto asked = draw_foot(scale);
+  const auto asked = draw_foot(theme, scale);
   page.foot_high = ImGui::GetCursorPosY() - above;
   ImGui::End();
   return asked;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/doctor/display.hpp"
 #include "host/texts/texts.hpp"
 #include "host/window/glfw_window.hpp"
 
@@ -21,13 +22,11 @@ namespace birdseye::host {
 
 namespace {
 
-// Readable from the other side of the table; Dear ImGui's own is the fallback.
-constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
-constexpr float kFontPx = 16;
+constexpr float kFontPx = 16;  // readable from the other side of the table
 
 void use_font(float scale) {
   ImGuiIO& io = ImGui::GetIO();
-  if (std::filesystem::exists(kFont)) {
+  if (std::filesystem::exists(kWindowFont)) {
     // Of all letters that the texts and the signs have, and patients' names in Europe; ImGui keeps the pointer.
     static ImVector<ImWchar> ranges;
     ranges.clear();
@@ -39,7 +38,7 @@ void use_font(float scale) {
     glyphs.AddText(language_text().c_str());
     for (const char* sign : {kGoodSign, kWarnSign, kBadSign}) glyphs.AddText(sign);
     glyphs.BuildRanges(&ranges);
-    io.Fonts->AddFontFromFileTTF(kFont, std::round(kFontPx * scale), nullptr, ranges.Data);
+    io.Fonts->AddFontFromFileTTF(kWindowFont, std::round(kFontPx * scale), nullptr, ranges.Data);
   } else {
     io.FontGlobalScale = scale;
   }

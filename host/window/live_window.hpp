@@ -61,6 +61,7 @@ class LiveWindow final : public GlContext {
   [[nodiscard]] std::uintptr_t picture(Slot slot) const { return textures_[static_cast<std::size_t>(slot)].name; }
   /// The colours of its panels, from the next frame on.
   void set_room(Room room);
+  [[nodiscard]] Room room() const { return room_; }
   /// Of text and panels, against a screen of usual density.
   [[nodiscard]] float scale() const { return scale_; }
   /// What end_frame() drew, before swap(): RGB, rows from the top.
