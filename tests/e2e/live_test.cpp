@@ -30,10 +30,11 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
                                      "wait fiducials 60\nshot " + out + "/registered.png\n" +
                                      "press space 1.4 views 60\nkey enter\nkey space\nwait deform 180\nshot " + out +
                                      "/deformed.png\nkey enter\nkey space\nwait run 2\nsleep 6\n" + several + "end\n");
-  const auto result = run("birdseye",
-                          "live --simulate --seed 3 --deformation-mm 10 --look-s 240 --out " + out + " --script " +
-                              script + " --json " + (scratch / "live.json").string(),
-                          display.env());
+  const auto result =
+      run("birdseye",
+          "live --simulate --seed 3 --deformation-mm 10 --look-s 240 --margins 5,10 --outlines --hole 0.4 --out " +
+              out + " --script " + script + " --json " + (scratch / "live.json").string(),
+          display.env());
   ASSERT_EQ(result.code, 0) << result.output;
   const nlohmann::json json = read_json(scratch / "live.json");
   EXPECT_NE(json["verdict"], "fail") << json;

@@ -6,6 +6,9 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "host/overlay/margins.hpp"
+#include "host/render/scene/transfer_function.hpp"
+
 namespace birdseye::host {
 namespace {
 
@@ -54,6 +57,33 @@ TEST(Theme, GoodWarnAndBadAreToldApartByEveryEye) {
       EXPECT_GT(apart(theme.good, theme.warn), kApart) << static_cast<int>(room);
       EXPECT_GT(apart(theme.good, theme.bad), kApart) << static_cast<int>(room);
       EXPECT_GT(apart(theme.warn, theme.bad), kApart) << static_cast<int>(room);
+    }
+  }
+}
+
+TEST(Theme, WhatTheOverlayShowsIsToldApartByEveryEye) {
+  const auto transfer = load_transfer_function("tumour-and-vessels");
+  ASSERT_TRUE(transfer);
+  const auto colour_at = [&transfer](int hu) {
+    const TransferFunction::Entry& entry = transfer->at(hu);
+    return Eigen::Vector3f(entry.r, entry.g, entry.b);
+  };
+  // Hepatic veins, portal veins, tumour, and the liver's own red beneath them.
+  const Eigen::Vector3f veins = colour_at(160), portal = colour_at(220), tumour = colour_at(350),
+                        liver(0.6F, 0.25F, 0.2F);
+  for (const Eigen::Matrix3d& eye : eyes()) {
+    const auto apart = [&eye](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+      return (lab_of(eye * linear_of(a)) - lab_of(eye * linear_of(b))).norm();
+    };
+    for (const Eigen::Vector3f& vessel : {veins, portal}) {
+      EXPECT_GT(apart(tumour, vessel), 20);
+      EXPECT_GT(apart(vessel, liver), 20);
+    }
+    EXPECT_GT(apart(tumour, liver), 20);
+    for (std::size_t a = 0; a < kMostMargins; ++a) {
+      EXPECT_GT(apart(margin_colour(a).cast<float>(), liver), 20) << a;
+      for (std::size_t b = 0; b < a; ++b)
+        EXPECT_GT(apart(margin_colour(a).cast<float>(), margin_colour(b).cast<float>()), 15) << a << " " << b;
     }
   }
 }
