@@ -13,6 +13,7 @@
 #include "host/files/write_files.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
+#include "host/volume/mask_folder.hpp"
 #include "host/volume/series_list.hpp"
 
 namespace birdseye::host {
@@ -147,6 +148,11 @@ Result<void> volume_info(const InfoOptions& options) {
   nlohmann::json json;
   if (holds_dicom(options.source.path)) {
     const auto list = list_series(options.source);
+    if (!list && list.error().code == Errc::not_found && is_mask_folder(options.source.path)) {
+      fmt::print("segmentation of one mask a file\n");
+      print_labels(mask_names(options.source.path), json);
+      return write_file(options.json, text_of(json));
+    }
     if (!list) return list.error();
     const SeriesInfo& first = list->series.front();
     // Of a single series that is no volume the error says all.

@@ -133,10 +133,10 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   if (!table.has("label")) return {};
   const auto label = table.path("label");
   if (!label) return label.error();
-  auto labels = import_named_labels(*label, out.ct);
-  if (!labels) return labels.error();
   const auto wanted = read_labels_wanted(table);
   if (!wanted) return wanted.error();
+  auto labels = import_named_labels(*label, out.ct, *wanted);
+  if (!labels) return labels.error();
   const auto values = values_of_labels(labels->names, *wanted);
   if (!values) return values.error().with_context(label->string());
   out.labels = std::move(labels->volume);

@@ -10,6 +10,7 @@
 
 #include "host/dicom/dicom_dataset.hpp"
 #include "host/dicom/refused.hpp"
+#include "host/dicom/shared_values.hpp"
 
 namespace birdseye::host {
 
@@ -17,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kHighestValue = std::numeric_limits<std::int16_t>::max();
 constexpr std::size_t kMostLabelVoxels = std::size_t{1} << 31U;
 
 /// Where a frame lies, and which segment it shows; 0: its pixels say.
@@ -42,47 +42,6 @@ struct LabelPixels {
     if (bits == 8) return bytes[i];
     return bytes[2 * i] | bytes[2 * i + 1] << 8;
   }
-};
-
-/// Gives voxels that belong to several segments values of their own.
-class SharedValues {
- public:
-  explicit SharedValues(int highest_number) : next_(highest_number + 1) {}
-
-  /// The value of a voxel that had `had` and is of a further segment; empty where there are too many.
-  std::optional<int> with(int had, int segment) {
-    if (had == 0) return segment;
-    const auto known = values_.find({had, segment});
-    if (known != values_.end()) return known->second;
-    std::vector<int> both = segments_of(had);
-    if (std::binary_search(both.begin(), both.end(), segment)) return values_[{had, segment}] = had;
-    both.insert(std::upper_bound(both.begin(), both.end(), segment), segment);
-    for (const auto& [value, segments] : shared_) {
-      if (segments == both) return values_[{had, segment}] = value;
-    }
-    if (next_ > kHighestValue) return std::nullopt;
-    shared_[next_] = both;
-    return values_[{had, segment}] = next_++;
-  }
-
-  /// The values of voxels of this segment beside its number.
-  [[nodiscard]] std::vector<int> shared_by(int segment) const {
-    std::vector<int> values;
-    for (const auto& [value, segments] : shared_) {
-      if (std::binary_search(segments.begin(), segments.end(), segment)) values.push_back(value);
-    }
-    return values;
-  }
-
- private:
-  [[nodiscard]] std::vector<int> segments_of(int value) const {
-    const auto shared = shared_.find(value);
-    return shared == shared_.end() ? std::vector<int>{value} : shared->second;
-  }
-
-  int next_;
-  std::map<std::pair<int, int>, int> values_;
-  std::map<int, std::vector<int>> shared_;
 };
 
 std::vector<NamedLabel> read_names(DcmDataset& dataset) {
@@ -139,7 +98,7 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     const auto place = elements.numbers(DCM_ImagePositionPatient);
     if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
     const auto number = elements.numbers(DCM_ReferencedSegmentNumber);
-    if (!by_pixels && (number.size() != 1 || number[0] < 1 || number[0] > kHighestValue))
+    if (!by_pixels && (number.size() != 1 || number[0] < 1 || number[0] > kHighestLabel))
       return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
     if (frames.empty()) {
       axes = elements.numbers(DCM_ImageOrientationPatient);
@@ -215,7 +174,7 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
   int highest = 0;
   for (const NamedLabel& label : out.names) highest = std::max(highest, label.number);
   for (const LabelFrame& frame : frames) highest = std::max(highest, frame.segment);
-  if (highest > kHighestValue) return "numbers its segments too high; export it again";
+  if (highest > kHighestLabel) return "numbers its segments too high; export it again";
   SharedValues values(highest);
   const std::size_t plane = pixels.per_frame();
   out.labels.assign(plane * static_cast<std::size_t>(out.size[2]), 0);
@@ -225,7 +184,7 @@ std::string lay_frames(const std::vector<LabelFrame>& frames, const std::vector<
       const int pixel = pixels.at(f * plane + i);
       if (pixel < pixels.at_least) continue;
       const auto value = values.with(slice[i], frames[f].segment == 0 ? pixel : frames[f].segment);
-      if (!value || *value > kHighestValue) return "has too many segments that share voxels; export fewer of them";
+      if (!value || *value > kHighestLabel) return "has too many segments that share voxels; export fewer of them";
       slice[i] = static_cast<std::int16_t>(*value);
     }
   }

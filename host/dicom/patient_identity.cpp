@@ -30,9 +30,8 @@ std::string person_name(const std::string& dicom_name) {
 
 std::string dashed_date(const std::string& dicom_date) {
   constexpr std::size_t kDigits = 8;
-  const bool sound = dicom_date.size() >= kDigits &&
-                     std::all_of(dicom_date.begin(), dicom_date.begin() + kDigits,
-                                 [](unsigned char c) { return c >= '0' && c <= '9'; });
+  const bool sound = dicom_date.size() >= kDigits && std::all_of(dicom_date.begin(), dicom_date.begin() + kDigits,
+                                                                 [](unsigned char c) { return c >= '0' && c <= '9'; });
   if (!sound) return {};
   return fmt::format("{}-{}-{}", dicom_date.substr(0, 4), dicom_date.substr(4, 2), dicom_date.substr(6, 2));
 }

@@ -17,7 +17,7 @@ Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice
   ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};
   if (choice.labels.empty()) return shown;
   const std::string file = choice.labels.string();
-  const auto labels = import_named_labels(choice.labels, shown.volume);
+  const auto labels = import_named_labels(choice.labels, shown.volume, all_of({choice.keep, choice.margin_of}));
   if (!labels) return labels.error();
   if (!choice.margins_mm.empty()) {
     const auto values = values_of_labels(labels->names, choice.margin_of, &shown.notes);

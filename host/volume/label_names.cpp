@@ -45,10 +45,21 @@ std::string some_of(const std::vector<NamedLabel>& names) {
 
 }  // namespace
 
+std::vector<LabelChoice> all_of(std::initializer_list<std::vector<LabelChoice>> choices) {
+  std::vector<LabelChoice> all;
+  for (const auto& some : choices) all.insert(all.end(), some.begin(), some.end());
+  return all;
+}
+
 std::string joined(std::span<const LabelChoice> labels, std::string_view between) {
   std::string words;
   for (const LabelChoice& label : labels) words += fmt::format("{}{}", words.empty() ? "" : between, label.text);
   return words;
+}
+
+bool is_chosen(const LabelChoice& choice, const NamedLabel& label) {
+  const auto number = number_in(choice.text);
+  return number ? label.number == *number : plain_name(label.name) == plain_name(choice.text);
 }
 
 Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, std::span<const LabelChoice> wanted,
@@ -61,7 +72,7 @@ Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, 
     const auto number = number_in(one);
     bool found = false;
     for (const NamedLabel& label : number ? names : known) {
-      if (number ? label.number != *number : plain_name(label.name) != plain_name(one)) continue;
+      if (!is_chosen({one}, label)) continue;
       values.insert(values.end(), label.values.begin(), label.values.end());
       found = true;
     }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <string_view>
@@ -21,8 +22,14 @@ struct LabelChoice {
   LabelChoice() = default;
 };
 
+/// Several choices as one.
+std::vector<LabelChoice> all_of(std::initializer_list<std::vector<LabelChoice>> choices);
 /// "1, liver".
 std::string joined(std::span<const LabelChoice> labels, std::string_view between = ", ");
+
+/// Whether it is asked for by that: its number, or its name, of which capitals count as small letters, blanks and
+/// hyphens as underscores.
+bool is_chosen(const LabelChoice& choice, const NamedLabel& label);
 
 /// The values of the voxels that belong to one of these. Of names, capitals count as small
 /// letters, blanks and hyphens as underscores. Where a segmentation names none of its labels, names are those of

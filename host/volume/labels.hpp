@@ -7,22 +7,18 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
-#include "host/dicom/dicom_labels.hpp"
+#include "host/volume/label_names.hpp"
+#include "host/volume/label_volume.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
-/// A segmentation on the grid of a CT.
-struct LabelVolume {
-  Volume volume;                  ///< a value a voxel, 0 where nothing is
-  std::vector<NamedLabel> names;  ///< of its labels; without names where its file gives none
-};
-
-/// Reads a DICOM segmentation (the file, or a folder that holds one), or a label volume of any format that
-/// import_volume reads, and stops as it does. Its voxels must be the CT's, though it may have fewer of them, and its
+/// Reads a DICOM segmentation (the file, or a folder that holds one), a label volume of any format that import_volume
+/// reads, or a folder of masks (is_mask_folder), of which only those that are wanted, where any are; stops as
+/// import_volume does. Its voxels must be the CT's, though it may have fewer of them, and its
 /// axes another order or direction; an error where they are not, or where it lies outside of the CT.
 Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const Volume& ct,
-                                        const std::stop_token& stop = {});
+                                        std::span<const LabelChoice> wanted = {}, const std::stop_token& stop = {});
 /// Without the names.
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct, const std::stop_token& stop = {});
 

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <random>
 #include <set>
 
 #include "host/volume/import.hpp"
 #include "host/volume/label_names.hpp"
 #include "host/volume/labels.hpp"
+#include "host/volume/segmentation.hpp"
 #include "tests/support/dicom_files.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -313,6 +315,74 @@ TEST(LabelNames, OfANiftiFileAreItsOwnBeforeAnybodyElses) {
     ASSERT_TRUE(labels) << labels.error().what;
     EXPECT_TRUE(labels->names.empty()) << odd;
   }
+}
+
+/// A folder of one mask a file, as TotalSegmentator writes it, of a small CT.
+class MaskFolder : public ::testing::Test {
+ protected:
+  MaskFolder() {
+    ct_.size = {6, 5, 4};
+    ct_.spacing_mm = {0.7, 0.7, 1.5};
+    ct_.patient_from_voxel = Eigen::Translation3d(-20, 10, 5) * Eigen::Scaling(0.7, 0.7, 1.5);
+    ct_.hu.assign(grid_count(ct_.size), 40);
+    mask("liver", [](int i, int, int) { return i < 4; });
+    mask("my_tumour", [](int i, int j, int) { return i == 3 && j == 2; });
+    mask("portal_vein_and_splenic_vein", [](int i, int j, int) { return i == 5 && j < 2; });
+    (void)scratch_.file("masks/report.json", "{}");
+  }
+  void mask(const std::string& name, const std::function<bool(int, int, int)>& inside) {
+    Volume out = ct_;
+    for (int k = 0; k < out.size[2]; ++k) {
+      for (int j = 0; j < out.size[1]; ++j) {
+        for (int i = 0; i < out.size[0]; ++i) out.hu[out.index(i, j, k)] = inside(i, j, k) ? 1 : 0;
+      }
+    }
+    fs::create_directories(folder_);
+    ASSERT_TRUE(write_labels(folder_ / (name + ".nii.gz"), out));
+  }
+  /// How many voxels have a structure.
+  static std::ptrdiff_t count(const LabelVolume& labels, const char* name) {
+    const auto values = values_of_labels(labels.names, std::vector<LabelChoice>{name});
+    EXPECT_TRUE(values) << values.error().what;
+    return std::count_if(labels.volume.hu.begin(), labels.volume.hu.end(), [&](std::int16_t value) {
+      return std::find(values->begin(), values->end(), value) != values->end();
+    });
+  }
+  Scratch scratch_;
+  fs::path folder_ = scratch_ / "masks";
+  Volume ct_;
+};
+
+TEST_F(MaskFolder, IsASegmentationWithTheFilesNames) {
+  const auto labels = import_named_labels(folder_, ct_);
+  ASSERT_TRUE(labels) << labels.error().what;
+  EXPECT_EQ(count(*labels, "liver"), 4 * 5 * 4);
+  EXPECT_EQ(count(*labels, "My tumour"), 4) << "which is within the liver";
+  EXPECT_EQ(count(*labels, "portal_vein_and_splenic_vein"), 2 * 4);
+  EXPECT_EQ(count(*labels, "5"), 4 * 5 * 4) << "the liver's number";
+  const auto none = values_of_labels(labels->names, std::vector<LabelChoice>{"spleen"});
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().what.find("liver, my_tumour, portal"), std::string::npos) << none.error().what;
+}
+
+TEST_F(MaskFolder, OnlyWhatIsWantedIsRead) {
+  (void)scratch_.file("masks/spleen.nii.gz", "damaged");
+  const auto liver = import_named_labels(folder_, ct_, std::vector<LabelChoice>{"liver", "201"});
+  ASSERT_TRUE(liver) << liver.error().what;
+  EXPECT_EQ(count(*liver, "liver"), 4 * 5 * 4);
+  EXPECT_EQ(count(*liver, "my_tumour"), 4) << "the first that TotalSegmentator does not know";
+  EXPECT_EQ(count(*liver, "portal_vein_and_splenic_vein"), 0);
+  const auto all = import_named_labels(folder_, ct_);
+  ASSERT_FALSE(all);
+  EXPECT_NE(all.error().what.find("spleen.nii.gz"), std::string::npos) << all.error().what;
+}
+
+TEST_F(MaskFolder, OfAnotherCtIsRefusedByTheFilesName) {
+  ct_.spacing_mm.x() = 0.9;
+  ct_.patient_from_voxel = Eigen::Translation3d(-20, 10, 5) * Eigen::Scaling(0.9, 0.7, 1.5);
+  const auto labels = import_named_labels(folder_, ct_);
+  ASSERT_FALSE(labels);
+  EXPECT_NE(labels.error().what.find("liver.nii.gz: is not on the grid"), std::string::npos) << labels.error().what;
 }
 
 }  // namespace

@@ -1,0 +1,78 @@
+#include "host/volume/label_grid.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <optional>
+
+namespace birdseye::host {
+
+namespace {
+
+/// Which voxel of the CT the labels' first is, and which way its neighbours along each of the labels' axes lie.
+struct VoxelWay {
+  Eigen::Vector3i first;
+  Eigen::Matrix3i steps;  ///< columns: a unit step along an axis of the CT, there or back
+};
+
+/// Empty where the voxels of the labels are not voxels of the CT.
+std::optional<VoxelWay> way_into(const Volume& ct, const ImageFile& labels) {
+  Eigen::Affine3d patient_from_label = Eigen::Affine3d::Identity();
+  patient_from_label.linear() = labels.axes * labels.spacing_mm.asDiagonal();
+  patient_from_label.translation() = labels.origin_mm;
+  const Eigen::Affine3d ct_from_label = ct.patient_from_voxel.inverse() * patient_from_label;
+  VoxelWay way;
+  way.steps = ct_from_label.linear().array().round().cast<int>();
+  way.first = ct_from_label.translation().array().round().cast<int>();
+  if ((way.steps.cast<double>() * way.steps.cast<double>().transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-9)
+    return std::nullopt;
+  // Corners, not matrices: what matters is where the voxels lie, however far from the origin the patient is.
+  const double allowed_mm = 0.2 * ct.spacing_mm.minCoeff();
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3i voxel((corner & 1) != 0 ? labels.size[0] - 1 : 0, (corner & 2) != 0 ? labels.size[1] - 1 : 0,
+                                (corner & 4) != 0 ? labels.size[2] - 1 : 0);
+    const Eigen::Vector3d there = ct.patient_from_voxel * (way.first + way.steps * voxel).cast<double>();
+    if ((patient_from_label * voxel.cast<double>() - there).norm() > allowed_mm) return std::nullopt;
+  }
+  return way;
+}
+
+/// On the CT's grid; empty where no voxel of the CT has a label and some outside of it have.
+std::optional<Volume> laid_into(const Volume& ct, const ImageFile& labels, const VoxelWay& way) {
+  Volume out;
+  out.size = ct.size;
+  out.spacing_mm = ct.spacing_mm;
+  out.patient_from_voxel = ct.patient_from_voxel;
+  out.hu.assign(grid_count(ct.size), 0);
+  bool inside = false, outside = false;
+  const std::int16_t* label = labels.hu.data();
+  for (int k = 0; k < labels.size[2]; ++k) {
+    for (int j = 0; j < labels.size[1]; ++j) {
+      for (int i = 0; i < labels.size[0]; ++i, ++label) {
+        if (*label == 0) continue;
+        const Eigen::Vector3i at = way.first + way.steps * Eigen::Vector3i(i, j, k);
+        const bool in = (at.array() >= 0).all() && at.x() < ct.size[0] && at.y() < ct.size[1] && at.z() < ct.size[2];
+        (in ? inside : outside) = true;
+        if (in) out.hu[out.index(at.x(), at.y(), at.z())] = *label;
+      }
+    }
+  }
+  if (outside && !inside) return std::nullopt;
+  return out;
+}
+
+}  // namespace
+
+Result<Volume> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path) {
+  const auto way = way_into(ct, labels);
+  if (!way) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: is not on the grid of the CT; resample the labels to it", path.string())};
+  }
+  auto volume = laid_into(ct, labels, *way);
+  if (!volume)
+    return Error{Errc::bad_value, fmt::format("{}: lies outside of the CT; is it of this CT?", path.string())};
+  return *std::move(volume);
+}
+
+}  // namespace birdseye::host
