@@ -37,11 +37,12 @@ struct CameraInput {
   std::vector<PatternView> views;
   std::vector<RejectedView> rejected;  ///< pictures without a view
   int width_px = 0, height_px = 0;
-  std::string note;  ///< how the pattern was read, where otherwise than told
+  std::string note;             ///< how the pattern was read, where otherwise than told
+  std::vector<fs::path> files;  ///< the pictures, for the report
 };
 
 CameraInput input_of_views(PictureViews views) {
-  CameraInput out{std::move(views.used), {}, views.width_px, views.height_px, views.note};
+  CameraInput out{std::move(views.used), {}, views.width_px, views.height_px, views.note, std::move(views.files)};
   for (const auto& [name, reason] : views.rejected) out.rejected.push_back({0, name, reason});
   return out;
 }
@@ -123,7 +124,7 @@ void calibrate_one(const CameraOptions& options, const CameraCalibrationSettings
   if (!found) return status.refuse(found.error());
   add_rejected(input, *found);
   HtmlPage page("Camera calibration");
-  add_camera_to(page, *found);
+  add_camera_to(page, *found, input.files);
   Verdict verdict = judge_camera(*found);
   tell_note(input, verdict);
   finish_with(options, *found, camera_json(*found), std::move(page), verdict, status);
@@ -165,8 +166,8 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
               {"rms of the joint fit, px", fmt::format("{:.3f}", found->rms_px)},
               {"held out, px", fmt::format("{:.3f}", found->held_out_px)},
               {"from the epipolar lines, rms px", fmt::format("{:.3f}", found->epipolar_rms_px)}});
-  add_camera_to(page, found->left, "left camera: ");
-  add_camera_to(page, found->right, "right camera: ");
+  add_camera_to(page, found->left, left.files, "left camera: ");
+  add_camera_to(page, found->right, right.files, "right camera: ");
   nlohmann::json json = camera_json(found->left);
   json["right"] = camera_json(found->right);
   json["stereo"] = stereo_json(*found);

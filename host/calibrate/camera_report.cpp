@@ -2,10 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "calibration/base/units.hpp"
+#include "host/calibrate/lens_picture.hpp"
+#include "host/calibrate/picture_views.hpp"
 #include "host/calibrate/residual_picture.hpp"
+#include "host/calibrate/station_picture.hpp"
 #include "host/report/bar_chart.hpp"
 #include "host/report/line_plot.hpp"
 
@@ -79,6 +84,43 @@ void add_views(HtmlPage& page, const CameraCalibration& c, const std::string& wh
   page.svg(bars_svg(bars, "held-out error, px (red: half as much again as the mean)"),
            "Each view with the lens of the others: only its pose is its own.");
   page.table(rows);
+}
+
+/// Each point of a view over its picture, where that can still be read.
+void add_view_picture(HtmlPage& page, const CameraCalibration& c, std::size_t view, const std::string& what,
+                      const std::vector<std::filesystem::path>& files) {
+  std::vector<PixelResidual> residuals;
+  for (const FittedPoint& p : c.points) {
+    if (p.view == view) residuals.push_back({p.pixel_px, p.residual_px, p.outlier});
+  }
+  const std::string& name = c.views[view].name;
+  page.svg(
+      residual_picture_svg(residuals, c.camera.width_px, c.camera.height_px, 0, picture_of_view(files, name)),
+      fmt::format("{}, {}: {:.2f} px held out. At each corner an arrow, from where the lens puts it towards where it "
+                  "was seen.",
+                  what, name, c.views[view].held_out_px));
+}
+
+/// The worst view and the one in the middle.
+void add_view_pictures(HtmlPage& page, const CameraCalibration& c, const std::string& which,
+                       const std::vector<std::filesystem::path>& files) {
+  if (c.views.empty()) return;
+  std::vector<std::size_t> order(c.views.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return c.views[a].held_out_px > c.views[b].held_out_px; });
+  page.heading(which + "what it leaves in single views");
+  add_view_picture(page, c, order.front(), "The view that fits worst", files);
+  if (order.size() > 2) add_view_picture(page, c, order[order.size() / 2], "A view of the middle", files);
+}
+
+void add_places(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
+  std::vector<StationMark> marks;
+  for (const auto& camera_from_marker : c.camera_from_marker) marks.push_back({camera_from_marker});
+  page.heading(which + "where the board was looked at from");
+  page.svg(station_picture_svg(marks),
+           "Tilted boards tell focal length from distance: marks should lie all round, out to 30 degrees and more, and "
+           "ticks point different ways.");
 }
 
 void add_regions_to(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
@@ -171,7 +213,8 @@ nlohmann::json stereo_json(const StereoCalibration& c) {
           {"pairs_rejected", rejected_json(c.rejected)}};
 }
 
-void add_camera_to(HtmlPage& page, const CameraCalibration& c, const std::string& which) {
+void add_camera_to(HtmlPage& page, const CameraCalibration& c, const std::vector<std::filesystem::path>& files,
+                   const std::string& which) {
   page.paragraph(
       fmt::format("{}{} of {} points in {} views fitted to {:.3f} px rms; views that were held out to {:.3f} "
                   "px, which is {:.3f} mm at the boards' mean distance of {:.0f} mm.",
@@ -189,6 +232,10 @@ void add_camera_to(HtmlPage& page, const CameraCalibration& c, const std::string
   page.heading(which + "coverage");
   page.svg(coverage_picture_svg(points, c.camera.width_px, c.camera.height_px, c.columns, c.rows),
            "Points in each cell of the picture. Where there are none, the distortion is a guess.");
+  page.heading(which + "what the lens does");
+  page.svg(lens_picture_svg(c.camera), "Straight lines of the world, evenly spaced, as this lens shows them.");
+  add_places(page, c, which);
+  add_view_pictures(page, c, which, files);
   add_tables(page, c, which);
   add_views(page, c, which);
   add_regions_to(page, c, which);

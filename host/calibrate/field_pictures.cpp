@@ -96,7 +96,7 @@ std::string chart(const std::vector<FieldCheck>& history, double FieldCheck::*va
            svg_text(right + 6, axes.y_of(v) + 4, fmt::format("{} {:.2f}", name, v), Anchor::start, colour);
   };
   if (limits.days > 0) {
-    level(limits.mean, kGreen, "", "mean");
+    level(limits.mean, kInk, "", "mean");
     level(limits.mean + 3 * limits.sigma, kRed, kDashed, "+3 sigma");
     if (either_way) level(limits.mean - 3 * limits.sigma, kRed, kDashed, "-3 sigma");
     const double learned = axes.x_of(limits.days + 0.5);

@@ -33,6 +33,7 @@ struct HandEyeRecording {
   calibration::HandEyeInput input;
   std::vector<std::string> notes;
   std::vector<std::string> pictures;                   ///< names of all that were read, used or not
+  std::vector<std::filesystem::path> picture_files;    ///< theirs, for the report; none of points found before
   std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images; of a stereo scope, the left
   Verdict camera_verdict;                              ///< on that
   double stream_offset_s =

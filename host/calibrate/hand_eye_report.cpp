@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "host/calibrate/camera_report.hpp"
+#include "host/calibrate/picture_views.hpp"
 #include "host/calibrate/residual_picture.hpp"
 #include "host/calibrate/station_picture.hpp"
 #include "host/report/bar_chart.hpp"
@@ -118,13 +120,13 @@ json solution_json(const HandEyeResult& r) {
 }
 
 void add_station_table(const HandEyeResult& r, HtmlPage& page) {
-  std::vector<std::vector<std::string>> rows{{"station", "held out, mm", "turn off, deg", "shift off, mm"}};
+  std::vector<std::vector<std::string>> rows{{"number", "station", "held out, mm", "turn off, deg", "shift off, mm"}};
   if (has_pictures(r))
-    rows.front() = {"station",      "corners, px",   "tracked, px",  "held out, px",
-                    "held out, mm", "turn off, deg", "shift off, mm"};
+    rows.front() = {"number",       "station",      "corners, px",   "tracked, px",
+                    "held out, px", "held out, mm", "turn off, deg", "shift off, mm"};
   rows.front().emplace_back("");
   for (const HandEyeStationFit& s : r.stations) {
-    std::vector<std::string>& row = rows.emplace_back(1, s.name);
+    std::vector<std::string> row{std::to_string(rows.size()), s.name};
     if (!s.why_not.starts_with("rejected")) {
       std::vector<double> figures{s.held_out_mm, s.turn_off_deg, s.shift_off_mm};
       if (has_pictures(r)) figures.insert(figures.begin(), {s.view_rms_px, s.tracked_px, s.held_out_px});
@@ -132,30 +134,120 @@ void add_station_table(const HandEyeResult& r, HtmlPage& page) {
     }
     row.resize(rows.front().size());
     row.back() = s.why_not;
+    rows.push_back(std::move(row));
   }
   page.table(rows);
+}
+
+/// The station used at which an overlay would be off by most, over its picture.
+void add_worst_picture(const HandEyeResult& r, const HandEyeRecording& recording, HtmlPage& page) {
+  const HandEyeStationFit* worst = nullptr;
+  for (const HandEyeStationFit& s : r.stations) {
+    if (s.used && !s.seen_px.empty() && (worst == nullptr || s.held_out_px > worst->held_out_px)) worst = &s;
+  }
+  if (worst == nullptr) return;
+  std::vector<PixelResidual> residuals;
+  for (std::size_t i = 0; i < worst->seen_px.size(); ++i)
+    residuals.push_back({worst->seen_px[i], worst->seen_px[i] - worst->tracked_corner_px[i]});
+  const CameraModel& camera = *recording.input.camera;
+  page.svg(residual_picture_svg(residuals, camera.width_px, camera.height_px, 0,
+                                picture_of_view(recording.picture_files, worst->name)),
+           fmt::format("The station used that is off by most, {}: {:.1f} px. Each arrow is by how much an overlay "
+                       "would be off there.",
+                       worst->name, worst->held_out_px));
+}
+
+/// Of all points that were seen; the origin where poses took the place of pictures.
+Eigen::Vector3d board_middle_mm(const HandEyeRecording& recording) {
+  Eigen::Vector3d sum_mm = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const auto& station : recording.input.stations) {
+    for (const Eigen::Vector3d& point_mm : station.view.points_in_marker_mm) {
+      sum_mm += point_mm;
+      ++count;
+    }
+  }
+  return count > 0 ? Eigen::Vector3d(sum_mm / count) : sum_mm;
+}
+
+/// Where tracker and picture put a place of the board by one hand-eye, in the frame that the board rests in.
+Eigen::Vector3d tracked_place_mm(const calibration::HandEyeStation& station, const HandEyeStationFit& fit,
+                                 const Transform<Camera, Sensor>& camera_from_sensor,
+                                 const Eigen::Vector3d& in_marker_mm) {
+  const Eigen::Vector3d in_tracker_mm =
+      station.tracker_from_sensor * (camera_from_sensor.inverse() * (fit.camera_from_marker * in_marker_mm));
+  return station.tracker_from_body ? station.tracker_from_body->inverse() * in_tracker_mm : in_tracker_mm;
+}
+
+/// By how much, seen through the scope, each station's place of the board lies off the mean of them all.
+Curve scatter_of(const std::string& name, const HandEyeResult& r, const HandEyeRecording& recording,
+                 const Transform<Camera, Sensor>& camera_from_sensor) {
+  const Eigen::Vector3d middle_mm = board_middle_mm(recording);
+  std::vector<Eigen::Vector3d> places_mm;
+  Eigen::Vector3d mean_mm = Eigen::Vector3d::Zero();
+  double used = 0;
+  for (std::size_t i = 0; i < r.stations.size(); ++i) {
+    places_mm.push_back(tracked_place_mm(recording.input.stations[i], r.stations[i], camera_from_sensor, middle_mm));
+    if (!r.stations[i].used) continue;
+    mean_mm += places_mm.back();
+    ++used;
+  }
+  mean_mm /= std::max(used, 1.0);
+  Curve curve{name, {}};
+  for (std::size_t i = 0; i < r.stations.size(); ++i) {
+    if (!r.stations[i].used) continue;
+    const calibration::HandEyeStation& station = recording.input.stations[i];
+    const Eigen::Vector3d off_mm = places_mm[i] - mean_mm;
+    const Eigen::Matrix3d tracker_from_body =
+        station.tracker_from_body ? station.tracker_from_body->rotation() : Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d in_camera_mm =
+        camera_from_sensor.rotation() * station.tracker_from_sensor.rotation().transpose() * tracker_from_body * off_mm;
+    const Eigen::Vector3d sight = (r.stations[i].camera_from_marker * middle_mm).normalized();
+    curve.points.emplace_back(static_cast<double>(i + 1), (in_camera_mm - sight.dot(in_camera_mm) * sight).norm());
+  }
+  return curve;
+}
+
+/// Each station before and after the refinement.
+void add_before_after(const HandEyeResult& r, const HandEyeRecording& recording, HtmlPage& page) {
+  const auto start = std::ranges::find_if(
+      r.starts, [&](const HandEyeStart& one) { return one.failed.empty() && one.method == r.start; });
+  if (start == r.starts.end() || recording.input.stations.size() != r.stations.size()) return;
+  page.svg(plot_svg({{"The board's middle by the tracker, off its mean as the scope sees it",
+                      "station, in the order of the table",
+                      "distance, mm",
+                      {scatter_of("before: " + start->method, r, recording, start->camera_from_sensor),
+                       scatter_of("after refining", r, recording, r.camera_from_sensor)}}},
+                    1, {920, 280}),
+           "The board is at one place. By a wrong hand-eye the tracker puts it elsewhere at each station; what is left "
+           "after refining is the tracker's own error. Refining weighs all corners and turns, so that single stations "
+           "may come out farther off.");
 }
 
 void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, HtmlPage& page) {
   std::vector<StationMark> marks;
   std::vector<Bar> bars;
   std::vector<PixelResidual> residuals;
-  for (const HandEyeStationFit& s : r.stations) {
+  for (std::size_t n = 0; n < r.stations.size(); ++n) {
+    const HandEyeStationFit& s = r.stations[n];
     const bool odd = s.why_not.starts_with("outlier");
     if (!s.used && !odd) continue;
-    marks.push_back({s.camera_from_marker, odd});
+    marks.push_back({s.camera_from_marker, odd, std::to_string(n + 1)});
     bars.push_back({s.name, s.held_out_mm, odd ? kRed : kBlue});
     for (std::size_t i = 0; i < s.seen_px.size(); ++i)
       residuals.push_back({s.seen_px[i], s.seen_px[i] - s.tracked_corner_px[i], odd});
   }
   page.heading("Where the scope looked from");
-  page.svg(station_picture_svg(marks),
-           "Spread marks and ticks that point different ways determine hand-eye; marks on one spot or line do not.");
+  page.svg(
+      station_picture_svg(marks),
+      "Spread marks and ticks that point different ways determine hand-eye; marks on one spot or line do not. Red: "
+      "stations that were left out. Numbers are those of the table below.");
   page.heading("What overlay would be off by");
   if (!residuals.empty() && recording.input.camera)
     page.svg(residual_picture_svg(residuals, recording.input.camera->width_px, recording.input.camera->height_px),
              "Each corner, from where the tracker and the hand-eye of all the other stations put it to where it was "
              "seen. The arrows of one station point one way: that is the tracker's error at that moment.");
+  if (!residuals.empty() && recording.input.camera) add_worst_picture(r, recording, page);
   constexpr std::size_t kMostBars = 60;
   const char* const caption =
       "Each station, with the hand-eye of all the others; of a stream, of those outside its own block of time.";
@@ -168,7 +260,7 @@ void add_pictures(const HandEyeResult& r, const HandEyeRecording& recording, Htm
   page.svg(plot_svg({{"Held-out error at the board", "station", "error, mm", {curve}}}, 1, {920, 260}), caption);
 }
 
-void add_convergence(const HandEyeResult& r, HtmlPage& page) {
+void add_convergence(const HandEyeResult& r, const HandEyeRecording& recording, HtmlPage& page) {
   page.heading("How it was found");
   std::vector<std::vector<std::string>> rows{
       {"closed form", has_pictures(r) ? "tracked, px" : "tracked, mm", "from the answer, mm", "deg", ""}};
@@ -182,6 +274,7 @@ void add_convergence(const HandEyeResult& r, HtmlPage& page) {
                     fmt::format("{:.2f}", far.turn_deg), start.method == r.start ? "refined" : ""});
   }
   page.table(rows);
+  add_before_after(r, recording, page);
   Curve cost{"cost", {}};
   for (std::size_t i = 0; i < r.cost_trace.size(); ++i)
     cost.points.emplace_back(static_cast<double>(i), r.cost_trace[i]);
@@ -253,7 +346,7 @@ HtmlPage hand_eye_page(const HandEyeResult& r, const HandEyeRecording& recording
   }
   page.heading("Stations");
   add_station_table(r, page);
-  if (r.solved) add_convergence(r, page);
+  if (r.solved) add_convergence(r, recording, page);
   for (const std::string& note : recording.notes) page.paragraph(note);
   return page;
 }

@@ -16,6 +16,7 @@
 #include "host/files/name_pattern.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/point_files.hpp"
+#include "host/report/html_page.hpp"
 
 namespace birdseye::host {
 
@@ -137,6 +138,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
   if (!pictures) return pictures.error();
   std::vector<Looked> looked = look_at_all(pattern, *pictures, pixel_aspect);
   PictureViews views;
+  views.files = *pictures;
   if (has_other_layout(looked)) {
     calibration::Pattern other = pattern;
     other.legacy = !pattern.legacy;
@@ -175,7 +177,16 @@ Result<PictureViews> read_found_views(const fs::path& folder, const std::string&
   if (!views) return views.error();
   const auto px = size.empty() ? size_beside(folder) : size_of(size);
   if (!px) return px.error();
-  return PictureViews{*std::move(views), {}, px->x(), px->y(), {}};
+  return PictureViews{*std::move(views), {}, px->x(), px->y(), {}, {}};
+}
+
+std::string picture_of_view(const std::vector<fs::path>& files, const std::string& view) {
+  constexpr double kWide_px = 760;
+  const auto of_view = [&](const fs::path& file) { return file.filename() == view; };
+  if (std::ranges::count_if(files, of_view) != 1) return {};
+  const auto picture = read_picture(*std::ranges::find_if(files, of_view));
+  if (!picture) return {};
+  return data_url(tile({&*picture, 1}, 1, std::min(1.0, kWide_px / picture->width_px)));
 }
 
 Result<double> parse_pixel_aspect(const std::string& text) {

@@ -18,7 +18,12 @@ struct PictureViews {
   std::vector<Rejected> rejected;
   int width_px = 0, height_px = 0;
   std::string note;  ///< that the pattern was read otherwise than it was told; empty where it was not
+  std::vector<std::filesystem::path> files;  ///< of all pictures, for reports; empty where points were found before
 };
+
+/// The picture of a view, made small enough for a page, as data_url() gives it; empty where no file or more than one
+/// has the view's name, or it cannot be read any more.
+std::string picture_of_view(const std::vector<std::filesystem::path>& files, const std::string& view);
 
 /// Finds the pattern in each picture (PNG, JPEG, BMP, TIFF, PPM, PGM), on all cores. A folder stands for all pictures
 /// in it, and a path whose last part holds * or ? for all that match. A picture that cannot be read is rejected by

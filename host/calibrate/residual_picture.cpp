@@ -29,23 +29,10 @@ double magnification_for(std::span<const PixelResidual> residuals, double units_
   return round_down(kReadable / units_per_px / std::max(*middle, kNothing_px));
 }
 
-std::string arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& by, const char* colour) {
-  const Eigen::Vector2d to = from + by;
-  const double length = by.norm();
-  std::string svg = fmt::format("<path d='M{:.1f} {:.1f}L{:.1f} {:.1f}", from.x(), from.y(), to.x(), to.y());
-  if (length > 2) {
-    const Eigen::Vector2d along = by / length * std::min(4.0, 0.4 * length);
-    const Eigen::Vector2d across(-0.5 * along.y(), 0.5 * along.x());
-    const Eigen::Vector2d left = to - along + across, right = to - along - across;
-    svg += fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}", left.x(), left.y(), to.x(), to.y(), right.x(),
-                       right.y());
-  }
-  return svg + fmt::format("' stroke='{}' fill='none'/>", colour);
-}
-
 }  // namespace
 
-std::string residual_picture_svg(std::span<const PixelResidual> residuals, int width_px, int height_px, double times) {
+std::string residual_picture_svg(std::span<const PixelResidual> residuals, int width_px, int height_px, double times,
+                                 const std::string& image) {
   constexpr std::size_t kMost = 3000;
   constexpr double kFoot = 26, kLongest = 60;
   const double scale = kWidth / std::max(width_px, 1);
@@ -53,8 +40,13 @@ std::string residual_picture_svg(std::span<const PixelResidual> residuals, int w
   if (!(times > 0)) times = magnification_for(residuals, scale);
   const std::size_t step = residuals.size() / kMost + 1;
   bool cut = false;
-  std::string svg = fmt::format("<rect x='0.5' y='0.5' width='{}' height='{:.1f}' fill='#f7f8fa' stroke='#999'/>",
-                                kWidth - 1, height - 1);
+  std::string svg = fmt::format(
+      "<svg width='{0}' height='{2:.1f}'>"  // which cuts off what would lie outside
+      "<rect x='0.5' y='0.5' width='{1}' height='{3:.1f}' fill='#f7f8fa' stroke='#999'/>",
+      kWidth, kWidth - 1, height, height - 1);
+  // Pale, so that arrows of every colour stand out.
+  if (!image.empty())
+    svg += fmt::format("<image href='{}' width='{}' height='{:.1f}' opacity='0.55'/>", image, kWidth, height);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const PixelResidual& r = residuals[i];
     if ((i % step != 0 && !r.outlier) || !r.pixel_px.allFinite() || !r.residual_px.allFinite()) continue;
@@ -64,8 +56,10 @@ std::string residual_picture_svg(std::span<const PixelResidual> residuals, int w
       drawn *= kLongest / drawn.norm();
       cut = true;
     }
-    svg += arrow(scale * (r.pixel_px + Eigen::Vector2d(0.5, 0.5)), drawn, r.outlier ? kRed : kBlue);
+    const Eigen::Vector2d from = scale * (r.pixel_px + Eigen::Vector2d(0.5, 0.5));
+    svg += svg_arrow(from.x(), from.y(), from.x() + drawn.x(), from.y() + drawn.y(), r.outlier ? kRed : kBlue);
   }
+  svg += "</svg>";
   const double sample_px = round_down(60 / scale / times);
   svg += fmt::format("<path d='M8 {0:.1f}h{1:.1f}m0 -3v6m{2:.1f} 0v-6' stroke='#222' fill='none'/>", height + 14,
                      sample_px * times * scale, -sample_px * times * scale);

@@ -9,6 +9,7 @@
 
 #include "calibration/base/units.hpp"
 #include "host/report/axes.hpp"
+#include "host/report/place_views.hpp"
 #include "host/report/svg.hpp"
 
 namespace birdseye::host {
@@ -35,7 +36,9 @@ std::string dot(double x, double y, bool used, bool beyond) {
 
 std::string tip_residuals_svg(const std::vector<PivotPose>& poses, const Pivot& pivot) {
   constexpr double kWidth = 960, kHeight = 280, kTop = 30;
-  const double most = std::max(1e-9, *std::max_element(pivot.residuals_mm.begin(), pivot.residuals_mm.end()));
+  constexpr double kShown = 8;  // times the root mean square
+  const double worst = std::max(1e-9, *std::max_element(pivot.residuals_mm.begin(), pivot.residuals_mm.end()));
+  const double most = std::min(worst, kShown * std::max(pivot.robust.rms_mm, 1e-9));
   const auto count = static_cast<double>(poses.size());
   const Axes axes({Axes::kLeft, kTop, kWidth - Axes::kLeft - 10, kHeight - kTop - Axes::kBelow},
                   {{0, count}, "pose, in the order in which they were recorded", 10},
@@ -45,7 +48,7 @@ std::string tip_residuals_svg(const std::vector<PivotPose>& poses, const Pivot& 
   const auto used = used_of(pivot);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double x = axes.x_of(static_cast<double>(i)), step = axes.x_of(1) - axes.x_of(0);
-    const double top = axes.y_of(pivot.residuals_mm[i]);
+    const double top = axes.y_of(std::min(pivot.residuals_mm[i], 1.05 * most));
     svg += fmt::format("<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' fill='{}'/>", x + 0.1 * step, top,
                        0.8 * step, bottom - top, used[i] ? kBlue : kRed);
     if (pivot.robust.pivots_in_tracker_mm.size() == 1 || (i > 0 && poses[i].divot == poses[i - 1].divot)) continue;
@@ -55,7 +58,8 @@ std::string tip_residuals_svg(const std::vector<PivotPose>& poses, const Pivot& 
   const double rms = axes.y_of(pivot.robust.rms_mm);
   svg += svg_line(axes.area().left, rms, axes.area().left + axes.area().width, rms, kInk, kDashed);
   svg += svg_text(axes.area().left, 14,
-                  fmt::format("dashed: root mean square of the poses used, {:.2f} mm", pivot.robust.rms_mm),
+                  fmt::format("dashed: root mean square of the poses used, {:.2f} mm{}", pivot.robust.rms_mm,
+                              most < worst ? fmt::format("; bars are cut above, the longest is {:.3g} mm", worst) : ""),
                   Anchor::start, kGrey);
   return svg_picture(kWidth, kHeight, svg);
 }
@@ -89,6 +93,22 @@ std::string tip_cloud_svg(const Pivot& pivot) {
     }
   }
   return svg_picture(3 * kPanel, kTop + kSide + Axes::kBelow, svg);
+}
+
+std::string tip_places_svg(const std::vector<PivotPose>& poses, const Pivot& pivot) {
+  constexpr std::size_t kMost = 600;
+  PlaceViews views;
+  const auto used = used_of(pivot);
+  const std::size_t step = poses.size() / kMost + 1;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (i % step != 0 && used[i]) continue;
+    views.marks.push_back(
+        {poses[i].tracker_from_sensor.translation() - pivot.robust.pivots_in_tracker_mm[poses[i].divot],
+         Eigen::Vector3d::Zero(), used[i] ? kBlue : kRed, used[i] ? PlaceShape::dot : PlaceShape::cross});
+  }
+  views.marks.push_back({Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), kInk, PlaceShape::ring, "tip"});
+  views.radius_mm = pivot.robust.tip_in_sensor_mm.norm();
+  return place_views_svg(views, 1);
 }
 
 namespace {

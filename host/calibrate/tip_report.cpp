@@ -121,6 +121,12 @@ HtmlPage tip_page(const TipFound& found, const TipInput& input) {
     page.svg(
         tilt_coverage_svg(input.poses, *found.pivot),
         "Angle from the mean direction, as seen along it. Shaded: sides to which it leaned by less than 10 degrees.");
+    page.heading("Where the sensor was");
+    page.svg(
+        tip_places_svg(input.poses, *found.pivot),
+        "Place of the sensor at each pose about its divot, along the tracker's axes. A tip that stands still keeps "
+        "it on the dashed sphere. The more of the sphere is covered, the better the tip is known. Red crosses: "
+        "outliers.");
     page.heading("Where the tip was");
     page.svg(tip_cloud_svg(*found.pivot),
              "Place of the tip at each pose about its pivot, along the tracker's axes. Dashed: the root mean square "

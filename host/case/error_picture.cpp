@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "host/registration/geometry/organ_surface.hpp"
 #include "host/registration/geometry/seen_surface.hpp"
+#include "host/report/even_colours.hpp"
 #include "host/report/slice_picture.hpp"
 
 namespace birdseye::host {
@@ -21,7 +21,7 @@ using Eigen::Vector3d;
 
 constexpr int kSide_px = 250, kScale_px = 60;
 constexpr std::uint8_t kGround = 32;
-constexpr Colour kInk{255, 255, 255};
+constexpr Colour kWriting{255, 255, 255};
 
 /// From where the organ is looked at, head up or, from above and below, the front up. Patient LPS.
 struct Side {
@@ -45,27 +45,19 @@ double end_of_scale_mm(std::span<const SurfacePlace> places) {
   return most_mm;
 }
 
-/// From nothing to the end of the scale: of even steps in brightness, for the colour-blind too.
+/// From nothing to the end of the scale.
 class Scale {
  public:
-  explicit Scale(double end_mm) : end_mm_(end_mm) {
-    cv::Mat steps(1, 256, CV_8U);
-    for (int i = 0; i < steps.cols; ++i) steps.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
-    cv::applyColorMap(steps, colours_, cv::COLORMAP_VIRIDIS);
-  }
+  explicit Scale(double end_mm) : end_mm_(end_mm) {}
   [[nodiscard]] Colour of(double mm, double brightness) const {
-    const int step = static_cast<int>(std::lround(255 * std::clamp(mm / end_mm_, 0.0, 1.0)));
-    const cv::Vec3b& bgr = colours_.at<cv::Vec3b>(0, step);
-    Colour out{};
-    for (int channel = 0; channel < 3; ++channel)
-      out[static_cast<std::size_t>(channel)] = static_cast<std::uint8_t>(brightness * bgr[2 - channel]);
+    Colour out = even_colour(mm / end_mm_);
+    for (std::uint8_t& channel : out) channel = static_cast<std::uint8_t>(brightness * channel);
     return out;
   }
   [[nodiscard]] double end_mm() const { return end_mm_; }
 
  private:
   double end_mm_;
-  cv::Mat colours_;  ///< BGR
 };
 
 /// Between places, of which the nearest count most.
@@ -142,11 +134,11 @@ void draw_scale(Picture& picture, int top_px, const Scale& scale) {
       std::copy(colour.begin(), colour.end(), picture.rgb.begin() + std::ptrdiff_t{3} * pixel);
     }
   }
-  draw_text(picture, {kAside_px, top_px + 16.0}, "error to be expected, mm rms", kInk);
+  draw_text(picture, {kAside_px, top_px + 16.0}, "error to be expected, mm rms", kWriting);
   for (int n = 0; n <= kIntervals; ++n) {
     const double share = static_cast<double>(n) / kIntervals;
     draw_text(picture, {kAside_px + share * wide_px - 8, top_px + 52.0}, fmt::format("{:.3g}", share * scale.end_mm()),
-              kInk);
+              kWriting);
   }
 }
 
@@ -167,11 +159,11 @@ Picture draw_expected_error(const SignedDistance& organ, std::span<const Surface
         box.middle_mm, side.right, side.look.cross(side.right), box.longest_mm / (kFilled * kSide_px),
         kSide_px,      kSide_px};
     Picture picture = draw_side(surface, side, plane, rms_mm, scale);
-    draw_text(picture, {8, 18}, side.name, kInk);
+    draw_text(picture, {8, 18}, side.name, kWriting);
     if (target_mm) {
       const Eigen::Vector2d at_px = plane.px_of(*target_mm);
-      draw_cross_hair(picture, at_px, kCross_px, kInk);
-      if (n == 0) draw_text(picture, at_px + Eigen::Vector2d(10, -8), "target", kInk);
+      draw_cross_hair(picture, at_px, kCross_px, kWriting);
+      if (n == 0) draw_text(picture, at_px + Eigen::Vector2d(10, -8), "target", kWriting);
     }
     paste(out, picture, n % kColumns * kSide_px, n / kColumns * kSide_px);
     ++n;

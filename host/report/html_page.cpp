@@ -46,6 +46,10 @@ std::string list_of(const std::vector<std::string>& items) {
 
 }  // namespace
 
+std::string data_url(const Picture& picture) {
+  return "data:image/png;base64," + base64(png_of(picture.view()));
+}
+
 void HtmlPage::heading(const std::string& text) {
   std::string capital = text;
   if (!capital.empty()) capital[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(capital[0])));
@@ -78,8 +82,7 @@ void HtmlPage::svg(const std::string& svg, const std::string& caption) {
 }
 
 void HtmlPage::picture(const Picture& picture, const std::string& caption) {
-  const std::string png = png_of(picture.view());
-  figure(fmt::format("<img src='data:image/png;base64,{}' alt='{}'>", base64(png), escape_markup(caption)), caption);
+  figure(fmt::format("<img src='{}' alt='{}'>", data_url(picture), escape_markup(caption)), caption);
 }
 
 void HtmlPage::picture_files(const std::vector<std::string>& files, const std::string& caption) {

@@ -9,6 +9,9 @@
 
 namespace birdseye::host {
 
+/// A picture as an address that holds all of it, for an <img> or, in an SVG, an <image>.
+std::string data_url(const Picture& picture);
+
 /// The page of a result: an HTML file that loads nothing from a network. It holds title, verdict and then what was
 /// added, in that order. Texts are escaped; SVGs are not.
 class HtmlPage {

@@ -12,7 +12,13 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr const char* kColours[] = {kBlue, kOrange, kGreen, "#8d4aa8", "#7a6a1e", "#555555"};
+/// What tells curves apart: a colour and, for prints without colours, dashes.
+struct Style {
+  const char* colour;
+  const char* dashes;
+};
+constexpr Style kStyles[] = {{kBlue, "none"},      {kOrange, "7 3"},    {kGreen, "2 3"},
+                             {kPurple, "9 3 2 3"}, {"#7a6a1e", "12 4"}, {"#555555", "4 2"}};
 
 Range range_of(const Panel& panel, bool of_x) {
   Range range;
@@ -28,7 +34,7 @@ Range range_of(const Panel& panel, bool of_x) {
 }
 
 /// Curves are told apart by the order in which their names first appear.
-const char* colour_of(const std::string& name, const std::vector<Panel>& panels) {
+const Style& style_of(const std::string& name, const std::vector<Panel>& panels) {
   std::vector<std::string> seen;
   for (const Panel& panel : panels) {
     for (const Curve& curve : panel.curves) {
@@ -36,34 +42,41 @@ const char* colour_of(const std::string& name, const std::vector<Panel>& panels)
     }
   }
   const auto at = static_cast<std::size_t>(std::find(seen.begin(), seen.end(), name) - seen.begin());
-  return kColours[at % std::size(kColours)];
+  return kStyles[at % std::size(kStyles)];
+}
+
+/// Further attributes of a line.
+std::string drawn_as(const Style& style) {
+  return fmt::format("stroke-width='1.8' stroke-dasharray='{}'", style.dashes);
 }
 
 /// The curves' names above the plot, where there are several; below: where its lines end.
 std::string legend_svg(const Panel& panel, const std::vector<Panel>& all, double width, double& below) {
-  constexpr double kLetter = 7.3, kBetween = 14, kLine = 16;
+  constexpr double kLetter = 7.3, kBetween = 14, kLine = 16, kSample = 26, kGap = 5;
   if (panel.curves.size() < 2) return {};
   std::string out;
   double x = Axes::kLeft;
   below += kLine;
   for (const Curve& curve : panel.curves) {
-    const double needed = kLetter * static_cast<double>(curve.name.size());
+    const double needed = kSample + kGap + kLetter * static_cast<double>(curve.name.size());
     if (x > Axes::kLeft && x + needed > width) {
       x = Axes::kLeft;
       below += kLine;
     }
-    out += svg_text(x, below, curve.name, Anchor::start, colour_of(curve.name, all));
+    const Style& style = style_of(curve.name, all);
+    out += svg_line(x, below - 4, x + kSample, below - 4, style.colour, drawn_as(style).c_str()) +
+           svg_text(x + kSample + kGap, below, curve.name);
     x += needed + kBetween;
   }
   return out;
 }
 
-std::string curve_svg(const Curve& curve, const Axes& axes, const char* colour) {
+std::string curve_svg(const Curve& curve, const Axes& axes, const Style& style) {
   constexpr std::size_t kFew = 8;
   std::string out, line;
   const auto end_line = [&] {
     if (!line.empty())
-      out += fmt::format("<polyline points='{}' fill='none' stroke='{}' stroke-width='1.8'/>", line, colour);
+      out += fmt::format("<polyline points='{}' fill='none' stroke='{}' {}/>", line, style.colour, drawn_as(style));
     line.clear();
   };
   for (const auto& [x, y] : curve.points) {
@@ -72,7 +85,7 @@ std::string curve_svg(const Curve& curve, const Axes& axes, const char* colour) 
       continue;
     }
     line += fmt::format("{:.1f},{:.1f} ", axes.x_of(x), axes.y_of(y));
-    if (curve.points.size() <= kFew) out += svg_dot(axes.x_of(x), axes.y_of(y), 2.6, colour);
+    if (curve.points.size() <= kFew) out += svg_dot(axes.x_of(x), axes.y_of(y), 2.6, style.colour);
   }
   end_line();
   return out;
@@ -92,7 +105,7 @@ std::string panel_svg(const Panel& panel, const std::vector<Panel>& all, const P
     svg += svg_line(axes.x_of(mark.x), top, axes.x_of(mark.x), top + axes.area().height, kGrey, kDashed) +
            svg_text(axes.x_of(mark.x), top - 4, mark.text, Anchor::start, kGrey);
   }
-  for (const Curve& curve : panel.curves) svg += curve_svg(curve, axes, colour_of(curve.name, all));
+  for (const Curve& curve : panel.curves) svg += curve_svg(curve, axes, style_of(curve.name, all));
   return svg;
 }
 

@@ -17,7 +17,7 @@ struct Mark {
 };
 struct Panel {
   std::string title, x_label, y_label;
-  std::vector<Curve> curves;  ///< at most six; a curve of the same name has the same colour in every panel
+  std::vector<Curve> curves;  ///< at most six; a curve of the same name has the same colour and dashes in every panel
   bool from_zero = true;      ///< the y axis begins at 0, where no value is below
   std::vector<Mark> marks = {};
 };

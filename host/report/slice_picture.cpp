@@ -109,6 +109,33 @@ void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int rad
   }
 }
 
+ThreePlanes::ThreePlanes(const Vector3d& centre_in_patient_mm, double width_mm, int side_px) : side_px_(side_px) {
+  std::ranges::transform(
+      std::array{SliceKind::axial, SliceKind::coronal, SliceKind::sagittal}, planes_.begin(),
+      [&](SliceKind kind) { return slice_plane(kind, centre_in_patient_mm, width_mm, side_px, side_px); });
+}
+
+Picture ThreePlanes::draw(const Volume& ct, double low_hu, double high_hu) const {
+  static constexpr const char* kNames[] = {"axial", "coronal", "sagittal"};
+  constexpr Colour kWhite{255, 255, 255};
+  Picture out = black(3 * side_px_, side_px_);
+  for (std::size_t n = 0; n < planes_.size(); ++n) {
+    Picture slice = draw_slice(ct, planes_[n], low_hu, high_hu);
+    draw_text(slice, {6, side_px_ - 8.0}, kNames[n], kWhite);
+    paste(out, slice, static_cast<int>(n) * side_px_, 0);
+  }
+  return out;
+}
+
+void ThreePlanes::mark(Picture& picture, const Vector3d& place_in_patient_mm, const Colour& colour) const {
+  for (std::size_t n = 0; n < planes_.size(); ++n) {
+    const Eigen::Vector2d at_px = planes_[n].px_of(place_in_patient_mm);
+    const bool inside = at_px.minCoeff() >= 0 && at_px.maxCoeff() <= side_px_;
+    if (inside)
+      draw_cross_hair(picture, at_px + Eigen::Vector2d(static_cast<double>(n) * side_px_, 0), side_px_ / 4, colour);
+  }
+}
+
 void paste(Picture& onto, const Picture& what, int x_px, int y_px) {
   mat_of(what.view()).copyTo(view_of(onto)(cv::Rect(x_px, y_px, what.width_px, what.height_px)));
 }

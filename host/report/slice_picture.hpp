@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <string>
 
 #include "host/files/picture.hpp"
@@ -39,6 +40,21 @@ void draw_text(Picture& picture, const Eigen::Vector2d& at_px, const std::string
 /// A cross hair one pixel thin with its middle left open, so that it hides nothing. open: the part of the radius.
 void draw_cross_hair(Picture& picture, const Eigen::Vector2d& centre_px, int radius_px, const Colour& colour,
                      double open = 0.25);
+
+/// The axial, coronal and sagittal plane through a place, side by side.
+class ThreePlanes {
+ public:
+  ThreePlanes(const Eigen::Vector3d& centre_in_patient_mm, double width_mm, int side_px);
+
+  [[nodiscard]] Picture draw(const Volume& ct, double low_hu, double high_hu) const;
+  /// A cross hair in each plane where it shows the place, in the plane or before or behind it.
+  void mark(Picture& picture, const Eigen::Vector3d& place_in_patient_mm, const Colour& colour) const;
+
+ private:
+  int side_px_;
+  std::array<SlicePlane, 3> planes_;
+};
+
 void paste(Picture& onto, const Picture& what, int x_px, int y_px);
 
 }  // namespace birdseye::host

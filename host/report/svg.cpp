@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace birdseye::host {
 
 std::string escape_markup(std::string_view text) {
@@ -43,6 +46,19 @@ std::string svg_line(double x1, double y1, double x2, double y2, const char* col
 
 std::string svg_dot(double x, double y, double radius, const char* colour) {
   return fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='{}' fill='{}'/>", x, y, radius, colour);
+}
+
+std::string svg_arrow(double x1, double y1, double x2, double y2, const char* colour) {
+  constexpr double kShortest = 2, kHead = 4, kShare = 0.4;
+  const double length = std::hypot(x2 - x1, y2 - y1);
+  std::string path = fmt::format("<path d='M{:.1f} {:.1f}L{:.1f} {:.1f}", x1, y1, x2, y2);
+  if (length > kShortest) {
+    const double part = std::min(kHead, kShare * length) / length;
+    const double along_x = part * (x2 - x1), along_y = part * (y2 - y1);
+    path += fmt::format("M{:.1f} {:.1f}L{:.1f} {:.1f}L{:.1f} {:.1f}", x2 - along_x - along_y / 2,
+                        y2 - along_y + along_x / 2, x2, y2, x2 - along_x + along_y / 2, y2 - along_y - along_x / 2);
+  }
+  return path + fmt::format("' stroke='{}' fill='none'/>", colour);
 }
 
 std::string svg_picture(double width, double height, const std::string& body) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "host/report/even_colours.hpp"
 #include "host/report/slice_picture.hpp"
 
 namespace birdseye::host {
@@ -17,14 +18,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kSide_px = 480;
+constexpr double kBad_mm = 5;  // from here on the tint is the brightest
 constexpr Colour kFiducial{120, 200, 255}, kTarget{255, 255, 255}, kLine{255, 255, 255};
-
-/// Green where the error is none, yellow at half, red from 5 mm.
-Eigen::Array3d tint_of(double tre_mm) {
-  constexpr double kBad_mm = 5;
-  const double bad = std::clamp(tre_mm / kBad_mm, 0.0, 1.0);
-  return Eigen::Array3d(std::min(1.0, 2 * bad), std::min(1.0, 2 - 2 * bad), 0) * 255;
-}
 
 /// A round step that puts some six lines between the least and the most.
 double step_of(double least_mm, double most_mm) {
@@ -80,9 +75,10 @@ Picture draw_target_error(const calibration::TargetError& error, const TargetErr
     for (int y = 0; y < kSide_px; ++y) {
       for (int x = 0; x < kSide_px; ++x) {
         tre_mm.push_back(error.rms_mm(plane.at(x + 0.5, y + 0.5)));
-        const Eigen::Array3d tint = tint_of(tre_mm.back());
+        const Colour tint = even_colour(tre_mm.back() / kBad_mm);
         std::uint8_t* rgb = &slice.rgb[3 * (tre_mm.size() - 1)];
-        for (int c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(0.7 * rgb[c] + 0.3 * tint[c]);
+        for (int c = 0; c < 3; ++c)
+          rgb[c] = static_cast<std::uint8_t>(0.65 * rgb[c] + 0.35 * tint[static_cast<std::size_t>(c)]);
       }
     }
     draw_lines(slice, tre_mm);

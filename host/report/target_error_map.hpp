@@ -15,7 +15,8 @@ struct TargetErrorScene {
   const Volume* ct = nullptr;  ///< drawn under the map; may be null
 };
 
-/// Three slices through the first target, or through where the error is least, with lines of equal error.
+/// Three slices through the first target, or through where the error is least, with lines of equal error. The tint is
+/// the brighter the larger the error, up to 5 mm.
 Picture draw_target_error(const calibration::TargetError& error, const TargetErrorScene& scene);
 
 /// The error over the patient's tissue (over -300 HU).

@@ -72,7 +72,8 @@ TEST(CalibrateCameraCommand, WritesCameraFiguresAndPage) {
   EXPECT_GE(json["held_out_px"], json["rms_px"]);
   EXPECT_NE(testing::contents_of(scratch / "c.yaml").find("camera_matrix"), std::string::npos);
   const std::string page = testing::contents_of(scratch / "c.html");
-  for (const char* words : {"<svg", "held out, px", "image_points.4.txt", "coverage", "convergence"})
+  for (const char* words : {"<svg", "held out, px", "image_points.4.txt", "coverage", "convergence",
+                            "What the lens does", "Where the board was looked at from", "The view that fits worst"})
     EXPECT_NE(page.find(words), std::string::npos) << words;
   EXPECT_EQ(page.find("http-equiv"), std::string::npos);
 }

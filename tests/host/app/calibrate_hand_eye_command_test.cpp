@@ -89,7 +89,12 @@ TEST(CalibrateHandEyeCommand, ASecondCameraIsUsedWithItsLens) {
   EXPECT_EQ(json["right"]["views_used"], DrawnStereo::kStations - 1);
   EXPECT_THAT(json["notes"].dump(), HasSubstr("view_05.png (right): "));
   EXPECT_LT(json["rms_px"].get<double>(), 0.3);
-  EXPECT_THAT(testing::contents_of(drawn.scratch / "x.html"), HasSubstr("A stereo scope: 11 of the stations"));
+  const std::string page = testing::contents_of(drawn.scratch / "x.html");
+  EXPECT_THAT(page, HasSubstr("A stereo scope: 11 of the stations"));
+  EXPECT_THAT(page, HasSubstr("<image href='data:image/png;base64,")) << "the worst station's picture";
+  EXPECT_THAT(page, HasSubstr("places of the camera, from above"));
+  EXPECT_THAT(page, HasSubstr("before: "));
+  EXPECT_THAT(page, HasSubstr("after refining"));
 }
 
 TEST(CalibrateHandEyeCommand, BothLensesMayComeFromThePicturesThemselves) {
