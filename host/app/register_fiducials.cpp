@@ -8,6 +8,7 @@
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/case/fiducial_registration.hpp"
+#include "host/case/fiducial_report.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 
@@ -17,7 +18,7 @@ namespace {
 
 struct RegisterFiducialsOptions {
   FiducialFiles files;
-  std::filesystem::path out, map, json;
+  std::filesystem::path out, map, json, report;
 };
 
 void print(const FiducialInput& input, const FiducialsFound& out, const Verdict& verdict) {
@@ -51,9 +52,11 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   const auto out = register_fiducials(options.files, *input);
   if (!out) return out.error();
   const Verdict verdict = judge_fiducials(*out);
-  if (auto written = write_files({{options.out, pose_text(out->patient_from_tracker().matrix())},
-                                  {options.map, options.map.empty() ? "" : fiducials_map(*input, *out)},
-                                  {options.json, text_of(fiducials_json(*input, *out, verdict))}});
+  if (auto written =
+          write_files({{options.out, pose_text(out->patient_from_tracker().matrix())},
+                       {options.map, options.map.empty() ? "" : png_of(fiducials_map(*input, *out).view())},
+                       {options.report, options.report.empty() ? "" : fiducials_page(*input, *out, verdict).html()},
+                       {options.json, text_of(fiducials_json(*input, *out, verdict))}});
       !written) {
     return written.error();
   }
@@ -93,6 +96,7 @@ void add_register(CLI::App& app, CommandStatus& status) {
   surface_points->needs(surface);
   fiducials.add_option("--out", options->out, "patient_from_tracker, a 4x4 matrix")->required();
   fiducials.add_option("--json", options->json, "write the figures to this file");
+  fiducials.add_option("--report", options->report, "a page with the figures and pictures (HTML)");
   fiducials.callback([options, &status] {
     const auto done = run(*options);
     done ? void(status.code = *done) : status.refuse(done.error());

@@ -217,6 +217,7 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
   auto engine = make_engine("cpu", kept ? *kept : c.ct, transfer);
   if (!engine) return engine.error();
   std::vector<FileText> files;
+  std::vector<ImageRgba> overlays_before;
   OverlayLook look;
   look.opacity = 0.7;
   for (const bool after : {false, true}) {
@@ -228,13 +229,18 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
       if (after && found.adjusted) camera_from_model = found.adjusted->camera_from_patient[n];
       if (after) camera_from_model = camera_from_model * found.patient_from_model;
       const Still still{c.pictures[n].rgb, view.camera, camera_from_model};
-      const PaintedStill painted = paint_still(still, **engine, look, vouched_for({}));
+      PaintedStill painted = paint_still(still, **engine, look, vouched_for({}));
       const char* const when = after ? "after" : "before";
       files.push_back({fmt::format("view{}_{}.png", n, when),
                        png_of(RgbView{painted.rgb, view.camera.width_px, view.camera.height_px})});
       files.push_back(
           {fmt::format("view{}_difference_{}.png", n, when),
            png_of(RgbView{difference_picture(view, painted.volume), view.camera.width_px, view.camera.height_px})});
+      if (after)
+        files.push_back({fmt::format("view{}_outlines.png", n),
+                         png_of(outline_picture(c.pictures[n], overlays_before[n], painted.volume).view())});
+      else
+        overlays_before.push_back(std::move(painted.volume));
     }
   }
   return files;
@@ -249,7 +255,7 @@ Result<void> make_empty_of_results(const fs::path& folder) {
   for (const char* name : {"field.mha", "result.json", "report.html", "expected_error.png", "trace.svg", "pose.txt"})
     old.push_back(folder / name);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
-    static const std::regex kOfAView("view[0-9]+(_difference)?_(before|after)\\.png");
+    static const std::regex kOfAView("view[0-9]+((_difference)?_(before|after)|_outlines)\\.png");
     if (std::regex_match(entry.path().filename().string(), kOfAView)) old.push_back(entry.path());
   }
   for (const fs::path& path : old) {

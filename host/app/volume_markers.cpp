@@ -8,10 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/case/marker_picture.hpp"
 #include "host/files/write_files.hpp"
-#include "host/report/slice_picture.hpp"
+#include "host/report/html_page.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/marker_finder.hpp"
 #include "host/volume/marker_near.hpp"
@@ -25,62 +27,22 @@ using Eigen::Vector3d;
 
 struct VolumeMarkersOptions {
   VolumeSource source;
-  std::filesystem::path out, picture, json;
+  std::filesystem::path out, picture, json, report;
   std::optional<MarkerKind> kind;
   double diameter_mm = 0, hole_mm = 0, height_mm = 0;
   std::vector<std::string> near;
   std::optional<int> threshold_hu;
 };
 
-constexpr double kLeastShown_mm = 8;  // of the CT round a marker, in the picture: three times as much
+constexpr double kLeastShown_mm = 8;  // of a marker, in the picture, which shows three times as much
 const std::map<std::string, MarkerKind> kKinds{{name_of(MarkerKind::ball), MarkerKind::ball},
                                                {name_of(MarkerKind::ring), MarkerKind::ring},
                                                {name_of(MarkerKind::cylinder), MarkerKind::cylinder},
                                                {name_of(MarkerKind::post), MarkerKind::post}};
 
-constexpr Colour kFound{90, 255, 120}, kDoubtful{255, 90, 80}, kText{255, 255, 255};
-
-/// Left the whole CT from the front, right every marker in two slices through its centre.
-Picture picture_of(const Volume& ct, const FoundMarkers& found, double diameter_mm) {
-  constexpr int kTile_px = 150, kOverview_px = 600, kPairs = 3;
-  const Vector3d last(ct.size[0] - 1, ct.size[1] - 1, ct.size[2] - 1);
-  const Vector3d centre = ct.patient_from_voxel * Vector3d(0.5 * last);
-  const Vector3d extent = (ct.patient_from_voxel.linear() * last.asDiagonal()).cwiseAbs().rowwise().sum();
-  const double wide_mm = std::max(extent.x(), extent.z()) * 1.05;
-  const SlicePlane front = slice_plane(SliceKind::coronal, centre, wide_mm, kOverview_px, kOverview_px);
-  Picture overview = draw_brightest(ct, front, 0.5 * extent.y(), -200, 2000);
-  draw_text(overview, {8, 18}, "from the front, brightest in depth", kText);
-
-  const auto count = static_cast<int>(found.markers.size() + found.doubtful.size());
-  const int rows = std::max(1, (count + kPairs - 1) / kPairs);
-  Picture out{kOverview_px + 2 * kPairs * kTile_px, std::max(kOverview_px, rows * kTile_px), {}};
-  out.rgb.resize(static_cast<std::size_t>(out.width_px) * static_cast<std::size_t>(out.height_px) * 3);
-  int cell = 0;
-  const auto show = [&](const Vector3d& at, const std::string& name, double high_hu, const Colour& colour) {
-    draw_cross_hair(overview, front.px_of(at), 10, colour);
-    draw_text(overview, front.px_of(at) + Eigen::Vector2d(8, -6), name, colour);
-    for (const SliceKind kind : {SliceKind::axial, SliceKind::coronal}) {
-      const SlicePlane plane = slice_plane(kind, at, 3 * diameter_mm, kTile_px, kTile_px);
-      Picture tile = draw_slice(ct, plane, -200, high_hu);
-      draw_cross_hair(tile, plane.px_of(at), 40, colour);
-      draw_text(tile, {6, 18}, name, colour);
-      draw_text(tile, {6, kTile_px - 8}, kind == SliceKind::axial ? "axial" : "coronal", kText);
-      const int column = 2 * (cell % kPairs) + (kind == SliceKind::coronal ? 1 : 0);
-      paste(out, tile, kOverview_px + column * kTile_px, cell / kPairs * kTile_px);
-    }
-    ++cell;
-  };
-  for (std::size_t i = 0; i < found.markers.size(); ++i)
-    show(found.markers[i].centre_in_patient_mm, std::to_string(i + 1), found.markers[i].hu, kFound);
-  for (const DoubtfulMarker& d : found.doubtful) show(d.centre_in_patient_mm, "?", 2000, kDoubtful);
-  paste(out, overview, 0, 0);
-  return out;
-}
-
 struct Findings {
   FoundMarkers found;
-  std::string verdict;
-  std::vector<std::string> reasons;
+  Verdict verdict;
   std::vector<std::string> of_picks;  ///< of each place that was pointed at, what is there
 };
 
@@ -94,22 +56,23 @@ Findings search_whole(const Volume& ct, const VolumeMarkersOptions& options, con
   Findings out;
   out.found = find_markers(ct, search);
   const std::size_t n = out.found.markers.size();
-  out.reasons.push_back(fmt::format("{} marker{} found", n, n == 1 ? "" : "s"));
+  out.verdict.reasons.push_back(fmt::format("{} marker{} found", n, n == 1 ? "" : "s"));
   for (const DoubtfulMarker& d : out.found.doubtful)
-    out.reasons.push_back(
+    out.verdict.reasons.push_back(
         fmt::format("what looks like a marker at {} {}", place_text(d.centre_in_patient_mm), d.reason));
   if (n < 3) {
-    out.reasons.push_back(
+    out.verdict.reasons.push_back(
         fmt::format("a registration needs three: are shape and size right? {} thing{} of about the size passed over; "
                     "point at a marker that was missed by --near",
                     out.found.passed_over, out.found.passed_over == 1 ? "" : "s"));
     const std::size_t posts = shape.kind == MarkerKind::post ? 0 : find_hollow_posts(ct, {}).markers.size();
-    if (posts > 0) out.reasons.push_back(fmt::format("hollow posts are seen ({}): find them by --shape post", posts));
-    out.verdict = "fail";
+    if (posts > 0)
+      out.verdict.reasons.push_back(fmt::format("hollow posts are seen ({}): find them by --shape post", posts));
+    out.verdict.grade = Grade::fail;
     return out;
   }
-  if (n < 5) out.reasons.emplace_back("with five or more a wrong touch can be named");
-  out.verdict = out.found.doubtful.empty() ? "pass" : "marginal";
+  if (n < 5) out.verdict.reasons.emplace_back("with five or more a wrong touch can be named");
+  out.verdict.grade = out.found.doubtful.empty() ? Grade::pass : Grade::marginal;
   return out;
 }
 
@@ -129,7 +92,6 @@ Result<Vector3d> parse_place(const std::string& text) {
 Result<Findings> search_near(const Volume& ct, const std::vector<Vector3d>& places,
                              const std::optional<MarkerShape>& shape) {
   Findings out;
-  out.verdict = "pass";
   for (const Vector3d& place : places) {
     const auto fit = find_marker_near(ct, place, shape);
     if (!fit && fit.error().code != Errc::not_found) return fit.error().with_context("--near");
@@ -147,11 +109,11 @@ Result<Findings> search_near(const Volume& ct, const std::vector<Vector3d>& plac
       }
     }
     if (what.empty()) continue;
-    out.verdict = "fail";
-    out.reasons.push_back(what);
+    out.verdict.grade = Grade::fail;
+    out.verdict.reasons.push_back(what);
   }
-  out.reasons.insert(out.reasons.begin(),
-                     fmt::format("{} of {} places have a marker", out.found.markers.size(), places.size()));
+  out.verdict.reasons.insert(out.verdict.reasons.begin(),
+                             fmt::format("{} of {} places have a marker", out.found.markers.size(), places.size()));
   return out;
 }
 
@@ -169,6 +131,26 @@ nlohmann::json marker_json(const MarkerFit& m) {
   return json;
 }
 
+HtmlPage markers_page(const Findings& findings, const Picture& picture) {
+  HtmlPage page("Markers in the CT");
+  page.set_verdict(findings.verdict);
+  page.picture(
+      picture,
+      "Left, all of the CT from the front; right, each marker in an axial, a coronal and a sagittal slice, the "
+      "cross hair on the centre that was found. A cross hair that is off its marker is a wrong centre.");
+  std::vector<std::vector<std::string>> rows{
+      {"marker", "kind", "centre, patient LPS, mm", "95 % within, mm", "across, mm", "HU"}};
+  for (std::size_t i = 0; i < findings.found.markers.size(); ++i) {
+    const MarkerFit& m = findings.found.markers[i];
+    const Vector3d& c = m.centre_in_patient_mm;
+    rows.push_back({std::to_string(i + 1), name_of(m.kind), fmt::format("{:.2f}, {:.2f}, {:.2f}", c.x(), c.y(), c.z()),
+                    fmt::format("{:.2f}", kSigmasOf95 * m.sigma_mm), fmt::format("{:.1f}", m.diameter_mm),
+                    fmt::format("{:.0f}", m.hu)});
+  }
+  page.table(rows);
+  return page;
+}
+
 Result<void> write_findings(const VolumeMarkersOptions& options, const Volume& ct, const Findings& findings) {
   const FoundMarkers& found = findings.found;
   nlohmann::json json;
@@ -184,15 +166,16 @@ Result<void> write_findings(const VolumeMarkersOptions& options, const Volume& c
   for (const DoubtfulMarker& d : found.doubtful)
     json["doubtful"].push_back({{"centre_mm", place_json(d.centre_in_patient_mm)}, {"reason", d.reason}});
   if (options.near.empty()) json["passed_over"] = found.passed_over;
-  json["verdict"] = findings.verdict;
-  json["reasons"] = findings.reasons;
-  std::string png;
-  if (!options.picture.empty()) {
-    const Picture picture =
-        picture_of(ct, found, std::max({widest_mm, options.diameter_mm, options.height_mm, kLeastShown_mm}));
-    png = png_of(picture.view());
+  json["verdict"] = name_of(findings.verdict.grade);
+  json["reasons"] = findings.verdict.reasons;
+  std::vector<FileText> files{{options.out, points}, {options.json, text_of(json)}};
+  if (!options.picture.empty() || !options.report.empty()) {
+    const double shown_mm = 3 * std::max({widest_mm, options.diameter_mm, options.height_mm, kLeastShown_mm});
+    const Picture picture = draw_markers(ct, found, shown_mm);
+    files.push_back({options.picture, png_of(picture.view())});
+    files.push_back({options.report, markers_page(findings, picture).html()});
   }
-  return write_files({{options.out, points}, {options.picture, std::move(png)}, {options.json, text_of(json)}});
+  return write_files(files);
 }
 
 Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
@@ -231,9 +214,9 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
                c.x(), c.y(), c.z(), kSigmasOf95 * m.sigma_mm, name_of(m.kind), m.diameter_mm, m.hu,
                options.near.empty() ? "" : ", ", options.near.empty() ? "" : findings.of_picks[i]);
   }
-  for (const std::string& reason : findings.reasons) fmt::print("{}\n", reason);
-  fmt::print("verdict: {}\n", findings.verdict);
-  return findings.verdict == "fail" ? ExitCode::verdict_fail : ExitCode::success;
+  for (const std::string& reason : findings.verdict.reasons) fmt::print("{}\n", reason);
+  fmt::print("verdict: {}\n", name_of(findings.verdict.grade));
+  return findings.verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
 }  // namespace
@@ -260,6 +243,7 @@ void add_volume_markers(CLI::App& volume, CommandStatus& status) {
   markers.add_option("--out", options->out, "centres to write, x y z a line, mm, as `register fiducials` reads")
       ->required();
   markers.add_option("--picture", options->picture, "a PNG of what was found");
+  markers.add_option("--report", options->report, "a page with the figures and pictures (HTML)");
   markers.add_option("--json", options->json, "write the figures to this file");
   markers.callback([options, &status] {
     const auto done = volume_markers(*options);

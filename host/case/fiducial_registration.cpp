@@ -174,10 +174,9 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
   return json;
 }
 
-std::string fiducials_map(const FiducialInput& input, const FiducialsFound& out) {
-  const Picture picture = draw_target_error(calibration::TargetError(input.ct_mm, out.localisation.rms_mm),
-                                            {input.ct_mm, input.targets_mm, input.volume ? &*input.volume : nullptr});
-  return png_of(picture.view());
+Picture fiducials_map(const FiducialInput& input, const FiducialsFound& out) {
+  return draw_target_error(calibration::TargetError(input.ct_mm, out.localisation.rms_mm),
+                           {input.ct_mm, input.targets_mm, input.volume ? &*input.volume : nullptr});
 }
 
 }  // namespace birdseye::host

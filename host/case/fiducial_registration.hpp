@@ -12,6 +12,7 @@
 #include "calibration/points/odd_points.hpp"
 #include "calibration/points/point_error.hpp"
 #include "calibration/points/point_fit.hpp"
+#include "host/files/picture.hpp"
 #include "host/registration/rigid/surface.hpp"
 #include "host/registration/rigid/surface_refinement.hpp"
 #include "host/report/target_error_map.hpp"
@@ -63,7 +64,7 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
 
 Verdict judge_fiducials(const FiducialsFound& found);
 nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& found, const Verdict& verdict);
-/// The predicted error in slices, PNG.
-std::string fiducials_map(const FiducialInput& input, const FiducialsFound& found);
+/// The predicted error in slices.
+Picture fiducials_map(const FiducialInput& input, const FiducialsFound& found);
 
 }  // namespace birdseye::host

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -66,6 +67,42 @@ std::vector<std::uint8_t> difference_picture(const VideoView& view, const ImageR
 
 namespace {
 
+/// Whether a pixel of the organ has a neighbour that is not of it.
+bool on_outline(const ImageRgba& overlay, int x, int y) {
+  const auto is_organ = [&](int i, int j) {
+    constexpr std::uint8_t kHalf = 128;
+    const auto at =
+        static_cast<std::size_t>(j) * static_cast<std::size_t>(overlay.width_px) + static_cast<std::size_t>(i);
+    return overlay.rgba[4 * at + 3] >= kHalf;
+  };
+  if (x == 0 || y == 0 || x + 1 == overlay.width_px || y + 1 == overlay.height_px || !is_organ(x, y)) return false;
+  return !is_organ(x - 1, y) || !is_organ(x + 1, y) || !is_organ(x, y - 1) || !is_organ(x, y + 1);
+}
+
+void draw_outline(Picture& picture, const ImageRgba& overlay, const std::array<std::uint8_t, 3>& colour, bool dashed) {
+  constexpr int kDash_px = 6;
+  for (int y = 0; y < picture.height_px; ++y) {
+    for (int x = 0; x < picture.width_px; ++x) {
+      if (!on_outline(overlay, x, y) || (dashed && (x + y) / kDash_px % 2 != 0)) continue;
+      for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+        const int i = std::min(x + dx, picture.width_px - 1), j = std::min(y + dy, picture.height_px - 1);
+        std::copy(colour.begin(), colour.end(), picture.rgb.begin() + std::ptrdiff_t{3} * (j * picture.width_px + i));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Picture outline_picture(const Picture& view, const ImageRgba& before, const ImageRgba& after) {
+  Picture out = view;
+  draw_outline(out, before, {230, 159, 0}, true);
+  draw_outline(out, after, {86, 180, 233}, false);
+  return out;
+}
+
+namespace {
+
 /// expected_error.png lies beside the page.
 void add_expected(HtmlPage& page, const ExpectedErrors& expected) {
   page.heading("Error to be expected");
@@ -113,6 +150,10 @@ std::string registration_report(const RegistrationCase& c, const ViewRegistratio
     std::vector<std::string> files;
     for (const char* kind : {"before", "after", "difference_before", "difference_after"})
       files.push_back(fmt::format("view{}_{}.png", n, kind));
+    page.picture_files({fmt::format("view{}_outlines.png", n)},
+                       fmt::format("{}: the organ's outline before (orange, dashed) and after (blue). After, it should "
+                                   "lie on the edge of the organ that is seen.",
+                                   c.views[n].name));
     page.picture_files(files, fmt::format("{}{}. Left: before; right: after. Above: the overlay; below: difference of "
                                           "grey (red: the video is brighter; blue: darker; grey: not compared).",
                                           c.views[n].name, how_it_fits(found, n)));

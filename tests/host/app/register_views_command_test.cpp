@@ -68,8 +68,8 @@ TEST(RegisterViewsCommand, FindsADeformationFromSimulatedVideo) {
   EXPECT_EQ(json["verdict"], "pass") << json["reasons"];
   EXPECT_GT(json["epsilon_before"], 0.01);
   EXPECT_LT(json["epsilon_after"], 0.05 * json["epsilon_before"].get<double>());
-  for (const char* name :
-       {"field.mha", "report.html", "trace.svg", "view0_before.png", "view2_after.png", "view1_difference_after.png"})
+  for (const char* name : {"field.mha", "report.html", "trace.svg", "view0_before.png", "view2_after.png",
+                           "view1_difference_after.png", "view0_outlines.png", "view2_outlines.png"})
     EXPECT_GT(fs::file_size(scratch / "out" / name), 100U) << name;
   // Another command reads the field back.
   EXPECT_EQ(

@@ -55,9 +55,9 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
   ASSERT_TRUE(truth);
   const std::string ct = (scratch / "patient/ct").string();
   const std::string points = (scratch / "m.txt").string();
-  const auto found =
-      run("birdseye", "volume markers " + ct + " --shape ball --diameter 8 --out " + points + " --picture " +
-                          (scratch / "m.png").string() + " --json " + (scratch / "m.json").string());
+  const auto found = run("birdseye", "volume markers " + ct + " --shape ball --diameter 8 --out " + points +
+                                         " --picture " + (scratch / "m.png").string() + " --report " +
+                                         (scratch / "m.html").string() + " --json " + (scratch / "m.json").string());
   ASSERT_EQ(found.code, 0) << found.output;
   const nlohmann::json markers = read_json(scratch / "m.json");
   EXPECT_EQ(markers["verdict"], "pass");
@@ -71,6 +71,9 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
     EXPECT_LT(nearest, 0.15);
   }
   EXPECT_GT(fs::file_size(scratch / "m.png"), 10'000U);
+  const std::string markers_page = testing::contents_of(scratch / "m.html");
+  EXPECT_NE(markers_page.find("<img src='data:image/png;base64,"), std::string::npos);
+  EXPECT_NE(markers_page.find("6 markers found"), std::string::npos);
 
   // Pointed at, a few mm off, in an order of one's own.
   std::string near;
@@ -95,8 +98,8 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
   const std::string common = "register fiducials --ct " + points + " --tracker " +
                              scratch.file("t.txt", text_of(touched(five))) + " --match --targets " +
                              scratch.file("g.txt", text_of({truth->tumour_centre_mm})) + " --volume " + ct + " --map " +
-                             (scratch / "map.png").string() + " --out " + (scratch / "p.txt").string() + " --json " +
-                             (scratch / "r.json").string();
+                             (scratch / "map.png").string() + " --out " + (scratch / "p.txt").string() + " --report " +
+                             (scratch / "r.html").string() + " --json " + (scratch / "r.json").string();
   const auto registered = run("birdseye", common);
   ASSERT_EQ(registered.code, 0) << registered.output;
   const nlohmann::json r = read_json(scratch / "r.json");
@@ -111,6 +114,10 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
   EXPECT_LE(r["tre_mm_p95"].get<double>(), r["tre_mm_max"].get<double>());
   EXPECT_TRUE(r["outliers"].empty());
   EXPECT_GT(fs::file_size(scratch / "map.png"), 10'000U);
+  const std::string page = testing::contents_of(scratch / "r.html");
+  for (const char* words : {"Where the markers are", "By how much each touch is off", "The markers in the CT",
+                            "Error to be expected", "target 1"})
+    EXPECT_NE(page.find(words), std::string::npos) << words;
 }
 
 TEST(RigidCommands, ABlunderIsNamedAndASharperErrorPredictedWhereItIsKnown) {
