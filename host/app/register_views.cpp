@@ -153,6 +153,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                          {"optimiser", c.optimiser},           {"views", c.views.size()},
                          {"min_jacobian", found.min_jacobian}, {"uncertainty_mm", nullptr}};
   if (found.uncertainty_mm) json["uncertainty_mm"] = *found.uncertainty_mm;
+  json["notes"] = c.notes;
   if (found.held_out_gain) {
     json["held_out_gain_nats"] = found.held_out_gain->nats;
     json["held_out_gain_error_nats"] = found.held_out_gain->standard_error_nats;
@@ -318,6 +319,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   if (auto written = write_files(*files); !written) return written.error();
   progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), name_of(verdict.grade),
                             verdict.reasons.front()));
+  for (const std::string& note : c.notes) fmt::print("{}\n", note);
   for (std::size_t n = 0; n < found.matched.size(); ++n) {
     if (!found.matched[n].thought_wrong()) continue;
     fmt::print("{} is {:.1f} mm off all else and was thought to be wrong: check its places\n", c.matched[n].name,

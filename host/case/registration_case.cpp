@@ -12,6 +12,7 @@
 #include <toml.hpp>
 
 #include "host/case/named_landmarks.hpp"
+#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/registration/similarity/overlap_mask.hpp"
@@ -236,6 +237,8 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   const auto model = read_camera(folder / *camera);
   if (!model) return table.wrong("camera", model.error().what);
   view.camera = *model;
+  const auto covariance = read_camera_covariance(folder / *camera);
+  if (!covariance) return table.wrong("camera", covariance.error().what);
   if (bgr.cols != model->width_px || bgr.rows != model->height_px) {
     return table.wrong("camera", fmt::format("is for pictures of {}x{} and {} is of {}x{}; calibrate at this size",
                                              model->width_px, model->height_px, image->string(), bgr.cols, bgr.rows));
@@ -276,6 +279,12 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
     if (other.grey == view.grey)
       return table.wrong("image", fmt::format("is the same picture as {}; name each view once", other.name));
   }
+  if (!*covariance) {
+    std::string note = fmt::format("{} does not tell how well its lens is known: what is to be expected leaves it out",
+                                   (folder / *camera).string());
+    if (std::ranges::find(out.notes, note) == out.notes.end()) out.notes.push_back(std::move(note));
+  }
+  out.camera_covariances.push_back(*covariance);
   out.pictures.push_back(std::move(picture));
   out.views.push_back(std::move(view));
   return {};

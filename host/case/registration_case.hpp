@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "host/case/point_rows.hpp"
 #include "host/case/true_deformation.hpp"
 #include "host/deform/displacement_field.hpp"
@@ -34,7 +35,10 @@ struct RegistrationCase {
   double pose_prior = Prior{}.pose;
   std::optional<DisplacementField> initial;
   std::vector<VideoView> views;
-  std::vector<Picture> pictures;             ///< of the views, in colour
+  std::vector<Picture> pictures;  ///< of the views, in colour
+  /// Of the views' lenses, one a view; empty where a camera's file does not tell how well its lens is known.
+  std::vector<std::optional<CameraMatrix>> camera_covariances;
+  std::vector<std::string> notes;            ///< on what was read, to be told
   std::optional<Eigen::Vector3d> target_mm;  ///< what is to be hit, as the CT has it; none: the organ's inside
   std::vector<SeenPoint> surface_points;     ///< only with geometry, as is what is matched
   std::vector<NamedMatch> matched;           ///< landmarks that views show, then what the points' file has

@@ -140,6 +140,7 @@ std::string registration_report(const RegistrationCase& c, const ViewRegistratio
     if (value.is_string()) rows.push_back({key, value.get<std::string>()});
   }
   page.table(rows);
+  for (const std::string& note : c.notes) page.paragraph(note);
   if (found.expected && !found.expected->places.empty()) add_expected(page, *found.expected);
   if (!found.trace.empty()) {
     page.heading("Similarity on the way");

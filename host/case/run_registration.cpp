@@ -28,6 +28,7 @@ Result<CaseRegistration> run_registration(const RegistrationCase& c, const Trans
     if (c.target_mm) settings.targets_at_rest_mm.push_back(*c.target_mm);
     for (const Landmark& landmark : c.landmarks) settings.targets_at_rest_mm.push_back(landmark.rest_mm);
     settings.touches = c.surface_points;
+    settings.camera_covariances = c.camera_covariances;
     for (const NamedMatch& match : c.matched) settings.matched.push_back(match.place);
     settings.by_similarity = [&](const std::vector<VideoView>& views) -> Result<DisplacementField> {
       ViewRegistrationSettings by_gradient;

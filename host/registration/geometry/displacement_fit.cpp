@@ -124,6 +124,11 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     out.unknowns_ = start->unknowns_;
     out.shared_ = start->shared_;
   }
+  Eigen::Index of_lenses = 0;
+  for (const SeenPoint& point : points) of_lenses = std::max(of_lenses, point.by_lens_mm.cols());
+  const Eigen::Index before = out.shared_.size(), all_shared = kShared + of_lenses;
+  out.shared_.conservativeResize(all_shared);
+  if (all_shared > before) out.shared_.tail(all_shared - before).setZero();
   out.weights_.assign(points.size(), 1);
   out.matched_weights_.assign(matched.size(), 1);
   Eigen::MatrixX3d known(n, 3);  // where a point is seen, and where what is matched was at rest
@@ -164,14 +169,15 @@ DisplacementFit DisplacementFit::solve(const SignedDistance& organ, std::span<co
     };
     Eigen::MatrixX3d rows(n, 3);
     Eigen::VectorXd wanted(n), noise(n);
-    Eigen::Matrix<double, Eigen::Dynamic, kShared> by_shared(of_points, kShared);
+    Eigen::MatrixXd by_shared = Eigen::MatrixXd::Zero(of_points, all_shared);
     for (Eigen::Index i = 0; i < of_points; ++i) {
       const auto m = static_cast<std::size_t>(i);
       const auto at = organ.sample(prior.of_seen ? Eigen::Vector3d((seen.row(i) + w.row(i)).transpose())
                                                  : Eigen::Vector3d(places.row(i).transpose()));
       rows.row(i) = at.gradient.transpose() * carries(i);
       wanted[i] = rows.row(i).dot(w.row(i)) - at.distance_mm;
-      by_shared.row(i) << rows.row(i) * points[m].by_common_mm, points[m].shift_mm * rows.row(i);
+      by_shared.row(i).head<kShared>() << rows.row(i) * points[m].by_common_mm, points[m].shift_mm * rows.row(i);
+      by_shared.row(i).segment(kShared, points[m].by_lens_mm.cols()) = rows.row(i) * points[m].by_lens_mm;
       const double off_mm = at.distance_mm - by_shared.row(i).dot(out.shared_);
       double weight = robust_weight(std::pow(off_mm / std::max(scale_mm, 2.5 * sigma[i]), 2));
       const auto& from_camera = points[m].from_camera;

@@ -40,7 +40,7 @@ class DisplacementFit {
   [[nodiscard]] CommonErrors common_errors() const { return shared_.head<kCommonErrors>(); }
 
  private:
-  /// Errors that points share: the views', and the shift along three axes.
+  /// Errors that points share: the views', the shift along three axes, and after them those of the lenses.
   static constexpr int kShared = kCommonErrors + 3;
 
   /// At many places at once.
@@ -55,7 +55,7 @@ class DisplacementFit {
   Eigen::VectorXd alpha_;
   Eigen::MatrixX3d weights_of_centres_ = Eigen::MatrixX3d(0, 3);
   Eigen::VectorXd unknowns_;  ///< of the basis
-  Eigen::Matrix<double, kShared, 1> shared_ = Eigen::Matrix<double, kShared, 1>::Zero();
+  Eigen::VectorXd shared_ = Eigen::VectorXd::Zero(kShared);
   Eigen::LLT<Eigen::MatrixXd> factor_;
   double log_evidence_ = 0;
   std::vector<double> weights_, matched_weights_;

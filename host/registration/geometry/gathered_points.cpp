@@ -43,11 +43,13 @@ std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const 
     const double before_mm = points[members.front()].sigma_mm;
     double variance_mm2 = before_mm * before_mm, count = 1;
     Eigen::Vector3d place_mm = points[members.front()].place_mm, from_camera = Eigen::Vector3d::Zero();
+    ByLensErrors by_lens_mm = points[members.front()].by_lens_mm;
     for (int round = 0; round < 5; ++round) {
       const double scale2 = 9 * variance_mm2;
       double sum = 0, sum_off = 0, sum_square = 0;
       place_mm.setZero();
       from_camera.setZero();
+      by_lens_mm.setZero();
       for (std::size_t n = 0; n < members.size(); ++n) {
         const SeenPoint& point = points[members[n]];
         const double from_mean = off_mm[n] - mean_mm;
@@ -57,10 +59,12 @@ std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const 
         sum_off += weight * off_mm[n];
         sum_square += weight * from_mean * from_mean;
         place_mm += weight * point.place_mm;
+        by_lens_mm += weight * point.by_lens_mm;
         if (point.from_camera) from_camera += weight * *point.from_camera;
       }
       mean_mm = sum_off / sum;
       place_mm /= sum;
+      by_lens_mm /= sum;
       variance_mm2 = (kBefore * before_mm * before_mm + sum_square) / (kBefore + sum);
       count = sum;
     }
@@ -69,6 +73,7 @@ std::vector<SeenPoint> gathered_points(std::span<const SeenPoint> points, const 
     place_mm += (mean_mm - surface.distance().distance_mm(place_mm)) * normal;
     SeenPoint gathered{place_mm, std::max(kLeastSigma_mm, std::sqrt(variance_mm2 * (1 / count + kCommon))),
                        std::nullopt, points[members.front()].shift_mm, points[members.front()].broad_mm};
+    gathered.by_lens_mm = by_lens_mm;
     if (points[members.front()].from_camera) gathered.from_camera = from_camera.normalized();
     out.push_back(gathered);
   }

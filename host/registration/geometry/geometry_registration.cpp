@@ -63,6 +63,23 @@ Result<void> check_pictures(const std::vector<VideoView>& views, std::span<const
   return {};
 }
 
+std::vector<CameraModel> cameras_of(const std::vector<VideoView>& views) {
+  std::vector<CameraModel> out;
+  for (const VideoView& view : views) out.push_back(view.camera);
+  return out;
+}
+
+/// A covariance a view, each of numbers, and of a variance that is none below zero.
+Result<void> check_lenses(std::size_t views, const std::vector<std::optional<CameraMatrix>>& covariances) {
+  if (!covariances.empty() && covariances.size() != views)
+    return Error{Errc::bad_value, fmt::format("{} covariances of lenses for {} views", covariances.size(), views)};
+  for (const auto& covariance : covariances) {
+    if (covariance && !(covariance->allFinite() && covariance->diagonal().minCoeff() >= 0))
+      return Error{Errc::bad_value, "a lens's covariance is none; calibrate the lens again"};
+  }
+  return {};
+}
+
 /// Places whose error is none would be believed against everything else.
 Result<void> check_places(const GeometrySettings& settings) {
   for (std::size_t i = 0; i < settings.touches.size(); ++i) {
@@ -143,12 +160,15 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
                                            const GeometrySettings& settings) {
   if (auto good = check_pictures(views, pictures); !good) return good.error();
   if (auto good = check_places(settings); !good) return good.error();
+  if (auto good = check_lenses(views.size(), settings.camera_covariances); !good) return good.error();
   const SignedDistance& distance = organ.distance;
   ViewRegistration out;
   std::vector<PinholeView> seen_by;
   const SeenSurface rest(distance);
+  const auto lenses = lens_errors(cameras_of(views), settings.camera_covariances);
   for (std::size_t n = 0; n < views.size(); ++n) {
     seen_by.push_back(pinhole_view(views[n], pictures[n]));
+    seen_by.back().lens_error = lenses[n];
     if (auto good = check_seen(views[n], seen_by.back(), rest); !good) return good.error();
   }
 

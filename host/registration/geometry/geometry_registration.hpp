@@ -2,12 +2,14 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calibration/base/image_view.hpp"
 #include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "host/registration/geometry/matched_point.hpp"
 #include "host/registration/geometry/organ_at_rest.hpp"
 #include "host/registration/geometry/seen_point.hpp"
@@ -27,6 +29,9 @@ struct GeometrySettings {
   /// Whether touches close together are told as one, for their errors are alike: those of a stroke. The result's
   /// touches are the gathered ones then.
   bool gather_touches = false;
+  /// How well each view's lens is known: what that does to the places counts in every error that is to be expected.
+  /// None at all, or one a view; an empty one: its lens is taken for exact.
+  std::vector<std::optional<CameraMatrix>> camera_covariances;
   std::vector<MatchedPoint> matched;  ///< what is known both at rest and now
   /// Registers the views by similarity of renderings: asked once, where stereo finds little. What it finds are further
   /// places of the surface, of a large error that neighbours share. Empty: stereo, outlines and touches alone tell.

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -183,6 +184,7 @@ std::vector<SeenPoint> of_view(const PinholeView& view, const SeenSurface& surfa
       const Closest closest = closest_place(surface, view, ray, met->depth_mm);
       if (std::abs(closest.distance_mm) > most_mm) continue;
       out.push_back({view.eye_in_patient_mm + closest.depth_mm * ray, kSigma_mm, std::nullopt});
+      out.back().by_lens_mm = by_lens_errors(out.back().place_mm, std::array{&view});
     }
   }
   return out;

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <opencv2/core.hpp>
 
 #include "calibration/base/image_view.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "host/registration/geometry/lens_error.hpp"
 #include "host/registration/views/synthetic_view.hpp"
 
 namespace birdseye::host {
@@ -15,11 +17,12 @@ struct PinholeView {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   Transform<Camera, Patient> camera_from_patient;
   Eigen::Vector3d eye_in_patient_mm;
-  cv::Mat smooth;   ///< float: grey, smoothed by a pixel
-  cv::Mat texture;  ///< float: log of grey without its slow changes; NaN where not usable
-  cv::Mat colour;   ///< 8 bits a channel, RGB
-  cv::Mat lens;     ///< 8 bit: not 0 where the picture shows anything at all
-  cv::Mat usable;   ///< 8 bit: not 0 where moreover nothing glares
+  std::shared_ptr<const LensError> lens_error;  ///< null: not known, and the lens taken for exact
+  cv::Mat smooth;                               ///< float: grey, smoothed by a pixel
+  cv::Mat texture;                              ///< float: log of grey without its slow changes; NaN where not usable
+  cv::Mat colour;                               ///< 8 bits a channel, RGB
+  cv::Mat lens;                                 ///< 8 bit: not 0 where the picture shows anything at all
+  cv::Mat usable;                               ///< 8 bit: not 0 where moreover nothing glares
 
   /// Along the pixel's ray: one unit is one mm of depth.
   [[nodiscard]] Eigen::Vector3d ray(double x_px, double y_px) const {

@@ -10,6 +10,10 @@ inline constexpr int kCommonErrors = 7;
 using ByCommonErrors = Eigen::Matrix<double, 3, kCommonErrors>;  ///< how they move a place, mm
 using CommonErrors = Eigen::Matrix<double, kCommonErrors, 1>;
 
+/// How errors of the views' lenses, each independent and of a standard deviation of 1, move a place, mm: as many
+/// columns as there are such errors, and none where nothing is known of them.
+using ByLensErrors = Eigen::Matrix3Xd;
+
 /// What a standard deviation may be of a place that is given from outside: smaller ones contradict one another where a
 /// place is given twice, and beyond the larger a place tells nothing of an organ.
 inline constexpr double kLeastGivenSigma_mm = 0.01, kMostGivenSigma_mm = 100;
@@ -24,6 +28,7 @@ struct SeenPoint {
   double shift_mm = 0;
   double broad_mm = 0;  ///< a standard deviation of what places within some 25 mm have wrong together; 0: nothing
   ByCommonErrors by_common_mm = ByCommonErrors::Zero();  ///< of a place that views tell of, where these errors count
+  ByLensErrors by_lens_mm = ByLensErrors(3, 0);          ///< likewise
 };
 
 }  // namespace birdseye::host

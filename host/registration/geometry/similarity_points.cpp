@@ -11,6 +11,8 @@ std::vector<SeenPoint> similarity_points(const std::vector<PinholeView>& views, 
   // Mutual information finds the surface to 1.2 mm across it, and places within 25 mm err together.
   constexpr double kGrid_px = 24, kSigma_mm = 0.4, kBroad_mm = 1.2;
   const SeenSurface surface(deformed_distance(organ, field));
+  std::vector<const PinholeView*> all;
+  for (const PinholeView& view : views) all.push_back(&view);
   std::vector<SeenPoint> out;
   for (const GridPixel& pixel : patch_grid(views, kGrid_px)) {
     const PinholeView& view = views[pixel.view];
@@ -21,6 +23,7 @@ std::vector<SeenPoint> similarity_points(const std::vector<PinholeView>& views, 
     const Eigen::Vector3d place_mm = view.eye_in_patient_mm + met->depth_mm * ray;
     if (-surface.normal(place_mm).dot(ray.normalized()) < kPatchFacing) continue;
     out.push_back({place_mm, kSigma_mm, ray.normalized(), 0, kBroad_mm});
+    out.back().by_lens_mm = by_lens_errors(place_mm, all);
   }
   return out;
 }

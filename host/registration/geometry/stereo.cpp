@@ -22,6 +22,7 @@ constexpr int kPeak = 4;  ///< steps to each side of a peak that are its own
 struct Found {
   Eigen::Vector3d place_mm, normal, from_camera;
   double sigma_mm;
+  ByLensErrors by_lens_mm;
 };
 
 /// Over the views that show the patch at this depth; -1: none does.
@@ -59,8 +60,11 @@ class Sweep {
     if (!patch) return std::nullopt;
     const int half = static_cast<int>(std::lround(settings_.span_mm / settings_.step_mm));
     std::vector<PatchSeenBy> seen_by;
+    std::vector<const PinholeView*> all{&views_[v]};
     for (std::size_t w = 0; w < views_.size(); ++w) {
-      if (w != v && sight_.sees(w, patch->place_mm)) seen_by.emplace_back(*patch, views_[w]);
+      if (w == v || !sight_.sees(w, patch->place_mm)) continue;
+      seen_by.emplace_back(*patch, views_[w]);
+      all.push_back(&views_[w]);
     }
     if (seen_by.empty()) return std::nullopt;
     std::vector<float> score(2 * static_cast<std::size_t>(half) + 1, -1);
@@ -90,7 +94,8 @@ class Sweep {
     const double facing = -patch->normal.dot(patch->ray);
     const double of_peak_mm = settings_.step_mm * facing * std::sqrt(static_cast<double>((1 - at(best)) / bend));
     const double sigma_mm = std::hypot(kOfPeak * of_peak_mm, kBeside_mm);
-    return Found{views_[v].eye_in_patient_mm + depth * patch->ray, patch->normal, patch->ray.normalized(), sigma_mm};
+    const Eigen::Vector3d place_mm = views_[v].eye_in_patient_mm + depth * patch->ray;
+    return Found{place_mm, patch->normal, patch->ray.normalized(), sigma_mm, by_lens_errors(place_mm, all)};
   }
 
   const std::vector<PinholeView>& views_;
@@ -162,7 +167,9 @@ std::vector<SeenPoint> stereo_points(const std::vector<PinholeView>& views, cons
   const std::vector<bool> keep = in_line(found);
   std::vector<SeenPoint> out;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (keep[i]) out.push_back({found[i].place_mm, found[i].sigma_mm, found[i].from_camera});
+    if (!keep[i]) continue;
+    out.push_back({found[i].place_mm, found[i].sigma_mm, found[i].from_camera});
+    out.back().by_lens_mm = found[i].by_lens_mm;
   }
   return out;
 }
