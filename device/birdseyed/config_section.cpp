@@ -8,6 +8,9 @@
 #include <sstream>
 #include <toml.hpp>
 
+#include "calibration/base/nesting.hpp"
+#include "calibration/base/parser_words.hpp"
+
 namespace birdseye::device {
 
 struct ConfigValue : toml::value {
@@ -166,17 +169,19 @@ void ConfigSection::finish() {
 }
 
 Result<ConfigFile> ConfigFile::parse(const std::string& text, const std::filesystem::path& path) {
+  if (nests_too_deeply(text, Notation::toml)) {
+    return Error{
+        Errc::bad_format,
+        fmt::format("{}: nests lists, tables or keys deeper than any configuration; write it anew", path.string())};
+  }
   try {
     std::istringstream stream(text);
     return ConfigFile(std::make_shared<ConfigValue>(toml::parse(stream, path.string())));
   } catch (const toml::syntax_error& problem) {
-    // The first line of toml11's message says what; the rest draws the place.
-    const std::string what = problem.what();
     return Error{Errc::bad_format, fmt::format("{}:{}: is not TOML (texts need quotes): {}", path.string(),
-                                               problem.location().line(), what.substr(0, what.find('\n')))};
+                                               problem.location().line(), parser_words(problem.what()))};
   } catch (const std::exception& problem) {
-    const std::string what = problem.what();
-    return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), what.substr(0, what.find('\n')))};
+    return Error{Errc::bad_format, fmt::format("{}: is not TOML: {}", path.string(), parser_words(problem.what()))};
   }
 }
 

@@ -5,12 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <iterator>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
 #include <toml.hpp>
 
+#include "calibration/base/nesting.hpp"
+#include "calibration/base/parser_words.hpp"
 #include "host/case/named_landmarks.hpp"
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
@@ -373,12 +377,17 @@ Result<RegistrationCase> read_case(const fs::path& path) {
         Errc::unreadable,
         fmt::format("{}: is no file; name the case's TOML file, as birdseye-sim case writes it", path.string())};
   }
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  if (nests_too_deeply(text.str(), Notation::toml)) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: nests lists, tables or keys deeper than any case; write it anew", path.string())};
+  }
   toml::value all;
   try {
-    all = toml::parse(path.string());
+    all = toml::parse(text, path.string());
   } catch (const std::exception& problem) {
-    std::string what = problem.what();
-    return Error{Errc::bad_format, fmt::format("{}: is no case: {}", path.string(), what.substr(0, what.find('\n')))};
+    return Error{Errc::bad_format, fmt::format("{}: is no case: {}", path.string(), parser_words(problem.what()))};
   }
   if (auto known = only_known_keys(path, "", all); !known) return known.error();
   RegistrationCase out;

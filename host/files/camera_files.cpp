@@ -8,8 +8,10 @@
 #include <array>
 #include <fstream>
 #include <opencv2/core.hpp>
+#include <sstream>
 #include <vector>
 
+#include "calibration/base/nesting.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -210,6 +212,11 @@ Result<void> check_file(const fs::path& path) {
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   if (fs::file_size(path, ignored) > kMostBytes)
     return Error{Errc::bad_format, fmt::format("{}: is no camera file: it is larger than 10 MB", path.string())};
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  if (nests_too_deeply(text.str(), Notation::yaml_or_xml))
+    return Error{Errc::bad_format,
+                 fmt::format("{}: is no camera file: it nests lists deeper than any; write it anew", path.string())};
   return {};
 }
 

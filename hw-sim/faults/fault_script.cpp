@@ -5,11 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string>
 #include <toml.hpp>
 
+#include "calibration/base/nesting.hpp"
+#include "calibration/base/parser_words.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/faults/fault_table.hpp"
 
@@ -186,9 +190,15 @@ Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instrum
   if (!std::filesystem::is_regular_file(path, error)) {
     return Error{Errc::not_found, fmt::format("{}: no such file of faults", path.string())};
   }
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  if (nests_too_deeply(text.str(), Notation::toml)) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: nests lists, tables or keys deeper than any script; write it anew", path.string())};
+  }
   try {
     Reader reader(instruments, seed);
-    reader.read(toml::parse(path.string()));
+    reader.read(toml::parse(text, path.string()));
     if (const std::string problems = reader.problems(); !problems.empty()) {
       return Error{Errc::bad_value, fmt::format("{}: {}", path.string(), problems)};
     }
@@ -197,10 +207,10 @@ Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instrum
     }
     return std::move(reader.script);
   } catch (const toml::syntax_error& problem) {
-    return Error{Errc::bad_format,
-                 fmt::format("{}: line {}: is not TOML: {}", path.string(), problem.location().line(), problem.what())};
+    return Error{Errc::bad_format, fmt::format("{}: line {}: is not TOML: {}", path.string(), problem.location().line(),
+                                               parser_words(problem.what()))};
   } catch (const std::exception& problem) {
-    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), problem.what())};
+    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), parser_words(problem.what()))};
   }
 }
 

@@ -1,0 +1,40 @@
+#include "calibration/base/nesting.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace birdseye {
+namespace {
+
+std::string times(int count, const std::string& text) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+TEST(Nesting, DeepOnesAreFound) {
+  for (const auto& text : {"x = " + times(70, "["), "x = " + times(70, "{a=") + "1", times(70, "a.") + "a = 1",
+                           "[" + times(70, "'a' . ") + "a]"}) {
+    EXPECT_TRUE(nests_too_deeply(text, Notation::toml)) << text;
+  }
+  for (const auto& text : {"x: " + times(70, "["), times(70, "<a>"), "x:\n  " + times(70, "- ") + "1"}) {
+    EXPECT_TRUE(nests_too_deeply(text, Notation::yaml_or_xml)) << text;
+  }
+}
+
+TEST(Nesting, WhatUsersWriteIsNot) {
+  for (const auto& text : {std::string("[tracker]\ndevice = \"/dev/serial/by-id/usb-FTDI_1.2.3\"\n"),
+                           "# " + times(80, ".") + "\n[a.b.c]\n", "x = [" + times(200, "0.5, ") + "1]\n",
+                           times(200, "[[fault]]\nname = \"drop_byte\"\n")}) {
+    EXPECT_FALSE(nests_too_deeply(text, Notation::toml)) << text;
+  }
+  for (const auto& text : {"# " + times(80, "-") + "\n---\nx: 1\n", "data: [" + times(200, " -0.5,") + " 1. ]\n",
+                           "<a>" + times(200, "<b>1. 2.</b><c/>") + "</a>", times(200, "-\n"),
+                           "x: " + times(90, "-") + "\n", "<data>" + times(200, " 1. -2.") + "</data>"}) {
+    EXPECT_FALSE(nests_too_deeply(text, Notation::yaml_or_xml)) << text;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye
