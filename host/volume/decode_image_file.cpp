@@ -5,6 +5,7 @@
 #include <itkNrrdImageIO.h>
 #include <zlib.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -14,11 +15,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "drivers/system/process_copy.hpp"
 #include "host/volume/decode.hpp"
+#include "host/volume/stated_geometry.hpp"
 #include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
@@ -48,14 +51,39 @@ class NiftiFile {
     return file;
   }
 
-  [[nodiscard]] bool header_is_finite() const {
+  /// Whether its numbers are finite, and those of places no further off than a patient may lie: the reader takes for
+  /// ever over 1e38 mm.
+  [[nodiscard]] bool header_is_sound() const {
     // pixdim, vox_offset, scl_slope, scl_inter, quaternion and offsets, the three rows of the affine map.
-    for (const auto& [begin, end] : {std::pair{76UL, 120UL}, {256UL, 328UL}}) {
+    constexpr float kFurthest = 1e6F;
+    for (const auto& [begin, end, most] :
+         {std::tuple{76UL, 108UL, kFurthest}, {108UL, 120UL, INFINITY}, {256UL, 328UL, kFurthest}}) {
       for (std::size_t at = begin; at < end; at += 4) {
-        if (!std::isfinite(number<float>(at))) return false;
+        if (!std::isfinite(number<float>(at)) || std::abs(number<float>(at)) > most) return false;
       }
     }
     return true;
+  }
+
+  /// What is wrong with what the header says of where the voxels lie; empty where it says so, and once.
+  [[nodiscard]] std::string geometry_fault(const std::array<int, 3>& size) const {
+    const bool by_quaternion = number<std::int16_t>(252) > 0, by_matrix = number<std::int16_t>(254) > 0;
+    if (!by_quaternion && !by_matrix)
+      return "does not say where its voxels lie (neither its qform nor its sform is set); save it again by the "
+             "program that made it, or convert the DICOM series anew";
+    if (!by_quaternion || !by_matrix) return {};
+    double apart_mm = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector4d voxel((corner & 1) * (size[0] - 1), (corner >> 1 & 1) * (size[1] - 1),
+                                  (corner >> 2) * (size[2] - 1), 1);
+      apart_mm = std::max(apart_mm, ((quaternion_map() - matrix_map()) * voxel).norm());
+    }
+    const double least_mm = std::min({number<float>(80), number<float>(84), number<float>(88)});
+    if (apart_mm <= 0.5 * least_mm) return {};
+    return fmt::format(
+        "says two places for its voxels, {:.1f} mm apart: its qform and its sform differ; keep the one "
+        "that is right (as by fslorient -copysform2qform)",
+        apart_mm);
   }
 
   /// Of so many numbers, by bitpix.
@@ -91,6 +119,24 @@ class NiftiFile {
 
  private:
   static constexpr std::int32_t kHeaderBytes = 348;
+  using Map = Eigen::Matrix<double, 3, 4>;  // from voxel indices to mm, RAS
+
+  [[nodiscard]] Map matrix_map() const {
+    Map map;
+    for (int k = 0; k < 12; ++k) map(k / 4, k % 4) = number<float>(280 + 4 * static_cast<std::size_t>(k));
+    return map;
+  }
+  [[nodiscard]] Map quaternion_map() const {
+    const double b = number<float>(256), c = number<float>(260), d = number<float>(264);
+    const double a = std::sqrt(std::max(0.0, 1 - b * b - c * c - d * d));
+    const double handedness = number<float>(76) < 0 ? -1 : 1;
+    Map map;
+    map.leftCols<3>() =
+        Eigen::Quaterniond(a, b, c, d).normalized().toRotationMatrix() *
+        Eigen::Vector3d(number<float>(80), number<float>(84), handedness * number<float>(88)).asDiagonal();
+    map.col(3) = Eigen::Vector3d(number<float>(268), number<float>(272), number<float>(276));
+    return map;
+  }
 
   static bool read(const fs::path& path, std::size_t offset, char* to, std::size_t bytes) {
     const gzFile file = gzopen(path.c_str(), "rb");
@@ -140,6 +186,8 @@ void take_whole(itk::ImageIOBase& io) {
   for (unsigned axis = 0; axis < io.GetNumberOfDimensions(); ++axis) whole.SetSize(axis, io.GetDimensions(axis));
   io.SetIORegion(whole);
 }
+
+constexpr double kLeastSpacingMm = 0.01;
 
 constexpr char kFilling = '\xA5';  // as 16 bits no Hounsfield unit of a patient, so that it shows
 
@@ -223,9 +271,12 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
   const std::string why_cut = "is cut short or damaged; export it again";
   try {
     const auto nifti = std::string(io->GetNameOfClass()) == "NiftiImageIO" ? NiftiFile::open(path) : std::nullopt;
-    if (nifti && !nifti->header_is_finite()) {
-      return refused(Errc::bad_value, path, "has numbers in its header that are not finite; export it again");
+    if (nifti && !nifti->header_is_sound()) {
+      return refused(Errc::bad_value, path,
+                     "has numbers in its header that are not finite or no place of a patient; export it again");
     }
+    if (const std::string unstated = unstated_geometry(path); !unstated.empty())
+      return refused(Errc::bad_format, path, unstated);
     io->SetFileName(path.string());
     io->ReadImageInformation();
     for (unsigned axis = 3; axis < io->GetNumberOfDimensions(); ++axis) {
@@ -248,10 +299,17 @@ Result<ImageFile> decode_image_file(const fs::path& path, int components) {
       image.size[axis] = static_cast<int>(io->GetDimensions(axis));
       count *= io->GetDimensions(axis);
       image.spacing_mm[axis] = io->GetSpacing(axis);
+      if (image.spacing_mm[axis] < kLeastSpacingMm) {
+        return refused(
+            Errc::bad_value, path,
+            fmt::format("has voxels {:.4g} mm apart; is it in metres? Export it in mm", io->GetSpacing(axis)));
+      }
       image.origin_mm[axis] = io->GetOrigin(axis);
       for (unsigned row = 0; row < 3; ++row) image.axes(row, axis) = io->GetDirection(axis)[row];
     }
     if (nifti) {
+      if (const std::string fault = nifti->geometry_fault(image.size); !fault.empty())
+        return refused(Errc::bad_value, path, fault);
       // By the file's own type: a slope makes the reader give floats where the file holds integers.
       const std::string fault = nifti->fault(nifti->bytes_of(count));
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);

@@ -119,6 +119,7 @@ TEST(Import, RefusesWithAReason) {
     put(72, std::int16_t{32});
     for (std::size_t i = 0; i < 4; ++i) put(76 + 4 * i, 1.0F);
     put(108, 352.0F);
+    put(252, std::int16_t{1});
     std::memcpy(header.data() + 344, "n+1", 4);
     std::ofstream out(scratch / "nan.nii", std::ios::binary);
     out.write(header.data(), static_cast<std::streamsize>(header.size()));
