@@ -66,7 +66,8 @@ Result<void> write_file(const fs::path& path, const std::string& text) {
 }
 
 std::string text_of(const nlohmann::json& json) {
-  return json.dump(2) + "\n";
+  // Names may come from files in other encodings: what is found is not lost for one of them.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace birdseye::host
