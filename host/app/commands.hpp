@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
 
 #include "calibration/base/result.hpp"
 #include "drivers/system/program.hpp"
@@ -16,6 +17,10 @@ struct CommandStatus {
   /// Prints `birdseye: <what>` on standard error and turns the exit code to 2.
   void refuse(const Error& error);
 };
+
+/// For CLI11's check of an option that names a picture to write: what is wrong with the name, empty where it ends in
+/// .png.
+std::string png_name(const std::string& file);
 
 // One file per command: each adds its subcommand, whose callback sets status.
 void add_bench(CLI::App& app, CommandStatus& status);

@@ -52,16 +52,19 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   const auto out = register_fiducials(options.files, *input);
   if (!out) return out.error();
   const Verdict verdict = judge_fiducials(*out);
-  if (auto written =
-          write_files({{options.out, pose_text(out->patient_from_tracker().matrix())},
-                       {options.map, options.map.empty() ? "" : png_of(fiducials_map(*input, *out).view())},
-                       {options.report, options.report.empty() ? "" : fiducials_page(*input, *out, verdict).html()},
-                       {options.json, text_of(fiducials_json(*input, *out, verdict))}});
+  const bool failed = verdict.grade == Grade::fail;
+  if (auto written = write_files(
+          {{failed ? std::filesystem::path() : options.out, pose_text(out->patient_from_tracker().matrix())},
+           {options.map, options.map.empty() ? "" : png_of(fiducials_map(*input, *out).view())},
+           {options.report, options.report.empty() ? "" : fiducials_page(*input, *out, verdict).html()},
+           {options.json, text_of(fiducials_json(*input, *out, verdict))}});
       !written) {
     return written.error();
   }
   print(*input, *out, verdict);
-  return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
+  if (!failed) return ExitCode::success;
+  fmt::print(stderr, "birdseye: {} is not written: the verdict is fail\n", options.out.string());
+  return ExitCode::verdict_fail;
 }
 
 }  // namespace
@@ -83,7 +86,8 @@ void add_register(CLI::App& app, CommandStatus& status) {
   fiducials.add_option("--volume", options->files.volume.path,
                        "the CT: predicts the error over it, and shows it in the map");
   add_ct_options(fiducials, options->files.volume);
-  fiducials.add_option("--map", options->map, "a PNG of the predicted error, in slices through the first target");
+  fiducials.add_option("--map", options->map, "a PNG of the predicted error, in slices through the first target")
+      ->check(png_name);
   CLI::Option* surface = fiducials.add_option(
       "--surface", options->files.surface, "refine by this surface: VTK polygons, PLY, STL or OBJ, patient frame, mm");
   CLI::Option* surface_points =

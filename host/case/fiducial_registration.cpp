@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -36,6 +37,30 @@ Result<calibration::PointFit<Patient, Tracker>> fit_fiducials(const FiducialFile
   input.ct_mm = std::move(ordered);
   input.ct_of_touch = std::move(matched->ct_of_touch);
   return std::move(matched->fit);
+}
+
+/// Root mean square distance from the points' middle.
+double spread_of(const Points& points) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) middle += point / static_cast<double>(points.size());
+  double sum = 0;
+  for (const Eigen::Vector3d& point : points) sum += (point - middle).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(points.size()));
+}
+
+/// By the points' shapes: whether one of the two is in metres, or mirrored.
+std::string misfit_advice(const FiducialInput& input, double fre_rms_mm) {
+  const double ratio = spread_of(input.ct_mm) / spread_of(input.touched_mm);
+  const auto near = [](double value) { return value > 900 && value < 1100; };
+  if (near(ratio)) return "the touched points seem to be in metres: give mm";
+  if (near(1 / ratio)) return "the points of the CT seem to be in metres: give mm";
+  Points mirrored = input.touched_mm;
+  for (Eigen::Vector3d& point : mirrored) point.x() *= -1;
+  const auto fitted = calibration::fit_points<Patient, Tracker>(input.ct_mm, mirrored);
+  if (fitted && fitted->fre_rms_mm < 5 && fitted->fre_rms_mm < fre_rms_mm / 4) {
+    return "one of the two files is mirrored: one axis has the wrong sign (between 3D Slicer's RAS and LPS, two have)";
+  }
+  return "are the points in the same order? --match finds it";
 }
 
 nlohmann::json rows_of(const Eigen::Matrix4d& m) {
@@ -103,6 +128,7 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   out.localisation = files.localisation_mm
                          ? calibration::LocalisationError{*files.localisation_mm, *files.localisation_mm, 0}
                          : calibration::localisation_error_of(out.fit.fre_rms_mm, input.ct_mm.size());
+  out.misfit_advice = misfit_advice(input, out.fit.fre_rms_mm);
   out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
   const calibration::TargetError predicted(input.ct_mm, out.localisation.rms_mm);
   for (const Eigen::Vector3d& target : input.targets_mm) out.tre_mm.push_back(predicted.rms_mm(target));
@@ -121,7 +147,7 @@ Verdict judge_fiducials(const FiducialsFound& out) {
   Verdict verdict;
   // What a fiducial registration error means for a skin-marker registration of the liver.
   verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, 5,
-                out.fit.fre_rms_mm > 5 ? "are the points in the same order?" : "touch the worst marker again");
+                out.fit.fre_rms_mm > 5 ? out.misfit_advice : "touch the worst marker again");
   for (std::size_t i = 0; i < out.tre_mm.size(); ++i) {
     verdict.judge(fmt::format("predicted error at target {}", i + 1), out.tre_mm[i], "mm", 3, 5,
                   "place markers round the target");

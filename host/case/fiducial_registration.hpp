@@ -49,6 +49,7 @@ struct FiducialsFound {
   std::vector<double> tre_mm;
   std::optional<TargetErrorRange> range;
   std::optional<SurfaceRefinement> refinement;
+  std::string misfit_advice;  ///< what to do where the points do not fit one another at all
   [[nodiscard]] const Transform<Patient, Tracker>& patient_from_tracker() const {
     return refinement ? refinement->patient_from_tracker : fit.to_from;
   }

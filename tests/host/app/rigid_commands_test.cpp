@@ -188,6 +188,25 @@ TEST(RigidCommands, ARealAbdomenWithoutMarkersHasNone) {
   }
 }
 
+TEST(RigidCommands, PointsThatDoNotFitAreNotWrittenAndTheReasonIsNamed) {
+  const Scratch scratch;
+  Points mirrored = kMarkers, metres = kMarkers, swapped = kMarkers;
+  for (Eigen::Vector3d& point : mirrored) point.x() *= -1;
+  for (Eigen::Vector3d& point : metres) point /= 1000;
+  std::swap(swapped[0], swapped[1]);
+  const std::string out = (scratch / "o.txt").string();
+  for (const auto& [points, words] :
+       {std::pair{mirrored, "is mirrored"}, {metres, "in metres"}, {swapped, "--match finds it"}}) {
+    const auto result =
+        run("birdseye", "register fiducials --ct " + scratch.file("p.txt", text_of(points)) + " --tracker " +
+                            scratch.file("t.txt", text_of(touched(kMarkers))) + " --out " + out);
+    EXPECT_EQ(result.code, 3) << result.output;
+    EXPECT_NE(result.output.find(words), std::string::npos) << words << "\n" << result.output;
+    EXPECT_NE(result.output.find("is not written: the verdict is fail"), std::string::npos) << result.output;
+    EXPECT_FALSE(fs::exists(out));
+  }
+}
+
 TEST(RigidCommands, RefuseBadInputInOneLine) {
   const Scratch scratch;
   const std::string points = scratch.file("p.txt", text_of(kMarkers));
