@@ -79,6 +79,16 @@ std::vector<T> taken(const Receive& receive) {
   return receive_values<T>(receive, count).value_or(std::vector<T>());
 }
 
+/// Whether it is a PLY whose header has no end: its reader seeks one for ever.
+bool is_endless_ply(const fs::path& path) {
+  constexpr std::streamsize kLongestHeader = 1 << 16;
+  std::ifstream file(path, std::ios::binary);
+  std::string head(kLongestHeader, '\0');
+  file.read(head.data(), kLongestHeader);
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return head.starts_with("ply") && head.find("end_header") == std::string::npos;
+}
+
 }  // namespace
 
 Result<Surface> read_surface(const fs::path& path) {
@@ -87,6 +97,10 @@ Result<Surface> read_surface(const fs::path& path) {
     return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   if (!std::ifstream(path))
     return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
+  if (is_endless_ply(path))
+    return Error{
+        Errc::bad_format,
+        fmt::format("{}: is cut short in its header, which has no end_header; export it again", path.string())};
   constexpr Duration kLongest = Duration::from_ms(60'000);
   Surface surface;
   const auto ran = run_isolated(

@@ -41,11 +41,17 @@ Result<Volume> slab_behind(const Surface& surface, const SlabSettings& settings)
   if (!(settings.spacing_mm > 0) || !(settings.depth_mm > 0) || !settings.seen_from_mm.allFinite())
     return Error{Errc::bad_value, "spacing and depth are lengths over 0 mm, and the eye is a point"};
   const SurfaceIndex index(surface);
-  Box box;
+  Box box, surface_box;
   for (const Eigen::Vector3f& vertex : surface.vertices_mm) {
     const Eigen::Vector3d p = vertex.cast<double>();
+    surface_box.add(p);
     box.add(p);
     box.add(p + settings.depth_mm * (p - settings.seen_from_mm).normalized());
+  }
+  if (const double across_mm = (surface_box.high - surface_box.low).maxCoeff(); across_mm < 2 * settings.spacing_mm) {
+    return Error{Errc::bad_value, fmt::format("the surface is {:.3g} mm across; is it in metres? Give it in mm, or a "
+                                              "smaller --spacing-mm",
+                                              across_mm)};
   }
   std::size_t met = 0;
   for (const auto& t : surface.triangles) {

@@ -204,6 +204,7 @@ TEST(SurfaceFile, RefusesWhatIsNoSurfaceInOneLine) {
   expect(scratch.path().string(), "no such file");
   expect(scratch.file("text.ply", "what"), "no triangles");
   expect(scratch.file("text.vtk", "what"), "no triangles");
+  expect(scratch.file("cut.ply", "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\n"), "end_header");
   expect(scratch.file("index.vtk",
                       "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 10 0 0 "
                       "10 20 0\nPOLYGONS 1 4\n3 0 1 9\n"),
