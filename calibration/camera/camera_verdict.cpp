@@ -131,6 +131,11 @@ Verdict judge_no_camera(const Error& error, std::span<const RejectedView> reject
                           "into all corners of the picture",
                           limits::kViewsPass));
   tell_rejected(rejected, verdict);
+  if (!rejected.empty()) {
+    verdict.next_steps.insert(verdict.next_steps.begin(),
+                              "see above why each view is rejected: is --board the pattern in the pictures, counted as "
+                              "it says (inner corners of a chessboard)?");
+  }
   return verdict;
 }
 

@@ -104,9 +104,15 @@ std::string why_not(const Pattern& pattern, const cv::Mat& grey) {
   const int step = std::max(box.width / std::max(1, size.cols - 1), box.height / std::max(1, size.rows - 1));
   const bool cut = box.x < step || box.y < step || box.br().x > small.cols - step || box.br().y > small.rows - step;
   const bool swapped = (size.cols < size.rows) != (pattern.columns < pattern.rows);
-  return fmt::format("a chessboard of {}x{} inner corners is seen where {}x{} are expected: {}",
-                     swapped ? size.rows : size.cols, swapped ? size.cols : size.rows, pattern.columns, pattern.rows,
-                     cut ? "part of it lies outside the picture" : "part of it is covered, or it is another board");
+  const int columns = swapped ? size.rows : size.cols, rows = swapped ? size.cols : size.rows;
+  const bool more = columns > pattern.columns || rows > pattern.rows;
+  const bool squares = columns == pattern.columns - 1 && rows == pattern.rows - 1;
+  return fmt::format("a chessboard of {}x{} inner corners is seen where {}x{} are expected: {}", columns, rows,
+                     pattern.columns, pattern.rows,
+                     more      ? "it is another board"
+                     : squares ? "were squares counted, and not inner corners? Else its border is covered"
+                     : cut     ? "part of it lies outside the picture"
+                               : "part of it is covered, or it is another board");
 }
 
 }  // namespace

@@ -197,7 +197,8 @@ void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
 std::string scale_in_words(double scale, double sigma, double square_mm) {
   constexpr double kNear = 0.1;
   const auto near = [&](double value) { return std::abs(scale / value - 1) < kNear; };
-  if (near(1e-3)) return "the board seems 1000 times smaller than stated: poses in metres, taken for millimetres?";
+  if (near(1e-3))
+    return "the board seems 1000 times smaller than stated: poses in metres, taken for millimetres? Give --unit m";
   if (near(1e3)) return "the board seems 1000 times larger than stated: its squares in metres, taken for millimetres?";
   if (near(25.4)) return "the board seems 25.4 times larger than stated: its squares in inches?";
   if (near(1 / 25.4)) return "the board seems 25.4 times smaller than stated: poses in inches?";

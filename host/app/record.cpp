@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
@@ -45,6 +46,7 @@ struct Ending {
 /// Until there is a reason to end.
 Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions& options, Progress& progress) {
   HostTime heard = host_now();
+  int told_s = -1;
   while (!interrupted()) {
     const RecordingFigures& figures = writer.figures();
     if (options.seconds > 0 && figures.seconds() >= options.seconds)
@@ -63,7 +65,8 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
     if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
       return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};
     if (auto added = writer.add(**event); !added) return {added.error().what};
-    progress(fmt::format("{:.0f} s, {} frames, {} poses", figures.seconds(), figures.frames, figures.measurements));
+    if (const int second = static_cast<int>(figures.seconds()); std::exchange(told_s, second) != second)
+      progress(fmt::format("{} s, {} frames, {} poses", second, figures.frames, figures.measurements));
   }
   return {"it was interrupted", true};
 }
@@ -125,6 +128,7 @@ Result<ExitCode> run(const RecordOptions& options) {
   fmt::print("{}: {:.1f} s, {} frames, {} measurements\n", options.out.string(), figures.seconds(), figures.frames,
              figures.measurements);
   for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  fmt::print("verdict: {}\n", name_of(verdict.grade));
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

@@ -218,7 +218,7 @@ void add_render(CLI::App& app, CommandStatus& status) {
   CLI::Option* const over =
       command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
   for (CLI::Option* const option : add_look_options(command, options->look)) option->needs(over);
-  command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over");
+  command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over")->check(png_name);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");
   command.add_option("--clip", options->clip, "share of the depth cut away in the view without a camera (default 0.5)")

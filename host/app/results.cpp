@@ -19,6 +19,14 @@ std::string folder_is_there(const std::string& file) {
   return fmt::format("{}: there is no folder {}; make it first", file, folder.string());
 }
 
+/// Likewise: a file that is there and is no sound calibration record would be left alone.
+std::string record_is_sound(const std::string& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return "";
+  const auto record = read_record(file);
+  return record ? "" : record.error().what;
+}
+
 }  // namespace
 
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record) {
@@ -27,7 +35,8 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
   if (record)
     command.add_option("--record", paths.record, "the scope's calibration record, which gets this as an entry")
         ->type_name("FILE")
-        ->check(folder_is_there);
+        ->check(folder_is_there)
+        ->check(record_is_sound);
   command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
       ->type_name("FILE")
       ->check(folder_is_there);

@@ -242,7 +242,7 @@ void add_volume_markers(CLI::App& volume, CommandStatus& status) {
       ->allow_extra_args(false);
   markers.add_option("--out", options->out, "centres to write, x y z a line, mm, as `register fiducials` reads")
       ->required();
-  markers.add_option("--picture", options->picture, "a PNG of what was found");
+  markers.add_option("--picture", options->picture, "a PNG of what was found")->check(png_name);
   markers.add_option("--report", options->report, "a page with the figures and pictures (HTML)");
   markers.add_option("--json", options->json, "write the figures to this file");
   markers.callback([options, &status] {

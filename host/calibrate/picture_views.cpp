@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -52,7 +53,10 @@ Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or
     }
     if (failure) return Error{Errc::unreadable, path.string() + ": " + failure.message()};
   }
-  if (pictures.empty()) return Error{Errc::not_found, "no pictures: give PNG or JPEG files, or a folder of them"};
+  if (pictures.empty())
+    return Error{Errc::not_found, fmt::format("{}: no picture in it; give PNG, JPEG, BMP, TIFF, PPM or PGM files, or a "
+                                              "folder of them",
+                                              images_or_folders.empty() ? "" : images_or_folders.front().string())};
   std::sort(pictures.begin(), pictures.end(),
             [](const fs::path& a, const fs::path& b) { return before_by_number(a.string(), b.string()); });
   return pictures;
@@ -81,8 +85,22 @@ void bring_back(const cv::Mat& stretched, const cv::Mat& grey, calibration::Patt
   for (Eigen::Vector2d& p : view.points_px) p = (p.array() + 0.5) * per_px - 0.5;
 }
 
+/// Whether it is a PNG without its last chunk; the reader would say so on standard error, in words of its own.
+bool is_cut_png(const fs::path& path) {
+  constexpr std::streamoff kLastBytes = 64;
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const std::streamoff size = file.tellg();
+  std::string first(4, '\0'), last(static_cast<std::size_t>(std::clamp<std::streamoff>(size, 0, kLastBytes)), '\0');
+  file.seekg(0);
+  file.read(first.data(), static_cast<std::streamsize>(first.size()));
+  file.seekg(std::max<std::streamoff>(0, size - kLastBytes));
+  file.read(last.data(), static_cast<std::streamsize>(last.size()));
+  return first == "\x89PNG" && last.find("IEND") == std::string::npos;
+}
+
 Looked look(const calibration::Pattern& pattern, const fs::path& path, double pixel_aspect) {
   Looked looked;
+  if (is_cut_png(path)) return looked;
   const cv::Mat grey = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
