@@ -1,9 +1,11 @@
 #include "host/operation/operation_keeper.hpp"
-#include "drivers/system/clock.hpp"
 
 #include <fmt/format.h>
 
 #include <utility>
+
+#include "drivers/system/clock.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 

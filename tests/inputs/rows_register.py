@@ -1,0 +1,164 @@
+"""birdseye register."""
+import math
+import random
+
+import boards
+import motion
+import volumes
+from judge import Row
+
+MARKERS = ((0, 0, 0), (120, 10, 5), (15, 140, -10), (130, 150, 30), (60, 70, 90), (-20, 60, 45))
+TRACKER_FROM_PATIENT = motion.product(motion.shift(300.0, -40.0, 120.0), motion.turn((0.3, -0.5, 1.0), 70.0))
+FIDUCIALS = "birdseye register fiducials --ct ct.txt --tracker touched.txt --out patient_from_tracker.txt --json r.json"
+BOTH = ("patient_from_tracker.txt", "r.json")
+
+
+def points_text(points):
+    return "".join(" ".join(f"{v:.5f}" for v in point) + "\n" for point in points)
+
+
+def fiducials(folder, count=6, change=None, noise_mm=0.3, header=""):
+    chance = random.Random(17)
+    places = [tuple(float(v) for v in marker) for marker in MARKERS[:count]]
+    touched = [tuple(v + chance.gauss(0, noise_mm) for v in motion.apply(TRACKER_FROM_PATIENT, place)) for place in places]
+    if change:
+        places, touched = change(places, touched)
+    (folder / "ct.txt").write_text(header + points_text(places))
+    (folder / "touched.txt").write_text(points_text(touched))
+
+
+def close(mm):
+    def check(folder, _):
+        found = motion.inverse(motion.read_matrix(folder / "patient_from_tracker.txt"))
+        off = max(math.dist(motion.apply(found, m), motion.apply(TRACKER_FROM_PATIENT, m)) for m in MARKERS)
+        return f"a marker is off by {off:.2f} mm" if off > mm else ""
+    return check
+
+
+def mirrored(places, touched):
+    return [(-x, y, z) for x, y, z in places], touched
+
+
+def swapped(places, touched):
+    return places, [touched[1], touched[0], *touched[2:]]
+
+
+def scrambled(places, touched):
+    return places, [touched[k] for k in (3, 0, 5, 1, 4, 2)]
+
+
+def one_off(places, touched):
+    return places, [*touched[:4], tuple(v + 8 for v in touched[4]), *touched[5:]]
+
+
+def in_metres(places, touched):
+    return places, [tuple(v / 1000 for v in point) for point in touched]
+
+
+def on_a_line(places, touched):
+    return [(10.0 * k, 5.0 * k, 0.0) for k in range(5)], [motion.apply(TRACKER_FROM_PATIENT, (10.0 * k, 5.0 * k, 0.0)) for k in range(5)]
+
+
+def with_nan(places, touched):
+    return places, [(math.nan, 0.0, 0.0), *touched[1:]]
+
+
+def one_more(places, touched):
+    return places, touched[:-1]
+
+
+def same_point(places, touched):
+    return places, [touched[0]] * len(touched)
+
+
+def comments(folder):
+    fiducials(folder, header="# x y z, mm, LPS\r\n")
+
+
+def named(folder):
+    """As 3D Slicer saves its points."""
+    fiducials(folder)
+    lines = (folder / "ct.txt").read_text().splitlines()
+    (folder / "ct.txt").write_text("# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n"
+                                   "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n" +
+                                   "".join(f"{k},{','.join(line.split())},0,0,0,1,1,1,0,F-{k},,\n" for k, line in enumerate(lines)))
+
+
+PELVIS = "$DATA/fiducial_registration_pelvis_phantom"
+
+
+def case(folder, **changes):
+    """A case of a CT and one picture, to be refused."""
+    volumes.write_nifti(folder / "ct.nii.gz")
+    (folder / "camera.yaml").write_text(boards.lens_yaml())
+    boards.write_views(folder, boards.chessboard, boards.poses(2), name="view{}.png", write=boards.draw.write_png)
+    boards.write_poses(folder, [motion.product(motion.shift(0, 0, 260.0), motion.turn((1, 0, 0), 90.0), motion.shift(15, 0, -140))] * 2,
+                       name="view{}.txt")
+    text = ('[volume]\npath = "ct.nii.gz"\ntransfer = "liver"\n[model]\ncontrol_points = "auto"\n' +
+            "".join(f'[[view]]\nimage = "view{k}.png"\ncamera = "camera.yaml"\ncamera_from_patient = "view{k}.txt"\n' for k in range(2)))
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    (folder / "case.toml").write_text(text)
+
+
+def case_but(old, new):
+    return lambda folder: case(folder, **{old: new})
+
+
+def case_without(name):
+    def make(folder):
+        case(folder)
+        (folder / name).unlink()
+    return make
+
+
+VIEWS = "birdseye register views --case case.toml --out out"
+
+ROWS = [
+    Row("register fiducials", "good", "six markers, touched to 0.3 mm", "pass; to 1 mm", FIDUCIALS, 0, fiducials, "pass", writes=BOTH,
+        check=close(1.0)),
+    Row("register fiducials", "good", "touched in another order, --match", "pass; the order is found", FIDUCIALS + " --match", 0,
+        lambda folder: fiducials(folder, change=scrambled), "pass", writes=BOTH, check=close(1.0)),
+    Row("register fiducials", "good", "four real markers of a pelvis phantom", "FRE 0.43 mm, as published",
+        f"birdseye register fiducials --ct {PELVIS}/pelvis_cropped_ct_fiducial_markers.txt --tracker {PELVIS}/Tracker_Fiducial_Markers.txt "
+        "--out patient_from_tracker.txt --json r.json", 0, verdict="pass", data=["fiducial_registration_pelvis_phantom"], says=["0\\.43"],
+        writes=BOTH),
+    Row("register fiducials", "odd", "one of six touched 14 mm off", "marginal; the fifth is named; to 1 mm without it", FIDUCIALS, 0,
+        lambda folder: fiducials(folder, change=one_off), "marginal", says=["\\b5\\b"], writes=BOTH),
+    Row("register fiducials", "odd", "three markers alone", "done, and said that a wrong one could not be told", FIDUCIALS, 0,
+        lambda folder: fiducials(folder, 3), "pass", says=["cannot be told"], writes=BOTH),
+    Row("register fiducials", "odd", "a remark before the points, DOS' ends of lines", "read all the same", FIDUCIALS, 0, comments, "pass",
+        writes=BOTH, check=close(1.0)),
+    Row("register fiducials", "odd", "the CT's points as 3D Slicer saves them (.fcsv)", "refused: what a line must be; or read", FIDUCIALS, 2,
+        named, says=["ct.txt", "line"]),
+    Row("register fiducials", "odd", "two markers in the wrong order", "fail; --match is named", FIDUCIALS, 3,
+        lambda folder: fiducials(folder, change=swapped), "fail", says=["order|--match"], writes=["r.json"]),
+    Row("register fiducials", "wrong", "mirrored: the CT's points in another handedness", "fail; they are mirrored", FIDUCIALS, 3,
+        lambda folder: fiducials(folder, change=mirrored), "fail", says=["mirror"], writes=["r.json"]),
+    Row("register fiducials", "wrong", "touches in metres", "fail; the unit is named", FIDUCIALS, 3,
+        lambda folder: fiducials(folder, change=in_metres), "fail", says=["metres"], writes=["r.json"]),
+    Row("register fiducials", "wrong", "all markers on a line", "refused: on a line", FIDUCIALS, 2,
+        lambda folder: fiducials(folder, change=on_a_line), says=["line"]),
+    Row("register fiducials", "wrong", "two markers", "refused: three are needed", FIDUCIALS, 2, lambda folder: fiducials(folder, 2),
+        says=["three|at least 3"]),
+    Row("register fiducials", "odd", "six markers, five touches, no --match", "refused: both numbers; --match", FIDUCIALS, 2,
+        lambda folder: fiducials(folder, change=one_more), says=["6", "5"]),
+    Row("register fiducials", "wrong", "a touch that is not a number", "refused: the line is named", FIDUCIALS, 2,
+        lambda folder: fiducials(folder, change=with_nan), says=["touched.txt", "line 1|1"]),
+    Row("register fiducials", "wrong", "the same touch six times", "refused: they are one point", FIDUCIALS, 2,
+        lambda folder: fiducials(folder, change=same_point), says=["touched|same|line"]),
+    Row("register views", "good", "a simulated case of three views", "pass; a field, a report; the error is less than before",
+        "birdseye-sim case --out case --seed 2 --views 4 --size 512x384 >/dev/null 2>&1 && birdseye register views --case case/case.toml --out out", 0,
+        says=["report.html: pass"], writes=["case/*", "out/*"], slow=True),
+    Row("register views", "wrong", "a CT that is not there", "refused: the path is named", VIEWS, 2, case_without("ct.nii.gz"), says=["ct.nii.gz"]),
+    Row("register views", "wrong", "a pose that is not there", "refused: the path is named", VIEWS, 2, case_without("view1.txt"),
+        says=["view1.txt"]),
+    Row("register views", "wrong", "a key that there is not", "refused: the key is named", VIEWS, 2,
+        case_but("[model]\n", "[model]\ncontroll_points = 3\n"), says=["controll_points"]),
+    Row("register views", "wrong", "an optimiser that there is not", "refused: those that there are", VIEWS, 2,
+        case_but("[model]\n", '[model]\noptimiser = "magic"\n'), says=["optimiser", "geometry"]),
+    Row("register views", "wrong", "views of a board, with no organ in them", "fail: no view tells where the organ is", VIEWS, 3, case,
+        says=["fail \\(no place of the surface"], writes=["out/result.json"], slow=True),
+    Row("register views", "wrong", "hostile deep_case.toml", "refused at once",
+        "birdseye register views --case $DATA/hostile/deep_case.toml --out out", 2, data=["hostile/deep_case.toml"], says=["deep_case.toml"]),
+]
