@@ -66,7 +66,7 @@ ROWS = [
         "mkdir session; echo mine > session/events.jsonl; birdseye record --server 127.0.0.1:$PORT --out session --seconds 1", 2,
         cart_at_port, beside=BESIDE, says=["session"], writes=["session/events.jsonl"]),
     Row("record", "wrong", "nobody listens there", "refused or fail within seconds: the address is named",
-        "birdseye record --server 127.0.0.1:1 --out session --seconds 1", 2, says=["127.0.0.1:1"]),
+        "birdseye record --server 127.0.0.1:1 --out session --seconds 1", 2, says=["127.0.0.1:1"], slow=True),
     Row("record", "wrong", "a port that is none", "refused", "birdseye record --server 127.0.0.1:99999 --out session --seconds 1", 2,
         says=["99999"]),
     Row("calibrate latency", "wrong", "an appliance whose scope moves, but whose video shows no texture", "refused: no motion is seen; what to look at",

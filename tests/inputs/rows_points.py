@@ -211,7 +211,7 @@ ROWS = [
     Row("calibrate tip", "wrong", "--phases beyond the file's end", "refused; how many poses there are", TIP_RUN + " --phases 0-99,150-900", 2,
         tip_file(lambda: table(pivot())), says=["900|200"]),
     Row("calibrate tip", "wrong", "an appliance that is not there", "refused within seconds; the address is named",
-        "birdseye calibrate tip --server 127.0.0.1:1 --seconds 2 --out tip.txt", 2, says=["127.0.0.1:1"]),
+        "birdseye calibrate tip --server 127.0.0.1:1 --seconds 2 --out tip.txt", 2, says=["127.0.0.1:1"], slow=True),
     Row("calibrate tip", "odd", "57 real poses of an optical pointer, with outliers", "marginal; the tip that the manual has, to 2 mm of the published one",
         TIP_RUN.replace("poses.csv", "$DATA/pivot_optical_pointer"), 0, verdict="marginal", data=["pivot_optical_pointer"], writes=TIP_BOTH,
         check=tip_close(2, (-14.473, 394.634, -7.407))),
@@ -259,5 +259,5 @@ ROWS = [
         says=["none.json"]),
     Row("calibrate record", "wrong", "--bind where no appliance is", "refused: the address is named; the record is left alone",
         RECORD.split(" && ")[0] + " >/dev/null; birdseye calibrate record scope.json --bind 127.0.0.1:1", 2, record_of,
-        says=["127.0.0.1:1"], writes=["scope.json"]),
+        says=["127.0.0.1:1"], writes=["scope.json"], slow=True),
 ]
