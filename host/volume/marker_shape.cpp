@@ -91,7 +91,8 @@ Result<void> check(const MarkerShape& s) {
   const bool hollow = s.kind == MarkerKind::ring || s.kind == MarkerKind::cylinder;
   if (s.kind == MarkerKind::post && s.diameter_mm == 0) return {};  // of any size
   if (!(s.diameter_mm > 0) || s.diameter_mm > kMost_mm)
-    return Error{Errc::bad_value, fmt::format("a marker {} mm across: give its outer diameter in mm (--diameter)", s.diameter_mm)};
+    return Error{Errc::bad_value,
+                 fmt::format("a marker {} mm across: give its outer diameter in mm (--diameter)", s.diameter_mm)};
   if (hollow && !(s.hole_mm > 0 && s.hole_mm < s.diameter_mm)) {
     return Error{Errc::bad_value,
                  fmt::format("a hole of {} mm in a marker {} mm across: give the hole's diameter in mm", s.hole_mm,
