@@ -131,6 +131,7 @@ std::vector<Eigen::Vector3d> find_fiducials(const Volume& ct, const std::stop_to
     if (posts.size() > markers.size()) markers = std::move(posts);
   }
   std::vector<Eigen::Vector3d> places_mm;
+  places_mm.reserve(markers.size());
   for (const MarkerFit& marker : markers) places_mm.push_back(marker.centre_in_patient_mm);
   return places_mm;
 }
