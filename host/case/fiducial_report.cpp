@@ -115,8 +115,9 @@ void add_error(HtmlPage& page, const FiducialInput& input, const FiducialsFound&
 /// Distances of the touched points from the surface, the least first.
 Curve distances_of(const std::string& name, const SurfaceIndex& surface, const std::vector<Vector3d>& touched_mm,
                    const Transform<Patient, Tracker>& pose) {
-  std::vector<double> distances_mm;
-  for (const Vector3d& place : touched_mm) distances_mm.push_back(surface.nearest(pose * place).distance_mm);
+  std::vector<double> distances_mm(touched_mm.size());
+  std::transform(touched_mm.begin(), touched_mm.end(), distances_mm.begin(),
+                 [&](const Vector3d& place) { return surface.nearest(pose * place).distance_mm; });
   std::sort(distances_mm.begin(), distances_mm.end());
   Curve curve{name, {}};
   for (std::size_t i = 0; i < distances_mm.size(); ++i)

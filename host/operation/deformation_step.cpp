@@ -47,7 +47,8 @@ std::string words_of(const std::vector<PlaceFit>& touches) {
 
 void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
                             std::shared_ptr<const PatientPlan> patient,
-                            std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches) {
+                            std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches,
+                            const std::optional<CameraMatrix>& camera_covariance) {
   if (running()) return;
   if (kept.size() < (touches.empty() ? kFewestViews : kFewestBesideTouches)) {
     note_.line = words("note_few_views", kept.size(), kEnoughViews);
@@ -68,13 +69,14 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
   dropped_ = false;
   if (made_.patient.lock() != patient || made_.transfer.lock() != transfer) made_ = {patient, transfer, nullptr};
   matching_.start([views = std::move(views), frames = std::move(frames), patient = std::move(patient),
-                   transfer = std::move(transfer), made = made_.organ,
-                   touches = std::move(touches)](const std::stop_token& stop, const auto& say) -> Result<Matched> {
+                   transfer = std::move(transfer), made = made_.organ, touches = std::move(touches),
+                   camera_covariance](const std::stop_token& stop, const auto& say) -> Result<Matched> {
     std::vector<RgbView> pictures;
     for (const wire::VideoFrame& frame : frames) pictures.push_back({*frame.rgb, frame.width_px, frame.height_px});
     GeometrySettings settings;
     settings.targets_at_rest_mm = {target_in_patient_mm(*patient)};
     settings.touches = touches;
+    settings.camera_covariances.assign(views.size(), camera_covariance);
     settings.gather_touches = true;
     settings.progress = say;
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };

@@ -21,9 +21,11 @@ namespace birdseye::host {
 /// Matches the CT with views. The thread that does it has copies of all it is given, and shares what is never changed.
 class DeformationStep {
  public:
-  /// touches: places of the organ's surface as it lies now, patient mm, whose neighbours err alike.
+  /// touches: places of the organ's surface as it lies now, patient mm, whose neighbours err alike. camera_covariance:
+  /// empty, how well the lens is known does not count in what is to be expected.
   void begin(std::span<const KeptView> views, const CameraModel& camera, std::shared_ptr<const PatientPlan> patient,
-             std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches = {});
+             std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches = {},
+             const std::optional<CameraMatrix>& camera_covariance = std::nullopt);
   void cancel() { matching_.cancel(); }
   /// True: another deformation was found.
   bool tick();

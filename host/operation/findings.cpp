@@ -11,9 +11,10 @@ Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, cons
     return Error{Errc::degenerate, "the verdict is fail" + why};
   }
   const auto& lens = found.stations.lens;
-  return CalibratedScope{ScopeSetup::of_hand_eye(*found.stations.input.camera,
-                                                 lens ? std::optional(lens->rms_px) : std::nullopt, found.hand_eye),
-                         made_utc, true};
+  return CalibratedScope{
+      ScopeSetup::of_hand_eye(*found.stations.input.camera, lens ? std::optional(lens->rms_px) : std::nullopt,
+                              found.hand_eye, lens ? std::optional(lens->covariance) : std::nullopt),
+      made_utc, true};
 }
 
 Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,

@@ -295,7 +295,8 @@ void LiveWorkflow::primary() {
       if (setup && patient_.plan() && patient_.transfer()) {
         matched_ = {views_.views(), setup->camera(), nullptr, nullptr};
         deformation_.begin(matched_.views, matched_.camera, patient_.plan(), patient_.transfer(),
-                           strokes_.touches(tip_shift_mm(tip_rms_mm_, picture_.figures().scope.held_out_mm)));
+                           strokes_.touches(tip_shift_mm(tip_rms_mm_, picture_.figures().scope.held_out_mm)),
+                           calibration_.found()->scope.camera_covariance());
       }
       break;
     case LiveStep::check:

@@ -1,5 +1,4 @@
 #include "host/operation/operation.hpp"
-#include "host/files/camera_files.hpp"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,8 @@
 #include <span>
 
 #include "device/wire/igtl_bytes.hpp"
+#include "host/files/camera_covariance.hpp"
+#include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 
@@ -51,6 +52,12 @@ nlohmann::json figures_of(const CalibratedScope& found) {
   return out;
 }
 
+/// Its lens, and how well that is known, where anything says so.
+std::string camera_file(const ScopeSetup& scope) {
+  const auto& covariance = scope.camera_covariance();
+  return camera_text(scope.camera()) + (covariance ? camera_covariance_text(*covariance) : "");
+}
+
 }  // namespace
 
 std::string ct_checksum(const Volume& ct) {
@@ -67,7 +74,7 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
   std::vector<FileText> files;
   if (const auto& found = operation.calibrated) {
     sheet["calibrated"] = figures_of(*found);
-    files.push_back({folder / kCamera, camera_text(found->scope.camera())});
+    files.push_back({folder / kCamera, camera_file(found->scope)});
     files.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
   }
   if (const auto& found = operation.registered) {

@@ -25,7 +25,8 @@ Result<std::vector<int>> values_in(const LabelVolume& labels, const PatientFiles
 }
 
 Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std::stop_token& stop) {
-  const auto labels = import_named_labels(files.labels, plan.ct, all_of({files.shown, files.targets, files.organ}), stop);
+  const auto labels =
+      import_named_labels(files.labels, plan.ct, all_of({files.shown, files.targets, files.organ}), stop);
   if (!labels) return labels.error();
   const Volume& volume = labels->volume;
   if (!files.shown.empty()) {

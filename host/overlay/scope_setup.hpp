@@ -5,6 +5,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/overlay/trust.hpp"
 
@@ -48,9 +49,10 @@ class ScopeSetup {
   /// figures that count in place of the record's.
   static std::optional<ScopeSetup> of_record(const calibration::CalibrationRecord& record,
                                              const ScopeFigures& stated = {});
-  /// found: solved. camera_rms_px: of the lens it was found with; empty: it is not known.
+  /// found: solved. camera_rms_px and camera_covariance: of the lens it was found with; empty: they are not known.
   static ScopeSetup of_hand_eye(const CameraModel& camera, std::optional<double> camera_rms_px,
-                                const calibration::HandEyeResult& found);
+                                const calibration::HandEyeResult& found,
+                                const std::optional<CameraMatrix>& camera_covariance = std::nullopt);
   /// A lens (OpenCV YAML) and a 4x4 matrix. stated: what somebody says of them, for the files hold no figures. An error
   /// names the file.
   static Result<ScopeSetup> of_files(const std::filesystem::path& camera,
@@ -59,12 +61,15 @@ class ScopeSetup {
   [[nodiscard]] const CameraModel& camera() const { return camera_; }
   [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
   [[nodiscard]] const ScopeFigures& figures() const { return figures_; }
+  /// How well the lens is known; empty: nothing says so.
+  [[nodiscard]] const std::optional<CameraMatrix>& camera_covariance() const { return camera_covariance_; }
   [[nodiscard]] Setup registered(const Transform<Tracker, Patient>& tracker_from_patient) const;
 
  private:
   ScopeSetup() = default;
 
   CameraModel camera_;
+  std::optional<CameraMatrix> camera_covariance_;
   Transform<Camera, Sensor> camera_from_sensor_;
   ScopeFigures figures_;
 };

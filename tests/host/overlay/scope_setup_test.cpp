@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "host/files/camera_covariance.hpp"
+#include "host/files/camera_files.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -21,6 +23,9 @@ TEST(ScopeSetup, OfARecordTellsTheHeldOutErrorAndNotTheFits) {
   EXPECT_EQ(scope->figures().held_out_px, 1.75);
   EXPECT_EQ(scope->figures().held_out_mm, 0.5);
   EXPECT_EQ(ScopeSetup::of_record(record, {0.4, 3, std::nullopt})->figures().held_out_px, 3);
+  EXPECT_EQ(scope->camera_covariance(), record.lens->covariance);
+  record.lens->covariance.setZero();
+  EXPECT_FALSE(ScopeSetup::of_record(record)->camera_covariance().has_value()) << "nobody has stated it";
   record.hand_eye.reset();
   EXPECT_FALSE(ScopeSetup::of_record(record).has_value());
 }
@@ -48,6 +53,14 @@ TEST(ScopeSetup, OfFilesKnowsWhatIsStatedAndNamesWhatIsMissing) {
   EXPECT_EQ(scope->figures().camera_rms_px, 0.3);
   EXPECT_FALSE(scope->figures().held_out_px.has_value());
   EXPECT_EQ(scope->camera_from_sensor().translation().x(), 5);
+  EXPECT_FALSE(scope->camera_covariance().has_value());
+  CameraMatrix covariance = CameraMatrix::Identity();
+  covariance(0, 1) = covariance(1, 0) = 0.25;
+  const auto known = ScopeSetup::of_files(
+      scratch.file("known.yaml", camera_text(scope->camera()) + camera_covariance_text(covariance)), pose, {});
+  ASSERT_TRUE(known) << known.error().what;
+  ASSERT_TRUE(known->camera_covariance().has_value());
+  EXPECT_LT((*known->camera_covariance() - covariance).norm(), 1e-9);
   const auto none = ScopeSetup::of_files(camera, scratch / "nothere.txt", {});
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().what.find("nothere.txt"), std::string::npos);
