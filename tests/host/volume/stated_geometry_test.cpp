@@ -45,7 +45,8 @@ std::string nifti(std::int16_t quaternion, std::int16_t matrix, float apart_mm) 
   const auto put = [&file](std::size_t at, auto value) { std::memcpy(file.data() + at, &value, sizeof value); };
   put(0, std::int32_t{348});
   for (int axis = 0; axis < 8; ++axis)
-    put(40 + 2 * static_cast<std::size_t>(axis), std::array<std::int16_t, 8>{3, 4, 3, 2, 1, 1, 1, 1}[axis]);
+    put(40 + 2 * static_cast<std::size_t>(axis),
+        std::array<std::int16_t, 8>{3, 4, 3, 2, 1, 1, 1, 1}[static_cast<std::size_t>(axis)]);
   put(70, std::int16_t{4});
   put(72, std::int16_t{16});
   for (std::size_t at = 76; at < 92; at += 4) put(at, 1.0F);
