@@ -190,8 +190,11 @@ void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
       {Grade::fail,
        fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way round",
                    as_given, if_inverted),
-       in.given_poses ? "give poses as tracker_from_sensor and as marker_from_camera: one of the two is the other way"
-                      : "give poses that take points of the sensor to the tracker (tracker_from_sensor)"});
+       in.given_poses
+           ? "give poses as tracker_from_sensor and as marker_from_camera: one of the two is the other way; or "
+             "its quaternions are not in the order that is read: is w the first of the four?"
+           : "give poses that take points of the sensor to the tracker (tracker_from_sensor); or is w the "
+             "first of the quaternion's four numbers? Name them in a header: qw,qx,qy,qz"});
 }
 
 std::string scale_in_words(double scale, double sigma, double square_mm) {

@@ -83,7 +83,7 @@ Result<void> prepare_window(LiveOptions& options) {
       window.height_px < 480) {
     return Error{Errc::bad_value, fmt::format("--size: \"{}\" is no size of at least 640x480", options.size)};
   }
-  window.title = "Birdseye";
+  window.title = "Birdseye - research, not for use on patients";
   window.layout = layout_file();
   return {};
 }

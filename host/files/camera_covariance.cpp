@@ -10,6 +10,9 @@ namespace birdseye::host {
 namespace fs = std::filesystem;
 
 Result<std::optional<CameraMatrix>> read_camera_covariance(const fs::path& path) {
+  // One camera of several, as "kalibr.yaml:cam0" names it, has none; OpenCV would print what it finds amiss.
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return std::optional<CameraMatrix>();
   cv::Mat matrix;
   try {
     const cv::FileStorage file(path.string(), cv::FileStorage::READ);

@@ -14,7 +14,9 @@ namespace {
 
 using Words = std::set<std::string, std::less<>>;
 
-const std::map<std::string, double, std::less<>> kLengths{{"mm", 1}, {"cm", 10}, {"m", 1000}};
+const std::map<std::string, double, std::less<>> kLengths{{"mm", 1},    {"cm", 10},       {"m", 1000},
+                                                          {"in", 25.4}, {"inch", 25.4},   {"inches", 25.4},
+                                                          {"um", 1e-3}, {"\u00b5m", 1e-3}};
 const std::map<std::string, double, std::less<>> kTimes{{"s", 1},     {"sec", 1},   {"seconds", 1},
                                                         {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
 const Words kTimeWords{"t", "time", "timestamp", "timestamps", "stamp", "sec", "secs", "seconds"};

@@ -48,6 +48,7 @@ Result<PoseColumns> columns_by_name(const Fields& header) {
   PoseColumns out;
   out.count = header.size();
   std::array<bool, kPoseColumns> exact{};
+  std::vector<std::string> units;  // of lengths
   for (std::size_t i = 0; i < header.size(); ++i) {
     const ColumnName name = column_name(header[i]);
     const auto column = pose_column(name);
@@ -64,7 +65,21 @@ Result<PoseColumns> columns_by_name(const Fields& header) {
     out.at[c] = i;
     exact[c] = ours;
     if (c == kTime) out.s_per = seconds_per(name.unit);
-    if (c > kTime && c < 4 && mm_per(name.unit)) out.mm_per = mm_per(name.unit);
+    if (c > kTime && c < 4 && !name.unit.empty()) units.push_back(name.unit);
+  }
+  for (const std::string& unit : units) {
+    if (!mm_per(unit)) {
+      return Error{
+          Errc::bad_format,
+          fmt::format("its header has lengths in '{}', which is no unit that is read: give mm, cm, m or inches", unit)};
+    }
+    if (unit != units.front() || units.size() < 3) {
+      return Error{Errc::bad_format,
+                   fmt::format("its header has lengths in {} alone or mixed: give x, y and z the same "
+                               "unit, or none",
+                               fmt::join(units, ", "))};
+    }
+    out.mm_per = mm_per(unit);
   }
   std::vector<std::string_view> lacking;
   for (std::size_t c = 1; c < kPoseColumns; ++c) {
@@ -99,7 +114,9 @@ class PoseTable {
   Result<PoseSet> finish(bool decimal_commas) {
     if (!collector_) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path_.string())};
     if (decimal_commas) collector_->note("its numbers have decimal commas, and are read so");
-    if (repeated_headers_ > 0) collector_->note(fmt::format("its header is repeated {} times", repeated_headers_));
+    if (repeated_headers_ > 0)
+      collector_->note(
+          fmt::format("its header comes again in {} later lines, which are passed over", repeated_headers_));
     if (columns_->timed() && s_per_ != 1) collector_->note(fmt::format("its times are in units of {:g} s", s_per_));
     if (columns_->mm_per && columns_->mm_per != how_.mm_per_unit)
       collector_->note(fmt::format("its header says that lengths are in units of {:g} mm", *columns_->mm_per));
@@ -140,7 +157,9 @@ class PoseTable {
       const std::string problem = read_number(fields[fields.size() > 1 ? 1 : 0]).problem;
       const bool absent = fields.size() <= 2 && (problem == "missing" || problem == "INVALID");
       return collector_->reject(
-          name, absent ? problem : fmt::format("{} numbers where a row has {}", fields.size(), columns_->count));
+          name, absent ? problem
+                       : fmt::format("{} numbers where a row has {}{}", fields.size(), columns_->count,
+                                     header_.empty() ? "; without a header all rows have 7, 8, 12 or 16" : ""));
     }
     double time_s = place;
     if (columns_->timed()) {

@@ -36,7 +36,7 @@ void LiveWorkflow::tick() {
     resume_fault_.clear();
     pick_line_.clear();
     const std::string& id = patient_.plan()->identity.id;
-    patient_confirmed_ = simulated_ || (!settings_.patient_id.empty() && settings_.patient_id == id);
+    patient_confirmed_ = settings_.patient_id.empty() ? simulated_ : settings_.patient_id == id;
     fit();
     // What was touched meanwhile counts more than what is taken up, and is fitted first.
     if (fiducials_.touches().empty() || (patient_.markers_in_patient_mm() && patient_confirmed_)) take_up();
@@ -118,7 +118,7 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   // The hand need not wait for the arithmetic.
   const bool touching = step_ == LiveStep::fiducials ||
                         (step_ == LiveStep::calibrate && fiducials_.confirmed() && calibration_.working_out());
-  if (!rested || !touching || !fiducials_.add(*rested, settings_.fiducials)) return;
+  if (!rested || !touching || is_other_patients() || !fiducials_.add(*rested, settings_.fiducials)) return;
   fit();
   keep();
 }
@@ -175,6 +175,7 @@ void LiveWorkflow::fit() {
 /// Views are of the poses that they were kept with, touches are where the former registration had them, and a
 /// deformation takes in what that was off by: another setup's is no better than none.
 void LiveWorkflow::forget_views(const std::string& why) {
+  check_ = run_ = {};  // they were of the setup that is no more
   const bool touched = strokes_.stroking() || strokes_.places() > 0;
   if (views_.views().empty() && !touched && !deformation_.found() && !deformation_.running()) return;
   views_.forget(why);
@@ -217,7 +218,9 @@ void LiveWorkflow::set_picture_up() {
   const auto& scope = calibration_.found();
   const auto& registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
-  if (patient_.plan() && !patient_confirmed_) return picture_.set_setup(std::nullopt, {}, words("patient_unconfirmed"));
+  if (patient_.plan() && !patient_confirmed_)
+    return picture_.set_setup(std::nullopt, {},
+                              is_other_patients() ? words("patient_other") : words("patient_unconfirmed"));
   if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_));
   TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   figures.moved_mm = motion_.moved_mm();
@@ -266,11 +269,14 @@ void LiveWorkflow::go_on() {
   if (step_ == LiveStep::run) return;
   const bool may_be_skipped = step_ == LiveStep::views || step_ == LiveStep::deform || step_ == LiveStep::check;
   if (!view().note(step_).done && (!may_be_skipped || deformation_.running())) return;
+  // Nobody has looked yet whether what was taken up holds: that is not to be skipped.
+  if (step_ == LiveStep::check && !fiducials_.confirmed()) return;
   if (step_ == LiveStep::check) check_.done = true;
   go_to(static_cast<LiveStep>(static_cast<int>(step_) + 1));
 }
 
 void LiveWorkflow::primary() {
+  if (frozen_) return freeze_or_let_go();
   if (asks_for_patient()) return confirm_patient();
   const auto& setup = picture_.setup();
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
@@ -304,7 +310,7 @@ void LiveWorkflow::primary() {
       update_setup();
       return go_on();
     case LiveStep::run:
-      return frozen_ ? freeze_or_let_go() : hide_or_show_overlay();
+      return hide_or_show_overlay();
   }
 }
 

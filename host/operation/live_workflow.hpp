@@ -67,7 +67,10 @@ class LiveWorkflow {
   void go_on();    ///< to the next step, where this one is done
   void go_to(LiveStep step);
   void freeze_or_let_go() { frozen_ = !frozen_; }
-  void hide_or_show_overlay() { picture_.hide(!picture_.hidden()); }
+  /// Not of a frozen picture, which bears none.
+  void hide_or_show_overlay() {
+    if (!frozen_) picture_.hide(!picture_.hidden());
+  }
   void set_transfer(const TransferFunction& transfer) { patient_.set_transfer(transfer); }
   void set_look(const OverlayLook& look) { picture_.set_look(look); }
 
@@ -88,6 +91,7 @@ class LiveWorkflow {
   void fit();
   void take(const PlacePicks::Picked& picked);
   [[nodiscard]] bool asks_for_patient() const;
+  [[nodiscard]] bool is_other_patients() const;
   void forget_views(const std::string& why);
   void show_shape();
   void show_margins();

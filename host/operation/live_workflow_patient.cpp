@@ -10,11 +10,14 @@ bool LiveWorkflow::asks_for_patient() const {
   return patient_.plan() && !patient_confirmed_ && step_ != LiveStep::connect && step_ != LiveStep::calibrate;
 }
 
+/// Another system names somebody else than the CT does.
+bool LiveWorkflow::is_other_patients() const {
+  return patient_.plan() && !settings_.patient_id.empty() && settings_.patient_id != patient_.plan()->identity.id;
+}
+
 void LiveWorkflow::confirm_patient() {
   if (!patient_.plan() || patient_confirmed_) return;
-  const std::string& id = patient_.plan()->identity.id;
-  // Whom another system names is not to be overruled by a key.
-  if (!settings_.patient_id.empty() && settings_.patient_id != id) return;
+  if (is_other_patients()) return;  // whom another system names is not to be overruled by a key
   patient_confirmed_ = true;
   if (!fiducials_.touches().empty() && patient_.markers_in_patient_mm()) {
     fit();
@@ -37,7 +40,8 @@ void LiveWorkflow::take(const PlacePicks::Picked& picked) {
   if (picked.patient != patient_.plan()) return;
   const auto& marker = picked.marker;
   if (picked.kind == PlacePicks::Kind::landmark) {
-    const std::string name = words("landmark_name", patient_.landmarks().size() + 1);
+    const std::string name =
+        words("landmark_name", patient_.landmarks().size() - patient_.plan()->landmarks.size() + 1);
     const Eigen::Vector3d place_mm = marker ? marker->centre_in_patient_mm : picked.pointed_mm;
     patient_.add_landmark({name, place_mm});
     const double off_mm = (place_mm - picked.pointed_mm).norm();

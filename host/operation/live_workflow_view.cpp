@@ -25,10 +25,8 @@ OperationView LiveWorkflow::view() const {
   for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
     if (out.fault.empty()) out.fault = *fault;
   }
-  if (const auto& plan = patient_.plan(); plan && !settings_.patient_id.empty()) {
-    const std::string& id = plan->identity.id;
-    if (id != settings_.patient_id) out.patient_fault = words("patient_wrong", id, settings_.patient_id);
-  }
+  if (is_other_patients())
+    out.patient_fault = words("patient_wrong", patient_.plan()->identity.id, settings_.patient_id);
   out.asks_for_patient = asks_for_patient();
   out.link = connection_.link();
   out.board_named = settings_.pattern.has_value();
@@ -55,6 +53,7 @@ OperationView LiveWorkflow::view() const {
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();
+  out.watched = out.deformed != nullptr && watch_.watches();
   out.organ_moved = motion_.moved_mm().has_value();
   if (out.deformed) out.surface_check = watch_.watches() ? motion_.line() : words("note_not_watched");
   out.patient = patient_.plan();

@@ -5,6 +5,8 @@
 namespace birdseye::host {
 
 std::string primary_words(const OperationView& operation) {
+  if (operation.frozen) return words("do_let_go");
+  if (!operation.patient_fault.empty()) return words("do_other_ct");
   if (operation.asks_for_patient) return words("do_confirm_patient");
   const bool done = operation.note(operation.step).done;
   switch (operation.step) {
@@ -23,7 +25,7 @@ std::string primary_words(const OperationView& operation) {
     case LiveStep::check:
       return operation.unconfirmed ? words("do_landmarks_fit") : words("do_go_on");
     case LiveStep::run:
-      return operation.frozen ? words("do_let_go") : operation.overlay_hidden ? words("do_show") : words("do_hide");
+      return operation.overlay_hidden ? words("do_show") : words("do_hide");
   }
   return {};
 }

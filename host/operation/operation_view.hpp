@@ -56,6 +56,7 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
+  bool watched = false;       ///< whether the video is held against the deformed surface
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered

@@ -68,7 +68,9 @@ ShownPicture LivePicture::at(HostTime now) {
   const Freshness fresh = freshness_at(now, exposed_, frame_->info.pose.age, settings_.freshness);
   out.age_ms = fresh.age.seconds() * 1e3;
   out.stale = fresh.stopped;
-  if (!setup()) {
+  if (out.stale) {
+    out.reason = fresh.why_too_old;  // whatever else there is: what is seen is not what is
+  } else if (!setup()) {
     out.reason = why_no_setup_;
   } else if (engine_ == nullptr) {
     out.reason = words("why_no_ct");

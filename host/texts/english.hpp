@@ -40,6 +40,7 @@ inline constexpr std::array kEnglish{
     EnglishText{"patient_confirmed", "confirmed"},
     EnglishText{"patient_pseudonym", "patient not named; CT {}"},
     EnglishText{"patient_unconfirmed", "nobody has confirmed the patient: compare name, ID and date, then press Space"},
+    EnglishText{"patient_other", "this CT is another patient's"},
     EnglishText{"patient_wrong", "this CT is of ID {}, and the patient on the table has ID {}"},
 
     // The steps
@@ -51,13 +52,15 @@ inline constexpr std::array kEnglish{
     EnglishText{"step_check", "check"},
     EnglishText{"step_run", "run"},
     EnglishText{"keys", "Space or the pedal: this. Enter: go on. 1 to 7: a step. F1: all keys."},
-    EnglishText{
-        "all_keys",
-        "O: overlay on or off. U: outlines. H: hole. M: margins. G: surface in front. C: cutting plane. + and -: "
-        "opacity. V: slices. F: freeze. S: snapshot. T: stroke. L: light or dark. Backspace: take back."},
+    EnglishText{"all_keys",
+                "Space: the large button. Enter: go on. Backspace: take back. 1 to 7: a step. O: overlay on or off. "
+                "U: outlines. H: hole. M: margins. G: surface in front. C: cutting plane. + and -: opacity. I: small "
+                "picture. V: slices. In the slices P: fiducial here. X: no fiducial here. K: landmark here. T: stroke. "
+                "F: freeze. S: snapshot. L: light or dark."},
 
     // What Space and the pedal do
     EnglishText{"do_confirm_patient", "this is the patient"},
+    EnglishText{"do_other_ct", "close, and give the CT of this patient"},
     EnglishText{"do_wait", "wait for the appliance"},
     EnglishText{"do_go_on", "go on"},
     EnglishText{"do_begin", "begin"},
@@ -232,7 +235,14 @@ inline constexpr std::array kEnglish{
     // Over the picture
     EnglishText{"banner_frozen", "FROZEN: this is no live picture"},
     EnglishText{"banner_stale", "NOT LIVE: {}"},
-    EnglishText{"banner_whole", "overlay; FRE {:.1f} mm"},
+    EnglishText{"banner_simulated", "SIMULATED - {}"},
+    EnglishText{"banner_whole", "overlay; {}"},
+    EnglishText{"banner_target", "target within ±{:.1f} mm"},
+    EnglishText{"banner_no_target", "target out of view"},
+    EnglishText{"banner_unmatched", "overlay, not matched with the video: {} if the organ has not moved since the CT"},
+    EnglishText{"banner_unwatched", "overlay, and nothing watches whether the organ moves; {}"},
+    EnglishText{"banner_cut", "overlay, a part of the CT is cut away; {}"},
+    EnglishText{"banner_opacity", "its opacity is 0"},
     EnglishText{"banner_fades", "overlay fades: {}"},
     EnglishText{"banner_none", "no overlay: {}"},
     EnglishText{"banner_recording", "RECORDING, not live - {}"},

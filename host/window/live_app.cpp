@@ -245,6 +245,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (wishes.freeze) workflow_.freeze_or_let_go();
   if (wishes.hide_or_show) workflow_.hide_or_show_overlay();
   if (wishes.step) workflow_.go_to(*wishes.step);
+  if (wishes.inset) facts_.inset = !facts_.inset;
   if (wishes.keys) facts_.keys = !facts_.keys;
   if (wishes.room) window_->set_room(facts_.room = *wishes.room);
   if (wishes.inset_corner) facts_.inset_corner = *wishes.inset_corner;

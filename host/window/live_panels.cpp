@@ -141,6 +141,7 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
   if (key == "s") wishes.snapshot = true;
   if (key == "o") wishes.hide_or_show = true;
   if (key == "v") wishes.slices = true;
+  if (key == "i") wishes.inset = true;
   if (key == "?") wishes.keys = true;
   if (key == "c") wishes.clip = !facts.clip;
   if (key == "l") wishes.room = facts.room == Room::dark ? Room::light : Room::dark;

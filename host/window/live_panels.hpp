@@ -19,6 +19,7 @@ struct PanelWishes {
   bool primary = false, next = false, undo = false, stroke = false, freeze = false, snapshot = false;
   bool hide_or_show = false;                                             ///< the overlay
   bool slices = false;                                                   ///< opened, or closed
+  bool inset = false;                                                    ///< the small picture shown, or not any more
   bool keys = false;                                                     ///< all of them shown, or not any more
   bool pick_marker = false, pick_landmark = false, drop_marker = false;  ///< at the slices' cross-hair
   std::optional<LiveStep> step;
@@ -50,6 +51,7 @@ struct PanelFacts {
   Room room = Room::dark;
   std::optional<SliceView> slices;  ///< empty: closed
   int inset_corner = 0;
+  bool inset = true;
 };
 
 /// How wide the workflow beside the video is.

@@ -22,7 +22,8 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr float kFontPx = 16;  // readable from the other side of the table
+constexpr float kUsualHeightPx = 864;  // of a window that has letters of the usual size
+constexpr float kFontPx = 16;          // readable from the other side of the table
 
 void use_font(float scale) {
   ImGuiIO& io = ImGui::GetIO();
@@ -56,7 +57,9 @@ Result<std::unique_ptr<LiveWindow>> LiveWindow::open(const Settings& settings) {
   made->begin();
   float wide = 1, high = 1;
   glfwGetWindowContentScale(made->window_, &wide, &high);
-  made->scale_ = settings.scale > 0 ? static_cast<float>(settings.scale) : std::max(1.0F, std::max(wide, high));
+  made->scale_ = settings.scale > 0
+                     ? static_cast<float>(settings.scale)
+                     : std::max({1.0F, wide, high, static_cast<float>(settings.height_px) / kUsualHeightPx});
   made->imgui_ = ImGui::CreateContext();
   ImGuiIO& io = ImGui::GetIO();
   made->layout_ = settings.layout.string();

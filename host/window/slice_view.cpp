@@ -95,8 +95,8 @@ Picture SliceView::draw(const std::vector<SliceMark>& marks) const {
     draw_cross_hair(slice, here.px_of(place_mm_), kSidePx, kHair, 0.03);
     const auto& edges = kEdges[static_cast<std::size_t>(view)];
     constexpr double kMiddle = 0.5 * kSidePx;
-    draw_text(slice, {4, kMiddle}, edges[0], kLetters);
-    draw_text(slice, {kSidePx - 14, kMiddle}, edges[1], kLetters);
+    draw_text(slice, {8, kMiddle}, edges[0], kLetters);
+    draw_text(slice, {kSidePx - 24, kMiddle}, edges[1], kLetters);
     draw_text(slice, {kMiddle, 16}, edges[2], kLetters);
     draw_text(slice, {kMiddle, kSidePx - 6}, edges[3], kLetters);
     paste(out, slice, view * kSidePx, 0);

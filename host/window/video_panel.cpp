@@ -17,26 +17,45 @@ namespace {
 constexpr ImU32 kGround = IM_COL32(0, 0, 0, 235);
 constexpr float kBannerPx = 28;
 
+/// What is said over the picture, and how good it is; no grade: somebody has asked for it, and nothing is wrong.
+struct Banner {
+  std::string text;
+  std::optional<Grade> grade = Grade::marginal;
+};
+
+/// Of an overlay that is whole: what it leaves open, and how far off the target may be.
+Banner whole_overlay(const OperationView& operation, const OverlayLook& look) {
+  if (look.opacity <= 0) return {words("banner_none", words("banner_opacity"))};
+  const auto& target = operation.target;
+  const std::string error = target ? words("banner_target", target->radius_mm) : words("banner_no_target");
+  if (look.render.clip) return {words("banner_cut", error)};
+  if (!operation.deformed) return {words("banner_unmatched", error)};
+  if (!operation.watched) return {words("banner_unwatched", error)};
+  return {words("banner_whole", error), Grade::pass};
+}
+
+Banner banner_of(const PanelContext& context) {
+  const ShownPicture& shown = context.shown;
+  if (context.operation.frozen) return {words("banner_frozen")};
+  if (!shown.any) return {shown.reason, Grade::fail};
+  if (shown.stale) return {words("banner_stale", shown.reason), Grade::fail};
+  if (!context.operation.patient_fault.empty()) return {words("banner_none", shown.reason), Grade::fail};
+  if (shown.overlaid && shown.reason.empty()) return whole_overlay(context.operation, context.facts.look);
+  if (shown.overlaid) return {words("banner_fades", shown.reason)};
+  if (context.operation.overlay_hidden) return {words("banner_none", shown.reason), std::nullopt};
+  return {words("banner_none", shown.reason)};
+}
+
 /// The safety of the picture, in words, sign and colour, over its upper edge.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
-  const ShownPicture& shown = context.shown;
   const float scale = context.at.scale;
-  std::string text;
-  Grade grade = Grade::marginal;
-  if (context.operation.frozen) {
-    text = words("banner_frozen");
-  } else if (shown.stale || !shown.any) {
-    text = shown.any ? words("banner_stale", shown.reason) : shown.reason;
-    grade = Grade::fail;
-  } else if (shown.overlaid && shown.reason.empty()) {
-    text = words("banner_whole", context.operation.fre_mm.value_or(0));
-    grade = Grade::pass;
-  } else {
-    text = shown.overlaid ? words("banner_fades", shown.reason) : words("banner_none", shown.reason);
-  }
+  const Banner banner = banner_of(context);
+  std::string text = banner.text;
   if (context.facts.recorded) text = words("banner_recording", text);
-  text = fmt::format("{} {}", sign_of(grade), text);
-  const ImU32 ink = ImGui::GetColorU32(colour(colour_of(grade, theme_over_video())));
+  if (context.facts.simulated) text = words("banner_simulated", text);
+  if (banner.grade) text = fmt::format("{} {}", sign_of(*banner.grade), text);
+  const Theme& theme = theme_over_video();
+  const ImU32 ink = ImGui::GetColorU32(colour(banner.grade ? colour_of(*banner.grade, theme) : theme.text));
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const float high = kBannerPx * scale;
   list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), kGround);
@@ -62,7 +81,7 @@ ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float sc
   const ImVec2 from(fits ? middle.x + beside : middle.x - beside - wide.x, middle.y - wide.y / 2);
   const ImVec2 to(from.x + wide.x, from.y + wide.y);
   list->AddRectFilled(ImVec2(from.x - 3 * scale, from.y - 2 * scale), ImVec2(to.x + 3 * scale, to.y + 2 * scale),
-                      IM_COL32(0, 0, 0, 150));
+                      IM_COL32(0, 0, 0, 220));
   list->AddText(from, ink, text.c_str());
   return {{std::min(from.x, middle.x - radius), std::min(from.y, middle.y - radius)},
           {std::max(to.x, middle.x + radius), std::max(to.y, middle.y + radius)}};
@@ -71,7 +90,7 @@ ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float sc
 /// The CT from outside, in a corner that leaves the target free.
 void draw_inset(PanelContext& context, const ScreenBox& area, const std::optional<ScreenBox>& target) {
   const std::uintptr_t inset = context.window.picture(LiveWindow::Slot::inset);
-  if (inset == 0) return;
+  if (inset == 0 || !context.facts.inset) return;
   const float size = context.at.scale * 0.75F;
   const auto place =
       place_inset(area, {size * InsetView::kWidthPx, size * InsetView::kHeightPx}, target, context.facts.inset_corner);

@@ -71,7 +71,22 @@ TEST(PoseTables, HeadersOfOtherPrograms) {
     EXPECT_NEAR(set->poses[1].time_s - set->poses[0].time_s, apart_s, 1e-6) << text;
   }
   EXPECT_NE(joined(read(std::get<0>(tables[3]))->notes).find("decimal commas"), std::string::npos);
-  EXPECT_NE(joined(read(std::get<0>(tables[4]))->notes).find("header is repeated 1 times"), std::string::npos);
+  EXPECT_NE(joined(read(std::get<0>(tables[4]))->notes).find("header comes again in 1 later lines"), std::string::npos);
+}
+
+TEST(PoseTables, AUnitOfLengthThatIsNotReadIsRefusedByName) {
+  const std::string row = "0,1,2,3,0,0,0,1\n";
+  for (const auto& [header, said] : std::vector<std::pair<std::string, std::string>>{
+           {"t,x [furlong],y [furlong],z [furlong],qx,qy,qz,qw\n", "'furlong'"},
+           {"t,x [m],y [mm],z [mm],qx,qy,qz,qw\n", "m, mm, mm"},
+           {"t,x [m],y,z,qx,qy,qz,qw\n", "m alone"}}) {
+    const auto set = read(header + row);
+    ASSERT_FALSE(set) << header;
+    EXPECT_NE(set.error().what.find(said), std::string::npos) << set.error().what;
+  }
+  const auto inches = read("t,x (in),y (in),z (in),qx,qy,qz,qw\n" + row);
+  ASSERT_TRUE(inches) << inches.error().what;
+  EXPECT_NEAR(inches->poses.front().tracker_from_sensor.translation().x(), 25.4, 1e-9);
 }
 
 TEST(PoseTables, AHeaderWithTwoPosesIsRefused) {

@@ -3,6 +3,7 @@
 
 #include <sstream>
 
+#include "calibration/detect/pattern.hpp"
 #include "tests/support/live_operation.hpp"
 
 namespace birdseye::host {
@@ -50,6 +51,32 @@ TEST(PatientConfirmed, AnotherSystemMayNameThePatient) {
   EXPECT_TRUE(workflow.picture().setup().has_value());
 }
 
+TEST(PatientConfirmed, ASimulatedPatientIsNobodyElse) {
+  const Scratch scratch;
+  LiveSettings settings = operation_settings(scratch);
+  settings.patient_id = "4711";
+  LiveWorkflow workflow(settings);
+  workflow.set_sheet(*calibration::parse_pattern("chessboard:9x6:5mm"), {0, 0, 150}, 4);
+  read_ct(workflow);
+  EXPECT_FALSE(workflow.view().patient_confirmed);
+  EXPECT_FALSE(workflow.view().patient_fault.empty());
+}
+
+TEST(PatientConfirmed, WhatWasCheckedIsNotWhenItIsRegisteredAnew) {
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  touch_all(workflow);
+  workflow.confirm_patient();
+  workflow.go_to(LiveStep::check);
+  workflow.go_on();
+  ASSERT_TRUE(workflow.view().note(LiveStep::check).done);
+  ASSERT_TRUE(workflow.view().note(LiveStep::run).done);
+  workflow.go_to(LiveStep::fiducials);
+  workflow.undo();
+  EXPECT_FALSE(workflow.view().note(LiveStep::check).done);
+  EXPECT_FALSE(workflow.view().note(LiveStep::run).done);
+}
+
 TEST(PatientConfirmed, AnotherPatientsCtIsNotToBeConfirmed) {
   const Scratch scratch;
   LiveSettings settings = operation_settings(scratch);
@@ -58,6 +85,8 @@ TEST(PatientConfirmed, AnotherPatientsCtIsNotToBeConfirmed) {
   touch_all(workflow);
   EXPECT_NE(workflow.view().patient_fault.find("SIM1"), std::string::npos) << workflow.view().patient_fault;
   EXPECT_NE(workflow.view().patient_fault.find("4711"), std::string::npos);
+  EXPECT_EQ(primary_words(workflow.view()), "close, and give the CT of this patient");
+  EXPECT_TRUE(workflow.view().touches.empty()) << "nothing is begun with another patient's CT";
   workflow.primary();
   workflow.confirm_patient();
   EXPECT_FALSE(workflow.view().patient_confirmed);
@@ -151,8 +180,9 @@ TEST_F(Picks, ThePedalSwitchesTheRunningOverlayOffAndOn) {
   pedal.pressed = true;
   workflow_->take(pedal, HostTime{0}, std::nullopt);
   EXPECT_FALSE(workflow_->view().overlay_hidden);
-  // What is frozen is let go first.
+  // What is frozen bears no overlay to switch off, and is let go first.
   workflow_->freeze_or_let_go();
+  workflow_->hide_or_show_overlay();
   workflow_->primary();
   EXPECT_FALSE(workflow_->view().frozen);
   EXPECT_FALSE(workflow_->view().overlay_hidden);
