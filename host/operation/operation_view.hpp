@@ -23,6 +23,7 @@ namespace birdseye::host {
 struct OperationView {
   LiveStep step = LiveStep::connect;
   bool frozen = false;
+  bool watched = false;         ///< whether the video is held against the deformed surface
   bool overlay_hidden = false;  ///< a person has switched it off
   bool board_named = false;     ///< there is a board to calibrate with
   bool guiding = false;
@@ -56,7 +57,6 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
-  bool watched = false;       ///< whether the video is held against the deformed surface
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered

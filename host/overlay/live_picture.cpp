@@ -56,6 +56,18 @@ std::optional<Transform<Camera, Patient>> LivePicture::seen_from() const {
   return frame_ && engine_ ? painter_.seen_from(*frame_, decision_) : std::nullopt;
 }
 
+std::string LivePicture::why_bare(const Freshness& fresh) const {
+  if (fresh.stopped) return fresh.why_too_old;  // whatever else there is: what is seen is not what is
+  if (!setup()) return why_no_setup_;
+  if (engine_ == nullptr) return words("why_no_ct");
+  if (hidden_) return words("why_hidden");
+  if (!painter_.fits(*frame_)) {
+    return words("why_other_size", frame_->width_px, frame_->height_px, setup()->camera().width_px,
+                 setup()->camera().height_px);
+  }
+  return fresh.why_too_old;
+}
+
 ShownPicture LivePicture::at(HostTime now) {
   ShownPicture out;
   if (!frame_) {
@@ -68,20 +80,8 @@ ShownPicture LivePicture::at(HostTime now) {
   const Freshness fresh = freshness_at(now, exposed_, frame_->info.pose.age, settings_.freshness);
   out.age_ms = fresh.age.seconds() * 1e3;
   out.stale = fresh.stopped;
-  if (out.stale) {
-    out.reason = fresh.why_too_old;  // whatever else there is: what is seen is not what is
-  } else if (!setup()) {
-    out.reason = why_no_setup_;
-  } else if (engine_ == nullptr) {
-    out.reason = words("why_no_ct");
-  } else if (hidden_) {
-    out.reason = words("why_hidden");
-  } else if (!fresh.why_too_old.empty()) {
-    out.reason = fresh.why_too_old;
-  } else if (!painter_.fits(*frame_)) {
-    out.reason = words("why_other_size", frame_->width_px, frame_->height_px, setup()->camera().width_px,
-                       setup()->camera().height_px);
-  } else {
+  out.reason = why_bare(fresh);
+  if (out.reason.empty()) {
     out.reason = decision_.reason;
     out.overlaid = !overlaid_.empty();
     out.strength = out.overlaid ? decision_.strength : 0;

@@ -91,6 +91,9 @@ class LivePicture {
   [[nodiscard]] std::optional<Transform<Camera, Patient>> seen_from() const;
 
  private:
+  /// Why the newest frame may bear no overlay now, whatever the gate says of its pose; empty: it may.
+  [[nodiscard]] std::string why_bare(const Freshness& fresh) const;
+
   Settings settings_;
   FramePainter painter_;
   std::shared_ptr<Engine> engine_;
