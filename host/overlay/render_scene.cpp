@@ -5,29 +5,12 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "host/volume/patient_box.hpp"
+
 namespace birdseye::host {
 
-namespace {
-
-/// The corners of the volume's box in the patient frame.
-std::pair<Eigen::Vector3d, Eigen::Vector3d> bounds(const Volume& volume) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9);
-  Eigen::Vector3d high = -low;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d voxel((corner & 1) * (volume.size[0] - 1), (corner >> 1 & 1) * (volume.size[1] - 1),
-                                (corner >> 2) * (volume.size[2] - 1));
-    const Eigen::Vector3d p = volume.patient_from_voxel * voxel;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return {low, high};
-}
-
-}  // namespace
-
 Eigen::Vector3d middle_of(const Volume& volume) {
-  const auto [low, high] = bounds(volume);
-  return 0.5 * (low + high);
+  return patient_box(volume).middle_mm();
 }
 
 Result<void> look_from_the_front(RenderScene& scene, const std::string& size, double clip) {
@@ -38,7 +21,7 @@ Result<void> look_from_the_front(RenderScene& scene, const std::string& size, do
       c.height_px > 8192) {
     return Error{Errc::bad_value, fmt::format("--size {}: give WIDTHxHEIGHT of 16 to 8192 pixels", size)};
   }
-  const auto [low, high] = bounds(scene.volume);
+  const auto [low, high] = patient_box(scene.volume);
   const Eigen::Vector3d extent = high - low;
   const bool thin = 2 * extent.z() < std::min(extent.x(), extent.y());
   const Eigen::Vector3d right = Eigen::Vector3d::UnitX();

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "host/volume/patient_box.hpp"
 
 namespace birdseye::host {
 
@@ -53,17 +54,11 @@ HuHistogram::HuHistogram(const Volume& volume) {
 }
 
 ClipPlane clip_plane(const CuttingPlane& plane, const Volume& volume) {
-  double low = std::numeric_limits<double>::max(), high = std::numeric_limits<double>::lowest();
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d voxel((corner & 1) * (volume.size[0] - 1), (corner >> 1 & 1) * (volume.size[1] - 1),
-                                (corner >> 2) * (volume.size[2] - 1));
-    const double place = (volume.patient_from_voxel * voxel)[plane.axis];
-    low = std::min(low, place);
-    high = std::max(high, place);
-  }
+  const PatientBox box = patient_box(volume);
+  const double low_mm = box.low_mm[plane.axis], high_mm = box.high_mm[plane.axis];
   ClipPlane out;
   out.normal = Eigen::Vector3d::Unit(plane.axis);
-  out.offset_mm = low + plane.part * (high - low);
+  out.offset_mm = low_mm + plane.part * (high_mm - low_mm);
   return out;
 }
 

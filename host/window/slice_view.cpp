@@ -19,21 +19,11 @@ constexpr double kShownWithin_mm = 4;
 
 }  // namespace
 
-SliceView::SliceView(std::shared_ptr<const Volume> ct) : ct_(std::move(ct)) {
-  low_mm_.setConstant(1e9);
-  high_mm_ = -low_mm_;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3d voxel((corner & 1) * (ct_->size[0] - 1), (corner >> 1 & 1) * (ct_->size[1] - 1),
-                                (corner >> 2) * (ct_->size[2] - 1));
-    const Eigen::Vector3d place_mm = ct_->patient_from_voxel * voxel;
-    low_mm_ = low_mm_.cwiseMin(place_mm);
-    high_mm_ = high_mm_.cwiseMax(place_mm);
-  }
-  place_mm_ = 0.5 * (low_mm_ + high_mm_);
-}
+SliceView::SliceView(std::shared_ptr<const Volume> ct)
+    : ct_(std::move(ct)), box_(patient_box(*ct_)), place_mm_(box_.middle_mm()) {}
 
 void SliceView::go_to(const Eigen::Vector3d& place_in_patient_mm) {
-  if (place_in_patient_mm.allFinite()) place_mm_ = place_in_patient_mm.cwiseMax(low_mm_).cwiseMin(high_mm_);
+  if (place_in_patient_mm.allFinite()) place_mm_ = place_in_patient_mm.cwiseMax(box_.low_mm).cwiseMin(box_.high_mm);
 }
 
 void SliceView::scroll(int view, double notches) {
@@ -58,13 +48,13 @@ std::optional<int> SliceView::hu() const {
 }
 
 SlicePlane SliceView::plane(int view) const {
-  const Eigen::Vector3d middle_mm = 0.5 * (low_mm_ + high_mm_);
+  const Eigen::Vector3d middle_mm = box_.middle_mm();
   // The nearer it is looked at, the more the place is in the middle; it stays where it is on the screen.
   Eigen::Vector3d centre_mm = middle_mm + (1 - 1 / zoom_) * (place_mm_ - middle_mm);
   const int axis = kAcross[static_cast<std::size_t>(view)];
   centre_mm[axis] = place_mm_[axis];
   constexpr double kAround = 1.04;
-  const double width_mm = kAround * (high_mm_ - low_mm_).maxCoeff() / zoom_;
+  const double width_mm = kAround * (box_.high_mm - box_.low_mm).maxCoeff() / zoom_;
   return slice_plane(kKinds[static_cast<std::size_t>(view)], centre_mm, width_mm, kSidePx, kSidePx);
 }
 

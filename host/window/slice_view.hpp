@@ -9,6 +9,7 @@
 
 #include "host/files/picture.hpp"
 #include "host/report/slice_picture.hpp"
+#include "host/volume/patient_box.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
@@ -64,7 +65,7 @@ class SliceView {
   [[nodiscard]] SlicePlane plane(int view) const;
 
   std::shared_ptr<const Volume> ct_;
-  Eigen::Vector3d low_mm_, high_mm_;  ///< the CT's box, patient frame
+  PatientBox box_;
   Eigen::Vector3d place_mm_;
   double zoom_ = 1;
   HuWindow window_;

@@ -29,16 +29,20 @@ def _cell(text):
     return re.sub(r"\s+", " ", text).replace("|", "\\|").strip()
 
 
+def _shown(line):
+    """Without the folders of this run, and no longer than a cell may be."""
+    line = re.sub(r"/tmp/inputs-\w+/work/", "", line).replace(f"{data_folder()}/", "")
+    return line if len(line) <= 160 else line[:157] + ".."
+
+
 def _said(row, outcome):
     """The line that tells most: a refusal's first, else the first reason that is not met, else nothing."""
     lines = [line.strip() for line in outcome.errors.splitlines() if re.match(r"birdseye(d|-sim)?: ", line)]
     if outcome.exit == 2 and lines:
-        text = re.sub(r"^birdseye(d|-sim)?: ", "", lines[0])
-        text = re.sub(r"/tmp/inputs-\w+/work/", "", text).replace(f"{data_folder()}/", "")
-        return text if len(text) <= 160 else text[:157] + ".."
+        return _shown(re.sub(r"^birdseye(d|-sim)?: ", "", lines[0]))
     if row.says:
         found = next((line.strip() for line in outcome.output.splitlines() if re.search(row.says[0], line, re.I)), "")
-        return found if len(found) <= 160 else found[:157] + ".."
+        return _shown(found)
     return ""
 
 

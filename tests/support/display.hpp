@@ -26,7 +26,8 @@ class Display {
       const int nowhere = ::open("/dev/null", O_RDWR);
       ::dup2(fds[1], STDOUT_FILENO);
       ::dup2(nowhere, STDERR_FILENO);
-      ::execlp("Xvfb", "Xvfb", "-displayfd", "1", "-screen", "0", (size + "x24").c_str(), "-nolisten", "tcp", nullptr);
+      ::execlp("Xvfb", "Xvfb", "-displayfd", "1", "-screen", "0", (size + "x24").c_str(), "-nolisten", "tcp",
+               "-noreset", nullptr);
       ::_exit(127);
     }
     ::close(fds[1]);
