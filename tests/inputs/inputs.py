@@ -65,7 +65,7 @@ def main():
         sys.exit(f"inputs: no row has {asked.only!r}")
     # For the page one after the other: times are to be those of a command alone.
     workers = 1 if asked.page else len(os.sched_getaffinity(0))
-    # Spawned, each has its own port and screen, and little memory, which is counted to the programs that it starts.
+    # Spawned, each has its own port, and little memory, which is counted to the programs that it starts.
     with concurrent.futures.ProcessPoolExecutor(workers, multiprocessing.get_context("spawn")) as pool:
         waited = [pool.submit(judged, number, asked.programs.resolve(), data_folder()) for number in chosen]
         results, failed = [], 0

@@ -32,6 +32,7 @@ class Row:
     writes: Sequence[str] = ()  # files that are new afterwards and not empty; `*` is any letters, also slashes
     check: Callable[[Path, str], str] | None = None  # of the folder and what was printed: what is wrong with the figures
     data: Sequence[str] = ()  # public recordings that it needs, below the folder of data
+    screen: bool = False  # whether it has an X server
     beside: Sequence[tuple[str, str]] = ()  # programs that run meanwhile, and what each prints once it is ready
     slow: bool = False  # only run when all rows are
 

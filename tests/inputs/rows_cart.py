@@ -1,7 +1,7 @@
 """birdseye record, live and demo, birdseyed and birdseye-sim."""
 import volumes
 from judge import Row
-from running import PORT, SCREEN
+from running import PORT
 from rows_draw import registration
 
 
@@ -54,8 +54,6 @@ def bad_window_script(folder):
 
 
 SIM = "birdseye-sim minibird --tty $PWD/bird --boot-ms 0 --seconds 1 --faults faults.toml"
-# xvfb-run would put its own exit code in place of the window's.
-DISPLAY = ((f"Xvfb :{SCREEN} -displayfd 1 -screen 0 1280x1024x24 -nolisten tcp 2>/dev/null", f"{SCREEN}"),)
 WINDOW = "birdseye live --script keys.txt"
 
 ROWS = [
@@ -72,20 +70,20 @@ ROWS = [
     Row("calibrate latency", "wrong", "an appliance whose scope moves, but whose video shows no texture", "refused: no motion is seen; what to look at",
         "birdseye calibrate latency --server 127.0.0.1:$PORT --seconds 10 --json latency.json", 2, cart_at_port,
         beside=BESIDE, says=["no motion", "texture"], slow=True),
-    Row("live", "wrong", "no CT and no server", "refused: what to give", WINDOW, 2, window_script, says=["--server|--simulate|--recording"], beside=DISPLAY),
-    Row("live", "wrong", "a server without a CT", "refused: --ct is named", WINDOW + " --server 127.0.0.1:1", 2, window_script, says=["--ct"], beside=DISPLAY),
+    Row("live", "wrong", "no CT and no server", "refused: what to give", WINDOW, 2, window_script, says=["--server|--simulate|--recording"], screen=True),
+    Row("live", "wrong", "a server without a CT", "refused: --ct is named", WINDOW + " --server 127.0.0.1:1", 2, window_script, says=["--ct"], screen=True),
     Row("live", "wrong", "no display", "refused: DISPLAY, xvfb-run",
         "env -u DISPLAY birdseye live --script keys.txt --server 127.0.0.1:1 --ct ct.nii.gz", 2, window_script, says=["DISPLAY|display"]),
     Row("live", "odd", "nobody listens at the server", "the window opens and goes on trying; ended by its script",
-        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --board chessboard:9x6:5mm --json live.json", 0, window_script, writes=["live.json"], beside=DISPLAY),
+        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --board chessboard:9x6:5mm --json live.json", 0, window_script, writes=["live.json"], screen=True),
     Row("live", "wrong", "a script with a word that there is not", "refused before the window opens: line 2",
-        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --board chessboard:9x6:5mm", 2, bad_window_script, says=["keys.txt", "2|pres"], beside=DISPLAY),
+        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --board chessboard:9x6:5mm", 2, bad_window_script, says=["keys.txt", "2|pres"], screen=True),
     Row("live", "odd", "labels without --organ", "refused: --organ is named",
-        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --labels ct.nii.gz --board chessboard:9x6:5mm", 2, window_script, says=["--organ"], beside=DISPLAY),
+        WINDOW + " --server 127.0.0.1:1 --ct ct.nii.gz --labels ct.nii.gz --board chessboard:9x6:5mm", 2, window_script, says=["--organ"], screen=True),
     Row("live", "wrong", "a recording that is none", "refused: the path is named",
-        WINDOW + " --recording ct.nii.gz --ct ct.nii.gz --board chessboard:9x6:5mm", 2, window_script, says=["ct.nii.gz"], beside=DISPLAY),
+        WINDOW + " --recording ct.nii.gz --ct ct.nii.gz --board chessboard:9x6:5mm", 2, window_script, says=["ct.nii.gz"], screen=True),
     Row("live", "wrong", "a CT that is not there", "refused before the window opens", WINDOW + " --server 127.0.0.1:1 --ct none", 2, window_script,
-        says=["none"], beside=DISPLAY),
+        says=["none"], screen=True),
     Row("demo", "wrong", "--ct that is not there", "refused at once: the path is named", "birdseye demo --ct none --out out", 2, says=["none"]),
     Row("demo", "wrong", "--ct that is a text", "refused at once; no half a demo is left", "birdseye demo --ct notes.txt --out out", 2,
         lambda folder: (folder / "notes.txt").write_text("hello\n"), says=["notes.txt"]),

@@ -1,5 +1,6 @@
 """Runs a row of the table in a folder of its own."""
 import os
+import select
 import signal
 import subprocess
 import tempfile
@@ -11,7 +12,6 @@ from judge import Outcome
 DEADLINE_S = 120
 READY_S = 30
 PORT = 20000 + os.getpid() % 20000  # of the appliances that rows start
-SCREEN = 100 + os.getpid() % 10000  # of the X server of those with a window
 
 
 def data_folder():
@@ -31,6 +31,9 @@ def missing_data(row, data):
 def _end(process):
     """Ends a program that we started, and all that it started."""
     try:
+        os.killpg(process.pid, signal.SIGTERM)  # an X server takes its lock away
+        process.wait(timeout=5)
+    except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
     except ProcessLookupError:
         pass
@@ -63,6 +66,20 @@ def _start_beside(row, folder, logs, environment):
                 _end(process)
             raise RuntimeError(f"{command}: not ready: {log.read_text(errors='replace')[-300:]}")
     return started
+
+
+def _start_screen(environment):
+    """An X server, which chooses a number that is free: environment names it. xvfb-run would put its own exit code in
+    place of the window's."""
+    server = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                              start_new_session=True)
+    number = server.stdout.readline().decode().strip() if select.select([server.stdout], [], [], READY_S)[0] else ""
+    if not number:
+        _end(server)
+        raise RuntimeError("Xvfb: not ready")
+    environment["DISPLAY"] = f":{number}"
+    return server
 
 
 def _run(row, folder, logs, environment):
@@ -102,13 +119,15 @@ def run(row, programs, data):
         folder.mkdir()
         logs.mkdir()
         environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8",
-                       "PORT": str(PORT), "DISPLAY": f":{SCREEN}", "DATA": str(data or "")}
+                       "PORT": str(PORT), "DATA": str(data or "")}
         if row.make:
             row.make(folder)
         before = _listing(folder)
         beside = _start_beside(row, folder, logs, environment)
         kept = _listing(folder) if row.beside else before
         try:
+            if row.screen:
+                beside.append(_start_screen(environment))
             exit_code, seconds, most_mb = _run(row, folder, logs, environment)
         finally:
             for process in reversed(beside):
