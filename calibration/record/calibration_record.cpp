@@ -236,20 +236,26 @@ Result<CalibrationRecord> parse_record(const std::string& text) {
   }
 }
 
+std::optional<IdentityDifference> first_difference(const Identity& recorded, const Identity& told) {
+  for (const auto& [name, value] : recorded) {
+    const auto found = told.find(name);
+    if (found == told.end()) return IdentityDifference{name, value, ""};
+    if (found->second != value) return IdentityDifference{name, value, found->second};
+  }
+  return std::nullopt;
+}
+
 std::string misfit(const std::string& what, const Identity& recorded, const Identity& told) {
   if (recorded.empty())
     return fmt::format(
         "the record does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind "
         "HOST",
         what);
-  for (const auto& [key, value] : recorded) {
-    const auto found = told.find(key);
-    if (found == told.end())
-      return fmt::format("the record is of {} {} {}; this one does not tell its", what, key, value);
-    if (found->second != value)
-      return fmt::format("the record is of {} {} {}; this one's is {}", what, key, value, found->second);
-  }
-  return {};
+  const auto other = first_difference(recorded, told);
+  if (!other) return {};
+  if (other->told.empty())
+    return fmt::format("the record is of {} {} {}; this one does not tell its", what, other->name, other->recorded);
+  return fmt::format("the record is of {} {} {}; this one's is {}", what, other->name, other->recorded, other->told);
 }
 
 }  // namespace birdseye::calibration

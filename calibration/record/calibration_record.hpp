@@ -84,6 +84,12 @@ std::string record_text(const CalibrationRecord& record);
 /// sense.
 Result<CalibrationRecord> parse_record(const std::string& text);
 
+/// What of an instrument is not as it was recorded: the first that differs, or that is told no more (told: empty).
+struct IdentityDifference {
+  std::string name, recorded, told;
+};
+std::optional<IdentityDifference> first_difference(const Identity& recorded, const Identity& told);
+
 /// Why a record made with one instrument is not to be used with another, in words; empty where all that the record
 /// knows is as the instrument says. A record that knows nothing fits nothing, and what the instrument does not say
 /// cannot fit. what: "tracker", "camera".

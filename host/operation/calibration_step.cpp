@@ -31,9 +31,52 @@ void CalibrationStep::push(const wire::Event& event) {
   guide_.push(event);
 }
 
-bool CalibrationStep::tick() {
+void CalibrationStep::take(CalibratedScope found, const std::string& line) {
+  found_ = std::move(found);
+  held_back_.reset();
+  note_ = {true, line};
+}
+
+void CalibrationStep::hold_back(const std::string& why) {
+  if (found_) {
+    held_back_ = std::exchange(found_, std::nullopt);
+    line_ = note_.line;
+  }
+  note_ = {false, why};
+}
+
+bool CalibrationStep::withdraw_record(const std::string& why) {
+  if (!found_ && !held_back_) {
+    if (!why.empty()) note_.line = why;
+    return false;
+  }
+  if (found_ ? found_->by_board : held_back_->by_board) return false;
+  const bool changes = found_.has_value();
+  person_may_say_ = false;
+  hold_back(words("held_record", why));
+  return changes;
+}
+
+bool CalibrationStep::judge(const ConnectedInstruments& connected) {
+  const auto& judged = found_ ? found_ : held_back_;
+  if (!judged || !judged->by_board) return false;
+  const InstrumentMatch match = connected.match(judged->found_with, DependsOn::tracker_and_camera);
+  const bool changes = match.holds != found_.has_value();
+  person_may_say_ = match.person_may_say;
+  if (!match.holds) hold_back(match.why_not);
+  if (match.holds && held_back_) {
+    // Told from now on by this connection, whatever nobody told before.
+    held_back_->found_with = connected.now();
+    take(*std::exchange(held_back_, std::nullopt), line_);
+  }
+  return changes;
+}
+
+bool CalibrationStep::tick(const Instruments& found_with) {
   auto guided = guide_.take();
-  return guided && finish(*guided);
+  if (!guided || !finish(*guided)) return false;
+  found_->found_with = found_with;
+  return true;
 }
 
 bool CalibrationStep::finish(const Result<GuidedCalibration>& guided) {
@@ -47,10 +90,8 @@ bool CalibrationStep::finish(const Result<GuidedCalibration>& guided) {
     note_.line = scope.error().what;
     return false;
   }
-  found_ = *std::move(scope);
-  note_.done = true;
-  note_.line = fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(guided->verdict.grade),
-                           guided->stations.input.stations.size(), guided->hand_eye.held_out_mm);
+  take(*std::move(scope), fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(guided->verdict.grade),
+                                      guided->stations.input.stations.size(), guided->hand_eye.held_out_mm));
   return true;
 }
 
@@ -58,15 +99,11 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   auto scope = ScopeSetup::of_record(record);
   if (!scope) return Adopted::no;
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
-  if (found_ && found_->by_board && made_utc <= found_->made_utc) return Adopted::no;
-  const bool anew = found_ && made_utc != found_->made_utc;
-  found_ = {*std::move(scope), made_utc, false};
-  note_ = {true, words("note_record_of", made_utc)};
+  const auto& before = found_ ? found_ : held_back_;
+  if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
+  const bool anew = before && (before->by_board || made_utc != before->made_utc);
+  take({*std::move(scope), made_utc, false, {}}, words("note_record_of", made_utc));
   return anew ? Adopted::anew : Adopted::again;
-}
-
-void CalibrationStep::tell_none(const std::string& why) {
-  if (!why.empty()) note_.line = why;
 }
 
 void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& line) {
@@ -77,9 +114,8 @@ void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& li
     return;
   }
   guide_.give_up();
-  found_ = kept;
+  take(kept, line);
   found_->by_board = true;
-  note_ = {true, line};
 }
 
 }  // namespace birdseye::host

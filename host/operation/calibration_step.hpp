@@ -21,17 +21,26 @@ class CalibrationStep {
   /// What the appliance sends, for the guide.
   void push(const wire::Event& event);
   /// True: the guide has found a calibration.
-  bool tick();
+  bool tick(const Instruments& found_with);
 
   enum class Adopted { no, again, anew };
   /// The appliance's record. again: it is the one that is in force already.
   Adopted adopt(const calibration::CalibrationRecord& record);
-  /// There is none in force, and why.
-  void tell_none(const std::string& why);
+  /// The appliance has no record in force, and why: one that was adopted is held back. True: that changes what is
+  /// found.
+  bool withdraw_record(const std::string& why);
+  /// Holds back what was found by the board with other hardware, and gives it back where that has come again. True:
+  /// what is found is no more what it was.
+  bool judge(const ConnectedInstruments& connected);
   /// What an earlier window found by the board, unless there is a newer one.
   void take_up(const CalibratedScope& kept, const std::string& line);
 
+  /// Empty where nothing is found, or what was found is held back.
   [[nodiscard]] const std::optional<CalibratedScope>& found() const { return found_; }
+  /// What was found with hardware that is not connected now. Nothing is drawn by it.
+  [[nodiscard]] const std::optional<CalibratedScope>& held_back() const { return held_back_; }
+  /// It is held back because nothing tells what is connected: a person may say that it is the same.
+  [[nodiscard]] bool person_may_say() const { return held_back_ && person_may_say_; }
   [[nodiscard]] const StepNote& note() const { return note_; }
   [[nodiscard]] bool guiding() const { return guide_.guiding(); }
   /// The stations are taken, and the last solution is being worked out.
@@ -45,8 +54,12 @@ class CalibrationStep {
 
  private:
   bool finish(const Result<GuidedCalibration>& guided);
+  void hold_back(const std::string& why);
+  void take(CalibratedScope found, const std::string& line);
 
-  std::optional<CalibratedScope> found_;
+  std::optional<CalibratedScope> found_, held_back_;
+  std::string line_;  ///< of what is held back, as it was found
+  bool person_may_say_ = false;
   StepNote note_;
   std::optional<Verdict> verdict_;
   GuideWorker guide_;

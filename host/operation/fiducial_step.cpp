@@ -14,19 +14,26 @@ constexpr std::size_t kFewestFiducials = 3;
 
 }  // namespace
 
-bool FiducialStep::add(const Touch& touch, std::size_t wanted) {
+bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments& found_with) {
+  if (held_back_) {
+    touches_.clear();
+    registered_.reset();
+    held_back_ = false;
+  }
   if (wanted != 0 && touches_.size() >= wanted) return false;
+  if (touches_.empty()) found_with_ = found_with;
   touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
   return true;
 }
 
 bool FiducialStep::undo() {
-  if (touches_.empty()) return false;
+  if (held_back_ || touches_.empty()) return false;
   touches_.pop_back();
   return true;
 }
 
 void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted) {
+  if (held_back_) return;
   confirmed_ = true;
   registered_.reset();
   fault_.clear();
@@ -43,6 +50,7 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   }
   for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
   registered_ = found->registered;
+  registered_->found_with = found_with_;
   note_.line = words("note_touched_fre", touches_.size(), registered_->fre_mm);
   note_.done = touches_.size() >= std::max(kFewestFiducials + 1, wanted);
 }
@@ -52,9 +60,35 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
   touches_.clear();
   if (!kept) return true;
   registered_ = kept;
+  found_with_ = kept->found_with;
   confirmed_ = false;
   note_ = {true, words("note_taken_up_fre", when, kept->fre_mm)};
   return true;
+}
+
+void FiducialStep::doubt() {
+  if (registered_) confirmed_ = false;
+}
+
+bool FiducialStep::judge(const ConnectedInstruments& connected) {
+  if (!registered_ && touches_.empty()) return false;
+  const InstrumentMatch match = connected.match(found_with_, DependsOn::tracker);
+  person_may_say_ = match.person_may_say;
+  const bool changes = match.holds == held_back_;
+  if (!match.holds) {
+    if (changes) {
+      line_ = note_.line;
+      done_ = note_.done;
+    }
+    held_back_ = true;
+    note_ = {false, match.why_not};
+  } else if (held_back_) {
+    held_back_ = false;
+    found_with_ = connected.now();
+    if (registered_) registered_->found_with = found_with_;
+    note_ = {done_, line_};
+  }
+  return changes;
 }
 
 }  // namespace birdseye::host

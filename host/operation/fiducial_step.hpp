@@ -16,7 +16,8 @@ namespace birdseye::host {
 class FiducialStep {
  public:
   /// One more; false: all that are wanted are touched (wanted 0: as many as come). fit() is due then.
-  bool add(const Touch& touch, std::size_t wanted);
+  /// found_with: by which it was touched.
+  bool add(const Touch& touch, std::size_t wanted, const Instruments& found_with);
   /// The last is taken back; false: there is none.
   bool undo();
   /// By the markers of the CT, empty as long as they are looked for. Three give a fit, one more, and as many as are
@@ -27,9 +28,20 @@ class FiducialStep {
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);
   /// Somebody has looked, and the registration holds.
   void confirm() { confirmed_ = true; }
+  /// Whether the registration holds is to be looked at anew.
+  void doubt();
+  /// Holds back, touches and all, what was found with another tracker, and gives it back where that has come again.
+  /// True: what is registered is no more what it was.
+  bool judge(const ConnectedInstruments& connected);
 
   [[nodiscard]] const std::vector<TouchedFiducial>& touches() const { return touches_; }
-  [[nodiscard]] const std::optional<RegisteredPatient>& registered() const { return registered_; }
+  /// Empty where nothing is registered, or what was is held back.
+  [[nodiscard]] std::optional<RegisteredPatient> registered() const { return held_back_ ? std::nullopt : registered_; }
+  /// That too by which nothing is drawn, for its tracker is not connected.
+  [[nodiscard]] const std::optional<RegisteredPatient>& registered_or_held_back() const { return registered_; }
+  [[nodiscard]] bool held_back() const { return held_back_; }
+  /// It is held back because nothing tells what is connected: a person may say that it is the same.
+  [[nodiscard]] bool person_may_say() const { return held_back_ && person_may_say_; }
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const std::string& fault() const { return fault_; }
   [[nodiscard]] const StepNote& note() const { return note_; }
@@ -37,8 +49,10 @@ class FiducialStep {
  private:
   std::vector<TouchedFiducial> touches_;
   std::optional<RegisteredPatient> registered_;
-  bool confirmed_ = true;
-  std::string fault_;
+  Instruments found_with_;  ///< all touches, or what was taken up
+  bool confirmed_ = true, held_back_ = false, person_may_say_ = false;
+  std::string fault_, line_;  ///< line_: of what is held back, as it was found
+  bool done_ = false;         ///< and whether the step was done by it
   StepNote note_;
 };
 

@@ -8,6 +8,7 @@
 
 #include "calibration/base/result.hpp"
 #include "host/deform/displacement_field.hpp"
+#include "host/operation/instruments.hpp"
 #include "host/overlay/scope_setup.hpp"
 #include "host/overlay/trust.hpp"
 
@@ -19,8 +20,9 @@ struct GuidedCalibration;
 /// How the scope is calibrated.
 struct CalibratedScope {
   ScopeSetup scope;
-  std::string made_utc;   ///< 2026-11-22T09:30:00Z
-  bool by_board = false;  ///< here, by the board; else by a record
+  std::string made_utc;      ///< 2026-11-22T09:30:00Z
+  bool by_board = false;     ///< here, by the board; else by a record
+  Instruments found_with{};  ///< of one by the board; what a record is of, the appliance judges
 };
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);
@@ -30,6 +32,7 @@ struct RegisteredPatient {
   Transform<Tracker, Patient> tracker_from_patient;
   double fre_mm = 0;
   std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
+  Instruments found_with{};                              ///< the tracker counts: touches are in its frame
 };
 
 /// How the organ is deformed, and how well that is known; what was not estimated is absent.

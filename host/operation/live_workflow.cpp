@@ -10,9 +10,13 @@ namespace birdseye::host {
 namespace {
 
 /// Why there is no overlay by what the fiducials give.
-const std::string& why_unregistered(const FiducialStep& fiducials) {
+std::string why_unregistered(const FiducialStep& fiducials) {
+  if (fiducials.held_back()) return words("why_registration_held", fiducials.note().line);
   return fiducials.confirmed() ? words("why_unregistered") : words("why_unconfirmed");
 }
+
+// Whoever was away from the patient for so long does not know what was moved meanwhile.
+constexpr Duration kPause = Duration::from_ms(10'000);
 
 }  // namespace
 
@@ -56,7 +60,7 @@ void LiveWorkflow::tick() {
     keep();
   }
   if (const auto checked = watch_.tick()) take(*checked);
-  if (!calibration_.tick()) return;
+  if (!calibration_.tick(instruments_.now())) return;
   forget_views(words("note_calibrated_anew"));
   update_setup();
   keep();
@@ -66,6 +70,13 @@ void LiveWorkflow::tick() {
 }
 
 void LiveWorkflow::set_link(bool connected, const std::string& words) {
+  if (connected != instruments_.connected()) {
+    instruments_.set_link(connected);
+    // Behind another connection may stand another appliance: it has to send its record first.
+    if (!connected && calibration_.withdraw_record(host::words("held_no_link"))) follow_held_back();
+    if (!connected) record_tip_in_pointer_mm_.reset();
+    judge_instruments();
+  }
   connection_.set_link(connected, words, picture_.frame().has_value());
   if (connection_.note().done && step_ == LiveStep::connect) go_to(LiveStep::calibrate);
 }
@@ -80,6 +91,7 @@ void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::V
 
 void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
+    note_pause(now);
     if (!frozen_) {
       picture_.take(*frame, clock ? clock->host_from_device(frame->info.acquired) : now);
       watch_surface(now);
@@ -88,6 +100,8 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
     take(*birds);
   } else if (const auto* health = std::get_if<wire::Health>(&event)) {
     connection_.take(*health);
+    instruments_.take(*health);
+    judge_instruments();
   } else if (const auto* status = std::get_if<wire::Status>(&event)) {
     connection_.take(*status);
   } else if (const auto* calibration = std::get_if<wire::Calibration>(&event)) {
@@ -108,33 +122,85 @@ void LiveWorkflow::take(const wire::Birds& birds) {
     jitter_.push(birds.acquired,
                  setup->camera_from_patient(bird.tracker_from_sensor) * target_in_patient_mm(*patient_.plan()));
   }
-  if (!settings_.tip_in_pointer_mm) return;
-  const auto rested = pointer_.take(birds, settings_.pointer, *settings_.tip_in_pointer_mm);
+  const auto& tip_mm = settings_.tip_in_pointer_mm ? settings_.tip_in_pointer_mm : record_tip_in_pointer_mm_;
+  if (!tip_mm) return;
+  const auto rested = pointer_.take(birds, settings_.pointer, *tip_mm);
+  const auto registered = fiducials_.registered();
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name != settings_.pointer || !strokes_.stroking()) continue;
-    strokes_.take(birds.acquired, fiducials_.registered()->tracker_from_patient.inverse() *
-                                      (bird.tracker_from_sensor * *settings_.tip_in_pointer_mm));
+    if (bird.name != settings_.pointer || !strokes_.stroking() || !registered) continue;
+    strokes_.take(birds.acquired, registered->tracker_from_patient.inverse() * (bird.tracker_from_sensor * *tip_mm));
   }
   // The hand need not wait for the arithmetic.
   const bool touching = step_ == LiveStep::fiducials ||
                         (step_ == LiveStep::calibrate && fiducials_.confirmed() && calibration_.working_out());
-  if (!rested || !touching || is_other_patients() || !fiducials_.add(*rested, settings_.fiducials)) return;
+  if (!rested || !touching || is_other_patients() || !fiducials_.add(*rested, settings_.fiducials, instruments_.now()))
+    return;
   fit();
   keep();
 }
 
 void LiveWorkflow::take(const wire::Calibration& calibration) {
-  if (!calibration.in_force) return calibration_.tell_none(calibration.why_not);
+  record_tip_in_pointer_mm_.reset();
+  tip_rms_mm_.reset();
+  if (!calibration.in_force) {
+    if (calibration_.withdraw_record(calibration.why_not)) follow_held_back();
+    return;
+  }
   const auto record = calibration::parse_record(calibration.record);
-  if (!record) return;
-  if (record->tip && !settings_.tip_in_pointer_mm) {
-    settings_.tip_in_pointer_mm = record->tip->tip_in_sensor_mm;
-    tip_rms_mm_ = record->tip->rms_mm;
+  if (!record) {
+    if (calibration_.withdraw_record(record.error().what)) follow_held_back();
+    return;
+  }
+  if (record->tip) {
+    record_tip_in_pointer_mm_ = record->tip->tip_in_sensor_mm;
+    if (!settings_.tip_in_pointer_mm) tip_rms_mm_ = record->tip->rms_mm;
   }
   const auto adopted = calibration_.adopt(*record);
   if (adopted == CalibrationStep::Adopted::no) return;
   if (adopted == CalibrationStep::Adopted::anew) forget_views(words("note_calibrated_anew"));
+  follow_held_back();
+}
+
+/// What is found holds with the instruments that are connected now, or is held back.
+void LiveWorkflow::judge_instruments() {
+  const bool scope = calibration_.judge(instruments_), patient = fiducials_.judge(instruments_);
+  if (scope || patient) follow_held_back();
+}
+
+/// The first step of which something is held back is open again; with all of it back the operation goes on where it
+/// was.
+void LiveWorkflow::follow_held_back() {
+  strokes_.end();
+  const bool held_back = calibration_.held_back() || fiducials_.held_back();
+  if (held_back) {
+    if (!return_to_) return_to_ = step_;
+    step_ = !instruments_.connected()  ? LiveStep::connect
+            : calibration_.held_back() ? LiveStep::calibrate
+                                       : LiveStep::fiducials;
+  } else if (return_to_) {
+    step_ = *std::exchange(return_to_, std::nullopt);
+  }
   update_setup();
+}
+
+/// Patient or transmitter may have been moved while nobody saw it: only a landmark tells.
+void LiveWorkflow::note_pause(HostTime now) {
+  const bool paused = video_came_ && now - *video_came_ > kPause;
+  video_came_ = now;
+  if (!paused || !fiducials_.registered_or_held_back()) return;
+  fiducials_.doubt();
+  check_ = run_ = {};
+  (return_to_ ? *return_to_ : step_) = LiveStep::check;
+  update_setup();
+}
+
+bool LiveWorkflow::asks_for_instruments() const {
+  return connection_.note().done && (calibration_.person_may_say() || fiducials_.person_may_say());
+}
+
+void LiveWorkflow::confirm_instruments() {
+  instruments_.vouch();
+  judge_instruments();
 }
 
 /// The newest frame, if it is time for another check. Of a motion that is known the check goes on: it may pass.
@@ -216,11 +282,13 @@ void LiveWorkflow::update_setup() {
 
 void LiveWorkflow::set_picture_up() {
   const auto& scope = calibration_.found();
-  const auto& registered = fiducials_.registered();
+  const auto registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
   if (patient_.plan() && !patient_confirmed_)
     return picture_.set_setup(std::nullopt, {},
                               is_other_patients() ? words("patient_other") : words("patient_unconfirmed"));
+  if (calibration_.held_back())
+    return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
   if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_));
   TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   figures.moved_mm = motion_.moved_mm();
@@ -231,8 +299,9 @@ void LiveWorkflow::keep() {
   if (!patient_.plan()) return;
   Operation operation;
   operation.ct_checksum = patient_.plan()->checksum;
-  if (const auto& scope = calibration_.found(); scope && scope->by_board) operation.calibrated = scope;
-  operation.registered = fiducials_.registered();
+  const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();
+  if (scope && scope->by_board) operation.calibrated = scope;
+  operation.registered = fiducials_.registered_or_held_back();
   operation.deformed = deformation_.found();
   keeper_.keep(std::move(operation));
 }
@@ -252,16 +321,24 @@ void LiveWorkflow::take_up() {
     deformation_.take_up(kept->deformed, when);
     show_shape();
   }
+  judge_instruments();
   update_setup();
   keep();
   // Patient or transmitter may have been moved meanwhile: only a landmark tells.
-  if (!fiducials_.confirmed()) go_to(LiveStep::check);
+  if (fiducials_.confirmed()) return;
+  if (return_to_) {
+    return_to_ = LiveStep::check;
+  } else {
+    go_to(LiveStep::check);
+  }
 }
 
 void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
   if (step != LiveStep::views) strokes_.end();
-  if (step == LiveStep::calibrate && !calibration_.note().done) calibration_.begin(settings_.scope, settings_.pattern);
+  // What is held back may come back by itself; by the large button the scope is calibrated anew.
+  const bool open = !calibration_.note().done && !calibration_.held_back();
+  if (step == LiveStep::calibrate && open) calibration_.begin(settings_.scope, settings_.pattern);
   if (step == LiveStep::run) run_ = {true, words("note_runs")};
 }
 
@@ -277,6 +354,7 @@ void LiveWorkflow::go_on() {
 
 void LiveWorkflow::primary() {
   if (frozen_) return freeze_or_let_go();
+  if (asks_for_instruments()) return confirm_instruments();
   if (asks_for_patient()) return confirm_patient();
   const auto& setup = picture_.setup();
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
@@ -289,7 +367,7 @@ void LiveWorkflow::primary() {
     case LiveStep::calibrate:
       return calibration_.guiding() ? calibration_.end() : calibration_.begin(settings_.scope, settings_.pattern);
     case LiveStep::fiducials:
-      if (const auto held = pointer_.held(); held && fiducials_.add(*held, settings_.fiducials)) {
+      if (const auto held = pointer_.held(); held && fiducials_.add(*held, settings_.fiducials, instruments_.now())) {
         fit();
         keep();
       }
@@ -317,7 +395,7 @@ void LiveWorkflow::primary() {
 void LiveWorkflow::stroke() {
   if (step_ != LiveStep::views) return;
   if (strokes_.stroking()) return strokes_.end();
-  if (!settings_.tip_in_pointer_mm) return strokes_.refuse(words("note_no_tip"));
+  if (!settings_.tip_in_pointer_mm && !record_tip_in_pointer_mm_) return strokes_.refuse(words("note_no_tip"));
   if (!fiducials_.registered() || !fiducials_.confirmed()) {
     return strokes_.refuse(words("note_no_stroke", why_unregistered(fiducials_)));
   }

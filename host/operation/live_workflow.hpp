@@ -9,6 +9,7 @@
 #include "host/operation/connection_step.hpp"
 #include "host/operation/deformation_step.hpp"
 #include "host/operation/fiducial_step.hpp"
+#include "host/operation/instruments.hpp"
 #include "host/operation/operation_keeper.hpp"
 #include "host/operation/operation_view.hpp"
 #include "host/operation/organ_motion.hpp"
@@ -56,7 +57,8 @@ class LiveWorkflow {
   void load(const PatientFiles& files) { patient_.load(files); }
 
   // What a person does.
-  void confirm_patient();  ///< the CT is of the patient on the table; nothing is registered before
+  void confirm_instruments();  ///< tracker and camera are the same as before the connection was lost
+  void confirm_patient();      ///< the CT is of the patient on the table; nothing is registered before
   /// Looks for a marker at a place of the CT, to be one more fiducial, or a landmark: its centre, or the place itself.
   void pick(PlacePicks::Kind kind, const Eigen::Vector3d& place_in_patient_mm);
   /// The fiducial of the CT that is nearest to a place is not used any more.
@@ -90,6 +92,10 @@ class LiveWorkflow {
   void take(const wire::Calibration& calibration);
   void fit();
   void take(const PlacePicks::Picked& picked);
+  [[nodiscard]] bool asks_for_instruments() const;
+  void judge_instruments();
+  void follow_held_back();
+  void note_pause(HostTime now);
   [[nodiscard]] bool asks_for_patient() const;
   [[nodiscard]] bool is_other_patients() const;
   void forget_views(const std::string& why);
@@ -103,6 +109,10 @@ class LiveWorkflow {
 
   LiveSettings settings_;
   LiveStep step_ = LiveStep::connect;
+  std::optional<LiveStep> return_to_;   ///< once what is held back comes back
+  std::optional<HostTime> video_came_;  ///< the newest frame
+  ConnectedInstruments instruments_;
+  std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force
   bool frozen_ = false;
   std::string resume_fault_;
   std::uint64_t shapes_ = 0;

@@ -28,6 +28,7 @@ OperationView LiveWorkflow::view() const {
   if (is_other_patients())
     out.patient_fault = words("patient_wrong", patient_.plan()->identity.id, settings_.patient_id);
   out.asks_for_patient = asks_for_patient();
+  out.asks_for_instruments = asks_for_instruments();
   out.link = connection_.link();
   out.board_named = settings_.pattern.has_value();
   out.guiding = calibration_.guiding();
@@ -46,7 +47,7 @@ OperationView LiveWorkflow::view() const {
   out.looking_for_marker = picks_.looking();
   out.pick_line = pick_line_;
   out.touches = fiducials_.touches();
-  const auto& registered = fiducials_.registered();
+  const auto registered = fiducials_.registered();
   if (registered) out.fre_mm = registered->fre_mm;
   out.registration_fault = fiducials_.fault();
   out.unconfirmed = !fiducials_.confirmed();

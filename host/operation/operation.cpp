@@ -33,6 +33,14 @@ std::optional<double> figure_of(const nlohmann::json& figures, const char* name)
   return figures.contains(name) ? std::optional(figures.at(name).get<double>()) : std::nullopt;
 }
 
+/// What files of 0.1.0 do not say is not known.
+Instruments instruments_of(const nlohmann::json& found) {
+  Instruments out;
+  if (found.contains("tracker")) found.at("tracker").get_to(out.tracker);
+  if (found.contains("camera")) found.at("camera").get_to(out.camera);
+  return out;
+}
+
 /// A file of 0.1.0 has tracked_rms_px in place of held_out_px: what the fit leaves, which is not the error held out.
 /// That one is then not known.
 Result<CalibratedScope> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
@@ -40,11 +48,12 @@ Result<CalibratedScope> read_calibrated(const fs::path& folder, const nlohmann::
       folder / kCamera, folder / kHandEye,
       {figure_of(figures, "camera_rms_px"), figure_of(figures, "held_out_px"), figure_of(figures, "hand_eye_mm")});
   if (!scope) return scope.error();
-  return CalibratedScope{*std::move(scope), figures.at("made_utc").get<std::string>(), true};
+  return CalibratedScope{*std::move(scope), figures.at("made_utc").get<std::string>(), true, instruments_of(figures)};
 }
 
 nlohmann::json figures_of(const CalibratedScope& found) {
-  nlohmann::json out{{"made_utc", found.made_utc}};
+  nlohmann::json out{
+      {"made_utc", found.made_utc}, {"tracker", found.found_with.tracker}, {"camera", found.found_with.camera}};
   const ScopeFigures& figures = found.scope.figures();
   if (figures.camera_rms_px) out["camera_rms_px"] = *figures.camera_rms_px;
   if (figures.held_out_px) out["held_out_px"] = *figures.held_out_px;
@@ -78,7 +87,9 @@ Result<void> write_operation(const fs::path& folder, const Operation& operation)
     files.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
   }
   if (const auto& found = operation.registered) {
-    sheet["registered"] = {{"fre_mm", found->fre_mm}, {"fiducials_in_patient_mm", nlohmann::json::array()}};
+    sheet["registered"] = {{"fre_mm", found->fre_mm},
+                           {"tracker", found->found_with.tracker},
+                           {"fiducials_in_patient_mm", nlohmann::json::array()}};
     for (const Eigen::Vector3d& place : found->fiducials_in_patient_mm)
       sheet["registered"]["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
     files.push_back({folder / kRegistration, pose_text(found->tracker_from_patient.inverse().matrix())});
@@ -126,7 +137,8 @@ Result<Operation> read_operation(const fs::path& folder) {
       if (!matrix) return matrix.error();
       out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix).inverse(),
                         sheet.at("registered").at("fre_mm").get<double>(),
-                        {}};
+                        {},
+                        instruments_of(sheet.at("registered"))};
       for (const auto& place : sheet.at("registered").at("fiducials_in_patient_mm"))
         out.registered->fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                                              place.at(2).get<double>());

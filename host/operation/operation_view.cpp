@@ -6,6 +6,7 @@ namespace birdseye::host {
 
 std::string primary_words(const OperationView& operation) {
   if (operation.frozen) return words("do_let_go");
+  if (operation.asks_for_instruments) return words("do_same_instruments");
   if (!operation.patient_fault.empty()) return words("do_other_ct");
   if (operation.asks_for_patient) return words("do_confirm_patient");
   const bool done = operation.note(operation.step).done;

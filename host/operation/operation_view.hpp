@@ -23,9 +23,10 @@ namespace birdseye::host {
 struct OperationView {
   LiveStep step = LiveStep::connect;
   bool frozen = false;
-  bool watched = false;         ///< whether the video is held against the deformed surface
-  bool overlay_hidden = false;  ///< a person has switched it off
-  bool board_named = false;     ///< there is a board to calibrate with
+  bool watched = false;               ///< whether the video is held against the deformed surface
+  bool asks_for_instruments = false;  ///< whether tracker and camera are the same as before, for nothing tells it
+  bool overlay_hidden = false;        ///< a person has switched it off
+  bool board_named = false;           ///< there is a board to calibrate with
   bool guiding = false;
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
   bool deforming = false;

@@ -227,10 +227,26 @@ inline constexpr std::array kEnglish{
     EnglishText{"why_no_video", "no video has come yet"},
     EnglishText{"why_no_ct", "the CT is not ready"},
     EnglishText{"why_hidden", "it is switched off"},
+    EnglishText{"why_calibration_held", "the calibration is not used: {}"},
+    EnglishText{"why_registration_held", "the registration is not used: {}"},
     EnglishText{"why_other_size", "the video is {} x {} and the camera was calibrated at {} x {}"},
     EnglishText{"why_unregistered", "the patient is not registered yet"},
-    EnglishText{"why_unconfirmed",
-                "the registration was taken up and is not confirmed: point at landmarks in step 6, then press Space"},
+    EnglishText{
+        "why_unconfirmed",
+        "nobody has looked whether the registration still holds: point at landmarks in step 6, then press Space"},
+
+    // What is held back, for other instruments are connected than those that it was found with
+    EnglishText{"instrument_tracker", "tracker"},
+    EnglishText{"instrument_camera", "camera"},
+    EnglishText{"held_no_link", "nothing is connected"},
+    EnglishText{"held_record", "the appliance has withdrawn its record ({})"},
+    EnglishText{"held_other", "it was found with the {} whose {} is {}, and this one's is {}"},
+    EnglishText{"held_other_untold", "it was found with the {} whose {} is {}, and this one does not say its own"},
+    EnglishText{"held_untold", "nothing says whether the {} is the one that it was found with"},
+    EnglishText{"instruments_ask",
+                "Are tracker and camera the same as before? The server does not say. Space: yes, the same. If not: "
+                "calibrate and register anew."},
+    EnglishText{"do_same_instruments", "Same tracker and camera (Space)"},
 
     // Over the picture
     EnglishText{"banner_frozen", "FROZEN: this is no live picture"},

@@ -175,6 +175,8 @@ void draw_patient_card(PanelContext& context) {
   }
   if (!operation.patient_fault.empty() && !context.facts.pseudonymised) {
     say(theme.bad, fmt::format("{} {}", kBadSign, operation.patient_fault));
+  } else if (operation.asks_for_instruments) {
+    say(theme.warn, fmt::format("{} {}", kWarnSign, words("instruments_ask")));
   } else if (operation.asks_for_patient) {
     say(theme.warn, fmt::format("{} {}", kWarnSign, words("patient_ask")));
   }

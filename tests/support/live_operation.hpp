@@ -86,11 +86,26 @@ inline void give_record(LiveWorkflow& workflow,
   workflow.take(calibration, HostTime{0}, std::nullopt);
 }
 
-inline void connect_and_calibrate(LiveWorkflow& workflow) {
+inline const calibration::Identity kTracker{{"model", "miniBIRD 800"}, {"unit_serial", "4711"}};
+inline const calibration::Identity kCamera{{"card", "Storz"}, {"serial", "A1"}};
+
+/// The appliance tells how it is, and what it has.
+inline void tell_health(LiveWorkflow& workflow, const calibration::Identity& tracker = kTracker,
+                        const calibration::Identity& camera = kCamera) {
   wire::Health health;
   health.state = "ready";
+  health.instruments = {{"tracker", "running", "", 0, tracker}, {"camera", "running", "", 0, camera}};
   workflow.take(health, HostTime{0}, std::nullopt);
+}
+
+inline void connect(LiveWorkflow& workflow) {
+  workflow.set_link(true, "connecting");
+  tell_health(workflow);
   workflow.set_link(true, "connected");
+}
+
+inline void connect_and_calibrate(LiveWorkflow& workflow) {
+  connect(workflow);
   EXPECT_EQ(workflow.view().step, LiveStep::calibrate);
   give_record(workflow);
   EXPECT_TRUE(workflow.view().note(LiveStep::calibrate).done);

@@ -11,6 +11,7 @@
 namespace birdseye::host {
 namespace {
 
+using birdseye::testing::connect;
 using birdseye::testing::connect_and_calibrate;
 using birdseye::testing::give_record;
 using birdseye::testing::Hand;
@@ -139,7 +140,7 @@ Operation registered_operation(const LiveSettings& settings) {
   Operation kept;
   kept.ct_checksum = read_patient(settings.patient)->checksum;
   kept.made_utc = "2026-11-22T10:00:00Z";
-  kept.registered = {kTrackerFromPatient, 0.3, kFiducials};
+  kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
   return kept;
 }
 
@@ -161,6 +162,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
   ASSERT_TRUE(write_operation(scratch.path(), kept));
   LiveWorkflow workflow(again);
+  connect(workflow);
   load(workflow);
   ASSERT_EQ(workflow.view().fault, "");
   give_record(workflow);
@@ -210,6 +212,7 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
   LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect(workflow);
   load(workflow);
   EXPECT_EQ(workflow.view().fault, "");
   EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
@@ -284,9 +287,12 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
     found.held_out_px = 1;
     // The record's is 09:30.
     kept.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found),
-                       record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z", true};
+                       record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z",
+                       true,
+                       {birdseye::testing::kTracker, birdseye::testing::kCamera, 0}};
     ASSERT_TRUE(write_operation(scratch.path(), kept));
     LiveWorkflow workflow(again);
+    connect(workflow);
     load(workflow);
     ASSERT_EQ(workflow.view().fault, "");
     give_record(workflow);

@@ -98,7 +98,7 @@ class DeformedOperation : public ::testing::Test {
     Operation kept;
     kept.ct_checksum = read_patient(settings.patient)->checksum;
     kept.made_utc = "2026-11-22T10:00:00Z";
-    kept.registered = {kTrackerFromPatient, 0.3, kFiducials};
+    kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
     DisplacementField field;
     field.size = {2, 2, 2};
     field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
@@ -107,6 +107,7 @@ class DeformedOperation : public ::testing::Test {
     ASSERT_TRUE(write_operation(scratch_.path(), kept));
     settings.resume = scratch_.path();
     workflow_.emplace(settings);
+    birdseye::testing::connect(*workflow_);
     load(*workflow_);
     ASSERT_EQ(workflow_->view().fault, "");
     give_record(*workflow_);

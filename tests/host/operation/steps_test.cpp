@@ -78,14 +78,14 @@ TEST(CalibrationStep, GuidesOnlyOverABoard) {
   CalibrationStep step;
   step.begin("scope", std::nullopt);
   EXPECT_FALSE(step.guiding());
-  step.tell_none("the tracker is another");
+  EXPECT_FALSE(step.withdraw_record("the tracker is another"));
   EXPECT_EQ(step.note().line, "the tracker is another");
   step.begin("scope", *calibration::parse_pattern("chessboard:14x9:3mm"));
   EXPECT_TRUE(step.guiding());
   step.end();
   for (int i = 0; i < 1000 && step.guiding(); ++i) {
     sleep_for(Duration::from_ms(10));
-    EXPECT_FALSE(step.tick()) << "no station, no calibration";
+    EXPECT_FALSE(step.tick({})) << "no station, no calibration";
   }
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.found().has_value());
@@ -99,7 +99,7 @@ TEST(CalibrationStep, WhatIsTakenUpGivesUpTheGuideAndItMayBeginAgain) {
   step.take_up(kept, "taken up");
   EXPECT_FALSE(step.guiding());
   EXPECT_FALSE(step.guide().has_value());
-  EXPECT_FALSE(step.tick());
+  EXPECT_FALSE(step.tick({}));
   EXPECT_EQ(step.note().line, "taken up");
   step.begin("scope", *board);
   ASSERT_TRUE(step.guiding());
@@ -107,7 +107,7 @@ TEST(CalibrationStep, WhatIsTakenUpGivesUpTheGuideAndItMayBeginAgain) {
   step.end();
   for (int i = 0; i < 1000 && step.guiding(); ++i) {
     sleep_for(Duration::from_ms(10));
-    EXPECT_FALSE(step.tick());
+    EXPECT_FALSE(step.tick({}));
   }
   EXPECT_FALSE(step.guiding());
   EXPECT_EQ(step.found()->made_utc, kept.made_utc) << "no station, and what there was still holds";
@@ -137,10 +137,10 @@ Touch touch_at(const Eigen::Vector3d& in_patient_mm) {
 TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
   FiducialStep step;
   for (const Eigen::Vector3d& fiducial : kFiducials) {
-    EXPECT_TRUE(step.add(touch_at(fiducial), 4));
+    EXPECT_TRUE(step.add(touch_at(fiducial), 4, {}));
     step.fit(std::nullopt, 4);
   }
-  EXPECT_FALSE(step.add(touch_at(Eigen::Vector3d::Zero()), 4)) << "all are touched";
+  EXPECT_FALSE(step.add(touch_at(Eigen::Vector3d::Zero()), 4, {})) << "all are touched";
   EXPECT_FALSE(step.registered().has_value());
   EXPECT_EQ(step.note().line, "4 touched");
   step.fit(kFiducials, 4);
@@ -156,7 +156,7 @@ TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
 TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
   const RegisteredPatient kept{kTrackerFromPatient, 0.3, kFiducials};
   FiducialStep step;
-  EXPECT_TRUE(step.add(touch_at(kFiducials[0]), 0));
+  EXPECT_TRUE(step.add(touch_at(kFiducials[0]), 0, {}));
   EXPECT_TRUE(step.take_up(kept, "taken up"));
   EXPECT_TRUE(step.touches().empty());
   EXPECT_FALSE(step.confirmed());
@@ -164,7 +164,7 @@ TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
   step.confirm();
   EXPECT_TRUE(step.confirmed());
   FiducialStep fitted;
-  for (const Eigen::Vector3d& fiducial : kFiducials) fitted.add(touch_at(fiducial), 0);
+  for (const Eigen::Vector3d& fiducial : kFiducials) fitted.add(touch_at(fiducial), 0, {});
   fitted.fit(kFiducials, 0);
   EXPECT_FALSE(fitted.take_up(kept, "taken up"));
   EXPECT_TRUE(fitted.confirmed());

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "calibration/record/calibration_record.hpp"
+#include "device/wire/messages.hpp"
+
+namespace birdseye::host {
+
+/// The instruments that something was found with. An identity is empty where nobody has told it.
+struct Instruments {
+  calibration::Identity tracker, camera;
+  std::uint64_t link = 0;  ///< by which of this window's connections they were told; 0: an earlier window's
+};
+
+/// What a finding depends on: hand-eye and lens on both instruments, a registration by touches on the tracker alone.
+enum class DependsOn : std::uint8_t { tracker, tracker_and_camera };
+
+/// Whether what was found with some hardware holds with what is connected now.
+struct InstrumentMatch {
+  bool holds = false;
+  bool person_may_say = false;  ///< nothing tells what is connected now, or what it was: only a person can know
+  std::string why_not;          ///< in words; empty where it holds
+};
+
+/// The instruments that are connected now, as the appliance tells them.
+class ConnectedInstruments {
+ public:
+  /// The link came or went. Of the instruments behind another connection nothing is known before they are told.
+  void set_link(bool connected);
+  void take(const wire::Health& health);
+  /// A person says that the instruments are those from before, of whatever nobody tells of.
+  void vouch() { vouched_ = true; }
+
+  [[nodiscard]] const Instruments& now() const { return now_; }
+  [[nodiscard]] bool connected() const { return connected_; }
+  /// What tells no identity while it is connected is taken for the same instrument; after a reconnection it is not.
+  [[nodiscard]] InstrumentMatch match(const Instruments& found_with, DependsOn depends_on) const;
+
+ private:
+  Instruments now_;
+  bool connected_ = false, vouched_ = false;
+};
+
+}  // namespace birdseye::host
