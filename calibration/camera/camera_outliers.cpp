@@ -61,8 +61,9 @@ void fit_robustly(CameraModel& camera, std::vector<SoundView>& views, LensModel 
 /// Moves views that do not fit to the rejected ones; false if there are none.
 bool reject_views(const CameraModel& camera, SoundViews& sound) {
   constexpr double kTimes = 5;  // a view that is merely blurred scatters two or three times as much as the others
+  constexpr double kFinest_px = 0.05;  // of what a detector leaves: no picture has less, and drawn ones may have none
   const Scatter scatter = scatter_of(camera, sound.views);
-  const double usual_px = median_of(scatter.view_px);
+  const double usual_px = std::max(median_of(scatter.view_px), kFinest_px);
   std::vector<SoundView> kept;
   for (std::size_t v = 0; v < sound.views.size(); ++v) {
     if (scatter.view_px[v] > kTimes * usual_px) {

@@ -170,6 +170,7 @@ Detection detect(const Pattern& pattern, const GreyView& picture, const std::str
   detection.points_seen = static_cast<int>(found.ids.size());
   detection.contrast = found.contrast;
   detection.layout = found.layout;
+  detection.inset = found.inset;
   detection.area_share = area_share(found.points_px, picture);
   measure_sharpness(found.edges, detection);
   // Where too little is found to tell, or edges are wider than corners are looked at, the whole picture says more.

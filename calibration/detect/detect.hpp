@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 
@@ -19,6 +20,13 @@ struct LayoutEvidence {
   [[nodiscard]] bool is_other() const { return joined_in_other >= joined + 3; }
 };
 
+/// Corners of a ChArUco board's inset, of one picture or of several.
+struct InsetEvidence {
+  std::size_t looked_for = 0, found = 0;
+  /// It is not where the pattern has it: other counts, another square, another board.
+  [[nodiscard]] bool is_wrong() const { return looked_for >= 12 && found == 0; }
+};
+
 /// What a picture shows of a pattern, and how well it shows it. Figures are given where they could be taken, for
 /// rejected pictures too.
 struct Detection {
@@ -34,6 +42,7 @@ struct Detection {
   double contrast = 0;    ///< light less dark of the pattern, grey levels
   double area_share = 0;  ///< of the picture, within the outline of the points
   LayoutEvidence layout;  ///< of a ChArUco board
+  InsetEvidence inset;    ///< of one with an inset
 };
 
 /// How much time a picture without the pattern may take. `thorough` searches again and looks for the reason why nothing

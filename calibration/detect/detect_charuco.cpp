@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cstdlib>
 #include <map>
 #include <opencv2/aruco.hpp>
 #include <opencv2/imgproc.hpp>
@@ -171,6 +172,42 @@ void detect_tags(const Pattern& pattern, const cv::Mat& grey, std::vector<int>& 
   cv::aruco::detectMarkers(grey, cv::aruco::getPredefinedDictionary(pattern.dictionary), quads, ids, settings);
 }
 
+/// How tags fit together where the pattern's counts were others.
+struct Recount {
+  Pattern pattern;
+  int joined = 0;
+};
+
+/// Counts that are swapped, off by one, or both, with which clearly more corners join than with those that were told;
+/// the nearest to these of several that fit alike. Even rows of the old layout differ from odd ones.
+std::optional<Recount> recount(const Pattern& pattern, const std::vector<int>& ids,
+                               const std::vector<std::vector<cv::Point2f>>& quads, int joined) {
+  constexpr int kClearly = 6;  // corners; a misread tag joins or tears a corner or two
+  std::optional<Recount> best;
+  int least_changes = 0;
+  for (const bool swapped : {false, true}) {
+    for (int columns_more = -1; columns_more <= 1; ++columns_more) {
+      for (int rows_more = -1; rows_more <= 1; ++rows_more) {
+        for (const bool legacy : {pattern.legacy, !pattern.legacy}) {
+          Pattern other = pattern;
+          if (swapped) std::swap(other.columns, other.rows);
+          other.columns += columns_more;
+          other.rows += rows_more;
+          other.legacy = legacy;
+          const int changes = (swapped ? 1 : 0) + std::abs(columns_more) + std::abs(rows_more);
+          if (changes == 0 || other.columns < 3 || other.rows < 3) continue;
+          const int fits = joined_in(predict(other, ids, quads));
+          const int ahead = best ? fits - best->joined : fits - joined - kClearly;
+          if (ahead < 0 || (best && ahead == 0 && changes >= least_changes)) continue;
+          best = Recount{other, fits};
+          least_changes = changes;
+        }
+      }
+    }
+  }
+  return best;
+}
+
 /// With an odd count of rows the two layouts are one.
 LayoutEvidence evidence_of(const Pattern& pattern, const std::map<int, Predicted>& predictions,
                            const std::vector<int>& ids, const std::vector<std::vector<cv::Point2f>>& quads) {
@@ -178,6 +215,18 @@ LayoutEvidence evidence_of(const Pattern& pattern, const std::map<int, Predicted
   Pattern other = pattern;
   other.legacy = !pattern.legacy;
   return {joined_in(predictions), joined_in(predict(other, ids, quads))};
+}
+
+FoundPattern miscounted(const Pattern& pattern, const Recount& other) {
+  FoundPattern none;
+  none.failure = fmt::format(
+      "the tags fit together as on a board of {}x{} squares{}, not of {}x{}: give the counts in --board, columns first",
+      other.pattern.columns, other.pattern.rows,
+      other.pattern.legacy == pattern.legacy ? ""
+      : other.pattern.legacy                 ? ":legacy"
+                                             : " without :legacy",
+      pattern.columns, pattern.rows);
+  return none;
 }
 
 }  // namespace
@@ -190,16 +239,34 @@ FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Searc
   const auto predictions = predict(pattern, ids, quads);
   const LayoutEvidence layout = evidence_of(pattern, predictions, ids, quads);
   if (layout.is_other()) {
+    if (const auto other = recount(pattern, ids, quads, layout.joined_in_other)) return miscounted(pattern, *other);
     FoundPattern none;
     none.layout = layout;
     none.failure = fmt::format("the tags lie as in the {} layout: {} :legacy in the pattern",
                                pattern.legacy ? "new" : "old", pattern.legacy ? "leave out" : "add");
     return none;
   }
+  if (pattern.rows % 2 != 0) {
+    // The rows' count says nothing but which squares the tags lie in, and is not seen to be wrong otherwise.
+    Pattern even = pattern;
+    even.rows += 1;
+    even.legacy = true;
+    const LayoutEvidence counts{joined_in(predictions), joined_in(predict(even, ids, quads))};
+    if (counts.is_other()) {
+      FoundPattern none;
+      none.failure = fmt::format(
+          "the tags lie as in the old layout of an even count of rows, {} or {}, not {}: count the board's rows of "
+          "squares, and add :legacy to the pattern",
+          pattern.rows - 1, pattern.rows + 1, pattern.rows);
+      return none;
+    }
+  }
   FoundPattern found = corners_between(pattern, picture, predictions);
   found.layout = layout;
   const std::size_t corners = found.ids.size();
   if (corners >= kLeastCorners) return found;
+  if (const auto other = recount(pattern, ids, quads, std::max(0, joined_in(predictions))))
+    return miscounted(pattern, *other);
   cv::Mat mirrored;
   std::vector<int> mirrored_ids;
   if (search == Search::thorough) {

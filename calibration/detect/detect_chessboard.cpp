@@ -90,8 +90,26 @@ bool find_thoroughly(const cv::Mat& grey, const cv::Size& size, std::vector<cv::
   return true;
 }
 
+/// A board of counts near those that were told, in words; empty where none is seen.
+std::string counted_otherwise(const Pattern& pattern, const cv::Mat& grey) {
+  constexpr std::array<std::array<int, 2>, 7> kMore{{{-1, -1}, {-1, 0}, {0, -1}, {1, 1}, {1, 0}, {0, 1}, {-2, -2}}};
+  for (const auto& [columns_more, rows_more] : kMore) {
+    const cv::Size size(pattern.columns + columns_more, pattern.rows + rows_more);
+    std::vector<cv::Point2f> corners;
+    constexpr int kFast = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+    if (size.width < 3 || size.height < 3 || !cv::findChessboardCorners(grey, size, corners, kFast)) continue;
+    const bool squares = columns_more == -1 && rows_more == -1;
+    return fmt::format("a chessboard of {}x{} inner corners is seen where {}x{} are expected: {}", size.width,
+                       size.height, pattern.columns, pattern.rows,
+                       squares ? "squares were counted; give its inner corners in --board"
+                               : "give its inner corners in --board, unless its border is covered");
+  }
+  return {};
+}
+
 /// What else of a chessboard is seen, in words.
 std::string why_not(const Pattern& pattern, const cv::Mat& grey) {
+  if (std::string words = counted_otherwise(pattern, grey); !words.empty()) return words;
   const cv::Mat small = reduced(grey, kWords_px);
   std::vector<cv::Point2f> corners;
   cv::Mat size;

@@ -98,6 +98,9 @@ class InsetSearch {
     return static_cast<double>(points_.size()) < least ? 0 : points_.size();
   }
 
+  /// Of its corners, how many lie near enough to what is known to be looked for.
+  [[nodiscard]] std::size_t looked_for() const { return looked_for_.size(); }
+
   void add_to(FoundPattern& found) const {
     std::vector<double> contrasts;
     for (const GridPoint& point : points_) {
@@ -180,6 +183,7 @@ void add_inset(const Pattern& pattern, const GreyView& picture, FoundPattern& fo
   InsetSearch dark(pattern, picture, found), light(pattern, picture, found);
   const std::size_t as_dark = dark.run(true), as_light = light.run(false);
   if (std::max(as_dark, as_light) > 0) (as_dark > as_light ? dark : light).add_to(found);
+  found.inset = {std::max(dark.looked_for(), light.looked_for()), std::max(as_dark, as_light)};
   if (found.ids.size() >= kLeastTogether) found.failure.clear();
 }
 

@@ -27,6 +27,7 @@ struct FoundPattern {
   double glare = 0;     ///< share of the dark places seen that are saturated
   std::string failure;  ///< why the points will not do; empty where they do
   LayoutEvidence layout;
+  InsetEvidence inset;
 };
 
 FoundPattern find_chessboard(const Pattern& pattern, const GreyView& picture, Search search);

@@ -19,8 +19,6 @@ using Subset = std::vector<std::size_t>;
 constexpr double kFalseAlarm = 0.01;  // for the whole search
 constexpr double kSure = 0.95;
 constexpr std::size_t kFewestSound = 4, kMostOdd = 2;
-/// Nobody localises better than this: without it, rounding in made-up points would be told from rounding.
-constexpr double kFinestLocalisation_mm = 0.1;
 
 /// A choice of points to leave out, and what the fit of the rest leaves.
 struct Without {

@@ -17,6 +17,9 @@ struct LocalisationError {
   int degrees_of_freedom = 0;  ///< of the estimate; 0 where the error was given
 };
 
+/// Nobody localises better than this: without it, rounding in made-up points would be told from rounding.
+inline constexpr double kFinestLocalisation_mm = 0.1;
+
 /// From the FRE of a rigid fit of so many points: FLE^2 = FRE^2 n / (n - 2) (R. Sibson, 1979), and its upper bound from
 /// the chi-square distribution of the residuals with 3 n - 6 degrees of freedom. points >= 3.
 LocalisationError localisation_error_of(double fre_rms_mm, std::size_t points);

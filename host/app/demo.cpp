@@ -9,6 +9,7 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "host/app/commands.hpp"
+#include "host/app/ct_options.hpp"
 #include "host/demo/demo_session.hpp"
 #include "host/demo/demo_verdict.hpp"
 #include "host/files/camera_files.hpp"
@@ -16,6 +17,7 @@
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/simulated/simulated_truth.hpp"
+#include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 
 namespace birdseye::host {
@@ -93,8 +95,27 @@ Result<void> write_pictures(const fs::path& out, DemoSession& session, const std
 
 struct DemoOptions {
   SimulatedCartSettings cart;
+  VolumeSource ct;
   std::string noise = "typical";
 };
+
+/// The chosen CT as the simulator can read it, which knows no series. With the host's own checks: what would be stacked
+/// wrongly is refused here, with the reason.
+Result<fs::path> simple_ct(const VolumeSource& source, const fs::path& out) {
+  const auto ct = import_with_notes(source);
+  if (!ct) return ct.error();
+  print_notes(ct->notes);
+  const Volume& volume = ct->volume;
+  ImageFile image;
+  image.size = volume.size;
+  image.spacing_mm = volume.spacing_mm;
+  image.origin_mm = volume.patient_from_voxel.translation();
+  image.axes = volume.patient_from_voxel.linear().colwise().normalized();
+  image.hu = volume.hu;
+  const fs::path path = out / "ct.nii.gz";
+  if (auto written = write_image(path, image, StoredAs::int16); !written) return written.error();
+  return path;
+}
 
 Result<ExitCode> demo(const DemoOptions& options) {
   Progress progress;
@@ -105,16 +126,17 @@ Result<ExitCode> demo(const DemoOptions& options) {
   std::error_code error;
   fs::create_directories(out, error);
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", out.string())};
-  if (!settings.ct.empty()) {
-    // With the host's own checks: what would be stacked wrongly is refused here, with the reason.
-    if (const auto sound = import_volume(settings.ct); !sound) return sound.error();
+  if (!options.ct.path.empty()) {
+    auto simple = simple_ct(options.ct, out);
+    if (!simple) return simple.error();
+    settings.ct = *std::move(simple);
   }
   for (const char* name : {"report.json", "report.html", "overlay.png", "video.png", "rigid_and_deformed.png",
                            "overlay.mp4", "simulator.log", "birdseyed.log"}) {
     fs::remove(out / name, error);
   }
   note_interrupts();
-  progress(settings.ct.empty() ? "making the patient" : "making the patient from " + settings.ct.string());
+  progress(settings.ct.empty() ? "making the patient" : "making the patient from " + options.ct.path.string());
   if (auto made = SimulatedCart::make_patient(settings); !made) return made.error();
   progress("starting tracker, camera and appliance");
   const auto cart = SimulatedCart::start(settings);
@@ -158,8 +180,8 @@ Result<ExitCode> demo(const DemoOptions& options) {
   session.figures.drops.tell(session.figures.verdict);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();
-  progress.keep(fmt::format("{}: {}", name_of(session.figures.verdict.grade), session.figures.verdict.reasons.front()));
-  fmt::print("{}\n", (out / "report.html").string());
+  progress.keep(fmt::format("{}: {}", (out / "report.html").string(), session.figures.verdict.reasons.front()));
+  fmt::print("verdict: {}\n", name_of(session.figures.verdict.grade));
   return session.figures.verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
@@ -173,7 +195,10 @@ void add_demo(CLI::App& app, CommandStatus& status) {
   CLI::App& command =
       *app.add_subcommand("demo", "the whole cart, simulated: calibrate, register, deform, overlay, report");
   command.add_option("--out", cart.folder, "folder for the report (default out/demo)");
-  command.add_option("--ct", cart.ct, "a CT to operate on, in place of the procedural patient");
+  CLI::Option* const ct =
+      command.add_option("--ct", options->ct.path, "a CT to operate on, in place of the procedural patient");
+  add_ct_options(command, options->ct);
+  for (const char* name : {"--series", "--untilt"}) command.get_option(name)->needs(ct);
   command.add_option("--seed", cart.seed, "everything random follows from it");
   command
       .add_option(

@@ -137,6 +137,23 @@ Result<double> worst_difference(const fs::path& path, const Registered& register
   return worst_mm;
 }
 
+/// Takes away what an earlier export wrote there, and says so: a file that this one does not write must not be taken
+/// for this one's.
+Result<void> remove_earlier_export(const fs::path& folder) {
+  std::string removed;
+  for (const char* name : {"ct.nrrd", "registration.h5", "rigid.tfm", "deformation.nrrd", "export.json"}) {
+    std::error_code error;
+    if (fs::remove(folder / name, error)) removed += fmt::format("{}{}", removed.empty() ? "" : ", ", name);
+    if (error) {
+      return Error{Errc::unreadable,
+                   fmt::format("{}: is of an earlier export and cannot be removed; choose another --out",
+                               (folder / name).string())};
+    }
+  }
+  if (!removed.empty()) print_notes({fmt::format("{}: replaced an earlier export ({})", folder.string(), removed)});
+  return {};
+}
+
 Result<ExitCode> run(const ExportOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   if (options.registration.empty() && options.views.empty() && options.deformation.empty()) {
@@ -151,6 +168,8 @@ Result<ExitCode> run(const ExportOptions& options) {
   fs::create_directories(options.out, error);
   if (error)
     return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", options.out.string())};
+
+  if (auto removed = remove_earlier_export(options.out); !removed) return removed.error();
 
   nlohmann::json files = nlohmann::json::object();
   double worst_mm = 0;
@@ -194,6 +213,7 @@ Result<ExitCode> run(const ExportOptions& options) {
     return written.error();
   for (const auto& [name, told] : files.items())
     fmt::print("{}: {}\n", (options.out / name).string(), told.get<std::string>());
+  fmt::print("all in the {} frame\n", options.frame == "tracker" ? "tracker's" : "patient's");
   fmt::print("verdict: {} ({})\n", name_of(verdict.grade), verdict.reasons.front());
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }

@@ -49,6 +49,11 @@ Result<std::string> text_of_lens(const ExportLensOptions& options) {
 }
 
 Result<void> run_export_lens(const ExportLensOptions& options) {
+  std::error_code ignored;
+  if (std::filesystem::exists(options.out, ignored)) {
+    return Error{Errc::bad_value, fmt::format("--out {}: is there already; name another file, or remove it first",
+                                              options.out.string())};
+  }
   const auto text = text_of_lens(options);
   if (!text) return text.error();
   return write_file(options.out, *text);
@@ -61,7 +66,8 @@ CLI::App* add_export_lens(CLI::App& parent, CommandStatus& status) {
   CLI::App* const command = parent.add_subcommand("lens", "a lens in another program's format");
   command->add_option("--camera", options->camera, "the lens: a file of OpenCV, ROS or Kalibr (camchain.yaml:cam1)")
       ->type_name("FILE");
-  command->add_option("--record", options->record, "or a calibration record that holds it")->type_name("FILE");
+  command->add_option("--record,--calibration", options->record, "or a calibration record that holds it")
+      ->type_name("FILE");
   command->add_option("--as", options->as, "opencv, ros (camera_info) or kalibr (camchain)")
       ->required()
       ->check(CLI::IsMember({"opencv", "ros", "kalibr"}));

@@ -12,7 +12,7 @@
 #include "host/app/overlay_options.hpp"
 #include "host/demo/demo_report.hpp"
 #include "host/doctor/first_run.hpp"
-#include "host/files/text_files.hpp"
+#include "host/files/named_points.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation.hpp"
@@ -126,7 +126,7 @@ Result<void> prepare(LiveOptions& options) {
     options.live.pattern = *std::move(pattern);
   }
   if (!options.tip.empty()) {
-    const auto points = read_points(options.tip);
+    const auto points = read_points(options.tip, PointsOf::sensor);
     if (!points) return points.error();
     if (points->size() != 1)
       return Error{Errc::bad_value, options.tip.string() + ": holds no single point; give what calibrate tip wrote"};

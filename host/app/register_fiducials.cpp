@@ -25,6 +25,7 @@ void print(const FiducialInput& input, const FiducialsFound& out, const Verdict&
   for (const std::string& note : input.notes) fmt::print("{}\n", note);
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
     fmt::print("fiducial {:2}", i + 1);
+    if (!input.names.empty()) fmt::print(" ({})", input.names[i]);
     if (!input.ct_of_touch.empty()) fmt::print(" is CT marker {:2}", input.ct_of_touch[i] + 1);
     fmt::print("  residual {:6.3f} mm", out.fit.residuals_mm[i]);
     if (!out.fit.leave_one_out_mm.empty()) fmt::print("  left out {:6.3f} mm", out.fit.leave_one_out_mm[i]);
@@ -75,16 +76,22 @@ void add_register(CLI::App& app, CommandStatus& status) {
   reg.require_subcommand(1);
   add_register_views(reg, status);
   CLI::App& fiducials = *reg.add_subcommand("fiducials", "rigidly, by corresponding points");
-  fiducials.add_option("--ct", options->files.ct, "markers in the CT: x y z a line, mm, patient frame")->required();
   fiducials
-      .add_option("--tracker", options->files.tracker, "the same markers as touched, in the same order, tracker frame")
+      .add_option("--ct", options->files.ct,
+                  "markers in the CT, patient frame: x y z a line, mm (also names), 3D Slicer's .mrk.json or .fcsv, "
+                  "MITK's .mps")
+      ->required();
+  fiducials
+      .add_option("--tracker", options->files.tracker,
+                  "the same markers as touched, tracker frame, in the same order or with the same names")
       ->required();
   fiducials.add_flag("--match", options->files.match, "in any order; the CT may have more markers than were touched");
   fiducials.add_option("--fle", options->files.localisation_mm,
                        "how well a marker is found and touched, mm rms, if known (default: from the residuals)");
   fiducials.add_option("--targets", options->files.targets, "points to predict the error at, patient frame");
-  fiducials.add_option("--volume", options->files.volume.path,
-                       "the CT: predicts the error over it, and shows it in the map");
+  fiducials.add_option(
+      "--volume", options->files.volume.path,
+      "the CT: says whether the points lie in it, predicts the error over it, and shows it in the map");
   add_ct_options(fiducials, options->files.volume);
   fiducials.add_option("--map", options->map, "a PNG of the predicted error, in slices through the first target")
       ->check(png_name);

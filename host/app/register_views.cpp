@@ -276,7 +276,7 @@ Result<ExitCode> write_nothing_found(const RegisterViewsOptions& options, const 
   const std::string text = text_of({{"verdict", name_of(Grade::fail)}, {"reasons", {why.what}}});
   if (auto written = write_files({{options.out / "result.json", text}, {options.json, text}}); !written)
     return written.error();
-  fmt::print("{}: {} ({})\n", options.file.string(), name_of(Grade::fail), why.what);
+  fmt::print("{}: {}\nverdict: {}\n", options.file.string(), why.what, name_of(Grade::fail));
   return ExitCode::verdict_fail;
 }
 
@@ -317,8 +317,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();
-  progress.keep(fmt::format("{}: {} ({})", (options.out / "report.html").string(), name_of(verdict.grade),
-                            verdict.reasons.front()));
+  progress.keep(fmt::format("{}: {}", (options.out / "report.html").string(), verdict.reasons.front()));
   for (const std::string& note : c.notes) fmt::print("{}\n", note);
   for (std::size_t n = 0; n < found.matched.size(); ++n) {
     if (!found.matched[n].thought_wrong()) continue;
@@ -329,6 +328,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
     fmt::print("target error {:.2f} mm before, {:.2f} mm after (mean of {} landmarks)\n",
                json["tre_before_mm_mean"].get<double>(), json["tre_after_mm_mean"].get<double>(), c.landmarks.size());
   }
+  fmt::print("verdict: {}\n", name_of(verdict.grade));
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

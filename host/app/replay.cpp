@@ -146,7 +146,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
 void add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("recording", inputs.recording, "a session recording (a folder), or a .igs.mha")->required();
   command.add_option("--transform", inputs.transform, "of a .igs.mha: which transform is the scope's");
-  command.add_option("--calibration", inputs.calibration, "the calibration record (default: the recording's own)");
+  command.add_option("--calibration,--record", inputs.calibration,
+                     "the calibration record (default: the recording's own)");
   command.add_option("--camera", inputs.camera,
                      "lens (of OpenCV, ROS or Kalibr), in place of the calibration record's");
   command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm");

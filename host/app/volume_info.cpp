@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -6,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
+#include <span>
 
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
@@ -13,6 +15,7 @@
 #include "host/files/write_files.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
+#include "host/volume/labels.hpp"
 #include "host/volume/mask_folder.hpp"
 #include "host/volume/series_list.hpp"
 
@@ -83,9 +86,32 @@ nlohmann::json json_of(const SeriesInfo& info) {
   return json;
 }
 
-void print_volume(const Volume& volume, nlohmann::json& json) {
+/// Whether values are labels: few, and none below 0, where a CT has the air about the patient.
+bool look_like_labels(const std::vector<std::int16_t>& values) {
+  constexpr std::size_t kMostLabels = 256;
+  return values.size() <= kMostLabels && (values.empty() || values.front() > 0);
+}
+
+void print_values(const Volume& volume, bool labels, nlohmann::json& json) {
+  if (labels) {
+    const auto values = values_in(volume);
+    constexpr std::size_t kShown = 30;
+    fmt::print("labels       {}{} (no Hounsfield units: give this as --labels)\n",
+               fmt::join(std::span(values).first(std::min(values.size(), kShown)), ", "),
+               values.size() > kShown ? fmt::format(" and {} more", values.size() - kShown)
+                                      : std::string(values.empty() ? "none" : ""));
+    json["label_values"] = values;
+    return;
+  }
   const auto [low, high] = std::minmax_element(volume.hu.begin(), volume.hu.end());
   const double mean = std::accumulate(volume.hu.begin(), volume.hu.end(), 0.0) / static_cast<double>(volume.hu.size());
+  fmt::print("HU           {} to {}, mean {:.1f}\n", *low, *high, mean);
+  json["hu_min"] = *low;
+  json["hu_max"] = *high;
+  json["hu_mean"] = mean;
+}
+
+void print_grid(const Volume& volume, nlohmann::json& json) {
   const auto& size = volume.size;
   const Eigen::Vector3d& spacing = volume.spacing_mm;
   const Eigen::Matrix4d m = volume.patient_from_voxel.matrix();
@@ -96,14 +122,10 @@ void print_volume(const Volume& volume, nlohmann::json& json) {
              size[2] * spacing.z());
   fmt::print("orientation  {} (voxel axes point to the patient's)\n", letters);
   fmt::print("first voxel  ({:.3f}, {:.3f}, {:.3f}) mm, patient LPS\n", m(0, 3), m(1, 3), m(2, 3));
-  fmt::print("HU           {} to {}, mean {:.1f}\n", *low, *high, mean);
   json["size"] = {size[0], size[1], size[2]};
   json["spacing_mm"] = {spacing.x(), spacing.y(), spacing.z()};
   for (int i = 0; i < 4; ++i) json["patient_from_voxel"].push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
   json["orientation"] = letters;
-  json["hu_min"] = *low;
-  json["hu_max"] = *high;
-  json["hu_mean"] = mean;
 }
 
 void print_series(const SeriesList& list, nlohmann::json& json) {
@@ -164,7 +186,10 @@ Result<void> volume_info(const InfoOptions& options) {
   }
   const auto imported = import_with_notes(options.source);
   if (!imported) return imported.error();
-  print_volume(imported->volume, json);
+  print_grid(imported->volume, json);
+  const bool labels = !imported->label_names.empty() ||
+                      (!holds_dicom(options.source.path) && look_like_labels(values_in(imported->volume)));
+  print_values(imported->volume, labels, json);
   print_labels(imported->label_names, json);
   if (!imported->notes.empty()) json["notes"] = imported->notes;
   for (const std::string& note : imported->notes) fmt::print("note         {}\n", note);

@@ -159,6 +159,14 @@ Result<LatencyStreams> record_streams(const std::string& server, const LatencySo
 
 Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, const LatencySource& source,
                                       Progress& progress) {
+  if (std::filesystem::is_directory(recording)) {
+    return Error{
+        Errc::bad_format,
+        fmt::format("{}: is a folder; a session recording (birdseye record) will not do: give an appliance "
+                    "recording, a .berec file that birdseyed writes by its section [record], or measure at the "
+                    "appliance: --server",
+                    recording.string())};
+  }
   if (!std::filesystem::is_regular_file(recording))
     return Error{Errc::not_found, fmt::format("{}: there is no such recording", recording.string())};
   note_interrupts();

@@ -31,6 +31,13 @@ bool is_picture(const fs::path& path) {
                              [&](const char* known) { return ::strcasecmp(ending.c_str(), known) == 0; });
 }
 
+/// Frames in one file: a PLUS sequence or a film.
+bool is_recording(const fs::path& path) {
+  const std::string ending = path.extension().string();
+  return std::ranges::any_of(std::array{".mha", ".mhd", ".nrrd", ".mp4", ".avi", ".mkv", ".mov"},
+                             [&](const char* known) { return ::strcasecmp(ending.c_str(), known) == 0; });
+}
+
 Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or_folders) {
   std::vector<fs::path> pictures;
   for (const fs::path& path : images_or_folders) {
@@ -45,6 +52,13 @@ Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or
     }
     if (!fs::is_directory(path, failure)) {
       if (!fs::exists(path, failure)) return Error{Errc::not_found, path.string() + ": no such file or folder"};
+      if (is_recording(path)) {
+        return Error{
+            Errc::unsupported,
+            fmt::format("{}: is a recording, not a picture; give its frames as PNG files: `ffmpeg -i video.mp4 "
+                        "-vf fps=1 frame%04d.png` of a film, 3D Slicer or PLUS' EditSequenceFile of a sequence",
+                        path.string())};
+      }
       pictures.push_back(path);
       continue;
     }
@@ -130,6 +144,22 @@ bool has_other_layout(const std::vector<Looked>& looked) {
   return all.is_other();
 }
 
+/// What is to be said of an inset that no picture shows, though many show where it should be; empty where that is not
+/// so.
+std::string inset_note(const calibration::Pattern& pattern, const std::vector<Looked>& looked) {
+  calibration::InsetEvidence all;
+  for (const Looked& one : looked) {
+    all.looked_for += one.detection.inset.looked_for;
+    all.found += one.detection.inset.found;
+  }
+  if (!all.is_wrong()) return {};
+  return fmt::format(
+      "no corner of the inset is found in any picture, where {}x{} inner corners with squares of {:g} mm are said to "
+      "lie "
+      "in the board's middle: check :inset in --board; the rest of the board is used without it",
+      pattern.inset_columns, pattern.inset_rows, pattern.inset_mm);
+}
+
 /// Of a picture that lies beside the points.
 Result<Eigen::Vector2i> size_beside(const fs::path& folder) {
   std::error_code failed;
@@ -164,6 +194,8 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
     views.note = fmt::format("the board's tags lie as in the {} layout: it was read as {}, {} :legacy",
                              other.legacy ? "old" : "new", pattern.spec, other.legacy ? "with" : "without");
   }
+  if (const std::string note = inset_note(pattern, looked); !note.empty())
+    views.note += fmt::format("{}{}", views.note.empty() ? "" : "; ", note);
   std::string first;
   for (std::size_t i = 0; i < looked.size(); ++i) {
     const std::string name = (*pictures)[i].filename().string();

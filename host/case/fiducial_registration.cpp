@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <utility>
 
 #include "calibration/base/units.hpp"
+#include "host/case/points_in_ct.hpp"
 #include "host/files/field_files.hpp"
+#include "host/files/named_points.hpp"
 #include "host/files/picture.hpp"
-#include "host/files/text_files.hpp"
 #include "host/registration/rigid/point_matching.hpp"
 #include "host/volume/import.hpp"
 
@@ -19,6 +23,15 @@ namespace {
 
 using calibration::OddPointsVerdict;
 using Points = std::vector<Eigen::Vector3d>;
+
+constexpr double kLargestFre_mm = 5;   // beyond it nothing is written
+constexpr double kLeastSpread_mm = 5;  // of markers on a patient
+// A scale that chance makes in so many sets: marginal below the one, fail below the other.
+constexpr double kChanceOfScale = 0.01, kLeastChanceOfScale = 0.001;
+
+bool is_mirrored(const calibration::PointShape& shape) {
+  return shape.handedness == calibration::Handedness::mirrored && shape.mirrored_fre_rms_mm < kLargestFre_mm;
+}
 
 Result<calibration::PointFit<Patient, Tracker>> fit_fiducials(const FiducialFiles& files, FiducialInput& input) {
   const auto named = [&](const Error& error) {
@@ -48,25 +61,121 @@ double spread_of(const Points& points) {
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-/// By the points' shapes: whether one of the two is in metres, or mirrored.
-std::string misfit_advice(const FiducialInput& input, double fre_rms_mm) {
+/// What a ratio of lengths, CT over touched, looks like.
+std::string scale_advice(double scale) {
+  const auto near = [&](double value) { return std::abs(scale / value - 1) < 0.1; };
+  if (near(1000)) return "the touched points seem to be in metres: give mm";
+  if (near(0.001)) return "the points of the CT seem to be in metres: give mm";
+  if (near(10)) return "the touched points seem to be in cm: give mm";
+  if (near(0.1)) return "the points of the CT seem to be in cm: give mm";
+  if (near(25.4)) return "the touched points seem to be in inches: give mm";
+  return "look at the CT's spacing: are its slices as far apart as the file says, and are the CT's points in mm of the "
+         "patient, not in voxels? Is the tracker's scale right?";
+}
+
+/// What to do where the points do not fit one another, by their shapes.
+std::string misfit_advice(const FiducialInput& input, const calibration::PointShape& shape) {
   const double ratio = spread_of(input.ct_mm) / spread_of(input.touched_mm);
-  const auto near = [](double value) { return value > 900 && value < 1100; };
-  if (near(ratio)) return "the touched points seem to be in metres: give mm";
-  if (near(1 / ratio)) return "the points of the CT seem to be in metres: give mm";
-  Points mirrored = input.touched_mm;
-  for (Eigen::Vector3d& point : mirrored) point.x() *= -1;
-  const auto fitted = calibration::fit_points<Patient, Tracker>(input.ct_mm, mirrored);
-  if (fitted && fitted->fre_rms_mm < 5 && fitted->fre_rms_mm < fre_rms_mm / 4) {
-    return "one of the two files is mirrored: one axis has the wrong sign (between 3D Slicer's RAS and LPS, two have)";
+  if (ratio > 5 || ratio < 0.2) return scale_advice(ratio);
+  if (is_mirrored(shape)) {
+    return "one of the two files is mirrored: one axis has the wrong sign, or two axes are exchanged (between 3D "
+           "Slicer's RAS and LPS, two have the other sign: that mirrors nothing)";
   }
   return "are the points in the same order? --match finds it";
+}
+
+std::string list_of(const std::vector<std::size_t>& indices) {
+  std::string text;
+  for (std::size_t i = 0; i < indices.size(); ++i)
+    text += fmt::format("{}{}", i == 0 ? "" : i + 1 == indices.size() ? " and " : ", ", indices[i] + 1);
+  return text;
+}
+
+void judge_shape(Verdict& verdict, const FiducialsFound& out) {
+  const calibration::PointShape& shape = out.shape;
+  const double fre_mm = std::min(shape.fre_rms_mm, shape.mirrored_fre_rms_mm);
+  if (out.ct_spread_mm < kLeastSpread_mm) {
+    verdict.add(Grade::fail, fmt::format("the markers lie within {:.2g} mm of one another", out.ct_spread_mm),
+                "are both files in metres? Give mm");
+  }
+  if (is_mirrored(shape)) {
+    verdict.add(Grade::fail,
+                fmt::format("mirrored, the touched points fit the CT's to {:.2f} mm; as they are, to {:.2f} mm",
+                            shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
+                out.misfit_advice);
+  } else if (shape.handedness == calibration::Handedness::cannot_tell && fre_mm < kLargestFre_mm &&
+             out.fit.residuals_mm.size() > 3) {
+    verdict.add(Grade::marginal,
+                fmt::format("the markers lie so nearly in a plane that their mirror image fits as well ({:.2f} mm; as "
+                            "they are, {:.2f} mm): whether a file is mirrored cannot be told",
+                            shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
+                "touch one more marker, off the plane of the others");
+  }
+  if (shape.scale_chance < kChanceOfScale && fre_mm < kLargestFre_mm) {
+    verdict.add(shape.scale_chance < kLeastChanceOfScale ? Grade::fail : Grade::marginal,
+                fmt::format("lengths in the CT are {:.4g} times those that were touched (sigma {:.2g})", shape.scale,
+                            shape.scale_sigma),
+                scale_advice(shape.scale));
+  }
+}
+
+void judge_places(Verdict& verdict, const FiducialsFound& out) {
+  constexpr std::string_view kWhere = "outside of the CT, or in the air beside the patient";
+  if (!out.ct_outside.empty()) {
+    verdict.add(Grade::fail,
+                fmt::format("by the CT's file, fiducial{} {} lie{} {}", out.ct_outside.size() > 1 ? "s" : "",
+                            list_of(out.ct_outside), out.ct_outside.size() > 1 ? "" : "s", kWhere),
+                out.ras
+                    ? "the file looks like RAS: with the other sign of x and y all its markers lie in the CT. Give "
+                      "LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, which say their frame"
+                    : fmt::format("is this the CT that the markers were found in, and are they in mm, patient LPS? "
+                                  "The CT has {}",
+                                  out.ct_reach));
+  }
+  if (!out.targets_outside.empty()) {
+    verdict.add(Grade::marginal,
+                fmt::format("target{} {} lie{} {}", out.targets_outside.size() > 1 ? "s" : "",
+                            list_of(out.targets_outside), out.targets_outside.size() > 1 ? "" : "s", kWhere),
+                fmt::format("are the targets in mm, patient LPS? The CT has {}", out.ct_reach));
+  }
 }
 
 nlohmann::json rows_of(const Eigen::Matrix4d& m) {
   nlohmann::json rows;
   for (int i = 0; i < 4; ++i) rows.push_back({m(i, 0), m(i, 1), m(i, 2), m(i, 3)});
   return rows;
+}
+
+/// Brings the CT's points into the order of the touches of the same names, and leaves names where it did.
+Result<void> pair_by_name(const FiducialFiles& files, const std::vector<std::string>& ct_names, FiducialInput& input) {
+  const auto index_of = [&](const std::string& name) {
+    return static_cast<std::size_t>(std::find(ct_names.begin(), ct_names.end(), name) - ct_names.begin());
+  };
+  const auto known = [&](const std::string& name) { return index_of(name) < ct_names.size(); };
+  if (files.match || ct_names.empty() || std::none_of(input.names.begin(), input.names.end(), known)) {
+    if (!files.match && !ct_names.empty() && !input.names.empty())
+      input.notes.push_back("the files have no name in common: their points are paired in the order of the files");
+    input.names.clear();
+    return {};
+  }
+  Points ordered;
+  ordered.reserve(input.names.size());
+  for (const std::string& name : input.names) {
+    if (!known(name)) {
+      return Error{
+          Errc::bad_value,
+          fmt::format("{}: \"{}\" is no name of a point in {}, where others are: name it alike, take it out, or "
+                      "let --match find out which is which",
+                      files.tracker.string(), name, files.ct.string())};
+    }
+    ordered.push_back(input.ct_mm[index_of(name)]);
+  }
+  if (const std::size_t left = ct_names.size() - ordered.size(); left > 0)
+    input.notes.push_back(
+        fmt::format("{} of {} points of {} were not touched", left, ct_names.size(), files.ct.string()));
+  input.notes.push_back("points are paired by their names");
+  input.ct_mm = std::move(ordered);
+  return {};
 }
 
 Result<void> correct_by_field(const FiducialFiles& files, FiducialInput& input) {
@@ -95,15 +204,25 @@ Result<void> correct_by_field(const FiducialFiles& files, FiducialInput& input) 
 
 Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
   FiducialInput input;
-  for (const auto& [path, points] : {std::pair{&files.ct, &input.ct_mm},
-                                     {&files.tracker, &input.touched_mm},
-                                     {&files.targets, &input.targets_mm},
-                                     {&files.surface_points, &input.surface_points_mm}}) {
-    if (path->empty()) continue;
-    auto read = read_points(*path);
+  std::vector<std::string> ct_names;
+  struct Part {
+    const std::filesystem::path& path;
+    PointsOf of;
+    Points& points_mm;
+    std::vector<std::string>* names;
+  };
+  for (const Part& part : {Part{files.ct, PointsOf::patient, input.ct_mm, &ct_names},
+                           {files.tracker, PointsOf::tracker, input.touched_mm, &input.names},
+                           {files.targets, PointsOf::patient, input.targets_mm, nullptr},
+                           {files.surface_points, PointsOf::tracker, input.surface_points_mm, nullptr}}) {
+    if (part.path.empty()) continue;
+    auto read = read_named_points(part.path, part.of);
     if (!read) return read.error();
-    *points = *std::move(read);
+    part.points_mm = std::move(read->places_mm);
+    if (part.names != nullptr) *part.names = std::move(read->names);
+    std::move(read->notes.begin(), read->notes.end(), std::back_inserter(input.notes));
   }
+  if (const auto paired = pair_by_name(files, ct_names, input); !paired) return paired.error();
   if (!files.field.empty()) {
     if (const auto done = correct_by_field(files, input); !done) return done.error();
   }
@@ -128,11 +247,19 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   out.localisation = files.localisation_mm
                          ? calibration::LocalisationError{*files.localisation_mm, *files.localisation_mm, 0}
                          : calibration::localisation_error_of(out.fit.fre_rms_mm, input.ct_mm.size());
-  out.misfit_advice = misfit_advice(input, out.fit.fre_rms_mm);
+  out.shape = calibration::compare_shapes(input.ct_mm, input.touched_mm, files.localisation_mm);
+  out.ct_spread_mm = spread_of(input.ct_mm);
+  out.misfit_advice = misfit_advice(input, out.shape);
   out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
   const calibration::TargetError predicted(input.ct_mm, out.localisation.rms_mm);
   for (const Eigen::Vector3d& target : input.targets_mm) out.tre_mm.push_back(predicted.rms_mm(target));
-  if (input.volume) out.range = target_error_range(predicted, *input.volume);
+  if (input.volume) {
+    out.range = target_error_range(predicted, *input.volume);
+    out.ct_outside = points_outside(*input.volume, input.ct_mm);
+    out.targets_outside = points_outside(*input.volume, input.targets_mm);
+    out.ras = look_like_ras(*input.volume, input.ct_mm);
+    out.ct_reach = reach_of(*input.volume);
+  }
   if (input.surface) {
     auto refined = refine_on_surface(
         *input.surface, input.surface_points_mm,
@@ -146,14 +273,22 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
 Verdict judge_fiducials(const FiducialsFound& out) {
   Verdict verdict;
   // What a fiducial registration error means for a skin-marker registration of the liver.
-  verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, 5,
-                out.fit.fre_rms_mm > 5 ? out.misfit_advice : "touch the worst marker again");
+  verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, kLargestFre_mm,
+                out.fit.fre_rms_mm > kLargestFre_mm ? out.misfit_advice : "touch the worst marker again");
   for (std::size_t i = 0; i < out.tre_mm.size(); ++i) {
     verdict.judge(fmt::format("predicted error at target {}", i + 1), out.tre_mm[i], "mm", 3, 5,
                   "place markers round the target");
   }
+  if (out.range && out.tre_mm.empty()) {
+    verdict.judge("predicted error over the CT, median", out.range->median_mm, "mm", 3, 5,
+                  "place markers round what will be operated on, and name it with --targets");
+  }
+  judge_shape(verdict, out);
+  judge_places(verdict, out);
   const bool wrong = out.odd.verdict == OddPointsVerdict::named || out.odd.verdict == OddPointsVerdict::suspected;
-  verdict.add(wrong ? Grade::marginal : Grade::pass, out.odd.told);
+  // Three markers fit whatever one of them is, mirrored or not: the figures above then rest on nothing.
+  const bool unchecked = out.fit.residuals_mm.size() == 3;
+  verdict.add(wrong || unchecked ? Grade::marginal : Grade::pass, out.odd.told);
   if (out.refinement) verdict.add(out.refinement->accepted ? Grade::pass : Grade::marginal, out.refinement->told);
   return verdict;
 }
@@ -175,6 +310,15 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
     json["tre_mm_median"] = out.range->median_mm;
     json["tre_mm_p95"] = out.range->p95_mm;
     json["tre_mm_max"] = out.range->most_mm;
+  }
+  json["names"] = input.names;
+  json["scale"] = out.shape.scale;
+  json["scale_sigma"] = out.shape.scale_sigma;
+  json["mirrored_fre_rms_mm"] = out.shape.mirrored_fre_rms_mm;
+  if (input.volume) {
+    json["ct_outside"] = json["targets_outside"] = nlohmann::json::array();
+    for (const std::size_t i : out.ct_outside) json["ct_outside"].push_back(i + 1);
+    for (const std::size_t i : out.targets_outside) json["targets_outside"].push_back(i + 1);
   }
   json["outliers"] = json["suspects"] = nlohmann::json::array();
   for (const calibration::OddPoint& p : out.odd.named)

@@ -12,6 +12,7 @@
 #include "calibration/points/odd_points.hpp"
 #include "calibration/points/point_error.hpp"
 #include "calibration/points/point_fit.hpp"
+#include "calibration/points/point_shape.hpp"
 #include "host/files/picture.hpp"
 #include "host/registration/rigid/surface.hpp"
 #include "host/registration/rigid/surface_refinement.hpp"
@@ -37,7 +38,8 @@ struct FiducialInput {
   std::vector<Eigen::Vector3d> touched_mm, targets_mm, surface_points_mm;
   std::optional<Volume> volume;
   std::optional<Surface> surface;
-  std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order holds
+  std::vector<std::size_t> ct_of_touch;  ///< empty where the files' order or names hold
+  std::vector<std::string> names;        ///< one for each touch where both files name their points; else empty
   std::vector<std::string> notes;        ///< what was done to the points, to be told
 };
 
@@ -46,6 +48,11 @@ struct FiducialsFound {
   calibration::PointFit<Patient, Tracker> fit;
   calibration::LocalisationError localisation;
   calibration::OddPoints odd;
+  calibration::PointShape shape;
+  double ct_spread_mm = 0;  ///< root mean square distance of the CT's markers from their middle
+  std::vector<std::size_t> ct_outside, targets_outside;  ///< by index: those that are nowhere at the CT's patient
+  bool ras = false;      ///< the CT's markers would all be in it if their file is in RAS
+  std::string ct_reach;  ///< where the CT lies, in words; empty without a CT
   std::vector<double> tre_mm;
   std::optional<TargetErrorRange> range;
   std::optional<SurfaceRefinement> refinement;
@@ -55,8 +62,9 @@ struct FiducialsFound {
   }
 };
 
-/// With a map of the field, touched points are corrected by it. A fiducial where it maps nothing is refused, by name;
-/// points of the surface there are left out and counted in a note.
+/// Points pair by their names where both files name them (and `match` is not asked for), else by their order. With a
+/// map of the field, touched points are corrected by it. A fiducial where it maps nothing is refused, by name; points
+/// of the surface there are left out and counted in a note.
 Result<FiducialInput> read_fiducials(const FiducialFiles& files);
 
 /// Brings CT and tracker together by the markers, then by the surface if there is one. Brings ct_mm of the input into

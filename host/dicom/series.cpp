@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
 
@@ -94,15 +96,31 @@ Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVol
   return series;
 }
 
-/// Without the files that lie in another folder too, as where an export was copied into itself. Two of one folder stay:
-/// that is no copy of a whole.
-Files without_copies(const Files& files) {
-  std::map<std::string, std::filesystem::path> folder_of;
+/// Whether two files are the same, byte for byte.
+bool are_alike(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code error;
+  if (std::filesystem::file_size(a, error) != std::filesystem::file_size(b, error) || error) return false;
+  std::ifstream of_a(a, std::ios::binary), of_b(b, std::ios::binary);
+  return of_a && of_b && std::equal(std::istreambuf_iterator<char>(of_a), {}, std::istreambuf_iterator<char>(of_b), {});
+}
+
+/// Without the files that lie in another folder too, as where an export was copied into itself, and without those that
+/// are the same as another of their folder. Two of one folder that differ stay, and are named as lying at the same
+/// place.
+Files without_copies(const Files& files, std::vector<std::filesystem::path>& copies) {
+  std::map<std::string, Files> known;
   Files once;
   for (const DicomFile* file : files) {
-    const auto folder = file->path.parent_path();
-    const auto [known, is_new] = folder_of.try_emplace(file->instance_uid, folder);
-    if (file->instance_uid.empty() || is_new || known->second == folder) once.push_back(file);
+    Files& alike = known[file->instance_uid];
+    const bool copy = !file->instance_uid.empty() && std::any_of(alike.begin(), alike.end(), [&](const DicomFile* one) {
+      return one->path.parent_path() != file->path.parent_path() || are_alike(one->path, file->path);
+    });
+    if (copy) {
+      copies.push_back(file->path);
+      continue;
+    }
+    alike.push_back(file);
+    once.push_back(file);
   }
   return once;
 }
@@ -129,11 +147,13 @@ void add_volumes(const Files& files, const std::vector<DicomFile>& all, bool unt
   }
 }
 
-/// A number for people: that of the series, which several studies may have, so with a letter from the second on.
-std::string id_of(const std::optional<int>& number, std::map<std::string, int>& used) {
-  std::string base = number ? fmt::format("{}", *number) : "none";
-  const int before = used[base]++;
-  if (before == 0) return base;
+std::string number_of(const DicomFile& file) {
+  return file.series_number ? fmt::format("{}", *file.series_number) : "none";
+}
+
+/// A number for people: that of the series; with a letter where several series have it, as those of several studies do.
+std::string id_of(const std::string& base, int before, int count) {
+  if (count == 1) return base;
   return before < 26 ? fmt::format("{}{}", base, static_cast<char>('a' + before))
                      : fmt::format("{}-{}", base, before + 1);
 }
@@ -149,14 +169,18 @@ std::vector<Series> sort_into_series(const std::vector<DicomFile>& files, bool u
     sorted[{file.series_number.value_or(std::numeric_limits<int>::max()), uid}].push_back(&file);
   }
   std::vector<Series> out;
-  std::map<std::string, int> used;
+  std::map<std::string, int> used, count;
+  for (const auto& [key, of_series] : sorted) ++count[number_of(*of_series.front())];
   for (const auto& [key, of_series] : sorted) {
-    const std::string id = id_of(of_series.front()->series_number, used);
+    const std::string number = number_of(*of_series.front());
+    const std::string id = id_of(number, used[number]++, count[number]);
     const bool whole = std::all_of(of_series.begin(), of_series.end(),
                                    [](const DicomFile* file) { return !file->slices.empty() && file->fault.empty(); });
     const std::size_t had = out.size();
     if (whole) {
-      add_volumes(without_copies(of_series), files, untilt, out);
+      std::vector<std::filesystem::path> copies;
+      add_volumes(without_copies(of_series, copies), files, untilt, out);
+      for (std::size_t i = had; i < out.size(); ++i) out[i].copies = copies;
     } else {
       out.push_back(without_volume(of_series));
     }

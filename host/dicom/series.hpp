@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 /// What a series, or one of several volumes in it, is to whoever chooses one. Texts are empty where nothing is known.
 struct SeriesInfo {
-  std::string id;   ///< to choose it by: its number, "3"; "3.2" of a series of several volumes
+  std::string id;   ///< to choose it by: its number, "3"; "3b" where another has it too; "3.2" of several volumes
   std::string uid;  ///< Series Instance UID (0020,000E)
   std::string description, modality;
   std::string date, time;     ///< YYYYMMDD, HHMMSS
@@ -32,6 +32,7 @@ struct Series {
   SliceStack stack;           ///< no slices where a file has a fault
   std::filesystem::path bad;  ///< the file with the fault; empty where there is none
   std::string fault;
+  std::vector<std::filesystem::path> copies;  ///< of other files of the series, which were taken in their place
 };
 
 /// Sorts what files hold into series, by number, and a series whose slices lie at the same places, or differ in size or

@@ -33,10 +33,21 @@ std::string names_of(const std::vector<SeriesInfo>& series, const std::vector<st
   return names;
 }
 
+/// Whether a series has that number, and more behind it: "3b" and "3.2" have 3, "30" has not.
+bool is_of_number(const std::string& id, const std::string& number) {
+  return !number.empty() && id.starts_with(number) && id.size() > number.size() &&
+         (id[number.size()] < '0' || id[number.size()] > '9');
+}
+
 Result<std::size_t> choose_unnamed(const std::vector<SeriesInfo>& series) {
   auto left = those_that(series, [](const SeriesInfo& one) { return !one.passed_over; });
   if (left.empty()) left = those_that(series, [](const SeriesInfo&) { return true; });
   if (left.empty()) return Error{Errc::not_found, "holds no series; give the folder that holds one"};
+  // One slice is no volume where there are volumes: a picture to plan by, or one that was kept.
+  if (left.size() > 1) {
+    const auto thick = those_that(series, [](const SeriesInfo& one) { return !one.passed_over && one.size[2] != 1; });
+    if (!thick.empty()) left = thick;
+  }
   if (left.size() == 1) return left.front();
   std::set<std::string> uids;
   for (const std::size_t i : left) uids.insert(series[i].uid);
@@ -58,7 +69,7 @@ Result<std::size_t> choose_series(const std::vector<SeriesInfo>& series, const s
   const std::string text = lower_case(wanted), phase = phase_named_in(wanted);
   const Fits rules[] = {
       [&](const SeriesInfo& one) { return one.id == text || one.uid == wanted; },
-      [&](const SeriesInfo& one) { return one.id.starts_with(fmt::format("{}.", text)); },
+      [&](const SeriesInfo& one) { return is_of_number(one.id, text); },
       [&](const SeriesInfo& one) { return lower_case(one.description) == text; },
       [&](const SeriesInfo& one) { return !phase.empty() && one.phase == phase; },
       [&](const SeriesInfo& one) { return one.part == text; },

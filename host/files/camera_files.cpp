@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "calibration/base/nesting.hpp"
+#include "host/files/record_file.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -122,7 +123,21 @@ Result<CameraModel> ros_camera(const YAML::Node& node) {
   for (const char* binning : {"binning_x", "binning_y"}) {
     if (node[binning] && node[binning].as<int>() > 1)
       return Error{Errc::unsupported,
-                   fmt::format("its {} is over 1: give the lens of the pictures as they are", binning)};
+                   fmt::format("its {} is over 1: give the lens of the pictures as they are, all lengths of them in "
+                               "px divided by it",
+                               binning)};
+  }
+  // Width and K are the whole sensor's; of the pictures they hold only where the region of interest is all of it.
+  if (const YAML::Node roi = node["roi"]) {
+    const auto of_roi = [&roi](const char* key) { return roi[key] ? roi[key].as<int>() : 0; };
+    const int x = of_roi("x_offset"), y = of_roi("y_offset"), wide = of_roi("width"), high = of_roi("height");
+    if (x != 0 || y != 0 || (wide != 0 && wide != camera.width_px) || (high != 0 && high != camera.height_px)) {
+      return Error{
+          Errc::unsupported,
+          fmt::format("its roi is a part of the picture ({}x{} px from {}, {}): give the lens of the pictures as "
+                      "they are: the roi's width and height, cx less {} and cy less {}, and no roi",
+                      wide, high, x, y, x, y)};
+    }
   }
   if (const auto sound = set_matrix(numbers_under(node, {"camera_matrix", "K", "k"}), camera); !sound)
     return sound.error();
@@ -241,6 +256,12 @@ Result<void> has_no_k3(const CameraModel& camera) {
 Result<CameraModel> read_camera(const fs::path& path) {
   const CameraPath which = camera_path(path);
   if (const auto there = check_file(which.file); !there) return there.error();
+  if (read_record(which.file)) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: is a calibration record; `birdseye export lens --record {} --as opencv --out "
+                             "camera.yaml` writes its lens",
+                             which.file.string(), which.file.string())};
+  }
   if (is_opencv(which.file) && !which.camera.empty())
     return Error{Errc::bad_value,
                  fmt::format("{}: holds one camera: leave :{} out", which.file.string(), which.camera)};

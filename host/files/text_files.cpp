@@ -55,21 +55,6 @@ Result<std::vector<NumberRow>> read_rows(const fs::path& path, bool headed = fal
 
 }  // namespace
 
-Result<std::vector<Eigen::Vector3d>> read_points(const fs::path& path) {
-  const auto rows = read_rows(path);
-  if (!rows) return rows.error();
-  std::vector<Eigen::Vector3d> points;
-  for (const NumberRow& row : *rows) {
-    if (row.numbers.size() != 3) {
-      return Error{Errc::bad_format, fmt::format("{}: line {}: {} numbers where a point has three", path.string(),
-                                                 row.line, row.numbers.size())};
-    }
-    points.emplace_back(row.numbers[0], row.numbers[1], row.numbers[2]);
-  }
-  if (points.empty()) return Error{Errc::bad_format, fmt::format("{}: holds no points", path.string())};
-  return points;
-}
-
 Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& m, const std::string& where) {
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() > 0 &&

@@ -11,10 +11,6 @@
 
 namespace birdseye::host {
 
-/// Points, three numbers a line, mm; lines that are blank or begin with # are passed over. A line of anything else is
-/// an error that names file and line.
-Result<std::vector<Eigen::Vector3d>> read_points(const std::filesystem::path& path);
-
 /// The matrix, or, with `where` before it, that it is no rigid transform: rotation to 1e-3, last row 0 0 0 1.
 Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& matrix, const std::string& where);
 /// A rigid transform as a 4x4 matrix, four numbers a line, mm. Refuses a missing row, a last row that is not 0 0 0 1

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "host/files/field_files.hpp"
-#include "host/files/text_files.hpp"
+#include "host/files/named_points.hpp"
 #include "host/operation/operation.hpp"
 #include "host/simulated/simulated_patient.hpp"
 #include "host/texts/texts.hpp"
@@ -112,7 +112,7 @@ Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_toke
   }
   if (plan.shown.hu.empty()) plan.shown = plan.ct;
   if (!files.fiducials.empty()) {
-    auto points = read_points(files.fiducials);
+    auto points = read_points(files.fiducials, PointsOf::patient);
     if (!points) return points.error();
     plan.fiducials_in_patient_mm = *std::move(points);
   }

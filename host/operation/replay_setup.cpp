@@ -4,6 +4,7 @@
 
 #include "calibration/record/calibration_record.hpp"
 #include "drivers/system/clock.hpp"
+#include "host/files/named_points.hpp"
 #include "host/files/record_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/operation/patient.hpp"
@@ -79,7 +80,7 @@ Result<Eigen::Vector3d> tip_of(const ReplayInputs& inputs, const std::optional<C
     if (record && record->tip) return record->tip->tip_in_sensor_mm;
     return Error{Errc::bad_value, "--fiducials: the pointer's tip is not known; give --tip, or a record that has it"};
   }
-  const auto points = read_points(inputs.tip);
+  const auto points = read_points(inputs.tip, PointsOf::sensor);
   if (!points) return points.error();
   if (points->size() == 1) return points->front();
   return Error{Errc::bad_format,
@@ -88,7 +89,7 @@ Result<Eigen::Vector3d> tip_of(const ReplayInputs& inputs, const std::optional<C
 
 Result<void> register_anew(const ReplayInputs& inputs, const std::optional<CalibrationRecord>& record,
                            ReplaySetup& out) {
-  const auto markers = read_points(inputs.fiducials);
+  const auto markers = read_points(inputs.fiducials, PointsOf::patient);
   if (!markers) return markers.error();
   const auto tip = tip_of(inputs, record);
   if (!tip) return tip.error();

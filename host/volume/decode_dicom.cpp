@@ -17,8 +17,12 @@ std::vector<std::string> notes_of(const DicomScan& scan, std::size_t chosen) {
   if (scan.series.size() > 1) notes.push_back(fmt::format("read series {}", series_name(scan.series[chosen].info)));
   for (std::size_t i = 0; i < scan.series.size(); ++i) {
     const SeriesInfo& info = scan.series[i].info;
-    if (i != chosen && info.passed_over)
+    if (i != chosen && (info.passed_over || info.size[2] == 1))
       notes.push_back(fmt::format("passed over series {}: {}", series_name(info), info.problem));
+  }
+  if (const auto& copies = scan.series[chosen].copies; !copies.empty()) {
+    notes.push_back(fmt::format("passed over {} cop{} of slices: {}{}", copies.size(), copies.size() == 1 ? "y" : "ies",
+                                copies.front().filename().string(), copies.size() == 1 ? "" : " and others"));
   }
   for (const Error& unreadable : scan.tree.unreadable) notes.push_back(fmt::format("passed over {}", unreadable.what));
   return notes;

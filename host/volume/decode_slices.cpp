@@ -81,13 +81,13 @@ Result<Hu> decode_slices(const std::vector<DicomFile>& files, const std::vector<
     started.push_back(*std::move(copy));
   }
   // In the order of the slices: while one copy is waited for, the others decode ahead by what their pipes hold.
-  const Deadline deadline = Deadline::after(Duration::from_ms(300'000));
+  constexpr Duration kLongestOfASlice = Duration::from_ms(300'000);
   const std::size_t pixels = pixels_of(slices.front());
   Hu hu(pixels * slices.size());
   for (std::size_t i = 0; i < slices.size(); ++i) {
     const auto& path = files[slices[i].file].path;
     announce(path);
-    auto came = receive_slice(started[i % count], deadline, hu.data() + i * pixels, pixels);
+    auto came = receive_slice(started[i % count], Deadline::after(kLongestOfASlice), hu.data() + i * pixels, pixels);
     if (!came && came.error().code == Errc::disconnected) {
       return refused(
           Errc::bad_format, path,

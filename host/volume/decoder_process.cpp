@@ -20,7 +20,9 @@ namespace fs = std::filesystem;
 /// What the copy of this process sends: the file it is about to read, how it failed, or that the outcome follows.
 enum class MessageKind : std::uint8_t { reading = 'r', error = 'e', decoded = 'd' };
 
-constexpr Duration kLongest = Duration::from_ms(300'000);
+/// Without a word of the decoder, which names each file before it reads it: a slow disk's large series takes longer in
+/// all.
+constexpr Duration kLongestSilence = Duration::from_ms(300'000);
 
 void send_text(const Send& send, MessageKind kind, std::int32_t code, const std::string& text) {
   const auto length = static_cast<std::uint32_t>(text.size());
@@ -56,8 +58,8 @@ void bound_memory() {
 Error not_decoded(const fs::path& reading, const Result<void>& ran) {
   if (!ran && ran.error().code == Errc::timeout) {
     return refused(Errc::timeout, reading,
-                   fmt::format("its decoder {} after {:.0f} s; copy it again, to a disk of this machine",
-                               ran.error().what, kLongest.seconds()));
+                   fmt::format("its decoder {} after {:.0f} s on one file; copy it again, to a disk of this machine",
+                               ran.error().what, kLongestSilence.seconds()));
   }
   return refused(Errc::bad_format, reading,
                  fmt::format("is cut short, damaged, or too large to decode{}; copy it again",
@@ -100,7 +102,7 @@ Result<void> run_decoder(const fs::path& path, const std::function<Result<SendDe
     }
   };
   try {
-    const auto ran = run_isolated(work, receive_all, kLongest, stop);
+    const auto ran = run_isolated(work, receive_all, kLongestSilence, stop);
     if (stop.stop_requested()) return refused(Errc::disconnected, path, "was not read: cancelled");
     if (failed) return *failed;
     if (came) return {};

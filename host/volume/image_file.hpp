@@ -30,10 +30,10 @@ struct ImageFile {
 
 /// Reads one of the series of a folder of DICOM files and of those below it, a DICOM file, or a NIfTI, NRRD, MHA or MHD
 /// file, with `components` values a voxel. The decoders run in processes of their own
-/// (docs/decisions/0012-isolated-import.md), for no longer than five minutes. Refuses, in one line that names the path,
-/// a file that is missing, unreadable or cut short, one without a sound geometry, and (with one value a voxel) values
-/// that are not finite or beyond 16 bits. Once stop is requested, the decoders are ended before the next of their
-/// files, and nothing is read.
+/// (docs/decisions/0012-isolated-import.md), for no longer than five minutes on one file. Refuses, in one line that
+/// names the path, a file that is missing, unreadable or cut short, one without a sound geometry, and (with one value a
+/// voxel) values that are not finite or beyond 16 bits. Once stop is requested, the decoders are ended before the next
+/// of their files, and nothing is read.
 Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop = {});
 
 /// Reads a segmentation as read_image reads a CT, with the names of its labels: a DICOM segmentation, or a folder that

@@ -3,13 +3,12 @@
 namespace birdseye::host {
 
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
-                          Duration within, const std::stop_token& stop) {
-  const Deadline deadline = Deadline::after(within);
+                          Duration silence, const std::stop_token& stop) {
   auto copy = ProcessCopy::start(work);
   if (!copy) return std::move(copy).error();
   Result<void> received;
   take([&](void* to, std::size_t size) {
-    if (received) received = copy->receive(to, size, deadline, stop);
+    if (received) received = copy->receive(to, size, Deadline::after(silence), stop);
     return received.has_value();
   });
   return received;

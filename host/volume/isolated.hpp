@@ -22,11 +22,12 @@ using Receive = std::function<bool(void* to, std::size_t size)>;
 /// Runs `work` in a copy of this process, and at the same time `take` in this process (ProcessCopy). For decoders of
 /// files from elsewhere: Debian's GDCM meets damage with an assertion, which no catch can hold
 /// (docs/decisions/0012-isolated-import.md). What take receives is not to be trusted. Whatever else uses those
-/// decoders' libraries holds copies off meanwhile (CopiesHeldOff). The copy is killed at the deadline, or when take
-/// returns, or when stop is requested. Errors: no process is free; and, where take asked for more than came, how the
-/// copy ended: Errc::timeout or Errc::disconnected, in words that go on from "its decoder".
+/// decoders' libraries holds copies off meanwhile (CopiesHeldOff). The copy is killed where one receive of take waits
+/// for longer than `silence`, or when take returns, or when stop is requested: work may take as long as it needs if it
+/// sends meanwhile, and what take asks for is to be bounded. Errors: no process is free; and, where take asked for more
+/// than came, how the copy ended: Errc::timeout or Errc::disconnected, in words that go on from "its decoder".
 Result<void> run_isolated(const std::function<void(const Send&)>& work, const std::function<void(const Receive&)>& take,
-                          Duration within, const std::stop_token& stop = {});
+                          Duration silence, const std::stop_token& stop = {});
 
 /// Receives `count` values. The count is only what the other process says, so memory is touched only as values come.
 /// Empty where not all of them come.

@@ -11,6 +11,31 @@
 
 namespace birdseye::host {
 
+namespace {
+
+/// Which labels there are, in words.
+std::string labels_in(const Volume& labels) {
+  constexpr std::size_t kNamed = 20;
+  const std::vector<std::int16_t> found = values_in(labels);
+  if (found.empty()) return "no label covers any of the CT";
+  const auto some = std::span(found).first(std::min(found.size(), kNamed));
+  return fmt::format("those there are {}{}; `birdseye volume info` of the labels' file names them",
+                     fmt::join(some, ", "),
+                     found.size() > kNamed ? fmt::format(" and {} more", found.size() - kNamed) : "");
+}
+
+}  // namespace
+
+std::vector<std::int16_t> values_in(const Volume& labels) {
+  std::vector<bool> seen(1U << 16U);
+  for (const std::int16_t value : labels.hu) seen[static_cast<std::uint16_t>(value)] = true;
+  std::vector<std::int16_t> found;
+  for (int value = -32768; value < 32768; ++value) {
+    if (value != 0 && seen[static_cast<std::uint16_t>(value)]) found.push_back(static_cast<std::int16_t>(value));
+  }
+  return found;
+}
+
 Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const Volume& ct,
                                         std::span<const LabelChoice> wanted, const std::stop_token& stop) {
   if (is_mask_folder(path)) return import_masks(path, ct, wanted, stop);
@@ -44,7 +69,8 @@ Result<Volume> keep_labels(const Volume& ct, const Volume& labels, std::span<con
     }
   }
   if (high[0] < 0) {
-    return Error{Errc::not_found, fmt::format("the labels hold none of {}", fmt::join(values, ", "))};
+    return Error{Errc::not_found,
+                 fmt::format("the labels hold no voxel of {}: {}", fmt::join(values, ", "), labels_in(labels))};
   }
   // The kept voxels, their neighbours, and a border of nothing.
   low = (low - 2).max(0);
@@ -88,7 +114,8 @@ Result<Eigen::Vector3d> label_centroid_mm(const Volume& labels, std::span<const 
     }
   }
   if (count == 0)
-    return Error{Errc::not_found, fmt::format("the labels hold no voxel of value {}", fmt::join(values, ", "))};
+    return Error{Errc::not_found,
+                 fmt::format("the labels hold no voxel of {}: {}", fmt::join(values, ", "), labels_in(labels))};
   return Eigen::Vector3d(labels.patient_from_voxel * Eigen::Vector3d(sum / static_cast<double>(count)));
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <stop_token>
@@ -21,6 +22,9 @@ Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const
                                         std::span<const LabelChoice> wanted = {}, const std::stop_token& stop = {});
 /// Without the names.
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct, const std::stop_token& stop = {});
+
+/// All values but 0 that voxels have, ascending.
+std::vector<std::int16_t> values_in(const Volume& labels);
 
 /// The CT at voxels whose label is one of values and at their 26 neighbours, -1024 HU elsewhere: the neighbours keep
 /// the soft edge that partial volume gives an organ. Cut to the box that holds these voxels, so patient_from_voxel

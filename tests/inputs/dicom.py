@@ -46,6 +46,15 @@ def write(path, dataset):
     path.write_bytes(b"\0" * 128 + b"DICM" + element(0x00020000, "UL", len(text)) + text + elements(dataset))
 
 
+def halve_stream(path):
+    """Takes the second half of a compressed slice's stream away, with lengths that say so: a whole file of half a picture."""
+    data = path.read_bytes()
+    at = data.rindex(b"\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff") + 12
+    at += 8 + struct.unpack_from("<I", data, at + 4)[0]  # past the table of offsets
+    half = struct.unpack_from("<I", data, at + 4)[0] // 4 * 2
+    path.write_bytes(data[:at + 4] + struct.pack("<I", half) + data[at + 8:at + 8 + half] + b"\xfe\xff\xdd\xe0" + b"\0" * 4)
+
+
 def numbers(values):
     return "\\".join(f"{v:.6g}" for v in values)
 

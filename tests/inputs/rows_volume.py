@@ -82,6 +82,20 @@ def copied_file(folder):
     shutil.copy(folder / "ct" / "s1_005.dcm", folder / "ct" / "s1_005 (1).dcm")
 
 
+def plan_beside(folder):
+    series(folder)
+    dicom.write(folder / "ct" / "plan.dcm", dicom.ct_slice(volumes.slice_bytes(9), volumes.COLUMNS, volumes.ROWS, volumes.place(0, 0, 9),
+                                                           series=9, description="plan"))
+
+
+def jpeg_cut(option, tool="dcmcjpeg"):
+    """A compressed series whose twelfth slice lacks the second half of its stream; its file is whole."""
+    def make(folder):
+        through(tool, option)(folder)
+        dicom.halve_stream(folder / "ct" / "s1_011.dcm")
+    return make
+
+
 def mixed_spacing(folder):
     """Slices of 2 mm, then of 4 mm."""
     volumes.write_series(folder / "ct", place_of=lambda k: (*volumes.ORIGIN_MM[:2], 100.0 + (2 * k if k < 20 else 40 + 4 * (k - 20))))
@@ -189,8 +203,19 @@ ROWS = [
     Row("volume info", "odd", "folders in folders, and a link that goes round", "read once; nothing hangs", INFO, 0, deep_folder, writes=ONE,
         check=is_the_ct),
     Row("volume info", "good", "big-endian pixels", "as the series", INFO, 0, through("dcmconv", "+tb"), writes=ONE, check=is_the_ct),
-    Row("volume info", "odd", "one file twice, under another name", "refused: both names; remove the doubled one", INFO, 2, copied_file,
-        says=["s1_005 \\(1\\).dcm", "s1_005.dcm", "remove"]),
+    Row("volume info", "odd", "one file twice, under another name", "read once, and said", INFO, 0, copied_file,
+        says=["passed over 1 copy of slices: s1_005"], writes=ONE, check=is_the_ct),
+    Row("volume info", "odd", "a single slice beside a series", "the series; the slice is passed over, and said", INFO, 0, plan_beside,
+        says=["passed over series 9 'plan': one slice"], writes=ONE, check=is_the_ct),
+    Row("volume info", "odd", "lossless JPEG, one slice cut in the middle of its pixels", "refused: the file is named", INFO, 2,
+        jpeg_cut("+e1"), says=["s1_011.dcm", "again"]),
+    Row("volume info", "odd", "lossy JPEG, one slice cut in the middle of its pixels", "refused: the file is named", INFO, 2,
+        jpeg_cut("+ee"), says=["s1_011.dcm", "again"]),
+    Row("volume info", "odd", "JPEG-LS, one slice cut in the middle of its pixels", "refused: the file is named", INFO, 2,
+        jpeg_cut("+el", tool="dcmcjpls"), says=["s1_011.dcm", "again"]),
+    Row("volume info", "odd", "a file of labels without names", "its labels, no Hounsfield units", info_of("labels.mha"), 0,
+        lambda folder: volumes.write_mha(folder / "labels.mha", volumes.labels()), says=["labels       5 \\(no Hounsfield"],
+        says_not=["^HU"], writes=ONE),
     Row("volume info", "good", "tilted gantry, --untilt", "resampled, and how much that blurs", INFO + " --untilt", 0, tilted, says=["blur"],
         writes=ONE),
     Row("volume info", "odd", "tilted gantry", "refused: --untilt is named", INFO, 2, tilted, says=["tilt", "--untilt"]),

@@ -69,7 +69,7 @@ def write_series(folder, which=range(SLICES), series=1, description="abdomen", p
                                    instance=number + 1, description=description, **more))
 
 
-def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0):
+def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0, shift_mm=(0.0, 0.0, 0.0)):
     """NIfTI-1 of the CT; form are the codes of qform and sform, kind 4 is int16 and 16 float."""
     values = hounsfield() if values is None else values
     content = values.tobytes()
@@ -82,7 +82,7 @@ def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0):
     struct.pack_into("<b", head, 123, 2)
     struct.pack_into("<hh", head, 252, *form)
     # RAS: the first two axes are those of LPS turned round.
-    x, y, z = ORIGIN_MM
+    x, y, z = (o + moved for o, moved in zip(ORIGIN_MM, shift_mm))
     s = SPACING_MM * scale
     struct.pack_into("<6f", head, 256, 0.0, 0.0, 1.0, -x, -y, z)  # turned by half a turn about z
     struct.pack_into("<12f", head, 280, -s, 0, 0, -x, 0, -s, 0, -y, 0, 0, s, z)

@@ -237,6 +237,18 @@ TEST(CameraCalibration, BadViewsAreNamed) {
   EXPECT_NEAR(found.noise_sigma_px, scene.noise_px, 0.02);
 }
 
+TEST(CameraCalibration, AViewThatIsNearlyPerfectStaysHoweverGoodTheOthersAre) {
+  BoardScene scene;
+  scene.noise_px = 0.01;
+  const CameraModel truth = hd_lens();
+  Views views = scene.views(truth, 14, 6);
+  scene.noise_px = 0.15;  // fifteen times as much, and no more than a detector leaves
+  views[4] = scene.views(truth, 14, 6)[4];
+  const auto found = calibrated(views, truth);
+  EXPECT_TRUE(found.rejected.empty()) << found.rejected.front().reason;
+  EXPECT_EQ(found.views.size(), 14U);
+}
+
 TEST(CameraCalibration, OrderChangesNothing) {
   const BoardScene scene;
   const CameraModel truth = hd_lens();

@@ -88,6 +88,47 @@ INSTANTIATE_TEST_SUITE_P(Detect, StorzPlate,
                          ::testing::Values(std::pair{"charuco:19x26:5mm:4mm:DICT_4X4_250:legacy", 180},
                                            std::pair{"charuco:19x26:5mm:4mm:DICT_4X4_250:legacy:inset=8x13:3mm", 270}));
 
+/// The words with which a real picture is rejected.
+std::string why_rejected(const std::string& spec, const std::filesystem::path& file) {
+  const auto pattern = parse_pattern(spec);
+  EXPECT_TRUE(pattern) << spec;
+  const cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+  EXPECT_FALSE(grey.empty()) << file;
+  return detect(*pattern, view_of(grey), spec).rejected;
+}
+
+TEST(Detect, WrongCountsOfRealBoardsAreToldWithThoseThatFit) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  for (const char* name : {"0", "2", "7"}) {
+    const auto file = *data / "laparoscope_charuco_handeye" / (std::string("calib.left.images.") + name + ".png");
+    for (const char* counts : {"18x26", "20x26", "26x19", "25x18", "26x18", "18x25", "20x27"}) {
+      const std::string told = why_rejected(std::string("charuco:") + counts + ":5mm:4mm:DICT_4X4_250:legacy", file);
+      EXPECT_NE(told.find("as on a board of 19x"), std::string::npos) << name << " " << counts << ": " << told;
+    }
+  }
+  const auto chessboard = *data / "camera_undistort_opencv/left01.jpg";
+  EXPECT_EQ(why_rejected("chessboard:9x6:25mm", chessboard), "");
+  for (const char* counts : {"10x7", "7x10"}) {
+    const std::string told = why_rejected(std::string("chessboard:") + counts + ":25mm", chessboard);
+    EXPECT_NE(told.find("squares were counted"), std::string::npos) << counts << ": " << told;
+  }
+  EXPECT_NE(why_rejected("chessboard:10x6:25mm", chessboard).find("9x6 inner corners is seen"), std::string::npos);
+}
+
+TEST(Detect, AnInsetThatIsNotThereIsSeenToBeWrong) {
+  const auto data = testing::data_dir();
+  if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
+  const auto file = *data / "laparoscope_charuco_handeye/calib.left.images.0.png";
+  const cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+  for (const auto& [inset, wrong] : {std::pair{"8x13:3mm", false}, {"9x14:3mm", true}, {"8x13:4mm", true}}) {
+    const auto pattern = parse_pattern(std::string("charuco:19x26:5mm:4mm:DICT_4X4_250:legacy:inset=") + inset);
+    ASSERT_TRUE(pattern);
+    const Detection seen = detect(*pattern, view_of(grey), inset);
+    EXPECT_EQ(seen.inset.is_wrong(), wrong) << inset << ": " << seen.inset.found << " of " << seen.inset.looked_for;
+  }
+}
+
 TEST(Detect, WebcamCornersLieAtThePublishedOnesAndFaultsAreNamed) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";

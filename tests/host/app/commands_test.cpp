@@ -73,6 +73,7 @@ TEST(Commands, VolumeInfoListsSeriesAndLooksAtTheOneThatIsNamed) {
   EXPECT_EQ(std::count(list.output.begin(), list.output.end(), '\n'), 3) << list.output;
   const nlohmann::json json = read_json(json_path);
   ASSERT_EQ(json["series"].size(), 2U);
+  EXPECT_EQ(json["series"][0]["id"], "1a");
   EXPECT_EQ(json["series"][1]["id"], "1b");
   EXPECT_EQ(json["series"][1]["size"], nlohmann::json({4, 3, 5}));
   EXPECT_EQ(json["series"][1]["readable"], true);
@@ -82,7 +83,10 @@ TEST(Commands, VolumeInfoListsSeriesAndLooksAtTheOneThatIsNamed) {
   EXPECT_EQ(read_json(json_path)["hu_max"], 20);
   const auto none = run("birdseye", "volume info " + folder + " --series portal");
   EXPECT_EQ(none.code, 2);
-  EXPECT_NE(none.output.find("--series portal fits none of 1, 1b"), std::string::npos) << none.output;
+  EXPECT_NE(none.output.find("--series portal fits none of 1a, 1b"), std::string::npos) << none.output;
+  const auto both = run("birdseye", "volume info " + folder + " --series 1");
+  EXPECT_EQ(both.code, 2);
+  EXPECT_NE(both.output.find("--series 1 fits 2 (1a, 1b)"), std::string::npos) << both.output;
   expect_refused("birdseye", "volume segment " + folder + " --hu 0,50 --out " + (scratch / "a.nii.gz").string(),
                  {"holds 2 series", "--series"}, scratch / "a.nii.gz");
   const auto segmented =

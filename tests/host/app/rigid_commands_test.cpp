@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host/files/text_files.hpp"
+#include "host/files/named_points.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/data.hpp"
@@ -84,7 +84,7 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
   const auto refined =
       run("birdseye", "volume markers " + ct + near + " --out " + own + " --json " + (scratch / "own.json").string());
   ASSERT_EQ(refined.code, 0) << refined.output;
-  const auto places = host::read_points(own);
+  const auto places = host::read_points(own, host::PointsOf::patient);
   ASSERT_TRUE(places);
   ASSERT_EQ(places->size(), pointed.size());
   for (std::size_t i = 0; i < pointed.size(); ++i) EXPECT_LT(((*places)[i] - pointed[i]).norm(), 0.15);

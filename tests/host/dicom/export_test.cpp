@@ -121,6 +121,44 @@ TEST(DicomExport, ACopyOfAWholeSeriesInAnotherFolderIsTheSameSeries) {
   expect_ct(scratch / "cd", 4, 0);
 }
 
+TEST(DicomExport, ACopyOfASliceInItsFolderIsTakenOnceAndSaid) {
+  const Scratch scratch;
+  write_ct_series(scratch / "ct", {}, 4);
+  fs::copy(scratch / "ct/2.dcm", scratch / "ct/2 (1).dcm");
+  expect_ct(scratch / "ct", 4, 0);
+  const auto told = import_with_notes(scratch / "ct");
+  ASSERT_TRUE(told) << told.error().what;
+  ASSERT_EQ(told->notes.size(), 1U);
+  EXPECT_EQ(told->notes[0].substr(0, 32), "passed over 1 copy of slices: 2.") << told->notes[0];
+  // Of the same name for the world, with other pixels: which one is right, nobody knows.
+  write_ct_slice(scratch / "ct/other.dcm", {"2.25.1", 1, 2, 1500, {0, 0, 2}, "abdomen"});
+  expect_error(scratch / "ct", "same place");
+}
+
+TEST(DicomExport, ASingleSliceBesideASeriesIsPassedOverAndSaid) {
+  const Scratch scratch;
+  write_ct_series(scratch / "ct", {}, 4);
+  write_ct_slice(scratch / "plan/1.dcm", {"2.25.7", 7, 1, 3000, {0, 0, 0}, "plan"});
+  expect_ct(scratch.path(), 4, 0);
+  const auto told = import_with_notes(scratch.path());
+  ASSERT_TRUE(told) << told.error().what;
+  std::string notes;
+  for (const std::string& note : told->notes) notes += note + "\n";
+  EXPECT_NE(notes.find("passed over series 7 'plan': one slice"), std::string::npos) << notes;
+  // By itself, or by its number, it is what is meant.
+  expect_ct(scratch / "plan", 1, 2000);
+  expect_ct(one_of(scratch.path(), "7"), 1, 2000);
+}
+
+TEST(DicomExport, ANumberThatTwoStudiesHaveNamesNone) {
+  const Scratch scratch;
+  write_ct_series(scratch / "a", {"2.25.1", 3, 1, 1000, {0, 0, 0}, "first"}, 4);
+  write_ct_series(scratch / "b", {"2.25.2", 3, 1, 2000, {0, 0, 0}, "second"}, 5);
+  expect_error(one_of(scratch.path(), "3"), "--series 3 fits 2 (3a 'first', 3b 'second'); name one by its number");
+  expect_ct(one_of(scratch.path(), "3a"), 4, 0);
+  expect_ct(one_of(scratch.path(), "3b"), 5, 1000);
+}
+
 TEST(DicomExport, SeriesWithoutIdentifiersAreToldApartByTheirFolders) {
   const Scratch scratch;
   const auto anonymous = [](DcmDataset& dataset) {

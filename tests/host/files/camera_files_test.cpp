@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "calibration/geometry/rotations.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -58,6 +59,26 @@ TEST(CameraFiles, APairOfKalibrIsReadCameraByCameraAndInMm) {
   EXPECT_THAT(which.error().what, HasSubstr("say which of its cameras; it holds cam0, cam1"));
   EXPECT_THAT(read_camera(path + ":cam7").error().what, HasSubstr("has no camera cam7"));
   EXPECT_THAT(read_camera_relation(path + ":cam0").error().what, HasSubstr("lacks T_cn_cnm1"));
+}
+
+TEST(CameraFiles, ARegionOfInterestIsRefusedUnlessItIsAll) {
+  const std::string ros = ros_camera_text(kLens, "scope");
+  const auto with_roi = [&](const std::string& roi) { return read_lens_text(ros + "roi: " + roi + "\n"); };
+  EXPECT_EQ(*with_roi("{x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}"), kLens);
+  EXPECT_EQ(*with_roi("{x_offset: 0, y_offset: 0, height: 1080, width: 1920, do_rectify: false}"), kLens);
+  const auto part = with_roi("{x_offset: 200, y_offset: 100, height: 800, width: 1000, do_rectify: false}");
+  ASSERT_FALSE(part);
+  EXPECT_THAT(part.error().what, HasSubstr("its roi is a part of the picture (1000x800 px from 200, 100)"));
+  EXPECT_THAT(part.error().what, HasSubstr("cx less 200 and cy less 100"));
+}
+
+TEST(CameraFiles, ACalibrationRecordIsToldFromALens) {
+  const Scratch scratch;
+  const std::string path =
+      scratch.file("scope.json", calibration::record_text(testing::example_record(1920, 1080, {}, {})));
+  const auto camera = read_camera(path);
+  ASSERT_FALSE(camera);
+  EXPECT_THAT(camera.error().what, HasSubstr("is a calibration record; `birdseye export lens --record " + path));
 }
 
 /// A chain as Kalibr writes it, of the EuRoC data set's kind.
