@@ -255,10 +255,11 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
   FieldFit fit{no_map(*box)};
   if (const auto aligned = align(samples, grid, fit); !aligned) return aligned.error();
   if (fit.scale < kLeastScale || fit.scale > kMostScale)
-    return Error{Errc::bad_value,
-                 fmt::format("the tracker has distances {:.4g} times those of the grid; are both in mm, and is the "
-                             "grid's step right?",
-                             fit.scale)};
+    return Error{
+        Errc::bad_value,
+        fmt::format("the tracker has distances {:.4g} times those of the grid, which are in mm: say the unit of "
+                    "the tracker's (--unit m, cm or in), and see that the grid's step is right",
+                    fit.scale)};
   for (const Eigen::Vector3d& p : grid.measured_mm) grid.fold.push_back(detail::fold_of(*box, p));
 
   FieldFunctions first = *box;  // smooth enough for wrong places to stand out, and of few parameters

@@ -167,7 +167,8 @@ Verdict verdict_of(const FieldFit& fit) {
   const double part = outliers / static_cast<double>(fit.residuals.size());
   if (part > kFewOutliers) {
     verdict.add(part > kManyOutliers ? Grade::fail : Grade::marginal,
-                fmt::format("{:.0f} of {} measurements do not fit the rest", outliers, fit.residuals.size()),
+                fmt::format("{:.0f} of {} measurements {} the rest", outliers, fit.residuals.size(),
+                            outliers == 1 ? "does not fit" : "do not fit"),
                 "look whether the sensor was seated at the places that are named, and measure those again");
   }
   if (fit.mapped_part < kMostlyMapped) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/counted.hpp"
 #include "calibration/field/field_fit_parts.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -226,9 +227,10 @@ Vectors before(const FoldedPairs& data, const SensorPair& body) {
 
 Result<FoldedPairs> taken(std::span<const FieldPair> pairs, const FieldPairSettings& settings) {
   if (pairs.size() < kFewestPairs)
-    return Error{Errc::degenerate, fmt::format("{} pairs of poses at the same moment; a map needs {} at least, and a "
-                                               "good one over a thousand",
-                                               pairs.size(), kFewestPairs)};
+    return Error{Errc::degenerate,
+                 fmt::format("{} of poses at the same moment; a map needs {} at least, and a good one "
+                             "over a thousand",
+                             counted(pairs.size(), "pair", "pairs"), kFewestPairs)};
   FoldedPairs data;
   const std::size_t count = std::min(pairs.size(), kMostPairs);
   for (std::size_t k = 0; k < count; ++k) {
@@ -307,7 +309,7 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   if (const double length_mm = mean_body(data).b_in_a_mm.norm(); length_mm < kShortestMm)
     return Error{Errc::degenerate,
                  fmt::format("the sensors are {:.0f} mm apart, or do not sit on one rigid body; a map "
-                             "needs {:.0f} mm between them at least",
+                             "needs {:.0f} mm between them at least (of lengths in metres or cm: --unit m, --unit cm)",
                              length_mm, kShortestMm)};
   FieldFunctions first = *box;
   first.order = 2;

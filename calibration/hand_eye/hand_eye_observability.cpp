@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/base/counted.hpp"
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
@@ -191,10 +192,11 @@ void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
        fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way round",
                    as_given, if_inverted),
        in.given_poses
-           ? "give poses as tracker_from_sensor and as marker_from_camera: one of the two is the other way; or "
-             "its quaternions are not in the order that is read: is w the first of the four?"
-           : "give poses that take points of the sensor to the tracker (tracker_from_sensor); or is w the "
-             "first of the quaternion's four numbers? Name them in a header: qw,qx,qy,qz"});
+           ? "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: if "
+             "it is the tracker's, say --poses-are sensor_from_tracker; or w is the first of a quaternion's four "
+             "numbers: name them in a header, qw,qx,qy,qz"
+           : "if the poses are sensor_from_tracker, say so: --poses-are sensor_from_tracker; if w is the first of the "
+             "quaternion's four numbers, name them in a header: qw,qx,qy,qz"});
 }
 
 std::string scale_in_words(double scale, double sigma, double square_mm) {
@@ -203,8 +205,10 @@ std::string scale_in_words(double scale, double sigma, double square_mm) {
   if (near(1e-3))
     return "the board seems 1000 times smaller than stated: poses in metres, taken for millimetres? Give --unit m";
   if (near(1e3)) return "the board seems 1000 times larger than stated: its squares in metres, taken for millimetres?";
+  if (near(0.1)) return "the board seems 10 times smaller than stated: poses in cm, taken for mm? Give --unit cm";
+  if (near(10)) return "the board seems 10 times larger than stated: its squares in cm, taken for mm?";
   if (near(25.4)) return "the board seems 25.4 times larger than stated: its squares in inches?";
-  if (near(1 / 25.4)) return "the board seems 25.4 times smaller than stated: poses in inches?";
+  if (near(1 / 25.4)) return "the board seems 25.4 times smaller than stated: poses in inches? Give --unit in";
   std::string words =
       fmt::format("by the tracker the board is {:.3f} +- {:.3f} times as large as stated", scale, sigma);
   if (square_mm > 0) words += fmt::format(": squares of {:.3g} mm, not {:.3g}", scale * square_mm, square_mm);
@@ -261,9 +265,10 @@ HandEyeObservability observe_hand_eye(const StationsInOrder& in, const std::opti
   HandEyeObservability found;
   found.stations = in.stations.size();
   if (in.stations.size() < kFewestStations) {
-    found.findings.push_back(
-        {Grade::fail, fmt::format("{} stations with board and pose, of at least {}", found.stations, kFewestStations),
-         "take more stations: ten or more, turned about different axes"});
+    found.findings.push_back({Grade::fail,
+                              fmt::format("{} with board and pose, of at least {}",
+                                          counted(found.stations, "station", "stations"), kFewestStations),
+                              "take more stations: ten or more, turned about different axes"});
     if (in.stations.size() == 2) find_axes(in.stations, found);
     return found;
   }

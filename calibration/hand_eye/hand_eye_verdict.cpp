@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calibration/base/counted.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 
@@ -53,7 +54,7 @@ void judge_rejected(const HandEyeResult& r, Verdict& verdict) {
 
 void judge_stations(const HandEyeResult& r, Verdict& verdict) {
   const std::size_t used = r.observability.stations - r.outliers.size();
-  const std::string count = fmt::format("{} stations used", used);
+  const std::string count = fmt::format("{} used", counted(used, "station", "stations"));
   if (used >= kEnoughStations) {
     verdict.add(Grade::pass, count);
   } else {
@@ -67,7 +68,10 @@ void judge_stations(const HandEyeResult& r, Verdict& verdict) {
       part > 2 * kManyOutliers ? Grade::fail
       : part > kManyOutliers   ? Grade::marginal
                                : Grade::pass,
-      fmt::format("{} do not fit the others and are left out: {}", r.outliers.size(), joined(r.outliers)),
+      fmt::format("{} left out: {}",
+                  counted(r.outliers.size(), "station does not fit the others and is",
+                          "stations do not fit the others and are"),
+                  joined(r.outliers)),
       part > kManyOutliers ? "hold the scope still at each station, away from metal, and take those again" : "");
 }
 

@@ -73,7 +73,10 @@ struct Speed {
   double time_s, rad_s;
 };
 
-/// Pearson's, of the views' speeds and the sensor's at the same moments; -1 if too few pair.
+/// In place of a correlation where too few moments pair.
+constexpr double kNothingPairs = -1;
+
+/// Pearson's, of the views' speeds and the sensor's at the same moments; kNothingPairs if too few pair.
 double correlation_at(std::span<const StampedSensor> sensor, const std::vector<Speed>& views, double offset_s) {
   double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
   for (const Speed& view : views) {
@@ -86,9 +89,9 @@ double correlation_at(std::span<const StampedSensor> sensor, const std::vector<S
     bb += *other * *other;
     ab += view.rad_s * *other;
   }
-  if (n < static_cast<double>(std::max(kFewestSpeeds, views.size() / 3))) return -1;
+  if (n < static_cast<double>(std::max(kFewestSpeeds, views.size() / 3))) return kNothingPairs;
   const double spread = (aa - a * a / n) * (bb - b * b / n);
-  return spread > 0 ? (ab - a * b / n) / std::sqrt(spread) : -1;
+  return spread > 0 ? (ab - a * b / n) / std::sqrt(spread) : 0;
 }
 
 double best_offset(std::span<const StampedSensor> sensor, const std::vector<Speed>& views, double middle_s,
@@ -141,9 +144,24 @@ std::vector<HandEyeStation> stations_of(std::span<const StampedSensor> sensor, s
   return out;
 }
 
+/// Streams of which no clock's offset that is looked for makes two poses of one moment.
+Result<void> check_overlap(std::span<const StampedSensor> sensor, std::span<const StampedView> views) {
+  if (sensor.empty() || views.empty()) return Error{Errc::degenerate, "a stream has no poses"};
+  const double from_s = std::max(sensor.front().time_s, views.front().time_s);
+  const double to_s = std::min(sensor.back().time_s, views.back().time_s);
+  if (to_s - from_s > -kGreatestOffsetS) return {};
+  return Error{
+      Errc::degenerate,
+      fmt::format("the two streams do not overlap in time: the sensor's poses are from {:.3f} to {:.3f} s, the "
+                  "camera's from {:.3f} to {:.3f} s: record both at once, and give times of one clock in one "
+                  "unit",
+                  sensor.front().time_s, sensor.back().time_s, views.front().time_s, views.back().time_s)};
+}
+
 }  // namespace
 
 Result<StreamPairing> pair_pose_streams(std::span<const StampedSensor> sensor, std::span<const StampedView> views) {
+  if (const auto common = check_overlap(sensor, views); !common) return common.error();
   std::vector<Speed> speeds;
   for (const StampedView& view : views) {
     if (const auto speed = speed_at(views, view.time_s)) speeds.push_back({view.time_s, *speed});
@@ -163,6 +181,14 @@ Result<StreamPairing> pair_pose_streams(std::span<const StampedSensor> sensor, s
   const double bend = low - 2 * top + high;
   out.offset_s = bend < 0 ? fine_s + std::clamp(0.5 * (low - high) / bend, -1.0, 1.0) * kReachS : fine_s;
   out.correlation = top;
+  if (top <= kNothingPairs) {
+    return Error{Errc::degenerate,
+                 fmt::format("the two streams have too few moments in common: the sensor's poses are from {:.3f} to "
+                             "{:.3f} s, the camera's from {:.3f} to {:.3f} s: record both for the same time, without "
+                             "holes of more than {:.1f} s",
+                             sensor.front().time_s, sensor.back().time_s, views.front().time_s, views.back().time_s,
+                             kGreatestGapS)};
+  }
   if (!(top >= kLeastCorrelation))
     return Error{
         Errc::degenerate,

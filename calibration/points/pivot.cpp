@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "calibration/base/counted.hpp"
 #include "calibration/base/median.hpp"
 #include "calibration/base/student95.hpp"
 #include "calibration/base/units.hpp"
@@ -369,8 +370,8 @@ bool less(const PivotPose& a, const PivotPose& b) {
 
 Result<Pivot> solve_pivot(std::span<const PivotPose> given) {
   if (given.size() < kLeastPoses) {
-    return Error{Errc::degenerate, fmt::format("{} poses: a pivot needs at least {}, tilted to several sides",
-                                               given.size(), kLeastPoses)};
+    return Error{Errc::degenerate, fmt::format("{}: a pivot needs at least {}, tilted to several sides",
+                                               counted(given.size(), "pose", "poses"), kLeastPoses)};
   }
   std::size_t divots = 0;
   for (std::size_t i = 0; i < given.size(); ++i) {

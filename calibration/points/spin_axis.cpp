@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "calibration/base/counted.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 
@@ -73,8 +74,8 @@ double turned_deg(const Rotations& rotations, const Indices& used, const SpunAxi
 Result<SpinAxis> solve_spin_axis(std::span<const Transform<Tracker, Sensor>> tracker_from_sensor,
                                  const Eigen::Vector3d& towards) {
   if (tracker_from_sensor.size() < kLeastSpinPoses) {
-    return Error{Errc::degenerate, fmt::format("{} poses of the spun pointer: its axis needs at least {}",
-                                               tracker_from_sensor.size(), kLeastSpinPoses)};
+    return Error{Errc::degenerate, fmt::format("{} of the spun pointer: its axis needs at least {}",
+                                               counted(tracker_from_sensor.size(), "pose", "poses"), kLeastSpinPoses)};
   }
   Rotations rotations;
   for (const auto& pose : tracker_from_sensor) {

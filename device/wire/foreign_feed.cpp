@@ -140,6 +140,10 @@ void ForeignFeed::take(const Header& header, const ForeignPoses& poses, HostTime
     if (stamped && !tool->poses.push(time, kStampSigma, bird.tracker_from_sensor)) continue;
     birds.birds.push_back(bird);
   }
+  if (settings_.scope_bird.empty()) {
+    if (!birds.birds.empty()) events_.emplace_back(std::move(birds));
+    return;
+  }
   const Scope chosen = scope();
   std::erase_if(birds.birds, [&](const Bird& bird) {
     return bird.name == settings_.scope_bird && (chosen.name == nullptr || *chosen.name != bird.name);

@@ -19,7 +19,8 @@ struct ForeignSettings {
   std::string
       video_device{};       ///< the device whose pictures are the scope's; empty: the only device that sends pictures
   std::string not_scope{};  ///< the pointer's device: never taken for the scope's, even where no other sends poses
-  std::string scope_bird = "scope";  ///< the name under which the scope's poses are given on
+  /// The name under which the scope's poses are given on; empty: all poses keep the names that the server gave.
+  std::string scope_bird = "scope";
 };
 
 /// Makes what an appliance sends, frames with the scope's pose at their time, from the video and poses of another

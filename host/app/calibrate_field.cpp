@@ -8,9 +8,11 @@
 #include "drivers/system/clock.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/calibrate_field_check.hpp"
+#include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
 #include "host/calibrate/field_pictures.hpp"
 #include "host/files/field_files.hpp"
+#include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {
 
@@ -24,6 +26,8 @@ struct CalibrateFieldOptions {
   std::string grid_spec, kind = "auto";
   std::optional<double> distance_mm;
   bool held_alike = false;
+  std::vector<std::string> tools;
+  PoseOptions poses_are;
   ResultPaths results;
 };
 
@@ -34,7 +38,16 @@ struct Fitted {
 };
 
 Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
-  auto pairs = read_field_pairs(options.pair[0], options.pair[1]);
+  auto how = pose_reading(options.poses_are);
+  if (!how) return how.error();
+  PoseFile a{options.pair[0], *how}, b{options.pair[1], *how};
+  if (options.tools.size() == 1)
+    return Error{Errc::bad_value, "--tool: with --pair give it twice, for the first file and for the second"};
+  if (!options.tools.empty()) {
+    a.how.transform = options.tools[0];
+    b.how.transform = options.tools[1];
+  }
+  auto pairs = read_field_pairs(a, b);
   if (!pairs) return pairs.error();
   auto fit = calibration::fit_field_from_pairs(pairs->pairs, {basis, options.distance_mm});
   if (!fit) return fit.error().with_context(options.pair[0].string());
@@ -44,10 +57,14 @@ Result<Fitted> fit_pairs(const CalibrateFieldOptions& options, const std::option
 
 Result<Fitted> fit_places(const CalibrateFieldOptions& options, const std::optional<calibration::FieldBasis>& basis) {
   const auto read = [&]() -> Result<FieldSamples> {
-    if (!options.grid.empty()) return read_field_grid(options.grid, options.held_alike);
+    auto how = pose_reading(options.poses_are);
+    if (!how) return how.error();
+    if (!options.grid.empty()) return read_field_grid(options.grid, options.held_alike, how->mm_per_unit);
+    if (options.tools.size() > 1) return Error{Errc::bad_value, "--tool: with --poses give it once"};
+    if (!options.tools.empty()) how->transform = options.tools[0];
     const auto spec = parse_grid_spec(options.grid_spec);
     if (!spec) return spec.error();
-    return read_field_poses(options.poses, *spec, options.held_alike);
+    return read_field_poses(options.poses, *spec, options.held_alike, *how);
   };
   auto samples = read();
   if (!samples) return samples.error();
@@ -60,10 +77,24 @@ Result<Fitted> fit_places(const CalibrateFieldOptions& options, const std::optio
                 fmt::format("{} places of a board", samples->samples.size())};
 }
 
-Result<Fitted> fit(const CalibrateFieldOptions& options) {
+/// Refuses, by its name, what was given and would be of no effect.
+Result<void> check_use(const CLI::App& field, const CalibrateFieldOptions& options) {
+  if (options.poses.empty()) {
+    if (auto fine = refuse_given(field, {"--grid-spec"}, "goes with --poses"); !fine) return fine;
+  }
+  if (!options.grid.empty()) {
+    if (auto fine = refuse_given(field, {"--tool", "--time-unit", "--poses-are"}, "goes with --poses or --pair"); !fine)
+      return fine;
+  }
+  if (options.pair.empty()) return refuse_given(field, {"--distance"}, "goes with --pair");
+  return refuse_given(field, {"--held-alike"}, "goes with --grid or --poses");
+}
+
+Result<Fitted> fit(const CLI::App& field, const CalibrateFieldOptions& options) {
   const int inputs = (options.grid.empty() ? 0 : 1) + (options.poses.empty() ? 0 : 1) + (options.pair.empty() ? 0 : 1);
   if (inputs != 1)
     return Error{Errc::bad_value, "calibrate field: give one of --grid, --poses with --grid-spec, and --pair"};
+  if (const auto used = check_use(field, options); !used) return used.error();
   const auto basis = calibration::field_basis_of(options.kind);
   return options.pair.empty() ? fit_places(options, basis) : fit_pairs(options, basis);
 }
@@ -140,9 +171,10 @@ HtmlPage page_of(const Fitted& fitted) {
   return page;
 }
 
-void run(const CalibrateFieldOptions& options, CommandStatus& status) {
-  const auto fitted = fit(options);
+void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandStatus& status) {
+  const auto fitted = fit(field, options);
   if (!fitted) return status.refuse(fitted.error());
+  for (const std::string& line : by_kind(fitted->rejected)) fmt::print("rejected {}\n", line);
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
@@ -158,7 +190,7 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
   auto options = std::make_shared<CalibrateFieldOptions>();
   CLI::App* field =
       calibrate.add_subcommand("field", "map how metal bends the tracker's field, and check it day by day");
-  field->add_option("--grid", options->grid, "a table true_x,true_y,true_z,x,y,z[,qx,qy,qz,qw], mm (CSV)")
+  field->add_option("--grid", options->grid, "a table true_x,true_y,true_z,x,y,z[,qx,qy,qz,qw] (CSV)")
       ->type_name("FILE");
   field->add_option("--poses", options->poses, "poses at the nodes of --grid-spec, in their order")->type_name("PATH");
   field->add_option("--grid-spec", options->grid_spec, "counts and steps, x fastest: 6x6x5:100x96x100mm")
@@ -166,6 +198,11 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
   field->add_option("--pair", options->pair, "poses of two sensors on one rigid body, recorded together")
       ->expected(2)
       ->type_name("A B");
+  field
+      ->add_option("--tool,--transform", options->tools,
+                   "whose poses, where a file holds those of several tools; twice with --pair")
+      ->expected(1, 2);
+  add_unit_options(*field, options->poses_are);
   field->add_option("--distance", options->distance_mm, "between the centres of the pair's sensors, mm")
       ->check(CLI::Range(1.0, 10'000.0));
   field->add_flag("--held-alike", options->held_alike,
@@ -175,7 +212,7 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
   add_result_options(*field, options->results, "the map, for [calibration] field of birdseyed (JSON)", false);
   CLI::App* check = add_calibrate_field_check(*field, status);
   field->callback([options, field, check, &status] {
-    if (!field->got_subcommand(check)) run(*options, status);
+    if (!field->got_subcommand(check)) run(*field, *options, status);
   });
 }
 

@@ -100,6 +100,12 @@ void run(const CalibrateFieldCheckOptions& options, CommandStatus& status) {
   const auto places = places_of(options);
   if (!places) return status.refuse(places.error());
   const std::string when = options.when.empty() ? local_time_now() : options.when;
+  const auto known = std::ranges::find_if(*history, [&](const FieldCheck& day) { return day.when == day_name(when); });
+  if (!options.when.empty() && known != history->end()) {
+    return status.refuse({Errc::bad_value, fmt::format("{}: has a day {} already: give another --when, or take that "
+                                                       "line out",
+                                                       options.history.string(), known->when)});
+  }
   const auto check = calibration::check_field(when, *places);
   if (!check) return status.refuse(check.error().with_context(options.measured.string()));
   history->push_back(*check);

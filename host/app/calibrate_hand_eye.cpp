@@ -18,6 +18,7 @@
 #include "host/files/text_files.hpp"
 #include "host/guide/live_hand_eye.hpp"
 #include "host/link/appliance_hardware.hpp"
+#include "host/recording/recording_reader.hpp"
 
 namespace birdseye::host {
 
@@ -27,6 +28,7 @@ struct CalibrateHandEyeOptions {
   HandEyeFiles files;
   std::filesystem::path rod_angles;
   bool live = false;
+  std::filesystem::path recording;
   LivePlan plan;
   PoseOptions poses_are;
   std::vector<double> at;
@@ -52,15 +54,47 @@ Result<void> check_right(const HandEyeFiles& files) {
                "are then calibrated from the pictures"};
 }
 
+/// Refuses, by its name, what was given and would be of no effect.
+Result<void> check_use(const CLI::App& command, const CalibrateHandEyeOptions& options) {
+  const HandEyeFiles& files = options.files;
+  const bool recorded = !options.recording.empty();
+  if (!options.live) {
+    if (auto fine = refuse_given(command, {"--server", "--stations", "--seconds"}, "goes with --live"); !fine)
+      return fine;
+  }
+  if (!options.live && !recorded) {
+    if (auto fine = refuse_given(command, {"--bird", "--keep", "--most-stations"}, "goes with --live or --recording");
+        !fine)
+      return fine;
+  } else if (auto fine = refuse_given(command,
+                                      {"--poses", "--transform", "--body", "--board-poses", "--unit", "--time-unit",
+                                       "--poses-are", "--max-error", "--size"},
+                                      recorded ? "goes with files, and --recording takes their place"
+                                               : "goes with files, and --live takes none");
+             !fine) {
+    return fine;
+  }
+  if (files.board_poses.empty()) {
+    if (auto fine = refuse_given(command, {"--board-transform", "--board-body"}, "goes with --board-poses"); !fine)
+      return fine;
+  }
+  if (files.points.empty() && !files.size.empty()) return Error{Errc::bad_value, "--size goes with --points"};
+  if (files.eye_poses.empty()) return refuse_given(command, {"--eye-transform"}, "goes with --eye-poses");
+  return refuse_given(command, {"--board"}, "goes with pictures, and --eye-poses takes their place");
+}
+
 Result<void> check(const CalibrateHandEyeOptions& options) {
   const HandEyeFiles& files = options.files;
   const int sources = (options.live ? 1 : 0) + (files.images.empty() ? 0 : 1) + (files.points.empty() ? 0 : 1) +
-                      (files.eye_poses.empty() ? 0 : 1);
-  if (sources != 1)
-    return Error{Errc::bad_value, "give one of --images (with --board), --points, --eye-poses and --live"};
+                      (files.eye_poses.empty() ? 0 : 1) + (options.recording.empty() ? 0 : 1);
+  if (sources != 1) {
+    return Error{Errc::bad_value,
+                 "give one of --images (with --board), --points, --eye-poses and --live, or a --recording"};
+  }
   if (files.eye_poses.empty() && files.points.empty() && files.board.empty())
     return Error{Errc::bad_value, "--board is missing: which pattern is looked at?"};
-  if (!options.live && files.poses.empty())
+  const bool guided = options.live || !options.recording.empty();
+  if (!guided && files.poses.empty())
     return Error{Errc::bad_value, "--poses is missing: where was the tracker's sensor?"};
   if (const auto sound = check_right(files); !sound) return sound.error();
   if (!options.at.empty() && files.eye_poses.empty())
@@ -69,7 +103,7 @@ Result<void> check(const CalibrateHandEyeOptions& options) {
     return Error{Errc::bad_value, "--rod-angles goes with --images, whose pictures it names"};
   if (files.pixel_aspect != 1 && files.images.empty() && files.points.empty())
     return Error{Errc::bad_value, "--pixel-aspect goes with --images"};
-  if (options.live && !options.poses_are.field.empty())
+  if (guided && !options.poses_are.field.empty())
     return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
   if ((options.position_sigma_mm > 0) != (options.angle_sigma_deg > 0))
     return Error{Errc::bad_value, "give --position-sigma and --angle-sigma together"};
@@ -84,10 +118,15 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   HandEyeFiles& files = options.files;
   for (PoseReading* tracked : {&files.of_sensor, &files.of_board}) {
     tracked->mm_per_unit = how->mm_per_unit;
+    tracked->s_per_unit = how->s_per_unit;
+    tracked->inverted = how->inverted;
     tracked->field = how->field;
     tracked->most_error_mm = how->most_error_mm;
   }
+  files.of_board.option_prefix = "board-";
+  files.of_eye.option_prefix = "eye-";
   files.of_eye.mm_per_unit = how->mm_per_unit;
+  files.of_eye.s_per_unit = how->s_per_unit;
   return {};
 }
 
@@ -113,6 +152,7 @@ Result<void> check_record(const CalibrateHandEyeOptions& options) {
                            path.string(), options.files.camera.string())};
 }
 
+/// Of an appliance that runs, or of a recording of one.
 Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
   LivePlan plan = options.plan;
   auto pattern = calibration::parse_pattern(options.files.board);
@@ -124,7 +164,15 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
     plan.guide.camera = *camera;
   }
   Progress progress;
-  auto session = guide_hand_eye(plan, progress);
+  Result<GuidedStations> session = Error{};
+  if (options.recording.empty()) {
+    session = guide_hand_eye(plan, progress);
+  } else {
+    const auto reader = RecordingReader::open(options.recording, {});
+    if (!reader) return reader.error();
+    session = stations_of_recording(**reader, plan.guide, progress);
+    if (!session) return session.error().with_context(options.recording.string());
+  }
   if (!session) return session.error();
   HandEyeRecording out;
   out.input = std::move(session->input);
@@ -193,12 +241,13 @@ void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& reco
                      std::move(json), std::move(page), found.verdict, status, entry_of(options, recording, found));
 }
 
-void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
+void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatus& status) {
   HandEyeFiles& files = options.files;
   const auto aspect = parse_pixel_aspect(options.pixel_aspect);
   if (!aspect) return status.refuse(aspect.error());
   files.pixel_aspect = *aspect;
   if (const auto sound = check(options); !sound) return status.refuse(sound.error());
+  if (const auto used = check_use(command, options); !used) return status.refuse(used.error());
   if (const auto read = read_how(options); !read) return status.refuse(read.error());
   if (const auto sound = check_record(options); !sound) return status.refuse(sound.error());
   if (!options.at.empty())
@@ -213,7 +262,7 @@ void run(CalibrateHandEyeOptions& options, CommandStatus& status) {
     if (!read) return status.refuse(read.error());
     angles = *std::move(read);
   }
-  auto recording = options.live ? record_live(options) : read_hand_eye_stations(files);
+  auto recording = options.live || !options.recording.empty() ? record_live(options) : read_hand_eye_stations(files);
   if (!recording) return status.refuse(recording.error());
   if (options.position_sigma_mm > 0)
     recording->input.tracker_noise =
@@ -240,7 +289,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("RATIO");
   command->add_option("--poses", files.poses, "tracked poses of the sensor, one for each picture")->type_name("PATH");
   command->add_option("--transform,--tool", files.of_sensor.transform,
-                      "which of a sequence's transforms, or of an NDI log's tools, that is");
+                      "whose poses, where --poses holds those of several tools");
   command
       ->add_option("--body", files.of_sensor.body,
                    "points of a body in place of a sensor, name,x,y,z a line: --poses is a table of where these were "
@@ -249,8 +298,8 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--board-body", files.of_board.body, "the same of --board-poses")->type_name("FILE");
   command->add_option("--board-poses", files.board_poses, "tracked poses of what carries the board, if it moves")
       ->type_name("PATH");
-  command->add_option("--board-transform,--board-tool", files.of_board.transform,
-                      "which of a sequence's transforms, or of an NDI log's tools, that is");
+  command->add_option("--board-transform,--board-tool", files.of_board.transform, "the same of --board-poses");
+  command->add_option("--eye-transform,--eye-tool", files.of_eye.transform, "the same of --eye-poses");
   command
       ->add_option("--camera", files.camera,
                    "lens (of OpenCV, ROS or Kalibr); without it, calibrated from the pictures")
@@ -284,20 +333,25 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
                    "of an oblique scope: at what its rod stood, as lines of picture,degrees")
       ->type_name("FILE");
   command->add_flag("--live", options->live, "be guided, with an appliance that runs, in place of files");
+  command
+      ->add_option("--recording", options->recording,
+                   "a session recording, in place of files: each rest of the scope over the board is a station")
+      ->type_name("FOLDER");
   LivePlan& plan = options->plan;
   command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")
       ->type_name("HOST:PORT");
-  command->add_option("--bird", plan.guide.bird, "with --live: the scope's bird, by its name (default: scope)");
-  command->add_option("--keep", plan.guide.keep, "with --live: a folder for the stations' pictures and poses")
+  command->add_option("--bird", plan.guide.bird,
+                      "with --live or --recording: the scope's bird, by its name (default: scope)");
+  command->add_option("--keep", plan.guide.keep, "likewise: a folder for the stations' pictures and poses")
       ->type_name("FOLDER");
   command->add_option("--stations", plan.guide.fewest_stations, "with --live: the fewest (default 12)")
       ->check(CLI::Range(6, 100));
-  command->add_option("--most-stations", plan.guide.most_stations, "with --live: then it ends in any case (default 40)")
+  command->add_option("--most-stations", plan.guide.most_stations, "likewise: then it ends in any case (default 40)")
       ->check(CLI::Range(6, 200));
   command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
       ->check(CLI::Range(5.0, 7200.0));
   add_result_options(*command, options->results, "camera_from_sensor, a 4x4 matrix, mm");
-  command->callback([options, &status] { run(*options, status); });
+  command->callback([options, command, &status] { run(*command, *options, status); });
 }
 
 }  // namespace birdseye::host

@@ -11,6 +11,7 @@
 #include "host/app/results.hpp"
 #include "host/calibrate/latency_report.hpp"
 #include "host/calibrate/latency_streams.hpp"
+#include "host/files/pose_collector.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/link/appliance_hardware.hpp"
 
@@ -66,7 +67,8 @@ Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progre
   if (!options.recording.empty()) {
     LatencySource all = options.source;
     all.seconds = 0;
-    streams = replay_streams(options.recording, all, progress);
+    streams = is_session(options.recording) ? session_streams(options.recording, all, progress)
+                                            : replay_streams(options.recording, all, progress);
   } else {
     streams = record_streams(options.server, options.source, progress);
   }
@@ -99,10 +101,8 @@ Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& p
                  fmt::format("{}: its poses bear no times, only an order; give a CSV with times", path.string())};
   std::vector<calibration::TimedRotation> rows;
   for (const TimedPose& pose : set->poses) rows.push_back({pose.time_s, pose.tracker_from_sensor.quaternion()});
-  if (!set->rejected.empty()) {
-    odd.add(Grade::pass, fmt::format("{}: {} rows rejected, the first: {}", path.filename().string(),
-                                     set->rejected.size(), set->rejected.front()));
-  }
+  for (const std::string& line : by_kind(set->rejected))
+    odd.add(Grade::pass, fmt::format("{}: rejected {}", path.filename().string(), line));
   for (const std::string& note : set->notes) odd.add(Grade::pass, path.filename().string() + ": " + note);
   return rows;
 }
@@ -114,7 +114,9 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& o
   const auto a = read_rotations(options.poses, *how, odd);
   if (!a) return a.error();
   how->transform = options.eye_transform;
+  how->option_prefix = "eye-";
   how->field.reset();
+  how->inverted = false;
   how->most_error_mm.reset();  // what the camera saw is not the tracker's
   const auto b = read_rotations(options.eye_poses, *how, odd);
   if (!b) return b.error();
@@ -142,16 +144,29 @@ std::string made_from(const CalibrateLatencyOptions& options) {
   return fmt::format("{} and {}", options.poses.filename().string(), options.eye_poses.filename().string());
 }
 
-void run(const CalibrateLatencyOptions& options, CommandStatus& status) {
+/// Refuses, by its name, what was given and would be of no effect.
+Result<void> check(const CLI::App& command, const CalibrateLatencyOptions& options) {
+  const bool files = !options.poses.empty();
+  if (static_cast<int>(files) + static_cast<int>(!options.recording.empty()) +
+              static_cast<int>(!options.server.empty()) !=
+          1 ||
+      files == options.eye_poses.empty()) {
+    return Error{Errc::bad_value, "calibrate latency: give one of --server, --recording, or --poses with --eye-poses"};
+  }
+  if (files) return refuse_given(command, {"--bird", "--seconds", "--delay-ms"}, "goes with --server or --recording");
+  if (auto fine = refuse_given(command, kPoseOptions, "goes with --poses"); !fine) return fine;
+  if (auto fine = refuse_given(command, {"--transform", "--eye-transform"}, "goes with --poses (--bird names a bird)");
+      !fine)
+    return fine;
+  if (options.recording.empty()) return {};
+  return refuse_given(command, {"--seconds"}, "goes with --server: a recording is played to its end");
+}
+
+void run(const CLI::App& command, const CalibrateLatencyOptions& options, CommandStatus& status) {
+  if (const auto fine = check(command, options); !fine) return status.refuse(fine.error());
   Progress progress;
   Verdict odd;
   const bool files = !options.poses.empty();
-  if (static_cast<int>(files) + static_cast<int>(!options.recording.empty()) +
-          static_cast<int>(!options.server.empty()) !=
-      1) {
-    return status.refuse(
-        {Errc::bad_value, "calibrate latency: give one of --server, --recording, or --poses with --eye-poses"});
-  }
   if (!options.server.empty()) {
     const auto fits = check_bound_record(options.paths.record, options.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
@@ -192,26 +207,24 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   command.add_option("--server", options->server, "an appliance that runs: record from it now")->type_name("HOST:PORT");
   command.add_option("--seconds", options->source.seconds, "how long to record from it (default 20)")
       ->check(CLI::Range(8.0, 600.0));
-  command.add_option("--recording", options->recording, "an appliance recording (.berec), played again")
+  command
+      .add_option("--recording", options->recording,
+                  "an appliance recording (.berec) or a session recording (a folder), played again")
       ->type_name("FILE");
   command.add_option("--bird", options->source.bird, "the bird on the scope, by its name (default scope)");
   command.add_option("--delay-ms", options->delay_ms, "what [camera] delay_ms is now, to be told what to set")
       ->check(CLI::Range(0.0, 1000.0));
-  CLI::Option* const poses =
-      command.add_option("--poses", options->poses, "poses with times, in place of an appliance: of the tracker")
-          ->type_name("FILE");
-  command.add_option("--eye-poses", options->eye_poses, "of the camera, against what it looks at")
-      ->type_name("FILE")
-      ->needs(poses);
-  command.add_option("--transform", options->transform, "which transform of --poses, of a PLUS sequence")->needs(poses);
-  command.add_option("--eye-transform", options->eye_transform, "the same of --eye-poses")->needs(poses);
+  command.add_option("--poses", options->poses, "poses with times, in place of an appliance: of the tracker")
+      ->type_name("FILE");
+  command.add_option("--eye-poses", options->eye_poses, "of the camera, against what it looks at")->type_name("FILE");
+  command.add_option("--transform,--tool", options->transform, "whose poses, where --poses holds those of several");
+  command.add_option("--eye-transform,--eye-tool", options->eye_transform, "the same of --eye-poses");
   add_pose_options(command, options->poses_are);
-  command.get_option("--field")->needs(poses);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
-  command.callback([options, &status] {
+  command.callback([options, &command, &status] {
     options->settings.find_drift = !options->no_drift;
-    run(*options, status);
+    run(command, *options, status);
   });
 }
 

@@ -11,6 +11,7 @@
 #include "host/calibrate/tip_calibration.hpp"
 #include "host/calibrate/tip_phases.hpp"
 #include "host/calibrate/tip_report.hpp"
+#include "host/files/pose_collector.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/guide/live_poses.hpp"
 #include "host/link/appliance_hardware.hpp"
@@ -39,13 +40,20 @@ Result<PoseSet> read_set(const CalibrateTipOptions& options, const std::filesyst
   return read_pose_set(path, *how);
 }
 
-Result<TipInput> read_input(const CalibrateTipOptions& options) {
+/// Refuses, by its name, what was given and would be of no effect.
+Result<void> check(const CLI::App& tip, const CalibrateTipOptions& options) {
   if (options.poses.empty() == options.server.empty())
     return Error{Errc::bad_value, "calibrate tip: give one of --poses and --server"};
+  if (options.server.empty()) return refuse_given(tip, {"--bird", "--seconds"}, "goes with --server");
+  if (!options.poses_are.field.empty())
+    return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
+  if (auto fine = refuse_given(tip, {"--reference", "--body", "--max-error"}, "goes with --poses"); !fine) return fine;
+  if (!options.spin.empty()) return {};
+  return refuse_given(tip, {"--unit", "--time-unit", "--poses-are", "--transform"}, "goes with --poses or --spin");
+}
+
+Result<TipInput> read_input(const CalibrateTipOptions& options) {
   if (!options.server.empty()) {
-    if (!options.poses_are.field.empty())
-      return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
-    if (!options.body.empty()) return Error{Errc::bad_value, "--body goes with --poses"};
     if (const auto fits = check_bound_record(options.results.record, options.server, {"tracker"}); !fits)
       return fits.error();
   }
@@ -61,6 +69,9 @@ Result<TipInput> read_input(const CalibrateTipOptions& options) {
   }
   auto input = tip_input_of(*std::move(set), phases);
   if (!input) return input.error().with_context(options.poses.string());
+  input->relative = !options.reference.empty();
+  input->direction_said = !options.poses_are.direction.empty() || options.poses.empty();
+  input->inverted = options.poses_are.direction == "sensor_from_tracker" && !options.poses.empty();
   input->source = options.poses.empty() ? options.server : options.poses.filename().string();
   if (!options.spin.empty()) {
     auto spin = read_set(options, options.spin);
@@ -77,8 +88,10 @@ void print(const TipFound& found, const TipInput& input) {
     if (count > kNamed) names.resize(kNamed);
     return fmt::format("{}{}", fmt::join(names, ", "), count > kNamed ? ", ..." : "");
   };
-  if (!input.set.rejected.empty())
-    fmt::print("{} poses rejected: {}\n", input.set.rejected.size(), shorten(input.set.rejected));
+  if (!input.set.rejected.empty()) {
+    fmt::print("{} {} rejected:\n", input.set.rejected.size(), input.set.rejected.size() == 1 ? "pose" : "poses");
+    for (const std::string& line : by_kind(input.set.rejected)) fmt::print("  {}\n", line);
+  }
   for (const std::string& note : input.set.notes) fmt::print("{}\n", note);
   if (found.pivot) {
     const Pivot& p = *found.pivot;
@@ -110,15 +123,16 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   const auto options = std::make_shared<CalibrateTipOptions>();
   CLI::App& tip = *calibrate.add_subcommand("tip", "where a pointer's tip is on its sensor, by a pivot");
   tip.add_option(
-      "--poses", options->poses,
-      "poses while the tip stands in a divot: a folder of 4x4 matrices, a table, an NDI log or a PLUS sequence");
+      "--poses,--recording", options->poses,
+      "poses while the tip stands in a divot: a folder of 4x4 matrices, a table, an NDI log, a PLUS sequence "
+      "or a session recording");
   tip.add_option("--server", options->server, "an appliance that runs: take the poses from it, now")
       ->type_name("HOST:PORT");
   tip.add_option("--bird", options->bird, "the pointer's bird, as the appliance names it (default: pointer)");
   tip.add_option("--seconds", options->seconds, "how long to take poses from it (default: 20)")
       ->check(CLI::Range(2.0, 600.0));
   tip.add_option("--transform,--tool", options->transform,
-                 "the pointer's, in a sequence or NDI log of several, as StylusToTracker");
+                 "the pointer's name, in a file of several tools, as StylusToTracker");
   tip.add_option("--body", options->body,
                  "the pointer's points, name,x,y,z a line: the poses are then tables of where these were tracked")
       ->type_name("FILE");
@@ -129,7 +143,8 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   tip.add_option("--spin", options->spin, "poses while the pointer is spun about its shaft: gives its axis, too");
   add_pose_options(tip, options->poses_are);
   add_result_options(tip, options->results, "the tip, x y z in the sensor's frame, mm");
-  tip.callback([options, &status] {
+  tip.callback([options, &tip, &status] {
+    if (const auto fine = check(tip, *options); !fine) return status.refuse(fine.error());
     const auto input = read_input(*options);
     if (!input) return status.refuse(input.error());
     const auto found = calibrate_tip(*input);

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
 
@@ -12,14 +13,27 @@ namespace birdseye::host {
 /// What a command is told about all its files of poses.
 struct PoseOptions {
   std::string unit = "mm";
+  std::string time_unit;
+  std::string direction;        ///< empty where it is not said: tracker_from_sensor
   std::filesystem::path field;  ///< empty: poses are as recorded
   std::optional<double> most_error_mm;
 };
 
-/// Adds `--unit`, `--field` and `--max-error`. options must outlive the command's parsing.
+/// The options that say how files of poses are to be read: what does not read such files refuses them.
+inline constexpr std::initializer_list<const char*> kPoseOptions = {"--unit", "--time-unit", "--poses-are", "--field",
+                                                                    "--max-error"};
+
+/// Adds `--unit`, `--time-unit` and `--poses-are`: of commands that make the map of the field themselves.
+void add_unit_options(CLI::App& command, PoseOptions& options);
+
+/// Adds these and `--field` and `--max-error`. options must outlive the command's parsing.
 void add_pose_options(CLI::App& command, PoseOptions& options);
 
 /// Refuses a map of the field that cannot be read.
 Result<PoseReading> pose_reading(const PoseOptions& options);
+
+/// Refuses the first of these options that was given, by its name, for it would be of no effect. why: "goes with
+/// --server".
+Result<void> refuse_given(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 }  // namespace birdseye::host

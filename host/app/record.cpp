@@ -101,10 +101,13 @@ Result<ExitCode> run(const RecordOptions& options) {
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   ::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is told as a full disk is
-  auto client = connect_appliance(options.server, options.foreign);
+  wire::ForeignSettings foreign = options.foreign;
+  foreign.scope_bird.clear();  // what is recorded is found again by the names that the server gave
+  auto client = connect_appliance(options.server, foreign);
   if (!client) return client.error();
   auto writer = RecordingWriter::create({.folder = options.out,
                                          .source = options.server,
+                                         .scope = foreign.scope_device.empty() ? "scope" : foreign.scope_device,
                                          .compressed = options.video == "compressed",
                                          .pair = options.pair});
   if (!writer) return writer.error();

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <map>
 
 #include "calibration/hand_eye/pose_streams.hpp"
 #include "host/calibrate/hand_eye_pictures.hpp"
+#include "host/calibrate/station_poses.hpp"
+#include "host/files/pose_collector.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -16,59 +16,30 @@ namespace {
 
 using calibration::HandEyeStation;
 
-/// Poses by their place among all that were recorded.
-struct PosesByPlace {
-  std::map<std::size_t, TimedPose> poses;
-  std::size_t count = 0;
-};
-
-Result<PosesByPlace> read_by_place(const std::filesystem::path& path, const PoseReading& how,
-                                   std::vector<std::string>& notes) {
-  auto set = read_pose_set(path, how);
-  if (!set) return set.error();
-  PosesByPlace out;
-  for (const TimedPose& pose : set->poses) {
-    out.poses.emplace(pose.index, pose);
-    out.count = std::max(out.count, pose.index + 1);
-  }
-  out.count = std::max(out.count, set->poses.size() + set->rejected.size());
-  for (const auto* told : {&set->rejected, &set->notes}) {
-    for (const std::string& words : *told) notes.push_back(path.string() + ": " + words);
-  }
-  return out;
-}
-
-Error count_error(const char* what, std::size_t count, std::size_t poses) {
-  return {Errc::bad_value, fmt::format("{} {} and {} poses of the sensor: they pair one by one in the order of their "
-                                       "names, so there must be as many",
-                                       count, what, poses)};
-}
-
 /// Stations whose poses are missing are told, and left out.
 Result<void> add_poses(const HandEyeFiles& files, std::vector<HandEyeStation>& stations, const char* what,
                        std::vector<std::string>& notes) {
-  const auto sensor = read_by_place(files.poses, files.of_sensor, notes);
+  const auto sensor = poses_of_stations(files.poses, files.of_sensor, stations, "the sensor", what, notes);
   if (!sensor) return sensor.error();
-  if (sensor->count != stations.size()) return count_error(what, stations.size(), sensor->count);
-  PosesByPlace board;
-  if (!files.board_poses.empty()) {
-    auto read = read_by_place(files.board_poses, files.of_board, notes);
+  const bool moves = !files.board_poses.empty();
+  std::vector<std::optional<TimedPose>> board(stations.size());
+  if (moves) {
+    auto read = poses_of_stations(files.board_poses, files.of_board, stations, "the board", what, notes);
     if (!read) return read.error();
     board = *std::move(read);
-    if (board.count != sensor->count) return count_error("poses of the board", board.count, sensor->count);
   }
   std::vector<HandEyeStation> kept;
   for (std::size_t i = 0; i < stations.size(); ++i) {
-    const auto pose = sensor->poses.find(i);
-    const auto body = board.poses.find(i);
-    if (pose == sensor->poses.end() || (!files.board_poses.empty() && body == board.poses.end())) {
+    const auto& pose = (*sensor)[i];
+    if (!pose || (moves && !board[i])) {
       notes.push_back(stations[i].name + ": there is no pose that could be used");
       continue;
     }
-    stations[i].tracker_from_sensor = pose->second.tracker_from_sensor;
-    if (!files.board_poses.empty())
+    stations[i].tracker_from_sensor = pose->tracker_from_sensor;
+    if (moves) {
       stations[i].tracker_from_body =
-          Transform<Tracker, TrackedBody>::from_matrix(body->second.tracker_from_sensor.matrix());
+          Transform<Tracker, TrackedBody>::from_matrix(board[i]->tracker_from_sensor.matrix());
+    }
     kept.push_back(std::move(stations[i]));
   }
   stations = std::move(kept);
@@ -79,24 +50,9 @@ Transform<Camera, Marker> view_of(const TimedPose& eye) {
   return Transform<Marker, Camera>::from_matrix(eye.tracker_from_sensor.matrix()).inverse();
 }
 
-/// A line for each kind of reason: those that differ in numbers alone are of one kind.
 void tell_by_kind(const std::string& of_what, const std::vector<std::string>& rejected,
                   std::vector<std::string>& notes) {
-  struct Kind {
-    std::string first;
-    std::size_t count = 0;
-  };
-  std::map<std::string, Kind> kinds;
-  for (const std::string& line : rejected) {
-    std::string kind = line;
-    std::erase_if(kind, [](unsigned char c) { return std::isdigit(c) != 0; });
-    Kind& of_line = kinds[kind];
-    if (of_line.count++ == 0) of_line.first = line;
-  }
-  for (const auto& [name, kind] : kinds) {
-    notes.push_back(of_what + kind.first);
-    if (kind.count > 1) notes.back() += fmt::format(" (and {} more like it)", kind.count - 1);
-  }
+  for (const std::string& line : by_kind(rejected)) notes.push_back(of_what + line);
 }
 
 /// Whether the world's origin is what a camera looks at: ahead of nearly all of the eyes, by less than 60 degrees.

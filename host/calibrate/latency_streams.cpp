@@ -14,6 +14,8 @@
 #include "host/files/picture.hpp"
 #include "host/files/write_files.hpp"
 #include "host/link/appliance_link.hpp"
+#include "host/recording/recording_reader.hpp"
+#include "host/recording/recording_writer.hpp"
 
 namespace birdseye::host {
 
@@ -108,7 +110,7 @@ std::string last_line(const std::filesystem::path& log) {
   return last;
 }
 
-Result<LatencyStreams> gather(EventStream& stream, const LatencySource& source, Progress& progress) {
+Result<LatencyStreams> gather(EventSource& stream, const LatencySource& source, Progress& progress) {
   Gatherer gatherer(source);
   HostTime heard = host_now();
   // Streams that come but tell nothing of this bird, or show no motion, do not last: finish() says why.
@@ -117,7 +119,7 @@ Result<LatencyStreams> gather(EventStream& stream, const LatencySource& source, 
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
     auto event = stream.next(Deadline::after(kLook));
     if (!event) {
-      if (source.seconds <= 0) break;  // a recording has come to its end
+      if (source.seconds <= 0 && event.error().code == Errc::disconnected) break;  // a recording has come to its end
       return event.error();
     }
     if (!*event) {
@@ -155,6 +157,19 @@ Result<LatencyStreams> record_streams(const std::string& server, const LatencySo
   if (!client) return client.error();
   EventStream stream(*std::move(client), kMostFramesWaiting);
   return gather_streams(stream, source, progress);
+}
+
+bool is_session(const std::filesystem::path& recording) {
+  std::error_code ignored;
+  return std::filesystem::exists(recording / kRecordingEvents, ignored);
+}
+
+Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const LatencySource& source,
+                                       Progress& progress) {
+  note_interrupts();
+  const auto reader = RecordingReader::open(recording, {});
+  if (!reader) return reader.error();
+  return gather(**reader, source, progress);
 }
 
 Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, const LatencySource& source,

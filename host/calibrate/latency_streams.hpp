@@ -35,4 +35,10 @@ Result<LatencyStreams> record_streams(const std::string& server, const LatencySo
 Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, const LatencySource& source,
                                       Progress& progress);
 
+/// Whether the path is a session recording: a folder with its events.
+bool is_session(const std::filesystem::path& recording);
+/// From a session recording. source.bird: as the server named it that was recorded.
+Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const LatencySource& source,
+                                       Progress& progress);
+
 }  // namespace birdseye::host

@@ -21,6 +21,10 @@ struct TipInput {
   std::size_t divots = 1;
   std::optional<PoseSet> spin;
   std::string source;
+  /// The poses are against a tracked reference: how far the divot is from its frame's origin tells nothing.
+  bool relative = false;
+  bool direction_said = false;  ///< somebody said which way the poses go
+  bool inverted = false;        ///< the file holds sensor_from_tracker, and each pose was inverted
 };
 
 /// What was found out; where there is no pivot the verdict says why.

@@ -89,11 +89,10 @@ Result<std::size_t> choose_series(const std::vector<SeriesInfo>& series, const s
     return Error{Errc::unsupported, fmt::format("--series {} fits {} ({}); name one by its number", wanted,
                                                 found.size(), names_of(series, found))};
   }
-  return Error{
-      Errc::not_found,
-      fmt::format(
-          "--series {} fits none of {}; name one of these", wanted,
-          series.empty() ? "the files" : names_of(series, those_that(series, [](const SeriesInfo&) { return true; })))};
+  if (series.empty()) return Error{Errc::not_found, fmt::format("--series {}: the files hold no series", wanted)};
+  return Error{Errc::not_found,
+               fmt::format("--series {}: there is no such series; name one of {}", wanted,
+                           names_of(series, those_that(series, [](const SeriesInfo&) { return true; })))};
 }
 
 }  // namespace birdseye::host

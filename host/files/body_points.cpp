@@ -25,7 +25,7 @@ using Fields = std::vector<std::string>;
 struct PointColumns {
   std::vector<std::array<std::size_t, 3>> of_point;
   std::optional<std::size_t> time;
-  double s_per = 1;
+  std::optional<double> s_per;   ///< likewise
   std::optional<double> mm_per;  ///< as the header tells
   std::size_t count = 0;
 };
@@ -109,7 +109,7 @@ Result<PointColumns> columns_by_name(const Fields& header, const RigidBody& body
     const ColumnName name = column_name(header[i]);
     if (pose_column(name) == PoseColumn::time && !out.time) {
       out.time = i;
-      out.s_per = seconds_per(name.unit).value_or(1);
+      out.s_per = seconds_per(name.unit);
     } else if (const auto point = point_column(name)) {
       auto& at = points[point->point].at(point->axis);
       if (at) return Error{Errc::bad_format, fmt::format("its header has the column {} twice", header[i])};
@@ -212,7 +212,9 @@ class BodyTable {
     }
     if (few_ > 0) collector_->note(fmt::format("{} of {} rows show fewer than three points of the body", few_, count_));
     if (!columns_->time) collector_->note("it has no times: its poses count by their order, row by row");
-    return std::move(*collector_).finish(path_);
+    auto set = std::move(*collector_).finish(path_);
+    if (set) set->direction_known = true;
+    return set;
   }
 
  private:
@@ -227,7 +229,7 @@ class BodyTable {
     if (columns_->time) {
       const ReadNumber time = read_number(fields[*columns_->time]);
       if (!time.problem.empty()) return collector_->reject(name, time.problem);
-      time_s = columns_->s_per * time.value;
+      time_s = columns_->s_per.value_or(how_.s_per_unit.value_or(1)) * time.value;
     }
     const SeenPoints seen = seen_in(fields);
     const ReadPose pose = pose_of_body(body_, seen);

@@ -17,8 +17,8 @@ using Words = std::set<std::string, std::less<>>;
 const std::map<std::string, double, std::less<>> kLengths{{"mm", 1},    {"cm", 10},       {"m", 1000},
                                                           {"in", 25.4}, {"inch", 25.4},   {"inches", 25.4},
                                                           {"um", 1e-3}, {"\u00b5m", 1e-3}};
-const std::map<std::string, double, std::less<>> kTimes{{"s", 1},     {"sec", 1},   {"seconds", 1},
-                                                        {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
+const std::map<std::string, double, std::less<>> kTimes{{"s", 1},     {"sec", 1},   {"seconds", 1},   {"ms", 1e-3},
+                                                        {"us", 1e-6}, {"ns", 1e-9}, {"\u00b5s", 1e-6}};
 const Words kTimeWords{"t", "time", "timestamp", "timestamps", "stamp", "sec", "secs", "seconds"};
 const Words kPositionWords{"p", "pos", "position", "t", "trans", "translation", "loc", "location"};
 const Words kTurnWords{"q", "quat", "quaternion", "orientation", "rotation", "rot"};
@@ -54,9 +54,10 @@ PoseColumn turn(std::size_t axis) {
   return static_cast<PoseColumn>(4 + axis);
 }
 
-/// Of one word: x, tx, px, qx, q0.
+/// Of one word: x, tx, px, qx, q0 to q3, of which the first is w.
 std::optional<PoseColumn> of_word(std::string_view word) {
   if (word == "q0") return PoseColumn::qw;
+  if (word == "q1" || word == "q2" || word == "q3") return turn(static_cast<std::size_t>(word[1] - '1'));
   const auto axis = axis_of(word.substr(word.empty() ? 0 : word.size() - 1));
   if (!axis || word.size() > 2) return std::nullopt;
   if (word.size() == 2 && word[0] == 'q') return turn(*axis);
@@ -96,6 +97,20 @@ std::optional<double> mm_per(std::string_view unit) {
 
 std::optional<double> seconds_per(std::string_view unit) {
   return value_in(kTimes, unit);
+}
+
+std::string name_of_mm(double mm_per_unit) {
+  if (mm_per_unit == 1) return "mm";
+  if (mm_per_unit == 10) return "cm";
+  if (mm_per_unit == 1000) return "metres";
+  if (mm_per_unit == 25.4) return "inches";
+  return "micrometres";
+}
+
+std::string name_of_seconds(double s_per_unit) {
+  if (s_per_unit == 1) return "seconds";
+  if (s_per_unit == 1e-3) return "milliseconds";
+  return s_per_unit == 1e-6 ? "microseconds" : "nanoseconds";
 }
 
 std::optional<PoseColumn> pose_column(const ColumnName& name) {

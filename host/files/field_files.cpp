@@ -12,7 +12,7 @@
 #include <optional>
 #include <sstream>
 
-#include "host/files/pose_files.hpp"
+#include "host/files/column_names.hpp"
 #include "host/files/text_rows.hpp"
 
 namespace birdseye::host {
@@ -24,10 +24,27 @@ using Row = std::vector<std::string>;
 
 struct TextTable {
   Row columns;
+  std::vector<double> mm_per;  ///< of each column as the header names its unit; 0 where it names none
   std::vector<std::pair<std::size_t, Row>> rows;  ///< with their lines
 };
 
-Result<TextTable> read_table(const fs::path& path, const Row& needed) {
+/// Takes units off the names of columns, as "x [m]" has one, and gives those of other programs ours: "tx" is x.
+void plain_columns(TextTable& table) {
+  constexpr std::array kNames{"t", "x", "y", "z", "qx", "qy", "qz", "qw"};
+  Row names;
+  for (const std::string& title : table.columns) {
+    const ColumnName name = column_name(title);
+    const auto column = pose_column(name);
+    const bool truth = !name.words.empty() && name.words.front() == "true";
+    names.push_back(truth    ? fmt::format("{}", fmt::join(name.words, "_"))
+                    : column ? kNames.at(static_cast<std::size_t>(*column))
+                             : title);
+    table.mm_per.push_back(mm_per(name.unit).value_or(0));
+  }
+  table.columns = std::move(names);
+}
+
+Result<TextTable> read_table(const fs::path& path, const Row& needed, bool plain = false) {
   auto rows = TextRows::open(path);
   if (!rows) return rows.error();
   TextTable table;
@@ -40,6 +57,7 @@ Result<TextTable> read_table(const fs::path& path, const Row& needed) {
       table.rows.emplace_back(row->line, std::move(row->fields));
     }
   }
+  if (plain) plain_columns(table);
   for (const std::string& name : needed) {
     if (std::find(table.columns.begin(), table.columns.end(), name) == table.columns.end())
       return Error{Errc::bad_format, fmt::format("{}: has no column {}; the first line names the columns: {}",
@@ -77,6 +95,20 @@ std::optional<std::array<double, N>> numbers(const TextTable& table, const Row& 
   return out;
 }
 
+/// Three lengths, mm.
+std::optional<Eigen::Vector3d> place_mm(const TextTable& table, const Row& row,
+                                        const std::array<const char*, 3>& columns, double mm_per_unit) {
+  const auto values = numbers<3>(table, row, columns);
+  if (!values) return std::nullopt;
+  Eigen::Vector3d place;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto at = std::find(table.columns.begin(), table.columns.end(), columns.at(axis)) - table.columns.begin();
+    const double told = table.mm_per.at(static_cast<std::size_t>(at));
+    place[static_cast<int>(axis)] = (told > 0 ? told : mm_per_unit) * values->at(axis);
+  }
+  return place;
+}
+
 Result<void> all_used(const fs::path& path, std::size_t used) {
   if (used > 0) return {};
   return Error{Errc::bad_format, path.string() + ": holds no row that can be used"};
@@ -84,19 +116,20 @@ Result<void> all_used(const fs::path& path, std::size_t used) {
 
 }  // namespace
 
-Result<FieldSamples> read_field_grid(const fs::path& path, bool held_alike) {
+Result<FieldSamples> read_field_grid(const fs::path& path, bool held_alike, double mm_per_unit) {
   Row needed{"true_x", "true_y", "true_z", "x", "y", "z"};
   if (held_alike) needed.insert(needed.end(), {"qx", "qy", "qz", "qw"});
-  const auto table = read_table(path, needed);
+  const auto table = read_table(path, needed, true);
   if (!table) return table.error();
   FieldSamples out;
   for (const auto& [line, row] : table->rows) {
     std::string name = cell(*table, row, "name");
     if (name.empty()) name = fmt::format("line {}", line);
-    const auto p = numbers<6>(*table, row, {"true_x", "true_y", "true_z", "x", "y", "z"});
+    const auto truth_mm = place_mm(*table, row, {"true_x", "true_y", "true_z"}, 1);
+    const auto measured_mm = place_mm(*table, row, {"x", "y", "z"}, mm_per_unit);
     std::optional<std::array<double, 4>> q{{0, 0, 0, 1}};
     if (held_alike) q = numbers<4>(*table, row, {"qx", "qy", "qz", "qw"});
-    if (!p || !q) {
+    if (!truth_mm || !measured_mm || !q) {
       out.rejected.push_back(fmt::format("line {}: a number is missing, or is none that can be", line));
       continue;
     }
@@ -105,7 +138,7 @@ Result<FieldSamples> read_field_grid(const fs::path& path, bool held_alike) {
       out.rejected.push_back(fmt::format("line {}: qx,qy,qz,qw is no rotation", line));
       continue;
     }
-    calibration::FieldSample sample{name, {(*p)[0], (*p)[1], (*p)[2]}, {}, {turn, {(*p)[3], (*p)[4], (*p)[5]}}};
+    calibration::FieldSample sample{name, *truth_mm, {}, {turn, *measured_mm}};
     if (held_alike) sample.true_rotation = Eigen::Matrix3d::Identity();
     out.samples.push_back(std::move(sample));
   }
@@ -134,8 +167,9 @@ Result<GridSpec> parse_grid_spec(const std::string& text) {
                fmt::format("--grid-spec {}: give counts and steps, as 6x6x5:100mm or 6x6x5:100x96x100mm", text)};
 }
 
-Result<FieldSamples> read_field_poses(const fs::path& path, const GridSpec& spec, bool held_alike) {
-  auto poses = read_pose_set(path);
+Result<FieldSamples> read_field_poses(const fs::path& path, const GridSpec& spec, bool held_alike,
+                                      const PoseReading& how) {
+  auto poses = read_pose_set(path, how);
   if (!poses) return poses.error();
   const auto& n = spec.counts;
   const std::size_t nodes = static_cast<std::size_t>(n[0]) * static_cast<std::size_t>(n[1] * n[2]);
@@ -157,13 +191,13 @@ Result<FieldSamples> read_field_poses(const fs::path& path, const GridSpec& spec
   return out;
 }
 
-Result<FieldPairs> read_field_pairs(const fs::path& a, const fs::path& b) {
+Result<FieldPairs> read_field_pairs(const PoseFile& a, const PoseFile& b) {
   constexpr double kSameMomentS = 0.005;
-  auto of_a = read_pose_set(a), of_b = read_pose_set(b);
+  auto of_a = read_pose_set(a.path, a.how), of_b = read_pose_set(b.path, b.how);
   if (!of_a) return of_a.error();
   if (!of_b) return of_b.error();
   FieldPairs out;
-  for (const auto& [path, set] : {std::pair{&a, &*of_a}, std::pair{&b, &*of_b}}) {
+  for (const auto& [path, set] : {std::pair{&a.path, &*of_a}, std::pair{&b.path, &*of_b}}) {
     for (const std::string& why : set->rejected) out.rejected.push_back(path->filename().string() + ": " + why);
   }
   const bool timed = of_a->timed && of_b->timed;
@@ -182,7 +216,7 @@ Result<FieldPairs> read_field_pairs(const fs::path& a, const fs::path& b) {
   if (out.pairs.empty())
     return Error{Errc::bad_value, fmt::format("{} and {}: no two poses are of the same moment (to 5 ms); were they "
                                               "recorded together, on one clock?",
-                                              a.string(), b.string())};
+                                              a.path.string(), b.path.string())};
   return out;
 }
 
@@ -210,16 +244,16 @@ CorrectedPlaces corrected_places(const calibration::FieldMap& map, std::span<con
 }
 
 Result<std::vector<std::pair<std::string, Eigen::Vector3d>>> read_places(const fs::path& path) {
-  const auto table = read_table(path, {"name", "x", "y", "z"});
+  const auto table = read_table(path, {"name", "x", "y", "z"}, true);
   if (!table) return table.error();
   std::vector<std::pair<std::string, Eigen::Vector3d>> out;
   for (const auto& [line, row] : table->rows) {
-    const auto p = numbers<3>(*table, row, {"x", "y", "z"});
-    if (!p)
+    const auto place = place_mm(*table, row, {"x", "y", "z"}, 1);
+    if (!place)
       return Error{Errc::bad_format,
                    fmt::format("{}:{}: needs a name and three numbers, mm; measure it again, or take it out",
                                path.string(), line)};
-    out.emplace_back(cell(*table, row, "name"), Eigen::Vector3d((*p)[0], (*p)[1], (*p)[2]));
+    out.emplace_back(cell(*table, row, "name"), *place);
   }
   return out;
 }
@@ -240,14 +274,17 @@ Result<std::vector<calibration::FieldCheck>> read_history(const fs::path& path) 
   return out;
 }
 
+std::string day_name(std::string when) {
+  std::replace_if(
+      when.begin(), when.end(), [](char c) { return std::string_view(",;\t\n\r\" ").find(c) < 7; }, '-');
+  return when;
+}
+
 std::string history_text(const std::vector<calibration::FieldCheck>& history) {
   std::string out = "when,rms_mm,scale_percent,worst_mm,worst_place\n";
   for (const auto& day : history) {
-    std::string when = day.when;  // a name of its own making must not become columns
-    std::replace_if(
-        when.begin(), when.end(), [](char c) { return std::string_view(",;\t\n\r\" ").find(c) < 7; }, '-');
-    out +=
-        fmt::format("{},{:.4f},{:.4f},{:.4f},{}\n", when, day.rms_mm, day.scale_percent, day.worst_mm, day.worst_place);
+    out += fmt::format("{},{:.4f},{:.4f},{:.4f},{}\n", day_name(day.when), day.rms_mm, day.scale_percent, day.worst_mm,
+                       day.worst_place);
   }
   return out;
 }

@@ -208,7 +208,7 @@ class NdiLog {
   }
 
   /// By its number from 1, its title or one of its names; where there is one only, it need not be named.
-  [[nodiscard]] Result<const LoggedTool*> find(const std::string& wanted) const {
+  [[nodiscard]] Result<const LoggedTool*> find(const std::string& wanted, const std::string& option_prefix) const {
     std::vector<std::string> titles;
     for (std::size_t k = 0; k < tools_.size(); ++k) {
       const LoggedTool& tool = tools_[k];
@@ -219,8 +219,8 @@ class NdiLog {
       if (wanted == fmt::format("{}", k + 1)) return &tools_[k];
     }
     if (wanted.empty()) {
-      return Error{Errc::bad_value, fmt::format("say by name which tool is the sensor (--transform); it holds {}",
-                                                fmt::join(titles, ", "))};
+      return Error{Errc::bad_value, fmt::format("say by name which tool is the sensor (--{}tool); it holds {}",
+                                                option_prefix, fmt::join(titles, ", "))};
     }
     return Error{Errc::bad_value, fmt::format("has no tool {}; it holds {}", wanted, fmt::join(titles, ", "))};
   }
@@ -298,9 +298,9 @@ std::optional<double> time_of(const ToolRecord& record) {
 
 /// The pose of a record; with a reference, against that of the reference in the same row.
 ReadPose pose_in_row(const LoggedTool& tool, const LoggedTool* reference, std::size_t row, const PoseReading& how) {
-  ReadPose pose = corrected(pose_of_tool(tool.records[row]), how.field);
+  ReadPose pose = corrected(pose_of_tool(tool.records[row]), how);
   if (reference == nullptr) return pose;
-  return against(pose, tool.title, corrected(pose_of_tool(reference->records[row]), how.field), reference->title);
+  return against(pose, tool.title, corrected(pose_of_tool(reference->records[row]), how), reference->title);
 }
 
 /// "Port 1 (8700339): of 500 records 460 are OK, 33 Missing, 7 Disabled".
@@ -329,12 +329,12 @@ Result<PoseSet> read_ndi_log(const fs::path& path, const PoseReading& how) {
   const auto log = NdiLog::read(path);
   if (!log) return log.error();
   if (log->empty()) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path.string())};
-  const auto found = log->find(how.transform);
+  const auto found = log->find(how.transform, how.option_prefix);
   if (!found) return found.error().with_context(path.string());
   const LoggedTool& tool = **found;
   const LoggedTool* reference = nullptr;
   if (!how.reference.empty()) {
-    const auto other = log->find(how.reference);
+    const auto other = log->find(how.reference, how.option_prefix);
     if (!other) return other.error().with_context(path.string());
     reference = *other;
     if (!log->side_by_side() || reference == &tool) {
@@ -351,7 +351,9 @@ Result<PoseSet> read_ndi_log(const fs::path& path, const PoseReading& how) {
   collector.note(count_of_states(tool));
   if (log->decimal_commas()) collector.note("its numbers have decimal commas, and are read so");
   if (!timed) collector.note("it has no times: its poses count by their order, row by row");
-  return std::move(collector).finish(path);
+  auto set = std::move(collector).finish(path);
+  if (set) set->direction_known = true;
+  return set;
 }
 
 }  // namespace birdseye::host

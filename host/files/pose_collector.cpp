@@ -1,12 +1,15 @@
 #include "host/files/pose_collector.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include "calibration/base/lower_case.hpp"
 #include "host/files/text_rows.hpp"
@@ -115,8 +118,14 @@ ReadPose read_matrix(std::string_view text, double mm_per_unit) {
   return checked_pose(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), mm_per_unit);
 }
 
-ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& field) {
-  if (!field || !pose.problem.empty()) return pose;
+ReadPose corrected(ReadPose pose, const PoseReading& how) {
+  if (!pose.problem.empty()) return pose;
+  if (how.inverted) {
+    const auto sensor_from_tracker = Transform<Sensor, Tracker>::from_matrix(pose.tracker_from_sensor.matrix());
+    pose.tracker_from_sensor = sensor_from_tracker.inverse();
+  }
+  const auto& field = how.field;
+  if (!field) return pose;
   if (const auto by_map = field->correct(pose.tracker_from_sensor)) {
     pose.tracker_from_sensor = by_map->tracker_from_sensor;
   } else {
@@ -138,14 +147,35 @@ ReadPose against(const ReadPose& sensor, const std::string& sensor_name, const R
   return out;
 }
 
-void PoseCollector::add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose) {
+std::vector<std::string> by_kind(const std::vector<std::string>& rejected) {
+  struct Kind {
+    std::string first;
+    std::size_t count = 0;
+  };
+  std::map<std::string, Kind> kinds;
+  for (const std::string& line : rejected) {
+    std::string kind = line;
+    std::erase_if(kind, [](unsigned char c) { return std::isdigit(c) != 0; });
+    Kind& of_line = kinds[kind];
+    if (of_line.count++ == 0) of_line.first = line;
+  }
+  std::vector<std::string> out;
+  out.reserve(kinds.size());
+  for (const auto& [name, kind] : kinds)
+    out.push_back(kind.count > 1 ? fmt::format("{} (and {} more like it)", kind.first, kind.count - 1) : kind.first);
+  return out;
+}
+
+void PoseCollector::add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose,
+                        const std::string& picture) {
   if (pose.unmapped) ++unmapped_;
   if (!pose.problem.empty()) return reject(name, pose.problem);
   if (!std::isfinite(time_s) || !std::isfinite(unfiltered_time_s)) return reject(name, "has no time");
   if (pose.error_mm) errors_mm_.push_back(*pose.error_mm);
   if (pose.error_mm && most_error_mm_ && !(*pose.error_mm <= *most_error_mm_))
     return reject(name, fmt::format("its error of {:.3g} mm is over {:.3g} mm", *pose.error_mm, *most_error_mm_));
-  set_.poses.push_back({name, next_index_++, time_s, unfiltered_time_s, pose.tracker_from_sensor, pose.error_mm});
+  set_.poses.push_back(
+      {name, next_index_++, time_s, unfiltered_time_s, pose.tracker_from_sensor, pose.error_mm, picture});
 }
 
 void PoseCollector::reject(const std::string& name, const std::string& why) {
@@ -163,14 +193,26 @@ void PoseCollector::sort_by_time() {
   }
   // One time cannot have two poses, and which of them is right cannot be known: the first one recorded stays.
   std::vector<TimedPose> kept;
+  std::size_t shared = 0;
   for (TimedPose& pose : poses) {
     if (!kept.empty() && kept.back().time_s == pose.time_s) {
+      ++shared;
       set_.rejected.push_back(fmt::format("{}: has the time of {}", pose.name, kept.back().name));
     } else {
       kept.push_back(std::move(pose));
     }
   }
+  note_shared_times(shared);
   poses = std::move(kept);
+}
+
+void PoseCollector::note_shared_times(std::size_t shared) {
+  constexpr std::size_t kOneIn = 10;
+  if (shared == 0 || shared * kOneIn < set_.poses.size()) return;
+  set_.notes.push_back(
+      fmt::format("{} of {} rows have the time of another row: has the file poses of several tools, or have its times "
+                  "too few digits?",
+                  shared, set_.poses.size()));
 }
 
 void PoseCollector::note_repeated_poses() {
@@ -216,8 +258,10 @@ Result<PoseSet> PoseCollector::finish(const std::filesystem::path& path) && {
   }
   if (!set_.poses.empty()) return std::move(set_);
   if (set_.rejected.empty()) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path.string())};
+  if (set_.rejected.size() == 1)
+    return Error{Errc::bad_value, fmt::format("{}: its one pose cannot be used; {}", path.string(), set_.rejected[0])};
   return Error{Errc::bad_value, fmt::format("{}: none of {} poses can be used; {}", path.string(), set_.rejected.size(),
-                                            set_.rejected.front())};
+                                            fmt::join(by_kind(set_.rejected), "; "))};
 }
 
 }  // namespace birdseye::host

@@ -34,12 +34,17 @@ ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3
 /// text: 16 numbers, row by row, separated by blanks.
 ReadPose read_matrix(std::string_view text, double mm_per_unit);
 
-/// As the map of the field corrects it, or the problem that it lies where the field was not mapped. No map: as it is.
-ReadPose corrected(ReadPose pose, const std::optional<calibration::FieldMap>& field);
+/// As how.inverted turns it round, and as the map of the field corrects it, or the problem that it lies where the field
+/// was not mapped. No map: as it is.
+ReadPose corrected(ReadPose pose, const PoseReading& how);
 
 /// reference_from_sensor, or which of both is not there. The reference takes the tracker's place.
 ReadPose against(const ReadPose& sensor, const std::string& sensor_name, const ReadPose& reference,
                  const std::string& reference_name);
+
+/// What was passed over, one line for each kind of reason: those that differ in numbers alone are of one kind. "line 7:
+/// missing (and 12 more like it)".
+std::vector<std::string> by_kind(const std::vector<std::string>& rejected);
 
 /// Gathers what a reader finds, in the order in which it was recorded.
 class PoseCollector {
@@ -50,7 +55,8 @@ class PoseCollector {
   }
 
   /// Keeps the pose, or names what is wrong with it.
-  void add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose);
+  void add(const std::string& name, double time_s, double unfiltered_time_s, const ReadPose& pose,
+           const std::string& picture = {});
   void reject(const std::string& name, const std::string& why);
   /// Keeps words on what is odd and harmless.
   void note(std::string words) { set_.notes.push_back(std::move(words)); }
@@ -63,6 +69,7 @@ class PoseCollector {
   void sort_by_time();
   void note_repeated_poses();
   void note_unmapped_poses();
+  void note_shared_times(std::size_t shared);
   void note_errors();
   PoseSet set_;
   std::optional<double> most_error_mm_;

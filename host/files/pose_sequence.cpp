@@ -28,7 +28,7 @@ Result<SequenceHeader> read_header(const fs::path& path) {
 
 /// The name as the sequence has it, whether or not it was given with "Transform" at its end.
 Result<std::string> find_transform(const SequenceHeader& sequence, const fs::path& path, std::string name,
-                                   const std::string& reference) {
+                                   const std::string& reference, const std::string& option_prefix) {
   const std::string held = fmt::format("it holds {}", fmt::join(sequence.transforms, ", "));
   if (name.ends_with(kTransformField)) name.resize(name.size() - kTransformField.size());
   if (sequence.transforms.contains(name)) return name;
@@ -37,8 +37,8 @@ Result<std::string> find_transform(const SequenceHeader& sequence, const fs::pat
   auto others = sequence.transforms;
   others.erase(reference);
   if (others.size() == 1) return *others.begin();
-  return Error{Errc::bad_value,
-               fmt::format("{}: say by name which transform is the sensor's (--transform); {}", path.string(), held)};
+  return Error{Errc::bad_value, fmt::format("{}: say by name which transform is the sensor's (--{}transform); {}",
+                                            path.string(), option_prefix, held)};
 }
 
 ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transform, const PoseReading& how) {
@@ -47,7 +47,7 @@ ReadPose pose_of(const SequenceHeader::Fields& frame, const std::string& transfo
   // A sequence without states has only what was seen.
   if (!status.empty() && status != kStatusOk) return {{}, std::string(status)};
   if (!frame.contains(key)) return {{}, "missing"};
-  return corrected(read_matrix(value_of(frame, key), how.mm_per_unit), how.field);
+  return corrected(read_matrix(value_of(frame, key), how.mm_per_unit), how);
 }
 
 }  // namespace
@@ -67,16 +67,21 @@ Result<PoseSet> read_sequence(const fs::path& path, const PoseReading& how) {
   if (!sequence) return sequence.error();
   const bool relative = !reference.empty();
   if (relative) {
-    auto found = find_transform(*sequence, path, reference, {});
+    auto found = find_transform(*sequence, path, reference, {}, how.option_prefix);
     if (!found) return found.error();
     reference = *found;
   }
-  auto found = find_transform(*sequence, path, transform, reference);
+  auto found = find_transform(*sequence, path, transform, reference, how.option_prefix);
   if (!found) return found.error();
   transform = *found;
   if (relative && transform == reference) {
     return Error{Errc::bad_value,
                  fmt::format("{}: {} against itself stands still; name two transforms", path.string(), transform)};
+  }
+  if (transform.starts_with("TrackerTo") && !how.inverted) {
+    return Error{Errc::bad_value, fmt::format("{}: {} by its name takes the tracker's points to the sensor: say so by "
+                                              "--poses-are sensor_from_tracker, or name the transform to the tracker",
+                                              path.string(), transform)};
   }
   const bool timed = std::any_of(sequence->frames.begin(), sequence->frames.end(),
                                  [](const auto& item) { return item.second.contains(kTimestampField); });
@@ -97,7 +102,9 @@ Result<PoseSet> read_sequence(const fs::path& path, const PoseReading& how) {
       collector.add(name, time.value, unfiltered.value, pose);
     }
   }
-  return std::move(collector).finish(path);
+  auto set = std::move(collector).finish(path);
+  if (set) set->direction_known = true;
+  return set;
 }
 
 }  // namespace birdseye::host

@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
-#include "calibration/base/units.hpp"
+#include "calibration/base/lower_case.hpp"
+#include "calibration/base/median.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/text_rows.hpp"
+#include "host/files/tool_column.hpp"
 
 namespace birdseye::host {
 
@@ -20,8 +23,18 @@ using Fields = std::vector<std::string>;
 
 constexpr std::array<std::string_view, kPoseColumns> kPoseNames{"t", "x", "y", "z", "qx", "qy", "qz", "qw"};
 constexpr auto kTime = static_cast<std::size_t>(PoseColumn::time);
-/// A time beyond this cannot be seconds: it is nanoseconds since 1970.
-constexpr double kLeastNanoseconds = 1e16;
+
+/// The unit of a time whose header names none, s. What is too large for seconds since 1970 is counted in smaller units.
+double seconds_per_unit_of(double time) {
+  constexpr double kLeastMilliseconds = 1e11, kLeastMicroseconds = 1e14, kLeastNanoseconds = 1e16;
+  if (time > kLeastNanoseconds) return 1e-9;
+  if (time > kLeastMicroseconds) return 1e-6;
+  return time > kLeastMilliseconds ? 1e-3 : 1;
+}
+
+/// Times so far apart are not in seconds: no tracker measures, and nobody takes stations, so seldom.
+constexpr double kLongestStepS = 600;
+constexpr std::size_t kFewestSteps = 20;
 
 /// Where in a row each of PoseColumn is, and what its numbers are.
 struct PoseColumns {
@@ -29,7 +42,8 @@ struct PoseColumns {
   std::size_t count = 0;         ///< of all columns of a row
   std::optional<double> mm_per;  ///< as the header tells
   std::optional<double> s_per;
-  bool matrix = false;  ///< rows are 4x4 or 3x4 matrices, row by row, and nothing else
+  std::optional<std::size_t> picture;  ///< the name of the one that was taken there
+  bool matrix = false;                 ///< rows are 4x4 or 3x4 matrices, row by row, and nothing else
   [[nodiscard]] bool timed() const { return at[kTime].has_value(); }
 };
 
@@ -43,6 +57,14 @@ PoseColumns columns_by_count(std::size_t count) {
   return out;
 }
 
+/// Whether a column may hold the names of pictures.
+bool names_pictures(const ColumnName& name) {
+  constexpr std::array<std::string_view, 9> kNames{"picture",   "image",     "file",        "filename", "picturename",
+                                                   "imagename", "imagefile", "picturefile", "name"};
+  const std::string joined = fmt::format("{}", fmt::join(name.words, ""));
+  return std::ranges::find(kNames, joined) != kNames.end();
+}
+
 /// What each column of a header is. A name that is exactly ours goes before others that mean the same.
 Result<PoseColumns> columns_by_name(const Fields& header) {
   PoseColumns out;
@@ -52,6 +74,7 @@ Result<PoseColumns> columns_by_name(const Fields& header) {
   for (std::size_t i = 0; i < header.size(); ++i) {
     const ColumnName name = column_name(header[i]);
     const auto column = pose_column(name);
+    if (!column && !out.picture && names_pictures(name)) out.picture = i;
     if (!column) continue;
     const auto c = static_cast<std::size_t>(*column);
     const bool ours = header[i] == kPoseNames[c];
@@ -94,14 +117,26 @@ bool is_words(const Fields& row) {
   return !row.empty() && !row[0].empty() && read_number(row[0]).problem.ends_with("is no number");
 }
 
+/// Whose rows are read, of a table with a column that says whose each is.
+struct Chosen {
+  std::size_t at = 0;  ///< of the column
+  std::string tool;
+};
+
 class PoseTable {
  public:
-  PoseTable(const fs::path& path, const PoseReading& how) : path_(path), how_(how) {}
+  PoseTable(const fs::path& path, const PoseReading& how, std::optional<Chosen> chosen)
+      : path_(path), how_(how), chosen_(std::move(chosen)) {}
 
   Result<void> take(TextRow row) {
     if (row.remark) return take_remark(row);
     drop_empty_ends(row.fields, columns_ ? columns_->count : 1);
     if (!columns_ && is_words(row.fields)) return take_header(row);
+    if (chosen_ && chosen_->at < row.fields.size() && row.fields[chosen_->at] != chosen_->tool &&
+        row.fields != header_) {
+      ++of_others_;
+      return {};
+    }
     if (row.fields == header_) {
       ++repeated_headers_;
       return {};
@@ -115,13 +150,21 @@ class PoseTable {
     if (!collector_) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path_.string())};
     if (decimal_commas) collector_->note("its numbers have decimal commas, and are read so");
     if (repeated_headers_ > 0)
-      collector_->note(
-          fmt::format("its header comes again in {} later lines, which are passed over", repeated_headers_));
-    if (columns_->timed() && s_per_ != 1) collector_->note(fmt::format("its times are in units of {:g} s", s_per_));
+      collector_->note(fmt::format("its header comes again in {} later {}, passed over", repeated_headers_,
+                                   repeated_headers_ == 1 ? "line" : "lines"));
+    if (const auto sound = check_steps(); !sound) return sound.error();
+    if (columns_->timed() && s_per_ != 1 && !how_.s_per_unit)
+      collector_->note(fmt::format("its times are read as {}", name_of_seconds(s_per_)));
     if (columns_->mm_per && columns_->mm_per != how_.mm_per_unit)
-      collector_->note(fmt::format("its header says that lengths are in units of {:g} mm", *columns_->mm_per));
-    if (!columns_->timed()) collector_->note("it has no times: its poses count by their order, row by row");
-    return std::move(*collector_).finish(path_);
+      collector_->note(fmt::format("its lengths are in {}, as its header says", name_of_mm(*columns_->mm_per)));
+    if (of_others_ > 0)
+      collector_->note(
+          fmt::format("the poses of {} are read; {} other rows name another tool, or none", chosen_->tool, of_others_));
+    if (!columns_->timed() && !columns_->picture)
+      collector_->note("it has no times: its poses count by their order, row by row");
+    auto set = std::move(*collector_).finish(path_);
+    if (set && columns_->picture) set->picture_column = header_[*columns_->picture];
+    return set;
   }
 
  private:
@@ -146,7 +189,7 @@ class PoseTable {
   void start(const PoseColumns& columns) {
     columns_ = columns;
     collector_.emplace(columns.timed(), how_.most_error_mm);
-    s_per_ = columns.s_per.value_or(1);
+    s_per_ = columns.s_per.value_or(how_.s_per_unit.value_or(1));
   }
 
   void take_pose(const TextRow& row) {
@@ -165,10 +208,27 @@ class PoseTable {
     if (columns_->timed()) {
       const ReadNumber time = read_number(fields[*columns_->at[kTime]]);
       if (!time.problem.empty()) return collector_->reject(name, time.problem);
-      if (!columns_->s_per && time.value > kLeastNanoseconds) s_per_ = 1 / kNsPerSecond;
+      if (!columns_->s_per && !how_.s_per_unit) s_per_ = std::min(s_per_, seconds_per_unit_of(time.value));
       time_s = s_per_ * time.value;
+      times_s_.push_back(time_s);
     }
-    collector_->add(name, time_s, time_s, corrected(pose_of_row(fields), how_.field));
+    collector_->add(name, time_s, time_s, corrected(pose_of_row(fields), how_),
+                    columns_->picture ? fields[*columns_->picture] : std::string());
+  }
+
+  /// Microseconds that nobody says to be such would pass for hours.
+  [[nodiscard]] Result<void> check_steps() const {
+    if (columns_->s_per || how_.s_per_unit || times_s_.size() < kFewestSteps) return {};
+    std::vector<double> steps_s;
+    steps_s.reserve(times_s_.size());
+    for (std::size_t i = 1; i < times_s_.size(); ++i) steps_s.push_back(std::abs(times_s_[i] - times_s_[i - 1]));
+    const double step_s = median_of(std::move(steps_s));
+    if (step_s <= kLongestStepS) return {};
+    return Error{
+        Errc::bad_value,
+        fmt::format("{}: its times, read as seconds, are {:g} s apart, which no tracker's are: say their unit, "
+                    "--time-unit ms, us or ns, or name it in the header, as t [us]",
+                    path_.string(), step_s)};
   }
 
   [[nodiscard]] ReadPose pose_of_row(const Fields& fields) const {
@@ -190,16 +250,67 @@ class PoseTable {
   Fields header_;
   std::optional<PoseColumns> columns_;
   std::optional<PoseCollector> collector_;
+  std::optional<Chosen> chosen_;
   double s_per_ = 1;
-  std::size_t count_ = 0, repeated_headers_ = 0;
+  std::vector<double> times_s_;
+  std::size_t count_ = 0, repeated_headers_ = 0, of_others_ = 0;
 };
+
+/// The column that says whose the rows are, where the table has a header with one.
+Result<std::optional<ToolColumn>> tool_column_of(const fs::path& path) {
+  auto rows = TextRows::open(path);
+  if (!rows) return rows.error();
+  std::optional<ToolColumnSearch> search;
+  Fields header;
+  while (auto row = rows->next()) {
+    drop_empty_ends(row->fields, header.empty() ? 1 : header.size());
+    if (search) {
+      if (!row->remark && row->fields != header) search->take(row->fields);
+      continue;
+    }
+    if (row->remark && !columns_by_name(row->fields)) continue;
+    if (!row->remark && !is_words(row->fields)) break;
+    header = row->fields;
+    search.emplace(header);
+    if (!search->possible()) break;
+  }
+  return search ? search->found() : std::optional<ToolColumn>();
+}
+
+/// Whose rows are to be read: the tool that is asked for, or the only one. None where no column says whose they are.
+Result<std::optional<Chosen>> choose_tool(const fs::path& path, const PoseReading& how) {
+  const auto column = tool_column_of(path);
+  if (!column) return column.error();
+  const std::string& wanted = how.transform;
+  if (!*column) {
+    if (wanted.empty()) return std::optional<Chosen>();
+    return Error{Errc::bad_value,
+                 fmt::format("{}: --{}tool {}: no column of this table says whose pose a row is, as one named tool "
+                             "would: leave the option out if all rows are of one tool",
+                             path.string(), how.option_prefix, wanted)};
+  }
+  const auto& names = (*column)->rows;
+  if (wanted.empty() && names.size() == 1) return std::optional<Chosen>(Chosen{(*column)->at, names.begin()->first});
+  const auto found = std::find_if(names.begin(), names.end(), [&](const auto& name) {
+    return name.first == wanted || lower_case(name.first) == lower_case(wanted);
+  });
+  if (!wanted.empty() && found != names.end()) return std::optional<Chosen>(Chosen{(*column)->at, found->first});
+  const std::string held = fmt::format("its column \"{}\" names {}", (*column)->title, (*column)->names());
+  if (wanted.empty()) {
+    return Error{Errc::bad_value, fmt::format("{}: say whose poses are meant by --{}tool NAME; {}", path.string(),
+                                              how.option_prefix, held)};
+  }
+  return Error{Errc::bad_value, fmt::format("{}: has no tool {}; {}", path.string(), wanted, held)};
+}
 
 }  // namespace
 
 Result<PoseSet> read_pose_table(const fs::path& path, const PoseReading& how) {
+  auto chosen = choose_tool(path, how);
+  if (!chosen) return chosen.error();
   auto rows = TextRows::open(path);
   if (!rows) return rows.error();
-  PoseTable table(path, how);
+  PoseTable table(path, how, *std::move(chosen));
   while (auto row = rows->next()) {
     if (const auto taken = table.take(*std::move(row)); !taken) return taken.error();
   }

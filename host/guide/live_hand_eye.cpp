@@ -1,6 +1,9 @@
 #include "host/guide/live_hand_eye.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <map>
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
@@ -91,6 +94,40 @@ Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) 
   note_interrupts();
   EventStream stream(*std::move(client), 60);
   return lead(plan, stream, progress);
+}
+
+Result<GuidedStations> stations_of_recording(EventSource& recording, const GuidePlan& asked, Progress& progress) {
+  if (const auto sound = HandEyeGuide::check(asked); !sound) return sound.error();
+  GuidePlan plan = asked;
+  plan.fewest_stations = plan.most_stations;  // a verdict of pass does not end it: the recording holds what it holds
+  bool begun = false;                         // what to do with the hands is nothing to say to a recording
+  HandEyeGuide guide(plan, {[](const std::string&) {},
+                            [&](const std::string& line) {
+                              if (begun) progress.keep(line);
+                            }});
+  begun = true;
+  note_interrupts();
+  std::map<std::string, std::size_t> poses;
+  while (!guide.ended()) {
+    if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
+    const auto event = recording.next(Deadline::after(kStationSilence));
+    if (!event && event.error().code != Errc::disconnected) return event.error();
+    if (!event) {
+      guide.end("the recording has ended");
+    } else if (*event) {
+      if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
+        for (const wire::Bird& bird : birds->birds) ++poses[bird.name];
+      }
+      if (const auto taken = guide.take(**event); !taken) return taken.error();
+    }
+  }
+  if (poses.contains(plan.bird)) return guide.finish();
+  std::vector<std::string> names;
+  names.reserve(poses.size());
+  for (const auto& [name, count] : poses) names.push_back(name);
+  return Error{Errc::not_found,
+               fmt::format("the recording has no poses of \"{}\", but of {}: say by --bird which are the scope's",
+                           plan.bird, names.empty() ? "nobody" : fmt::format("{}", fmt::join(names, ", ")))};
 }
 
 }  // namespace birdseye::host

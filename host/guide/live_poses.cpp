@@ -20,7 +20,9 @@ constexpr Duration kPoseLook = Duration::from_ms(200);  // how soon an interrupt
 }  // namespace
 
 Result<PoseSet> collect_poses(const std::string& server, const std::string& bird, double seconds, Progress& progress) {
-  auto client = connect_appliance(server);
+  wire::ForeignSettings foreign;
+  foreign.scope_bird.clear();  // bird is the name that the server gives
+  auto client = connect_appliance(server, foreign);
   if (!client) return client.error();
   if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(kPoseSilence)); !done)
     return done.error();

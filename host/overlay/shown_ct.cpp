@@ -11,7 +11,7 @@ Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice
   if (choice.margins_mm.empty() != choice.margin_of.empty())
     return Error{Errc::bad_value, "--margins and --margin-of go together: how many mm, about which labels"};
   if (!choice.labels.empty() && choice.keep.empty() && choice.margins_mm.empty())
-    return Error{Errc::bad_value, "--labels: what of it? Give --show, or --margins and --margin-of"};
+    return Error{Errc::bad_value, "--labels does nothing by itself: give --show too, or --margins with --margin-of"};
   auto ct = import_with_notes(source);
   if (!ct) return ct.error();
   ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};

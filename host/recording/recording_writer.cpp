@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "drivers/system/clock.hpp"
 #include "host/files/sequence_header.hpp"
@@ -66,15 +67,40 @@ Result<void> RecordingWriter::add(const wire::Event& event) {
   return add_line(event, {});
 }
 
+/// Two birds whose names differ in signs alone have two transforms.
+void RecordingWriter::name_transform(const std::string& bird) {
+  if (transform_of_.contains(bird) || transform_of_.size() >= kMostBirds) return;
+  const std::string name = transform_name(bird);
+  const auto taken = [&](const std::string& other) {
+    return std::ranges::any_of(transform_of_, [&](const auto& known) { return known.second == other; });
+  };
+  std::string own = name;
+  for (int number = 2; taken(own); ++number) own = fmt::format("{}{}", number, name);
+  transform_of_.emplace(bird, own);
+}
+
+/// A server may send the poses of one time one by one, as PLUS does: they are one measurement.
 Result<void> RecordingWriter::add_birds(const wire::Birds& birds) {
   note_time(birds.acquired);
-  SequenceWriter::Fields fields = {{std::string(kTimestampField), seconds_text(birds.acquired.ns)}};
+  if (birds.acquired != measured_.acquired) {
+    if (auto written = write_measurement(); !written) return written;
+    measured_.acquired = birds.acquired;
+  }
   for (const wire::Bird& bird : birds.birds) {
-    if (transform_of_.size() >= kMostBirds && !transform_of_.contains(bird.name)) continue;
-    transform_of_.try_emplace(bird.name, transform_name(bird.name));
+    name_transform(bird.name);
+    if (!transform_of_.contains(bird.name)) continue;
     histories_[bird.name].push(birds.acquired, {}, bird.tracker_from_sensor);
     ++figures_.poses[bird.name];
+    std::erase_if(measured_.birds, [&](const wire::Bird& other) { return other.name == bird.name; });
+    measured_.birds.push_back(bird);
   }
+  return {};
+}
+
+Result<void> RecordingWriter::write_measurement() {
+  const wire::Birds birds = std::exchange(measured_, {});
+  if (birds.birds.empty()) return {};
+  SequenceWriter::Fields fields = {{std::string(kTimestampField), seconds_text(birds.acquired.ns)}};
   // Every bird that ever told of itself is in each of the frames.
   for (const auto& [name, transform] : transform_of_) {
     const auto found = std::find_if(birds.birds.begin(), birds.birds.end(),
@@ -89,6 +115,15 @@ Result<void> RecordingWriter::add_birds(const wire::Birds& birds) {
   return {};
 }
 
+/// Whose pose that of the frame is; none where that is not known, so that no transform is invented.
+std::optional<std::string> RecordingWriter::scope_of(const wire::VideoFrame& frame) const {
+  for (const std::string& name : {settings_.scope, std::string("scope")}) {
+    if (transform_of_.contains(name)) return name;
+  }
+  if (frame.info.pose.tracker_from_sensor && transform_of_.size() == 1) return transform_of_.begin()->first;
+  return std::nullopt;
+}
+
 SequenceWriter::Fields RecordingWriter::fields_of(const wire::VideoFrame& frame) const {
   const wire::FrameInfo& info = frame.info;
   SequenceWriter::Fields fields = {{std::string(kFrameNumberField), std::to_string(info.sequence)},
@@ -97,16 +132,13 @@ SequenceWriter::Fields RecordingWriter::fields_of(const wire::VideoFrame& frame)
                                    {"TimestampSigma", seconds_text(info.acquired_sigma.ns)},
                                    {"PoseKind", to_string(info.pose.kind)},
                                    {"PoseSigmaMm", fmt::format("{}", info.pose.position_sigma_mm)}};
-  const auto add = [&](const std::string& transform, const PoseAnswer& pose) {
+  const auto scope = scope_of(frame);
+  for (const auto& [bird, transform] : transform_of_) {
+    const PoseAnswer pose = scope == bird ? info.pose : histories_.at(bird).at(info.acquired);
     const auto& m = pose.tracker_from_sensor;
     fields.emplace_back(transform + std::string(kTransformField),
                         transform_text(m ? m->matrix() : Eigen::Matrix4d(Eigen::Matrix4d::Identity())));
     fields.emplace_back(transform + std::string(kTransformStatusField), m ? kStatusOk : kStatusInvalid);
-  };
-  const std::string scope = transform_name("scope");
-  add(scope, info.pose);
-  for (const auto& [bird, transform] : transform_of_) {
-    if (transform != scope) add(transform, histories_.at(bird).at(info.acquired));
   }
   return fields;
 }
@@ -209,6 +241,7 @@ Result<void> RecordingWriter::end_video() {
 }
 
 Result<void> RecordingWriter::finish(const std::string& why) {
+  if (auto written = write_measurement(); !written) notes_.push_back(written.error().what);
   Result<void> ended = end_video();
   if (!ended) notes_.push_back(ended.error().what);
   if (auto synced = events_.sync(); !synced) notes_.push_back(synced.error().what);

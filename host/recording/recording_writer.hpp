@@ -24,9 +24,10 @@ inline constexpr int kRecordingVersion = 1;
 
 struct RecordingSettings {
   std::filesystem::path folder = {};
-  std::string source = {};  ///< whom it was recorded from, as HOST:PORT
-  bool compressed = false;  ///< films by ffmpeg, which lose something
-  bool pair = false;        ///< leaves header and pixels two files
+  std::string source = {};      ///< whom it was recorded from, as HOST:PORT
+  std::string scope = "scope";  ///< whose poses those of the frames are
+  bool compressed = false;      ///< films by ffmpeg, which lose something
+  bool pair = false;            ///< leaves header and pixels two files
 };
 
 /// One file of frames of one size.
@@ -70,6 +71,9 @@ class RecordingWriter {
   Result<void> add_line(const wire::Event& event, const FramePlace& place);
   Result<void> add_frame(const wire::VideoFrame& frame);
   Result<void> add_birds(const wire::Birds& birds);
+  Result<void> write_measurement();
+  void name_transform(const std::string& bird);
+  [[nodiscard]] std::optional<std::string> scope_of(const wire::VideoFrame& frame) const;
   Result<void> begin_video(const wire::VideoFrame& frame, double rate_hz);
   Result<void> begin_film(double rate_hz);
   Result<void> write_frame(const wire::VideoFrame& frame);
@@ -88,6 +92,7 @@ class RecordingWriter {
   std::optional<wire::VideoFrame> waiting_;  ///< the first frame of a film, until the second tells the rate
   std::map<std::string, PoseHistory> histories_;
   std::map<std::string, std::string> transform_of_;  ///< by bird
+  wire::Birds measured_;                             ///< of one time, until there are poses of another
   std::optional<std::uint64_t> last_sequence_;
   std::optional<wire::Health> health_;
   RecordingFigures figures_;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
@@ -72,6 +73,11 @@ Result<void> OutputFile::sync() {
 }
 
 std::string transform_name(const std::string& bird) {
+  const auto to = bird.find("To");
+  const bool letters = std::ranges::all_of(bird, [](unsigned char c) { return std::isalnum(c) != 0; });
+  if (letters && to != std::string::npos && to > 0 && to + 2 < bird.size() &&
+      std::isupper(static_cast<unsigned char>(bird[to + 2])) != 0)
+    return bird;
   std::string name;
   for (const char c : bird) {
     if (std::isalnum(static_cast<unsigned char>(c)) != 0) name += c;

@@ -34,7 +34,8 @@ class OutputFile {
   std::filesystem::path path_;
 };
 
-/// "scope" -> "ScopeToTracker", as PLUS names transforms: letters and digits, the first a capital.
+/// "scope" -> "ScopeToTracker", as PLUS names transforms: letters and digits, the first a capital. What is named as a
+/// transform already, as "StylusToReference", keeps its name.
 std::string transform_name(const std::string& bird);
 /// 16 numbers, row by row, that read back exactly.
 std::string transform_text(const Eigen::Matrix4d& matrix);

@@ -38,7 +38,7 @@ TEST(HandEyeInput, TooFewStations) {
   bench.input.stations.resize(2);
   expect_fail(bench.input, "2 stations with board and pose, of at least 3", "take more stations");
   bench.input.stations.resize(1);
-  expect_fail(bench.input, "1 stations", "take more stations");
+  expect_fail(bench.input, "1 station with", "take more stations");
   bench.input.stations.clear();
   EXPECT_EQ(calibrate_hand_eye(bench.input).error().code, Errc::bad_value);
   HandEyeBench four(kGood);

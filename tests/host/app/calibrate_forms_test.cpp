@@ -88,6 +88,44 @@ TEST_F(DrawnStations, PosesOfATableWithoutTimesPairByTheirOrder) {
                  {"12 pictures and 11 poses"});
 }
 
+TEST_F(DrawnStations, PosesPairWithThePicturesThatATableNames) {
+  const auto rows = table_of_poses(kStations);
+  std::vector<std::string> lines;
+  for (std::size_t from = rows.find('\n') + 1; from < rows.size(); from = rows.find('\n', from) + 1)
+    lines.push_back(rows.substr(from, rows.find('\r', from) - from));
+  std::string named = "image,tx,ty,tz,q0,qx,qy,qz\nelsewhere.png," + lines[3] + "\n";
+  for (std::size_t i = lines.size(); i-- > 1;)  // in another order, and without the first
+    named += fmt::format("C:\\shots\\{}.png,{}\n", i + 1, lines[i]);
+  const std::string images = "--camera " + at("lens.yml") + " --images " + at("pictures") + " --poses ";
+  EXPECT_LT(off_mm(hand_eye(images + scratch.file("p.csv", named))), 0.5);
+  const auto notes = read_json(scratch / "x.json")["notes"].dump();
+  EXPECT_THAT(notes, HasSubstr("names the picture of each pose"));
+  EXPECT_THAT(notes, HasSubstr("1.png: there is no pose that could be used"));
+  EXPECT_EQ(read_json(scratch / "x.json")["stations_used"], kStations - 1);
+  expect_refused("birdseye", hand_eye(images + scratch.file("q.csv", named + "5.png," + lines[0] + "\n")),
+                 {"both name the picture 5.png"});
+}
+
+TEST_F(DrawnStations, PosesPairByTimeWithPicturesWhoseNamesAreTimes) {
+  const auto rows = table_of_poses(kStations);
+  fs::create_directories(scratch / "timed");
+  std::string stream = "t,tx,ty,tz,q0,qx,qy,qz\n";
+  int number = 0;
+  for (std::size_t from = rows.find('\n') + 1; from < rows.size(); from = rows.find('\n', from) + 1) {
+    const std::int64_t at_ns = 1'600'000'000'000'000'000 + 5'000'000'000 * ++number;
+    fs::copy_file(scratch / fmt::format("pictures/{}.png", number), scratch / fmt::format("timed/{}.png", at_ns));
+    // At the first station the tracker saw nothing.
+    for (const int later_ms : {-12, 13, 2400})
+      stream += fmt::format("{:.4f},{}\n", 1e-9 * static_cast<double>(at_ns) + 1e-3 * (number == 1 ? 2400 : later_ms),
+                            rows.substr(from, rows.find('\r', from) - from));
+  }
+  EXPECT_LT(off_mm(hand_eye("--camera " + at("lens.yml") + " --images " + at("timed") + " --poses " +
+                            scratch.file("p.csv", stream))),
+            0.5);
+  EXPECT_THAT(read_json(scratch / "x.json")["notes"].dump(), HasSubstr("poses pair with pictures by time"));
+  EXPECT_EQ(read_json(scratch / "x.json")["stations_used"], kStations - 1);
+}
+
 TEST_F(DrawnStations, PointsFoundBeforeGiveWhatPicturesGive) {
   const auto views = host::read_picture_views(*calibration::parse_pattern(scope.board()), {scratch / "pictures"});
   ASSERT_TRUE(views && views->used.size() == kStations);

@@ -291,5 +291,35 @@ TEST(CalibrateHandEyeCommand, RefusesUsageThatMakesNoSense) {
   EXPECT_THAT(no_board.output, HasSubstr("--board is missing"));
 }
 
+TEST(CalibrateHandEyeCommand, WhatWouldBeOfNoEffectIsRefusedByName) {
+  const std::string files = "calibrate hand-eye --board chessboard:10x7:6mm --poses . --images . ";
+  for (const char* option : {"--bird", "--server", "--seconds", "--stations", "--most-stations", "--keep"})
+    expect_refused("birdseye", files + option + " 20", {std::string(option) + " goes with --live"});
+  for (const char* option : {"--board-tool", "--board-body"})
+    expect_refused("birdseye", files + option + " a", {"--board-", "goes with --board-poses"});
+  expect_refused("birdseye", files + "--eye-tool a", {"--eye-transform goes with --eye-poses"});
+  expect_refused("birdseye", files + "--size 640x480", {"--size goes with --points"});
+  const std::string live = "calibrate hand-eye --board chessboard:10x7:6mm --live --server 127.0.0.1:1 ";
+  for (const char* option : {"--poses .", "--unit m", "--tool Scope", "--poses-are sensor_from_tracker"})
+    expect_refused("birdseye", live + option, {"--live takes none: leave it out"});
+  expect_refused("birdseye", "calibrate hand-eye --board chessboard:10x7:6mm --recording . --server a",
+                 {"--server goes with --live"});
+}
+
+TEST(CalibrateHandEyeCommand, StreamsOfOtherTimesAreToldBySpans) {
+  const Scratch scratch;
+  std::string early, late;
+  for (int i = 0; i < 400; ++i) {
+    const double angle = 0.4 * std::sin(0.11 * i) + 0.2 * std::sin(0.043 * i);
+    const std::string pose = fmt::format("1,2,300,{:.9f},0,0,{:.9f}\n", std::sin(angle / 2), std::cos(angle / 2));
+    early += fmt::format("{:.3f},{}", 100 + 0.02 * i, pose);
+    late += fmt::format("{:.3f},{}", 500 + 0.02 * i, pose);
+  }
+  expect_refused(
+      "birdseye",
+      "calibrate hand-eye --poses " + scratch.file("hand.csv", early) + " --eye-poses " + scratch.file("eye.csv", late),
+      {"do not overlap in time", "from 100.000 to 107.980 s", "from 500.000 to 507.980 s"});
+}
+
 }  // namespace
 }  // namespace birdseye

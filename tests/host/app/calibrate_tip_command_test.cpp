@@ -154,7 +154,7 @@ TEST(CalibrateTip, InputThatCannotBeUsedIsRefusedInOneLine) {
   const std::string good = scratch.file("p.csv", csv_of(SimulatedPointer().poses(40)));
   for (const auto& [arguments, words] :
        {std::pair{(scratch / "none").string(), "no such file or folder"},
-        {scratch.file("e.csv", "1,nan,0,0,0,0,0,1\n"), "none of 1 poses can be used; line 1: not finite"},
+        {scratch.file("e.csv", "1,nan,0,0,0,0,0,1\n"), "its one pose cannot be used; line 1: not finite"},
         {scratch.file("two.mha",
                       "Seq_Frame0000_AToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"
                       "Seq_Frame0000_BToTrackerTransform = 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n"),
@@ -166,6 +166,88 @@ TEST(CalibrateTip, InputThatCannotBeUsedIsRefusedInOneLine) {
         {good + " --spin " + (scratch / "no.csv").string(), "no such file"}}) {
     testing::expect_refused("birdseye", command(scratch, arguments), {words}, scratch / "tip.txt");
   }
+}
+
+TEST(CalibrateTip, WhatWouldBeOfNoEffectIsRefusedByName) {
+  const Scratch scratch;
+  const std::string good = scratch.file("p.csv", csv_of(SimulatedPointer().poses(40)));
+  for (const char* option : {"--bird pointer", "--seconds 5", "--tool Stylus", "--transform StylusToTracker"}) {
+    testing::expect_refused("birdseye", command(scratch, good) + " " + option,
+                            {std::string(option).substr(0, 6), "leave"}, scratch / "tip.txt");
+  }
+  for (const char* option : {"--reference ReferenceToTracker", "--unit m", "--max-error 1", "--time-unit ms"}) {
+    const std::string name = std::string(option).substr(0, std::string(option).find(' '));
+    testing::expect_refused("birdseye", "calibrate tip --server 127.0.0.1:1 " + std::string(option),
+                            {name + " goes with --poses"});
+  }
+}
+
+TEST(CalibrateTip, OfSeveralToolsInATableOneMustBeNamed) {
+  const Scratch scratch;
+  SimulatedPointer pointer{.position_noise_mm = 0.2};
+  SimulatedPointer other{.tip_mm = {40, 8, -90}, .pivot_mm = {100, 300, 70}};
+  std::string text = "tool,t,x,y,z,qx,qy,qz,qw\n";
+  const auto of_pointer = pointer.poses(60), of_other = other.poses(60);
+  for (std::size_t i = 0; i < of_pointer.size(); ++i)
+    text += "Pointer," + csv_row(of_pointer[i]) + "Scope," + csv_row(of_other[i]);
+  const std::string mixed = command(scratch, scratch.file("p.csv", text));
+  testing::expect_refused("birdseye", mixed, {"p.csv", "--tool NAME", "Pointer (60 rows), Scope (60 rows)"},
+                          scratch / "tip.txt");
+  const auto one = run("birdseye", mixed + " --tool Pointer");
+  ASSERT_EQ(one.code, 0) << one.output;
+  EXPECT_LT((vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]) - pointer.tip_mm).norm(), 0.5);
+}
+
+TEST(CalibrateTip, InvertedPosesFailUntilSomebodySaysWhichWayTheyGo) {
+  const Scratch scratch;
+  SimulatedPointer pointer{.position_noise_mm = 0.2};
+  auto poses = pointer.poses(60);
+  for (PivotPose& pose : poses) {
+    const auto back = pose.tracker_from_sensor.inverse();
+    pose.tracker_from_sensor = {back.rotation(), back.translation()};
+  }
+  const std::string inverted = command(scratch, scratch.file("p.csv", csv_of(poses)));
+  const auto doubted = run("birdseye", inverted);
+  EXPECT_EQ(doubted.code, 3) << doubted.output;
+  EXPECT_NE(doubted.output.find("the poses seem to be inverted"), std::string::npos) << doubted.output;
+  EXPECT_NE(doubted.output.find("say --poses-are sensor_from_tracker"), std::string::npos) << doubted.output;
+  EXPECT_FALSE(fs::exists(scratch / "tip.txt"));
+  const auto told = run("birdseye", inverted + " --poses-are sensor_from_tracker");
+  ASSERT_EQ(told.code, 0) << told.output;
+  EXPECT_LT((vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]) - pointer.tip_mm).norm(), 0.5);
+  // Who says that they are right is believed.
+  EXPECT_EQ(run("birdseye", inverted + " --poses-are tracker_from_sensor").code, 0);
+}
+
+TEST(CalibrateTip, QuaternionsWithWFirstAreTold) {
+  const Scratch scratch;
+  std::string text = "t,x,y,z,qx,qy,qz,qw\n";
+  for (const PivotPose& pose : SimulatedPointer{.position_noise_mm = 0.2}.poses(60)) {
+    const Eigen::Vector3d& p = pose.tracker_from_sensor.translation();
+    const Eigen::Quaterniond q = pose.tracker_from_sensor.quaternion();
+    text += fmt::format("{},{},{},{},{},{},{},{}\n", pose.time_s, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z());
+  }
+  const auto told = run("birdseye", command(scratch, scratch.file("p.csv", text)));
+  EXPECT_EQ(told.code, 3) << told.output;
+  EXPECT_NE(told.output.find("the quaternions seem to have w first"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("name the columns in a header: qw,qx,qy,qz"), std::string::npos) << told.output;
+  EXPECT_EQ(
+      run("birdseye", command(scratch, scratch.file("w.csv", "t,x,y,z,qw,qx,qy,qz" + text.substr(text.find('\n')))))
+          .code,
+      0);
+}
+
+TEST(CalibrateTip, CentimetresAreDoubtedUntilTheyAreSaid) {
+  const Scratch scratch;
+  SimulatedPointer pointer{.position_noise_mm = 0.2};
+  const std::string cm = command(scratch, scratch.file("p.csv", csv_of(pointer.poses(60), 0.1)));
+  const auto doubted = run("birdseye", cm);
+  EXPECT_EQ(doubted.code, 0) << doubted.output;
+  EXPECT_NE(doubted.output.find("verdict: marginal"), std::string::npos) << doubted.output;
+  EXPECT_NE(doubted.output.find("--unit cm or --unit in"), std::string::npos) << doubted.output;
+  const auto told = run("birdseye", cm + " --unit cm");
+  EXPECT_NE(told.output.find("verdict: pass"), std::string::npos) << told.output;
+  EXPECT_LT((vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]) - pointer.tip_mm).norm(), 0.5);
 }
 
 TEST(CalibrateTip, RealRecordingsHaveTheirPublishedAnswers) {

@@ -83,7 +83,8 @@ TEST(Commands, VolumeInfoListsSeriesAndLooksAtTheOneThatIsNamed) {
   EXPECT_EQ(read_json(json_path)["hu_max"], 20);
   const auto none = run("birdseye", "volume info " + folder + " --series portal");
   EXPECT_EQ(none.code, 2);
-  EXPECT_NE(none.output.find("--series portal fits none of 1a, 1b"), std::string::npos) << none.output;
+  EXPECT_NE(none.output.find("--series portal: there is no such series; name one of 1a, 1b"), std::string::npos)
+      << none.output;
   const auto both = run("birdseye", "volume info " + folder + " --series 1");
   EXPECT_EQ(both.code, 2);
   EXPECT_NE(both.output.find("--series 1 fits 2 (1a, 1b)"), std::string::npos) << both.output;

@@ -74,6 +74,34 @@ TEST(FieldCommand, FromTheTableToTheAppliance) {
   EXPECT_EQ(checked.code, 0) << checked.output;
 }
 
+TEST(FieldCommand, LengthsInOtherUnitsAreTakenWhereTheyAreSaid) {
+  const Scratch scratch;
+  const auto samples = testing::grid_samples(hw_sim::FieldDistortion(10, 6), {}, 6);
+  std::string metres, headed = "name,true_x [cm],true_y [cm],true_z [cm],tx (m),ty (m),tz (m)\n";
+  std::string mm = "name,true_x,true_y,true_z,x,y,z\n";
+  metres = mm;
+  for (const auto& sample : samples) {
+    const Eigen::Vector3d &truth = sample.true_mm, &seen = sample.measured.translation();
+    mm += fmt::format("a,{},{},{},{},{},{}\n", truth.x(), truth.y(), truth.z(), seen.x(), seen.y(), seen.z());
+    metres += fmt::format("a,{},{},{},{},{},{}\n", truth.x(), truth.y(), truth.z(), seen.x() / 1000, seen.y() / 1000,
+                          seen.z() / 1000);
+    headed += fmt::format("a,{},{},{},{},{},{}\n", truth.x() / 10, truth.y() / 10, truth.z() / 10, seen.x() / 1000,
+                          seen.y() / 1000, seen.z() / 1000);
+  }
+  const std::string common = "calibrate field --json " + (scratch / "r.json").string() + " --grid ";
+  const auto held_out_mm = [&](const std::string& arguments) {
+    const auto made = run("birdseye", common + arguments);
+    EXPECT_EQ(made.code, 0) << made.output;
+    return read_json(scratch / "r.json")["held_out_mm"].get<double>();
+  };
+  const double truth_mm = held_out_mm(scratch.file("mm.csv", mm));
+  EXPECT_NEAR(held_out_mm(scratch.file("m.csv", metres) + " --unit m"), truth_mm, 1e-6);
+  EXPECT_NEAR(held_out_mm(scratch.file("h.csv", headed)), truth_mm, 1e-6);
+  expect_refused("birdseye", common + scratch.file("u.csv", metres), {"--unit m"});
+  expect_refused("birdseye", common + scratch.file("o.csv", mm) + " --tool a", {"--tool goes with --poses or --pair"});
+  expect_refused("birdseye", common + scratch.file("o.csv", mm) + " --distance 9", {"--distance goes with --pair"});
+}
+
 TEST(FieldCommand, PosesInTheOrderOfTheNodes) {
   const Scratch scratch;
   const hw_sim::FieldDistortion field(10, 2);
@@ -267,6 +295,11 @@ TEST(FieldCheckCommand, InputThatCannotBeUsedIsRefusedAndNoDayIsAdded) {
   expect_refused("birdseye", common + scratch.file("b.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\n"), {"2 places"},
                  history);
   expect_refused("birdseye", common + scratch.file("c.csv", "name,x,y,z\nd1,0,zero,0\n"), {"c.csv:2"}, history);
+  std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nfirst-day,0.1,0,0.1,d1\n";
+  expect_refused("birdseye",
+                 common + scratch.file("t.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n") +
+                     " --when 'first day'",
+                 {"h.csv", "has a day first-day already", "--when"});
   std::ofstream(history) << "when,rms_mm,scale_percent,worst_mm,worst_place\nmonday,much,0,0,d1\n";
   expect_refused("birdseye", common + scratch.file("d.csv", "name,x,y,z\nd1,0,0,0\nd2,80,0,0\nd3,0,80,0\nd4,80,80,0\n"),
                  {"h.csv:2"});

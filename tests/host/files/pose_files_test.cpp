@@ -207,7 +207,7 @@ TEST(PoseFiles, RefusalsSayWhatToDo) {
         {scratch.file("none.mha", sequence({})), std::string(), "holds no transforms"},
         {scratch.file("e.csv", ""), std::string(), "holds no poses"},
         {scratch.file("h.csv", "t,x,y,z,qx,qy,qz\n"), std::string(), "its header lacks qw"},
-        {scratch.file("b.csv", "0,1\n"), std::string(), "none of 1 poses can be used; line 1: 2 numbers"},
+        {scratch.file("b.csv", "0,1\n"), std::string(), "its one pose cannot be used; line 1: 2 numbers"},
         {(scratch / "no.csv").string(), std::string(), "no such file"},
         {(scratch / "empty").string(), std::string(), "has no files *.txt"}}) {
     const auto set = read_pose_set(path, {transform});

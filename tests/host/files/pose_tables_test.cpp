@@ -5,6 +5,7 @@
 #include "calibration/field/field_fit.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/field_files.hpp"
+#include "host/files/pose_collector.hpp"
 #include "host/files/pose_files.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/simulated_field.hpp"
@@ -71,7 +72,8 @@ TEST(PoseTables, HeadersOfOtherPrograms) {
     EXPECT_NEAR(set->poses[1].time_s - set->poses[0].time_s, apart_s, 1e-6) << text;
   }
   EXPECT_NE(joined(read(std::get<0>(tables[3]))->notes).find("decimal commas"), std::string::npos);
-  EXPECT_NE(joined(read(std::get<0>(tables[4]))->notes).find("header comes again in 1 later lines"), std::string::npos);
+  EXPECT_NE(joined(read(std::get<0>(tables[4]))->notes).find("header comes again in 1 later line, passed over"),
+            std::string::npos);
 }
 
 TEST(PoseTables, AUnitOfLengthThatIsNotReadIsRefusedByName) {
@@ -104,6 +106,8 @@ TEST(PoseTables, NamesOfColumns) {
                                      {"x_mm", PoseColumn::x},
                                      {"position.z", PoseColumn::z},
                                      {"Q0", PoseColumn::qw},
+                                     {"q1", PoseColumn::qx},
+                                     {"q3", PoseColumn::qz},
                                      {"orientation.w", PoseColumn::qw},
                                      {" Qx ", PoseColumn::qx},
                                      {"T_y [m]", PoseColumn::y},
@@ -113,6 +117,114 @@ TEST(PoseTables, NamesOfColumns) {
     EXPECT_FALSE(pose_column(column_name(text))) << text;
   EXPECT_EQ(column_name("x [m]").unit, "m");
   EXPECT_EQ(column_name("t_ns").unit, "ns");
+}
+
+/// Two tools, row after row, under a header with the column that names them.
+std::string of_two_tools(const std::string& column, const std::vector<std::string>& names) {
+  std::string text = fmt::format("t,{},x,y,z,qx,qy,qz,qw\n", column);
+  for (int n = 0; n < 6; ++n) {
+    const auto tool = static_cast<std::size_t>(n % 2);
+    text += fmt::format("{},{},{},{},3,0,0,0,1\n", 0.1 * (n / 2), names[tool], 10 * n, tool);
+  }
+  return text;
+}
+
+TEST(PoseTables, OfSeveralToolsOneMustBeNamed) {
+  for (const char* column : {"tool", "Tool Name", "rigid_body", "sensor_id", "port", "marker_id", "id", "name"}) {
+    const std::string text = of_two_tools(column, {"8700339", "Scope"});
+    const auto mixed = read(text);
+    ASSERT_FALSE(mixed) << column;
+    for (const char* words : {"p.csv", "--tool NAME", "8700339 (3 rows), Scope (3 rows)", column})
+      EXPECT_NE(mixed.error().what.find(words), std::string::npos) << mixed.error().what;
+    const auto one = read(text, {.transform = "scope"});
+    ASSERT_TRUE(one) << one.error().what;
+    ASSERT_EQ(one->poses.size(), 3U) << joined(one->rejected);
+    EXPECT_EQ(one->poses[1].tracker_from_sensor.translation(), Eigen::Vector3d(30, 1, 3));
+    EXPECT_EQ(one->poses[1].index, 1U);
+    EXPECT_TRUE(one->rejected.empty()) << joined(one->rejected);
+    EXPECT_NE(joined(one->notes).find("the poses of Scope are read; 3 other rows"), std::string::npos);
+    const auto none = read(text, {.transform = "Pointer", .option_prefix = "board-"});
+    ASSERT_FALSE(none);
+    EXPECT_NE(none.error().what.find("has no tool Pointer"), std::string::npos) << none.error().what;
+  }
+  const auto said = read(of_two_tools("tool", {"A", "B"}), {.option_prefix = "board-"});
+  ASSERT_FALSE(said);
+  EXPECT_NE(said.error().what.find("--board-tool NAME"), std::string::npos) << said.error().what;
+}
+
+TEST(PoseTables, ANameThatCannotApplyIsRefused) {
+  const auto table = read("t,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n", {.transform = "Scope"});
+  ASSERT_FALSE(table);
+  EXPECT_NE(table.error().what.find("--tool Scope"), std::string::npos) << table.error().what;
+  const Scratch scratch;
+  (void)scratch.file("a.txt", "1 0 0 1 0 1 0 2 0 0 1 3 0 0 0 1\n");
+  const auto folder = read_pose_set(scratch.path(), {.transform = "Scope"});
+  ASSERT_FALSE(folder);
+  EXPECT_NE(folder.error().what.find("--tool Scope"), std::string::npos) << folder.error().what;
+  // Names of rows, one of each, are no tools.
+  const std::string named = "name,x,y,z,qx,qy,qz,qw\nview1.png,1,2,3,0,0,0,1\nview2.png,4,5,6,0,0,0,1\n";
+  EXPECT_EQ(read(named)->poses.size(), 2U);
+  EXPECT_FALSE(read(named, {.transform = "view1.png"}));
+  // One tool alone need not be named.
+  const auto only = read("tool,x,y,z,qx,qy,qz,qw\nScope,1,2,3,0,0,0,1\nScope,4,5,6,0,0,0,1\n");
+  ASSERT_TRUE(only) << only.error().what;
+  EXPECT_EQ(only->poses.size(), 2U);
+}
+
+TEST(PoseTables, TimesTooLargeForSecondsAreCountedInSmallerUnits) {
+  for (const double per_s : {1.0, 1e3, 1e6, 1e9}) {
+    const auto set =
+        read(fmt::format("{:.0f},1,2,3,0,0,0,1\n{:.0f},4,5,6,0,0,0,1\n", 1.5e9 * per_s, 1.5e9 * per_s + 2 * per_s));
+    ASSERT_TRUE(set) << set.error().what;
+    EXPECT_NEAR(set->poses[1].time_s - set->poses[0].time_s, 2, 1e-5) << per_s;
+  }
+}
+
+TEST(PoseTables, TimesOfNoTrackersRateNeedAUnit) {
+  std::string text;
+  for (int n = 0; n < 30; ++n) text += fmt::format("{},{},2,3,0,0,0,1\n", 25'000 * n, n);  // microseconds
+  const auto refused = read(text);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("--time-unit"), std::string::npos) << refused.error().what;
+  const auto told = read(text, {.s_per_unit = 1e-6});
+  ASSERT_TRUE(told) << told.error().what;
+  EXPECT_NEAR(told->poses.back().time_s, 29 * 0.025, 1e-9);
+  EXPECT_TRUE(read("t [us],x,y,z,qx,qy,qz,qw\n" + text));
+}
+
+TEST(PoseTables, RowsThatShareTheirTimesAreTold) {
+  std::string text;
+  for (int n = 0; n < 40; ++n) text += fmt::format("{},{},2,3,0,0,0,1\n", n / 2, n);
+  const auto set = read(text);
+  ASSERT_TRUE(set) << set.error().what;
+  EXPECT_NE(joined(set->notes).find("20 of 40 rows have the time of another row: has the file poses of several tools"),
+            std::string::npos)
+      << joined(set->notes);
+  EXPECT_EQ(by_kind(set->rejected).size(), 1U);
+  EXPECT_NE(by_kind(set->rejected).front().find("(and 19 more like it)"), std::string::npos);
+}
+
+TEST(PoseTables, PosesTheOtherWayRoundAreInverted) {
+  const auto set = read("1,2,3,0,0,0.7071068,0.7071068\n", {.inverted = true});
+  ASSERT_TRUE(set) << set.error().what;
+  EXPECT_LT((set->poses[0].tracker_from_sensor * Eigen::Vector3d(1, 2, 3)).norm(), 1e-5);
+}
+
+TEST(PoseTables, AFolderOfTablesOfOneRowEachIsRead) {
+  const Scratch scratch;
+  for (const int n : {10, 9})
+    (void)scratch.file(fmt::format("pose_{}.csv", n), fmt::format("x,y,z,qx,qy,qz,qw\n{},2,3,0,0,0,1\n", n));
+  (void)scratch.file("pose_11.csv", "1,0,0,11\n0,1,0,2\n0,0,1,3\n0,0,0,1\n");
+  const auto set = read_pose_set(scratch.path());
+  ASSERT_TRUE(set) << set.error().what;
+  ASSERT_EQ(set->poses.size(), 3U) << joined(set->rejected);
+  for (const int n : {0, 1, 2}) {
+    const auto at = static_cast<std::size_t>(n);
+    EXPECT_EQ(set->poses[at].tracker_from_sensor.translation().x(), 9 + n);
+  }
+  (void)scratch.file("pose_12.csv", "1,2,3,0,0,0,1\n4,5,6,0,0,0,1\n");
+  EXPECT_EQ(joined(read_pose_set(scratch.path())->rejected),
+            "pose_12.csv: 2 rows where each file of a folder holds one pose\n");
 }
 
 const std::string kNdiHeader =
@@ -204,7 +316,7 @@ TEST(NdiLogs, UnitsInTheHeaderAndDecimalCommas) {
 
 TEST(NdiLogs, RefusalsNameTheTools) {
   for (const auto& [text, tool, words] :
-       {std::tuple{ndi_log(), "", "(--transform); it holds Port 1 (8700339), Port 2 (8700340)"},
+       {std::tuple{ndi_log(), "", "(--tool); it holds Port 1 (8700339), Port 2 (8700340)"},
         {ndi_log(), "Port 3", "has no tool Port 3; it holds Port 1"},
         {kNdiHeader, "", "holds no poses"},
         {std::string("Tools,Port 1,State,Q0,Qx,Qy\n1,a,OK,1,0,0\n"), "", "the columns of its tool 1 are not"}}) {
