@@ -253,6 +253,8 @@ FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Searc
     even.legacy = true;
     const LayoutEvidence counts{joined_in(predictions), joined_in(predict(even, ids, quads))};
     if (counts.is_other()) {
+      const auto other = recount(pattern, ids, quads, counts.joined);
+      if (other && other->pattern.columns != pattern.columns) return miscounted(pattern, *other);
       FoundPattern none;
       none.failure = fmt::format(
           "the tags lie as in the old layout of an even count of rows, {} or {}, not {}: count the board's rows of "
@@ -264,9 +266,10 @@ FoundPattern find_charuco(const Pattern& pattern, const GreyView& picture, Searc
   FoundPattern found = corners_between(pattern, picture, predictions);
   found.layout = layout;
   const std::size_t corners = found.ids.size();
-  if (corners >= kLeastCorners) return found;
+  // By wrong counts some tags still lie beside their neighbours: corners enough, and each with a wrong place.
   if (const auto other = recount(pattern, ids, quads, std::max(0, joined_in(predictions))))
     return miscounted(pattern, *other);
+  if (corners >= kLeastCorners) return found;
   cv::Mat mirrored;
   std::vector<int> mirrored_ids;
   if (search == Search::thorough) {

@@ -102,7 +102,8 @@ std::string counted_otherwise(const Pattern& pattern, const cv::Mat& grey) {
     return fmt::format("a chessboard of {}x{} inner corners is seen where {}x{} are expected: {}", size.width,
                        size.height, pattern.columns, pattern.rows,
                        squares ? "squares were counted; give its inner corners in --board"
-                               : "give its inner corners in --board, unless its border is covered");
+                               : "it is another board, or its border is covered; give its inner corners in "
+                                 "--board");
   }
   return {};
 }

@@ -64,8 +64,12 @@ def operation(options, folder):
     made, kept = folder / "made", folder / "operation"
     window(options, ["--simulate", "--out", made, "--look-s", "600"], KEYS, folder)
     kept.mkdir()
-    for name in ("operation.json", "field.mha"):
-        shutil.copy(made / name, kept)
+    shutil.copy(made / "field.mha", kept)
+    sheet = json.loads((made / "operation.json").read_text())
+    for found in (sheet.get("calibrated", {}), sheet.get("registered", {})):  # with instruments of another cart
+        found.pop("tracker", None)
+        found.pop("camera", None)
+    (kept / "operation.json").write_text(json.dumps(sheet))
     x, y, z = json.loads((made / "phantom" / "truth.json").read_text())["liver_centre_mm"]
     (kept / "patient_from_tracker.txt").write_text(f"1 0 0 {x - 400}\n0 1 0 {y}\n0 0 1 {z}\n0 0 0 1\n")
     # 130 mm before it, looking at it.
@@ -105,7 +109,7 @@ port = 18977
         figures = window(options, [
             "--server", "127.0.0.1:18977", "--ct", phantom / "ct", "--labels", phantom / "segmentation.nii.gz", "--show",
             "2,3,4", "--organ", "1,2,3,4", "--targets", "4", "--resume", folder / "operation", "--out", folder / "out"],
-            f"wait connect 30\nsleep 5\nkey 6\nkey space\nwait run 5\nsleep {options.seconds + 4}\nend\n", folder)
+            f"wait connect 30\nsleep 5\nkey space\nsleep 1.2\nkey space\nsleep 1.2\nkey 6\nkey space\nwait run 5\nsleep {options.seconds + 4}\nend\n", folder)
     finally:
         for program in running:
             program.terminate()

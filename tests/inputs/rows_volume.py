@@ -72,7 +72,7 @@ def missing_slice(folder):
 
 def doubled_slice(folder):
     series(folder)
-    dicom.write(folder / "ct" / "again.dcm", dicom.ct_slice(volumes.slice_bytes(9), volumes.COLUMNS, volumes.ROWS,
+    dicom.write(folder / "ct" / "again.dcm", dicom.ct_slice(volumes.slice_bytes(8), volumes.COLUMNS, volumes.ROWS,
                                                             volumes.place(0, 0, 9), instance=10))
 
 

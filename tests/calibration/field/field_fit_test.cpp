@@ -284,7 +284,7 @@ TEST(FieldFit, InputThatCannotBeUsedIsNamed) {
   EXPECT_NE(what(fit_field(grid_samples(field, {3, 3, 2}, 1))).find("18 samples"), std::string::npos);
   auto metres = grid_samples(field, {}, 1);
   for (FieldSample& s : metres) s.true_mm /= 1000;
-  EXPECT_NE(what(fit_field(metres)).find("both in mm"), std::string::npos) << what(fit_field(metres));
+  EXPECT_NE(what(fit_field(metres)).find("--unit m"), std::string::npos) << what(fit_field(metres));
   auto flat = grid_samples(field, {}, 1);
   std::erase_if(flat, [](const FieldSample& s) { return std::abs(s.measured.translation().z()) > 20; });
   EXPECT_NE(what(fit_field(flat)).find("along each axis"), std::string::npos) << what(fit_field(flat));

@@ -112,7 +112,7 @@ TEST(HandEyeInput, InvertedPoses) {
     const auto inverse = s.tracker_from_sensor.inverse();
     s.tracker_from_sensor = {inverse.rotation(), inverse.translation()};
   }
-  expect_fail(bench.input, "seem to be inverted", "tracker_from_sensor");
+  expect_fail(bench.input, "seem to be inverted", "--poses-are sensor_from_tracker");
 }
 
 TEST(HandEyeInput, ABoardOfAnotherSize) {

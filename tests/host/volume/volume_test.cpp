@@ -175,12 +175,18 @@ TEST(Import, RefusesFoldersThatAreNoStack) {
   make("a", 1);
   make("b", 2);
   fs::copy_file(scratch / "b/0001.dcm", scratch / "a/other.dcm");
+  fs::copy_file(scratch / "b/0002.dcm", scratch / "a/another.dcm");
   expect_refused(scratch / "a", "2 series");
   make("missing", 1);
   fs::remove(scratch / "missing/0002.dcm");
   expect_refused(scratch / "missing", "missing or unevenly spaced");
   make("doubled", 1);
   fs::copy_file(scratch / "doubled/0002.dcm", scratch / "doubled/again.dcm");
+  {
+    std::fstream again(scratch / "doubled/again.dcm", std::ios::binary | std::ios::in | std::ios::out);
+    again.seekp(-1, std::ios::end);
+    again.put('\x01');  // of a pixel: not the same file twice
+  }
   expect_refused(scratch / "doubled", "same place");
 }
 
