@@ -22,6 +22,7 @@ using Vectors = std::vector<Eigen::Vector3d>;
 
 constexpr std::size_t kFewestSamples = 30;
 constexpr double kLeastScale = 0.8, kMostScale = 1.25;
+constexpr double kLeastSpreadRatio = 0.2;  // further from 1 than places that are missing, or wrong, have it
 constexpr int kScreenings = 12;
 
 struct MeasuredGrid {
@@ -236,6 +237,28 @@ FieldMap no_map(const FieldFunctions& box) {
   return *FieldMap::from(std::move(data));
 }
 
+Error other_lengths(double scale) {
+  return {Errc::bad_value,
+          fmt::format("the tracker has distances {:.4g} times those of the grid, which are in mm: say the unit of "
+                      "the tracker's (--unit m, cm or in), and see that the grid's step is right",
+                      scale)};
+}
+
+/// How far the measured places lie from their middle, as a multiple of how far the true ones do; root mean square.
+double spread_ratio(std::span<const FieldSample> samples) {
+  Eigen::Vector3d measured_mm = Eigen::Vector3d::Zero(), true_mm = Eigen::Vector3d::Zero();
+  for (const FieldSample& s : samples) {
+    measured_mm += s.measured.translation() / static_cast<double>(samples.size());
+    true_mm += s.true_mm / static_cast<double>(samples.size());
+  }
+  double measured = 0, truth = 0;
+  for (const FieldSample& s : samples) {
+    measured += (s.measured.translation() - measured_mm).squaredNorm();
+    truth += (s.true_mm - true_mm).squaredNorm();
+  }
+  return std::sqrt(measured / truth);
+}
+
 }  // namespace
 
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings) {
@@ -250,16 +273,14 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
   }
   grid.used.assign(samples.size(), true);
   grid.wanted_mm.resize(samples.size());
+  // Before the places' box: by lengths in m it is too small, and the words would be of that.
+  if (const double ratio = spread_ratio(samples); ratio < kLeastSpreadRatio || ratio > 1 / kLeastSpreadRatio)
+    return other_lengths(ratio);
   auto box = detail::box_of(grid.measured_mm);
   if (!box) return box.error();
   FieldFit fit{no_map(*box)};
   if (const auto aligned = align(samples, grid, fit); !aligned) return aligned.error();
-  if (fit.scale < kLeastScale || fit.scale > kMostScale)
-    return Error{
-        Errc::bad_value,
-        fmt::format("the tracker has distances {:.4g} times those of the grid, which are in mm: say the unit of "
-                    "the tracker's (--unit m, cm or in), and see that the grid's step is right",
-                    fit.scale)};
+  if (fit.scale < kLeastScale || fit.scale > kMostScale) return other_lengths(fit.scale);
   for (const Eigen::Vector3d& p : grid.measured_mm) grid.fold.push_back(detail::fold_of(*box, p));
 
   FieldFunctions first = *box;  // smooth enough for wrong places to stand out, and of few parameters

@@ -111,7 +111,8 @@ void judge_shape(Verdict& verdict, const FiducialsFound& out) {
                             shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
                 "touch one more marker, off the plane of the others");
   }
-  if (shape.scale_chance < kChanceOfScale && fre_mm < kLargestFre_mm) {
+  // A touch that is off makes a scale of its own.
+  if (shape.scale_chance < kChanceOfScale && fre_mm < kLargestFre_mm && out.odd.named.empty()) {
     verdict.add(shape.scale_chance < kLeastChanceOfScale ? Grade::fail : Grade::marginal,
                 fmt::format("lengths in the CT are {:.4g} times those that were touched (sigma {:.2g})", shape.scale,
                             shape.scale_sigma),

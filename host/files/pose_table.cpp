@@ -284,10 +284,11 @@ Result<std::optional<Chosen>> choose_tool(const fs::path& path, const PoseReadin
   const std::string& wanted = how.transform;
   if (!*column) {
     if (wanted.empty()) return std::optional<Chosen>();
-    return Error{Errc::bad_value,
-                 fmt::format("{}: --{}tool {}: no column of this table says whose pose a row is, as one named tool "
-                             "would: leave the option out if all rows are of one tool",
-                             path.string(), how.option_prefix, wanted)};
+    return Error{
+        Errc::bad_value,
+        fmt::format("{}: --{}tool (or --transform) {}: no column of this table says whose pose a row is: leave the "
+                    "option out if all rows are of one tool",
+                    path.string(), how.option_prefix, wanted)};
   }
   const auto& names = (*column)->rows;
   if (wanted.empty() && names.size() == 1) return std::optional<Chosen>(Chosen{(*column)->at, names.begin()->first});

@@ -171,7 +171,7 @@ TEST(Commands, RegisterFiducialsRefusesBadInputInOneLine) {
   refuse(two, two, {"two.txt", "at least three"});
   refuse(line, line, {"line.txt", "on a line"});
   refuse(four, two, {"four.txt", "same points"});
-  refuse(scratch.file("word.txt", "0 0 0\n1 2 x\n"), four, {"word.txt", "line 2", "\"x\""});
+  refuse(scratch.file("word.txt", "0 0 0\n1 2 x\n"), four, {"word.txt", "line 2", "2 numbers"});
   refuse(scratch.file("short.txt", "0 0 0\n1 2\n"), four, {"short.txt", "line 2"});
 }
 

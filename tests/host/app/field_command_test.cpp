@@ -120,7 +120,7 @@ TEST(FieldCommand, PosesInTheOrderOfTheNodes) {
   EXPECT_EQ(r["rejected"].size(), 1U);
   expect_refused("birdseye", common + "6x6x6:100x96x100mm", {"180 poses for 216 nodes"});
   expect_refused("birdseye", common + "6x6x5", {"6x6x5:100mm"});
-  expect_refused("birdseye", common + "6x6x5:0.1x0.096x0.1mm", {"both in mm"});
+  expect_refused("birdseye", common + "6x6x5:0.1x0.096x0.1mm", {"--unit m"});
 }
 
 TEST(FieldCommand, TwoSensorsOnABar) {

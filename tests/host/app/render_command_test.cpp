@@ -206,7 +206,7 @@ TEST(RenderCommand, FilmsAndRestrictsToLabels) {
   EXPECT_GT(fs::file_size(scratch / "k.mp4"), 1000U);
   expect_refused("birdseye",
                  "render --volume " + ct + " --labels " + labels + " --keep 9 --out " + (scratch / "n.png").string(),
-                 {"l.nii.gz", "none of 9"}, scratch / "n.png");
+                 {"l.nii.gz", "hold no voxel of 9"}, scratch / "n.png");
 }
 
 /// All frames of a film, or a picture, as raw RGB.
