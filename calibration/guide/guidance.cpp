@@ -11,7 +11,7 @@
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/lens_fold.hpp"
 #include "calibration/geometry/rotations.hpp"
-#include "calibration/guide/guidance_words.hpp"
+#include "calibration/guide/scope_move.hpp"
 
 namespace birdseye::calibration {
 
@@ -249,17 +249,14 @@ NextPose next_best_pose(std::span<const Station> all, const CameraModel& camera,
   const ScopeView straight{.distance_mm = search.working_mm, .from_behind = search.from_behind};
   const Transform<Camera, Marker> from = now.value_or(pose_of(straight, search.centre_mm, {0, 0}));
   const std::vector<Transform<Camera, Marker>> poses = poses_to_compare(search, stations);
-  if (poses.empty()) {
-    return {from, "bring the whole board into the picture: draw back, or take a smaller board", 0};
-  }
+  if (poses.empty()) return {from, std::nullopt, !now, 0};
   const StationInformation information = information_of(search, stations, noise);
   std::vector<double> errors_mm;
   errors_mm.reserve(poses.size());
   for (const auto& pose : poses) errors_mm.push_back(information.expected_error_mm(pose));
   const double before_mm = information.expected_error_mm();
   const std::size_t chosen = nearest_good(poses, errors_mm, before_mm, from, search.working_mm);
-  const std::string words = words_for(from, poses[chosen], camera, search.centre_mm);
-  return {poses[chosen], now ? words : "from straight before the board, its x axis to the right: " + words,
+  return {poses[chosen], move_between(from, poses[chosen], camera, search.centre_mm), !now,
           1 - errors_mm[chosen] / before_mm};
 }
 

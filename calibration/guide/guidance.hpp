@@ -8,6 +8,7 @@
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/guide/scope_move.hpp"
 #include "calibration/guide/station_information.hpp"
 
 namespace birdseye::calibration {
@@ -46,9 +47,11 @@ std::string coverage_line(const Coverage& coverage);
 
 struct NextPose {
   Transform<Camera, Marker> camera_from_marker;
-  std::string words;  ///< what to do, from where the scope is now (words_for)
-  /// The part by which one more station there is expected to shrink the hand-eye's error, in [0, 1]. 0 where no pose
-  /// shows enough of the board; the words then say what to do first.
+  /// What to do, from where the scope is now; where that is not known, from straight before the board, its x axis to
+  /// the right. Empty: no pose shows enough of the board, which is to be brought into the picture first.
+  std::optional<ScopeMove> move;
+  bool from_straight = false;  ///< where the scope is now is not known
+  /// The part by which one more station there is expected to shrink the hand-eye's error, in [0, 1]. 0 without a move.
   double gain = 0;
 };
 
@@ -59,8 +62,8 @@ struct NextPose {
 /// best, the one nearest to the scope is taken. Directions within 15 degrees of a station's are left out while there
 /// are others, because a tracker repeats its error there. A pose must show at least as much of the board as the station
 /// that saw least of it; all of the board where there are no stations. board_extent_mm: from the board's first point to
-/// its last, along its x and y; its frame begins at the first. now: where the scope is; without it the words start from
-/// a view straight onto the board. Poses that are not finite are passed over.
+/// its last, along its x and y; its frame begins at the first. now: where the scope is. Poses that are not finite are
+/// passed over.
 NextPose next_best_pose(std::span<const Station> stations, const CameraModel& camera,
                         const Eigen::Vector3d& board_extent_mm, const std::optional<Transform<Camera, Marker>>& now,
                         const StationNoise& noise = {});

@@ -13,6 +13,7 @@
 #include "device/birdseyed/service.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/service_signals.hpp"
+#include "drivers/system/starter.hpp"
 #include "drivers/system/wait.hpp"
 
 namespace {
@@ -95,7 +96,7 @@ int main(int argc, char** argv) {
   CLI::App app{"birdseyed: tracker and camera of a laparoscope cart, on one clock, over OpenIGTLink", "birdseyed"};
   fs::path config_path, recording;
   app.set_version_flag("--version", "birdseyed " BIRDSEYE_VERSION);
-  bool check_only = false, probe_only = false;
+  bool check_only = false, probe_only = false, end_with_stdin = false;
   app.add_option("--config", config_path, "configuration file (TOML)")->required();
   CLI::Option* const check =
       app.add_flag("--check", check_only, "read the configuration, say whether it is sound, and end");
@@ -105,6 +106,8 @@ int main(int argc, char** argv) {
   app.add_option("--replay", recording, "an appliance recording, to be published in place of instruments")
       ->excludes(check)
       ->excludes(probe);
+  app.add_flag("--end-with-stdin", end_with_stdin,
+               "end when standard input is closed: for a program that starts this one");
   return run_program<CLI::ParseError>(app, argc, argv, [&] {
     if (check_only) {
       const auto config = device::read_config(config_path);
@@ -115,6 +118,7 @@ int main(int argc, char** argv) {
     spdlog::set_default_logger(
         std::make_shared<spdlog::logger>("birdseyed", std::make_shared<device::PatientStderr>()));
     ServiceSignals signals;
+    const OwnedThread watch = end_with_stdin ? end_with_standard_input() : OwnedThread();
     if (probe_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());

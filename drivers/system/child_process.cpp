@@ -24,7 +24,7 @@ constexpr Duration kGrace = Duration::from_ms(2000);  // to end by itself, once 
 }  // namespace
 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, const std::filesystem::path& log,
-                                         Pipe pipe, Signals signals) {
+                                         Pipe pipe, Signals signals, Life life) {
   birdseye::Pipe ends;
   if (pipe != Pipe::none) {
     auto opened = birdseye::Pipe::open();
@@ -35,12 +35,21 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   UniqueFd ours = std::move(child_writes ? ends.out : ends.in);
   const UniqueFd theirs = std::move(child_writes ? ends.in : ends.out);
 
+  birdseye::Pipe lifeline;
+  if (life == Life::ours) {
+    auto opened = birdseye::Pipe::open();
+    if (!opened) return std::move(opened).error();
+    lifeline = *std::move(opened);
+  }
+
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   const int log_flags = O_WRONLY | O_CREAT | O_APPEND;
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(), log_flags, 0644);
   if (pipe == Pipe::stdin_to_child) {
     posix_spawn_file_actions_adddup2(&actions, theirs.get(), STDIN_FILENO);
+  } else if (life == Life::ours) {
+    posix_spawn_file_actions_adddup2(&actions, lifeline.out.get(), STDIN_FILENO);
   } else {
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   }
@@ -66,12 +75,13 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
     return Error{Errc::not_found, fmt::format("{}: cannot be started; is it built and installed?", command[0])};
   }
   if (ours) ::fcntl(ours.get(), F_SETFL, O_NONBLOCK);
-  return ChildProcess(pid, std::move(ours), command[0]);
+  return ChildProcess(pid, std::move(ours), std::move(lifeline.in), command[0]);
 }
 
 ChildProcess::ChildProcess(ChildProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, -1)),
       fd_(std::move(other.fd_)),
+      lifeline_(std::move(other.lifeline_)),
       name_(std::move(other.name_)),
       buffer_(std::move(other.buffer_)),
       exit_code_(other.exit_code_) {}
@@ -81,6 +91,7 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
     stop();
     pid_ = std::exchange(other.pid_, -1);
     fd_ = std::move(other.fd_);
+    lifeline_ = std::move(other.lifeline_);
     name_ = std::move(other.name_);
     buffer_ = std::move(other.buffer_);
     exit_code_ = other.exit_code_;

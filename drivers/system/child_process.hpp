@@ -20,10 +20,14 @@ class ChildProcess {
   enum class Pipe { none, stdin_to_child, stdout_from_child };
   /// Whether Ctrl-C in our terminal ends the child too, or leaves it to us to let it finish.
   enum class Signals { with_us, ours_alone };
+  /// ours: the child's standard input is a pipe that the system closes when we end, in whatever way, so that a program
+  /// that watches it (end_with_standard_input()) ends too. Not together with stdin_to_child.
+  enum class Life { its_own, ours };
 
   /// command: program and arguments; its standard error goes to log (appended).
   static Result<ChildProcess> start(const std::vector<std::string>& command, const std::filesystem::path& log,
-                                    Pipe pipe = Pipe::none, Signals signals = Signals::with_us);
+                                    Pipe pipe = Pipe::none, Signals signals = Signals::with_us,
+                                    Life life = Life::its_own);
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
@@ -42,10 +46,12 @@ class ChildProcess {
   [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:
-  ChildProcess(pid_t pid, UniqueFd fd, std::string name) : pid_(pid), fd_(std::move(fd)), name_(std::move(name)) {}
+  ChildProcess(pid_t pid, UniqueFd fd, UniqueFd lifeline, std::string name)
+      : pid_(pid), fd_(std::move(fd)), lifeline_(std::move(lifeline)), name_(std::move(name)) {}
 
   pid_t pid_ = -1;
   UniqueFd fd_;
+  UniqueFd lifeline_;  ///< our end of a pipe that nothing goes through
   std::string name_;
   std::string buffer_;
   std::optional<int> exit_code_;

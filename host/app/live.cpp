@@ -105,6 +105,7 @@ Result<std::unique_ptr<LiveWindow>> offer_simulated_cart(LiveOptions& options, s
   const auto chosen = show_first_run_page(**window, lacking, first_run_questions(this_machine(), given), script);
   if (!chosen) return chosen.error();
   if (*chosen == FirstRunChoice::close) return lacks;
+  options.light_room = (*window)->room() == Room::light;
   options.simulate = true;
   options.server.clear();
   options.recording.clear();

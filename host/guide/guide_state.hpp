@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 /// Where a guided calibration stands, for whoever holds the scope.
 struct GuideState {
-  std::string next = "hold the scope over the pattern, all of it in the picture, and still for a second";
+  std::string next;                ///< what to do, in the present language
   calibration::Coverage coverage;  ///< of the stations, once a lens is known
   std::size_t stations = 0;
   bool collecting = true;  ///< false: enough has been taken, and the last solution is being worked out

@@ -6,6 +6,7 @@
 
 #include "drivers/system/blocking_queue.hpp"
 #include "host/link/drops.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -58,7 +59,7 @@ class GuideWorker::Session {
     {
       const std::lock_guard lock(mutex_);
       state_.collecting = false;
-      state_.next = "that is enough, and is being worked out; fiducials may be touched meanwhile";
+      state_.next = words("guide_enough");
     }
     GuidedStations stations = guide.finish();
     if (stop.stop_requested()) return cancelled;

@@ -8,6 +8,8 @@
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/guide/guide_words.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -46,6 +48,7 @@ HandEyeGuide::HandEyeGuide(GuidePlan plan, Teller tell)
     last = last.cwiseMax(point);
   }
   extent_mm_ = last - first;
+  state_.next = words("guide_begin");
   tell_.lasting(state_.next);
 }
 
@@ -80,7 +83,7 @@ void HandEyeGuide::end(const std::string& why) {
 
 GuidedStations HandEyeGuide::finish() {
   if (const std::string words = stations_.rests().left_out_words(); !words.empty()) tell_.lasting(words);
-  tell_.lasting(session_.ended + "; the last solution is being worked out");
+  tell_.lasting(words("guide_working_out", session_.ended));
   find_lens_or_say({});
   return std::move(session_);
 }
@@ -91,7 +94,7 @@ Result<void> HandEyeGuide::add(LiveStation taken) {
     const auto& b = taken.tracker_from_sensor;
     if ((a.translation() - b.translation()).norm() < kSamePlaceMm &&
         rotation_angle_between(a.rotation(), b.rotation()) < kSameTurnRad) {
-      tell_.lasting(fmt::format("not taken: the same pose as {}; move on", other.name));
+      tell_.lasting(words("guide_same_pose", other.name));
       return {};
     }
   }
@@ -99,15 +102,14 @@ Result<void> HandEyeGuide::add(LiveStation taken) {
   taken.view.name = fmt::format("station {}", number);
   if (auto kept = keep(taken, number); !kept) return kept;
   state_.stations = number;
-  tell_.lasting(fmt::format("station {}: {} points", number, taken.view.points_px.size()));
+  tell_.lasting(words("guide_station", number, taken.view.points_px.size()));
   HandEyeStation station;
   station.name = taken.view.name;
   station.tracker_from_sensor = taken.tracker_from_sensor;
   station.view = std::move(taken.view);
   session_.input.stations.push_back(std::move(station));
   if (number >= kFirstSolved) solve();
-  if (session_.ended.empty() && number >= plan_.most_stations)
-    session_.ended = fmt::format("{} stations, the most that were asked for", number);
+  if (session_.ended.empty() && number >= plan_.most_stations) session_.ended = words("guide_most_stations", number);
   next_look_ = {};
   return {};
 }
@@ -125,7 +127,7 @@ Result<void> HandEyeGuide::keep(const LiveStation& taken, std::size_t number) {
 void HandEyeGuide::find_lens_or_say(const calibration::CameraCalibrationSettings& settings) {
   if (plan_.camera) return;
   find_lens(session_, settings);
-  if (!session_.lens) tell_.lasting("lens: not found yet: " + session_.lens_fault);
+  if (!session_.lens) tell_.lasting(words("guide_no_lens", session_.lens_fault));
 }
 
 void HandEyeGuide::solve() {
@@ -143,11 +145,9 @@ void HandEyeGuide::solve() {
   }
   state_.grade = verdict.grade;
   if (result->solved) state_.held_out_mm = result->held_out_mm;
-  if (result->solved)
-    tell_.lasting(
-        fmt::format("hand-eye so far: held-out {:.2f} mm, verdict {}", result->held_out_mm, name_of(verdict.grade)));
+  if (result->solved) tell_.lasting(words("guide_so_far", result->held_out_mm, words_of(verdict.grade)));
   if (verdict.grade == Grade::pass && session_.input.stations.size() >= plan_.fewest_stations)
-    session_.ended = fmt::format("the verdict is pass with {} stations", session_.input.stations.size());
+    session_.ended = words("guide_passes", session_.input.stations.size());
 }
 
 std::optional<Transform<Camera, Marker>> HandEyeGuide::pose_of(const calibration::PatternView& view) const {
@@ -162,8 +162,7 @@ void HandEyeGuide::look() {
   next_look_ = host_now() + kLookEvery;
   if (stations_.rests().deciding() || session_.width_px == 0) return;
   if (!session_.input.camera) {
-    state_.next =
-        "tilt the scope by 20 to 40 degrees, each time another way, and turn it about its length between them";
+    state_.next = words("guide_any_tilt");
     tell_.now(fmt::format("{} stations; {}", session_.input.stations.size(), state_.next));
     return;
   }
@@ -174,9 +173,8 @@ void HandEyeGuide::look() {
   }
   const auto seen = stations_.look();
   state_.pattern_seen = seen.has_value();
-  state_.next =
-      calibration::next_best_pose(stations, *session_.input.camera, extent_mm_, seen ? pose_of(*seen) : std::nullopt)
-          .words;
+  state_.next = words_of(
+      calibration::next_best_pose(stations, *session_.input.camera, extent_mm_, seen ? pose_of(*seen) : std::nullopt));
   state_.coverage = calibration::coverage_of(stations, session_.width_px, session_.height_px);
   tell_.now(fmt::format("{} stations; {}; {}next: {}", stations.size(), coverage_line(state_.coverage),
                         seen ? "" : "the pattern is not seen now; ", state_.next));

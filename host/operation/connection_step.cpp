@@ -6,9 +6,10 @@
 
 namespace birdseye::host {
 
-void ConnectionStep::set_link(bool connected, const std::string& words, bool video) {
+void ConnectionStep::set_link(bool connected, const std::string& words, bool video, bool may_retry) {
   link_.connected = connected;
   link_.words = words;
+  link_.may_retry = may_retry;
   if (!connected) {
     link_.health.reset();
     link_.appliance_says.clear();

@@ -121,8 +121,8 @@ bool DeformationStep::tick() {
     note_ = {false, verdict.reasons.front() + words_of(registration.touches)};
     return false;
   }
-  note_ = {true, verdict.grade == Grade::marginal ? words("note_with_care", verdict.reasons.front())
-                                                  : verdict.reasons.front()};
+  with_care_ = verdict.grade == Grade::marginal;
+  note_ = {true, with_care_ ? words("note_with_care", verdict.reasons.front()) : verdict.reasons.front()};
   note_.line += words_of(registration.touches);
   DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt};
   if (const auto& expected = registration.expected) {
@@ -138,6 +138,7 @@ bool DeformationStep::tick() {
 
 void DeformationStep::undo() {
   found_.reset();
+  with_care_ = false;
   note_ = {false, words("note_undone")};
 }
 
@@ -145,12 +146,14 @@ bool DeformationStep::forget() {
   dropped_ = running();
   cancel();
   (void)matching_.take();  // ended, and not looked at yet
+  with_care_ = false;
   note_ = {};
   return std::exchange(found_, nullptr) != nullptr;
 }
 
 void DeformationStep::take_up(std::shared_ptr<const DeformedOrgan> kept, const std::string& line) {
   found_ = std::move(kept);
+  with_care_ = false;
   note_ = {true, line};
 }
 

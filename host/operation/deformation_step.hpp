@@ -46,6 +46,8 @@ class DeformationStep {
   /// How far it is, in words; empty before it has found anything.
   [[nodiscard]] std::string progress() const { return matching_.line(); }
   [[nodiscard]] const StepNote& note() const { return note_; }
+  /// What was found is to be used with care: the note says why.
+  [[nodiscard]] bool with_care() const { return with_care_; }
 
  private:
   /// What the thread found, and whether it may be believed.
@@ -66,6 +68,7 @@ class DeformationStep {
   std::shared_ptr<const DeformedOrgan> found_;
   std::vector<Transform<Camera, Patient>> adjusted_;
   StepNote note_;
+  bool with_care_ = false;
   bool dropped_ = false;  ///< what is being found is by a setup that is no more
   Background<Result<Matched>> matching_;
 };

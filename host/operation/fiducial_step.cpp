@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 
+#include "host/registration/rigid/point_matching.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -26,9 +28,9 @@ bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments
   return true;
 }
 
-bool FiducialStep::undo() {
-  if (held_back_ || touches_.empty()) return false;
-  touches_.pop_back();
+bool FiducialStep::take_back(std::size_t which) {
+  if (held_back_ || which >= touches_.size()) return false;
+  touches_.erase(touches_.begin() + static_cast<std::ptrdiff_t>(which));
   return true;
 }
 
@@ -37,6 +39,8 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   confirmed_ = true;
   registered_.reset();
   fault_.clear();
+  fits_poorly_ = false;
+  odd_.reset();
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
   note_ = {false, words("note_touched", touches_.size())};
   if (!markers_in_patient_mm || touches_.size() < kFewestFiducials) return;
@@ -44,12 +48,17 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   places.reserve(touches_.size());
   for (const TouchedFiducial& touch : touches_) places.push_back(touch.tip_in_tracker_mm);
   const auto found = register_by_touches(*markers_in_patient_mm, places);
+  fits_poorly_ = !found || found->registered.fre_mm > kGoodFit_mm;
+  if (found) registered_ = found->registered;
+  if (fits_poorly_ && touches_.size() > kFewestFiducials) {
+    odd_ = odd_touch(*markers_in_patient_mm, places,
+                     registered_ ? registered_->fiducials_in_patient_mm : std::vector<Eigen::Vector3d>(), kGoodFit_mm);
+  }
   if (!found) {
     fault_ = found.error().what;
     return;
   }
   for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
-  registered_ = found->registered;
   registered_->found_with = found_with_;
   note_.line = words("note_touched_fre", touches_.size(), registered_->fre_mm);
   note_.done = touches_.size() >= std::max(kFewestFiducials + 1, wanted);

@@ -18,8 +18,8 @@ class FiducialStep {
   /// One more; false: all that are wanted are touched (wanted 0: as many as come). fit() is due then.
   /// found_with: by which it was touched.
   bool add(const Touch& touch, std::size_t wanted, const Instruments& found_with);
-  /// The last is taken back; false: there is none.
-  bool undo();
+  /// One is taken back, from 0; false: there is none. fit() is due then.
+  bool take_back(std::size_t which);
   /// By the markers of the CT, empty as long as they are looked for. Three give a fit, one more, and as many as are
   /// wanted, make it done.
   void fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted);
@@ -44,6 +44,11 @@ class FiducialStep {
   [[nodiscard]] bool person_may_say() const { return held_back_ && person_may_say_; }
   [[nodiscard]] bool confirmed() const { return confirmed_; }
   [[nodiscard]] const std::string& fault() const { return fault_; }
+  /// The touches do not fit the markers as touches do: one or more are off, or a marker is none.
+  [[nodiscard]] bool fits_poorly() const { return fits_poorly_; }
+  /// Of those that fit poorly the one that is off, from 0: without it the others fit, and without another plainly
+  /// worse. Empty: it cannot be told.
+  [[nodiscard]] const std::optional<std::size_t>& odd() const { return odd_; }
   [[nodiscard]] const StepNote& note() const { return note_; }
 
  private:
@@ -53,6 +58,8 @@ class FiducialStep {
   bool confirmed_ = true, held_back_ = false, person_may_say_ = false;
   std::string fault_, line_;  ///< line_: of what is held back, as it was found
   bool done_ = false;         ///< and whether the step was done by it
+  bool fits_poorly_ = false;
+  std::optional<std::size_t> odd_;
   StepNote note_;
 };
 

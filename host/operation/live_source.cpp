@@ -15,6 +15,7 @@ namespace birdseye::host {
 namespace {
 
 constexpr std::size_t kMostFramesWaiting = 12;  // half a second: older frames are of no use to a picture that is live
+constexpr const char* kSimulatedCart = "the simulated cart";
 constexpr Duration kConnectAgain = Duration::from_ms(1000);
 
 }  // namespace
@@ -46,14 +47,14 @@ std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings setti
     if (!client) return client.error();
     return Connection{*std::move(cart), *std::move(client)};
   };
-  return std::unique_ptr<LiveSource>(new LiveSource("the simulated cart", connect));
+  return std::unique_ptr<LiveSource>(new LiveSource(kSimulatedCart, connect));
 }
 
 void LiveSource::take_link(Result<Connection> link) {
   if (!link) {
-    words_ = link.error().what;
+    given_up_ = name_ == kSimulatedCart;  // what could not be started once is not tried for ever
+    words_ = given_up_ ? link.error().what : host::words("note_tried_again", link.error().what);
     again_ = host_now() + kConnectAgain;
-    given_up_ = name_ == "the simulated cart";  // what could not be started once is not tried for ever
     return;
   }
   if (link->cart) cart_ = std::move(link->cart);
@@ -74,6 +75,13 @@ Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesyst
   source->live_ = false;
   source->words_ = host::words("note_playing", path.string());
   return source;
+}
+
+void LiveSource::retry() {
+  if (!may_retry()) return;
+  given_up_ = false;
+  again_ = host_now();
+  words_ = host::words("note_connecting", name_);
 }
 
 std::optional<wire::Event> LiveSource::next(Deadline deadline) {

@@ -15,7 +15,8 @@ namespace birdseye::host {
 class RecordingReader;
 
 /// Where events come from: an appliance on the wire, or another OpenIGTLink server, which is connected to again for as
-/// long as it takes, or a simulated cart of our own, which is started once. Never holds the caller up.
+/// long as it takes, or a simulated cart of our own, which is started once, and again where somebody asks for it. Never
+/// holds the caller up.
 class LiveSource {
  public:
   static std::unique_ptr<LiveSource> of_appliance(const std::string& address,
@@ -31,6 +32,9 @@ class LiveSource {
   [[nodiscard]] bool connected() const { return events_ != nullptr; }
   /// False for a recording, which nobody must take for the present.
   [[nodiscard]] bool live() const { return live_; }
+  /// Whether starting has failed and is not tried any more: retry() tries again.
+  [[nodiscard]] bool may_retry() const { return given_up_ && live_ && cart_ == nullptr; }
+  void retry();
   /// Connected to what, or why not, in words.
   [[nodiscard]] std::string words() const;
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;

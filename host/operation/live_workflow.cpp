@@ -65,11 +65,11 @@ void LiveWorkflow::tick() {
   update_setup();
   keep();
   if (step_ != LiveStep::calibrate) return;
-  const bool all_touched = settings_.fiducials != 0 && fiducials_.note().done;
+  const bool all_touched = settings_.fiducials != 0 && fiducials_.note().done && !fiducials_.fits_poorly();
   go_to(all_touched ? LiveStep::views : LiveStep::fiducials);
 }
 
-void LiveWorkflow::set_link(bool connected, const std::string& words) {
+void LiveWorkflow::set_link(bool connected, const std::string& words, bool may_retry) {
   if (connected != instruments_.connected()) {
     instruments_.set_link(connected);
     // Behind another connection may stand another appliance: it has to send its record first.
@@ -77,7 +77,7 @@ void LiveWorkflow::set_link(bool connected, const std::string& words) {
     if (!connected) record_tip_in_pointer_mm_.reset();
     judge_instruments();
   }
-  connection_.set_link(connected, words, picture_.frame().has_value());
+  connection_.set_link(connected, words, picture_.frame().has_value(), may_retry);
   if (connection_.note().done && step_ == LiveStep::connect) go_to(LiveStep::calibrate);
 }
 
@@ -107,7 +107,7 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
   } else if (const auto* calibration = std::get_if<wire::Calibration>(&event)) {
     take(*calibration);
   } else if (const auto* pedal = std::get_if<wire::Pedal>(&event)) {
-    if (pedal->pressed) primary();
+    if (pedal->pressed) primary(now);
   }
   calibration_.push(event);
 }
@@ -233,9 +233,11 @@ void LiveWorkflow::fit() {
   } else {
     fiducials_.fit(std::nullopt, settings_.fiducials);
   }
+  asked_to_take_back_.reset();
   forget_views(words("note_views_touched_anew"));
   update_setup();
-  if (fiducials_.note().done && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
+  const bool all_fit = fiducials_.note().done && !fiducials_.fits_poorly();
+  if (all_fit && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
 }
 
 /// Views are of the poses that they were kept with, touches are where the former registration had them, and a
@@ -335,6 +337,7 @@ void LiveWorkflow::take_up() {
 
 void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
+  asked_to_take_back_.reset();
   if (step != LiveStep::views) strokes_.end();
   // What is held back may come back by itself; by the large button the scope is calibrated anew.
   const bool open = !calibration_.note().done && !calibration_.held_back();
@@ -352,10 +355,15 @@ void LiveWorkflow::go_on() {
   go_to(static_cast<LiveStep>(static_cast<int>(step_) + 1));
 }
 
-void LiveWorkflow::primary() {
+void LiveWorkflow::primary(HostTime now) {
+  constexpr Duration kSettle = Duration::from_ms(1000);  // a hand that presses twice, a pedal that bounces
   if (frozen_) return freeze_or_let_go();
-  if (asks_for_instruments()) return confirm_instruments();
-  if (asks_for_patient()) return confirm_patient();
+  if (asks_for_instruments() || asks_for_patient()) {
+    asks_for_instruments() ? confirm_instruments() : confirm_patient();
+    confirmed_at_ = now;
+    return;
+  }
+  if (confirmed_at_ && now < *confirmed_at_ + kSettle) return;
   const auto& setup = picture_.setup();
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
                      step_ == LiveStep::deform;
@@ -402,11 +410,19 @@ void LiveWorkflow::stroke() {
   strokes_.begin(views_.views().size());
 }
 
-void LiveWorkflow::undo() {
-  if (step_ == LiveStep::fiducials && fiducials_.undo()) {
-    fit();
-    keep();
+void LiveWorkflow::take_back(std::size_t touch) {
+  if (step_ != LiveStep::fiducials || touch >= fiducials_.touches().size()) return;
+  if (asked_to_take_back_ != touch && !lost_with_registration().empty()) {
+    asked_to_take_back_ = touch;
+    return;
   }
+  fiducials_.take_back(touch);
+  fit();
+  keep();
+}
+
+void LiveWorkflow::undo() {
+  if (step_ == LiveStep::fiducials && !fiducials_.touches().empty()) take_back(fiducials_.touches().size() - 1);
   if (step_ == LiveStep::views && !strokes_.undo(views_.views().size())) views_.undo();
   if (step_ == LiveStep::check) patient_.undo_landmark();
   if (step_ == LiveStep::deform && deformation_.found() && !deformation_.running()) {

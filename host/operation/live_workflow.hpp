@@ -49,8 +49,8 @@ class LiveWorkflow {
   void take(const CheckedSurface& checked);
   /// Collects what threads have finished.
   void tick();
-  /// The link to the appliance came or went.
-  void set_link(bool connected, const std::string& words);
+  /// The link to the appliance came or went; may_retry as ConnectionStep has it.
+  void set_link(bool connected, const std::string& words, bool may_retry = false);
   /// What only a simulated cart can tell without being asked.
   void set_sheet(const calibration::Pattern& pattern, const Eigen::Vector3d& tip_in_pointer_mm, std::size_t fiducials);
   /// Reads another patient.
@@ -63,12 +63,18 @@ class LiveWorkflow {
   void pick(PlacePicks::Kind kind, const Eigen::Vector3d& place_in_patient_mm);
   /// The fiducial of the CT that is nearest to a place is not used any more.
   void drop_marker(const Eigen::Vector3d& place_in_patient_mm);
-  void primary();  ///< the space bar and the pedal
-  void undo();     ///< the last thing of the present step
-  void stroke();   ///< of the pointer over the organ: begins one, or ends it
-  void go_on();    ///< to the next step, where this one is done
+  /// The space bar and the pedal. A press within a second of that which confirmed the patient does nothing.
+  void primary(HostTime now);
+  void undo();  ///< the last thing of the present step
+  /// One touch, from 0. Where views or a deformation are dropped with it, it is asked for twice.
+  void take_back(std::size_t touch);
+  void stroke();  ///< of the pointer over the organ: begins one, or ends it
+  void go_on();   ///< to the next step, where this one is done
   void go_to(LiveStep step);
-  void freeze_or_let_go() { frozen_ = !frozen_; }
+  void freeze_or_let_go() {
+    frozen_ = !frozen_;
+    picture_.freeze(frozen_);
+  }
   /// Not of a frozen picture, which bears none.
   void hide_or_show_overlay() {
     if (!frozen_) picture_.hide(!picture_.hidden());
@@ -91,6 +97,7 @@ class LiveWorkflow {
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
   void fit();
+  [[nodiscard]] std::string lost_with_registration() const;
   void take(const PlacePicks::Picked& picked);
   [[nodiscard]] bool asks_for_instruments() const;
   void judge_instruments();
@@ -122,10 +129,12 @@ class LiveWorkflow {
   PatientStep patient_;
   bool simulated_ = false;  ///< nobody lies there
   bool patient_confirmed_ = false;
+  std::optional<HostTime> confirmed_at_;  ///< by Space or the pedal
   PlacePicks picks_;
   std::string pick_line_;
   PointerTip pointer_;
   FiducialStep fiducials_;
+  std::optional<std::size_t> asked_to_take_back_;
   ViewStep views_;
   OrganStrokes strokes_;
   std::optional<double> tip_rms_mm_;  ///< of the tip's calibration, where the record has it

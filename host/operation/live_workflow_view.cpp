@@ -2,11 +2,22 @@
 #include "host/operation/live_workflow.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "host/operation/landmark_check.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
+
+/// Views, touched places and a deformation, in words; empty: there are none.
+std::string LiveWorkflow::lost_with_registration() const {
+  std::vector<std::string> lost;
+  if (!views_.views().empty()) lost.push_back(words("lost_views", views_.views().size()));
+  if (strokes_.places() > 0) lost.push_back(words("lost_places", strokes_.places()));
+  if (deformation_.found()) lost.push_back(words("lost_deformation"));
+  if (deformation_.running()) lost.push_back(words("lost_matching"));
+  return fmt::format("{}", fmt::join(lost, ", "));
+}
 
 OperationView LiveWorkflow::view() const {
   OperationView out;
@@ -18,7 +29,7 @@ OperationView LiveWorkflow::view() const {
   out.stroke_line = strokes_.line();
   if (out.touched_places > 0) {
     std::string& line = out.notes[static_cast<std::size_t>(LiveStep::views)].line;
-    line += fmt::format("{}{} places touched", line.empty() ? "" : ", ", out.touched_places);
+    line += fmt::format("{}{}", line.empty() ? "" : ", ", words("note_places_touched", out.touched_places));
   }
   out.frozen = frozen_;
   out.overlay_hidden = picture_.hidden();
@@ -47,6 +58,10 @@ OperationView LiveWorkflow::view() const {
   out.looking_for_marker = picks_.looking();
   out.pick_line = pick_line_;
   out.touches = fiducials_.touches();
+  out.fits_poorly = fiducials_.fits_poorly();
+  out.odd_touch = fiducials_.odd();
+  out.touch_loses = lost_with_registration();
+  out.asked_to_take_back = asked_to_take_back_;
   const auto registered = fiducials_.registered();
   if (registered) out.fre_mm = registered->fre_mm;
   out.registration_fault = fiducials_.fault();
@@ -54,8 +69,10 @@ OperationView LiveWorkflow::view() const {
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();
+  out.deformed_with_care = deformation_.with_care();
   out.watched = out.deformed != nullptr && watch_.watches();
   out.organ_moved = motion_.moved_mm().has_value();
+  out.surface_told = out.watched && motion_.told();
   if (out.deformed) out.surface_check = watch_.watches() ? motion_.line() : words("note_not_watched");
   out.patient = patient_.plan();
   out.patient_confirmed = patient_confirmed_;

@@ -12,7 +12,7 @@ std::string primary_words(const OperationView& operation) {
   const bool done = operation.note(operation.step).done;
   switch (operation.step) {
     case LiveStep::connect:
-      return words("do_wait");
+      return operation.link.may_retry ? words("do_retry") : words("do_wait");
     case LiveStep::calibrate:
       if (done) return words("do_go_on");
       return operation.guiding ? words("do_end_stations") : words("do_begin");

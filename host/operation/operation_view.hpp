@@ -48,6 +48,10 @@ struct OperationView {
   bool looking_for_marker = false;                     ///< where a person has pointed at the CT
   std::string pick_line;                               ///< what came of that; empty: nothing yet
   std::vector<TouchedFiducial> touches;
+  bool fits_poorly = false;              ///< the touches, to the markers
+  std::optional<std::size_t> odd_touch;  ///< which of them is off, from 0; empty: it cannot be told, or all fit
+  std::string touch_loses;  ///< what is dropped with the registration, in words: views, a deformation; empty: nothing
+  std::optional<std::size_t> asked_to_take_back;  ///< a touch, from 0; another press of the key does it, and drops that
   std::optional<double> fre_mm;
   std::string registration_fault;
 
@@ -58,7 +62,9 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
+  bool deformed_with_care = false;  ///< its step's note says why
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
+  bool surface_told = false;  ///< by figures: the last check could tell
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
 

@@ -13,10 +13,13 @@ bool OrganMotion::take(const CheckedSurface& checked) {
   if (finding.verdict == SurfaceVerdict::cannot_tell) {
     if (!untold_since_) untold_since_ = checked.at;
     const Duration untold = checked.at - *untold_since_;
-    if (untold >= kTold) line_ = words("note_cannot_tell", untold.seconds(), finding.words);
+    if (untold < kTold) return false;
+    told_ = false;
+    line_ = words("note_cannot_tell", untold.seconds(), finding.words);
     return false;
   }
   untold_since_.reset();
+  told_ = true;
   line_ = words("note_surface", finding.words);
   const bool moved = finding.verdict == SurfaceVerdict::moved;
   if (moved == moved_mm_.has_value()) {

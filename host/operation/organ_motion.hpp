@@ -25,10 +25,13 @@ class OrganMotion {
   [[nodiscard]] const std::optional<double>& moved_mm() const { return moved_mm_; }
   /// What was found last; where it could not be told for ten seconds, that, and why.
   [[nodiscard]] const std::string& line() const { return line_; }
+  /// Whether that is a finding, with its figures.
+  [[nodiscard]] bool told() const { return told_; }
 
  private:
   std::optional<double> moved_mm_;
   std::string line_;
+  bool told_ = false;
   int against_ = 0;                       ///< checks in a row that say otherwise
   std::optional<HostTime> untold_since_;  ///< from when on no check could tell
 };

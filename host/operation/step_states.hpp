@@ -12,10 +12,14 @@ namespace birdseye::host {
 /// What is connected.
 struct LinkState {
   bool connected = false;
-  std::string words;  ///< to what, or why not
+  bool may_retry = false;  ///< it was given up, and can be tried again
+  std::string words;       ///< to what, or why not
   std::string appliance_says;
   std::optional<wire::Health> health;
 };
+
+/// What a fit's FRE, and a touch's residual, are up to where the touches fit well, and where one is plainly off.
+inline constexpr double kGoodFit_mm = 2, kPlainlyOff_mm = 5;
 
 /// A fiducial that was touched.
 struct TouchedFiducial {

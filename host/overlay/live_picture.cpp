@@ -8,11 +8,13 @@ namespace birdseye::host {
 
 namespace {
 
-/// The picture without colour and darker, so that nobody takes it for live.
-std::vector<std::uint8_t> greyed(const std::vector<std::uint8_t>& rgb) {
+/// The picture without colour, so that nobody takes it for live. Darker too where nobody has asked for it: who has
+/// frozen it wants to see what is in it.
+std::vector<std::uint8_t> greyed(const std::vector<std::uint8_t>& rgb, bool asked_for) {
+  const int shift = asked_for ? 8 : 9;
   std::vector<std::uint8_t> out(rgb.size());
   for (std::size_t i = 0; i + 2 < rgb.size(); i += 3) {
-    const int grey = (77 * rgb[i] + 150 * rgb[i + 1] + 29 * rgb[i + 2]) >> 9;  // ITU-R BT.601 luma, halved
+    const int grey = (77 * rgb[i] + 150 * rgb[i + 1] + 29 * rgb[i + 2]) >> shift;  // ITU-R BT.601 luma
     out[i] = out[i + 1] = out[i + 2] = static_cast<std::uint8_t>(grey);
   }
   return out;
@@ -86,7 +88,7 @@ ShownPicture LivePicture::at(HostTime now) {
     out.overlaid = !overlaid_.empty();
     out.strength = out.overlaid ? decision_.strength : 0;
   }
-  if (out.stale && stopped_.empty()) stopped_ = greyed(*frame_->rgb);
+  if (out.stale && stopped_.empty()) stopped_ = greyed(*frame_->rgb, frozen_);
   const int kind = out.overlaid ? 2 : out.stale ? 1 : 0;
   if (kind != kind_) ++changes_;
   kind_ = kind;

@@ -63,6 +63,11 @@ class LivePicture {
     redraw();
   }
   [[nodiscard]] bool hidden() const { return hidden_; }
+  /// Whether somebody has asked that the picture stand still: it then goes grey, but stays bright.
+  void freeze(bool frozen) {
+    frozen_ = frozen;
+    redraw();
+  }
   void set_look(const OverlayLook& look) {
     look_ = look;
     redraw();
@@ -104,7 +109,7 @@ class LivePicture {
   OverlayGate::Decision decision_;
   std::vector<std::uint8_t> overlaid_, stopped_;
   std::uint64_t changes_ = 0, skipped_ = 0;
-  bool dirty_ = false, hidden_ = false;
+  bool dirty_ = false, hidden_ = false, frozen_ = false;
   int kind_ = -1;
 };
 

@@ -82,7 +82,7 @@ void draw_shell(const cv::Mat& mask, const Eigen::Vector3d& colour, ImageRgba& p
 
 Eigen::Vector3d margin_colour(std::size_t shell) {
   constexpr std::array<std::array<int, 3>, kMostMargins> kColours{
-      {{86, 180, 233}, {240, 228, 66}, {0, 158, 115}, {0, 114, 178}}};
+      {{255, 255, 255}, {240, 228, 66}, {255, 150, 210}, {0, 0, 0}}};
   const auto& colour = kColours[shell % kColours.size()];
   return Eigen::Vector3d(colour[0], colour[1], colour[2]) / 255;
 }

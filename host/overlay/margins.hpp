@@ -27,8 +27,9 @@ using Margins = std::vector<MarginShell>;
 inline constexpr double kLeastMargin_mm = 1, kMostMargin_mm = 40;
 inline constexpr std::size_t kMostMargins = 4;
 
-/// The colour of a shell, by its place in Margins: four that people who see few colours tell apart, and that no tissue
-/// has (Okabe and Ito, Color universal design, 2008); in [0, 1], as the screen shows it.
+/// The colour of a shell, by its place in Margins: four that people who see few colours tell apart from each other,
+/// from the liver and from vessels, and the first from the tumour and its outline too
+/// (tests/host/window/theme_test.cpp); in [0, 1], as the screen shows it.
 Eigen::Vector3d margin_colour(std::size_t shell);
 
 /// Where labels hold one of values is the target. Errc::bad_value for shells that are not to be had, naming them;

@@ -71,12 +71,17 @@ wait_ms = {}
 }  // namespace
 
 Result<void> SimulatedCart::make_patient(const SimulatedCartSettings& settings) {
-  std::vector<std::string> command{
-      beside_us("birdseye-sim"),    "phantom", "--out", (settings.folder / "phantom").string(), "--seed",
-      std::to_string(settings.seed)};
+  std::vector<std::string> command{beside_us("birdseye-sim"),
+                                   "--end-with-stdin",
+                                   "phantom",
+                                   "--out",
+                                   (settings.folder / "phantom").string(),
+                                   "--seed",
+                                   std::to_string(settings.seed)};
   if (!settings.ct.empty()) command.insert(command.end(), {"--ct", settings.ct.string()});
   const std::filesystem::path log = settings.folder / "simulator.log";
-  auto child = ChildProcess::start(command, log);
+  auto child = ChildProcess::start(command, log, ChildProcess::Pipe::none, ChildProcess::Signals::with_us,
+                                   ChildProcess::Life::ours);
   if (!child) return std::move(child).error();
   std::optional<int> code;
   for (const Deadline deadline = Deadline::after(Duration::from_ms(60'000));
@@ -109,6 +114,7 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (!port) return port.error();
 
   std::vector<std::string> command{beside_us("birdseye-sim"),
+                                   "--end-with-stdin",
                                    "cart",
                                    "--phantom",
                                    (folder / "phantom").string(),
@@ -141,7 +147,8 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (settings.views) command.emplace_back("--views");
   if (settings.drop_late) command.emplace_back("--drop-late");
   if (!settings.faults.empty()) command.insert(command.end(), {"--faults", settings.faults.string()});
-  auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child);
+  auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child,
+                                       ChildProcess::Signals::with_us, ChildProcess::Life::ours);
   if (!simulator) return std::move(simulator).error();
   const auto line = simulator->read_line(Deadline::after(Duration::from_ms(30'000)));
   if (!line) return line.error();
@@ -154,8 +161,9 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (auto written = write_appliance_config(folder / "birdseyed.toml", settings, tty, socket, *port); !written) {
     return written.error();
   }
-  auto appliance = ChildProcess::start({beside_us("birdseyed"), "--config", (folder / "birdseyed.toml").string()},
-                                       folder / "birdseyed.log");
+  auto appliance = ChildProcess::start(
+      {beside_us("birdseyed"), "--end-with-stdin", "--config", (folder / "birdseyed.toml").string()},
+      folder / "birdseyed.log", ChildProcess::Pipe::none, ChildProcess::Signals::with_us, ChildProcess::Life::ours);
   if (!appliance) return std::move(appliance).error();
 
   std::unique_ptr<SimulatedCart> cart(new SimulatedCart(std::move(*simulator), std::move(*sheet), *port));

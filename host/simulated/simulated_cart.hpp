@@ -53,7 +53,8 @@ struct CartStage {
 };
 
 /// The simulated patient, instruments and appliance as programs of their own: birdseye-sim on a pseudo-terminal and a
-/// frame socket, birdseyed between them and the wire. They end with this object.
+/// frame socket, birdseyed between them and the wire. They end with this object, and with this program, however
+/// it ends.
 class SimulatedCart {
  public:
   /// Makes the patient (DICOM series, segmentation) in settings.folder/phantom.

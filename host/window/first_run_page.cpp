@@ -22,6 +22,8 @@ namespace {
 constexpr Duration kPageEvery = Duration::from_ms(30);
 constexpr const char* kSimulateKey = "space";
 constexpr const char* kCloseKey = "q";
+constexpr const char* kKeysKey = "?";  // F1, as LiveWindow::keys names it
+constexpr const char* kRoomKey = "l";
 
 struct Seen {
   Eigen::Vector3f colour;
@@ -75,9 +77,10 @@ std::optional<FirstRunChoice> draw_buttons(float scale) {
   return asked;
 }
 
-std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale) {
+std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale, bool keys) {
   ImGui::Separator();
   ImGui::Dummy(ImVec2(0, 6 * scale));
+  if (keys) say(theme.text, words("first_keys"));
   say(theme.quiet,
       words("first_all", "birdseye live --server HOST:PORT --ct PATH --labels FILE --organ NAMES --board SPEC"));
   say(theme.quiet, words("first_doctor", "birdseye doctor"));
@@ -91,6 +94,7 @@ std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale) {
 struct Page {
   std::string lacking;
   std::vector<Check> checks;
+  bool keys = false;  ///< all of them are shown
   float rows_high = 0, foot_high = 0;
 };
 
@@ -117,7 +121,7 @@ std::optional<FirstRunChoice> draw_page(const LiveWindow& window, Page& page) {
   page.rows_high = ImGui::GetCursorPosY();
   ImGui::EndChild();
   const float above = ImGui::GetCursorPosY();
-  const auto asked = draw_foot(theme, scale);
+  const auto asked = draw_foot(theme, scale, page.keys);
   page.foot_high = ImGui::GetCursorPosY() - above;
   ImGui::End();
   return asked;
@@ -133,8 +137,14 @@ std::optional<FirstRunChoice> choice_of_key(const std::string& key) {
 Result<std::optional<FirstRunChoice>> turn(LiveWindow& window, Page& page, const LiveScript::Act& act) {
   window.begin_frame();
   auto asked = draw_page(window, page);
-  for (const std::string& key : window.keys()) asked = asked ? asked : choice_of_key(key);
-  if (!asked) asked = act.end ? FirstRunChoice::close : choice_of_key(act.key);
+  std::vector<std::string> keys = window.keys();
+  keys.push_back(act.key);
+  for (const std::string& key : keys) {
+    if (!asked) asked = choice_of_key(key);
+    if (key == kKeysKey) page.keys = !page.keys;
+    if (key == kRoomKey) window.set_room(window.room() == Room::dark ? Room::light : Room::dark);
+  }
+  if (!asked && act.end) asked = FirstRunChoice::close;
   window.end_frame();
   if (!act.shot.empty()) {
     const LiveWindow::Shot shot = window.shot();

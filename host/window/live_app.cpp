@@ -38,6 +38,7 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
                  std::unique_ptr<Publisher> publisher)
     : window_(std::move(window)),
       source_(std::move(source)),
+      preset_(std::filesystem::path(settings.transfer).filename().string()),
       workflow_(std::move(settings)),
       simulated_(std::move(simulated)),
       script_(std::move(script)),
@@ -47,6 +48,7 @@ LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource>
   facts_.recorded = !source_->live();
   facts_.look.render.step_mm = kStepMm;
   facts_.editor = &editor_;
+  facts_.preset = preset_;
   workflow_.set_look(facts_.look);
 }
 
@@ -70,7 +72,7 @@ Result<void> LiveApp::run(HostTime asked) {
     take_events();
     if (auto said = saving_.take()) facts_.said = *std::move(said);
     note_simulator();
-    workflow_.set_link(source_->connected(), source_->words());
+    workflow_.set_link(source_->connected(), source_->words(), source_->may_retry());
     workflow_.tick();
     operation_ = workflow_.view();
     note_patient();
@@ -225,7 +227,7 @@ PanelWishes LiveApp::draw_window(const ShownPicture& shown, bool again) {
 
 /// What a key of the script asks for comes on top of what a hand asks for.
 PanelWishes LiveApp::with_scripted(PanelWishes wishes) {
-  for (const std::string& key : scripted_) add_key(key, facts_, wishes);
+  for (const std::string& key : scripted_) add_key(key, operation_, facts_, wishes);
   if (place_) {
     SliceView view = wishes.slice_view.value_or(*facts_.slices);
     view.go_to(*place_);
@@ -238,23 +240,33 @@ PanelWishes LiveApp::with_scripted(PanelWishes wishes) {
 
 void LiveApp::grant(const PanelWishes& asked) {
   const PanelWishes wishes = with_scripted(asked);
-  if (wishes.primary) workflow_.primary();
+  const bool begins = wishes.primary && operation_.step == LiveStep::connect && !operation_.frozen;
+  if (wishes.retry || begins) source_->retry();
+  if (wishes.primary) workflow_.primary(host_now());
   if (wishes.next) workflow_.go_on();
   if (wishes.undo) workflow_.undo();
+  if (wishes.take_back) workflow_.take_back(*wishes.take_back);
   if (wishes.stroke) workflow_.stroke();
   if (wishes.freeze) workflow_.freeze_or_let_go();
   if (wishes.hide_or_show) workflow_.hide_or_show_overlay();
   if (wishes.step) workflow_.go_to(*wishes.step);
   if (wishes.inset) facts_.inset = !facts_.inset;
+  if (wishes.details) facts_.details = !facts_.details;
+  if (wishes.large_slices) facts_.large_slices = !facts_.large_slices;
   if (wishes.keys) facts_.keys = !facts_.keys;
   if (wishes.room) window_->set_room(facts_.room = *wishes.room);
   if (wishes.inset_corner) facts_.inset_corner = *wishes.inset_corner;
   grant_look(wishes);
   grant_slices(wishes);
-  if (wishes.transfer) workflow_.set_transfer(TransferFunction(*wishes.transfer));
+  if (wishes.transfer) {
+    workflow_.set_transfer(TransferFunction(*wishes.transfer));
+    facts_.preset_changed = true;
+  }
   if (const auto preset = load_transfer_function(wishes.preset); !wishes.preset.empty() && preset) {
     workflow_.set_transfer(*preset);
     editor_.set_points(preset->points());
+    facts_.preset = wishes.preset;
+    facts_.preset_changed = false;
   }
   if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
 }

@@ -70,6 +70,7 @@ class LiveApp {
 
   std::unique_ptr<LiveWindow> window_;
   std::unique_ptr<LiveSource> source_;
+  std::string preset_;  ///< of the colours to begin with: its name, or its file's
   LiveWorkflow workflow_;
   OperationView operation_;  ///< as it stood when it was last looked at
   PatientFiles simulated_;

@@ -50,6 +50,39 @@ void draw_side(PanelContext& context) {
   ImGui::End();
 }
 
+/// How old the pictures were when they came to the screen, with what its axes are.
+void draw_ages(const PanelContext& context) {
+  constexpr float kFullMs = 160;
+  const PanelLayout& at = context.at;
+  const std::vector<float> ages = context.facts.ages->newest();
+  const ImVec2 size((at.wide - at.side) * 0.42F, at.strip - 20 * at.scale);
+  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0, nullptr, 0, kFullMs, size);
+  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const ImU32 ink = ImGui::GetColorU32(colour(context.theme.text));
+  const float gap = 5 * at.scale, line = ImGui::GetTextLineHeight();
+  const auto write = [&](const std::string& text, float part, float y) {
+    const float wide = ImGui::CalcTextSize(text.c_str()).x;
+    list->AddText(ImVec2(low.x + gap + part * (high.x - low.x - 2 * gap - wide), y), ink, text.c_str());
+  };
+  write(words("axis_ms", kFullMs), 0, low.y + 2);
+  write(words("ages_title"), 0.5F, low.y + 2);
+  write(words("axis_ms", 0.0F), 0, high.y - line - 2);
+  write(words("axis_pictures", AgeStrip::kShown), 0.5F, high.y - line - 2);
+  write(words("axis_now"), 1, high.y - line - 2);
+}
+
+/// What tells whoever looks after the cart how it does.
+void draw_figures(const PanelContext& context) {
+  const PanelFacts& facts = context.facts;
+  const Theme& theme = context.theme;
+  say(theme.text,
+      words("ages", facts.ages->percentile_ms(0.5), facts.ages->percentile_ms(0.95), facts.ages->most_ms()));
+  say(theme.quiet, words("rates", facts.frames_per_s, facts.frames_skipped, context.operation.engine_name));
+  if (const auto& health = context.operation.link.health)
+    say(theme.quiet, words("tracker_rate", health->tracker_rate_hz, health->doubted));
+}
+
 void draw_strip(PanelContext& context) {
   const PanelLayout& at = context.at;
   const PanelFacts& facts = context.facts;
@@ -58,20 +91,17 @@ void draw_strip(PanelContext& context) {
   ImGui::SetNextWindowPos(ImVec2(at.side, at.high - at.strip));
   ImGui::SetNextWindowSize(ImVec2(at.wide - at.side, at.strip));
   ImGui::Begin("strip", nullptr, kPanel);
-  const std::vector<float> ages = facts.ages->newest();
-  constexpr float kFullMs = 160;
-  const ImVec2 chart((at.wide - at.side) * 0.42F, at.strip - 20 * at.scale);
-  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0, words("ages_up_to", kFullMs).c_str(), 0,
-                   kFullMs, chart);
+  draw_ages(context);
   ImGui::SameLine();
   ImGui::BeginGroup();
-  say(theme.text,
-      words("ages", facts.ages->percentile_ms(0.5), facts.ages->percentile_ms(0.95), facts.ages->most_ms()));
-  say(theme.quiet, words("rates", facts.frames_per_s, facts.frames_skipped, operation.engine_name));
-  if (const auto& health = operation.link.health)
-    say(theme.quiet, words("tracker_rate", health->tracker_rate_hz, health->doubted));
   if (!operation.fault.empty()) say(theme.bad, fmt::format("{} {}", kBadSign, operation.fault));
-  if (!operation.surface_check.empty()) say(operation.organ_moved ? theme.warn : theme.quiet, operation.surface_check);
+  if (facts.details) draw_figures(context);
+  if (operation.surface_told && !facts.details) {
+    if (!operation.organ_moved) say(theme.quiet, words("surface_holds"));
+  } else if (!operation.surface_check.empty()) {
+    say(operation.organ_moved ? theme.warn : theme.quiet, operation.surface_check);
+  }
+  if (!facts.details) say(theme.quiet, words("details"));
   if (!facts.said.empty()) say(theme.quiet, facts.said);
   ImGui::EndGroup();
   ImGui::End();
@@ -132,7 +162,7 @@ int side_px(float scale) {
   return static_cast<int>(kSidePx * scale);
 }
 
-void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes) {
+void add_key(const std::string& key, const OperationView& operation, const PanelFacts& facts, PanelWishes& wishes) {
   if (key == "space") wishes.primary = true;
   if (key == "enter") wishes.next = true;
   if (key == "backspace") wishes.undo = true;
@@ -142,6 +172,9 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
   if (key == "o") wishes.hide_or_show = true;
   if (key == "v") wishes.slices = true;
   if (key == "i") wishes.inset = true;
+  if (key == "e") wishes.details = true;
+  if (key == "r") wishes.retry = true;
+  if (key == "d") wishes.take_back = operation.odd_touch;
   if (key == "?") wishes.keys = true;
   if (key == "c") wishes.clip = !facts.clip;
   if (key == "l") wishes.room = facts.room == Room::dark ? Room::light : Room::dark;
@@ -149,6 +182,7 @@ void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishe
     if (key == "p") wishes.pick_marker = true;
     if (key == "k") wishes.pick_landmark = true;
     if (key == "x") wishes.drop_marker = true;
+    if (key == "b") wishes.large_slices = true;
   }
   if (key.size() == 1 && key[0] >= '1' && key[0] < static_cast<char>('1' + kLiveSteps))
     wishes.step = static_cast<LiveStep>(key[0] - '1');
@@ -166,7 +200,7 @@ PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation
   draw_side(context);
   draw_video(context);
   draw_strip(context);
-  for (const std::string& key : window.keys()) add_key(key, facts, wishes);
+  for (const std::string& key : window.keys()) add_key(key, operation, facts, wishes);
   return wishes;
 }
 

@@ -20,8 +20,12 @@ struct PanelWishes {
   bool hide_or_show = false;                                             ///< the overlay
   bool slices = false;                                                   ///< opened, or closed
   bool inset = false;                                                    ///< the small picture shown, or not any more
+  bool details = false;                                                  ///< all figures shown, or not any more
+  bool large_slices = false;                                             ///< with more of the room, or with less
+  bool retry = false;                                                    ///< to connect, where that was given up
   bool keys = false;                                                     ///< all of them shown, or not any more
   bool pick_marker = false, pick_landmark = false, drop_marker = false;  ///< at the slices' cross-hair
+  std::optional<std::size_t> take_back;                                  ///< a touch, from 0
   std::optional<LiveStep> step;
   std::optional<OverlayLook> look;  ///< but for its cutting plane
   std::optional<bool> clip;
@@ -46,10 +50,14 @@ struct PanelFacts {
   bool recorded = false;       ///< the source is a recording
   bool simulated = false;      ///< it is the simulated cart, whose operator touches the fiducials and nothing else
   bool keys = false;           ///< all keys are shown
+  bool details = false;        ///< all figures are shown, not only that of the target
   bool pseudonymised = false;  ///< the patient's name and ID are not shown: the picture is to be kept
   std::string said;            ///< a remark of the window's own: where a snapshot went
   Room room = Room::dark;
   std::optional<SliceView> slices;  ///< empty: closed
+  bool large_slices = false;        ///< as large as the window's width lets them be
+  std::string preset;               ///< of the colours; empty: none
+  bool preset_changed = false;      ///< by hand since
   int inset_corner = 0;
   bool inset = true;
 };
@@ -60,6 +68,6 @@ int side_px(float scale);
 PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation, const ShownPicture& shown,
                         const PanelFacts& facts);
 /// The wish that a key stands for, as LiveWindow::keys names it; the window's texts name all of them ("all_keys").
-void add_key(const std::string& key, const PanelFacts& facts, PanelWishes& wishes);
+void add_key(const std::string& key, const OperationView& operation, const PanelFacts& facts, PanelWishes& wishes);
 
 }  // namespace birdseye::host

@@ -55,19 +55,30 @@ void draw_margin_choice(const PanelContext& context, OverlayLook& look, bool& ch
   if (plan == nullptr || !plan->margins) return say(context.theme.quiet, words("no_margins"));
   changed = ImGui::Checkbox(label_of(words("margins"), "margins").c_str(), &look.margins) || changed;
   for (std::size_t i = 0; i < plan->margins->size(); ++i) {
-    ImGui::SameLine();
-    const Eigen::Vector3f rgb = margin_colour(i).cast<float>();
-    const ImVec2 at = ImGui::GetCursorScreenPos();
-    const float side = ImGui::GetTextLineHeight() * 0.7F;
-    ImGui::GetWindowDrawList()->AddRectFilled(ImVec2(at.x, at.y + 6), ImVec2(at.x + side, at.y + 6 + side),
-                                              ImGui::GetColorU32(colour(rgb)));
+    const float side = 0.7F * ImGui::GetTextLineHeight();
+    draw_margin_sign(i, ImGui::GetCursorScreenPos(), side);
     ImGui::Dummy(ImVec2(side, side));
     ImGui::SameLine();
     say(context.theme.text, words("margin", (*plan->margins)[i].mm));
   }
+  say(context.theme.quiet, margin_error_words(context.operation));
 }
 
 }  // namespace
+
+void draw_margin_sign(std::size_t shell, const ImVec2& at, float side) {
+  const ImVec2 from(at.x, at.y + 0.25F * side), to(at.x + side, at.y + 1.25F * side);
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  list->AddRectFilled(from, to, ImGui::GetColorU32(colour(margin_colour(shell).cast<float>())));
+  list->AddRect(from, to, IM_COL32(128, 128, 128, 255));  // a white one on white, a black one on black
+}
+
+std::string margin_error_words(const OperationView& operation) {
+  const auto& target = operation.target;
+  if (!target) return words("margin_error_unknown");
+  return target->motion_counted ? words("margin_error", target->radius_mm)
+                                : words("margin_error_unmoved", target->radius_mm);
+}
 
 void draw_look(PanelContext& context) {
   const PanelFacts& facts = context.facts;
@@ -93,9 +104,13 @@ void draw_look(PanelContext& context) {
   if (changed) context.wishes.look = look;
   draw_plane(context);
   ImGui::SetNextItemWidth(-80 * scale);
-  if (ImGui::BeginCombo(label_of(words("colours"), "colours").c_str(), words("presets").c_str())) {
+  const std::string in_force = facts.preset.empty()   ? words("presets")
+                               : facts.preset_changed ? words("preset_changed", facts.preset)
+                                                      : facts.preset;
+  if (ImGui::BeginCombo(label_of(words("colours"), "colours").c_str(), in_force.c_str())) {
     for (const std::string& name : transfer_presets()) {
-      if (ImGui::Selectable(name.c_str())) context.wishes.preset = name;
+      const bool is_it = name == facts.preset && !facts.preset_changed;
+      if (ImGui::Selectable(name.c_str(), is_it)) context.wishes.preset = name;
     }
     ImGui::EndCombo();
   }

@@ -42,11 +42,18 @@ void say(const Eigen::Vector3f& rgb, const std::string& text);
 const Eigen::Vector3f& colour_of(Grade grade, const Theme& theme);
 const char* sign_of(Grade grade);
 
+/// A small square of a margin's colour, of that side, beside a line of text.
+void draw_margin_sign(std::size_t shell, const ImVec2& at, float side);
+/// How far off the margins may be: as far as the target that they lie about.
+std::string margin_error_words(const OperationView& operation);
+
 // The panels, each in a file of its own.
 void draw_patient_card(PanelContext& context);
 void draw_step(PanelContext& context);
 void draw_look(PanelContext& context);
 void draw_slices(PanelContext& context, const ImVec2& from, const ImVec2& size);
+/// How much of the video's room, of that size, the slices take.
+float slices_height(const PanelContext& context, const ImVec2& size);
 void draw_video(PanelContext& context);
 
 }  // namespace birdseye::host

@@ -10,6 +10,8 @@ namespace birdseye::host {
 
 namespace {
 
+constexpr float kControlsPx = 58, kMarginPx = 16;
+
 void draw_controls(PanelContext& context, const SliceView& now, SliceView& asked, bool& changed) {
   const float scale = context.at.scale;
   const Eigen::Vector3d& place = now.place_mm();
@@ -33,6 +35,9 @@ void draw_controls(PanelContext& context, const SliceView& now, SliceView& asked
     }
     ImGui::SameLine();
   }
+  const std::string size = context.facts.large_slices ? words("slices_smaller") : words("slices_larger");
+  if (ImGui::Button(label_of(size, "size").c_str())) context.wishes.large_slices = true;
+  ImGui::SameLine();
   const LiveStep step = context.operation.step;
   if (step == LiveStep::fiducials) {
     if (ImGui::Button(label_of(words("pick_marker"), "pick").c_str())) context.wishes.pick_marker = true;
@@ -49,6 +54,13 @@ void draw_controls(PanelContext& context, const SliceView& now, SliceView& asked
 
 }  // namespace
 
+float slices_height(const PanelContext& context, const ImVec2& size) {
+  // The video stays in sight.
+  const float most = (context.facts.large_slices ? 0.7F : 0.5F) * size.y;
+  const float whole = (size.x - kMarginPx) * SliceView::kHeightPx / SliceView::kWidthPx;
+  return std::min(most, whole + kControlsPx * context.at.scale + kMarginPx);
+}
+
 void draw_slices(PanelContext& context, const ImVec2& from, const ImVec2& size) {
   const SliceView& now = *context.facts.slices;
   SliceView asked = now;
@@ -56,8 +68,9 @@ void draw_slices(PanelContext& context, const ImVec2& from, const ImVec2& size) 
   ImGui::SetNextWindowPos(from);
   ImGui::SetNextWindowSize(size);
   ImGui::Begin("slices", nullptr, kPanel);
-  const float controls = 58 * context.at.scale;
-  const float fit = std::min((size.x - 16) / SliceView::kWidthPx, (size.y - controls - 16) / SliceView::kHeightPx);
+  const float controls = kControlsPx * context.at.scale;
+  const float fit =
+      std::min((size.x - kMarginPx) / SliceView::kWidthPx, (size.y - controls - kMarginPx) / SliceView::kHeightPx);
   const ImVec2 shape(fit * SliceView::kWidthPx, fit * SliceView::kHeightPx);
   if (const std::uintptr_t picture = context.window.picture(LiveWindow::Slot::slices); picture != 0 && fit > 0) {
     const ImVec2 corner(from.x + (size.x - shape.x) / 2, from.y + 4);

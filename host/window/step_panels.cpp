@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "host/guide/guide_words.hpp"
+#include "host/operation/step_states.hpp"
 #include "host/texts/texts.hpp"
 #include "host/window/panel_context.hpp"
 
@@ -19,6 +21,7 @@ void draw_connect(PanelContext& context) {
   const LinkState& link = context.operation.link;
   say(link.connected ? theme.good : theme.warn, link.words);
   if (!link.appliance_says.empty()) say(theme.warn, link.appliance_says);
+  if (link.may_retry) say(theme.warn, words("retry"));
   if (!link.health) return;
   for (const wire::InstrumentHealth& one : link.health->instruments) {
     const bool runs = one.state == "running";
@@ -57,7 +60,7 @@ void draw_guide(PanelContext& context, const GuideState& guide) {
   say(theme.quiet, words("covered_turns"));
   draw_cells(context, guide.coverage.turns, calibration::Coverage::kTurns);
   if (guide.held_out_mm)
-    say(colour_of(guide.grade, theme), words("held_out_so_far", name_of(guide.grade), *guide.held_out_mm));
+    say(colour_of(guide.grade, theme), words("held_out_so_far", words_of(guide.grade), *guide.held_out_mm));
   if (const auto& lines = context.operation.guide_lines; !lines.empty()) say(theme.quiet, lines.back());
 }
 
@@ -68,7 +71,7 @@ void draw_calibrate(PanelContext& context) {
   say(done_or_not(context, LiveStep::calibrate), operation.note(LiveStep::calibrate).line);
   if (const auto& verdict = operation.calibration_verdict) {
     const Grade grade = verdict->grade;
-    say(colour_of(grade, theme), fmt::format("{} {}", sign_of(grade), words("verdict", name_of(grade))));
+    say(colour_of(grade, theme), fmt::format("{} {}", sign_of(grade), words("verdict", words_of(grade))));
     for (const std::string& reason : verdict->reasons) say(theme.quiet, reason);
     for (const std::string& next : verdict->next_steps) say(theme.text, next);
   }
@@ -79,6 +82,46 @@ void draw_slice_buttons(PanelContext& context) {
   const std::string label = label_of(context.facts.slices ? words("slices_close") : words("slices"), "slices");
   if (ImGui::Button(label.c_str())) context.wishes.slices = true;
   if (!context.operation.pick_line.empty()) say(context.theme.text, context.operation.pick_line);
+}
+
+/// How one touch fits, in words, and in millimetres among the details; and the button that takes it back.
+void draw_touch(PanelContext& context, std::size_t i) {
+  const OperationView& operation = context.operation;
+  const Theme& theme = context.theme;
+  const TouchedFiducial& touch = operation.touches[i];
+  const bool details = context.facts.details;
+  ImGui::BeginGroup();
+  if (operation.odd_touch == i) {
+    say(theme.bad, fmt::format("{} {}", kBadSign, words("touch_odd", i + 1)));
+  } else if (operation.odd_touch || !touch.residual_mm) {
+    // Beside one that is off, residuals tell nothing of the others: the fit spreads its error over all.
+    say(theme.text, words("touch_taken", i + 1));
+  } else {
+    const Grade grade = *touch.residual_mm < kGoodFit_mm      ? Grade::pass
+                        : *touch.residual_mm < kPlainlyOff_mm ? Grade::marginal
+                                                              : Grade::fail;
+    const std::string how = grade == Grade::pass ? words("touch_fits", i + 1) : words("touch_fits_poorly", i + 1);
+    say(colour_of(grade, theme), fmt::format("{} {}", sign_of(grade), how));
+  }
+  ImGui::EndGroup();
+  ImGui::SameLine();
+  ImGui::PushID(static_cast<int>(i));
+  if (ImGui::SmallButton(label_of(words("take_back"), "take back").c_str())) context.wishes.take_back = i;
+  ImGui::PopID();
+  if (details && touch.residual_mm) say(theme.quiet, words("touch_residual", i + 1, *touch.residual_mm));
+  if (details && !touch.residual_mm) say(theme.quiet, words("touch_scatter", i + 1, touch.rms_mm));
+}
+
+/// What is wrong with touches that fit poorly, and what to do.
+void draw_fit(const PanelContext& context) {
+  constexpr std::size_t kTellsOne = 4;  // touches: of three, none can be left out
+  const OperationView& operation = context.operation;
+  if (!operation.fits_poorly) return;
+  const Theme& theme = context.theme;
+  if (const auto& odd = operation.odd_touch)
+    return say(theme.bad, fmt::format("{} {}", kBadSign, words("odd_touch", *odd + 1)));
+  const bool few = operation.touches.size() < kTellsOne;
+  say(theme.warn, fmt::format("{} {}", kWarnSign, few ? words("odd_touch_too_few") : words("odd_touch_unknown")));
 }
 
 void draw_fiducials(PanelContext& context) {
@@ -93,23 +136,28 @@ void draw_fiducials(PanelContext& context) {
     say(theme.quiet, words("markers_seen", *operation.markers_seen));
   }
   draw_slice_buttons(context);
-  for (std::size_t i = 0; i < operation.touches.size(); ++i) {
-    const TouchedFiducial& touch = operation.touches[i];
-    if (touch.residual_mm) {
-      const Grade grade = *touch.residual_mm < 2 ? Grade::pass : *touch.residual_mm < 5 ? Grade::marginal : Grade::fail;
-      say(colour_of(grade, theme),
-          fmt::format("{} {}", sign_of(grade), words("touch_residual", i + 1, *touch.residual_mm)));
-    } else {
-      say(theme.quiet, words("touch_scatter", i + 1, touch.rms_mm));
-    }
-  }
-  if (const auto& fre = operation.fre_mm) {
-    const Grade grade = *fre < 2 ? Grade::pass : Grade::marginal;
-    say(colour_of(grade, theme), fmt::format("{} {}", sign_of(grade), words("fre", *fre)));
-  }
+  for (std::size_t i = 0; i < operation.touches.size(); ++i) draw_touch(context, i);
+  if (const auto& fre = operation.fre_mm; fre && context.facts.details) say(theme.quiet, words("fre", *fre));
   if (!operation.registration_fault.empty())
     say(theme.bad, fmt::format("{} {}", kBadSign, operation.registration_fault));
-  say(theme.quiet, words("undo_touch"));
+  draw_fit(context);
+  if (!operation.touches.empty()) say(theme.quiet, words("undo_touch"));
+  if (operation.touch_loses.empty()) return;
+  if (operation.asked_to_take_back) {
+    say(theme.bad, fmt::format("{} {}", kBadSign, words("touch_loses_asked", operation.touch_loses)));
+  } else {
+    say(theme.warn, fmt::format("{} {}", kWarnSign, words("touch_loses", operation.touch_loses)));
+  }
+}
+
+/// From where the next view would tell most.
+std::string words_of(const ViewAdvice& advice) {
+  if (!advice.look_from_deg) return words("advice_here");
+  const double right = advice.look_from_deg->x(), down = advice.look_from_deg->y();
+  const std::string across = right > 0 ? words("advice_right", right) : words("advice_left", -right);
+  const std::string along = down > 0 ? words("advice_lower", down) : words("advice_upper", -down);
+  if (down == 0) return words("advice_from", across);
+  return right == 0 ? words("advice_from", along) : words("advice_from_both", across, along);
 }
 
 void draw_views(PanelContext& context) {
@@ -122,8 +170,8 @@ void draw_views(PanelContext& context) {
   if (!operation.stroke_line.empty()) say(operation.stroking ? theme.good : theme.warn, operation.stroke_line);
   const auto& advice = operation.view_advice;
   if (!advice) return say(theme.warn, fmt::format("{} {}", kWarnSign, words("no_view_now")));
-  say(theme.text, advice->words);
-  say(theme.quiet, words("view_gain", 100 * advice->gain_now, 100 * advice->gain_best));
+  say(theme.text, words_of(*advice));
+  if (context.facts.details) say(theme.quiet, words("view_gain", 100 * advice->gain_now, 100 * advice->gain_best));
   say(theme.quiet, words("undo_view"));
 }
 
@@ -131,7 +179,12 @@ void draw_deform(PanelContext& context) {
   const OperationView& operation = context.operation;
   const Theme& theme = context.theme;
   say(theme.text, words("match_views"));
-  say(operation.note(LiveStep::deform).done ? theme.good : theme.quiet, operation.note(LiveStep::deform).line);
+  const StepNote& note = operation.note(LiveStep::deform);
+  if (operation.deformed && !operation.deformed_with_care && !context.facts.details) {
+    say(theme.good, fmt::format("{} {}", kGoodSign, words("deform_found")));
+  } else {
+    say(!note.done ? theme.quiet : operation.deformed_with_care ? theme.warn : theme.good, note.line);
+  }
   if (operation.deforming) say(theme.text, operation.deform_progress);
   if (operation.deformed) say(theme.quiet, words("undo_deform"));
 }
@@ -143,7 +196,7 @@ void draw_check(PanelContext& context) {
   const auto& reading = context.operation.check;
   if (!reading) return say(theme.warn, fmt::format("{} {}", kWarnSign, words("no_pointer")));
   const Eigen::Vector3d& tip = reading->tip_in_patient_mm;
-  say(theme.quiet, words("tip_at", tip.x(), tip.y(), tip.z()));
+  if (context.facts.details) say(theme.quiet, words("tip_at", tip.x(), tip.y(), tip.z()));
   if (reading->nearest.empty()) return;
   say(reading->distance_mm < 3 ? theme.good : theme.text,
       words("from_nearest", reading->distance_mm, reading->nearest));

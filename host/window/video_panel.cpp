@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "host/overlay/margins.hpp"
 #include "host/texts/texts.hpp"
 #include "host/window/inset_place.hpp"
 #include "host/window/inset_view.hpp"
@@ -87,6 +88,31 @@ ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float sc
           {std::max(to.x, middle.x + radius), std::max(to.y, middle.y + radius)}};
 }
 
+/// What the rings about the target are, at the picture's lower edge, with how far off they may be. How high that is.
+float draw_margin_legend(const PanelContext& context, ImVec2 lower_left) {
+  const auto& plan = context.operation.patient;
+  const bool shown = context.shown.overlaid && context.facts.look.margins;
+  if (!shown || plan == nullptr || !plan->margins) return 0;
+  const float gap = 6 * context.at.scale, line = ImGui::GetTextLineHeight(), side = 0.7F * line;
+  const ImU32 ink = ImGui::GetColorU32(colour(theme_over_video().text));
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  const std::string error = margin_error_words(context.operation);
+  float wide = ImGui::CalcTextSize(error.c_str()).x + 2 * gap;
+  for (const MarginShell& shell : *plan->margins)
+    wide = std::max(wide, ImGui::CalcTextSize(words("margin", shell.mm).c_str()).x + side + 3 * gap);
+  const float high = line * static_cast<float>(plan->margins->size() + 1) + 2 * gap;
+  ImVec2 at(lower_left.x, lower_left.y - high);
+  list->AddRectFilled(at, ImVec2(at.x + wide, lower_left.y), IM_COL32(0, 0, 0, 220));
+  at = ImVec2(at.x + gap, at.y + gap);
+  for (std::size_t i = 0; i < plan->margins->size(); ++i) {
+    draw_margin_sign(i, at, side);
+    list->AddText(ImVec2(at.x + side + gap, at.y), ink, words("margin", (*plan->margins)[i].mm).c_str());
+    at.y += line;
+  }
+  list->AddText(at, ink, error.c_str());
+  return high;
+}
+
 /// The CT from outside, in a corner that leaves the target free.
 void draw_inset(PanelContext& context, const ScreenBox& area, const std::optional<ScreenBox>& target) {
   const std::uintptr_t inset = context.window.picture(LiveWindow::Slot::inset);
@@ -114,8 +140,9 @@ void draw_picture(PanelContext& context, ImVec2 from, ImVec2 size) {
     if (context.operation.target && shown.overlaid) target = draw_target(*context.operation.target, corner, fit, scale);
   }
   draw_banner(context, from, size.x);
+  const float legend_high = draw_margin_legend(context, ImVec2(from.x + gap, from.y + size.y - gap));
   const ScreenBox area{{from.x + gap, from.y + kBannerPx * scale + gap},
-                       {from.x + size.x - gap, from.y + size.y - gap}};
+                       {from.x + size.x - gap, from.y + size.y - gap - legend_high}};
   draw_inset(context, area, target);
 }
 
@@ -125,8 +152,7 @@ void draw_video(PanelContext& context) {
   const PanelLayout& at = context.at;
   const ImVec2 size(at.wide - at.side, at.high - at.strip);
   // Slices share the room with the video, which stays in sight.
-  const float slices_high =
-      context.facts.slices ? std::min(0.5F * size.y, size.x * SliceView::kHeightPx / SliceView::kWidthPx) : 0;
+  const float slices_high = context.facts.slices ? slices_height(context, size) : 0;
   ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, ImVec2(0, 0));
   ImGui::SetNextWindowPos(ImVec2(at.side, 0));
   ImGui::SetNextWindowSize(ImVec2(size.x, size.y - slices_high));

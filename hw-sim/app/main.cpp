@@ -3,6 +3,7 @@
 
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/program.hpp"
+#include "drivers/system/starter.hpp"
 #include "hw-sim/app/instruments.hpp"
 #include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
@@ -20,6 +21,13 @@ int main(int argc, char** argv) {
   CLI::App app{"birdseye-sim: a patient, a tracker and a laparoscope for the appliance, with known truth",
                "birdseye-sim"};
   app.require_subcommand(1);
+  bool end_with_stdin = false;
+  OwnedThread watch;
+  app.add_flag("--end-with-stdin", end_with_stdin,
+               "end when standard input is closed: for a program that starts this one");
+  app.parse_complete_callback([&] {
+    if (end_with_stdin) watch = end_with_standard_input();
+  });
   int code = 0;
   const auto take = [&](const Result<void>& outcome) {
     if (outcome) return;

@@ -1,10 +1,15 @@
 // `birdseye live` over the simulated cart, from the first connection to the registered overlay, by a script alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/support/child.hpp"
 #include "tests/support/command.hpp"
 #include "tests/support/display.hpp"
 #include "tests/support/json_file.hpp"
@@ -90,6 +95,33 @@ TEST(Live, WithoutASourceAPageOffersTheSimulatedCart) {
       run("birdseye", "live --script " + starting + " --out " + (scratch / "out").string(), display.env());
   EXPECT_EQ(started.code, 3) << started.output;  // for no overlay was reached yet
   EXPECT_EQ(cv::imread(shot("cart.png")).size(), cv::Size(1280, 720)) << started.output;
+}
+
+/// Programs that were started with a file of that folder, by their command lines.
+std::vector<std::string> programs_of(const std::filesystem::path& folder) {
+  std::vector<std::string> out;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc", ignored)) {
+    std::ifstream in(entry.path() / "cmdline", std::ios::binary);
+    std::string line((std::istreambuf_iterator<char>(in)), {});
+    std::replace(line.begin(), line.end(), '\0', ' ');
+    const bool ours = line.find("birdseyed --") != std::string::npos || line.find("birdseye-sim ") != std::string::npos;
+    if (ours && line.find(folder.string()) != std::string::npos) out.push_back(line);
+  }
+  return out;
+}
+
+TEST(Live, LeavesNoProgramBehindWhenItsXServerDies) {
+  const Scratch scratch;
+  auto display = std::make_unique<testing::Display>("1280x720");
+  const std::filesystem::path out = scratch / "live";
+  testing::Child live({"env", "-u", "WAYLAND_DISPLAY", "DISPLAY=" + display->name(),
+                       testing::programs_folder() + "/birdseye", "live", "--simulate", "--out", out.string()});
+  for (int i = 0; i < 6000 && programs_of(out).size() < 2; ++i) ::usleep(20'000);
+  ASSERT_EQ(programs_of(out).size(), 2U) << "simulator and appliance do not run";
+  display.reset();
+  for (int i = 0; i < 1500 && !programs_of(out).empty(); ++i) ::usleep(20'000);
+  EXPECT_TRUE(programs_of(out).empty()) << programs_of(out).front();
 }
 
 TEST(Live, SaysWhatIsMissing) {

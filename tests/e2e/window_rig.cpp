@@ -190,8 +190,9 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
                                            R"({"points": [{"hu": -500, "rgb": [1, 0, 1], "extinction_per_mm": 0},
                        {"hu": 0, "rgb": [1, 0, 1], "extinction_per_mm": 5}]})");
   // The operation does not say with which instruments it was found: a person says that they are these.
-  const std::string script = scratch.file(
-      "script.txt", "wait connect 30\nsleep 3\nkey space\nkey 6\nkey space\nkey space\nwait run 5\nsleep 3600\nend\n");
+  const std::string script = scratch.file("script.txt",
+                                          "wait connect 30\nsleep 3\nkey space\nsleep 1.2\nkey 6\nkey space\nsleep "
+                                          "1.2\nkey space\nwait run 5\nsleep 3600\nend\n");
   const int port = *free_port();
   std::vector<std::string> words;
   std::istringstream in(fmt::format(

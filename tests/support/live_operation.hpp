@@ -109,7 +109,7 @@ inline void connect_and_calibrate(LiveWorkflow& workflow) {
   EXPECT_EQ(workflow.view().step, LiveStep::calibrate);
   give_record(workflow);
   EXPECT_TRUE(workflow.view().note(LiveStep::calibrate).done);
-  workflow.primary();
+  workflow.primary(HostTime{0});
   EXPECT_EQ(workflow.view().step, LiveStep::fiducials);
 }
 

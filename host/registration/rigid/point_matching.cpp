@@ -113,9 +113,8 @@ class AssignmentSearch {
   std::size_t looks_ = 0;
 };
 
-}  // namespace
-
-Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+/// All orders weighed; one was found.
+Result<AssignmentSearch> searched(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
   const std::size_t touched = touched_in_tracker_mm.size();
   if (touched > ct_in_patient_mm.size()) {
     return Error{Errc::bad_value,
@@ -143,6 +142,51 @@ Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_trac
                     "markers, and are both files in mm?",
                     kWorstFre_mm)};
   }
+  return search;
+}
+
+/// Of the best assignment, whether another fits nearly as well or not; infinite where there is none.
+double least_fre_mm(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+  const auto search = searched(ct_in_patient_mm, touched_in_tracker_mm);
+  return search ? search->best_mm() : std::numeric_limits<double>::infinity();
+}
+
+std::vector<Eigen::Vector3d> without(Points points, std::size_t left_out) {
+  std::vector<Eigen::Vector3d> out(points.begin(), points.end());
+  out.erase(out.begin() + static_cast<std::ptrdiff_t>(left_out));
+  return out;
+}
+
+}  // namespace
+
+std::optional<std::size_t> odd_touch(Points ct_in_patient_mm, Points touched_in_tracker_mm,
+                                     Points ct_of_touches_in_patient_mm, double good_fit_mm) {
+  // A touch's own noise makes differences of some tenths of a millimetre.
+  constexpr double kTellsApart_mm = 1, kTellsApartTimes = 3;
+  std::optional<std::size_t> odd;
+  double best_mm = std::numeric_limits<double>::infinity(), second_mm = best_mm;
+  for (std::size_t left_out = 0; left_out < touched_in_tracker_mm.size(); ++left_out) {
+    const auto others = without(touched_in_tracker_mm, left_out);
+    double fre_mm = std::numeric_limits<double>::infinity();
+    if (ct_of_touches_in_patient_mm.empty()) {
+      fre_mm = least_fre_mm(ct_in_patient_mm, others);
+    } else if (const auto fit =
+                   calibration::fit_points<Patient, Tracker>(without(ct_of_touches_in_patient_mm, left_out), others)) {
+      fre_mm = fit->fre_rms_mm;
+    }
+    second_mm = std::min(second_mm, std::max(fre_mm, best_mm));
+    if (fre_mm >= best_mm) continue;
+    best_mm = fre_mm;
+    odd = left_out;
+  }
+  if (best_mm > good_fit_mm || second_mm < std::max(kTellsApart_mm, kTellsApartTimes * best_mm)) return std::nullopt;
+  return odd;
+}
+
+Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+  const auto found = searched(ct_in_patient_mm, touched_in_tracker_mm);
+  if (!found) return found.error();
+  const AssignmentSearch& search = *found;
   if (search.ambiguous()) {
     return Error{Errc::degenerate,
                  fmt::format("the markers cannot be told apart by their distances (FRE {:.1f} mm, and {:.1f} mm in "

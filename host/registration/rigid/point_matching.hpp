@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <span>
 
 #include "calibration/points/point_fit.hpp"
@@ -23,5 +25,12 @@ struct MatchedFit {
 /// would turn the patient.
 Result<MatchedFit> match_and_fit(std::span<const Eigen::Vector3d> ct_in_patient_mm,
                                  std::span<const Eigen::Vector3d> touched_in_tracker_mm);
+
+/// Which touch is off, from 0: without it the others fit to good_fit_mm, and without any other plainly worse. Empty
+/// where that cannot be told. ct_of_touches_in_patient_mm: the CT's point of each touch; empty where it is not known
+/// which is which.
+std::optional<std::size_t> odd_touch(std::span<const Eigen::Vector3d> ct_in_patient_mm,
+                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm,
+                                     std::span<const Eigen::Vector3d> ct_of_touches_in_patient_mm, double good_fit_mm);
 
 }  // namespace birdseye::host

@@ -1,7 +1,5 @@
 #include "host/registration/views/view_advice.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/LU>
 #include <cmath>
 
@@ -55,18 +53,7 @@ ViewAdvice advise_view(std::span<const Transform<Camera, Patient>> kept, const T
       best_deg = deg;
     }
   }
-  if (advice.gain_best < advice.gain_now + kWorthIt) {
-    advice.words = "keep this view";
-    return advice;
-  }
-  const auto side = [](double deg, const char* towards, const char* away) {
-    return fmt::format("{:.0f} degrees to the {}", std::abs(deg), deg > 0 ? towards : away);
-  };
-  advice.words = "look from ";
-  if (best_deg.x() != 0) advice.words += side(best_deg.x(), "right", "left");
-  if (best_deg.x() != 0 && best_deg.y() != 0) advice.words += " and ";
-  if (best_deg.y() != 0) advice.words += side(best_deg.y(), "lower side", "upper side");
-  advice.words += " of here";
+  if (advice.gain_best >= advice.gain_now + kWorthIt) advice.look_from_deg = best_deg;
   return advice;
 }
 

@@ -2,7 +2,6 @@
 
 #include <optional>
 #include <span>
-#include <string>
 
 #include "calibration/geometry/transform.hpp"
 
@@ -13,7 +12,9 @@ struct ViewAdvice {
   /// By how much one more view from where the camera is shrinks what the views leave open, in [0, 1].
   double gain_now = 0;
   double gain_best = 0;  ///< the same for the best place in reach
-  std::string words;     ///< what to do, as seen in the picture now
+  /// Where to look from instead, in degrees about the organ's middle: to the right and down in the picture as it is
+  /// now, one of them not 0. Empty: no place in reach is worth moving to.
+  std::optional<Eigen::Vector2d> look_from_deg;
 };
 
 /// A view tells where things are across its ray, not along it: of n views with unit rays d, the information on a place

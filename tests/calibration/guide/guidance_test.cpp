@@ -8,7 +8,7 @@
 #include <random>
 
 #include "calibration/base/units.hpp"
-#include "calibration/guide/guidance_words.hpp"
+#include "calibration/guide/scope_move.hpp"
 #include "tests/support/lens.hpp"
 
 namespace birdseye::calibration {
@@ -186,7 +186,8 @@ TEST(Guidance, LeadsOutOfTurnsAboutOneAxis) {
     const NextPose next = next_best_pose(stations, cart.camera, kExtent_mm, stations.back().camera_from_marker);
     const ScopeView view = scope_view(next.camera_from_marker);
     EXPECT_GT(view.tilt_rad, 15 * kRadPerDeg);
-    EXPECT_EQ(next.words.find("tilt the scope"), 0U) << next.words;
+    ASSERT_TRUE(next.move.has_value());
+    EXPECT_TRUE(next.move->tilt.has_value());
     EXPECT_GT(next.gain, 0.3);
     // Tilts to one side and back only, the scope never turned about its axis.
     stations.clear();
@@ -199,7 +200,7 @@ TEST(Guidance, LeadsOutOfTurnsAboutOneAxis) {
         other.camera_from_marker.rotation() * stations[2].camera_from_marker.rotation().transpose();
     const Eigen::Vector3d turn = rotation_log(moved);
     // The old axis is the picture's vertical.
-    EXPECT_GT(turn.cross(Eigen::Vector3d::UnitY()).norm(), 25 * kRadPerDeg) << other.words;
+    EXPECT_GT(turn.cross(Eigen::Vector3d::UnitY()).norm(), 25 * kRadPerDeg);
     EXPECT_GT(other.gain, 0.3);
   }
 }
@@ -208,7 +209,8 @@ TEST(Guidance, BeginsWithoutStations) {
   Cart cart(1);
   const NextPose next = next_best_pose({}, cart.camera, kExtent_mm, std::nullopt);
   EXPECT_TRUE(cart.whole_board_seen(next.camera_from_marker));
-  EXPECT_NE(next.words.find("from straight before the board"), std::string::npos) << next.words;
+  EXPECT_TRUE(next.from_straight);
+  EXPECT_TRUE(next.move.has_value());
 }
 
 TEST(Guidance, PassesOverStationsThatAreNotFinite) {
@@ -219,7 +221,8 @@ TEST(Guidance, PassesOverStationsThatAreNotFinite) {
   stations.push_back(stations[0]);
   stations.back().camera_from_marker = CameraPose(Eigen::Matrix3d(Eigen::Matrix3d::Constant(NAN)), {0, 0, 90});
   const NextPose with = next_best_pose(stations, cart.camera, kExtent_mm, stations.back().camera_from_marker);
-  EXPECT_EQ(with.words, without.words);
+  EXPECT_EQ(with.from_straight, without.from_straight);
+  EXPECT_EQ(with.camera_from_marker.matrix(), without.camera_from_marker.matrix());
   EXPECT_EQ(with.gain, without.gain);
 }
 
@@ -228,7 +231,7 @@ TEST(Guidance, SaysWhatToDoWhereNoPoseShowsTheBoard) {
   cart.camera.k1 = -4;  // folds before the board fits
   const NextPose next = next_best_pose({}, cart.camera, kExtent_mm, std::nullopt);
   EXPECT_EQ(next.gain, 0);
-  EXPECT_NE(next.words.find("bring the whole board into the picture"), std::string::npos);
+  EXPECT_FALSE(next.move.has_value());
 }
 
 TEST(Guidance, IsTheSameForABoardWhoseAxisPointsToTheCamera) {
@@ -276,23 +279,21 @@ CameraPose led(const CameraPose& now, double degrees, double x, double y, double
           roll * (seen_turns * (now.translation() - pivot) + pivot)};
 }
 
-TEST(GuidanceWords, TiltBringsThatSideOfThePictureNearer) {
+TEST(ScopeMove, TiltBringsThatSideOfThePictureNearer) {
   const CameraModel camera = wide_lens();
-  const std::pair<std::string, Eigen::Vector2d> kWays[] = {{"to the left", {-1, 0}},
-                                                           {"to the right", {1, 0}},
-                                                           {"up", {0, -1}},
-                                                           {"down", {0, 1}},
-                                                           {"up and to the left", {-1, -1}},
-                                                           {"down and to the right", {1, 1}},
-                                                           {"up and to the right", {1, -1}},
-                                                           {"down and to the left", {-1, 1}}};
+  const std::pair<PictureWay, Eigen::Vector2d> kWays[] = {
+      {PictureWay::left, {-1, 0}},     {PictureWay::right, {1, 0}},     {PictureWay::up, {0, -1}},
+      {PictureWay::down, {0, 1}},      {PictureWay::up_left, {-1, -1}}, {PictureWay::down_right, {1, 1}},
+      {PictureWay::up_right, {1, -1}}, {PictureWay::down_left, {-1, 1}}};
   Cart cart(11);
   for (const auto& [word, way] : kWays) {
     for (int i = 0; i < 6; ++i) {
       const CameraPose now = pose_of({0.2 * i, 1.0 * i, 0.7 * i, 90}, kCentre_mm, {0, 0});
       const CameraPose next = led(now, 30, way.x(), way.y(), 40.0 * (i % 3));
-      const std::string words = words_for(now, next, camera, kCentre_mm);
-      EXPECT_EQ(words.find("tilt the scope 30 degrees " + word + ", as the picture shows it"), 0U) << words;
+      const ScopeMove move = move_between(now, next, camera, kCentre_mm);
+      ASSERT_TRUE(move.tilt.has_value());
+      EXPECT_NEAR(move.tilt->by_rad, 30 * kRadPerDeg, 1e-9);
+      EXPECT_EQ(move.tilt->way, word);
       // By projecting: two squares that look equally large now, one on the word's side of the board's middle; after
       // the tilt it is the larger.
       const auto size_px = [&, &way = way](const CameraPose& pose, double side) {
@@ -307,42 +308,39 @@ TEST(GuidanceWords, TiltBringsThatSideOfThePictureNearer) {
         return (pixel(1, 0) - pixel(-1, 0)).norm() * (pixel(0, 1) - pixel(0, -1)).norm();
       };
       EXPECT_NEAR(size_px(now, 1) / size_px(now, -1), 1, 1e-9);
-      EXPECT_GT(size_px(next, 1) / size_px(next, -1), 1.1) << words;
+      EXPECT_GT(size_px(next, 1) / size_px(next, -1), 1.1);
     }
   }
 }
 
-TEST(GuidanceWords, ClockwiseMovesTheRightOfThePictureUp) {
+TEST(ScopeMove, ClockwiseMovesTheRightOfThePictureUp) {
   const CameraModel camera = wide_lens();
   const CameraPose now = pose_of({0.3, 0.5, 1.0, 90}, kCentre_mm, {0, 0});
   const Eigen::Vector3d on_the_right = now.inverse() * (now * kCentre_mm + Eigen::Vector3d(10, 0, 0));
-  for (const auto& [degrees, amount] : {std::pair{90, "a quarter of a turn"},
-                                        {45, "an eighth of a turn"},
-                                        {70, "70 degrees"},
-                                        {135, "three eighths of a turn"}}) {
+  for (const int degrees : {90, 45, 70, 135}) {
     const CameraPose clockwise = led(now, 0, 1, 0, degrees), back = led(now, 0, 1, 0, -degrees);
-    EXPECT_EQ(words_for(now, clockwise, camera, kCentre_mm),
-              std::string("turn it ") + amount + " clockwise about its long axis");
-    EXPECT_EQ(words_for(now, back, camera, kCentre_mm),
-              std::string("turn it ") + amount + " anticlockwise about its long axis");
+    EXPECT_NEAR(*move_between(now, clockwise, camera, kCentre_mm).turn_rad, degrees * kRadPerDeg, 1e-9);
+    EXPECT_NEAR(*move_between(now, back, camera, kCentre_mm).turn_rad, -degrees * kRadPerDeg, 1e-9);
     EXPECT_LT(project(camera, clockwise * on_the_right)->y(), project(camera, now * on_the_right)->y() - 20);
     EXPECT_GT(project(camera, back * on_the_right)->y(), project(camera, now * on_the_right)->y() + 20);
   }
 }
 
-TEST(GuidanceWords, NameDistanceAndPlaceInThePicture) {
+TEST(ScopeMove, NamesDistanceAndPlaceInThePicture) {
   const CameraModel camera = wide_lens();
   const CameraPose now = pose_of({0.1, 0.5, 0, 90}, kCentre_mm, {0, 0});
-  const auto words = [&](double distance_mm, double x, double y) {
-    return words_for(now, pose_of({0.1, 0.5, 0, distance_mm}, kCentre_mm, {x, y}), camera, kCentre_mm);
+  const auto move = [&](double distance_mm, double x, double y) {
+    return move_between(now, pose_of({0.1, 0.5, 0, distance_mm}, kCentre_mm, {x, y}), camera, kCentre_mm);
   };
-  EXPECT_EQ(words(70, 0, 0), "go 20 mm nearer");
-  EXPECT_EQ(words(120, 0, 0), "draw back by 30 mm");
-  EXPECT_EQ(words(90, -0.2, -0.2), "bring the board to the upper left of the picture");
-  EXPECT_EQ(words(90, 0.3, 0), "bring the board to the right side of the picture");
-  EXPECT_EQ(words(90, 0, 0.25), "bring the board to the lower part of the picture");
-  EXPECT_EQ(words(70, -0.2, 0.2), "go 20 mm nearer, and bring the board to the lower left of the picture");
-  EXPECT_EQ(words(91, 0.01, 0), "hold the scope where it is");
+  EXPECT_NEAR(*move(70, 0, 0).nearer_mm, 20, 0.5);
+  EXPECT_NEAR(*move(120, 0, 0).nearer_mm, -30, 0.5);
+  EXPECT_FALSE(move(70, 0, 0).board.has_value());
+  EXPECT_EQ(move(90, -0.2, -0.2).board, BoardPlace::upper_left);
+  EXPECT_EQ(move(90, 0.3, 0).board, BoardPlace::right);
+  EXPECT_EQ(move(90, 0, 0.25).board, BoardPlace::lower);
+  EXPECT_EQ(move(70, -0.2, 0.2).board, BoardPlace::lower_left);
+  const ScopeMove none = move(91, 0.01, 0);
+  EXPECT_FALSE(none.tilt || none.turn_rad || none.nearer_mm || none.board);
 }
 
 TEST(Coverage, CountsWhatStationsHaveBeenToSee) {

@@ -198,7 +198,7 @@ TEST_F(HeldBack, AServerThatTellsOfNoInstrumentIsAskedAboutAtAReconnection) {
   show_frame();
   EXPECT_FALSE(overlaid()) << "the registration is of a tracker of which nothing is told now";
   EXPECT_TRUE(workflow_.view().asks_for_instruments);
-  workflow_.primary();
+  workflow_.primary(HostTime{0});
   EXPECT_FALSE(workflow_.view().asks_for_instruments);
   show_frame();
   EXPECT_TRUE(overlaid()) << reason();
@@ -211,7 +211,7 @@ TEST_F(HeldBack, AfterAPauseSomebodyLooksWhetherTheRegistrationHolds) {
   EXPECT_FALSE(overlaid());
   EXPECT_TRUE(workflow_.view().unconfirmed);
   EXPECT_EQ(workflow_.view().step, LiveStep::check);
-  workflow_.primary();
+  workflow_.primary(HostTime{0});
   show_frame();
   EXPECT_TRUE(overlaid()) << reason();
 }
@@ -245,7 +245,7 @@ TEST(HeldBackOnResume, AnotherCameraTakesUpNoCalibrationByTheBoard) {
   EXPECT_TRUE(workflow.view().note(LiveStep::calibrate).done);
   EXPECT_EQ(workflow.view().step, LiveStep::check) << "and somebody has to look first";
   EXPECT_FALSE(workflow.picture().setup().has_value());
-  workflow.primary();
+  workflow.primary(HostTime{0});
   EXPECT_TRUE(workflow.picture().setup().has_value());
 }
 

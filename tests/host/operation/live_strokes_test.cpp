@@ -40,7 +40,7 @@ class LiveStrokes : public ::testing::Test {
   void keep_view() {
     workflow_.take(looking_at(workflow_, Eigen::Vector3d::Zero(), 100, 0.2), HostTime{0}, ClockGap{});
     workflow_.draw();
-    workflow_.primary();
+    workflow_.primary(HostTime{0});
   }
 
   [[nodiscard]] std::string note() const { return workflow_.view().note(LiveStep::views).line; }
@@ -92,6 +92,8 @@ TEST_F(LiveStrokes, AreForgottenWithTheRegistrationThatTheyAreOf) {
   workflow_.go_to(LiveStep::fiducials);
   EXPECT_FALSE(workflow_.view().stroking) << "another step ends it";
   EXPECT_GT(workflow_.view().touched_places, 0U);
+  workflow_.undo();
+  EXPECT_GT(workflow_.view().touched_places, 0U) << "it is said first what is lost";
   workflow_.undo();
   EXPECT_EQ(workflow_.view().touched_places, 0U);
   EXPECT_EQ(note(), "the fiducials were touched anew: keep views again");

@@ -166,7 +166,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   load(workflow);
   ASSERT_EQ(workflow.view().fault, "");
   give_record(workflow);
-  workflow.primary();
+  workflow.primary(HostTime{0});
   ASSERT_TRUE(workflow.picture().setup().has_value());
   workflow.take(looking_at(workflow, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
   workflow.draw();
@@ -223,7 +223,7 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   workflow.go_on();
   EXPECT_FALSE(workflow.picture().setup().has_value()) << "to skip the look is not to have looked";
   workflow.go_to(LiveStep::check);
-  workflow.primary();
+  workflow.primary(HostTime{0});
   ASSERT_TRUE(workflow.picture().setup().has_value());
   const auto& found = workflow.picture().setup()->tracker_from_patient();
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
@@ -296,7 +296,7 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
     load(workflow);
     ASSERT_EQ(workflow.view().fault, "");
     give_record(workflow);
-    workflow.primary();
+    workflow.primary(HostTime{0});
     ASSERT_TRUE(workflow.picture().setup().has_value());
     EXPECT_EQ(workflow.picture().setup()->camera().fx_px == 500, !record_is_newer);
   }
@@ -369,7 +369,7 @@ TEST(LiveWorkflow, AWrongTouchShowsAndIsTakenBack) {
   Hand hand(workflow);
   for (const Eigen::Vector3d& place : {kFiducials[0], kFiducials[1], Eigen::Vector3d(35, 60, 90)}) {
     hand.rest_at(place, 30);
-    workflow.primary();  // the pedal's way: at once
+    workflow.primary(HostTime{0});  // the pedal's way: at once
   }
   EXPECT_EQ(workflow.view().touches.size(), 3U);
   EXPECT_TRUE(!workflow.view().registration_fault.empty() || *workflow.view().fre_mm > 2);
@@ -377,6 +377,61 @@ TEST(LiveWorkflow, AWrongTouchShowsAndIsTakenBack) {
   EXPECT_EQ(workflow.view().touches.size(), 2U);
   EXPECT_FALSE(workflow.view().fre_mm.has_value());
   EXPECT_FALSE(workflow.picture().setup().has_value());
+}
+
+TEST(LiveWorkflow, StaysWithTheFiducialsWhereOneIsOffAndTakesThatOneBack) {
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  for (std::size_t i = 0; i < kFiducials.size(); ++i) {
+    hand.rest_at(kFiducials[i] + (i == 1 ? Eigen::Vector3d(9, 3, 0) : Eigen::Vector3d::Zero()), 80);
+  }
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().touches.size(), kFiducials.size());
+  EXPECT_TRUE(workflow.view().fits_poorly);
+  EXPECT_EQ(workflow.view().step, LiveStep::fiducials);
+  EXPECT_EQ(workflow.view().odd_touch, 1U) << workflow.view().registration_fault;
+  EXPECT_TRUE(workflow.view().touch_loses.empty());
+  workflow.take_back(1);
+  EXPECT_EQ(workflow.view().touches.size(), kFiducials.size() - 1);
+  hand.rest_at(kFiducials[1], 80);
+  hand.rest_at({0, 0, 200}, 1);
+  EXPECT_FALSE(workflow.view().fits_poorly);
+  EXPECT_EQ(workflow.view().step, LiveStep::views);
+}
+
+TEST(LiveWorkflow, ATouchIsTakenBackTwiceWhereViewsAreLostWithIt) {
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  load(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().step, LiveStep::views);
+  // The scope has a pose, and the frame an overlay: a view may be kept.
+  workflow.take(looking_at(workflow, {30, 30, 20}, 100, 0.2), HostTime{0}, ClockGap{});
+  workflow.draw();
+  workflow.primary(HostTime{0});
+  ASSERT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept");
+  workflow.go_to(LiveStep::fiducials);
+  EXPECT_EQ(workflow.view().touch_loses, "1 views");
+  workflow.undo();
+  EXPECT_EQ(workflow.view().touches.size(), kFiducials.size()) << "asked for once";
+  EXPECT_EQ(workflow.view().asked_to_take_back, kFiducials.size() - 1);
+  workflow.take_back(0);
+  EXPECT_EQ(workflow.view().touches.size(), kFiducials.size()) << "another one, and once too";
+  workflow.go_to(LiveStep::run);
+  workflow.go_to(LiveStep::fiducials);
+  EXPECT_FALSE(workflow.view().asked_to_take_back.has_value());
+  workflow.undo();
+  workflow.undo();
+  EXPECT_EQ(workflow.view().touches.size(), kFiducials.size() - 1);
+  EXPECT_TRUE(workflow.view().touch_loses.empty());
+  workflow.undo();
+  EXPECT_EQ(workflow.view().touches.size(), kFiducials.size() - 2) << "nothing is lost with it any more";
 }
 
 TEST(LiveWorkflow, SaysWhatIsWrongWithThePatientsFiles) {

@@ -57,9 +57,11 @@ TEST(OrganMotion, WhatCannotBeToldChangesNothingAndIsToldAfterTenSeconds) {
   for (int s = 1; s <= 10; ++s) {
     EXPECT_FALSE(motion.take(said(kCannotTell, s)));
     EXPECT_EQ(motion.line(), "surface: 0.4 mm off");
+    EXPECT_TRUE(motion.told());
   }
   EXPECT_FALSE(motion.take(said(kCannotTell, 11)));
   EXPECT_EQ(motion.line(), "for 10 s it cannot be told whether the organ has moved: smoke");
+  EXPECT_FALSE(motion.told());
   // Nor does it stand between two that say the same.
   EXPECT_FALSE(motion.take(said(kMoved, 12)));
   EXPECT_FALSE(motion.take(said(kCannotTell, 13)));
@@ -111,7 +113,7 @@ class DeformedOperation : public ::testing::Test {
     load(*workflow_);
     ASSERT_EQ(workflow_->view().fault, "");
     give_record(*workflow_);
-    workflow_->primary();
+    workflow_->primary(HostTime{0});
     ASSERT_TRUE(workflow_->picture().setup().has_value());
   }
 
@@ -145,13 +147,13 @@ TEST_F(DeformedOperation, KeepsViewsAnewThoughItsOverlayIsWithdrawn) {
   LiveWorkflow& workflow = *workflow_;
   (void)shown_after(workflow, 1);
   workflow.go_to(LiveStep::views);
-  workflow.primary();
+  workflow.primary(HostTime{0});
   ASSERT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept");
   workflow.take(said(kMoved, 1));
   workflow.take(said(kMoved, 2));
   EXPECT_NE(workflow.view().note(LiveStep::views).line.find("moved since"), std::string::npos);
   EXPECT_FALSE(shown_after(workflow, 3).overlaid);
-  workflow.primary();
+  workflow.primary(HostTime{0});
   EXPECT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept") << "the old one is not among them";
 }
 

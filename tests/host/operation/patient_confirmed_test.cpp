@@ -34,11 +34,32 @@ TEST(PatientConfirmed, NothingIsRegisteredBefore) {
   EXPECT_FALSE(workflow.view().fre_mm.has_value());
   EXPECT_FALSE(workflow.picture().setup().has_value());
   EXPECT_EQ(primary_words(workflow.view()), "this is the patient");
-  workflow.primary();  // the pedal
+  workflow.primary(HostTime{0});  // the pedal
   EXPECT_TRUE(workflow.view().patient_confirmed);
   EXPECT_FALSE(workflow.view().asks_for_patient);
   ASSERT_TRUE(workflow.view().fre_mm.has_value()) << "what was touched before counts";
   EXPECT_TRUE(workflow.picture().setup().has_value());
+}
+
+TEST(PatientConfirmed, APressTooManyTakesNoPoint) {
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  read_ct(workflow);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  hand.rest_at(kFiducials[0], 30);  // so short that a point is taken by a press alone
+  const auto press_after = [&workflow](std::int64_t ms) { workflow.primary(HostTime{ms * birdseye::testing::kMs}); };
+  press_after(5000);
+  ASSERT_TRUE(workflow.view().patient_confirmed);
+  press_after(5000);
+  press_after(5900);
+  EXPECT_TRUE(workflow.view().touches.empty());
+  wire::Pedal pedal;
+  pedal.pressed = true;
+  workflow.take(pedal, HostTime{5950 * birdseye::testing::kMs}, std::nullopt);
+  EXPECT_TRUE(workflow.view().touches.empty()) << "nor by the pedal";
+  press_after(6000);
+  EXPECT_EQ(workflow.view().touches.size(), 1U);
 }
 
 TEST(PatientConfirmed, AnotherSystemMayNameThePatient) {
@@ -87,7 +108,7 @@ TEST(PatientConfirmed, AnotherPatientsCtIsNotToBeConfirmed) {
   EXPECT_NE(workflow.view().patient_fault.find("4711"), std::string::npos);
   EXPECT_EQ(primary_words(workflow.view()), "close, and give the CT of this patient");
   EXPECT_TRUE(workflow.view().touches.empty()) << "nothing is begun with another patient's CT";
-  workflow.primary();
+  workflow.primary(HostTime{0});
   workflow.confirm_patient();
   EXPECT_FALSE(workflow.view().patient_confirmed);
   EXPECT_FALSE(workflow.picture().setup().has_value());
@@ -183,7 +204,7 @@ TEST_F(Picks, ThePedalSwitchesTheRunningOverlayOffAndOn) {
   // What is frozen bears no overlay to switch off, and is let go first.
   workflow_->freeze_or_let_go();
   workflow_->hide_or_show_overlay();
-  workflow_->primary();
+  workflow_->primary(HostTime{0});
   EXPECT_FALSE(workflow_->view().frozen);
   EXPECT_FALSE(workflow_->view().overlay_hidden);
 }

@@ -147,10 +147,51 @@ TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
   ASSERT_TRUE(step.registered().has_value()) << step.fault();
   EXPECT_TRUE(step.note().done);
   EXPECT_LT(*step.touches()[2].residual_mm, 1e-6);
-  EXPECT_TRUE(step.undo());
+  EXPECT_TRUE(step.take_back(3));
   step.fit(kFiducials, 4);
   EXPECT_TRUE(step.registered().has_value());
   EXPECT_FALSE(step.note().done) << "three leave open which is which";
+}
+
+/// Markers about an organ, and touches of them; one is off.
+FiducialStep touched_with_one_off(const std::vector<Eigen::Vector3d>& markers, std::size_t which,
+                                  const Eigen::Vector3d& off_mm) {
+  FiducialStep step;
+  for (std::size_t i = 0; i < markers.size(); ++i)
+    step.add(touch_at(markers[i] + (i == which ? off_mm : Eigen::Vector3d::Zero())), markers.size(), {});
+  step.fit(markers, markers.size());
+  return step;
+}
+
+TEST(FiducialStep, NamesTheTouchThatIsOff) {
+  std::vector<Eigen::Vector3d> five = kFiducials;
+  five.emplace_back(-9, -53, -55);  // no four of them are like four others
+  for (std::size_t which = 0; which < five.size(); ++which) {
+    FiducialStep step = touched_with_one_off(five, which, {6, -7, 8});
+    EXPECT_TRUE(step.fits_poorly());
+    ASSERT_EQ(step.odd(), which);
+    ASSERT_TRUE(step.take_back(which));
+    step.fit(five, five.size());
+    EXPECT_FALSE(step.fits_poorly());
+    EXPECT_FALSE(step.odd().has_value());
+    EXPECT_LT(step.registered()->fre_mm, 1e-6);
+    EXPECT_EQ(step.touches().size(), 4U);
+  }
+  // So far off that nothing fits at all.
+  const FiducialStep far_off = touched_with_one_off(five, 2, {0, 0, 90});
+  EXPECT_FALSE(far_off.registered().has_value());
+  EXPECT_EQ(far_off.odd(), 2U);
+  EXPECT_FALSE(FiducialStep().take_back(0));
+}
+
+TEST(FiducialStep, WhereItCannotBeToldWhichTouchIsOffItNamesNone) {
+  const FiducialStep good = touched_with_one_off(kFiducials, 1, {0.3, 0, 0});
+  EXPECT_FALSE(good.fits_poorly());
+  EXPECT_FALSE(good.odd().has_value());
+  // In a plane, and one lifted off it: what is left of any three fits as well.
+  const FiducialStep flat = touched_with_one_off({{0, 0, 0}, {90, 5, 0}, {20, 70, 0}, {85, 100, 0}}, 2, {0, 0, 14});
+  EXPECT_TRUE(flat.fits_poorly());
+  EXPECT_FALSE(flat.odd().has_value());
 }
 
 TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {

@@ -263,6 +263,13 @@ TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
   const ShownPicture stopped = picture.at(HostTime{400 * kMs});
   EXPECT_TRUE(stopped.stale);
   EXPECT_EQ(stopped.rgb->front(), 100);
+  // Who has frozen it wants to see what is in it.
+  picture.freeze(true);
+  picture.draw();
+  EXPECT_EQ(picture.at(HostTime{400 * kMs}).rgb->front(), 200);
+  picture.freeze(false);
+  picture.draw();
+  EXPECT_EQ(picture.at(HostTime{400 * kMs}).rgb->front(), 100);
   // It comes back with the next frame.
   picture.take(frame_at(440, {}), HostTime{440 * kMs});
   EXPECT_FALSE(picture.at(HostTime{450 * kMs}).stale);

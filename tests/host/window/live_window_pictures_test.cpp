@@ -187,6 +187,54 @@ TEST_F(LiveWindowPictures, FiducialsWithTheirResiduals) {
   expect_looks("fiducials-1280x720", workflow, HostTime{45'000'000});
 }
 
+TEST_F(LiveWindowPictures, ATouchIsOffAndTheFrozenPictureIsGrey) {
+  ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  Hand hand(workflow);
+  begin(workflow, hand, 3);
+  hand.rest_at(kFiducials[3] + Eigen::Vector3d(3, 8, 0), 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().odd_touch, 3U) << workflow.view().fre_mm.value_or(-1);
+  workflow.take(tissue(1, looking_at_the_ball()), HostTime{0}, ClockGap{});
+  workflow.freeze_or_let_go();
+  workflow.draw();
+  facts_.keys = true;
+  expect_looks("fiducials-one-off-1280x720", workflow, HostTime{2'000'000'000});
+}
+
+TEST_F(LiveWindowPictures, MarginsWithHowFarOffTheyMayBeAmongAllFigures) {
+  ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
+  const Scratch scratch;
+  LiveSettings settings = operation_settings(scratch);
+  hw_sim::Grid grid;
+  grid.size = {20, 20, 20};
+  grid.spacing_mm = {2, 2, 2};
+  grid.origin_mm = {-20, -20, -20};
+  std::vector<std::int16_t> labels;
+  for (int k = 0; k < 20; ++k) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i)
+        labels.push_back((grid.point(i, j, k) - Eigen::Vector3d(2, 0, 0)).norm() < 5 ? 4 : 0);
+    }
+  }
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "labels", grid, labels, 2));
+  settings.patient.labels = scratch / "labels";
+  settings.patient.organ = settings.patient.targets = {4};
+  settings.patient.landmarks.clear();
+  settings.patient.margins_mm = {5, 10};
+  LiveWorkflow workflow(settings);
+  Hand hand(workflow);
+  begin(workflow, hand, 4);
+  facts_.look.margins = true;
+  facts_.details = true;
+  facts_.preset = "tumour-and-vessels";
+  workflow.set_look(facts_.look);
+  const HostTime now = run_overlay(workflow);
+  ASSERT_TRUE(workflow.shown_at(now).overlaid) << workflow.shown_at(now).reason;
+  expect_looks("margins-1280x720", workflow, now);
+}
+
 TEST_F(LiveWindowPictures, ALightRoomWithSlicesAndAPatientNobodyHasConfirmed) {
   ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
   const Scratch scratch;

@@ -80,8 +80,12 @@ TEST(Theme, WhatTheOverlayShowsIsToldApartByEveryEye) {
       EXPECT_GT(apart(vessel, liver), 20);
     }
     EXPECT_GT(apart(tumour, liver), 20);
+    // The shell next to the tumour, against the tumour, its outline, which is of the colours between, and the vessels.
+    for (int hu = 160; hu <= 500; hu += 20) EXPECT_GT(apart(margin_colour(0).cast<float>(), colour_at(hu)), 20) << hu;
     for (std::size_t a = 0; a < kMostMargins; ++a) {
       EXPECT_GT(apart(margin_colour(a).cast<float>(), liver), 20) << a;
+      for (const Eigen::Vector3f& vessel : {veins, portal})
+        EXPECT_GT(apart(margin_colour(a).cast<float>(), vessel), 20) << a;
       for (std::size_t b = 0; b < a; ++b)
         EXPECT_GT(apart(margin_colour(a).cast<float>(), margin_colour(b).cast<float>()), 15) << a << " " << b;
     }

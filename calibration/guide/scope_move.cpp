@@ -1,9 +1,6 @@
-#include "calibration/guide/guidance_words.hpp"
-
-#include <fmt/format.h>
+#include "calibration/guide/scope_move.hpp"
 
 #include <cmath>
-#include <vector>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -35,41 +32,15 @@ double tilt_of(const Eigen::Vector3d& axis) {
   return std::atan2(axis.head<2>().norm(), axis.z());
 }
 
-int whole_degrees(double angle_rad) {
-  constexpr double kStep_deg = 5;
-  return static_cast<int>(kStep_deg * std::round(angle_rad * kDegPerRad / kStep_deg));
-}
-
 /// Of a vector in the picture, y down.
-std::string direction_word(double x, double y) {
-  static const char* const kWords[] = {"to the right", "down and to the right", "down", "down and to the left",
-                                       "to the left",  "up and to the left",    "up",   "up and to the right"};
-  const auto sector = static_cast<std::size_t>(std::lround(std::atan2(y, x) / (45 * kRadPerDeg)) + 8) % 8;
-  return kWords[sector];
+PictureWay way_of(double x, double y) {
+  return static_cast<PictureWay>((std::lround(std::atan2(y, x) / (45 * kRadPerDeg)) + 8) % 8);
 }
 
-std::string turn_words(double turn_rad) {
-  const double size = std::abs(turn_rad);
-  const char* const way = turn_rad > 0 ? "clockwise" : "anticlockwise";
-  static const char* const kEighths[] = {"an eighth of a turn", "a quarter of a turn", "three eighths of a turn",
-                                         "half a turn"};
-  const long eighths = std::lround(size / (45 * kRadPerDeg));
-  constexpr double kNear_rad = 8 * kRadPerDeg;
-  const bool named = eighths > 0 && std::abs(size - static_cast<double>(eighths) * 45 * kRadPerDeg) < kNear_rad;
-  const std::string amount = named ? kEighths[eighths - 1] : fmt::format("{} degrees", whole_degrees(size));
-  return fmt::format("turn it {} {} about its long axis", amount, way);
-}
-
-std::string off_centre_words(const CameraModel& camera, const Eigen::Vector2d& pixel) {
+BoardPlace place_of(const CameraModel& camera, const Eigen::Vector2d& pixel) {
   const double x = pixel.x() / camera.width_px - 0.5, y = pixel.y() / camera.height_px - 0.5;
-  const std::string row = y < -kLeastOffCentre ? "upper" : y > kLeastOffCentre ? "lower" : "";
-  const std::string column = x < -kLeastOffCentre ? "left" : x > kLeastOffCentre ? "right" : "";
-  if (row.empty() && column.empty()) return "bring the board to the middle of the picture";
-  const char* const between = row.empty() || column.empty() ? "" : " ";
-  return fmt::format("bring the board to the {}{}{} of the picture", row, between,
-                     column.empty() ? " part"
-                     : row.empty()  ? column + " side"
-                                    : column);
+  const auto third = [](double part) { return part < -kLeastOffCentre ? 0 : part > kLeastOffCentre ? 2 : 1; };
+  return static_cast<BoardPlace>(3 * third(y) + third(x));
 }
 
 }  // namespace
@@ -98,31 +69,23 @@ Transform<Camera, Marker> pose_of(const ScopeView& view, const Eigen::Vector3d& 
   return {rotation, Eigen::Vector3d(centre_in_camera - rotation * centre_mm)};
 }
 
-std::string words_for(const Transform<Camera, Marker>& now, const Transform<Camera, Marker>& next,
-                      const CameraModel& camera, const Eigen::Vector3d& centre_mm) {
+ScopeMove move_between(const Transform<Camera, Marker>& now, const Transform<Camera, Marker>& next,
+                       const CameraModel& camera, const Eigen::Vector3d& centre_mm) {
+  ScopeMove move;
   // The next camera's axes as the camera has them now.
   const auto [axis, turn_rad] = tilt_and_turn(now.rotation() * next.rotation().transpose());
-  std::vector<std::string> parts;
   if (tilt_of(axis) > kLeastTilt_rad) {
     // The tip points along the axis, so that the camera head lies the other way.
-    parts.push_back(fmt::format("tilt the scope {} degrees {}, as the picture shows it", whole_degrees(tilt_of(axis)),
-                                direction_word(-axis.x(), -axis.y())));
+    move.tilt = {tilt_of(axis), way_of(-axis.x(), -axis.y())};
   }
-  if (std::abs(turn_rad) > kLeastTurn_rad) parts.push_back(turn_words(turn_rad));
+  if (std::abs(turn_rad) > kLeastTurn_rad) move.turn_rad = turn_rad;
   const double from_mm = (now * centre_mm).z(), to_mm = (next * centre_mm).z();
-  if (std::abs(to_mm - from_mm) > kLeastShare * from_mm) {
-    parts.push_back(to_mm < from_mm ? fmt::format("go {:.0f} mm nearer", from_mm - to_mm)
-                                    : fmt::format("draw back by {:.0f} mm", to_mm - from_mm));
-  }
+  if (std::abs(to_mm - from_mm) > kLeastShare * from_mm) move.nearer_mm = from_mm - to_mm;
   const auto from_px = project(camera, now * centre_mm), to_px = project(camera, next * centre_mm);
   const Eigen::Vector2d size_px(camera.width_px, camera.height_px);
-  if (to_px && (!from_px || (*to_px - *from_px).cwiseQuotient(size_px).norm() > kLeastOffCentre)) {
-    parts.push_back(off_centre_words(camera, *to_px));
-  }
-  if (parts.empty()) return "hold the scope where it is";
-  std::string words = parts[0];
-  for (std::size_t i = 1; i < parts.size(); ++i) words += (i + 1 == parts.size() ? ", and " : ", ") + parts[i];
-  return words;
+  if (to_px && (!from_px || (*to_px - *from_px).cwiseQuotient(size_px).norm() > kLeastOffCentre))
+    move.board = place_of(camera, *to_px);
+  return move;
 }
 
 }  // namespace birdseye::calibration
