@@ -14,6 +14,7 @@ using drivers::minibird::MiniBirdCounters;
 
 constexpr Duration kDoubtToldEvery = Duration::from_ms(1000);
 constexpr Duration kDoubtInStatusAfter = Duration::from_ms(100);  // a record that is lost now and then is none of it
+constexpr Duration kClockFaultStays = Duration::from_ms(1000);    // after the last frame that shows it
 constexpr std::size_t kMostWaitingFrames = 16;                    // 100 MB of 1080p, and over a quarter of a second
 
 void add(MiniBirdCounters& sum, const MiniBirdCounters& more) {
@@ -75,6 +76,8 @@ void Core::note(const InstrumentChanged& changed) {
   if (changed.instrument == Instrument::camera && running) {
     frame_clock_.restart(changed.rate_hz, changed.exposure);
     next_sequence_.reset();
+    stamps_ahead_.reset();
+    board_.set_clock_fault("");
   }
 }
 
@@ -149,6 +152,14 @@ void Core::note(const FrameCame& came) {
   ++frames_seen_;
   calibration_.note_frame(frame.width_px, frame.height_px);
   frames_.push_back({frame, frame_clock_.time_of(frame)});
+  const FrameClock::Time& time = frames_.back().time;
+  if (time.ahead) {
+    stamps_ahead_ = frame.arrived;
+    board_.set_clock_fault(time.reason);
+  } else if (stamps_ahead_ && frame.arrived > *stamps_ahead_ + kClockFaultStays) {
+    stamps_ahead_.reset();
+    board_.set_clock_fault("");
+  }
   tell(Instrument::camera, frame_clock_.take_events());
   if (frames_.size() > kMostWaitingFrames) {  // the wait that is configured is longer than frames may be kept for
     publish(frames_.front());

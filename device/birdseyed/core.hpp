@@ -85,6 +85,7 @@ class Core {
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;
+  std::optional<DeviceTime> stamps_ahead_;  ///< when the newest frame came whose stamp lay ahead of the clock
   CalibrationGuard calibration_;
   std::deque<TimedFrame> frames_;  ///< waiting for poses
   std::uint64_t frames_seen_ = 0, frames_lost_ = 0, frames_repeated_ = 0;

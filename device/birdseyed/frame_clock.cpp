@@ -1,5 +1,7 @@
 #include "device/birdseyed/frame_clock.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace birdseye::device {
@@ -9,6 +11,10 @@ namespace {
 /// How far before and after where it is expected a frame may follow its edge, in periods; less than one together, for
 /// otherwise nothing tells one edge from the next. More after than before: delays are known at the least.
 constexpr double kEarlier = 0.4, kLater = 0.55;
+
+/// A frame cannot arrive before the middle of its exposure; stamp and arrival are read one after the other.
+constexpr std::int64_t kSurely = 3;  // sigmas
+constexpr Duration kClockReads = Duration::from_ms(1);
 
 }  // namespace
 
@@ -62,19 +68,26 @@ FrameClock::Time FrameClock::time_of(const drivers::Frame& frame) {
   if (frame.acquired_known) push(stamps_, frame.acquired, number);
   if (settings_.strobe) {
     const auto found = match(frame, number);
-    if (found.acquired) return {*found.acquired, found.sigma, true, {}};
+    if (found.acquired) return {*found.acquired, found.sigma, true, {}, {}};
     unmatched = found.reason;
   }
-  if (frame.acquired_known) return {frame.acquired, frame.acquired_sigma, true, {}};
+  if (frame.acquired_known) {
+    const Duration ahead = frame.acquired - frame.arrived;
+    if (ahead.ns > kSurely * frame.acquired_sigma.ns + kClockReads.ns) {
+      return {frame.arrived, frame.acquired_sigma, false,
+              fmt::format("the camera's stamps lie {:.0f} ms ahead of the clock", ahead.seconds() * 1e3), ahead};
+    }
+    return {frame.acquired, frame.acquired_sigma, true, {}, {}};
+  }
   const ClockLine::Tick tick = push(line_, frame.arrived, number);
   // A delay that nobody has told is any from none to a period, as drivers/video/frame_stamp.cpp takes it.
   const DeviceTime acquired = tick.time - settings_.delay.value_or(Duration{period().ns / 2});
   const Duration unknown = settings_.delay ? Duration{0} : Duration::from_seconds(period().seconds() / std::sqrt(12.0));
   const Duration sigma = in_quadrature(in_quadrature(tick.sigma, kWakeSigma), unknown);
   if (settings_.strobe && !settings_.delay)
-    return {acquired, sigma, false, unmatched + ", and the camera's delay_ms is not set"};
-  if (!tick.certain) return {acquired, sigma, false, "frames do not come at the camera's rate_hz"};
-  return {acquired, sigma, true, {}};
+    return {acquired, sigma, false, unmatched + ", and the camera's delay_ms is not set", {}};
+  if (!tick.certain) return {acquired, sigma, false, "frames do not come at the camera's rate_hz", {}};
+  return {acquired, sigma, true, {}, {}};
 }
 
 }  // namespace birdseye::device

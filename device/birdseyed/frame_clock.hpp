@@ -33,6 +33,9 @@ class FrameClock {
     Duration sigma;
     bool certain = true;  ///< false: the time has yet to be made out
     std::string reason;   ///< why not, in words
+    /// How far the camera's stamp lies ahead of the frame's arrival, where that is more than its sigma allows: it is
+    /// not believed, and `acquired` is the arrival.
+    std::optional<Duration> ahead;
   };
 
   explicit FrameClock(const Settings& settings);

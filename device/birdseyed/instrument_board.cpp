@@ -24,6 +24,7 @@ ApplianceState InstrumentBoard::state() const {
     all = false;
     if (entry.has_run || entry.state == InstrumentState::absent) return ApplianceState::degraded;
   }
+  if (all && !clock_fault_.empty()) return ApplianceState::degraded;
   return all ? ApplianceState::ready : ApplianceState::starting;
 }
 
@@ -33,6 +34,7 @@ std::string InstrumentBoard::faults() const {
     if (entry.state == InstrumentState::unused || entry.state == InstrumentState::running) continue;
     text += (text.empty() ? "" : "; ") + entry.text;
   }
+  if (!clock_fault_.empty()) text += (text.empty() ? "" : "; ") + clock_fault_;
   return text;
 }
 

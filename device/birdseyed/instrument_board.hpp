@@ -11,7 +11,7 @@ namespace birdseye::device {
 enum class ApplianceState : std::uint8_t {
   starting,  ///< an instrument has yet to run for the first time
   ready,     ///< all that is configured runs
-  degraded,  ///< an instrument that has run does not run now
+  degraded,  ///< an instrument that has run does not run now, or its times are not to be believed
 };
 const char* name_of(ApplianceState state);
 
@@ -27,6 +27,8 @@ class InstrumentBoard {
   };
 
   void note(const InstrumentChanged& changed);
+  /// What is wrong with the times of an instrument that runs, in words; empty: nothing is.
+  void set_clock_fault(const std::string& fault) { clock_fault_ = fault; }
   [[nodiscard]] const Entry& of(Instrument instrument) const { return entries_[static_cast<std::size_t>(instrument)]; }
   [[nodiscard]] ApplianceState state() const;
   /// What is wrong, in words; empty when nothing is.
@@ -34,6 +36,7 @@ class InstrumentBoard {
 
  private:
   std::array<Entry, kInstruments> entries_;
+  std::string clock_fault_;
 };
 
 /// Whether the status LED is lit now: steadily when ready, blinking slowly when starting and fast when degraded. Dark

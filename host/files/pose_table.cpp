@@ -286,7 +286,7 @@ Result<std::optional<Chosen>> choose_tool(const fs::path& path, const PoseReadin
     if (wanted.empty()) return std::optional<Chosen>();
     return Error{
         Errc::bad_value,
-        fmt::format("{}: --{}tool (or --transform) {}: no column of this table says whose pose a row is: leave the "
+        fmt::format("{}: --{}tool {} (or --transform): no column of this table says whose pose a row is: leave the "
                     "option out if all rows are of one tool",
                     path.string(), how.option_prefix, wanted)};
   }

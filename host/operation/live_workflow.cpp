@@ -93,7 +93,9 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
     note_pause(now);
     if (!frozen_) {
-      picture_.take(*frame, clock ? clock->host_from_device(frame->info.acquired) : now);
+      std::optional<RelatedTime<HostTime>> stamped;
+      if (clock) stamped = {clock->host_from_device(frame->info.acquired), clock->host.sigma};
+      picture_.take(*frame, exposure_of(stamped, frame->info.acquired_sigma, now));
       watch_surface(now);
     }
   } else if (const auto* birds = std::get_if<wire::Birds>(&event)) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "calibration/time/clock.hpp"
+#include "calibration/time/clock_relation.hpp"
 
 namespace birdseye::host {
 
@@ -27,8 +29,20 @@ struct Freshness {
   HostTime overlaid_until, bare_until;
 };
 
-/// exposed: the middle of the exposure. pose_age: how old the newest measurement behind the frame's pose was then; not
-/// above zero where the pose was measured.
-Freshness freshness_at(HostTime now, HostTime exposed, Duration pose_age, const FreshnessLimits& limits);
+/// When a frame was exposed, on this machine's clock.
+struct Exposure {
+  HostTime at{};        ///< the middle; where that is not to be believed, or not known, the frame's arrival
+  Duration sigma{};     ///< of the clocks' relation and of the frame's stamp
+  std::string doubt{};  ///< why its stamp is not believed, in words: it must not carry an overlay; empty: it is
+};
+
+/// stamped: where the clocks' relation has the frame's stamp; empty: the clocks are not related yet. stamp_sigma: of
+/// the stamp. A frame that was exposed after it arrived, by more than both sigmas allow, has a wrong stamp: by it video
+/// that has stopped would seem fresh.
+Exposure exposure_of(const std::optional<RelatedTime<HostTime>>& stamped, Duration stamp_sigma, HostTime arrived);
+
+/// pose_age: how old the newest measurement behind the frame's pose was at the exposure; not above zero where the pose
+/// was measured. A frame counts as old as it may be with a probability of 95 %.
+Freshness freshness_at(HostTime now, const Exposure& exposed, Duration pose_age, const FreshnessLimits& limits);
 
 }  // namespace birdseye::host

@@ -31,7 +31,7 @@ void LivePicture::set_setup(std::optional<Setup> setup, const TrustFigures& figu
   kind_ = -1;
 }
 
-void LivePicture::take(const wire::VideoFrame& frame, HostTime exposed) {
+void LivePicture::take(const wire::VideoFrame& frame, const Exposure& exposed) {
   frame_ = frame;
   exposed_ = exposed;
   decision_ = painter_.decide(frame);

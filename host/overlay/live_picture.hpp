@@ -77,9 +77,8 @@ class LivePicture {
   [[nodiscard]] const std::optional<Setup>& setup() const { return painter_.setup(); }
   [[nodiscard]] const TrustFigures& figures() const { return painter_.figures(); }
 
-  /// A frame that has come; one that came before and was not drawn yet is skipped. exposed: when its exposure was, on
-  /// this machine's clock; where that is not known, when it arrived.
-  void take(const wire::VideoFrame& frame, HostTime exposed);
+  /// A frame that has come; one that came before and was not drawn yet is skipped.
+  void take(const wire::VideoFrame& frame, const Exposure& exposed);
   /// Draws the newest frame, if that is still to be done: some tens of milliseconds.
   void draw();
   /// What of it may be shown at this moment.
@@ -88,7 +87,7 @@ class LivePicture {
   void redraw() { dirty_ = frame_.has_value(); }
 
   [[nodiscard]] const std::optional<wire::VideoFrame>& frame() const { return frame_; }
-  [[nodiscard]] HostTime exposed() const { return exposed_; }
+  [[nodiscard]] HostTime exposed() const { return exposed_.at; }
   [[nodiscard]] std::uint64_t frames_skipped() const { return skipped_; }
   /// Where the newest frame's overlay is drawn from; empty where nothing is drawn over it.
   [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient() const;
@@ -105,7 +104,7 @@ class LivePicture {
   OverlayLook look_;
   std::string why_no_setup_ = "the patient is not registered yet";
   std::optional<wire::VideoFrame> frame_;
-  HostTime exposed_;
+  Exposure exposed_;
   OverlayGate::Decision decision_;
   std::vector<std::uint8_t> overlaid_, stopped_;
   std::uint64_t changes_ = 0, skipped_ = 0;

@@ -309,6 +309,8 @@ inline constexpr std::array kEnglish{
     EnglishText{"why_stopped", "the video has stopped, {:.1f} s ago"},
     EnglishText{"why_old_picture", "the picture is {:.0f} ms old"},
     EnglishText{"why_old_pose", "the newest pose is {:.0f} ms old"},
+    EnglishText{"why_stamp_ahead",
+                "the frames' stamps lie {:.0f} ms ahead of the clock: how old they are is not known"},
     EnglishText{"why_no_video", "no video has come yet"},
     EnglishText{"why_no_ct", "the CT is not ready"},
     EnglishText{"why_hidden", "it is switched off"},

@@ -180,6 +180,32 @@ TEST(Core, StampsThatJumpAreAnEventOfTheClock) {
   EXPECT_EQ(core.counters().clock_events, 1U);
 }
 
+/// By such a stamp video that has stopped would seem fresh for as long as it lies ahead.
+TEST(Core, StampsAheadOfTheClockAreRefusedAndSaid) {
+  Core core({});
+  wire::Unpacker unpacker;
+  core.take(camera_runs(0));
+  std::vector<wire::Status> said;
+  const auto frame_of = [&](std::uint64_t n, double ahead_s) {
+    const double arrived = static_cast<double>(n) / 25;
+    const auto events = unpacked(core.take(FrameCame{frame(n, arrived + ahead_s, arrived)}), unpacker);
+    for (const auto& status : only<wire::Status>(events)) said.push_back(status);
+    return only<wire::VideoFrame>(events).at(0).info;
+  };
+  EXPECT_EQ(frame_of(0, -0.03).acquired.ns, at(-0.03).ns);
+  EXPECT_EQ(core.board().state(), ApplianceState::ready);
+  const wire::FrameInfo ahead = frame_of(1, 2);
+  EXPECT_EQ(ahead.acquired.ns, ahead.arrived.ns) << "it was exposed no later";
+  EXPECT_EQ(ahead.pose.kind, PoseKind::refused);
+  EXPECT_NE(ahead.pose.reason.find("2000 ms ahead of the clock"), std::string::npos) << ahead.pose.reason;
+  EXPECT_EQ(core.board().state(), ApplianceState::degraded);
+  ASSERT_FALSE(said.empty());
+  EXPECT_EQ(said.back().text, "the camera's stamps lie 2000 ms ahead of the clock");
+  for (std::uint64_t n = 2; n < 30; ++n) frame_of(n, -0.03);
+  EXPECT_EQ(core.board().state(), ApplianceState::ready);
+  EXPECT_TRUE(said.back().ok) << said.back().text;
+}
+
 TEST(Core, AnInstrumentThatGoesIsSaidOnceAndItsFramesHaveNoPose) {
   auto events = session(4, 3);
   const auto gone = [](const RawEvent& e) { return std::holds_alternative<TrackerBytes>(e) && time_of(e) > at(2); };

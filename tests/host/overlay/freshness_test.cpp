@@ -7,7 +7,7 @@ namespace {
 
 Freshness at_ms(std::int64_t age_ms, std::int64_t pose_age_ms = 0) {
   const HostTime exposed{5'000'000'000};
-  return freshness_at(exposed + Duration::from_ms(age_ms), exposed, Duration::from_ms(pose_age_ms), {});
+  return freshness_at(exposed + Duration::from_ms(age_ms), {exposed}, Duration::from_ms(pose_age_ms), {});
 }
 
 TEST(Freshness, SaysWhyAPictureIsTooOld) {
@@ -31,6 +31,33 @@ TEST(Freshness, SaysUntilWhenItMayStayOnTheScreen) {
   EXPECT_EQ((at_ms(0).overlaid_until - exposed).ns, Duration::from_ms(138).ns);
   EXPECT_EQ((at_ms(0, 40).overlaid_until - exposed).ns, Duration::from_ms(98).ns);
   EXPECT_EQ((at_ms(0, 40).bare_until - exposed).ns, Duration::from_ms(318).ns);
+}
+
+/// It counts as old as it may be: by two sigmas.
+TEST(Freshness, CountsHowWellTheExposuresTimeIsKnown) {
+  const HostTime exposed{5'000'000'000};
+  const Exposure unsure{exposed, Duration::from_ms(20), {}};
+  EXPECT_EQ(freshness_at(exposed + Duration::from_ms(80), unsure, {}, {}).why_too_old, "");
+  const Freshness old = freshness_at(exposed + Duration::from_ms(81), unsure, {}, {});
+  EXPECT_EQ(old.why_too_old, "the picture is 121 ms old");
+  EXPECT_EQ(old.age.ns, Duration::from_ms(81).ns);
+  EXPECT_EQ((old.overlaid_until - exposed).ns, Duration::from_ms(98).ns);
+}
+
+TEST(Freshness, OfAStampAheadOfTheClockTheArrivalCounts) {
+  const HostTime arrived{5'000'000'000};
+  const Duration sigma = Duration::from_ms(2);
+  const auto stamped = [&](std::int64_t ms) {
+    return exposure_of(RelatedTime<HostTime>{arrived + Duration::from_ms(ms), sigma}, {}, arrived);
+  };
+  EXPECT_EQ(stamped(-30).at.ns, arrived.ns - 30'000'000);
+  EXPECT_EQ(stamped(7).doubt, "") << "three sigmas and what it takes to read a clock";
+  const Exposure ahead = stamped(500);
+  EXPECT_EQ(ahead.at.ns, arrived.ns);
+  EXPECT_EQ(ahead.doubt, "the frames' stamps lie 500 ms ahead of the clock: how old they are is not known");
+  EXPECT_EQ(freshness_at(arrived, ahead, {}, {}).why_too_old, ahead.doubt) << "no overlay from the first frame on";
+  EXPECT_TRUE(freshness_at(arrived + Duration::from_ms(301), ahead, {}, {}).stopped);
+  EXPECT_EQ(exposure_of(std::nullopt, sigma, arrived).at.ns, arrived.ns);
 }
 
 }  // namespace

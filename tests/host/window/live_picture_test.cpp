@@ -122,7 +122,7 @@ void play(LivePicture& picture, const Fault& fault,
     if (exposed_ms >= 0 && exposed_ms % kFrameMs == 0) {
       auto frame = std::optional(frame_at(exposed_ms, good_pose()));
       if (exposed_ms >= kFaultMs) frame = fault(exposed_ms, *frame);
-      if (frame) picture.take(*frame, HostTime{exposed_ms * kMs});
+      if (frame) picture.take(*frame, {HostTime{exposed_ms * kMs}});
     }
     picture.draw();
     look(ms, picture.at(HostTime{ms * kMs}));
@@ -153,7 +153,7 @@ TEST(LivePicture, AnOverlayThatIsSwitchedOffIsGoneAtOnceAndSaysSo) {
   picture.set_engine(engine);
   picture.set_setup(setup(), kGood);
   for (std::int64_t ms = 0; ms < 400; ms += 40) {
-    picture.take(frame_at(ms, good_pose()), HostTime{ms * kMs});
+    picture.take(frame_at(ms, good_pose()), {HostTime{ms * kMs}});
     picture.draw();
   }
   const HostTime now{370 * kMs};
@@ -198,13 +198,13 @@ TEST(LivePicture, NothingIsDrawnWithoutRegistrationOrWithABadOne) {
   const auto engine = std::make_shared<Magenta>();
   LivePicture picture;
   picture.set_engine(engine);
-  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.take(frame_at(0, good_pose()), {HostTime{0}});
   picture.draw();
   EXPECT_EQ(picture.at(HostTime{kMs}).reason, "the patient is not registered yet");
   TrustFigures bad_fit = kGood;
   bad_fit.fre_mm = 9;
   picture.set_setup(setup(), bad_fit);
-  picture.take(frame_at(40, good_pose()), HostTime{40 * kMs});
+  picture.take(frame_at(40, good_pose()), {HostTime{40 * kMs}});
   picture.draw();
   const ShownPicture bad = picture.at(HostTime{50 * kMs});
   EXPECT_FALSE(bad.overlaid);
@@ -215,7 +215,7 @@ TEST(LivePicture, NothingIsDrawnByAFigureThatNobodyKnows) {
   LivePicture picture;
   picture.set_engine(std::make_shared<Magenta>());
   picture.set_setup(setup(), {});
-  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.take(frame_at(0, good_pose()), {HostTime{0}});
   picture.draw();
   const ShownPicture shown = picture.at(HostTime{10 * kMs});
   EXPECT_FALSE(shown.overlaid);
@@ -227,7 +227,7 @@ TEST(LivePicture, AFrameIsJudgedByTheSetupThatDrawsIt) {
   LivePicture picture;
   picture.set_engine(std::make_shared<Magenta>());
   picture.set_setup(setup(), kGood);
-  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.take(frame_at(0, good_pose()), {HostTime{0}});
   picture.set_setup(setup(), {});  // between the frame's coming and its drawing
   picture.draw();
   const ShownPicture shown = picture.at(HostTime{10 * kMs});
@@ -241,16 +241,16 @@ TEST(LivePicture, APoseIsTheNewestFramesAlsoBeforeThatIsDrawn) {
   LivePicture picture;
   picture.set_engine(std::make_shared<Magenta>());
   picture.set_setup(setup(), kGood);
-  picture.take(frame_at(0, good_pose()), HostTime{0});
+  picture.take(frame_at(0, good_pose()), {HostTime{0}});
   picture.draw();
   PoseAnswer moved = good_pose();
   moved.tracker_from_sensor = Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), {7, 0, 0});
-  picture.take(frame_at(40, moved), HostTime{40 * kMs});
+  picture.take(frame_at(40, moved), {HostTime{40 * kMs}});
   ASSERT_TRUE(picture.camera_from_patient());
   EXPECT_NEAR(picture.camera_from_patient()->translation().x(), -7, 1e-12);
   PoseAnswer refused;
   refused.reason = "the tracker is silent";
-  picture.take(frame_at(80, refused), HostTime{80 * kMs});
+  picture.take(frame_at(80, refused), {HostTime{80 * kMs}});
   EXPECT_FALSE(picture.camera_from_patient());
 }
 
@@ -258,7 +258,7 @@ TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
   LivePicture picture;
   auto frame = frame_at(0, {});
   frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::vector<std::uint8_t>(kWidth * kHeight * 3, 200));
-  picture.take(frame, HostTime{0});
+  picture.take(frame, {HostTime{0}});
   EXPECT_FALSE(picture.at(HostTime{200 * kMs}).stale);
   const ShownPicture stopped = picture.at(HostTime{400 * kMs});
   EXPECT_TRUE(stopped.stale);
@@ -271,7 +271,7 @@ TEST(LivePicture, AVideoThatHasStoppedLosesItsColours) {
   picture.draw();
   EXPECT_EQ(picture.at(HostTime{400 * kMs}).rgb->front(), 100);
   // It comes back with the next frame.
-  picture.take(frame_at(440, {}), HostTime{440 * kMs});
+  picture.take(frame_at(440, {}), {HostTime{440 * kMs}});
   EXPECT_FALSE(picture.at(HostTime{450 * kMs}).stale);
 }
 
@@ -280,8 +280,8 @@ TEST(LivePicture, AClockThatStartsAnewDoesNotStopIt) {
   LivePicture picture;
   picture.set_engine(engine);
   picture.set_setup(setup(), kGood);
-  picture.take(frame_at(90'000, good_pose()), HostTime{0});
-  picture.take(frame_at(10, good_pose()), HostTime{40 * kMs});
+  picture.take(frame_at(90'000, good_pose()), {HostTime{0}});
+  picture.take(frame_at(10, good_pose()), {HostTime{40 * kMs}});
   picture.draw();
   EXPECT_TRUE(picture.at(HostTime{50 * kMs}).overlaid);
   EXPECT_EQ(picture.frames_skipped(), 1U);

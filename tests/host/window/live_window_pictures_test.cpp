@@ -182,9 +182,9 @@ TEST_F(LiveWindowPictures, FiducialsWithTheirResiduals) {
   LiveWorkflow workflow(operation_settings(scratch));
   Hand hand(workflow);
   begin(workflow, hand, 3);
-  workflow.take(tissue(1, looking_at_the_ball()), HostTime{0}, ClockGap{});
+  workflow.take(tissue(1, looking_at_the_ball()), HostTime{40'000'000}, ClockGap{});
   workflow.draw();
-  expect_looks("fiducials-1280x720", workflow, HostTime{45'000'000});
+  expect_looks("fiducials-1280x720", workflow, HostTime{85'000'000});
 }
 
 TEST_F(LiveWindowPictures, ATouchIsOffAndTheFrozenPictureIsGrey) {
