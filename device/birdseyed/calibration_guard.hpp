@@ -21,6 +21,10 @@ class CalibrationGuard {
   void note_frame(int width_px, int height_px);
   /// What to tell clients, if it differs from what was last taken; else empty.
   std::optional<wire::Calibration> take_change();
+  /// What is left between the times of frames and poses, by the record in force; null: nobody measured it.
+  [[nodiscard]] const calibration::LatencyEntry* latency() const {
+    return in_force_ && record_->latency ? &*record_->latency : nullptr;
+  }
   /// Why the record is refused, in words; empty where it is in force, or where the instruments have yet to come.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 

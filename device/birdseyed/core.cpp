@@ -151,7 +151,8 @@ void Core::note(const FrameCame& came) {
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
   calibration_.note_frame(frame.width_px, frame.height_px);
-  frames_.push_back({frame, frame_clock_.time_of(frame)});
+  frames_.push_back({frame, frame_clock_.time_of(frame), std::nullopt});
+  correct_latency(frames_.back());
   const FrameClock::Time& time = frames_.back().time;
   if (time.ahead) {
     stamps_ahead_ = frame.arrived;
@@ -177,9 +178,20 @@ void Core::note(const EdgesCame& came) {
   }
 }
 
+/// A frame said to be of time t shows what the tracker measured at t less the latency.
+void Core::correct_latency(TimedFrame& timed) const {
+  const calibration::LatencyEntry* const latency = calibration_.latency();
+  if (latency == nullptr) return;
+  constexpr double kSigmasOf95 = 3.92;  // from one end of a normal distribution's 95 % to the other
+  const double sigma_s = (latency->ci95_high_ms - latency->ci95_low_ms) / kSigmasOf95 * 1e-3;
+  timed.latency = Duration::from_seconds(latency->offset_ms * 1e-3);
+  timed.time.acquired = timed.time.acquired - *timed.latency;
+  timed.time.sigma = Duration::from_seconds(std::hypot(timed.time.sigma.seconds(), sigma_s));
+}
+
 void Core::release_frames(DeviceTime now) {
   while (!frames_.empty()) {
-    const auto& [frame, time] = frames_.front();
+    const auto& [frame, time, latency] = frames_.front();
     const auto newest = scope_.newest();
     const bool covered = newest && *newest >= time.acquired + settings_.pose.smoothing;
     if (!covered && settings_.pose_wait.ns > 0 && now < frame.arrived + settings_.pose_wait) return;
@@ -189,12 +201,13 @@ void Core::release_frames(DeviceTime now) {
 }
 
 void Core::publish(const TimedFrame& timed) {
-  const auto& [frame, time] = timed;
+  const auto& [frame, time, latency] = timed;
   wire::VideoFrame out;
   out.info.sequence = frame.sequence;
   out.info.acquired = time.acquired;
   out.info.acquired_sigma = time.sigma;
   out.info.arrived = frame.arrived;
+  out.info.latency = latency;
   if (time.certain && time.sigma <= settings_.pose.max_time_sigma) {
     out.info.pose = scope_.at(time.acquired);
     if (out.info.pose.kind == PoseKind::refused && birds_[0].doubt != DoubtKind::none)

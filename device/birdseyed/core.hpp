@@ -60,6 +60,7 @@ class Core {
   struct TimedFrame {
     drivers::Frame frame;
     FrameClock::Time time;
+    std::optional<Duration> latency;  ///< by which time was put back
   };
 
   void note(const InstrumentChanged& changed);
@@ -72,6 +73,7 @@ class Core {
   /// The reading corrected by the field map; doubted where the field was not mapped.
   [[nodiscard]] drivers::minibird::BirdReading corrected(const drivers::minibird::BirdReading& reading);
   void note_doubt(std::size_t bird, const drivers::minibird::BirdReading& reading, DeviceTime at);
+  void correct_latency(TimedFrame& timed) const;
   void release_frames(DeviceTime now);
   void publish(const TimedFrame& timed);
   void publish_status(DeviceTime now);

@@ -72,6 +72,7 @@ void to_json(json& out, const FrameInfo& info) {
          {"arrived_ns", info.arrived.ns},
          {"frames_dropped", info.frames_dropped},
          {"pose", pose}};
+  if (info.latency) out["latency_ns"] = info.latency->ns;
 }
 
 void from_json(const json& in, FrameInfo& info) {
@@ -80,6 +81,7 @@ void from_json(const json& in, FrameInfo& info) {
   in.at("acquired_sigma_ns").get_to(info.acquired_sigma.ns);
   in.at("arrived_ns").get_to(info.arrived.ns);
   in.at("frames_dropped").get_to(info.frames_dropped);
+  if (in.contains("latency_ns")) info.latency.emplace().ns = in.at("latency_ns").get<std::int64_t>();
   const json& pose = in.at("pose");
   const auto kind = pose.at("kind").get<std::string>();
   pose.at("reason").get_to(info.pose.reason);

@@ -21,6 +21,9 @@ struct FrameInfo {
   DeviceTime arrived;
   PoseAnswer pose;                   ///< of the scope's bird at `acquired`
   std::uint64_t frames_dropped = 0;  ///< so far, by camera and appliance together
+  /// By which `acquired` was put back, as the calibration record has it, and acquired_sigma grown by how well that is
+  /// known. Empty: what is left between the times of frames and poses was not measured.
+  std::optional<Duration> latency = std::nullopt;
 };
 
 struct VideoFrame {

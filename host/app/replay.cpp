@@ -33,7 +33,7 @@ struct ReplayOptions {
   ShownChoice shown;
   OverlayLook look;
   fs::path deformation, out, json;
-  std::string transfer = "tumour-and-vessels", engine = "cpu";
+  std::string transfer = "tumour-and-vessels", engine = "cpu", scope = "scope";
   double film_hz = 0;
   int every = 10;
 };
@@ -75,13 +75,14 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
 }
 
 /// All of the recording through the overlay.
-Result<void> play(RecordingReader& reader, ReplayPlayer& player, Progress& progress) {
+Result<void> play(RecordingReader& reader, ReplayPlayer& player, const std::string& scope, Progress& progress) {
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
     const auto event = reader.next(Deadline::after(Duration::from_ms(30'000)));
     if (!event && event.error().code == Errc::disconnected) return {};
     if (!event) return event.error();
     if (!*event) continue;
+    if (const auto* birds = std::get_if<wire::Birds>(&**event)) player.take(*birds, scope);
     const auto* frame = std::get_if<wire::VideoFrame>(&**event);
     if (frame == nullptr) continue;
     if (auto taken = player.take(*frame); !taken) return taken;
@@ -123,7 +124,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
   const ReplayTrust trust = trust_of(*setup, *volume);
   ReplayPlayer player({options.out, options.every, options.film_hz, options.look}, setup->setup(), trust.figures,
                       **engine, std::move(margins));
-  if (auto played = play(**reader, player, progress); !played) return played.error();
+  if (auto played = play(**reader, player, options.scope, progress); !played) return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
@@ -160,6 +161,8 @@ void add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("--pointer", inputs.pointer, "the bird that touches (default pointer)")->needs(fiducials);
   command.add_option("--touched", inputs.touched_s, "from and to, s: when it touches")->expected(2)->needs(fiducials);
   command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views");
+  command.add_option("--rod-angle", inputs.rod_angle_deg,
+                     "of a scope whose rod turns, degrees, as it was read off when it was recorded");
   command.add_option("--camera-rms-px", inputs.camera_rms_px,
                      "how well the lens is known, where no calibration record says");
   command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye");
@@ -184,6 +187,7 @@ void add_replay(CLI::App& app, CommandStatus& status) {
   command.add_option("--step-mm", options->look.render.step_mm, "between samples along a ray")
       ->check(CLI::Range(0.05, 20.0));
   command.add_option("--out", options->out, "folder for pictures, frames.csv and replay.json")->required();
+  command.add_option("--scope", options->scope, "the scope's bird (default scope)");
   command.add_option("--every", options->every, "writes one frame in so many as a picture (default 10)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--film", options->film_hz, "also overlay.mp4, of so many frames a second")

@@ -44,11 +44,13 @@ class Gatherer {
     }
   }
   void take(const wire::VideoFrame& frame) {
-    begin(frame.info.acquired);
+    // What the appliance takes off by an earlier record is part of what is looked for.
+    const DeviceTime acquired = frame.info.acquired + frame.info.latency.value_or(Duration{0});
+    begin(acquired);
     ++streams_.frames;
     const std::vector<std::uint8_t> grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
     const auto motion =
-        motion_.push(seconds_of(frame.info.acquired, *origin_ns_), {grey, frame.width_px, frame.height_px});
+        motion_.push(seconds_of(acquired, *origin_ns_), {grey, frame.width_px, frame.height_px});
     if (motion) {
       streams_.video.push_back(*motion);
     } else if (++streams_.frames_without_motion > 1) {

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "calibration/base/median.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/operation/findings.hpp"
+#include "host/operation/landmark_check.hpp"
 
 namespace birdseye::host {
 
@@ -60,6 +62,11 @@ Result<void> DemoSession::take(const wire::Birds& birds) {
   if (stage == "views" || stage == "look") {
     rests_.push(birds);
     keep_views();
+  }
+  if (began_to_deform_) {
+    waiting_.emplace_back(birds);
+  } else {
+    take_scope(birds);
   }
   if (stage == "calibrate" || stage == "end") return {};
   const auto touch = pointer_.take(birds, "pointer", cart_.sheet().tip_in_pointer_mm);
@@ -122,7 +129,10 @@ Result<void> DemoSession::end_calibrating_and_register() {
   if (!engine) return engine.error();
   engine_ = *std::move(engine);
   look_.render.step_mm = 1.2;
-  painter_.set_setup(setup, trust_figures(scope.figures(), fit->registered, target_in_patient_mm(*patient_)));
+  const Eigen::Vector3d target_mm = target_in_patient_mm(*patient_);
+  TrustFigures trust = trust_figures(scope.figures(), fit->registered, target_mm);
+  trust.target_in_patient_mm = target_mm;
+  painter_.set_setup(setup, trust);
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye held out {:.2f} px, registration {:.2f} mm",
                              figures.camera_rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
   return {};
@@ -172,16 +182,32 @@ Result<void> DemoSession::end_deforming() {
   if (deformed() != nullptr) {
     said.surface_expected_mm = deformed()->seen_rms_mm;
     engine_->deform(deformed()->field);
+    TrustFigures trust = painter_.figures();
+    trust.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_), deformed());
+    trust.motion_error = deformed()->target;
+    painter_.set_setup(setup, trust);
   }
   progress_.keep(said.words);
-  for (const WaitingFrame& one : waiting_) {
+  for (const auto& one : waiting_) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
-    if (auto drawn = overlay(one.frame, one.decision); !drawn) return drawn;
+    const auto* const frame = std::get_if<wire::VideoFrame>(&one);
+    if (frame == nullptr) {
+      take_scope(std::get<wire::Birds>(one));
+    } else if (auto drawn = overlay(*frame); !drawn) {
+      return drawn;
+    }
   }
   return {};
 }
 
-Result<void> DemoSession::overlay(const wire::VideoFrame& frame, const OverlayGate::Decision& decision) {
+void DemoSession::take_scope(const wire::Birds& birds) {
+  for (const wire::Bird& bird : birds.birds) {
+    if (bird.name == "scope") painter_.take(birds.acquired, bird.tracker_from_sensor);
+  }
+}
+
+Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
+  const OverlayGate::Decision decision = painter_.decide(frame);
   const auto painted = painter_.paint(frame, decision, *engine_, look_);
   if (painted) {
     if (overlaid.size() % kKeepEvery == 0) {
@@ -220,7 +246,6 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
   if (!setup) {
     if (auto done = end_calibrating_and_register(); !done) return done;
   }
-  const OverlayGate::Decision decision = painter_.decide(frame);
   if (stage == "views") {
     rests_.push(frame);
     return {};
@@ -228,11 +253,11 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
   if (!began_to_deform_) {
     const auto stages = cart_.stages();
     const bool viewed = std::any_of(stages.begin(), stages.end(), [](const auto& s) { return s.name == "views"; });
-    if (!viewed) return overlay(frame, decision);
+    if (!viewed) return overlay(frame);
     begin_to_deform();
   }
   note_deformed();
-  waiting_.push_back({frame, decision});
+  waiting_.emplace_back(frame);
   return {};
 }
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "device/wire/messages.hpp"
@@ -80,7 +81,8 @@ class DemoSession {
   void begin_to_deform();
   void note_deformed();
   Result<void> end_deforming();
-  Result<void> overlay(const wire::VideoFrame& frame, const OverlayGate::Decision& decision);
+  void take_scope(const wire::Birds& birds);
+  Result<void> overlay(const wire::VideoFrame& frame);
 
   SimulatedCart& cart_;
   std::shared_ptr<const PatientPlan> patient_;  ///< all that the appliance does not send
@@ -97,12 +99,7 @@ class DemoSession {
   DeformationStep deformation_;
   std::optional<HostTime> began_to_deform_;
   std::optional<double> deforming_took_s_;
-  /// A frame that is to be drawn once the deformation is known.
-  struct WaitingFrame {
-    wire::VideoFrame frame;
-    OverlayGate::Decision decision;
-  };
-  std::vector<WaitingFrame> waiting_;
+  std::vector<std::variant<wire::VideoFrame, wire::Birds>> waiting_;  ///< to be drawn once the deformation is known
   std::unique_ptr<Engine> engine_;
   FramePainter painter_;
   OverlayLook look_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/operation/landmark_check.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -121,8 +122,7 @@ void LiveWorkflow::take(const wire::Birds& birds) {
     views_.take(birds.acquired, bird.tracker_from_sensor);
     if (!setup || !patient_.plan()) continue;
     views_.average(*setup);
-    jitter_.push(birds.acquired,
-                 setup->camera_from_patient(bird.tracker_from_sensor) * target_in_patient_mm(*patient_.plan()));
+    picture_.take(birds.acquired, bird.tracker_from_sensor);
   }
   const auto& tip_mm = settings_.tip_in_pointer_mm ? settings_.tip_in_pointer_mm : record_tip_in_pointer_mm_;
   if (!tip_mm) return;
@@ -212,8 +212,8 @@ void LiveWorkflow::watch_surface(HostTime now) {
   std::optional<double> pose_mm;
   if (const auto& hand_eye_mm = picture_.figures().scope.held_out_mm) {
     // Of a pose, each axis: its position's error, or where its angles' too have the target, which the jitter counts.
-    const double one_mm =
-        std::max(picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm().value_or(0) / std::sqrt(3.0));
+    const double one_mm = std::max(picture_.frame()->info.pose.position_sigma_mm,
+                                   picture_.jitter().rms_mm().value_or(0) / std::sqrt(3.0));
     pose_mm = std::hypot(*hand_eye_mm, std::sqrt(2.0) * one_mm);  // this view's, and that of a kept one
   }
   watch_.offer({*picture_.frame(), *seen_from}, pose_mm, now);
@@ -225,7 +225,7 @@ void LiveWorkflow::take(const CheckedSurface& checked) {
     views_.forget(words("note_views_organ_moved"));
     strokes_.forget();
   }
-  set_picture_up();
+  update_setup();
 }
 
 void LiveWorkflow::fit() {
@@ -256,9 +256,8 @@ void LiveWorkflow::forget_views(const std::string& why) {
 void LiveWorkflow::show_shape() {
   ++shapes_;
   watch_.forget();
-  const bool moved = motion_.moved_mm().has_value();
   motion_ = {};
-  if (moved) set_picture_up();
+  update_setup();
   if (!patient_.engine()) return;
   if (deformation_.found()) {
     patient_.engine()->deform(deformation_.found()->field);
@@ -280,11 +279,6 @@ void LiveWorkflow::show_margins() {
 }
 
 void LiveWorkflow::update_setup() {
-  jitter_ = {};
-  set_picture_up();
-}
-
-void LiveWorkflow::set_picture_up() {
   const auto& scope = calibration_.found();
   const auto registered = fiducials_.registered();
   const bool may = scope && registered && patient_.plan() && fiducials_.confirmed();
@@ -294,9 +288,21 @@ void LiveWorkflow::set_picture_up() {
   if (calibration_.held_back())
     return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
   if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_));
-  TrustFigures figures = trust_figures(scope->scope.figures(), *registered, target_in_patient_mm(*patient_.plan()));
+  const ScopeSetup turned = settings_.rod_angle_deg ? scope->scope.turned_to(*settings_.rod_angle_deg) : scope->scope;
+  TrustFigures figures = trust_figures(turned.figures(), *registered, target_in_patient_mm(*patient_.plan()));
+  const DeformedOrgan* const deformed = deformation_.found().get();
+  figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
+  if (deformed != nullptr) figures.motion_error = deformed->target;
   figures.moved_mm = motion_.moved_mm();
-  picture_.set_setup(scope->scope.registered(registered->tracker_from_patient), figures);
+  picture_.set_setup(turned.registered(registered->tracker_from_patient), figures);
+}
+
+void LiveWorkflow::turn_rod(double by_deg) {
+  const auto& found = calibration_.found();
+  if (!found || !found->scope.has_rod()) return;
+  auto& angle_deg = settings_.rod_angle_deg;
+  angle_deg = angle_deg ? std::remainder(*angle_deg + by_deg, 360.0) : found->scope.calibrated_at_deg();
+  update_setup();
 }
 
 void LiveWorkflow::keep() {

@@ -20,7 +20,6 @@
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/overlay/live_picture.hpp"
-#include "host/overlay/target_jitter.hpp"
 
 namespace birdseye::host {
 
@@ -30,6 +29,7 @@ struct LiveSettings {
   std::string scope = "scope", pointer = "pointer";  ///< birds, by their names
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
+  std::optional<double> rod_angle_deg;  ///< of a scope whose rod turns, as it is read off; empty: nobody has said it
   std::size_t fiducials = 0;                         ///< how many to touch; 0: as many as are wanted
   std::string patient_id;        ///< of the patient on the table, where another system knows it; else a person is asked
   std::filesystem::path out;     ///< where results go; empty: none are kept
@@ -79,6 +79,8 @@ class LiveWorkflow {
   void hide_or_show_overlay() {
     if (!frozen_) picture_.hide(!picture_.hidden());
   }
+  /// The rod of a scope that has one is turned by so much; the first time it is taken to be as it was calibrated.
+  void turn_rod(double by_deg);
   void set_transfer(const TransferFunction& transfer) { patient_.set_transfer(transfer); }
   void set_look(const OverlayLook& look) { picture_.set_look(look); }
 
@@ -109,7 +111,6 @@ class LiveWorkflow {
   void show_shape();
   void show_margins();
   void update_setup();
-  void set_picture_up();
   void watch_surface(HostTime now);
   void take_up();
   void keep();
@@ -145,7 +146,6 @@ class LiveWorkflow {
   StepNote check_, run_;
   OperationKeeper keeper_;
   LivePicture picture_;
-  TargetJitter jitter_;
 };
 
 }  // namespace birdseye::host

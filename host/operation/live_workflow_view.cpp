@@ -41,6 +41,8 @@ OperationView LiveWorkflow::view() const {
   out.asks_for_patient = asks_for_patient();
   out.asks_for_instruments = asks_for_instruments();
   out.link = connection_.link();
+  out.has_rod = calibration_.found() && calibration_.found()->scope.has_rod();
+  if (out.has_rod) out.rod_angle_deg = settings_.rod_angle_deg;
   out.board_named = settings_.pattern.has_value();
   out.guiding = calibration_.guiding();
   if (step_ == LiveStep::calibrate) {
@@ -88,16 +90,9 @@ OperationView LiveWorkflow::view() const {
     out.check = check_by_landmarks(*tip_mm, *registered, patient_.landmarks(),
                                    markers ? *markers : std::vector<Eigen::Vector3d>(), deformed);
   }
-  const auto& setup = picture_.setup();
-  const auto camera_from_patient = picture_.camera_from_patient();
-  const Eigen::Vector3d target_mm = target_in_patient_mm(*out.patient);
   if (const auto seen_from = picture_.seen_from(); seen_from && step_ == LiveStep::views)
-    out.view_advice = views_.advice(*seen_from, target_mm);
-  if (!camera_from_patient || !setup) return out;
-  out.target = target_mark({setup->camera(), *camera_from_patient, as_shown_mm(target_mm, deformed),
-                            picture_.frame()->info.pose.position_sigma_mm, jitter_.rms_mm(),
-                            deformed != nullptr ? deformed->target : std::nullopt},
-                           picture_.figures());
+    out.view_advice = views_.advice(*seen_from, target_in_patient_mm(*out.patient));
+  out.target = picture_.target();
   return out;
 }
 

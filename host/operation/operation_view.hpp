@@ -26,18 +26,26 @@ struct OperationView {
   bool watched = false;               ///< whether the video is held against the deformed surface
   bool asks_for_instruments = false;  ///< whether tracker and camera are the same as before, for nothing tells it
   bool overlay_hidden = false;        ///< a person has switched it off
+  bool has_rod = false;               ///< the scope's rod turns: its angle has to be known
   bool board_named = false;           ///< there is a board to calibrate with
   bool guiding = false;
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
   bool deforming = false;
-  bool stroking = false;     ///< the pointer, over the organ
-  bool organ_moved = false;  ///< since the views that the deformation was found by
+  bool stroking = false;            ///< the pointer, over the organ
+  bool organ_moved = false;         ///< since the views that the deformation was found by
+  bool looking_for_marker = false;  ///< where a person has pointed at the CT
+  bool fits_poorly = false;         ///< the touches, to the markers
+  bool deformed_with_care = false;  ///< its step's note says why
+  bool surface_told = false;        ///< by figures: the last check could tell
+  bool asks_for_patient = false;    ///< and waits for it before anything is registered
+  bool patient_confirmed = false;   ///< a person has compared name, ID and date with the patient on the table
   std::array<StepNote, kLiveSteps> notes;
   std::string fault;
 
   LinkState link;
 
-  std::optional<GuideState> guide;  ///< in its step, while it guides
+  std::optional<double> rod_angle_deg;  ///< as somebody has said it; empty: nobody has, or there is no rod
+  std::optional<GuideState> guide;      ///< in its step, while it guides
   std::vector<std::string> guide_lines;
   std::optional<Verdict> calibration_verdict;
 
@@ -45,10 +53,8 @@ struct OperationView {
   std::optional<std::size_t> markers_seen;             ///< fiducials in the CT; empty as long as they are looked for
   std::vector<Eigen::Vector3d> markers_in_patient_mm;  ///< fiducials in the CT, those that a person has picked too
   std::vector<NamedPoint> landmarks;                   ///< in the CT as it was taken
-  bool looking_for_marker = false;                     ///< where a person has pointed at the CT
   std::string pick_line;                               ///< what came of that; empty: nothing yet
   std::vector<TouchedFiducial> touches;
-  bool fits_poorly = false;              ///< the touches, to the markers
   std::optional<std::size_t> odd_touch;  ///< which of them is off, from 0; empty: it cannot be told, or all fit
   std::string touch_loses;  ///< what is dropped with the registration, in words: views, a deformation; empty: nothing
   std::optional<std::size_t> asked_to_take_back;  ///< a touch, from 0; another press of the key does it, and drops that
@@ -62,9 +68,7 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
-  bool deformed_with_care = false;  ///< its step's note says why
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
-  bool surface_told = false;  ///< by figures: the last check could tell
 
   std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
 
@@ -74,8 +78,6 @@ struct OperationView {
 
   std::shared_ptr<const PatientPlan> patient;  ///< null: it is not read yet
   std::string patient_fault;                   ///< why this CT cannot be that of the patient on the table
-  bool asks_for_patient = false;               ///< and waits for it before anything is registered
-  bool patient_confirmed = false;  ///< a person has compared name, ID and date with the patient on the table
   PatientFiles patient_files;
   std::string engine_asked;  ///< as it was named: "auto" too
   std::string engine_name;   ///< what runs, in words; empty: the CT cannot be drawn yet

@@ -38,6 +38,12 @@ ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustF
   if (margins) painter_.set_margins(std::make_shared<const Margins>(*std::move(margins)));
 }
 
+void ReplayPlayer::take(const wire::Birds& birds, const std::string& scope) {
+  for (const wire::Bird& bird : birds.birds) {
+    if (bird.name == scope) painter_.take(birds.acquired, bird.tracker_from_sensor);
+  }
+}
+
 Result<void> ReplayPlayer::take(const wire::VideoFrame& frame) {
   ++done_.frames;
   if (!painter_.fits(frame)) {

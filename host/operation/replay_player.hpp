@@ -36,6 +36,8 @@ class ReplayPlayer {
   ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
                std::optional<Margins> margins = std::nullopt);
 
+  /// The poses of the bird of that name tell how they scatter.
+  void take(const wire::Birds& birds, const std::string& scope);
   /// Fails where a picture or the film cannot be written.
   Result<void> take(const wire::VideoFrame& frame);
   /// Ends the film.

@@ -67,7 +67,7 @@ Result<ScopeSetup> scope_of(const ReplayInputs& inputs, const std::optional<Cali
                                               inputs.recording.string())};
   }
   auto scope = ScopeSetup::of_record(*record, stated);
-  if (scope) return *std::move(scope);
+  if (scope) return inputs.rod_angle_deg ? scope->turned_to(*inputs.rod_angle_deg) : *std::move(scope);
   return Error{Errc::bad_value,
                fmt::format("{}: the record has no {}; calibrate it, or give --camera and "
                            "--camera-from-sensor",
@@ -158,12 +158,14 @@ Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
 }
 
 ReplayTrust trust_of(const ReplaySetup& setup, const Volume& ct) {
+  const Eigen::Vector3d target_mm = setup.patient_from_model * middle_of_ct(ct);
   TrustFigures known{setup.scope.figures(), setup.fre_mm, std::nullopt};
   if (setup.by_touches) {
     RegisteredPatient registered = *setup.by_touches;
     registered.fre_mm = *setup.fre_mm;
-    known = trust_figures(setup.scope.figures(), registered, setup.patient_from_model * middle_of_ct(ct));
+    known = trust_figures(setup.scope.figures(), registered, target_mm);
   }
+  known.target_in_patient_mm = middle_of_ct(ct);
   ReplayTrust out{vouched_for(known), {}};
   const auto note = [&out](const char* name, const std::optional<double>& figure) {
     if (!figure) out.vouched_for.emplace_back(name);

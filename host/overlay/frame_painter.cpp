@@ -1,5 +1,7 @@
 #include "host/overlay/frame_painter.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "drivers/system/clock.hpp"
@@ -36,6 +38,34 @@ void FramePainter::set_setup(std::optional<Setup> setup, const TrustFigures& fig
   figures_ = figures;
   gate_ = OverlayGate(settings_);
   gate_.set_figures(figures_);
+  jitter_ = {};
+  single_poses_ = false;
+}
+
+void FramePainter::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+  if (!setup_ || !figures_.target_in_patient_mm) return;
+  if (!std::exchange(single_poses_, true)) jitter_ = {};
+  jitter_.push(acquired, setup_->camera_from_patient(tracker_from_sensor) * *figures_.target_in_patient_mm);
+}
+
+FramePose FramePainter::pose_of(const wire::VideoFrame& frame,
+                                const Transform<Camera, Patient>& camera_from_patient) const {
+  FramePose out;
+  out.camera_from_patient = camera_from_patient;
+  out.position_sigma_mm = frame.info.pose.position_sigma_mm;
+  out.jitter_mm = jitter_.rms_mm();
+  // Without single poses the sensor's own speed has to do, which knows nothing of its turning.
+  out.target_speed_mm_s = std::max(frame.info.pose.speed_mm_s, jitter_.speed_mm_s().value_or(0));
+  out.time_sigma =
+      Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds()));
+  out.latency_known = frame.info.latency.has_value();
+  return out;
+}
+
+std::optional<TargetMark> FramePainter::target(const wire::VideoFrame& frame,
+                                               const OverlayGate::Decision& decision) const {
+  const auto from = camera_from_patient(frame, decision);
+  return from ? target_mark(setup_->camera(), pose_of(frame, *from), figures_) : std::nullopt;
 }
 
 OverlayGate::Decision FramePainter::decide(const wire::VideoFrame& frame) {
@@ -44,7 +74,14 @@ OverlayGate::Decision FramePainter::decide(const wire::VideoFrame& frame) {
     gate_.set_figures(figures_);
   }
   newest_ = frame.info.acquired;
-  return gate_.decide(frame.info.acquired, frame.info.pose);
+  std::optional<ErrorBudget> expected;
+  if (const auto& pose = frame.info.pose.tracker_from_sensor; setup_ && pose) {
+    const Transform<Camera, Patient> from = setup_->camera_from_patient(*pose);
+    if (const auto& target_mm = figures_.target_in_patient_mm; target_mm && !single_poses_)
+      jitter_.push(frame.info.acquired, from * *target_mm);
+    expected = error_budget(setup_->camera(), pose_of(frame, from), figures_);
+  }
+  return gate_.decide(frame.info.acquired, frame.info.pose, expected);
 }
 
 bool FramePainter::fits(const wire::VideoFrame& frame) const {

@@ -12,6 +12,7 @@
 #include "host/overlay/margins.hpp"
 #include "host/overlay/overlay_look.hpp"
 #include "host/overlay/scope_setup.hpp"
+#include "host/overlay/target_jitter.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
 
@@ -50,8 +51,16 @@ class FramePainter {
   /// As the CT is shown: deformed, where it is. Null: there are none.
   void set_margins(std::shared_ptr<const Margins> margins) { margins_ = std::move(margins); }
 
+  /// A pose of the scope's sensor, as they come: they tell how they scatter, and how fast the target goes. Where none
+  /// come, the frames' poses have to do.
+  void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  [[nodiscard]] const TargetJitter& jitter() const { return jitter_; }
   /// Whether the frame may bear an overlay. Of every frame, in their order; a clock that goes back is another clock.
   OverlayGate::Decision decide(const wire::VideoFrame& frame);
+  /// Where the overlay has the target in a frame of that decision. Empty: nothing is drawn, the target is out of view,
+  /// or its error is not known.
+  [[nodiscard]] std::optional<TargetMark> target(const wire::VideoFrame& frame,
+                                                 const OverlayGate::Decision& decision) const;
   /// The frame is of the size that the camera was calibrated at; so it is where there is no setup.
   [[nodiscard]] bool fits(const wire::VideoFrame& frame) const;
 
@@ -72,8 +81,13 @@ class FramePainter {
                                              Engine& engine, const OverlayLook& look) const;
 
  private:
+  [[nodiscard]] FramePose pose_of(const wire::VideoFrame& frame,
+                                  const Transform<Camera, Patient>& camera_from_patient) const;
+
   OverlayGate::Settings settings_;
   OverlayGate gate_;
+  TargetJitter jitter_;
+  bool single_poses_ = false;  ///< the jitter is of them, not of the frames' poses
   std::optional<Setup> setup_;
   TrustFigures figures_;
   std::shared_ptr<const Margins> margins_;

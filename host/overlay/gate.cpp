@@ -10,6 +10,7 @@ namespace birdseye::host {
 
 std::string OverlayGate::doubt_of_figures() const {
   const ScopeFigures& scope = figures_.scope;
+  if (scope.rod_angle_missing) return words("why_rod_angle");
   if (!scope.camera_rms_px) return words("why_camera_unknown");
   if (!(*scope.camera_rms_px <= settings_.most_camera_rms_px)) return words("why_camera_rms", *scope.camera_rms_px);
   if (!scope.held_out_px) return words("why_hand_eye_unknown");
@@ -21,7 +22,7 @@ std::string OverlayGate::doubt_of_figures() const {
   return {};
 }
 
-std::string OverlayGate::doubt(const PoseAnswer& pose) const {
+std::string OverlayGate::doubt(const PoseAnswer& pose, const std::optional<ErrorBudget>& expected) const {
   if (!pose.tracker_from_sensor) return pose.reason.empty() ? words("why_no_pose") : pose.reason;
   if (std::string why = doubt_of_figures(); !why.empty()) return why;
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
@@ -30,6 +31,7 @@ std::string OverlayGate::doubt(const PoseAnswer& pose) const {
   if (!(pose.position_sigma_mm <= settings_.most_sigma_mm)) {
     return words("why_scatter", pose.position_sigma_mm);
   }
+  if (expected && !(expected->rms_mm() <= settings_.most_target_mm)) return words("why_error", expected->rms_mm());
   return {};
 }
 
@@ -38,9 +40,11 @@ std::string OverlayGate::doubt_of_motion() const {
   return words("why_moved", *figures_.moved_mm);
 }
 
-OverlayGate::Decision OverlayGate::decide(DeviceTime time, const PoseAnswer& pose) {
+OverlayGate::Decision OverlayGate::decide(DeviceTime time, const PoseAnswer& pose,
+                                          const std::optional<ErrorBudget>& expected) {
   Decision decision;
-  decision.reason = doubt(pose);
+  decision.expected = expected;
+  decision.reason = doubt(pose, expected);
   decision.believed = decision.reason.empty();
   if (decision.believed) decision.reason = doubt_of_motion();
   const double target = decision.reason.empty() ? 1.0 : 0.0;

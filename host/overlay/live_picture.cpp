@@ -54,6 +54,10 @@ std::optional<Transform<Camera, Patient>> LivePicture::camera_from_patient() con
   return frame_ && engine_ && !hidden_ ? painter_.camera_from_patient(*frame_, decision_) : std::nullopt;
 }
 
+std::optional<TargetMark> LivePicture::target() const {
+  return frame_ && engine_ && !hidden_ ? painter_.target(*frame_, decision_) : std::nullopt;
+}
+
 std::optional<Transform<Camera, Patient>> LivePicture::seen_from() const {
   return frame_ && engine_ ? painter_.seen_from(*frame_, decision_) : std::nullopt;
 }

@@ -77,6 +77,11 @@ class LivePicture {
   [[nodiscard]] const std::optional<Setup>& setup() const { return painter_.setup(); }
   [[nodiscard]] const TrustFigures& figures() const { return painter_.figures(); }
 
+  /// A pose of the scope's sensor, as they come.
+  void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+    painter_.take(acquired, tracker_from_sensor);
+  }
+  [[nodiscard]] const TargetJitter& jitter() const { return painter_.jitter(); }
   /// A frame that has come; one that came before and was not drawn yet is skipped.
   void take(const wire::VideoFrame& frame, const Exposure& exposed);
   /// Draws the newest frame, if that is still to be done: some tens of milliseconds.
@@ -91,6 +96,10 @@ class LivePicture {
   [[nodiscard]] std::uint64_t frames_skipped() const { return skipped_; }
   /// Where the newest frame's overlay is drawn from; empty where nothing is drawn over it.
   [[nodiscard]] std::optional<Transform<Camera, Patient>> camera_from_patient() const;
+  /// Where the newest frame's overlay has the target; empty where none is drawn, or it is out of view.
+  [[nodiscard]] std::optional<TargetMark> target() const;
+  /// What was decided on the newest frame.
+  [[nodiscard]] const OverlayGate::Decision& decision() const { return decision_; }
   /// Where the newest frame was seen from, where that is to be believed; whether the organ has moved since or not.
   [[nodiscard]] std::optional<Transform<Camera, Patient>> seen_from() const;
 

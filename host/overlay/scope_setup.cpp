@@ -1,5 +1,8 @@
 #include "host/overlay/scope_setup.hpp"
 
+#include <cmath>
+
+#include "calibration/base/units.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "calibration/record/calibration_record.hpp"
 #include "host/files/camera_covariance.hpp"
@@ -15,19 +18,55 @@ std::optional<double> if_measured(double px) {
   return px > 0 ? std::optional(px) : std::nullopt;
 }
 
+/// The solver's rotation turns about the sensor, far from the camera: exp(w) R, t + d. covariance: of (w, d).
+Eigen::Matrix<double, 6, 6> about_camera(const Eigen::Matrix<double, 6, 6>& covariance,
+                                         const Transform<Camera, Sensor>& camera_from_sensor) {
+  const Eigen::Vector3d& t = camera_from_sensor.translation();
+  Eigen::Matrix<double, 6, 6> by = Eigen::Matrix<double, 6, 6>::Identity();
+  by.bottomLeftCorner<3, 3>() << 0, -t.z(), t.y(), t.z(), 0, -t.x(), -t.y(), t.x(), 0;  // s = d + t x w
+  return by * covariance * by.transpose();
+}
+
 }  // namespace
+
+std::optional<ScopeSetup::Rod> ScopeSetup::rod_of(const calibration::CalibrationRecord& record) {
+  if (const auto& rod = record.hand_eye->rod) {
+    return Rod{rod->reference_angle_deg, RodScope{record.hand_eye->camera_from_sensor, rod->axis_in_sensor,
+                                                  rod->axis_point_in_sensor_mm, rod->picture_turn}};
+  }
+  if (record.lens->rod_angle_deg) return Rod{*record.lens->rod_angle_deg, std::nullopt};
+  return std::nullopt;
+}
 
 std::optional<ScopeSetup> ScopeSetup::of_record(const calibration::CalibrationRecord& record,
                                                 const ScopeFigures& stated) {
   if (!record.lens || !record.hand_eye) return std::nullopt;
   ScopeSetup out;
   out.camera_ = record.lens->camera;
-  if (!record.lens->covariance.isZero(0)) out.camera_covariance_ = record.lens->covariance;
   out.camera_from_sensor_ = record.hand_eye->camera_from_sensor;
   out.figures_ = {record.lens->rms_px, if_measured(record.hand_eye->held_out_px), record.hand_eye->held_out_mm};
+  if (!record.lens->covariance.isZero(0)) out.figures_.camera_covariance = record.lens->covariance;
+  if (!record.hand_eye->covariance.isZero(0))
+    out.figures_.hand_eye_covariance = about_camera(record.hand_eye->covariance, out.camera_from_sensor_);
   if (stated.camera_rms_px) out.figures_.camera_rms_px = stated.camera_rms_px;
   if (stated.held_out_px) out.figures_.held_out_px = stated.held_out_px;
   if (stated.held_out_mm) out.figures_.held_out_mm = stated.held_out_mm;
+  out.rod_ = rod_of(record);
+  out.figures_.rod_angle_missing = out.rod_.has_value();
+  return out;
+}
+
+ScopeSetup ScopeSetup::turned_to(double rod_angle_deg) const {
+  ScopeSetup out = *this;
+  if (!rod_) return out;
+  const double turned_deg = rod_angle_deg - rod_->calibrated_at_deg;
+  if (rod_->model) {
+    out.camera_from_sensor_ = rod_->model->camera_from_sensor(turned_deg * kRadPerDeg);
+    out.figures_.rod_angle_missing = !std::isfinite(turned_deg);
+  } else {
+    constexpr double kSameAngle_deg = 2;
+    out.figures_.rod_angle_missing = !(std::abs(std::remainder(turned_deg, 360)) <= kSameAngle_deg);
+  }
   return out;
 }
 
@@ -36,9 +75,11 @@ ScopeSetup ScopeSetup::of_hand_eye(const CameraModel& camera, std::optional<doub
                                    const std::optional<CameraMatrix>& camera_covariance) {
   ScopeSetup out;
   out.camera_ = camera;
-  out.camera_covariance_ = camera_covariance;
   out.camera_from_sensor_ = found.camera_from_sensor;
   out.figures_ = {camera_rms_px, if_measured(found.held_out_px), found.held_out_mm};
+  out.figures_.camera_covariance = camera_covariance;
+  if (!found.covariance.isZero(0))
+    out.figures_.hand_eye_covariance = about_camera(found.covariance, out.camera_from_sensor_);
   return out;
 }
 
@@ -52,9 +93,9 @@ Result<ScopeSetup> ScopeSetup::of_files(const std::filesystem::path& camera,
   if (!hand_eye) return hand_eye.error();
   ScopeSetup out;
   out.camera_ = *lens;
-  out.camera_covariance_ = *covariance;
   out.camera_from_sensor_ = Transform<Camera, Sensor>::from_matrix(*hand_eye);
   out.figures_ = stated;
+  out.figures_.camera_covariance = *covariance;
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/camera_parameters.hpp"
+#include "calibration/geometry/rod.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/overlay/trust.hpp"
 
@@ -45,7 +46,7 @@ class Setup {
 /// ways to one and no other.
 class ScopeSetup {
  public:
-  /// Of a rod that turns, as it is at its reference angle. Empty where the record has no lens or no hand-eye. stated:
+  /// A rod's angle is missing until turned_to() says it. Empty where the record has no lens or no hand-eye. stated:
   /// figures that count in place of the record's.
   static std::optional<ScopeSetup> of_record(const calibration::CalibrationRecord& record,
                                              const ScopeFigures& stated = {});
@@ -62,15 +63,28 @@ class ScopeSetup {
   [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
   [[nodiscard]] const ScopeFigures& figures() const { return figures_; }
   /// How well the lens is known; empty: nothing says so.
-  [[nodiscard]] const std::optional<CameraMatrix>& camera_covariance() const { return camera_covariance_; }
+  [[nodiscard]] const std::optional<CameraMatrix>& camera_covariance() const { return figures_.camera_covariance; }
+  /// The same scope with its rod at an angle, as a person reads it off. A scope without a rod stays as it is; one that
+  /// was calibrated at one angle only holds at that angle, give or take two degrees.
+  [[nodiscard]] ScopeSetup turned_to(double rod_angle_deg) const;
+  /// Whether the scope's rod can be at other angles than now.
+  [[nodiscard]] bool has_rod() const { return rod_.has_value(); }
+  /// At which the rod was when the scope was calibrated; 0 without a rod.
+  [[nodiscard]] double calibrated_at_deg() const { return rod_ ? rod_->calibrated_at_deg : 0; }
   [[nodiscard]] Setup registered(const Transform<Tracker, Patient>& tracker_from_patient) const;
 
  private:
+  struct Rod {
+    double calibrated_at_deg = 0;
+    std::optional<RodScope> model;  ///< empty: nobody measured how it turns
+  };
+
+  static std::optional<Rod> rod_of(const calibration::CalibrationRecord& record);
   ScopeSetup() = default;
 
   CameraModel camera_;
-  std::optional<CameraMatrix> camera_covariance_;
   Transform<Camera, Sensor> camera_from_sensor_;
+  std::optional<Rod> rod_;
   ScopeFigures figures_;
 };
 

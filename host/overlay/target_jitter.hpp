@@ -19,10 +19,14 @@ class TargetJitter {
   /// Of a single pose, as the length of the error in space, root mean square over the newest poses. Empty before there
   /// are enough.
   [[nodiscard]] std::optional<double> rms_mm() const;
+  /// How fast the target goes in the camera's frame, by a line through the poses of the newest fifth of a second. Empty
+  /// before there are enough.
+  [[nodiscard]] std::optional<double> speed_mm_s() const;
 
  private:
   std::deque<std::pair<DeviceTime, Eigen::Vector3d>> newest_;  ///< three at most
   std::deque<double> squares_mm2_;
+  std::deque<std::pair<DeviceTime, Eigen::Vector3d>> track_;  ///< of the newest fifth of a second
 };
 
 }  // namespace birdseye::host

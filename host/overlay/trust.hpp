@@ -5,7 +5,9 @@
 #include <span>
 
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/time/clock.hpp"
 
 namespace birdseye::host {
 
@@ -17,6 +19,18 @@ struct ScopeFigures {
   /// the fit's own residual lets the tracker's poses move, and that of all stations has seen what it is judged by.
   std::optional<double> held_out_px;
   std::optional<double> held_out_mm;  ///< the same across the line of sight, at the board
+  /// Of hand-eye, as errors e at a place p of the camera's frame: e = w x p + s, of w (rad) and s (mm), the shift at
+  /// the camera itself. It says how hand-eye's error grows with the distance.
+  std::optional<Eigen::Matrix<double, 6, 6>> hand_eye_covariance = std::nullopt;
+  std::optional<CameraMatrix> camera_covariance = std::nullopt;
+  /// Of a rod that turns, or that had been turned to one angle when it was calibrated: whether somebody has said how it
+  /// is turned now. Without that nobody knows where the camera sits, and nothing is drawn.
+  bool rod_angle_missing = false;
+};
+
+/// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
+struct MotionError {
+  double rms_mm = 0, radius95_mm = 0;
 };
 
 /// The figures by which it is judged whether an overlay may be drawn. What is absent is not known, and nothing is drawn
@@ -25,6 +39,10 @@ struct TrustFigures {
   ScopeFigures scope;
   std::optional<double> fre_mm;
   std::optional<double> target_mm;  ///< what the fiducials' error comes to at the target (registration_error_mm)
+  /// Where the target is drawn: deformed, where the CT is. Empty: the errors that grow with its distance from the
+  /// camera are not counted, as over a still.
+  std::optional<Eigen::Vector3d> target_in_patient_mm = std::nullopt;
+  std::optional<MotionError> motion_error = std::nullopt;  ///< empty: the organ's motion since the CT is not known
   /// How far the video shows the organ off the surface that is drawn, where that is more than chance. Empty: nothing
   /// says that it has moved.
   std::optional<double> moved_mm = std::nullopt;
@@ -40,30 +58,42 @@ TrustFigures vouched_for(const TrustFigures& stated);
 double registration_error_mm(double fre_mm, std::span<const Eigen::Vector3d> fiducials_mm,
                              const Eigen::Vector3d& target_mm);
 
+/// How the scope's pose was known when a frame was taken.
+struct FramePose {
+  Transform<Camera, Patient> camera_from_patient;
+  double position_sigma_mm = 0;             ///< of the frame's pose, each axis
+  std::optional<double> jitter_mm;          ///< of single poses at the target; empty before there are enough
+  std::optional<double> target_speed_mm_s;  ///< in the camera's frame; empty: it is not known
+  Duration time_sigma{};                    ///< of the frame's time against the poses', as far as that is stated
+  bool latency_known = false;               ///< the frame's time is corrected by a measured latency
+};
+
+/// How far off the target may be drawn, as the sum of what is known to add to it: root mean squares of the error's
+/// length in space, mm.
+struct ErrorBudget {
+  double fiducials_mm = 0;
+  double hand_eye_mm = 0;  ///< at the target's distance from the camera
+  double lens_mm = 0;      ///< at the target's place in the picture, beyond what hand-eye's error counts of it
+  double pose_mm = 0;      ///< by which the frame's pose scatters, beyond what hand-eye's error counts of it
+  double time_mm = 0;      ///< how far the target goes in the time that frame and pose may be apart
+  std::optional<MotionError> motion;  ///< empty: how the organ has moved since the CT is not counted
+
+  [[nodiscard]] double rigid_mm() const;     ///< of all but the motion
+  [[nodiscard]] double rms_mm() const;       ///< of all that is counted
+  [[nodiscard]] double radius95_mm() const;  ///< in the picture, it is within with a probability of 95 %
+};
+
+/// Empty where the registration's or hand-eye's error is not known, or where the target is.
+std::optional<ErrorBudget> error_budget(const CameraModel& camera, const FramePose& pose, const TrustFigures& figures);
+
 /// Where the overlay has the target, and how far from there it may be.
 struct TargetMark {
   Eigen::Vector2d at_px;
-  double rms_mm = 0;                    ///< the error that is to be expected, as a length in space
-  double radius_px = 0, radius_mm = 0;  ///< in the picture, it is within with a probability of 95 %, as far as counted
-  bool motion_counted = false;          ///< whether that counts how the organ has moved since the CT
+  ErrorBudget error;
+  double radius_px = 0;  ///< error.radius95_mm() in the picture
 };
 
-/// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
-struct MotionError {
-  double rms_mm = 0, radius95_mm = 0;
-};
-
-/// One frame as the target is seen in it.
-struct TargetView {
-  CameraModel camera;
-  Transform<Camera, Patient> camera_from_patient;
-  Eigen::Vector3d target_in_patient_mm;     ///< where it is shown: deformed, where the CT is
-  double position_sigma_mm = 0;             ///< of the frame's pose, each axis
-  std::optional<double> jitter_mm;          ///< of single poses at the target; empty before there are enough
-  std::optional<MotionError> motion_error;  ///< empty: the organ's motion since the CT is not known
-};
-
-/// Empty where the target is out of view, or hand-eye's or the registration's error is not known.
-std::optional<TargetMark> target_mark(const TargetView& view, const TrustFigures& figures);
+/// Empty where the target is out of view, or its error is not known.
+std::optional<TargetMark> target_mark(const CameraModel& camera, const FramePose& pose, const TrustFigures& figures);
 
 }  // namespace birdseye::host

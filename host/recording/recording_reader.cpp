@@ -134,6 +134,13 @@ Result<void> RecordingReader::make_events(std::size_t number, const SequenceHead
   frame.info.sequence =
       counted.problem.empty() && counted.value >= 0 ? static_cast<std::uint64_t>(counted.value) : number;
   frame.info.acquired = frame.info.arrived = acquired;
+  // As RecordingWriter has them; PLUS says nothing of the kind.
+  if (const ReadNumber sigma_s = read_number(value_of(fields, "TimestampSigma")); sigma_s.problem.empty())
+    frame.info.acquired_sigma = Duration::from_seconds(sigma_s.value);
+  if (const ReadNumber sigma_mm = read_number(value_of(fields, "PoseSigmaMm")); sigma_mm.problem.empty())
+    frame.info.pose.position_sigma_mm = sigma_mm.value;
+  if (const ReadNumber latency_s = read_number(value_of(fields, "Latency")); latency_s.problem.empty())
+    frame.info.latency = Duration::from_seconds(latency_s.value);
   frame.width_px = sequence_->width_px();
   frame.height_px = sequence_->height_px();
   made_.push_back({frame, {"", number}});

@@ -132,6 +132,7 @@ SequenceWriter::Fields RecordingWriter::fields_of(const wire::VideoFrame& frame)
                                    {"TimestampSigma", seconds_text(info.acquired_sigma.ns)},
                                    {"PoseKind", to_string(info.pose.kind)},
                                    {"PoseSigmaMm", fmt::format("{}", info.pose.position_sigma_mm)}};
+  if (info.latency) fields.emplace_back("Latency", seconds_text(info.latency->ns));
   const auto scope = scope_of(frame);
   for (const auto& [bird, transform] : transform_of_) {
     const PoseAnswer pose = scope == bird ? info.pose : histories_.at(bird).at(info.acquired);

@@ -57,7 +57,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
      "Space: the large button. Enter: go on. Backspace: take back. 1 to 7: a step. O: overlay on or off. "
      "U: outlines. H: hole. M: margins. G: surface in front. C: cutting plane. + and -: opacity. I: small "
      "picture. V: slices. In the slices P: fiducial here. X: no fiducial here. K: landmark here. B: larger. "
-     "T: stroke. D: take back the touch that is off. E: all figures. R: connect again. F: freeze. S: "
+     "T: stroke. Page Up, Page Down: turn the rod. D: take back the touch that is off. E: all figures. R: connect "
+     "again. F: freeze. S: "
      "snapshot. L: light or dark."},
 
     // What Space and the pedal do
@@ -287,6 +288,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_playing", "playing {}"},
 
     // Why no overlay is drawn
+    {"why_rod_angle", "the rod's angle is not known; turn it with Page Up and Page Down, or give --rod-angle"},
     {"why_camera_unknown", "how well the camera is calibrated is not known"},
     {"why_camera_rms", "the camera is calibrated to {:.1f} px only"},
     {"why_hand_eye_unknown", "how far hand-eye is off is not known"},
@@ -294,6 +296,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_fre_unknown", "how well the fiducials fit is not known"},
     {"why_fre", "the fiducials fit to {:.1f} mm only"},
     {"why_target_unknown", "how far the target may be off is not known"},
+    {"why_error", "the target may be off by {:.0f} mm; E shows by what"},
     {"why_target", "fiducials as these leave the target open by {:.0f} mm: touch others, round about it"},
     {"why_no_pose", "no pose"},
     {"why_predicted", "the pose is predicted {:.0f} ms ahead"},
@@ -342,6 +345,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"banner_opacity", "its opacity is 0"},
     {"banner_fades", "overlay fades: {}"},
     {"banner_none", "no overlay: {}"},
+    {"banner_rod", "rod at {:.0f}° - {}"},
     {"banner_recording", "RECORDING, not live - {}"},
     {"target_error", "±{:.1f} mm"},
     {"target_error_unmoved", "±{:.1f} mm, if it has not moved since the CT"},

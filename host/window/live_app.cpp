@@ -195,7 +195,7 @@ void LiveApp::draw() {
     facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
     if (log_) {
       const auto& mark = operation_.target;
-      log_->add(sequence, age_ms, shown.strength, operation_.shapes, mark ? mark->rms_mm : 0,
+      log_->add(sequence, age_ms, shown.strength, operation_.shapes, mark ? mark->error.rms_mm() : 0,
                 shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
     }
   }
@@ -247,6 +247,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (wishes.undo) workflow_.undo();
   if (wishes.take_back) workflow_.take_back(*wishes.take_back);
   if (wishes.stroke) workflow_.stroke();
+  if (wishes.turn_rod_deg) workflow_.turn_rod(*wishes.turn_rod_deg);
   if (wishes.freeze) workflow_.freeze_or_let_go();
   if (wishes.hide_or_show) workflow_.hide_or_show_overlay();
   if (wishes.step) workflow_.go_to(*wishes.step);

@@ -21,7 +21,7 @@ class LiveLog {
  public:
   /// folder: made if need be.
   static Result<LiveLog> open(const std::filesystem::path& folder);
-  /// shape: OperationView::shapes; expected_mm: of the target, TargetMark::rms_mm; 0 where it is out of view.
+  /// shape: OperationView::shapes; expected_mm: of the target, TargetMark::error; 0 where it is out of view.
   void add(std::uint64_t sequence, double age_ms, double strength, std::uint64_t shape, double expected_mm,
            const std::optional<Transform<Camera, Patient>>& camera_from_patient);
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }

@@ -167,6 +167,9 @@ void add_key(const std::string& key, const OperationView& operation, const Panel
   if (key == "enter") wishes.next = true;
   if (key == "backspace") wishes.undo = true;
   if (key == "t") wishes.stroke = true;
+  constexpr double kRodNotch_deg = 5;
+  if (key == "pageup") wishes.turn_rod_deg = kRodNotch_deg;
+  if (key == "pagedown") wishes.turn_rod_deg = -kRodNotch_deg;
   if (key == "f") wishes.freeze = true;
   if (key == "s") wishes.snapshot = true;
   if (key == "o") wishes.hide_or_show = true;

@@ -25,6 +25,7 @@ struct PanelWishes {
   bool retry = false;                                                    ///< to connect, where that was given up
   bool keys = false;                                                     ///< all of them shown, or not any more
   bool pick_marker = false, pick_landmark = false, drop_marker = false;  ///< at the slices' cross-hair
+  std::optional<double> turn_rod_deg;                                    ///< of a scope whose rod turns
   std::optional<std::size_t> take_back;                                  ///< a touch, from 0
   std::optional<LiveStep> step;
   std::optional<OverlayLook> look;  ///< but for its cutting plane

@@ -76,8 +76,8 @@ void draw_margin_sign(std::size_t shell, const ImVec2& at, float side) {
 std::string margin_error_words(const OperationView& operation) {
   const auto& target = operation.target;
   if (!target) return words("margin_error_unknown");
-  return target->motion_counted ? words("margin_error", target->radius_mm)
-                                : words("margin_error_unmoved", target->radius_mm);
+  return target->error.motion ? words("margin_error", target->error.radius95_mm())
+                              : words("margin_error_unmoved", target->error.radius95_mm());
 }
 
 void draw_look(PanelContext& context) {

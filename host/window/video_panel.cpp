@@ -28,7 +28,7 @@ struct Banner {
 Banner whole_overlay(const OperationView& operation, const OverlayLook& look) {
   if (look.opacity <= 0) return {words("banner_none", words("banner_opacity"))};
   const auto& target = operation.target;
-  const std::string error = target ? words("banner_target", target->radius_mm) : words("banner_no_target");
+  const std::string error = target ? words("banner_target", target->error.radius95_mm()) : words("banner_no_target");
   if (look.render.clip) return {words("banner_cut", error)};
   if (!operation.deformed) return {words("banner_unmatched", error)};
   if (!operation.watched) return {words("banner_unwatched", error)};
@@ -52,6 +52,7 @@ void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
   const Banner banner = banner_of(context);
   std::string text = banner.text;
+  if (context.operation.rod_angle_deg) text = words("banner_rod", *context.operation.rod_angle_deg, text);
   if (context.facts.recorded) text = words("banner_recording", text);
   if (context.facts.simulated) text = words("banner_simulated", text);
   if (banner.grade) text = fmt::format("{} {}", sign_of(*banner.grade), text);
@@ -71,11 +72,11 @@ ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float sc
                       corner.y + fit * static_cast<float>(mark.at_px.y() + 0.5));
   const float radius = fit * static_cast<float>(mark.radius_px);
   const Theme& theme = theme_over_video();
-  const ImU32 ink = ImGui::GetColorU32(colour(mark.motion_counted ? theme.good : theme.warn));
+  const ImU32 ink = ImGui::GetColorU32(colour(mark.error.motion ? theme.good : theme.warn));
   list->AddCircle(middle, radius, IM_COL32(0, 0, 0, 160), 0, 3.5F * scale);
   list->AddCircle(middle, radius, ink, 0, 1.5F * scale);
-  const std::string text =
-      mark.motion_counted ? words("target_error", mark.radius_mm) : words("target_error_unmoved", mark.radius_mm);
+  const std::string text = mark.error.motion ? words("target_error", mark.error.radius95_mm())
+                                             : words("target_error_unmoved", mark.error.radius95_mm());
   const ImVec2 wide = ImGui::CalcTextSize(text.c_str());
   const float beside = radius + 6 * scale, right = ImGui::GetWindowPos().x + ImGui::GetWindowSize().x;
   const bool fits = middle.x + beside + wide.x < right;

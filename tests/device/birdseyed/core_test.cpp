@@ -11,6 +11,7 @@
 #include "device/wire/foreign_messages.hpp"
 #include "drivers/system/clock.hpp"
 #include "tests/support/core_session.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::device {
@@ -50,6 +51,42 @@ TEST(Core, EachFrameHasThePoseOfItsOwnTime) {
     }
     EXPECT_GT(good, frames.size() - 5);
   }
+}
+
+/// Frames that are stamped 83.1 ms late, as the record in force says.
+TEST(Core, TheRecordsLatencyIsTakenOffTheFramesTimes) {
+  CoreSettings settings;
+  settings.calibration =
+      calibration::record_text(testing::example_record(4, 2, {{"model", "miniBIRD"}}, {{"card", "C"}}));
+  auto tracker = tracker_runs(0);
+  tracker.identity = {{"model", "miniBIRD"}};
+  auto camera = camera_runs(0);
+  camera.identity = {{"card", "C"}};
+  auto events = session(8, 1);
+  std::erase_if(events, [](const RawEvent& event) { return std::holds_alternative<InstrumentChanged>(event); });
+  events.insert(events.begin(), {tracker, camera});
+  constexpr double kLate_s = 0.0831;
+  for (RawEvent& event : events) {
+    if (auto* came = std::get_if<FrameCame>(&event)) {
+      came->frame.acquired = came->frame.acquired + Duration::from_seconds(kLate_s);
+      came->frame.arrived = came->frame.arrived + Duration::from_seconds(kLate_s);
+    }
+  }
+  std::stable_sort(events.begin(), events.end(), [](const auto& a, const auto& b) { return time_of(a) < time_of(b); });
+  const auto frames = only<wire::VideoFrame>(told(events, settings));
+  std::size_t good = 0;
+  for (const auto& f : frames) {
+    const double taken_s = static_cast<double>(f.info.sequence) / 25;
+    if (!f.info.pose.tracker_from_sensor || taken_s < 3) continue;
+    ++good;
+    ASSERT_TRUE(f.info.latency.has_value());
+    EXPECT_NEAR(f.info.latency->seconds(), kLate_s, 1e-9);
+    EXPECT_NEAR(f.info.acquired_sigma.seconds(), std::hypot(1e-4, 1e-3 / 3.92), 1e-6);
+    const Eigen::Vector3d true_mm = TrackerBytesSource::pose_at(taken_s).position_mm;
+    EXPECT_LT((f.info.pose.tracker_from_sensor->translation() - true_mm).norm(), 0.7) << taken_s;
+  }
+  EXPECT_GT(good, 100U);
+  EXPECT_FALSE(only<wire::VideoFrame>(told(session(1, 1)))[0].info.latency.has_value()) << "nobody measured it";
 }
 
 TEST(Core, PosesWhoseTimeIsInDoubtAreNotPublished) {

@@ -126,13 +126,13 @@ TEST(LiveWorkflow, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
   ASSERT_TRUE(mark.has_value());
   const CameraModel& camera = workflow.picture().setup()->camera();
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
-  EXPECT_FALSE(mark->motion_counted);
+  EXPECT_FALSE(mark->error.motion.has_value());
   // By hand: the fiducials, hand-eye's 0.5 mm of the record, across the line of sight, the pose's 0.2 mm an axis.
   const auto localisation = calibration::localisation_error_of(*workflow.view().fre_mm, 4);
   const double fiducials_mm = calibration::TargetError(kFiducials, localisation.upper95_mm).rms_mm(tumour_mm);
   const double rms_mm = std::sqrt(fiducials_mm * fiducials_mm + 1.5 * 0.25 + 3 * 0.04);
-  EXPECT_NEAR(mark->radius_mm, rms_mm * std::sqrt(5.99 / 3), 1e-3);
-  EXPECT_NEAR(mark->radius_px, mark->radius_mm * camera.fx_px / 100, 0.1);
+  EXPECT_NEAR(mark->error.radius95_mm(), rms_mm * std::sqrt(5.99 / 3), 1e-3);
+  EXPECT_NEAR(mark->radius_px, mark->error.radius95_mm() * camera.fx_px / 100, 0.1);
 }
 
 /// By all fiducials, of this CT.
@@ -174,11 +174,11 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   ASSERT_TRUE(mark.has_value());
   const CameraModel& camera = workflow.picture().setup()->camera();
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
-  EXPECT_TRUE(mark->motion_counted);
+  EXPECT_TRUE(mark->error.motion.has_value());
   const double fiducials_mm =
       calibration::TargetError(kFiducials, calibration::localisation_error_of(0.3, 4).upper95_mm).rms_mm({30, 30, 20});
   const double rigid_mm = std::sqrt((fiducials_mm * fiducials_mm + 1.5 * 0.25) * 5.99 / 3);
-  EXPECT_NEAR(mark->radius_mm, std::hypot(rigid_mm, 1.2), 1e-3);
+  EXPECT_NEAR(mark->error.radius95_mm(), std::hypot(rigid_mm, 1.2), 1e-3);
   Hand hand(workflow);
   hand.rest_at({34, 30, 21}, 30);
   const auto reading = workflow.view().check;

@@ -7,7 +7,7 @@
 namespace birdseye::host {
 namespace {
 
-constexpr TrustFigures kGood{{0.3, 2, 1}, 0.5, 2};
+const TrustFigures kGood{{0.3, 2, 1}, 0.5, 2};
 
 PoseAnswer sound() {
   PoseAnswer pose;
@@ -48,6 +48,29 @@ TEST(OverlayGate, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {
   const auto decision = gate.decide({0}, sound());
   EXPECT_EQ(decision.strength, 0);
   EXPECT_NE(decision.reason.find("leave the target open by 9 mm"), std::string::npos) << decision.reason;
+}
+
+TEST(OverlayGate, AllThatAddsToTheTargetsErrorCounts) {
+  OverlayGate gate;
+  gate.set_figures(kGood);
+  ErrorBudget budget;
+  budget.fiducials_mm = budget.hand_eye_mm = budget.pose_mm = budget.time_mm = 3.9;
+  EXPECT_EQ(gate.decide({0}, sound(), budget).strength, 1) << "7.8 mm in all";
+  budget.motion = MotionError{3, 6};
+  const auto decision = gate.decide({1'000'000'000}, sound(), budget);
+  EXPECT_EQ(decision.strength, 0);
+  EXPECT_EQ(decision.reason, "the target may be off by 8 mm; E shows by what");
+  ASSERT_TRUE(decision.expected.has_value());
+}
+
+TEST(OverlayGate, NobodyAnswersForARodWhoseAngleIsNotKnown) {
+  TrustFigures figures = vouched_for(kGood);
+  figures.scope.rod_angle_missing = true;
+  OverlayGate gate;
+  gate.set_figures(vouched_for(figures));
+  const auto decision = gate.decide({0}, sound());
+  EXPECT_EQ(decision.strength, 0);
+  EXPECT_NE(decision.reason.find("--rod-angle"), std::string::npos) << decision.reason;
 }
 
 /// Nothing is known before it is measured; and of what is known, each figure is needed.

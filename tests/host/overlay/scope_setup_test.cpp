@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
@@ -28,6 +30,57 @@ TEST(ScopeSetup, OfARecordTellsTheHeldOutErrorAndNotTheFits) {
   EXPECT_FALSE(ScopeSetup::of_record(record)->camera_covariance().has_value()) << "nobody has stated it";
   record.hand_eye.reset();
   EXPECT_FALSE(ScopeSetup::of_record(record).has_value());
+}
+
+TEST(ScopeSetup, OfARodIsWhereItIsTurnedTo) {
+  const auto record = example_record(768, 576, {}, {});
+  const auto scope = ScopeSetup::of_record(record);
+  ASSERT_TRUE(scope.has_value());
+  EXPECT_TRUE(scope->has_rod());
+  EXPECT_TRUE(scope->figures().rod_angle_missing) << "nobody has said it";
+  const ScopeSetup as_calibrated = scope->turned_to(30);
+  EXPECT_FALSE(as_calibrated.figures().rod_angle_missing);
+  EXPECT_TRUE(
+      as_calibrated.camera_from_sensor().matrix().isApprox(record.hand_eye->camera_from_sensor.matrix(), 1e-12));
+  // Points of the rod's axis stay where they are in the picture, but that this turns about its middle.
+  const ScopeSetup turned = scope->turned_to(75);
+  const auto& rod = *record.hand_eye->rod;
+  const Eigen::Vector3d before = as_calibrated.camera_from_sensor() * rod.axis_point_in_sensor_mm;
+  const Eigen::Vector3d after = turned.camera_from_sensor() * rod.axis_point_in_sensor_mm;
+  EXPECT_LT((Eigen::AngleAxisd(45 * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()) * before - after).norm(), 1e-9);
+  EXPECT_GT((turned.camera_from_sensor().translation() - as_calibrated.camera_from_sensor().translation()).norm(), 1);
+}
+
+/// The error of a place before the camera is that of the solver's own covariance, drawn at random.
+TEST(ScopeSetup, TheCovarianceOfHandEyeIsToldAboutTheCamera) {
+  calibration::HandEyeResult found;
+  found.camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {6, -14, -300});
+  const Eigen::Matrix<double, 6, 1> sigma =
+      (Eigen::Matrix<double, 6, 1>() << 1e-3, 2e-3, 1e-3, 0.3, 0.2, 0.5).finished();
+  found.covariance = sigma * sigma.transpose();  // one error, of which all six are multiples
+  const ScopeSetup scope = ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, found);
+  const Eigen::Vector3d place_mm(10, -5, 120), in_sensor_mm = place_mm - found.camera_from_sensor.translation();
+  const Eigen::Vector3d w = sigma.head<3>();
+  const Eigen::Vector3d error_mm = w.cross(in_sensor_mm) + sigma.tail<3>();  // to the first order
+  Eigen::Matrix<double, 3, 6> by;
+  by << 0, place_mm.z(), -place_mm.y(), 1, 0, 0, -place_mm.z(), 0, place_mm.x(), 0, 1, 0, place_mm.y(), -place_mm.x(),
+      0, 0, 0, 1;
+  const Eigen::Matrix3d told = by * *scope.figures().hand_eye_covariance * by.transpose();
+  EXPECT_TRUE(told.isApprox(error_mm * error_mm.transpose(), 1e-9)) << told;
+}
+
+TEST(ScopeSetup, CalibratedAtOneAngleOfTheRodHoldsAtThatOne) {
+  auto record = example_record(768, 576, {}, {});
+  record.hand_eye->rod.reset();  // nobody measured how it turns
+  const auto scope = ScopeSetup::of_record(record);
+  ASSERT_TRUE(scope.has_value());
+  EXPECT_TRUE(scope->figures().rod_angle_missing);
+  EXPECT_FALSE(scope->turned_to(31).figures().rod_angle_missing);
+  EXPECT_FALSE(scope->turned_to(390).figures().rod_angle_missing);
+  EXPECT_TRUE(scope->turned_to(40).figures().rod_angle_missing);
+  record.lens->rod_angle_deg.reset();
+  EXPECT_FALSE(ScopeSetup::of_record(record)->has_rod());
+  EXPECT_FALSE(ScopeSetup::of_record(record)->figures().rod_angle_missing);
 }
 
 /// Found from poses that another program gave, without pictures: no corner was off by anything.

@@ -34,6 +34,15 @@ TEST(TargetJitter, SaysNothingOfAFewPoses) {
   EXPECT_TRUE(after_a_sweep(0.5, 12).rms_mm().has_value());
 }
 
+TEST(TargetJitter, TellsHowFastTheHandGoes) {
+  EXPECT_FALSE(after_a_sweep(0, 2).speed_mm_s().has_value());
+  // The sweep's own speed, by its derivative in the middle of the newest fifth of a second.
+  const double t_s = 0.0097 * 69 - 0.1;
+  const Eigen::Vector3d speed_mm_s(54 * std::cos(0.9 * t_s), -52 * std::sin(1.3 * t_s), 12 * std::cos(t_s));
+  EXPECT_NEAR(*after_a_sweep(0, 70).speed_mm_s(), speed_mm_s.norm(), 0.3);
+  EXPECT_NEAR(*after_a_sweep(0.5, 70).speed_mm_s(), speed_mm_s.norm(), 6) << "0.5 mm of noise over 20 poses";
+}
+
 TEST(TargetJitter, AGapIsNoNoise) {
   EXPECT_LT(*after_a_sweep(0, 70, 40).rms_mm(), 0.01);
 }

@@ -45,7 +45,7 @@ Setup setup() {
   return ScopeSetup::of_hand_eye({kWidth, kHeight, 60, 60, 0, 0}, 0.3, {}).registered({});
 }
 
-constexpr TrustFigures kGood{{0.3, 2, 1}, 0.5, 2};
+const TrustFigures kGood{{0.3, 2, 1}, 0.5, 2};
 
 PoseAnswer good_pose() {
   PoseAnswer pose;

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "calibration/record/calibration_record.hpp"
+#include "calibration/time/pose_history.hpp"
+#include "host/operation/live_workflow.hpp"
+#include "tests/support/scratch.hpp"
+
+/// An operation in virtual time: a patient, a scope, a pointer, and a surgeon at the window's workflow, without window,
+/// wire and pictures' contents. What is true is known, and may be other than what the window is told.
+namespace birdseye::testing {
+
+/// What is true. A lie changes it, or what is told of it.
+struct RehearsedTruth {
+  Transform<Tracker, Patient> tracker_from_patient;
+  Transform<Camera, Sensor> camera_from_sensor;
+  CameraModel lens;
+  Eigen::Vector3d tip_in_pointer_mm{0, 0, 150};
+  Eigen::Vector3d target_mm;                      ///< patient frame, where it truly lies
+  std::vector<Eigen::Vector3d> fiducials_mm;      ///< patient frame, where they truly lie
+  Transform<Tracker, Tracker> told_from_tracker;  ///< what the unit reports of a true place
+};
+
+/// How the instruments err, one sigma an axis.
+struct RehearsedNoise {
+  double position_mm = 0.3, angle_deg = 0.1;
+  double touch_mm = 0.3;  ///< of how the pointer is set on a marker, beside the tracker
+};
+
+/// A frame that was shown with a whole overlay.
+struct GreenFrame {
+  double at_s = 0;
+  double error_mm = 0;   ///< of the target across the line of sight, as a length where it lies
+  double radius_mm = 0;  ///< within which the window says it is, with a probability of 95 %
+};
+
+/// What the window showed for a while.
+struct Watched {
+  std::size_t frames = 0;
+  std::vector<GreenFrame> green;
+  double last_green_s = -1;          ///< since the watching began; below zero: there was none
+  std::vector<std::string> reasons;  ///< why there was no overlay, each once
+};
+
+class Rehearsal {
+ public:
+  explicit Rehearsal(unsigned seed, const RehearsedNoise& noise = {});
+
+  // What a lie may change, before or between the acts.
+  RehearsedTruth truth;
+  calibration::CalibrationRecord record;               ///< that the appliance has
+  std::vector<Eigen::Vector3d> markers_mm;             ///< as the window is told of the fiducials in the CT
+  Eigen::Vector3d landmark_mm;                         ///< as it is told of the target
+  std::vector<std::size_t> touched{0, 1, 2, 3, 4, 5};  ///< which fiducials the hand goes to, in turn
+  std::vector<Eigen::Vector3d> beside_mm;              ///< by how much it misses each; missing: by nothing
+  calibration::Identity tracker, camera;               ///< that are connected
+  std::string scope_name = "scope", pointer_name = "pointer";
+  Duration frame_stamp_off{0}, frame_delay = Duration::from_ms(20);
+  bool frames_come = true, poses_come = true, frames_repeat = false, poses_repeat = false;
+  int width_px = 0, height_px = 0;                           ///< of the frames; 0: as the record's lens has it
+  std::function<void(host::LiveSettings&)> settings;         ///< changes what the window is started with
+  std::function<Eigen::Vector3d(double at_s)> organ_motion;  ///< of the target, patient frame
+
+  /// Starts the window, connects it and has the record adopted; true: the scope counts as calibrated.
+  bool begin();
+  /// The patient is confirmed, and each of the fiducials touched; true: the window registered.
+  bool register_patient();
+  /// The surgeon holds the pointer at the target and goes on where the window says less than this; true: gone on.
+  bool check(double most_mm = 5);
+  /// The scope looks at the target for a while.
+  Watched watch(double seconds);
+
+  [[nodiscard]] host::LiveWorkflow& workflow() { return *workflow_; }
+  void tell_instruments();
+  void give_record();
+
+ private:
+  void step_poses();
+  void step_frame(Watched* watched, double since_s);
+  void rest_at(const Eigen::Vector3d& in_patient_mm, int samples);
+  void push_birds();
+  [[nodiscard]] Transform<Camera, Patient> true_view() const;
+  [[nodiscard]] Transform<Tracker, Sensor> noisy(const Transform<Tracker, Sensor>& pose);
+  Eigen::Vector3d normal3(double sigma);
+
+  RehearsedNoise noise_;
+  std::mt19937 random_;
+  Scratch scratch_;
+  std::unique_ptr<host::LiveWorkflow> workflow_;
+  PoseHistory history_;
+  Transform<Tracker, Sensor> scope_, told_scope_;
+  Eigen::Vector3d tip_in_tracker_mm_{0, 0, 900};
+  std::int64_t time_ms_ = 1000;
+  double looked_s_ = 0;
+  std::uint64_t sequence_ = 0;
+  std::optional<wire::VideoFrame> frame_;
+};
+
+}  // namespace birdseye::testing
