@@ -49,8 +49,7 @@ class Gatherer {
     begin(acquired);
     ++streams_.frames;
     const std::vector<std::uint8_t> grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
-    const auto motion =
-        motion_.push(seconds_of(acquired, *origin_ns_), {grey, frame.width_px, frame.height_px});
+    const auto motion = motion_.push(seconds_of(acquired, *origin_ns_), {grey, frame.width_px, frame.height_px});
     if (motion) {
       streams_.video.push_back(*motion);
     } else if (++streams_.frames_without_motion > 1) {
