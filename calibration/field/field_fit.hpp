@@ -71,7 +71,8 @@ struct FieldFit {
   /// the direction from a to b).
   std::optional<Eigen::Vector3d> a_from_b_mm;
   double direction_spread = 0;
-  bool distance_known = true;  ///< pairs: without it the map's scale is as it was measured
+  std::optional<double> stated_distance_mm;  ///< pairs: without it the map's scale is as it was measured
+  double measured_distance_mm = 0;           ///< pairs: from sensor to sensor, median
 };
 
 /// The map that takes measured poses to where the board has them. The board's own place in the tracker's frame is not

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calibration/base/median.hpp"
+#include "calibration/base/units.hpp"
 
 namespace birdseye::calibration {
 
@@ -114,11 +116,40 @@ namespace {
 constexpr double kMapPassMm = 1.0, kMapMarginalMm = 2.5;
 // Pairs carry the noise of two sensors that move, and of their orientations.
 constexpr double kPairPassMm = 2.0, kPairMarginalMm = 4.0;
+// Metal bends a field, and stretches all of it by hardly a hundredth.
+constexpr double kSoundScale = 0.02, kWorstScale = 0.05;
 constexpr double kWorstFactor = 5;   // of the RMS; beyond it one region is not described by the map
 constexpr double kLittleGain = 0.9;  // of the error before: the map takes away next to nothing
 constexpr double kFewOutliers = 0.1, kManyOutliers = 0.25;
 constexpr double kMostlyMapped = 0.6;           // of the box
 constexpr double kLeastDirectionSpread = 0.02;  // a body that is turned by 30 deg about two axes has 0.06
+
+/// "cm" for 10 of them in one, where mm were taken for granted; nothing where the factor is no unit's.
+std::string unit_of(double mm_per_unit) {
+  constexpr double kNear = 1.1;
+  for (const auto& [unit_mm, name] : {std::pair{10.0, "cm"}, {kMmPerInch, "inches"}, {1000.0, "metres"}}) {
+    if (mm_per_unit < unit_mm * kNear && mm_per_unit > unit_mm / kNear) return name;
+  }
+  return {};
+}
+
+void judge_distance(double stated_mm, double measured_mm, Verdict& verdict) {
+  const double ratio = measured_mm / stated_mm, off = std::max(ratio, 1 / ratio) - 1;
+  if (off <= kSoundScale) return;
+  std::string step =
+      "measure the distance between the sensors' centres again, and move metal away from the transmitter";
+  if (const std::string unit = unit_of(ratio); !unit.empty()) {
+    step = fmt::format("--distance is in mm: {:.4g} seems to be in {}", stated_mm, unit);
+  } else if (const std::string of_poses = unit_of(1 / ratio); !of_poses.empty()) {
+    step = fmt::format("the lengths of the poses seem to be in {}: say so with --unit", of_poses);
+  }
+  verdict.add(
+      off > kWorstScale ? Grade::fail : Grade::marginal,
+      fmt::format("the sensors are {:.1f} mm apart by the tracker (median), and {:.1f} mm by --distance; these may "
+                  "differ by {:.0f} %",
+                  measured_mm, stated_mm, 100 * (off > kWorstScale ? kWorstScale : kSoundScale)),
+      step);
+}
 
 void judge_pairs(const FieldFit& fit, Verdict& verdict) {
   if (fit.direction_spread < kLeastDirectionSpread) {
@@ -128,7 +159,9 @@ void judge_pairs(const FieldFit& fit, Verdict& verdict) {
                             fit.direction_spread, kLeastDirectionSpread),
                 "turn the body about all axes while it is moved through the volume");
   }
-  if (!fit.distance_known) {
+  if (fit.stated_distance_mm) {
+    judge_distance(*fit.stated_distance_mm, fit.measured_distance_mm, verdict);
+  } else {
     verdict.add(Grade::marginal, "the distance between the sensors is not given: the scale is left as it was measured",
                 "measure the distance between the sensors' centres with a calliper and give it with --distance");
   }

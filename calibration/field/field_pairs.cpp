@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calibration/base/counted.hpp"
+#include "calibration/base/median.hpp"
 #include "calibration/field/field_fit_parts.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -22,6 +23,8 @@ using Eigen::MatrixXd;
 using Vectors = std::vector<Eigen::Vector3d>;
 
 constexpr std::size_t kFewestPairs = 100, kMostPairs = 1500;
+constexpr double kRigidPart =
+    0.25;                           // of the body's length: no field that is worth a map moves half of all pairs so far
 constexpr double kShortestMm = 30;  // a shorter body turns the sensors' noise into a larger error of the map
 constexpr double kMmPerRad = 200;   // 1.8 mm against 0.5 deg: what such a sensor's position and orientation are worth
 // The map has no rigid motion of its own, and no scale where none is known: said as strongly as measurements would.
@@ -208,6 +211,47 @@ SensorPair mean_body(const FoldedPairs& data) {
   return {sum / count, nearest_rotation(turns)};
 }
 
+/// Half of all pairs have b farther than this from where they have it on average, in a's frame.
+double median_slip_mm(const FoldedPairs& data, const SensorPair& body) {
+  std::vector<double> slips_mm;
+  slips_mm.reserve(data.pairs.size());
+  for (const FieldPair& pair : data.pairs) {
+    const Eigen::Vector3d b_in_a_mm = pair.a.rotation().transpose() * (pair.b.translation() - pair.a.translation());
+    slips_mm.push_back((b_in_a_mm - body.b_in_a_mm).norm());
+  }
+  return median_of(std::move(slips_mm));
+}
+
+/// From sensor to sensor as measured, which no error of an orientation touches.
+double median_distance_mm(const FoldedPairs& data) {
+  std::vector<double> distances_mm;
+  distances_mm.reserve(data.pairs.size());
+  for (std::size_t i = 0; i < data.pairs.size(); ++i) {
+    if (!data.used[i]) continue;
+    distances_mm.push_back((data.pairs[i].b.translation() - data.pairs[i].a.translation()).norm());
+  }
+  return median_of(std::move(distances_mm));
+}
+
+constexpr const char* kOneBody = "give the poses of two sensors that are fixed to one bar, recorded together";
+
+/// Refuses two sensors that are not fixed to each other, and those too close.
+Result<void> check_body(const FoldedPairs& data) {
+  const SensorPair body = mean_body(data);
+  const double length_mm = body.b_in_a_mm.norm(), slip_mm = median_slip_mm(data, body);
+  if (!(slip_mm <= kRigidPart * length_mm))
+    return Error{Errc::degenerate,
+                 fmt::format("these two do not sit on one rigid body: in the first's frame the second is {:.3g} mm "
+                             "away on average, and in half of the pairs more than {:.3g} mm from there; {}",
+                             length_mm, slip_mm, kOneBody)};
+  if (length_mm >= kShortestMm) return {};
+  return Error{
+      Errc::degenerate,
+      fmt::format("the sensors are {:.2g} mm apart; a map needs {:.0f} mm between them at least (of lengths in "
+                  "metres or cm: --unit m, --unit cm)",
+                  length_mm, kShortestMm)};
+}
+
 /// The least variance of the direction from a to b.
 double direction_spread(const FoldedPairs& data) {
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
@@ -286,14 +330,20 @@ FieldCandidate best_smoothing(const PairModel& model, const FoldedPairs& data, c
   return best;
 }
 
-/// Takes out pairs that no smooth map explains.
-void screen(const PairModel& model, double smoothing, FoldedPairs& data) {
+/// Takes out pairs that no smooth map explains; an error where these are most of them.
+Result<void> screen(const PairModel& model, double smoothing, FoldedPairs& data) {
   for (int round = 0; round < 2; ++round) {
     const GaussNewtonEquations linear = equations(model, data, mean_body(data), smoothing);
     const auto far =
         detail::far_off(held_out(model, linear, data, smoothing), data.used, detail::kLeastOutlierAtFirstMm);
     for (std::size_t i = 0; i < far.size(); ++i) data.used[i] = !far[i];
+    const auto out = static_cast<std::size_t>(std::ranges::count(far, true));
+    if (2 * out > far.size())
+      return Error{Errc::degenerate,
+                   fmt::format("these two do not sit on one rigid body: {} of {} pairs fit no map; {}", out, far.size(),
+                               kOneBody)};
   }
+  return {};
 }
 
 }  // namespace
@@ -306,15 +356,12 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   if (!box) return box.error();
   for (std::size_t i = 0; i < data.pairs.size(); ++i)
     data.fold.push_back(detail::fold_of(*box, (data.places_mm[2 * i] + data.places_mm[2 * i + 1]) / 2));
-  if (const double length_mm = mean_body(data).b_in_a_mm.norm(); length_mm < kShortestMm)
-    return Error{Errc::degenerate,
-                 fmt::format("the sensors are {:.0f} mm apart, or do not sit on one rigid body; a map "
-                             "needs {:.0f} mm between them at least (of lengths in metres or cm: --unit m, --unit cm)",
-                             length_mm, kShortestMm)};
+  if (const auto rigid = check_body(data); !rigid) return rigid.error();
   FieldFunctions first = *box;
   first.order = 2;
   constexpr double kFirstSmoothing = 1e-5;
-  screen(PairModel(detail::smoothed(first)), kFirstSmoothing, data);
+  if (const auto screened = screen(PairModel(detail::smoothed(first)), kFirstSmoothing, data); !screened)
+    return screened.error();
 
   const SensorPair body = mean_body(data);
   const auto functions = detail::families(*box, data.places_mm, settings.basis, kMostFunctions);
@@ -340,7 +387,8 @@ Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const Fi
   fit.mapped_part = part;
   fit.a_from_b_mm = solution.parameters.bottomRows<3>();
   fit.direction_spread = direction_spread(data);
-  fit.distance_known = settings.distance_mm.has_value();
+  fit.stated_distance_mm = settings.distance_mm;
+  fit.measured_distance_mm = median_distance_mm(data);
   const Vectors was = before(data, body);
   for (std::size_t i = 0; i < data.pairs.size(); ++i) {
     const Eigen::Vector3d middle = (data.places_mm[2 * i] + data.places_mm[2 * i + 1]) / 2;

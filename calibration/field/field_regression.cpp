@@ -114,6 +114,7 @@ FoldedNormals::FoldedNormals(Index parameters, Index columns)
       penalty(MatrixXd::Zero(parameters, parameters)) {}
 
 void FoldedNormals::add(int fold, const MatrixXd& rows, const MatrixXd& values) {
+  if (rows.rows() == 0) return;  // Eigen divides by the number of rows when it cuts large products into blocks
   const auto at = static_cast<std::size_t>(fold);
   gram[at].selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
   moment[at] += rows.transpose().lazyProduct(values);  // few columns: nothing is gained by blocks

@@ -1,6 +1,8 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "calibration/field/field_pairs.hpp"
+#include "calibration/field/field_regression.hpp"
 #include "tests/support/simulated_field.hpp"
 
 namespace birdseye::calibration {
@@ -85,6 +87,62 @@ TEST(FieldPairs, PairsThatSlippedAreNamed) {
   }
   EXPECT_EQ(named, (std::vector<std::string>{"pair 21", "pair 201", "pair 334"}));
   EXPECT_LT(against_truth(fit->map, field, 9).after_mm, 0.8);
+}
+
+TEST(FieldPairs, TwoSensorsThatAreNotOnOneBodyAreRefused) {
+  const hw_sim::FieldDistortion field(10, 4);
+  const auto one = bar_pairs(field, 300, 150, 0.3, 0.1, 7), other = bar_pairs(field, 300, 150, 0.3, 0.1, 8);
+  auto apart = one;
+  for (std::size_t i = 0; i < apart.size(); ++i) apart[i].b = other[i].b;
+  FieldPairSettings settings;
+  for (const double distance_mm : {0.0, 310.0}) {
+    if (distance_mm > 0) settings.distance_mm = distance_mm;
+    const auto fit = fit_field_from_pairs(apart, settings);
+    ASSERT_FALSE(fit);
+    EXPECT_EQ(fit.error().code, Errc::degenerate);
+    EXPECT_NE(fit.error().what.find("these two do not sit on one rigid body"), std::string::npos) << fit.error().what;
+  }
+  // A body that slipped halfway is two bodies.
+  auto slipped = one;
+  for (std::size_t i = 0; i < slipped.size(); ++i) {
+    if (i % 2 == 0) slipped[i].b = slipped[i].b * Transform<Sensor, Sensor>(Eigen::Matrix3d::Identity(), {-70, 60, 40});
+  }
+  const auto fit = fit_field_from_pairs(slipped, settings);
+  if (fit) {
+    EXPECT_EQ(verdict_of(*fit).grade, Grade::fail);
+  }
+}
+
+TEST(FieldPairs, AFoldWithoutPairsAddsNothing) {
+  detail::FoldedNormals normals(300, 1);
+  normals.add(3, Eigen::MatrixXd(0, 300), Eigen::MatrixXd(0, 1));
+  EXPECT_EQ(normals.gram[3].norm(), 0);
+}
+
+TEST(FieldPairs, ADistanceThatIsNotTheBodysFailsWithBothFigures) {
+  const hw_sim::FieldDistortion field(10, 4);
+  const auto pairs = bar_pairs(field, 300, 150, 0.3, 0.1, 7);
+  struct Case {
+    double distance_mm;
+    Grade grade;
+    const char* step;
+  };
+  for (const Case& c :
+       {Case{15, Grade::fail, "15 seems to be in cm"}, Case{5.9, Grade::fail, "5.9 seems to be in inches"},
+        Case{165, Grade::fail, "measure the distance"}, Case{155, Grade::marginal, "measure the distance"},
+        Case{150, Grade::pass, ""}}) {
+    FieldPairSettings settings;
+    settings.basis = FieldBasis::polynomial;
+    settings.distance_mm = c.distance_mm;
+    const auto fit = fit_field_from_pairs(pairs, settings);
+    ASSERT_TRUE(fit) << fit.error().what;
+    const Verdict verdict = verdict_of(*fit);
+    EXPECT_EQ(verdict.grade, c.grade) << c.distance_mm;
+    if (c.grade == Grade::pass) continue;
+    EXPECT_NE(verdict.reasons.back().find(fmt::format("{:.1f} mm by --distance", c.distance_mm)), std::string::npos);
+    EXPECT_NE(verdict.reasons.back().find("mm apart by the tracker"), std::string::npos) << verdict.reasons.back();
+    EXPECT_NE(verdict.next_steps.back().find(c.step), std::string::npos) << verdict.next_steps.back();
+  }
 }
 
 TEST(FieldPairs, InputThatCannotBeUsedIsNamed) {
