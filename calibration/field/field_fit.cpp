@@ -6,9 +6,11 @@
 #include <cmath>
 
 #include "calibration/base/units.hpp"
+#include "calibration/field/board_shape.hpp"
 #include "calibration/field/field_fit_parts.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/points/point_fit.hpp"
+#include "calibration/points/point_shape.hpp"
 
 namespace birdseye::calibration {
 
@@ -244,6 +246,15 @@ Error other_lengths(double scale) {
                       scale)};
 }
 
+bool is_mirrored(std::span<const FieldSample> samples, const Vectors& measured_mm) {
+  constexpr double kFarBetter = 3;
+  Vectors true_mm;
+  true_mm.reserve(samples.size());
+  for (const FieldSample& s : samples) true_mm.push_back(s.true_mm);
+  const PointShape shape = compare_shapes(measured_mm, true_mm);
+  return shape.mirrored_fre_rms_mm < shape.fre_rms_mm / kFarBetter;
+}
+
 /// How far the measured places lie from their middle, as a multiple of how far the true ones do; root mean square.
 double spread_ratio(std::span<const FieldSample> samples) {
   Eigen::Vector3d measured_mm = Eigen::Vector3d::Zero(), true_mm = Eigen::Vector3d::Zero();
@@ -280,6 +291,12 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
   if (!box) return box.error();
   FieldFit fit{no_map(*box)};
   if (const auto aligned = align(samples, grid, fit); !aligned) return aligned.error();
+  if (is_mirrored(samples, grid.measured_mm)) {
+    return Error{Errc::bad_value,
+                 "the measured places are the mirror image of the grid: two of its axes are exchanged, in the table or "
+                 "in the order of the places, or one has its sign turned; write the grid down with x to the right, y "
+                 "forward and z up"};
+  }
   if (fit.scale < kLeastScale || fit.scale > kMostScale) return other_lengths(fit.scale);
   for (const Eigen::Vector3d& p : grid.measured_mm) grid.fold.push_back(detail::fold_of(*box, p));
 
@@ -314,6 +331,10 @@ Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitS
   fit.chosen = fit.candidates[best];
   if (const auto done = finish(samples, bases[best], grid, fit); !done) return done.error();
   fit.chosen.held_out_mm = fit.held_out_mm;
+  fit.stretch = detail::stretch_of(samples, grid.used);
+  // A level far off is no outlier, though all its places are: look at it first.
+  fit.shifted_level = detail::shifted_level(samples, std::vector<bool>(samples.size(), true), *fit.tracker_from_board);
+  if (!fit.shifted_level) fit.shifted_level = detail::shifted_level(samples, grid.used, *fit.tracker_from_board);
   return fit;
 }
 

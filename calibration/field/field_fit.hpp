@@ -49,6 +49,15 @@ struct FieldResidual {
   bool beyond = false;
 };
 
+/// A level of the board's grid of which the places lie off the others' all alike: a spacer of another height, a board
+/// that was moved sideways, a row that was written down as the next.
+struct ShiftedLevel {
+  int axis = 2;                                        ///< of the board, across which the level lies
+  std::size_t level = 0;                               ///< from 1, the lowest
+  double at_mm = 0;                                    ///< where it is said to be on that axis
+  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();  ///< measured less said, in the board's frame
+};
+
 struct FieldFit {
   explicit FieldFit(FieldMap found) : map(std::move(found)) {}
 
@@ -65,8 +74,11 @@ struct FieldFit {
   std::optional<double> before_deg, held_out_deg;  ///< RMS, where orientation was mapped
   double mapped_part = 0;                          ///< of the box, 0..1
   std::optional<Transform<Tracker, Marker>> tracker_from_board;
-  /// Grid: how much longer the tracker has distances than the board, as a factor. Pairs: 1.
+  /// Grid: how much longer the tracker has distances than the board, as a factor, and along each of the board's axes.
+  /// Pairs: 1.
   double scale = 1;
+  Eigen::Vector3d stretch = Eigen::Vector3d::Ones();
+  std::optional<ShiftedLevel> shifted_level;  ///< grid
   /// Pairs: where sensor b is in a's frame, mm; and how well the body's turns span space, 0..1/3 (the least variance of
   /// the direction from a to b).
   std::optional<Eigen::Vector3d> a_from_b_mm;
@@ -85,8 +97,8 @@ struct FieldFit {
 /// off are named and not used. Orientations, where known, get a map of the same family from w = log(R_board turned_i
 /// sensor R_i^T). Where all samples are turned alike, the mean of w cannot be told from how the sensor sits in its
 /// holder, and is taken for that.
-/// Refuses fewer than 30 samples, samples in a plane or thinner than 100 mm, places that are not finite, and units that
-/// differ (a factor beyond 0.8..1.25).
+/// Refuses fewer than 30 samples, samples in a plane or thinner than 100 mm, places that are not finite, a grid of
+/// which the measured places are the mirror image, and units that differ (a factor beyond 0.8..1.25).
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
 
 /// What a map is good for, from its own figures.

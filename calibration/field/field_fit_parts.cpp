@@ -133,6 +133,54 @@ std::string unit_of(double mm_per_unit) {
   return {};
 }
 
+/// Metal moves no level of a grid as a whole, and stretches hardly anything evenly: such is the board, or its table.
+void judge_board(const FieldFit& fit, Verdict& verdict) {
+  double worst = fit.scale - 1;
+  int axis = -1;
+  // An axis counts by itself where it is off by far more than all three together.
+  for (int k = 0; k < 3; ++k) {
+    if (std::abs(fit.stretch[k] - 1) <= 1.5 * std::abs(worst)) continue;
+    worst = fit.stretch[k] - 1;
+    axis = k;
+  }
+  const double limit = std::abs(worst) > kWorstScale ? kWorstScale : kSoundScale;
+  std::string reason = fmt::format("by the tracker lengths are {:.1f} % {} than the grid has them",
+                                   100 * std::abs(fit.scale - 1), fit.scale >= 1 ? "longer" : "shorter");
+  if (axis >= 0 && std::abs(worst) > kSoundScale)
+    reason += fmt::format(", along {} they are {:.1f} % {}", "xyz"[axis], 100 * std::abs(worst),
+                          worst > 0 ? "longer" : "shorter");
+  const bool sound = std::abs(worst) <= kSoundScale;
+  verdict.add(sound                 ? Grade::pass
+              : limit > kSoundScale ? Grade::fail
+                                    : Grade::marginal,
+              fmt::format("{}, {} {:.0f} %", reason, sound ? "of at most" : "more than", 100 * limit),
+              sound ? ""
+                    : "measure the grid's steps and the spacers' heights with a ruler: what they are wrong by is "
+                      "mapped as if it were the field's");
+  if (!fit.shifted_level) return;
+  const ShiftedLevel& level = *fit.shifted_level;
+  const Eigen::Vector3d& shift = level.shift_mm;
+  verdict.add(
+      Grade::fail,
+      fmt::format("level {} of the grid ({} = {:.4g} mm) lies {:.1f} mm off the others, all its places alike: by "
+                  "{:.1f}, {:.1f}, {:.1f} mm along x, y and z; metal moves no level as a whole",
+                  level.level, "xyz"[level.axis], level.at_mm, shift.norm(), shift.x(), shift.y(), shift.z()),
+      "see whether that level's coordinates are written down as they are: the spacer's height, the board moved "
+      "sideways, a row counted twice");
+}
+
+std::string named_outliers(const FieldFit& fit) {
+  constexpr std::size_t kMostNamed = 6;
+  std::vector<std::string> names;
+  for (const FieldResidual& r : fit.residuals) {
+    if (r.outlier) names.push_back(r.name);
+  }
+  std::string out;
+  const std::size_t shown = std::min(names.size(), kMostNamed);
+  for (std::size_t i = 0; i < shown; ++i) out += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  return shown < names.size() ? fmt::format("{} and {} more", out, names.size() - shown) : out;
+}
+
 void judge_distance(double stated_mm, double measured_mm, Verdict& verdict) {
   const double ratio = measured_mm / stated_mm, off = std::max(ratio, 1 / ratio) - 1;
   if (off <= kSoundScale) return;
@@ -198,10 +246,13 @@ Verdict verdict_of(const FieldFit& fit) {
   const auto outliers = static_cast<double>(
       std::count_if(fit.residuals.begin(), fit.residuals.end(), [](const auto& r) { return r.outlier; }));
   const double part = outliers / static_cast<double>(fit.residuals.size());
-  if (part > kFewOutliers) {
-    verdict.add(part > kManyOutliers ? Grade::fail : Grade::marginal,
-                fmt::format("{:.0f} of {} measurements {} the rest", outliers, fit.residuals.size(),
-                            outliers == 1 ? "does not fit" : "do not fit"),
+  if (outliers > 0) {
+    verdict.add(part > kManyOutliers  ? Grade::fail
+                : part > kFewOutliers ? Grade::marginal
+                                      : Grade::pass,
+                fmt::format("{:.0f} of {} measurements {} used: {}", outliers, fit.residuals.size(),
+                            outliers == 1 ? "does not fit the rest, and is not" : "do not fit the rest, and are not",
+                            named_outliers(fit)),
                 "look whether the sensor was seated at the places that are named, and measure those again");
   }
   if (fit.mapped_part < kMostlyMapped) {
@@ -209,7 +260,11 @@ Verdict verdict_of(const FieldFit& fit) {
                 fmt::format("only {:.0f} % of the box around the samples is mapped", 100 * fit.mapped_part),
                 "measure where the report shows gaps: poses there will be doubted");
   }
-  if (fit.from_pairs) judge_pairs(fit, verdict);
+  if (fit.from_pairs) {
+    judge_pairs(fit, verdict);
+  } else {
+    judge_board(fit, verdict);
+  }
   return verdict;
 }
 

@@ -26,8 +26,8 @@ struct FieldPairSettings {
 /// pairs. That leaves open a rigid motion of everything, so the map is asked to have none over the samples. It leaves
 /// the scale open too, unless the distance is known. Solved by Gauss-Newton over both maps and the sensors' distance;
 /// an orientation counts as much as 200 mm/rad would make of it. Held-out errors are those of p_b - p_a. At most 1500
-/// pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors that are not fixed to each other or closer than 30
-/// mm, and volumes thinner than 100 mm.
+/// pairs are used, evenly taken. Refuses fewer than 100 pairs, sensors that are not fixed to each other or closer than
+/// 30 mm, and volumes thinner than 100 mm.
 Result<FieldFit> fit_field_from_pairs(std::span<const FieldPair> pairs, const FieldPairSettings& settings = {});
 
 }  // namespace birdseye::calibration

@@ -133,6 +133,15 @@ nlohmann::json json_of(const Fitted& fitted) {
     json["direction_spread"] = fit.direction_spread;
   } else {
     json["scale_percent"] = 100 * (fit.scale - 1);
+    const Eigen::Vector3d along = 100 * (fit.stretch.array() - 1);
+    json["scale_percent_along"] = {along.x(), along.y(), along.z()};
+    if (const auto& level = fit.shifted_level) {
+      const Eigen::Vector3d& by = level->shift_mm;
+      json["shifted_level"] = {{"axis", std::string(1, "xyz"[level->axis])},
+                               {"level", level->level},
+                               {"at_mm", level->at_mm},
+                               {"by_mm", {by.x(), by.y(), by.z()}}};
+    }
   }
   return json;
 }
