@@ -175,6 +175,8 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
     const auto written = write_files({{options.right_out, lens_text(found->right)},
                                       {options.right_from_left_out, pose_text(found->right_from_left.matrix())}});
     if (!written) return status.refuse(written.error());
+  } else {
+    for (const auto& path : {options.right_out, options.right_from_left_out}) tell_not_written(path);
   }
   finish_with(options, found->left, std::move(json), std::move(page), verdict, status);
 }

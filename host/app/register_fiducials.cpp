@@ -7,6 +7,7 @@
 #include "calibration/base/verdict.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
+#include "host/app/results.hpp"
 #include "host/case/fiducial_registration.hpp"
 #include "host/case/fiducial_report.hpp"
 #include "host/files/text_files.hpp"
@@ -64,7 +65,7 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   }
   print(*input, *out, verdict);
   if (!failed) return ExitCode::success;
-  fmt::print(stderr, "birdseye: {} is not written: the verdict is fail\n", options.out.string());
+  tell_not_written(options.out);
   return ExitCode::verdict_fail;
 }
 

@@ -42,6 +42,13 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
       ->check(folder_is_there);
 }
 
+void tell_not_written(const std::filesystem::path& path) {
+  if (path.empty()) return;
+  std::error_code ignored;
+  fmt::print(stderr, "birdseye: {} is not written: the verdict is fail{}\n", path.string(),
+             std::filesystem::exists(path, ignored) ? "; what is there is of an earlier run" : "");
+}
+
 void finish_calibration(const ResultPaths& paths, const std::string& out_text, nlohmann::json json, HtmlPage page,
                         const Verdict& verdict, CommandStatus& status, const RecordEntry& entry) {
   json["verdict"] = name_of(verdict.grade);
@@ -66,9 +73,7 @@ void finish_calibration(const ResultPaths& paths, const std::string& out_text, n
   for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
   if (verdict.grade == Grade::fail) {
     status.code = ExitCode::verdict_fail;
-    for (const auto& path : {paths.out, paths.record}) {
-      if (!path.empty()) fmt::print(stderr, "birdseye: {} is not written: the verdict is fail\n", path.string());
-    }
+    for (const auto& path : {paths.out, paths.record}) tell_not_written(path);
   }
 }
 

@@ -21,6 +21,10 @@ struct ResultPaths {
 /// out_help: what --out holds.
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record = true);
 
+/// Says on stderr that a file is not written for a verdict of fail, and whether one of an earlier run is there, which
+/// somebody may take for this run's. Nothing of an empty path.
+void tell_not_written(const std::filesystem::path& path);
+
 /// Prints grade, reasons and next steps; writes json with `verdict`, `reasons` and `next_steps` added, and the page.
 /// Unless the grade is fail, out_text goes to --out and the entry into --record: a worthless result is not left where
 /// it could be used. Sets status by the grade, or to the error of a file that cannot be written.

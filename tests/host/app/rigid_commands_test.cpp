@@ -204,7 +204,23 @@ TEST(RigidCommands, PointsThatDoNotFitAreNotWrittenAndTheReasonIsNamed) {
     EXPECT_NE(result.output.find(words), std::string::npos) << words << "\n" << result.output;
     EXPECT_NE(result.output.find("is not written: the verdict is fail"), std::string::npos) << result.output;
     EXPECT_FALSE(fs::exists(out));
+    EXPECT_EQ(result.output.find("of an earlier run"), std::string::npos) << result.output;
   }
+}
+
+TEST(RigidCommands, AFileOfAnEarlierRunIsNotTakenForThisRunsResult) {
+  const Scratch scratch;
+  Points mirrored = kMarkers;
+  for (Eigen::Vector3d& point : mirrored) point.x() *= -1;
+  const std::string older = scratch.file("o.txt", "older");
+  const auto result =
+      run("birdseye", "register fiducials --ct " + scratch.file("p.txt", text_of(mirrored)) + " --tracker " +
+                          scratch.file("t.txt", text_of(touched(kMarkers))) + " --out " + older);
+  EXPECT_EQ(result.code, 3) << result.output;
+  EXPECT_NE(result.output.find("o.txt is not written: the verdict is fail; what is there is of an earlier run"),
+            std::string::npos)
+      << result.output;
+  EXPECT_EQ(testing::contents_of(older), "older");
 }
 
 TEST(RigidCommands, RefuseBadInputInOneLine) {
