@@ -71,6 +71,7 @@ Result<TipInput> read_input(const CalibrateTipOptions& options) {
   if (!input) return input.error().with_context(options.poses.string());
   input->relative = !options.reference.empty();
   input->direction_said = !options.poses_are.direction.empty() || options.poses.empty();
+  input->unit_said = !options.poses_are.unit.empty() || options.poses.empty();
   input->inverted = options.poses_are.direction == "sensor_from_tracker" && !options.poses.empty();
   input->source = options.poses.empty() ? options.server : options.poses.filename().string();
   if (!options.spin.empty()) {

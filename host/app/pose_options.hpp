@@ -12,7 +12,7 @@ namespace birdseye::host {
 
 /// What a command is told about all its files of poses.
 struct PoseOptions {
-  std::string unit = "mm";
+  std::string unit;  ///< empty where it is not said: mm
   std::string time_unit;
   std::string direction;        ///< empty where it is not said: tracker_from_sensor
   std::filesystem::path field;  ///< empty: poses are as recorded

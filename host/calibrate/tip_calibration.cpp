@@ -72,16 +72,19 @@ void judge_direction(const TipInput& input, double tip_mm, double divot_mm, Verd
                           divot_mm, tip_mm));
 }
 
-/// Lengths in cm or inches pass for a very short pointer near the tracker.
+/// Lengths in cm or inches pass for a short pointer near the tracker. An optical tracker is a metre or more away, which
+/// is 100 cm; an electromagnetic one may be as near as that.
 void judge_unit(const TipInput& input, double tip_mm, double divot_mm, Verdict& verdict) {
-  constexpr double kNone_mm = 5, kVeryShort_mm = 25, kShort_mm = 60, kNearTracker_mm = 100;
+  constexpr double kNone_mm = 5, kVeryShort_mm = 25, kShort_mm = 60, kNearTracker_mm = 300;
+  if (input.unit_said) return;
   const bool near_tracker = !input.relative && divot_mm < kNearTracker_mm;
   if (tip_mm < kNone_mm || tip_mm > (near_tracker ? kShort_mm : kVeryShort_mm)) return;
   verdict.add(
       Grade::marginal,
       fmt::format("the tip is only {:.1f} mm from the sensor, and the divot {:.0f} mm from the tracker's origin",
                   tip_mm, divot_mm),
-      "if the lengths of the poses are in cm or inches, say so: --unit cm or --unit in");
+      "if the lengths of the poses are in cm or inches, say so: --unit cm or --unit in; if they are in mm, say --unit "
+      "mm");
 }
 
 void judge_reading(const TipInput& input, const calibration::Pivot& pivot, Verdict& verdict) {

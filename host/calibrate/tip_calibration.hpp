@@ -24,6 +24,7 @@ struct TipInput {
   /// The poses are against a tracked reference: how far the divot is from its frame's origin tells nothing.
   bool relative = false;
   bool direction_said = false;  ///< somebody said which way the poses go
+  bool unit_said = false;       ///< somebody said which unit the lengths are in
   bool inverted = false;        ///< the file holds sensor_from_tracker, and each pose was inverted
 };
 

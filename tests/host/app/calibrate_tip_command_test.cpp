@@ -245,6 +245,13 @@ TEST(CalibrateTip, CentimetresAreDoubtedUntilTheyAreSaid) {
   EXPECT_EQ(doubted.code, 0) << doubted.output;
   EXPECT_NE(doubted.output.find("verdict: marginal"), std::string::npos) << doubted.output;
   EXPECT_NE(doubted.output.find("--unit cm or --unit in"), std::string::npos) << doubted.output;
+  // So are those of an optical tracker, a metre away, until somebody says that they are mm.
+  pointer.tip_mm = {4, 3, -400};
+  pointer.pivot_mm = {120, -40, -1100};
+  const std::string far = command(scratch, scratch.file("far.csv", csv_of(pointer.poses(60), 0.1)));
+  EXPECT_NE(run("birdseye", far).output.find("--unit cm or --unit in"), std::string::npos) << far;
+  EXPECT_NE(run("birdseye", far + " --unit mm").output.find("verdict: pass"), std::string::npos) << far;
+  pointer = SimulatedPointer{.position_noise_mm = 0.2};
   const auto told = run("birdseye", cm + " --unit cm");
   EXPECT_NE(told.output.find("verdict: pass"), std::string::npos) << told.output;
   EXPECT_LT((vector_of(read_json(scratch / "tip.json")["tip_in_sensor_mm"]) - pointer.tip_mm).norm(), 0.5);
