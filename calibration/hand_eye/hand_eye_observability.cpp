@@ -192,9 +192,10 @@ void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
        fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way round",
                    as_given, if_inverted),
        in.given_poses
-           ? "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: if "
-             "it is the tracker's, say --poses-are sensor_from_tracker; or w is the first of a quaternion's four "
-             "numbers: name them in a header, qw,qx,qy,qz"
+           ? "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: of "
+             "the camera's, if they are where the board is in the camera's frame, as OpenCV and ArUco find it, say "
+             "--eye-poses-are camera_from_marker; of the tracker's, say --poses-are sensor_from_tracker; or w is the "
+             "first of a quaternion's four numbers: name them in a header, qw,qx,qy,qz"
            : "if the poses are sensor_from_tracker, say so: --poses-are sensor_from_tracker; if w is the first of the "
              "quaternion's four numbers, name them in a header: qw,qx,qy,qz"});
 }

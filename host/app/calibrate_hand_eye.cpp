@@ -31,6 +31,7 @@ struct CalibrateHandEyeOptions {
   std::filesystem::path recording;
   LivePlan plan;
   PoseOptions poses_are;
+  std::string eye_direction;  ///< empty where it is not said: marker_from_camera
   std::vector<double> at;
   std::string pixel_aspect = "1";
   double position_sigma_mm = 0, angle_sigma_deg = 0;
@@ -79,7 +80,8 @@ Result<void> check_use(const CLI::App& command, const CalibrateHandEyeOptions& o
       return fine;
   }
   if (files.points.empty() && !files.size.empty()) return Error{Errc::bad_value, "--size goes with --points"};
-  if (files.eye_poses.empty()) return refuse_given(command, {"--eye-transform"}, "goes with --eye-poses");
+  if (files.eye_poses.empty())
+    return refuse_given(command, {"--eye-transform", "--eye-poses-are"}, "goes with --eye-poses");
   return refuse_given(command, {"--board"}, "goes with pictures, and --eye-poses takes their place");
 }
 
@@ -127,6 +129,7 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   files.of_eye.option_prefix = "eye-";
   files.of_eye.mm_per_unit = how->mm_per_unit;
   files.of_eye.s_per_unit = how->s_per_unit;
+  files.of_eye.inverted = options.eye_direction == "camera_from_marker";
   return {};
 }
 
@@ -267,6 +270,9 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   if (options.position_sigma_mm > 0)
     recording->input.tracker_noise =
         calibration::TrackerNoise{options.position_sigma_mm, options.angle_sigma_deg * kRadPerDeg};
+  recording->directions_said = !options.poses_are.direction.empty() && !options.eye_direction.empty();
+  recording->sensor_inverted = files.of_sensor.inverted;
+  recording->eye_inverted = files.of_eye.inverted;
   const auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
   finish(options, *recording, *found, status);
@@ -316,6 +322,11 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->add_option("--eye-poses", files.eye_poses,
                    "instead of pictures, poses of the camera in the board's frame; by time if both have times")
       ->type_name("PATH");
+  command
+      ->add_option("--eye-poses-are", options->eye_direction,
+                   "what --eye-poses are: marker_from_camera, where the camera is in the board's frame (default), or "
+                   "camera_from_marker, where the board is in the camera's, as OpenCV and ArUco find it")
+      ->check(CLI::IsMember({"marker_from_camera", "camera_from_marker"}));
   command
       ->add_option("--at", options->at,
                    "with --eye-poses: the point of their world at which hand-eye is judged, in their unit")

@@ -22,6 +22,28 @@ Result<void> solve_rod(const RodAngles& angles, HandEyeRecording& recording, Han
   return {};
 }
 
+/// Where both streams are inverted they fit as well as the right ones: what is found then is where the tracker lies in
+/// the board's frame. What tells them apart is that a camera is near its sensor, and a tracker farther from the board.
+void judge_directions(const HandEyeRecording& recording, const calibration::HandEyeResult& result, Verdict& verdict) {
+  constexpr double kLongest_mm = 500;  // of a laparoscope, from the sensor on its handle to the lens
+  if (!result.solved || recording.directions_said || recording.input.stations.front().tracker_from_body) return;
+  const double hand_eye_mm = result.camera_from_sensor.translation().norm();
+  const double inverted_mm = (result.body_from_marker * Eigen::Vector3d(-recording.judged_at_mm)).norm();
+  if (hand_eye_mm <= inverted_mm) return;
+  verdict.add(
+      hand_eye_mm > kLongest_mm ? Grade::fail : Grade::marginal,
+      fmt::format("the camera would be {:.0f} mm from its sensor, and the board only {:.0f} mm from the tracker: "
+                  "both streams of poses seem to be inverted",
+                  hand_eye_mm, inverted_mm),
+      fmt::format("if the camera is {:.0f} mm from its sensor, say the other way of both: --poses-are {} "
+                  "--eye-poses-are {}; if it is {:.0f} mm, say both as they were read: --poses-are {} "
+                  "--eye-poses-are {}",
+                  inverted_mm, recording.sensor_inverted ? "tracker_from_sensor" : "sensor_from_tracker",
+                  recording.eye_inverted ? "marker_from_camera" : "camera_from_marker", hand_eye_mm,
+                  recording.sensor_inverted ? "sensor_from_tracker" : "tracker_from_sensor",
+                  recording.eye_inverted ? "camera_from_marker" : "marker_from_camera"));
+}
+
 }  // namespace
 
 Result<HandEyeFound> solve_hand_eye(HandEyeRecording& recording, const RodAngles& angles, bool by_eye_poses) {
@@ -41,6 +63,7 @@ Result<HandEyeFound> solve_hand_eye(HandEyeRecording& recording, const RodAngles
     out.result = *std::move(solved);
     out.verdict = calibration::judge(out.result);
   }
+  if (by_eye_poses) judge_directions(recording, out.result, out.verdict);
   if (const Grade lens = recording.camera_verdict.grade; lens != Grade::pass) {
     out.verdict.add(lens, fmt::format("the lens, calibrated from the same pictures, is {} by itself", name_of(lens)),
                     "calibrate the lens from more pictures (birdseye calibrate camera) and give it as --camera");

@@ -271,6 +271,58 @@ TEST(CalibrateHandEyeCommand, TwoTrackersAreJudgedWhereTheirPosesAre) {
   expect_refused("birdseye", command + " --at 1,2", {"--at"});
 }
 
+/// What OpenCV finds is where the board is in the camera's frame.
+TEST(CalibrateHandEyeCommand, BothStreamsInvertedAreNoHandEye) {
+  const Scratch scratch;
+  const testing::HandEyeStream stream({.seconds = 30, .sensor_hz = 30, .camera_hz = 10, .bent_mm = 0});
+  const std::string head = "t,x,y,z,qx,qy,qz,qw\n";
+  std::string hand = head, hand_inverted = head, eye = head, eye_inverted = head;
+  for (const auto& s : stream.sensor) {
+    hand += row_of(s.time_s, s.tracker_from_sensor.matrix());
+    hand_inverted += row_of(s.time_s, s.tracker_from_sensor.inverse().matrix());
+  }
+  for (const auto& s : stream.views) {
+    eye += row_of(s.time_s, s.camera_from_marker.inverse().matrix());
+    eye_inverted += row_of(s.time_s, s.camera_from_marker.matrix());
+  }
+  hand = " --poses " + scratch.file("hand.csv", hand);
+  hand_inverted = " --poses " + scratch.file("hand_inverted.csv", hand_inverted);
+  eye = " --eye-poses " + scratch.file("eye.csv", eye);
+  eye_inverted = " --eye-poses " + scratch.file("eye_inverted.csv", eye_inverted);
+  const std::string command = "calibrate hand-eye --json " + (scratch / "x.json").string();
+  const auto translation = [&] {
+    const auto json = read_json(scratch / "x.json");
+    Eigen::Vector3d at_mm;
+    for (std::size_t i = 0; i < 3; ++i)
+      at_mm[static_cast<Eigen::Index>(i)] = json["camera_from_sensor"][i][3].get<double>();
+    return at_mm;
+  };
+  EXPECT_EQ(run("birdseye", command + hand + eye).code, 0);
+  const Eigen::Vector3d truth_mm = translation();
+
+  const auto one = run("birdseye", command + hand + eye_inverted);
+  EXPECT_EQ(one.code, 3) << one.output;
+  EXPECT_THAT(one.output, HasSubstr("--eye-poses-are camera_from_marker"));
+  const auto said = run("birdseye", command + hand + eye_inverted + " --eye-poses-are camera_from_marker");
+  EXPECT_EQ(said.code, 0) << said.output;
+  EXPECT_LT((translation() - truth_mm).norm(), 0.01);
+
+  const std::string of_tracker = " --poses-are sensor_from_tracker";
+  for (const std::string& both : {hand + eye_inverted + of_tracker, hand_inverted + eye_inverted}) {
+    const auto wrong = run("birdseye", command + both);
+    EXPECT_EQ(wrong.code, 3) << wrong.output;
+    EXPECT_THAT(wrong.output, HasSubstr("both streams of poses seem to be inverted"));
+  }
+  const auto right =
+      run("birdseye", command + hand_inverted + eye_inverted + of_tracker + " --eye-poses-are camera_from_marker");
+  EXPECT_EQ(right.code, 0) << right.output;
+  EXPECT_LT((translation() - truth_mm).norm(), 0.01);
+  expect_refused(
+      "birdseye",
+      "calibrate hand-eye --board chessboard:10x7:6mm --poses . --images . --eye-poses-are camera_from_marker",
+      {"--eye-poses-are goes with --eye-poses"});
+}
+
 TEST(CalibrateHandEyeCommand, NamesBothCountsWherePicturesAndPosesDoNotPair) {
   const auto data = testing::data_dir();
   if (!data) GTEST_SKIP() << "no recordings: set BIRDSEYE_DATA to the folder of real data";
