@@ -246,6 +246,7 @@ Result<DicomFile> read_dicom_file(const fs::path& path) {
   if (file.kind == DicomFile::Kind::directory) return file;
   const auto words = [&dataset](const DcmTagKey& tag) { return words_of(dataset, text_of(dataset, tag)); };
   file.instance_uid = text_of(dataset, DCM_SOPInstanceUID);
+  file.frame_of_reference_uid = text_of(dataset, DCM_FrameOfReferenceUID);
   file.modality = words(DCM_Modality);
   file.description = words(DCM_SeriesDescription);
   if (file.description.empty()) file.description = words(DCM_ProtocolName);

@@ -61,7 +61,7 @@ struct DicomFile {
   std::filesystem::path path;
   Kind kind = Kind::no_image;
   std::string what;  ///< its kind in words: the SOP class
-  std::string instance_uid, series_uid, modality, description, date, time, agent, syntax;
+  std::string instance_uid, series_uid, frame_of_reference_uid, modality, description, date, time, agent, syntax;
   std::optional<int> series_number;
   PatientIdentity patient;
   int columns = 0, rows = 0, frames = 0;  ///< as it says; 0 where it does not

@@ -28,6 +28,7 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std
   const auto labels =
       import_named_labels(files.labels, plan.ct, all_of({files.shown, files.targets, files.organ}), stop);
   if (!labels) return labels.error();
+  plan.notes.insert(plan.notes.end(), labels->notes.begin(), labels->notes.end());
   const Volume& volume = labels->volume;
   if (!files.shown.empty()) {
     const auto shown = values_in(*labels, files, files.shown);

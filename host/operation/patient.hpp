@@ -41,7 +41,7 @@ struct PatientPlan {
   Volume ct, shown;
   std::string checksum;  ///< of the CT
   PatientIdentity identity;
-  std::vector<std::string> notes;  ///< of the CT's reader: what it passed over, what resampling cost
+  std::vector<std::string> notes;  ///< of the readers of the CT and of the labels, as what was passed over
   std::optional<Volume> labels;
   std::vector<int> organ;  ///< values in labels of what the views show: it is matched with them
   std::optional<std::vector<Eigen::Vector3d>> fiducials_in_patient_mm;  ///< where they are given

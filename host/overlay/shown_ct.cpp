@@ -19,6 +19,7 @@ Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice
   const std::string file = choice.labels.string();
   const auto labels = import_named_labels(choice.labels, shown.volume, all_of({choice.keep, choice.margin_of}));
   if (!labels) return labels.error();
+  shown.notes.insert(shown.notes.end(), labels->notes.begin(), labels->notes.end());
   if (!choice.margins_mm.empty()) {
     const auto values = values_of_labels(labels->names, choice.margin_of, &shown.notes);
     if (!values) return values.error().with_context(file);

@@ -9,8 +9,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<ImageFile> image_of_labels(const fs::path& path) {
-  auto labels = read_dicom_labels(path);
+Result<ImageFile> image_of_labels(const DicomFile& file) {
+  auto labels = read_dicom_labels(file.path);
   if (!labels) return labels.error();
   ImageFile image;
   image.size = labels->size;
@@ -19,6 +19,10 @@ Result<ImageFile> image_of_labels(const fs::path& path) {
   image.axes = labels->axes;
   image.hu = std::move(labels->labels);
   image.label_names = std::move(labels->names);
+  image.patient = file.patient;
+  image.frame_of_reference_uid = file.frame_of_reference_uid;
+  if (file.frame_of_reference_uid.empty())
+    image.notes.emplace_back("has no frame of reference: only its grid tells that it is of this CT");
   return image;
 }
 
@@ -39,7 +43,7 @@ Result<ImageFile> decode_dicom_labels(const fs::path& path, const Announce& anno
   }
   if (found == nullptr) return decode_dicom(path, announce, copies);
   announce(found->path);
-  return image_of_labels(found->path);
+  return image_of_labels(*found);
 }
 
 }  // namespace birdseye::host

@@ -34,7 +34,8 @@ void send_image(const Send& send, const ImageFile& image) {
   send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
   send(image.values.data(), image.values.size() * sizeof image.values[0]);
   const PatientIdentity& patient = image.patient;
-  for (const std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date})
+  for (const std::string* text :
+       {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date, &image.frame_of_reference_uid})
     send_long_text(send, *text);
   send_texts(send, image.notes);
   const std::size_t labels = image.label_names.size();
@@ -113,7 +114,8 @@ std::optional<ImageFile> receive_image(const Receive& receive, int components) {
     image.values = *std::move(values);
   }
   PatientIdentity& patient = image.patient;
-  for (std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date}) {
+  for (std::string* text :
+       {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date, &image.frame_of_reference_uid}) {
     auto received = receive_long_text(receive);
     if (!received) return std::nullopt;
     *text = *std::move(received);

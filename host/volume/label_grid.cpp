@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <optional>
 
+#include "host/dicom/refused.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -61,17 +63,34 @@ std::optional<Volume> laid_into(const Volume& ct, const ImageFile& labels, const
   return out;
 }
 
+/// Labels that say whose they are must be the CT's: two patients' CTs of one size may lie on one grid.
+Result<void> check_same_patient(const PatientFrame& ct, const ImageFile& labels, const std::filesystem::path& path) {
+  const std::string& id = labels.patient.id;
+  if (!id.empty() && !ct.patient_id.empty() && id != ct.patient_id) {
+    return refused(
+        Errc::bad_value, path,
+        fmt::format("is of patient {}, and the CT of patient {}; give the segmentation of this CT", id, ct.patient_id));
+  }
+  const std::string& uid = labels.frame_of_reference_uid;
+  if (!uid.empty() && !ct.uid.empty() && uid != ct.uid) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("is of another scan than the CT: its frame of reference is {}, the CT's {}; give the "
+                               "segmentation of this CT",
+                               uid, ct.uid));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Volume> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path) {
+  if (auto same = check_same_patient(ct.frame, labels, path); !same) return same.error();
   const auto way = way_into(ct, labels);
   if (!way) {
-    return Error{Errc::bad_value,
-                 fmt::format("{}: is not on the grid of the CT; resample the labels to it", path.string())};
+    return refused(Errc::bad_value, path, "is not on the grid of the CT; resample the labels to it");
   }
   auto volume = laid_into(ct, labels, *way);
-  if (!volume)
-    return Error{Errc::bad_value, fmt::format("{}: lies outside of the CT; is it of this CT?", path.string())};
+  if (!volume) return refused(Errc::bad_value, path, "lies outside of the CT; is it of this CT?");
   return *std::move(volume);
 }
 

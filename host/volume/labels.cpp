@@ -43,7 +43,14 @@ Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const
   if (!image) return image.error();
   auto volume = labels_on_grid(ct, *image, path);
   if (!volume) return volume.error();
-  return LabelVolume{*std::move(volume), std::move(image->label_names)};
+  LabelVolume labels{*std::move(volume), std::move(image->label_names), {}};
+  labels.notes.reserve(image->notes.size() + 1);
+  for (const std::string& note : image->notes) labels.notes.push_back(fmt::format("{}: {}", path.string(), note));
+  if (!image->frame_of_reference_uid.empty() && ct.frame.uid.empty()) {
+    labels.notes.push_back(fmt::format(
+        "{}: the CT has no frame of reference: only the grid tells that the labels are of this CT", path.string()));
+  }
+  return labels;
 }
 
 Result<Volume> import_labels(const std::filesystem::path& path, const Volume& ct, const std::stop_token& stop) {

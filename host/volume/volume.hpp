@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "host/dicom/patient_identity.hpp"
+
 namespace birdseye::host {
 
 /// The index of (i, j, k) among the values of a grid of this size, x fastest.
@@ -25,6 +27,7 @@ struct Volume {
   std::vector<std::int16_t> hu;
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
   Eigen::Affine3d patient_from_voxel = Eigen::Affine3d::Identity();
+  PatientFrame frame;  ///< to which patient_from_voxel leads
 
   [[nodiscard]] std::size_t index(int i, int j, int k) const { return grid_index(size, i, j, k); }
   [[nodiscard]] std::int16_t at(int i, int j, int k) const { return hu[index(i, j, k)]; }

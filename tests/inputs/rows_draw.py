@@ -5,7 +5,7 @@ import motion
 import rows_register
 import volumes
 from judge import Row
-from rows_volume import with_seg
+from rows_volume import with_seg, with_seg_of_another
 
 
 def ct(folder):
@@ -103,6 +103,9 @@ ROWS = [
     Row("render", "good", "a DICOM segmentation, --show liver", "the liver alone",
         "birdseye render --volume ct --labels liver.seg.dcm --show liver --transfer liver --size 320x240 --out ct.png", 0, with_seg,
         writes=["ct.png"]),
+    Row("render", "wrong", "a DICOM segmentation of another patient, on the CT's grid", "refused: both patients",
+        "birdseye render --volume ct --labels liver.seg.dcm --show liver --out ct.png", 2, with_seg_of_another,
+        says=["liver.seg.dcm: is of patient B2, and the CT of patient A1"]),
     Row("render", "good", "labels without names, --show liver", "taken to be TotalSegmentator's, which is said",
         RENDER + " --labels labels.nii.gz --show liver", 0, labels, says=["TotalSegmentator"], writes=["ct.png"]),
     Row("render", "odd", "a label that the file has not", "refused: the file is named", RENDER + " --labels labels.nii.gz --show spleen", 2, labels,

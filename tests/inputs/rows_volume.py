@@ -133,6 +133,16 @@ def with_seg(folder):
                                                              [volumes.place(0, 0, k) for k in range(volumes.SLICES)]))
 
 
+def with_seg_of_another(folder):
+    """A CT of patient A1, and a segmentation of patient B2 on the same grid."""
+    size = volumes.COLUMNS, volumes.ROWS
+    places = [volumes.place(0, 0, k) for k in range(volumes.SLICES)]
+    for k, place in enumerate(places):
+        dicom.write(folder / "ct" / f"{k:03d}.dcm", {**dicom.ct_slice(volumes.slice_bytes(k), *size, place, instance=k + 1),
+                                                     0x00100020: ("LO", "A1")})
+    dicom.write(folder / "liver.seg.dcm", {**dicom.segmentation(seg_masks(), *size, places), 0x00100020: ("LO", "B2")})
+
+
 def nifti(name="ct.nii.gz", **more):
     return lambda folder: volumes.write_nifti(folder / name, **more)
 

@@ -243,6 +243,56 @@ TEST(DicomSeg, WhatDoesNotFitIsRefused) {
   EXPECT_NE(ct.error().what.find("--labels"), std::string::npos) << ct.error().what;
 }
 
+/// The labels of patient B2 and of a frame of reference, over a CT of `frame`.
+Result<LabelVolume> labels_over(const PatientFrame& frame, const char* uid) {
+  const Scratch scratch;
+  Segmentation seg;
+  seg.frames = {{1, {0, 0, 0}, std::vector<int>(15, 1)}};
+  write_segmentation(scratch / "seg.dcm", seg, [uid](DcmDataset& dataset) {
+    put(dataset, DCM_PatientID, "B2");
+    if (uid != nullptr) put(dataset, DCM_FrameOfReferenceUID, uid);
+  });
+  Volume ct = ct_around();
+  ct.frame = frame;
+  return import_named_labels(scratch / "seg.dcm", ct);
+}
+
+TEST(DicomSeg, OfAnotherPatientOrScanIsRefusedAndWhatNobodySaysIsNoted) {
+  const auto same = labels_over({"B2", "2.25.1"}, "2.25.1");
+  ASSERT_TRUE(same) << same.error().what;
+  EXPECT_TRUE(same->notes.empty()) << same->notes.front();
+  const auto other = labels_over({"A1", "2.25.1"}, "2.25.1");
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("seg.dcm: is of patient B2, and the CT of patient A1"), std::string::npos)
+      << other.error().what;
+  const auto scan = labels_over({"B2", "2.25.1"}, "2.25.12");
+  ASSERT_FALSE(scan);
+  EXPECT_NE(scan.error().what.find("is of another scan than the CT"), std::string::npos) << scan.error().what;
+  for (const auto& [ct, uid, lacks] : {std::tuple{PatientFrame{}, "2.25.1", "the CT has no frame of reference"},
+                                       std::tuple{PatientFrame{"B2", "2.25.1"}, static_cast<const char*>(nullptr),
+                                                  "seg.dcm: has no frame of reference"}}) {
+    const auto labels = labels_over(ct, uid);
+    ASSERT_TRUE(labels) << labels.error().what;
+    ASSERT_EQ(labels->notes.size(), 1U);
+    EXPECT_NE(labels->notes[0].find(lacks), std::string::npos) << labels->notes[0];
+  }
+}
+
+TEST(DicomSeg, OfAnotherPatientInTheFolderOfTheCtIsRefused) {
+  const Scratch scratch;
+  testing::write_ct_series(scratch / "export/ct", {}, 4,
+                           [](DcmDataset& dataset) { put(dataset, DCM_PatientID, "A1"); });
+  Segmentation seg;
+  seg.frames = {{1, {-0.5, 0, 2}, std::vector<int>(15, 1)}};
+  write_segmentation(scratch / "export/seg", seg, [](DcmDataset& dataset) { put(dataset, DCM_PatientID, "B2"); });
+  const auto ct = import_volume(scratch / "export");
+  ASSERT_TRUE(ct) << ct.error().what;
+  EXPECT_EQ(ct->frame.patient_id, "A1");
+  const auto labels = import_named_labels(scratch / "export", *ct);
+  ASSERT_FALSE(labels);
+  EXPECT_NE(labels.error().what.find("is of patient B2"), std::string::npos) << labels.error().what;
+}
+
 TEST(LabelNames, AreChosenWhateverTheirCapitalsAndBlanks) {
   const std::vector<NamedLabel> names{{1, "Liver", {1, 4}}, {2, "Portal Vein", {2, 4}}, {3, "Tumour", {3}}};
   const std::vector<LabelChoice> wanted{"liver", "portal_vein", 3, 9};
