@@ -56,7 +56,10 @@ Result<ImageFile> decode(const VolumeSource& source, int components, const Annou
   if (!source.series.empty())
     return refused(Errc::bad_value, path, "is one volume, of which --series cannot choose; leave it out");
   auto image = decode_image_file(path, components);
-  if (image && components == 1) image->label_names = nifti_label_names(path);
+  if (!image || components != 1) return image;
+  auto names = nifti_label_names(path);
+  if (!names) return names.error();
+  image->label_names = *std::move(names);
   return image;
 }
 

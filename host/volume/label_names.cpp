@@ -66,7 +66,7 @@ Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, 
                                           std::vector<std::string>* notes) {
   const bool has_names =
       std::any_of(names.begin(), names.end(), [](const NamedLabel& label) { return !label.name.empty(); });
-  const std::vector<NamedLabel> known = has_names ? names : those_of_totalsegmentator();
+  const std::vector<NamedLabel> known = names.empty() ? those_of_totalsegmentator() : names;
   std::vector<int> values;
   for (const auto& [one] : wanted) {
     const auto number = number_in(one);
@@ -77,16 +77,16 @@ Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, 
       found = true;
     }
     if (!found && number) values.push_back(*number);
-    if (found && !number && !has_names && notes != nullptr) {
+    if (found && !number && names.empty() && notes != nullptr) {
       notes->push_back(fmt::format("the labels have no names: '{}' is taken for {}, as TotalSegmentator 2 counts", one,
                                    values.back()));
     }
     if (found || number) continue;
     return Error{Errc::not_found,
-                 has_names ? fmt::format("has no label '{}'; it has {}", one, some_of(known))
-                           : fmt::format("names none of its labels, and '{}' is none of TotalSegmentator's; give the "
-                                         "label's number",
-                                         one)};
+                 has_names
+                     ? fmt::format("has no label '{}'; it has {}", one, some_of(known))
+                     : fmt::format("names none of its labels{}; give the label's number",
+                                   names.empty() ? fmt::format(", and '{}' is none of TotalSegmentator's", one) : "")};
   }
   return values;
 }

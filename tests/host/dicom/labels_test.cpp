@@ -309,6 +309,9 @@ TEST(LabelNames, AreTotalSegmentatorsWhereTheFileHasNone) {
   ASSERT_EQ(notes.size(), 4U);
   EXPECT_NE(notes[0].find("'liver' is taken for 5, as TotalSegmentator 2 counts"), std::string::npos) << notes[0];
   EXPECT_FALSE(values_of_labels({}, std::vector<LabelChoice>{"tumour"}));
+  const auto unnamed = values_of_labels({{5, "", {5}}}, std::vector<LabelChoice>{"liver"});
+  ASSERT_FALSE(unnamed) << "a list of segments that are not TotalSegmentator's";
+  EXPECT_NE(unnamed.error().what.find("names none of its labels; give the label's number"), std::string::npos);
 }
 
 /// A NIfTI file of 9 x 7 x 6 labels on the grid of ct_around, all `label` but for a border, with this extension.
@@ -358,13 +361,58 @@ TEST(LabelNames, OfANiftiFileAreItsOwnBeforeAnybodyElses) {
   EXPECT_EQ(places_of(*named, {"liver_tumor"}).size(), 42U);
   EXPECT_TRUE(places_of(*named, {"liver_vessels"}).empty());
   EXPECT_FALSE(values_of_labels(named->names, std::vector<LabelChoice>{"liver"}));
-  // What is no table of names is none, and hurts nobody.
-  for (const char* odd : {"<Label Key=\"", "<Label Key=\"x\">y</Label>", "<Label ><![CDATA[", "</Label><Label "}) {
-    write_nifti(scratch / "odd.nii.gz", 5, odd);
-    const auto labels = import_named_labels(scratch / "odd.nii.gz", ct_around());
-    ASSERT_TRUE(labels) << labels.error().what;
-    EXPECT_TRUE(labels->names.empty()) << odd;
+}
+
+/// What a NIfTI file's labels are called, or why not.
+Result<std::vector<NamedLabel>> names_by(const std::string& extension) {
+  const Scratch scratch;
+  write_nifti(scratch / "odd.nii.gz", 5, extension);
+  const auto labels = import_named_labels(scratch / "odd.nii.gz", ct_around());
+  if (!labels) return labels.error();
+  return labels->names;
+}
+
+std::string table_of(const std::string& labels) {
+  return "<?xml version=\"1.0\"?><CaretExtension><VolumeInformation><LabelTable>" + labels +
+         "</LabelTable></VolumeInformation></CaretExtension>";
+}
+
+TEST(LabelNames, ThatCannotBeReadAreNoReasonToTakeThoseOfTotalSegmentator) {
+  const std::string table =
+      table_of("<Label Key=\"5\" Red=\"0\"><![CDATA[spleen]]></Label> <Label Key=\"6\"><![CDATA[liver]]></Label>\n");
+  ASSERT_TRUE(names_by(table));
+  for (std::size_t length = 1; length < table.size(); ++length) {
+    const auto cut = names_by(table.substr(0, length));
+    ASSERT_FALSE(cut) << table.substr(0, length);
+    EXPECT_NE(cut.error().what.find("odd.nii.gz: its table of label names is damaged"), std::string::npos)
+        << cut.error().what;
   }
+  const std::array<std::string, 8> damaged{"<Label Key=\"5",
+                                           "</Label><Label ",
+                                           table_of("<Label Key=\"99999999999\">liver</Label>"),
+                                           table_of("<Label Key=\"5x\">liver</Label>"),
+                                           table_of("<Label >liver</Label>"),
+                                           table_of("<Lable Key=\"5\">liver</Lable>"),
+                                           table_of("<Label Key=\"5\">liver &unknown;</Label>"),
+                                           std::string(3000, 'a').insert(0, "<a><a>")};
+  for (const std::string& text : damaged) EXPECT_FALSE(names_by(text)) << text;
+  const auto both = names_by(table_of("<Label Key=\"5\">liver</Label><Label Key=\"5\">spleen</Label>"));
+  ASSERT_FALSE(both);
+  EXPECT_NE(both.error().what.find("calls label 5 both 'liver' and 'spleen'"), std::string::npos) << both.error().what;
+}
+
+TEST(LabelNames, OfOtherExtensionsAreNoneAndReferencesAreRead) {
+  for (const std::string& other :
+       {std::string("a comment, 3 < 4"), std::string("<AFNI_attributes a=\"1\"></AFNI_attributes>"),
+        std::string("<!-- none --><CaretExtension/>"), table_of(""), std::string("\x08\0\x05\0\x10\0", 6)}) {
+    const auto names = names_by(other);
+    ASSERT_TRUE(names) << names.error().what;
+    EXPECT_TRUE(names->empty()) << other;
+  }
+  const auto names = names_by(table_of("<Label Key=\"5\">liver &amp; gall&#x27;s</Label>"));
+  ASSERT_TRUE(names) << names.error().what;
+  ASSERT_EQ(names->size(), 1U);
+  EXPECT_EQ(names->front().name, "liver & gall's");
 }
 
 /// A folder of one mask a file, as TotalSegmentator writes it, of a small CT.
