@@ -8,8 +8,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/detect/detect.hpp"
@@ -17,6 +15,7 @@
 #include "host/files/name_pattern.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/point_files.hpp"
+#include "host/files/read_mat.hpp"
 #include "host/report/html_page.hpp"
 
 namespace birdseye::host {
@@ -99,23 +98,9 @@ void bring_back(const cv::Mat& stretched, const cv::Mat& grey, calibration::Patt
   for (Eigen::Vector2d& p : view.points_px) p = (p.array() + 0.5) * per_px - 0.5;
 }
 
-/// Whether it is a PNG without its last chunk; the reader would say so on standard error, in words of its own.
-bool is_cut_png(const fs::path& path) {
-  constexpr std::streamoff kLastBytes = 64;
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = file.tellg();
-  std::string first(4, '\0'), last(static_cast<std::size_t>(std::clamp<std::streamoff>(size, 0, kLastBytes)), '\0');
-  file.seekg(0);
-  file.read(first.data(), static_cast<std::streamsize>(first.size()));
-  file.seekg(std::max<std::streamoff>(0, size - kLastBytes));
-  file.read(last.data(), static_cast<std::streamsize>(last.size()));
-  return first == "\x89PNG" && last.find("IEND") == std::string::npos;
-}
-
 Looked look(const calibration::Pattern& pattern, const fs::path& path, double pixel_aspect) {
   Looked looked;
-  if (is_cut_png(path)) return looked;
-  const cv::Mat grey = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+  const cv::Mat grey = read_mat(path, cv::IMREAD_GRAYSCALE);
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;
@@ -160,6 +145,15 @@ std::string inset_note(const calibration::Pattern& pattern, const std::vector<Lo
       pattern.inset_columns, pattern.inset_rows, pattern.inset_mm);
 }
 
+Error none_readable(const std::vector<PictureViews::Rejected>& rejected) {
+  constexpr std::size_t kNamed = 5;
+  std::string what;
+  for (std::size_t i = 0; i < std::min(kNamed, rejected.size()); ++i)
+    what += fmt::format("{}{} {}", i == 0 ? "" : "; ", rejected[i].name, rejected[i].reason);
+  if (rejected.size() > kNamed) what += fmt::format("; nor can {} more", rejected.size() - kNamed);
+  return {Errc::bad_format, fmt::format("no picture can be read, so copy them again: {}", what)};
+}
+
 /// Of a picture that lies beside the points.
 Result<Eigen::Vector2i> size_beside(const fs::path& folder) {
   std::error_code failed;
@@ -201,7 +195,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
     const std::string name = (*pictures)[i].filename().string();
     Looked& one = looked[i];
     if (one.width_px == 0) {
-      views.rejected.push_back({name, "cannot be read as a picture"});
+      views.rejected.push_back({name, fmt::format("cannot be read as a picture: {}", why_no_picture((*pictures)[i]))});
       continue;
     }
     if (first.empty()) {
@@ -219,6 +213,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
       views.rejected.push_back({name, one.detection.rejected});
     }
   }
+  if (first.empty()) return none_readable(views.rejected);
   return views;
 }
 

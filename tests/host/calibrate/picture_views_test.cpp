@@ -176,9 +176,29 @@ TEST(PictureViews, WhatCannotBeReadOrShowsNothingIsRejectedByName) {
   EXPECT_EQ(views->used[0].name, "good.png");
   ASSERT_EQ(views->rejected.size(), 2U);
   EXPECT_EQ(views->rejected[0].name, "broken.png");
-  EXPECT_EQ(views->rejected[0].reason, "cannot be read as a picture");
+  EXPECT_EQ(views->rejected[0].reason, "cannot be read as a picture: the file is cut short");
   EXPECT_EQ(views->rejected[1].name, "dark.png");
   EXPECT_NE(views->rejected[1].reason.find("too dark"), std::string::npos) << views->rejected[1].reason;
+}
+
+TEST(PictureViews, WhereNoPictureCanBeReadEachFileIsNamedWithItsFaultInNoLibrarysWords) {
+  const Scratch scratch;
+  std::ofstream(scratch / "a.png") << "garbage";
+  std::ofstream(scratch / "b.png");
+  std::ofstream(scratch / "c.ppm") << "P3\n4 4\n255\n1 2 3";
+  std::ofstream(scratch / "d.ppm") << "P6\n9000000000 4\n255\n";
+  std::ofstream(scratch / "e.ppm") << "P6\n2000000 2000000\n255\n";
+  std::ofstream(scratch / "f.ppm") << "P6\n640 480\n255\n123";
+  ::testing::internal::CaptureStderr();
+  const auto views = read_picture_views(pattern(), {scratch.path()});
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(views);
+  const std::string& what = views.error().what;
+  for (const char* said :
+       {"a.png cannot be read as a picture: the file is damaged, or no picture",
+        "b.png cannot be read as a picture: the file is empty", "c.ppm", "d.ppm", "e.ppm", "nor can 1 more"}) {
+    EXPECT_NE(what.find(said), std::string::npos) << what;
+  }
 }
 
 TEST(PictureViews, NothingToReadIsAnErrorThatNamesIt) {
