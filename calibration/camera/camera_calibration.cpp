@@ -143,9 +143,9 @@ bool as_good(const ModelFit& fit, const ModelFit& best) {
   return fit.held_out_px <= kTooLittle * best.held_out_px || gain_of(best, fit) <= kStandardErrors;
 }
 
-/// So far from the best that chance is no excuse.
+/// So far from the best that chance is no excuse. A gain that is sure and next to nothing refutes nobody.
 bool refuted(const ModelFit& fit, const ModelFit& best) {
-  return gain_of(best, fit) > 1;
+  return !as_good(fit, best) && gain_of(best, fit) > 1;
 }
 
 /// The model with the least held-out error.
@@ -167,6 +167,15 @@ const ModelFit& choose(const std::vector<ModelFit>& fits, const ModelFit& best, 
     if (asked) return fit.model == *asked;
     return &fit == &best || (fit.usable && best.usable && as_good(fit, best));
   });
+}
+
+/// Whether anybody need flatten the board: good ones are bent by some hundredths of a millimetre.
+bool matters(const BoardSag& sag, const CameraModel& camera) {
+  constexpr double kFlatEnough_mm = 0.05;
+  const Eigen::Array4d change = sag.lens_change.head<4>().array().abs();
+  return sag.sag_mm > kFlatEnough_mm ||
+         std::max(change[0] / camera.fx_px, change[1] / camera.fy_px) > camera_limits::kFocalSigmaPass ||
+         std::max(change[2], change[3]) > camera_limits::kCentreSigmaPass * camera.width_px;
 }
 
 /// From the noise's: each parameter's deviation at least what the views among themselves say, their correlations kept;
@@ -193,7 +202,7 @@ void add_doubt(const std::vector<ModelFit>& fits, const ModelFit& best, const Mo
   constexpr double kTold = 2;  // standard errors
   const auto sag = find_board_sag(fit.camera, fit.model, fit.views);
   if (sag && sag->standard_errors > kTold) {
-    out.board_sag_mm = sag->sag_mm;
+    if (matters(*sag, fit.camera)) out.board_sag_mm = sag->sag_mm;
     between += sag->lens_change * sag->lens_change.transpose();
   }
   out.covariance += between;

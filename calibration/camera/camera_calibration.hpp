@@ -95,8 +95,9 @@ struct CameraCalibration {
   CameraVector sigma_between_views = CameraVector::Zero();
   /// Root mean square distance of the lens to those of the models that the views do not refute.
   CameraVector sigma_between_models = CameraVector::Zero();
-  /// How far the board's middle seems to stand off its corners, mm, where the views tell it from flat; else 0. What
-  /// such a board does to the lens is in the covariance.
+  /// How far the board's middle seems to stand off its corners, mm, where the views tell it from flat, and it is over
+  /// 0.05 mm or changes the lens noticeably; else 0. What any bend that the views tell does to the lens is in the
+  /// covariance.
   double board_sag_mm = 0;
   /// The model with the least held-out error, where the views held out refute the one that was asked for.
   std::optional<LensModel> refuted_by;

@@ -35,7 +35,7 @@ void judge_fit(const CameraCalibration& c, Verdict& verdict) {
       return std::ranges::find(c.models, model, &LensModelFit::model)->held_out_px;
     };
     verdict.add(Grade::marginal,
-                fmt::format("the views refute the lens model {}: held out, it is off by {:.3g} px, and {} by {:.3g} px",
+                fmt::format("the views refute the lens model {}: held out, it is off by {:.4g} px, and {} by {:.4g} px",
                             name_of(c.model), held_out(c.model), name_of(*c.refuted_by), held_out(*c.refuted_by)),
                 "leave --model out, so that the views decide");
   }
