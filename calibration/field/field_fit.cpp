@@ -202,6 +202,33 @@ std::vector<double> sigmas(const SmoothedBasis& basis, const MeasuredGrid& grid,
                                });
 }
 
+/// Which outliers have another one within reach, at another place: two sensors are not badly seated side by side, but
+/// metal bends the field about several places.
+std::vector<bool> beside_one_another(const MeasuredGrid& grid, double reach_mm) {
+  constexpr double kOnePlace = 0.1;  // of the reach: a place that was measured twice
+  std::vector<bool> out(grid.used.size(), false);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (std::size_t k = 0; k < out.size() && !grid.used[i] && !out[i]; ++k) {
+      const double apart_mm = (grid.measured_mm[i] - grid.measured_mm[k]).norm();
+      out[i] = !grid.used[k] && apart_mm > kOnePlace * reach_mm && apart_mm <= reach_mm;
+    }
+  }
+  return out;
+}
+
+/// Takes what lies about these places off the map.
+void leave_out(const MeasuredGrid& grid, const std::vector<bool>& bent, double reach_mm, FieldMapData& data) {
+  Vectors places;
+  for (std::size_t i = 0; i < bent.size(); ++i) {
+    if (bent[i]) places.push_back(grid.measured_mm[i]);
+  }
+  const auto bent_nodes =
+      detail::sigma_lattice(data.functions, places, reach_mm, [](const Eigen::Vector3d&) { return 1.0; });
+  for (std::size_t node = 0; node < bent_nodes.size(); ++node) {
+    if (bent_nodes[node] > 0) data.sigma_mm[node] = -1;
+  }
+}
+
 Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& basis, const MeasuredGrid& grid,
                     FieldFit& fit) {
   const double smoothing = fit.chosen.smoothing;
@@ -211,6 +238,9 @@ Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& b
   FieldMapData data{basis.functions, coefficients(basis, solution.parameters), {}, {}};
   const std::vector<bool> beyond = extrapolated(held, grid);
   data.sigma_mm = sigmas(basis, grid, held, beyond, solution.inverse);
+  const double reach_mm = detail::reach_mm(basis.functions, grid.measured_mm);
+  const std::vector<bool> bent = beside_one_another(grid, reach_mm);
+  leave_out(grid, bent, reach_mm, data);
   const Vectors rotations = wanted_rotations(samples, grid.used, fit);
   if (!rotations.empty()) {
     const auto turning = normals_of(basis, grid, rotations);
@@ -224,7 +254,7 @@ Result<void> finish(std::span<const FieldSample> samples, const SmoothedBasis& b
   fit.map = *std::move(map);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     fit.residuals.push_back(
-        {samples[i].name, grid.measured_mm[i], -grid.wanted_mm[i], held.errors[i], !grid.used[i], beyond[i]});
+        {samples[i].name, grid.measured_mm[i], -grid.wanted_mm[i], held.errors[i], !grid.used[i], bent[i], beyond[i]});
   }
   detail::sum_up(fit);
   return {};

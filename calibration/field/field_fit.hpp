@@ -44,6 +44,7 @@ struct FieldResidual {
   Eigen::Vector3d before_mm;    ///< measured less true
   Eigen::Vector3d held_out_mm;  ///< the same after a map that was not shown the measurement's region
   bool outlier = false;
+  bool beside_outlier = false;  ///< an outlier with another one next to it: the field, and not mapped about it
   /// Without its region the map would be extrapolated here, at a corner of the volume say: held_out_mm tells then of
   /// the extrapolation, not of the map, and is not counted.
   bool beyond = false;
@@ -94,11 +95,12 @@ struct FieldFit {
 /// choice of the rigid part loses nothing.
 /// Family, order and smoothing are those with the least error in regions that were left out (11 folds of scattered
 /// cells, each a fifth of the box wide); within 2 % the one with fewer functions. Samples more than 4.5 robust sigmas
-/// off are named and not used. Orientations, where known, get a map of the same family from w = log(R_board turned_i
-/// sensor R_i^T). Where all samples are turned alike, the mean of w cannot be told from how the sensor sits in its
-/// holder, and is taken for that.
-/// Refuses fewer than 30 samples, samples in a plane or thinner than 100 mm, places that are not finite, a grid of
-/// which the measured places are the mirror image, and units that differ (a factor beyond 0.8..1.25).
+/// off are named and not used; where such samples lie next to one another, the field bends there as no map of these
+/// samples follows it, and the map leaves the places about them out. Orientations, where known, get a map of the same
+/// family from w = log(R_board turned_i sensor R_i^T). Where all samples are turned alike, the mean of w cannot be told
+/// from how the sensor sits in its holder, and is taken for that. Refuses fewer than 30 samples, samples in a plane or
+/// thinner than 100 mm, places that are not finite, a grid of which the measured places are the mirror image, and units
+/// that differ (a factor beyond 0.8..1.25).
 Result<FieldFit> fit_field(std::span<const FieldSample> samples, const FieldFitSettings& settings = {});
 
 /// What a map is good for, from its own figures.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "calibration/base/median.hpp"
@@ -169,18 +170,6 @@ void judge_board(const FieldFit& fit, Verdict& verdict) {
       "sideways, a row counted twice");
 }
 
-std::string named_outliers(const FieldFit& fit) {
-  constexpr std::size_t kMostNamed = 6;
-  std::vector<std::string> names;
-  for (const FieldResidual& r : fit.residuals) {
-    if (r.outlier) names.push_back(r.name);
-  }
-  std::string out;
-  const std::size_t shown = std::min(names.size(), kMostNamed);
-  for (std::size_t i = 0; i < shown; ++i) out += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
-  return shown < names.size() ? fmt::format("{} and {} more", out, names.size() - shown) : out;
-}
-
 void judge_distance(double stated_mm, double measured_mm, Verdict& verdict) {
   const double ratio = measured_mm / stated_mm, off = std::max(ratio, 1 / ratio) - 1;
   if (off <= kSoundScale) return;
@@ -215,6 +204,40 @@ void judge_pairs(const FieldFit& fit, Verdict& verdict) {
   }
 }
 
+/// The worst of these measurements by name, with how far off they are.
+std::string named(std::vector<const FieldResidual*> residuals) {
+  constexpr std::size_t kNamed = 8;
+  std::ranges::stable_sort(residuals, std::ranges::greater(),
+                           [](const FieldResidual* r) { return r->held_out_mm.norm(); });
+  std::string names;
+  for (std::size_t i = 0; i < std::min(kNamed, residuals.size()); ++i)
+    names += fmt::format("{}{} ({:.1f} mm)", i == 0 ? "" : ", ", residuals[i]->name, residuals[i]->held_out_mm.norm());
+  return residuals.size() > kNamed ? fmt::format("{} and {} more", names, residuals.size() - kNamed) : names;
+}
+
+void judge_outliers(const FieldFit& fit, Verdict& verdict) {
+  std::vector<const FieldResidual*> all, bent;
+  for (const FieldResidual& r : fit.residuals) {
+    if (r.outlier) all.push_back(&r);
+    if (r.beside_outlier) bent.push_back(&r);
+  }
+  if (all.empty()) return;
+  const double part = static_cast<double>(all.size()) / static_cast<double>(fit.residuals.size());
+  const bool few = part <= kFewOutliers;
+  verdict.add(few                    ? Grade::pass
+              : part > kManyOutliers ? Grade::fail
+                                     : Grade::marginal,
+              fmt::format("{} of {} measurements {} the rest: {}", all.size(), fit.residuals.size(),
+                          all.size() == 1 ? "does not fit" : "do not fit", named(all)),
+              "look whether the sensor was seated at the places that are named, and measure those again");
+  if (bent.empty()) return;
+  verdict.add(Grade::marginal,
+              fmt::format("{} of them lie next to one another: the field bends there as the map cannot follow, so that "
+                          "poses there are doubted: {}",
+                          bent.size(), named(bent)),
+              "move metal away from there, or measure around it in smaller steps");
+}
+
 }  // namespace
 
 Verdict verdict_of(const FieldFit& fit) {
@@ -243,18 +266,7 @@ Verdict verdict_of(const FieldFit& fit) {
                             fit.held_out_mm),
                 "if the error before is small enough, work without a map");
   }
-  const auto outliers = static_cast<double>(
-      std::count_if(fit.residuals.begin(), fit.residuals.end(), [](const auto& r) { return r.outlier; }));
-  const double part = outliers / static_cast<double>(fit.residuals.size());
-  if (outliers > 0) {
-    verdict.add(part > kManyOutliers  ? Grade::fail
-                : part > kFewOutliers ? Grade::marginal
-                                      : Grade::pass,
-                fmt::format("{:.0f} of {} measurements {} used: {}", outliers, fit.residuals.size(),
-                            outliers == 1 ? "does not fit the rest, and is not" : "do not fit the rest, and are not",
-                            named_outliers(fit)),
-                "look whether the sensor was seated at the places that are named, and measure those again");
-  }
+  judge_outliers(fit, verdict);
   if (fit.mapped_part < kMostlyMapped) {
     verdict.add(Grade::marginal,
                 fmt::format("only {:.0f} % of the box around the samples is mapped", 100 * fit.mapped_part),

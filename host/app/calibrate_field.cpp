@@ -122,7 +122,9 @@ nlohmann::json json_of(const Fitted& fitted) {
   for (const auto& c : fit.candidates)
     json["candidates"].push_back({{"kind", name_of(c.basis)}, {"order", c.order}, {"held_out_mm", c.held_out_mm}});
   for (const auto& r : fit.residuals) {
-    if (r.outlier) json["outliers"].push_back({{"name", r.name}, {"off_mm", r.held_out_mm.norm()}});
+    if (r.outlier)
+      json["outliers"].push_back(
+          {{"name", r.name}, {"off_mm", r.held_out_mm.norm()}, {"not_mapped", r.beside_outlier}});
   }
   if (fit.held_out_deg) {
     json["before_deg"] = *fit.before_deg;

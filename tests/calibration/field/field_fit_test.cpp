@@ -168,6 +168,51 @@ TEST(FieldFit, BlundersAreNamedAndDoNotBendTheMap) {
   EXPECT_LT(against_truth(fit->map, field, 6).after_mm, 0.4);
 }
 
+std::string all_reasons(const FieldFit& fit) {
+  std::string all;
+  for (const std::string& reason : verdict_of(fit).reasons) all += reason + "\n";
+  return all;
+}
+
+TEST(FieldFit, MetalThatMovesNeighboursIsNoBlunderOfEach) {
+  const hw_sim::FieldDistortion field(10, 6);
+  auto samples = grid_samples(field, {}, 6);
+  const Eigen::Vector3d middle = samples[6 * 6 * 2 + 6 * 2 + 2].measured.translation();
+  std::size_t moved = 0;
+  for (FieldSample& s : samples) {
+    const Eigen::Vector3d place = s.measured.translation();
+    const double by_mm = 20 * std::exp(-(place - middle).squaredNorm() / (100 * 100));
+    moved += by_mm > 6 ? 1 : 0;
+    s.measured =
+        Transform<Tracker, Sensor>(s.measured.rotation(), Eigen::Vector3d(place + Eigen::Vector3d(by_mm, 0, 0)));
+  }
+  ASSERT_EQ(moved, 7U);
+  const auto fit = fit_field(samples);
+  ASSERT_TRUE(fit) << fit.error().what;
+  ASSERT_GT(outliers(*fit), 1U) << "or the map follows the metal";
+  EXPECT_EQ(verdict_of(*fit).grade, Grade::marginal) << all_reasons(*fit);
+  EXPECT_NE(all_reasons(*fit).find("next to one another"), std::string::npos) << all_reasons(*fit);
+  EXPECT_FALSE(fit->map.correct(Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), middle)));
+  EXPECT_LT(fit->mapped_part, 0.98);
+  EXPECT_GT(fit->mapped_part, 0.7);
+}
+
+TEST(FieldFit, SingleOutliersAreNamedAndMappedOver) {
+  auto samples = grid_samples(hw_sim::FieldDistortion(10, 6), {}, 6);
+  for (const std::size_t i : {33U, 90U}) {
+    samples[i].measured = Transform<Tracker, Sensor>(
+        samples[i].measured.rotation(), Eigen::Vector3d(samples[i].measured.translation() + Eigen::Vector3d(25, 0, 0)));
+  }
+  const auto fit = fit_field(samples);
+  ASSERT_TRUE(fit) << fit.error().what;
+  EXPECT_EQ(verdict_of(*fit).grade, Grade::pass) << all_reasons(*fit);
+  EXPECT_NE(all_reasons(*fit).find("2 of 180 measurements do not fit the rest: node "), std::string::npos)
+      << all_reasons(*fit);
+  for (const char* name : {"node 34 (", "node 91 ("})
+    EXPECT_NE(all_reasons(*fit).find(name), std::string::npos) << all_reasons(*fit);
+  EXPECT_TRUE(fit->map.correct(samples[90].measured));
+}
+
 TEST(FieldFit, AHoleInTheSamplesIsNotMapped) {
   const hw_sim::FieldDistortion field(10, 7);
   auto samples = grid_samples(field, {9, 9, 8, 0.3, 0.1}, 7);
