@@ -211,7 +211,7 @@ std::string record_text(const CalibrationRecord& record) {
   if (record.hand_eye) json["hand_eye"] = json_of(*record.hand_eye);
   if (record.tip) json["tip"] = json_of(*record.tip);
   if (record.latency) json["latency"] = json_of(*record.latency);
-  json["checksum"] = checksum_of(json);
+  json["checksum"] = checksum_of(json.dump());
   return json.dump(2) + "\n";
 }
 
@@ -225,7 +225,8 @@ Result<CalibrationRecord> parse_record(const std::string& text) {
   }
   Json told = json;
   told.erase("checksum");
-  if (json.value("checksum", Json()) != checksum_of(told)) {
+  const Json checksum = json.value("checksum", Json());
+  if (!checksum.is_string() || !has_checksum(told.dump(), checksum.get<std::string>())) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
   }

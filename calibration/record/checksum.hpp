@@ -1,20 +1,13 @@
 #pragma once
 
-#include <fmt/format.h>
-#include <isa-l/crc64.h>
-
-#include <cstdint>
 #include <string>
 
 namespace birdseye::calibration {
 
-/// The checksum of what a JSON file says: CRC-64 of ECMA-182 over its text without white space, so that the file may be
-/// laid out anew but not changed.
-template <typename Json>
-std::string checksum_of(const Json& json) {
-  const std::string text = json.dump();
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(text.data());
-  return fmt::format("crc64-ecma:{:016x}", ::crc64_ecma_norm(0, bytes, text.size()));
-}
+/// The checksum of what a JSON file says: SHA-256 over its text without white space, so that the file may be laid out
+/// anew but not changed.
+std::string checksum_of(const std::string& json_text);
+/// Whether the checksum is that of the text. Files of 0.1.0 have CRC-64 of ECMA-182, which is taken too.
+bool has_checksum(const std::string& json_text, const std::string& checksum);
 
 }  // namespace birdseye::calibration

@@ -47,7 +47,7 @@ std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
                       {"made_utc", notes.made_utc},       {"software", notes.software},
                       {"made_from", notes.made_from},     {"verdict", name_of(notes.grade)},
                       {"held_out_mm", notes.held_out_mm}, {"map", map.data()}};
-  json["checksum"] = checksum_of(json);
+  json["checksum"] = checksum_of(json.dump());
   return json.dump(1) + "\n";
 }
 
@@ -60,7 +60,8 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
       return no_map(fmt::format("or of a version other than {}", kVersion));
     const auto checksum = json.at("checksum").get<std::string>();
     json.erase("checksum");
-    if (checksum != checksum_of(json)) return no_map("or was changed since it was made: its checksum does not fit");
+    if (!has_checksum(json.dump(), checksum))
+      return no_map("or was changed since it was made: its checksum does not fit");
     return map_of(json);
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
     return no_map("or not a whole one");

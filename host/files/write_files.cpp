@@ -4,7 +4,10 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <system_error>
+
+#include "drivers/system/durable.hpp"
 
 namespace birdseye::host {
 
@@ -48,11 +51,17 @@ Result<void> write_files(const std::vector<FileText>& files) {
     }
     replaced.push_back(&file);
     if (auto written = put(part_of(file.path), file.text, file.path); !written) return give_up(written.error());
+    if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());
   }
+  std::set<fs::path> folders;
   for (const FileText* file : replaced) {
     std::error_code error;
     fs::rename(part_of(file->path), file->path, error);
     if (error) return give_up({Errc::unreadable, fmt::format("{}: cannot be replaced", file->path.string())});
+    folders.insert(file->path.parent_path());
+  }
+  for (const fs::path& folder : folders) {
+    if (auto synced = sync_folder(folder); !synced) return synced;
   }
   for (const FileText& file : files) {
     if (file.path.empty() || !fs::is_other(file.path, ignored)) continue;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "calibration/record/sha256.hpp"
 #include "tests/support/example_record.hpp"
 
 namespace birdseye::calibration {
@@ -53,6 +54,35 @@ TEST(CalibrationRecord, MayBeLaidOutAnewButNotChanged) {
     ++digits;
   }
   EXPECT_GT(digits, 500);
+}
+
+TEST(CalibrationRecord, OneBitThatIsNotAsItWasIsRefused) {
+  const std::string text = record_text(example());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    std::string changed = text;
+    changed[i] = static_cast<char>(changed[i] ^ (1 << (i % 8)));
+    const auto read = parse_record(changed);
+    if (!read) continue;
+    // An "e" of a number may be an "E", and its last digit one too many to make another number.
+    ASSERT_EQ(record_text(*read), text) << i;
+  }
+}
+
+TEST(CalibrationRecord, Sha256IsThatOfTheStandard) {
+  EXPECT_EQ(sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+}
+
+TEST(CalibrationRecord, OneOf010WithItsOlderChecksumIsRead) {
+  std::string old = R"({"format": "birdseye calibration record", "version": 1, "scope": "no. 17",
+    "hardware": {"tracker": {"unit_serial": "4711"}, "camera": {"serial": "A1"}},
+    "checksum": "crc64-ecma:59e29bcac2c87f3b"})";
+  const auto read = parse_record(old);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->camera.at("serial"), "A1");
+  EXPECT_NE(record_text(*read).find("sha256:"), std::string::npos) << "written anew, it has the stronger one";
+  old.replace(old.find("4711"), 4, "4712");
+  EXPECT_FALSE(parse_record(old));
 }
 
 TEST(CalibrationRecord, ACutOrForeignFileIsNoRecord) {

@@ -1,0 +1,43 @@
+#include "drivers/system/durable.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "drivers/system/unique_fd.hpp"
+
+namespace birdseye {
+
+namespace {
+
+Result<void> sync(const std::filesystem::path& path, int flags) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | flags));
+  // Some file systems that are reached over a network cannot sync a folder, and say so by EINVAL.
+  if (fd && (::fsync(fd.get()) == 0 || errno == EINVAL)) return {};
+  return Error{Errc::io, fmt::format("{}: cannot be brought onto the disk ({}); is it full, or gone?", path.string(),
+                                     std::strerror(errno))};
+}
+
+}  // namespace
+
+Result<void> sync_file(const std::filesystem::path& path) {
+  return sync(path, 0);
+}
+
+Result<void> sync_folder(const std::filesystem::path& folder) {
+  return sync(folder.empty() ? "." : folder, O_DIRECTORY);
+}
+
+Result<void> replace_durably(const std::filesystem::path& written, const std::filesystem::path& place) {
+  if (auto synced = sync_file(written); !synced) return synced;
+  std::error_code error;
+  std::filesystem::rename(written, place, error);
+  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be replaced", place.string())};
+  return sync_folder(place.parent_path());
+}
+
+}  // namespace birdseye
