@@ -38,6 +38,8 @@ DisplacementField field_of(const PatchOctree& tree, const Eigen::Affine3d& patie
 /// refuses, naming the file: what is no such image, numbers that are not finite, and fields that fold.
 Result<void> write_field(const std::filesystem::path& path, const DisplacementField& field);
 Result<DisplacementField> read_field(const std::filesystem::path& path);
+/// What reading refuses of numbers that make no field, without a file's name.
+Result<void> check_sound(const DisplacementField& field);
 
 /// Checks that the field fits the volume. Refuses (Errc::bad_value) a field that lies outside the volume, and one that
 /// ends inside it with a displacement that is not zero, for there the picture would tear.

@@ -27,6 +27,17 @@ Result<void> write_field(const std::filesystem::path& path, const DisplacementFi
   return replace_durably(part, path);
 }
 
+Result<void> check_sound(const DisplacementField& field) {
+  for (const Eigen::Vector3f& u : field.displacement_mm) {
+    if (!u.allFinite()) return Error{Errc::bad_value, "has displacements that are not finite numbers"};
+  }
+  if (std::min({field.size[0], field.size[1], field.size[2]}) < 2)
+    return Error{Errc::bad_value, "is no volume of displacements: every axis needs at least two points"};
+  if (!(least_determinant(field) > 0))
+    return Error{Errc::bad_value, "the field folds: tissue would pass through itself; smooth it or lessen it"};
+  return {};
+}
+
 Result<DisplacementField> read_field(const std::filesystem::path& path) {
   const auto image = read_image(path, 3);
   if (!image) return image.error();
@@ -38,19 +49,7 @@ Result<DisplacementField> read_field(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < image->values.size(); i += 3) {
     field.displacement_mm.emplace_back(image->values[i], image->values[i + 1], image->values[i + 2]);
   }
-  for (const Eigen::Vector3f& u : field.displacement_mm) {
-    if (!u.allFinite())
-      return Error{Errc::bad_value, fmt::format("{}: has displacements that are not finite numbers", path.string())};
-  }
-  if (std::min({field.size[0], field.size[1], field.size[2]}) < 2) {
-    return Error{Errc::bad_value,
-                 fmt::format("{}: is no volume of displacements: every axis needs at least two points", path.string())};
-  }
-  if (!(least_determinant(field) > 0)) {
-    return Error{
-        Errc::bad_value,
-        fmt::format("{}: the field folds: tissue would pass through itself; smooth it or lessen it", path.string())};
-  }
+  if (auto sound = check_sound(field); !sound) return sound.error().with_context(path.string());
   return field;
 }
 

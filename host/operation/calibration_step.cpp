@@ -9,6 +9,16 @@
 
 namespace birdseye::host {
 
+namespace {
+
+bool is_same(const CalibratedScope& one, const CalibratedScope& other) {
+  return one.by_board == other.by_board && one.made_utc == other.made_utc &&
+         one.scope.camera() == other.scope.camera() &&
+         one.scope.camera_from_sensor().matrix() == other.scope.camera_from_sensor().matrix();
+}
+
+}  // namespace
+
 void CalibrationStep::begin(const std::string& bird, const std::optional<calibration::Pattern>& board) {
   if (guiding() || !board) return;
   GuidePlan plan;
@@ -99,23 +109,30 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   auto scope = ScopeSetup::of_record(record);
   if (!scope) return Adopted::no;
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
-  const auto& before = found_ ? found_ : held_back_;
+  const auto& before = found_ ? found_ : held_back_ ? held_back_ : former_;
   if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
-  const bool anew = before && (before->by_board || made_utc != before->made_utc);
-  take({*std::move(scope), made_utc, false, {}}, words("note_record_of", made_utc));
+  CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}};
+  const bool anew = before && !is_same(*before, adopted);
+  take(std::move(adopted), words("note_record_of", made_utc));
+  former_.reset();
   return anew ? Adopted::anew : Adopted::again;
 }
 
-void CalibrationStep::take_up(const CalibratedScope& kept, const std::string& line) {
-  if (found_ && kept.made_utc <= found_->made_utc) return;
+bool CalibrationStep::take_up(const CalibratedScope& kept, const std::string& line) {
+  if (!kept.by_board) {
+    const auto& now = found_ ? found_ : held_back_;
+    if (!now) former_ = kept;
+    return !now || is_same(*now, kept);
+  }
+  if (found_ && kept.made_utc <= found_->made_utc) return false;
   if (!kept.scope.figures().held_out_px) {
-    // As 0.1.0 kept it: nothing could be drawn by it.
+    // Nothing could be drawn by it.
     if (!found_) note_.line = words("note_kept_unknown");
-    return;
+    return false;
   }
   guide_.give_up();
   take(kept, line);
-  found_->by_board = true;
+  return true;
 }
 
 }  // namespace birdseye::host

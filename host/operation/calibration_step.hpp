@@ -32,8 +32,10 @@ class CalibrationStep {
   /// Holds back what was found by the board with other hardware, and gives it back where that has come again. True:
   /// what is found is no more what it was.
   bool judge(const ConnectedInstruments& connected);
-  /// What an earlier window found by the board, unless there is a newer one.
-  void take_up(const CalibratedScope& kept, const std::string& line);
+  /// What an earlier window found by the board, unless there is a newer one. The record that it had is for the
+  /// appliance to send again, and adopt() then says whether it is the same. False: another calibration is in force
+  /// already, so what was found by the kept one does not hold.
+  bool take_up(const CalibratedScope& kept, const std::string& line);
 
   /// Empty where nothing is found, or what was found is held back.
   [[nodiscard]] const std::optional<CalibratedScope>& found() const { return found_; }
@@ -58,7 +60,8 @@ class CalibrationStep {
   void take(CalibratedScope found, const std::string& line);
 
   std::optional<CalibratedScope> found_, held_back_;
-  std::string line_;  ///< of what is held back, as it was found
+  std::optional<CalibratedScope> former_;  ///< of an earlier window, by a record that has not come yet
+  std::string line_;                       ///< of what is held back, as it was found
   bool person_may_say_ = false;
   StepNote note_;
   std::optional<Verdict> verdict_;

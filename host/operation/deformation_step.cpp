@@ -7,6 +7,7 @@
 #include <exception>
 #include <utility>
 
+#include "drivers/system/clock.hpp"
 #include "host/files/picture.hpp"
 #include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/geometry/geometry_verdict.hpp"
@@ -124,7 +125,7 @@ bool DeformationStep::tick() {
   with_care_ = verdict.grade == Grade::marginal;
   note_ = {true, with_care_ ? words("note_with_care", verdict.reasons.front()) : verdict.reasons.front()};
   note_.line += words_of(registration.touches);
-  DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt};
+  DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt, utc_now()};
   if (const auto& expected = registration.expected) {
     if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;
     if (!expected->targets.empty())

@@ -1,5 +1,6 @@
 #include "host/operation/findings.hpp"
 
+#include "drivers/system/clock.hpp"
 #include "host/guide/guided_calibration.hpp"
 #include "host/registration/rigid/point_matching.hpp"
 
@@ -24,6 +25,7 @@ Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in
   TouchFit out;
   out.registered.tracker_from_patient = found->fit.to_from.inverse();
   out.registered.fre_mm = found->fit.fre_rms_mm;
+  out.registered.made_utc = utc_now();
   for (const std::size_t marker : found->ct_of_touch)
     out.registered.fiducials_in_patient_mm.push_back(markers_in_patient_mm[marker]);
   out.residuals_mm = found->fit.residuals_mm;

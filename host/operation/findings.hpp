@@ -22,7 +22,7 @@ struct CalibratedScope {
   ScopeSetup scope;
   std::string made_utc;      ///< 2026-11-22T09:30:00Z
   bool by_board = false;     ///< here, by the board; else by a record
-  Instruments found_with{};  ///< of one by the board; what a record is of, the appliance judges
+  Instruments found_with{};  ///< of one by a record, those that the record is of, which the appliance judges
 };
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);
@@ -33,6 +33,7 @@ struct RegisteredPatient {
   double fre_mm = 0;
   std::vector<Eigen::Vector3d> fiducials_in_patient_mm;  ///< those that were touched: three or more
   Instruments found_with{};                              ///< the tracker counts: touches are in its frame
+  std::string made_utc{};
 };
 
 /// How the organ is deformed, and how well that is known; what was not estimated is absent.
@@ -40,6 +41,7 @@ struct DeformedOrgan {
   DisplacementField field;            ///< patient LPS, mm
   std::optional<double> seen_rms_mm;  ///< to be expected of the surface that the views see, of three axes together
   std::optional<MotionError> target;
+  std::string made_utc{};
 };
 
 struct TouchFit {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/record/sha256.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/texts/texts.hpp"
 
@@ -29,6 +30,7 @@ LiveWorkflow::LiveWorkflow(LiveSettings settings)
 }
 
 void LiveWorkflow::tick() {
+  keeper_.tick();
   const PatientStep::News news = patient_.tick();
   if (news.engine) {
     picture_.set_engine(nullptr);
@@ -153,6 +155,7 @@ void LiveWorkflow::take(const wire::Calibration& calibration) {
     if (calibration_.withdraw_record(record.error().what)) follow_held_back();
     return;
   }
+  record_sha256_ = calibration::sha256_of(calibration::record_text(*record));
   if (record->tip) {
     record_tip_in_pointer_mm_ = record->tip->tip_in_sensor_mm;
     if (!settings_.tip_in_pointer_mm) tip_rms_mm_ = record->tip->rms_mm;
@@ -308,16 +311,18 @@ void LiveWorkflow::turn_rod(double by_deg) {
 void LiveWorkflow::keep() {
   if (!patient_.plan()) return;
   Operation operation;
-  operation.ct_checksum = patient_.plan()->checksum;
+  operation.ct_sha256 = patient_.plan()->ct_sha256;
+  operation.labels_sha256 = patient_.plan()->labels_sha256;
+  operation.record_sha256 = record_sha256_;
   const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();
-  if (scope && scope->by_board) operation.calibrated = scope;
+  operation.calibrated = scope;
   operation.registered = fiducials_.registered_or_held_back();
   operation.deformed = deformation_.found();
   keeper_.keep(std::move(operation));
 }
 
 void LiveWorkflow::take_up() {
-  const auto operation = keeper_.take_up(patient_.plan()->checksum);
+  const auto operation = keeper_.take_up(patient_.plan()->ct_sha256, patient_.plan()->labels_sha256);
   if (!operation) {
     resume_fault_ = operation.error().what;
     return;
@@ -325,9 +330,10 @@ void LiveWorkflow::take_up() {
   const auto& kept = *operation;
   if (!kept) return;
   const std::string when = words("note_taken_up", kept->made_utc);
-  // A record that the appliance sent meanwhile may be newer.
-  if (kept->calibrated) calibration_.take_up(*kept->calibrated, when);
-  if (fiducials_.take_up(kept->registered, when) && kept->deformed) {
+  if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
+  // The calibration that is in force may be newer: a deformation then means nothing.
+  const bool same_scope = !kept->calibrated || calibration_.take_up(*kept->calibrated, when);
+  if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
     deformation_.take_up(kept->deformed, when);
     show_shape();
   }

@@ -123,6 +123,7 @@ class LiveWorkflow {
   std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force
   bool frozen_ = false;
   std::string resume_fault_;
+  std::string record_sha256_;  ///< of the last record that was in force
   std::uint64_t shapes_ = 0;
 
   ConnectionStep connection_;

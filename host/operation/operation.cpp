@@ -4,13 +4,14 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <span>
+#include <sstream>
 
-#include "device/wire/igtl_bytes.hpp"
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/sealed_text.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/operation_parts.hpp"
 
 namespace birdseye::host {
 
@@ -24,42 +25,8 @@ constexpr const char* kHandEye = "camera_from_sensor.txt";
 constexpr const char* kRegistration = "patient_from_tracker.txt";
 constexpr const char* kField = "field.mha";
 
-template <typename T>
-std::span<const std::uint8_t> bytes_of(const T* data, std::size_t count) {
-  return {reinterpret_cast<const std::uint8_t*>(data), count * sizeof(T)};
-}
-
-std::optional<double> figure_of(const nlohmann::json& figures, const char* name) {
-  return figures.contains(name) ? std::optional(figures.at(name).get<double>()) : std::nullopt;
-}
-
-/// What files of 0.1.0 do not say is not known.
-Instruments instruments_of(const nlohmann::json& found) {
-  Instruments out;
-  if (found.contains("tracker")) found.at("tracker").get_to(out.tracker);
-  if (found.contains("camera")) found.at("camera").get_to(out.camera);
-  return out;
-}
-
-/// A file of 0.1.0 has tracked_rms_px in place of held_out_px: what the fit leaves, which is not the error held out.
-/// That one is then not known.
-Result<CalibratedScope> read_calibrated(const fs::path& folder, const nlohmann::json& figures) {
-  auto scope = ScopeSetup::of_files(
-      folder / kCamera, folder / kHandEye,
-      {figure_of(figures, "camera_rms_px"), figure_of(figures, "held_out_px"), figure_of(figures, "hand_eye_mm")});
-  if (!scope) return scope.error();
-  return CalibratedScope{*std::move(scope), figures.at("made_utc").get<std::string>(), true, instruments_of(figures)};
-}
-
-nlohmann::json figures_of(const CalibratedScope& found) {
-  nlohmann::json out{
-      {"made_utc", found.made_utc}, {"tracker", found.found_with.tracker}, {"camera", found.found_with.camera}};
-  const ScopeFigures& figures = found.scope.figures();
-  if (figures.camera_rms_px) out["camera_rms_px"] = *figures.camera_rms_px;
-  if (figures.held_out_px) out["held_out_px"] = *figures.held_out_px;
-  if (figures.held_out_mm) out["hand_eye_mm"] = *figures.held_out_mm;
-  return out;
-}
+constexpr const char* kFormat = "birdseye operation";
+constexpr int kVersion = 2;  // 0.1.0 wrote none
 
 /// Its lens, and how well that is known, where anything says so.
 std::string camera_file(const ScopeSetup& scope) {
@@ -67,47 +34,82 @@ std::string camera_file(const ScopeSetup& scope) {
   return camera_text(scope.camera()) + (covariance ? camera_covariance_text(*covariance) : "");
 }
 
-}  // namespace
-
-std::string ct_checksum(const Volume& ct) {
-  std::uint64_t crc = wire::checksum(bytes_of(ct.hu.data(), ct.hu.size()));
-  crc = wire::checksum(bytes_of(ct.size.data(), ct.size.size()), crc);
-  const Eigen::Matrix4d place = ct.patient_from_voxel.matrix();
-  crc = wire::checksum(bytes_of(place.data(), 16), crc);
-  return fmt::format("{:016x}", crc);
+std::string sheet_text(const Operation& operation) {
+  std::vector<SealedPart> parts{
+      {"format", {{"name", kFormat}, {"version", kVersion}}},
+      {"made", {{"made_utc", operation.made_utc}, {"software", "birdseye " BIRDSEYE_VERSION}}},
+      {"ct", {{"sha256", operation.ct_sha256}}}};
+  if (!operation.labels_sha256.empty()) parts.push_back({"labels", {{"sha256", operation.labels_sha256}}});
+  if (!operation.record_sha256.empty()) parts.push_back({"record", {{"sha256", operation.record_sha256}}});
+  if (operation.calibrated) parts.emplace_back("calibrated", json_of(*operation.calibrated));
+  if (operation.registered) parts.emplace_back("registered", json_of(*operation.registered));
+  if (operation.deformed) parts.emplace_back("deformed", json_of(*operation.deformed));
+  return sealed_text(parts);
 }
 
-Result<void> write_operation(const fs::path& folder, const Operation& operation) {
+/// For other programs. A copy of what is no more in the operation is taken away: it would be taken for the present.
+Result<void> write_copies(const fs::path& folder, const Operation& operation) {
   std::error_code ignored;
-  nlohmann::json sheet{{"made_utc", operation.made_utc}, {"ct_checksum", operation.ct_checksum}};
-  std::vector<FileText> files;
+  std::vector<FileText> copies;
   if (const auto& found = operation.calibrated) {
-    sheet["calibrated"] = figures_of(*found);
-    files.push_back({folder / kCamera, camera_file(found->scope)});
-    files.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
+    copies.push_back({folder / kCamera, camera_file(found->scope)});
+    copies.push_back({folder / kHandEye, pose_text(found->scope.camera_from_sensor().matrix())});
+  } else {
+    fs::remove(folder / kCamera, ignored);
+    fs::remove(folder / kHandEye, ignored);
   }
   if (const auto& found = operation.registered) {
-    sheet["registered"] = {{"fre_mm", found->fre_mm},
-                           {"tracker", found->found_with.tracker},
-                           {"fiducials_in_patient_mm", nlohmann::json::array()}};
-    for (const Eigen::Vector3d& place : found->fiducials_in_patient_mm)
-      sheet["registered"]["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
-    files.push_back({folder / kRegistration, pose_text(found->tracker_from_patient.inverse().matrix())});
-  }
-  sheet["deformed"] = operation.deformed != nullptr;
-  if (const auto& found = operation.deformed) {
-    if (found->seen_rms_mm) sheet["deformed_seen_rms_mm"] = *found->seen_rms_mm;
-    if (found->target) {
-      sheet["deformed_target_rms_mm"] = found->target->rms_mm;
-      sheet["deformed_target_radius95_mm"] = found->target->radius95_mm;
-    }
-    if (auto written = write_field(folder / kField, found->field); !written) return written;
+    copies.push_back({folder / kRegistration, pose_text(found->tracker_from_patient.inverse().matrix())});
   } else {
-    fs::remove(folder / kField, ignored);  // export would take an old one for the present
+    fs::remove(folder / kRegistration, ignored);
   }
-  if (!operation.registered) fs::remove(folder / kRegistration, ignored);
-  files.push_back({folder / kSheet, text_of(sheet)});
-  return write_files(files);
+  if (operation.deformed) {
+    if (auto written = write_field(folder / kField, operation.deformed->field); !written) return written;
+  } else {
+    fs::remove(folder / kField, ignored);
+  }
+  return write_files(copies);
+}
+
+/// What was kept before there was a format.
+bool is_of_010(const std::string& text) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  return json.is_object() && json.contains("ct_checksum");
+}
+
+std::string sha256_in(const nlohmann::json& sheet, const char* part) {
+  return sheet.contains(part) ? sheet.at(part).at("sha256").get<std::string>() : "";
+}
+
+Result<Operation> operation_of(const nlohmann::json& sheet) {
+  Operation out;
+  sheet.at("made").at("made_utc").get_to(out.made_utc);
+  out.ct_sha256 = sheet.at("ct").at("sha256").get<std::string>();
+  out.labels_sha256 = sha256_in(sheet, "labels");
+  out.record_sha256 = sha256_in(sheet, "record");
+  if (sheet.contains("calibrated")) {
+    auto found = calibrated_of(sheet.at("calibrated"));
+    if (!found) return found.error().with_context("calibrated");
+    out.calibrated = *std::move(found);
+  }
+  if (sheet.contains("registered")) {
+    auto found = registered_of(sheet.at("registered"));
+    if (!found) return found.error().with_context("registered");
+    out.registered = *std::move(found);
+  }
+  if (sheet.contains("deformed")) {
+    auto found = deformed_of(sheet.at("deformed"));
+    if (!found) return found.error().with_context("deformed");
+    out.deformed = std::make_shared<const DeformedOrgan>(*std::move(found));
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<void> write_operation(const fs::path& folder, const Operation& operation) {
+  if (auto written = write_file(folder / kSheet, sheet_text(operation)); !written) return written;
+  return write_copies(folder, operation);
 }
 
 bool has_operation(const fs::path& folder) {
@@ -115,52 +117,44 @@ bool has_operation(const fs::path& folder) {
   return fs::exists(folder / kSheet, ignored);
 }
 
-Result<Operation> read_operation(const fs::path& folder) {
-  const fs::path path = folder / kSheet;
-  std::ifstream in(path);
+Result<Operation> read_operation(const fs::path& given) {
+  std::error_code ignored;
+  const fs::path path = fs::is_directory(given, ignored) ? given / kSheet : given;
+  const auto refused = [&path](const std::string& why) {
+    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
+  };
+  std::ifstream in(path, std::ios::binary);
   if (!in) {
     return Error{Errc::not_found,
                  fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
   }
-  try {
-    const nlohmann::json sheet = nlohmann::json::parse(in);
-    Operation out;
-    sheet.at("made_utc").get_to(out.made_utc);
-    sheet.at("ct_checksum").get_to(out.ct_checksum);
-    if (sheet.contains("calibrated")) {
-      auto found = read_calibrated(folder, sheet.at("calibrated"));
-      if (!found) return found.error();
-      out.calibrated = *std::move(found);
-    }
-    if (sheet.contains("registered")) {
-      const auto matrix = read_pose(folder / kRegistration);
-      if (!matrix) return matrix.error();
-      out.registered = {Transform<Patient, Tracker>::from_matrix(*matrix).inverse(),
-                        sheet.at("registered").at("fre_mm").get<double>(),
-                        {},
-                        instruments_of(sheet.at("registered"))};
-      for (const auto& place : sheet.at("registered").at("fiducials_in_patient_mm"))
-        out.registered->fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
-                                                             place.at(2).get<double>());
-      if (out.registered->fiducials_in_patient_mm.size() < 3)
-        return Error{Errc::bad_format,
-                     fmt::format("{}: names fewer than three fiducials; register anew", path.string())};
-    }
-    if (sheet.at("deformed").get<bool>()) {
-      auto field = read_field(folder / kField);
-      if (!field) return field.error();
-      const auto rms_mm = figure_of(sheet, "deformed_target_rms_mm");
-      const auto radius95_mm = figure_of(sheet, "deformed_target_radius95_mm");
-      std::optional<MotionError> target;
-      if (rms_mm && radius95_mm) target = {*rms_mm, *radius95_mm};
-      out.deformed = std::make_shared<const DeformedOrgan>(
-          DeformedOrgan{*std::move(field), figure_of(sheet, "deformed_seen_rms_mm"), target});
-    }
-    return out;
-  } catch (const nlohmann::json::exception& wrong) {
-    return Error{Errc::bad_format, fmt::format("{}: is damaged, or of an earlier version ({}); register anew",
-                                               path.string(), wrong.what())};
+  std::ostringstream read;
+  read << in.rdbuf();
+  const std::string text = read.str();
+  const auto sheet = unseal(text);
+  if (!sheet && is_of_010(text)) {
+    return refused(
+        "was kept by an earlier version, which did not bind its files together: whether they were changed "
+        "since, nobody can tell; register anew");
   }
+  if (!sheet) return refused(sheet.error().what + "; give a copy that is as the window wrote it, or register anew");
+  try {
+    if (sheet->at("format").at("name") != kFormat) return refused("is no operation; give the --out folder of a live");
+    if (const nlohmann::json& version = sheet->at("format").at("version"); version != kVersion)
+      return refused(fmt::format("is of version {}; this program reads version {}", version.dump(), kVersion));
+    auto operation = operation_of(*sheet);
+    if (!operation) return operation.error().with_context(path.string());
+    return operation;
+  } catch (const std::exception& wrong) {
+    return refused(fmt::format("makes no sense ({}); register anew", wrong.what()));
+  }
+}
+
+Result<void> check_patient(const Operation& operation, const std::string& ct_sha256, const std::string& labels_sha256) {
+  if (operation.ct_sha256 != ct_sha256) return Error{Errc::bad_value, "is of another CT; give that CT"};
+  if (!operation.labels_sha256.empty() && !labels_sha256.empty() && operation.labels_sha256 != labels_sha256)
+    return Error{Errc::bad_value, "is of other labels; give those"};
+  return {};
 }
 
 }  // namespace birdseye::host

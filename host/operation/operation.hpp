@@ -6,28 +6,32 @@
 #include <string>
 
 #include "host/operation/findings.hpp"
-#include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
 /// What was found during an operation, kept in a folder so that a window that was closed can be opened again where it
-/// was. The files are those of the other commands: replay, export and render take them.
+/// was, and so that other commands use what the window found.
 struct Operation {
-  std::string ct_checksum;                        ///< which CT it was of: another's registration is refused
+  std::string ct_sha256;                          ///< which CT it was of: another's registration is refused
+  std::string labels_sha256;                      ///< and which labels; empty: there were none
   std::string made_utc;                           ///< 2026-11-22T09:30:00Z
-  std::optional<CalibratedScope> calibrated;      ///< by the board; empty where the appliance has a record
+  std::string record_sha256;                      ///< of the calibration record in force; empty: there was none
+  std::optional<CalibratedScope> calibrated;      ///< by the board or by the record
   std::optional<RegisteredPatient> registered;    ///< by touched fiducials
   std::shared_ptr<const DeformedOrgan> deformed;  ///< by views; null: it is not
 };
 
-/// Of the voxels and where they lie.
-std::string ct_checksum(const Volume& ct);
-
-/// operation.json, and beside it camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and field.mha, as far as
-/// there are such.
+/// operation.json holds all of it, sealed: not one bit of it may change. It is written first, and whole. Beside it, for
+/// other programs, stand copies of what is in it: camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and
+/// field.mha, as far as there are such; nothing here reads them.
 Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation);
 bool has_operation(const std::filesystem::path& folder);
-/// Refuses, naming the file, what is missing or damaged.
-Result<Operation> read_operation(const std::filesystem::path& folder);
+/// path: the file, or the folder that holds it. Refuses, naming the file and its part, what is missing, damaged or
+/// changed, and what 0.1.0 wrote, whose files nothing binds together.
+Result<Operation> read_operation(const std::filesystem::path& path);
+
+/// Refuses, with the remedy, a CT or labels other than the operation's. ct_sha256: host/overlay/ct_sha256.hpp;
+/// labels_sha256: host/files/files_sha256.hpp, or empty where no labels are given.
+Result<void> check_patient(const Operation& operation, const std::string& ct_sha256, const std::string& labels_sha256);
 
 }  // namespace birdseye::host

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <utility>
 
 #include "drivers/system/clock.hpp"
@@ -12,13 +13,15 @@ namespace birdseye::host {
 OperationKeeper::OperationKeeper(std::filesystem::path out, std::filesystem::path resume)
     : out_(std::move(out)), resume_(std::move(resume)) {}
 
-Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_checksum) {
+Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_sha256,
+                                                          const std::string& labels_sha256) {
   const std::filesystem::path folder = std::exchange(resume_, {});
   if (folder.empty()) return std::optional<Operation>();
   auto operation = read_operation(folder);
-  if (operation && operation->ct_checksum != ct_checksum) {
-    operation = Error{Errc::bad_value,
-                      fmt::format("{}: is of another CT; give that CT, or go on without --resume", folder.string())};
+  if (operation) {
+    if (auto same = check_patient(*operation, ct_sha256, labels_sha256); !same)
+      operation = Error{same.error().code,
+                        fmt::format("{}: {}, or go on without --resume", folder.string(), same.error().what)};
   }
   if (!operation) {
     out_.clear();
@@ -30,8 +33,12 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
 void OperationKeeper::keep(Operation operation) {
   if (out_.empty() || !resume_.empty()) return;
   operation.made_utc = utc_now();
-  const auto written = write_operation(out_, operation);
-  fault_ = written ? "" : words("note_not_kept", written.error().what);
+  writing_.start([out = out_, kept = std::make_shared<const Operation>(std::move(operation))](
+                     const std::stop_token&, const auto&) { return write_operation(out, *kept); });
+}
+
+void OperationKeeper::tick() {
+  if (const auto written = writing_.take()) fault_ = *written ? "" : words("note_not_kept", written->error().what);
 }
 
 }  // namespace birdseye::host

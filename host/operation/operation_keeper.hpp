@@ -1,28 +1,35 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
+#include "drivers/system/background.hpp"
 #include "host/operation/operation.hpp"
 
 namespace birdseye::host {
 
-/// Keeps what an operation has found in a folder, and takes up what an earlier window kept.
+/// Keeps what an operation has found in a folder, and takes up what an earlier window kept. It writes on a thread of
+/// its own, for a disk may take its time; its end waits until all is written.
 class OperationKeeper {
  public:
   /// out: where to; empty: nowhere. resume: what is to be taken up; or empty.
   OperationKeeper(std::filesystem::path out, std::filesystem::path resume);
 
-  /// Of another CT nothing is taken up. Once: the second time, and where nothing was to be taken up, it is empty. An
-  /// error names the folder; nothing is written from then on, for what is there may yet be needed.
-  Result<std::optional<Operation>> take_up(const std::string& ct_checksum);
-  /// Stamped now. Not before what is there has been taken up.
+  /// Of another CT or other labels nothing is taken up. Once: the second time, and where nothing was to be taken up, it
+  /// is empty. An error names the folder; nothing is written from then on, for what is there may yet be needed.
+  Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256);
+  /// Stamped now. Not before what is there has been taken up. Of several in a row the last is written at any rate.
   void keep(Operation operation);
-  /// Why the last could not be kept.
+  /// Hears what became of the last that was written.
+  void tick();
+  [[nodiscard]] bool writing() const { return writing_.running(); }
+  /// Why it could not be kept.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
  private:
   std::filesystem::path out_, resume_;
+  Background<Result<void>> writing_;
   std::string fault_;
 };
 

@@ -5,8 +5,9 @@
 #include <algorithm>
 
 #include "host/files/field_files.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/named_points.hpp"
-#include "host/operation/operation.hpp"
+#include "host/overlay/ct_sha256.hpp"
 #include "host/simulated/simulated_patient.hpp"
 #include "host/texts/texts.hpp"
 #include "host/volume/import.hpp"
@@ -107,9 +108,12 @@ Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_toke
   plan.ct = std::move(ct->volume);
   plan.identity = std::move(ct->patient);
   plan.notes = std::move(ct->notes);
-  plan.checksum = ct_checksum(plan.ct);
+  plan.ct_sha256 = ct_sha256(plan.ct);
   if (!files.labels.empty()) {
     if (auto read = read_labels(files, plan, stop); !read) return read.error();
+    auto sum = files_sha256(files.labels);
+    if (!sum) return sum.error();
+    plan.labels_sha256 = *std::move(sum);
   }
   if (plan.shown.hu.empty()) plan.shown = plan.ct;
   if (!files.fiducials.empty()) {

@@ -99,6 +99,19 @@ Result<ScopeSetup> ScopeSetup::of_files(const std::filesystem::path& camera,
   return out;
 }
 
+Result<ScopeSetup> ScopeSetup::of_values(const CameraModel& camera,
+                                         const std::optional<CameraMatrix>& camera_covariance,
+                                         const Transform<Camera, Sensor>& camera_from_sensor,
+                                         const ScopeFigures& figures) {
+  if (auto sound = check(camera); !sound) return sound.error();
+  ScopeSetup out;
+  out.camera_ = camera;
+  out.camera_covariance_ = camera_covariance;
+  out.camera_from_sensor_ = camera_from_sensor;
+  out.figures_ = figures;
+  return out;
+}
+
 Setup ScopeSetup::registered(const Transform<Tracker, Patient>& tracker_from_patient) const {
   return {camera_, camera_from_sensor_, tracker_from_patient};
 }

@@ -42,7 +42,7 @@ class Setup {
   Transform<Tracker, Patient> tracker_from_patient_;
 };
 
-/// How the scope is calibrated: its lens, where that sits on its sensor, and how well both are known. There are three
+/// How the scope is calibrated: its lens, where that sits on its sensor, and how well both are known. There are four
 /// ways to one and no other.
 class ScopeSetup {
  public:
@@ -58,6 +58,10 @@ class ScopeSetup {
   /// names the file.
   static Result<ScopeSetup> of_files(const std::filesystem::path& camera,
                                      const std::filesystem::path& camera_from_sensor, const ScopeFigures& stated);
+
+  /// What one of the other ways made, and an operation kept.
+  static Result<ScopeSetup> of_values(const CameraModel& camera, const std::optional<CameraMatrix>& camera_covariance,
+                                      const Transform<Camera, Sensor>& camera_from_sensor, const ScopeFigures& figures);
 
   [[nodiscard]] const CameraModel& camera() const { return camera_; }
   [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }

@@ -212,7 +212,7 @@ void draw_patient_card(PanelContext& context) {
     say(theme.quiet, words("patient_none"));
   } else if (context.facts.pseudonymised) {
     constexpr std::size_t kShort = 8;
-    say(theme.quiet, words("patient_pseudonym", plan->checksum.substr(0, kShort)));
+    say(theme.quiet, words("patient_pseudonym", plan->ct_sha256.substr(0, kShort)));
   } else {
     const PatientIdentity& who = plan->identity;
     say(theme.text, who.known() ? words("patient_name", who.name) : words("patient_no_name"));

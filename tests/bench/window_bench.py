@@ -9,6 +9,7 @@ window's and the appliance's as it is at a cart. The last line is JSON.
 """
 import argparse
 import csv
+import hashlib
 import json
 import os
 import pathlib
@@ -25,21 +26,7 @@ key space
 wait deform 180
 end
 """
-CAMERA = """%YAML:1.0
----
-image_width: {0}
-image_height: {1}
-camera_matrix: !!opencv-matrix
-   rows: 3
-   cols: 3
-   dt: d
-   data: [ {2}, 0., {3}, 0., {2}, {4}, 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 1
-   cols: 5
-   dt: d
-   data: [ -0.30, 0.10, 0.001, -0.0006, 0. ]
-"""
+LENS = [-0.30, 0.10, 0.001, -0.0006, 0]  # k1 k2 p1 p2 k3
 
 
 def window(options, arguments, script, folder):
@@ -59,23 +46,33 @@ def window(options, arguments, script, folder):
     return json.loads((folder / "live.json").read_text())
 
 
+def seal(parts):
+    """As the window seals what it keeps (host/files/sealed_text.hpp)."""
+    lines = {name: f'"{name}": {json.dumps(value)}' for name, value in parts.items()}
+    sums = {name: hashlib.sha256(line.encode()).hexdigest() for name, line in lines.items()}
+    text = "{\n" + "".join(line + ",\n" for line in [*lines.values(), f'"sha256": {json.dumps(sums)}'])
+    return text + f'"whole": "{hashlib.sha256(text.encode()).hexdigest()}"\n}}\n'
+
+
 def operation(options, folder):
     """A registered, deformed patient, as `--resume` takes it, round the middle of the tracker's circle."""
     made, kept = folder / "made", folder / "operation"
     window(options, ["--simulate", "--out", made, "--look-s", "600"], KEYS, folder)
     kept.mkdir()
-    shutil.copy(made / "field.mha", kept)
-    sheet = json.loads((made / "operation.json").read_text())
-    for found in (sheet.get("calibrated", {}), sheet.get("registered", {})):  # with instruments of another cart
-        found.pop("tracker", None)
-        found.pop("camera", None)
-    (kept / "operation.json").write_text(json.dumps(sheet))
+    parts = json.loads((made / "operation.json").read_text())
+    del parts["sha256"], parts["whole"]
+    scope, patient = parts["calibrated"], parts["registered"]
+    scope["tracker"], scope["camera"], patient["tracker"] = {}, {}, {}  # with instruments of another cart
     x, y, z = json.loads((made / "phantom" / "truth.json").read_text())["liver_centre_mm"]
-    (kept / "patient_from_tracker.txt").write_text(f"1 0 0 {x - 400}\n0 1 0 {y}\n0 0 1 {z}\n0 0 0 1\n")
+    patient["tracker_from_patient"] = [[1, 0, 0, 400 - x], [0, 1, 0, -y], [0, 0, 1, -z], [0, 0, 0, 1]]
     # 130 mm before it, looking at it.
-    (kept / "camera_from_sensor.txt").write_text("0 1 0 0\n0 0 -1 0\n-1 0 0 -70\n0 0 0 1\n")
+    scope["camera_from_sensor"] = [[0, 1, 0, 0], [0, 0, -1, 0], [-1, 0, 0, -70], [0, 0, 0, 1]]
     width, height = (int(part) for part in options.size.split("x"))
-    (kept / "camera.yaml").write_text(CAMERA.format(width, height, 0.78 * width, width / 2, height / 2))
+    focal = 0.78 * width
+    scope["lens"]["width_px"], scope["lens"]["height_px"] = width, height
+    scope["lens"]["fx_fy_cx_cy_k1_k2_p1_p2_k3"] = [focal, focal, width / 2, height / 2, *LENS]
+    scope["lens"].pop("covariance", None)
+    (kept / "operation.json").write_text(seal(parts))
     return made / "phantom"
 
 

@@ -16,6 +16,7 @@
 #include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
+#include "host/overlay/ct_sha256.hpp"
 #include "host/volume/import.hpp"
 #include "hw-sim/minibird/motion.hpp"
 #include "tests/support/programs_folder.hpp"
@@ -67,7 +68,7 @@ void write_registered(const std::filesystem::path& folder, const std::string& ct
   ASSERT_TRUE(volume) << volume.error().what;
   host::Operation operation;
   operation.made_utc = "2026-11-22T09:30:00Z";
-  operation.ct_checksum = host::ct_checksum(*volume);
+  operation.ct_sha256 = host::ct_sha256(*volume);
   calibration::HandEyeResult hand_eye;
   hand_eye.camera_from_sensor = camera_from_sensor();
   hand_eye.held_out_px = 1;

@@ -37,7 +37,7 @@ TEST(DemoPatient, IsThatOfALiveOperationWithItsBrightestMarkers) {
   ASSERT_TRUE(patient) << patient.error().what;
   const auto live = read_patient(simulated_patient(scratch.path()));
   ASSERT_TRUE(live) << live.error().what;
-  EXPECT_EQ(patient->checksum, live->checksum);
+  EXPECT_EQ(patient->ct_sha256, live->ct_sha256);
   EXPECT_EQ(patient->shown.hu, live->shown.hu);
   EXPECT_LT(patient->shown.hu.size(), patient->ct.hu.size()) << "vessels and tumour alone are shown";
   EXPECT_LT((target_in_patient_mm(*patient) - kTumourMm).norm(), 0.5);

@@ -222,7 +222,7 @@ TEST(HeldBackOnResume, AnotherCameraTakesUpNoCalibrationByTheBoard) {
   LiveSettings settings = operation_settings(scratch);
   settings.resume = scratch.path();
   Operation kept;
-  kept.ct_checksum = read_patient(settings.patient)->checksum;
+  kept.ct_sha256 = read_patient(settings.patient)->ct_sha256;
   kept.made_utc = "2026-11-22T10:00:00Z";
   calibration::HandEyeResult found;
   found.held_out_px = 1;

@@ -138,7 +138,7 @@ TEST(LiveWorkflow, SaysHowFarTheTargetMayBeFromWhereItIsDrawn) {
 /// By all fiducials, of this CT.
 Operation registered_operation(const LiveSettings& settings) {
   Operation kept;
-  kept.ct_checksum = read_patient(settings.patient)->checksum;
+  kept.ct_sha256 = read_patient(settings.patient)->ct_sha256;
   kept.made_utc = "2026-11-22T10:00:00Z";
   kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
   return kept;
@@ -325,15 +325,54 @@ TEST(LiveWorkflow, ATouchThatWasTakenBackIsNotTakenUp) {
 TEST(LiveWorkflow, ADamagedOperationIsNamed) {
   const Scratch scratch;
   register_into(scratch.path(), scratch);
-  for (const char* const file : {"operation.json", "patient_from_tracker.txt"}) {
-    const std::string whole = birdseye::testing::contents_of(scratch / file);
-    (void)scratch.file(file, whole.substr(0, whole.size() / 3));
-    LiveWorkflow workflow(resumed(scratch, scratch.path()));
-    load(workflow);
-    EXPECT_NE(workflow.view().fault.find(file), std::string::npos) << workflow.view().fault;
-    EXPECT_FALSE(workflow.view().fre_mm.has_value());
-    (void)scratch.file(file, whole);
+  const std::string whole = birdseye::testing::contents_of(scratch / "operation.json");
+  (void)scratch.file("operation.json", whole.substr(0, whole.size() / 3));
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("operation.json"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+}
+
+/// Found by a record that the appliance sent: whether it sends the same again decides.
+TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
+  const Scratch scratch;
+  const auto record = birdseye::testing::example_record(768, 576, {}, {});
+  auto other = record;
+  other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
+  Operation kept = registered_operation(operation_settings(scratch));
+  kept.calibrated = {*ScopeSetup::of_record(record), record.hand_eye->provenance.made_utc, false};
+  DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  for (const bool same : {true, false}) {
+    for (const bool record_comes_first : {true, false}) {
+      ASSERT_TRUE(write_operation(scratch.path(), kept));
+      LiveWorkflow workflow(resumed(scratch, scratch.path()));
+      connect(workflow);
+      if (record_comes_first) give_record(workflow, same ? record : other);
+      load(workflow);
+      ASSERT_EQ(workflow.view().fault, "");
+      if (!record_comes_first) give_record(workflow, same ? record : other);
+      EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+      EXPECT_EQ(workflow.view().deformed != nullptr, same) << record_comes_first;
+    }
   }
+}
+
+TEST(LiveWorkflow, AnOperationOfOtherLabelsIsNotTakenUp) {
+  const Scratch scratch;
+  Operation kept = registered_operation(operation_settings(scratch));
+  kept.labels_sha256 = "of labels that were shown";
+  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  LiveSettings settings = resumed(scratch, scratch.path());
+  settings.patient.labels = settings.patient.ct.path;  // on its grid
+  settings.patient.organ = {"200"};
+  LiveWorkflow workflow(settings);
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("is of other labels"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
 }
 
 TEST(LiveWorkflow, AServerThatIsNoApplianceIsReadyWhenItSendsVideoAndPoses) {

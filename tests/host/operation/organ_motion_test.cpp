@@ -98,7 +98,7 @@ class DeformedOperation : public ::testing::Test {
   void SetUp() override {
     LiveSettings settings = operation_settings(scratch_);
     Operation kept;
-    kept.ct_checksum = read_patient(settings.patient)->checksum;
+    kept.ct_sha256 = read_patient(settings.patient)->ct_sha256;
     kept.made_utc = "2026-11-22T10:00:00Z";
     kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0}};
     DisplacementField field;

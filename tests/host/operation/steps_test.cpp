@@ -12,7 +12,6 @@
 #include "host/operation/deformation_step.hpp"
 #include "host/operation/fiducial_step.hpp"
 #include "host/operation/landmark_check.hpp"
-#include "host/operation/operation_keeper.hpp"
 #include "host/operation/organ_strokes.hpp"
 #include "host/operation/patient_step.hpp"
 #include "host/operation/pointer_tip.hpp"
@@ -50,7 +49,7 @@ TEST(ConnectionStep, IsDoneWhileTheApplianceIsReady) {
 CalibratedScope kept_scope() {
   calibration::HandEyeResult found;
   found.held_out_px = 1;
-  return {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), "2026-11-22T09:35:00Z"};
+  return {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), "2026-11-22T09:35:00Z", true};
 }
 
 TEST(CalibrationStep, OfTwoCalibrationsTheNewerCounts) {
@@ -126,8 +125,8 @@ TEST(PatientStep, OfTwoPatientsTheSecondIsRead) {
     step.tick();
   }
   ASSERT_TRUE(step.plan()) << step.fault();
-  EXPECT_EQ(step.plan()->checksum, read_patient(others)->checksum);
-  EXPECT_NE(step.plan()->checksum, read_patient(files)->checksum);
+  EXPECT_EQ(step.plan()->ct_sha256, read_patient(others)->ct_sha256);
+  EXPECT_NE(step.plan()->ct_sha256, read_patient(files)->ct_sha256);
 }
 
 Touch touch_at(const Eigen::Vector3d& in_patient_mm) {
@@ -423,77 +422,6 @@ TEST(DeformationStep, WhatIsTakenUpCanBeUndone) {
   step.take_up(std::make_shared<const DeformedOrgan>(), "taken up");
   EXPECT_TRUE(step.forget());
   EXPECT_FALSE(step.forget());
-}
-
-TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
-  const Scratch scratch;
-  Operation one;
-  one.ct_checksum = "1";
-  one.registered = {kTrackerFromPatient, 0.3, kFiducials};
-  OperationKeeper(scratch.path(), {}).keep(one);
-  ASSERT_TRUE(has_operation(scratch.path()));
-  Operation other = one;
-  other.registered->fre_mm = 7;
-  OperationKeeper keeper(scratch.path(), scratch.path());
-  keeper.keep(other);
-  const auto kept = keeper.take_up("1");
-  ASSERT_TRUE(kept) << kept.error().what;
-  EXPECT_EQ((*kept)->registered->fre_mm, 0.3);
-  EXPECT_LT(((*kept)->registered->tracker_from_patient.translation() - kTrackerFromPatient.translation()).norm(), 1e-6);
-  EXPECT_FALSE((*keeper.take_up("1")).has_value()) << "once";
-  keeper.keep(other);
-  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
-  OperationKeeper wrong(scratch.path(), scratch.path());
-  EXPECT_FALSE(wrong.take_up("2"));
-  wrong.keep(one);
-  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
-}
-
-/// A figure that is not known is none in the files either.
-TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
-  const Scratch scratch;
-  Operation one;
-  one.ct_checksum = "1";
-  one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, {}), "2026-11-22T09:35:00Z",
-                    true};
-  OperationKeeper(scratch.path(), {}).keep(one);
-  const auto read = read_operation(scratch.path());
-  ASSERT_TRUE(read) << read.error().what;
-  EXPECT_FALSE(read->calibrated->scope.figures().camera_rms_px.has_value());
-  EXPECT_FALSE(read->calibrated->scope.figures().held_out_px.has_value());
-  EXPECT_TRUE(read->calibrated->scope.figures().held_out_mm.has_value());
-  EXPECT_TRUE(read->calibrated->by_board);
-}
-
-/// 0.1.0 kept what the fit leaves, which says less than the error held out: it does not stand in for that.
-TEST(OperationKeeper, AFileOf010OpensAndItsResidualIsNoHeldOutError) {
-  const Scratch scratch;
-  calibration::HandEyeResult found;
-  found.held_out_px = 3;
-  found.held_out_mm = 0.6;
-  Operation one;
-  one.ct_checksum = "1";
-  one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), "2026-11-22T09:35:00Z", true};
-  ASSERT_TRUE(write_operation(scratch.path(), one));
-  auto read = read_operation(scratch.path());
-  ASSERT_TRUE(read) << read.error().what;
-  EXPECT_EQ(read->calibrated->scope.figures().held_out_px, 3);
-  (void)scratch.file("operation.json",
-                     R"({"made_utc": "2026-11-22T10:00:00Z", "ct_checksum": "1", "deformed": false,
-                         "calibrated": {"made_utc": "2026-11-22T09:35:00Z", "camera_rms_px": 0.3,
-                                        "tracked_rms_px": 1.2, "hand_eye_mm": 0.6}})");
-  read = read_operation(scratch.path());
-  ASSERT_TRUE(read) << read.error().what;
-  const ScopeFigures& figures = read->calibrated->scope.figures();
-  EXPECT_EQ(figures.camera_rms_px, 0.3);
-  EXPECT_FALSE(figures.held_out_px.has_value());
-  EXPECT_EQ(figures.held_out_mm, 0.6);
-
-  CalibrationStep step;
-  step.take_up(*read->calibrated, "taken up");
-  EXPECT_FALSE(step.found().has_value()) << "nothing could be drawn by it";
-  EXPECT_FALSE(step.note().done) << "the window still asks for a calibration";
-  EXPECT_NE(step.note().line.find("calibrate anew"), std::string::npos) << step.note().line;
 }
 
 TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "calibration/base/result.hpp"
+
+namespace birdseye::host {
+
+/// The SHA-256 of a file's bytes; of a folder, of its files' names and sums, in the order of the names.
+Result<std::string> files_sha256(const std::filesystem::path& path);
+
+}  // namespace birdseye::host

@@ -1,0 +1,93 @@
+#include "host/files/sealed_text.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+
+#include "calibration/record/sha256.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using calibration::sha256_of;
+
+constexpr std::string_view kBegin = "{\n", kSums = "sha256", kWhole = "whole";
+
+std::string line_of(std::string_view name, const nlohmann::json& value) {
+  // Names may come from files in other encodings: what is found is not lost for one of them.
+  return fmt::format("\"{}\": {}", name, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+/// The line that begins with this name, without the comma at its end.
+std::optional<std::string_view> find_line(std::string_view text, std::string_view name) {
+  const std::string begin = fmt::format("\n\"{}\": ", name);
+  const std::size_t at = text.find(begin);
+  if (at == std::string_view::npos) return std::nullopt;
+  std::string_view line = text.substr(at + 1, text.find('\n', at + 1) - at - 1);
+  if (line.ends_with(',')) line.remove_suffix(1);
+  return line;
+}
+
+/// The name with which the text's last line begins.
+std::string last_name(std::string_view text) {
+  const std::size_t at = text.rfind("\n\"");
+  if (at == std::string_view::npos) return "";
+  const std::string_view rest = text.substr(at + 2);
+  return std::string(rest.substr(0, rest.find('"')));
+}
+
+std::string end_of(const std::string& before) {
+  return line_of(kWhole, sha256_of(before)) + "\n}\n";
+}
+
+/// What of a text that does not fit its sums is damaged, in words.
+std::string damage(const std::string& text) {
+  if (!text.starts_with("{\n\"")) return "is empty, or its beginning was changed or damaged";
+  const auto sums_line = find_line(text, kSums);
+  const std::size_t colon = sums_line ? sums_line->find(' ') : std::string_view::npos;
+  const nlohmann::json sums = colon == std::string_view::npos
+                                  ? nlohmann::json()
+                                  : nlohmann::json::parse(sums_line->substr(colon), nullptr, false);
+  const bool summed = sums.is_object() && !sums.empty() &&
+                      std::all_of(sums.begin(), sums.end(), [](const nlohmann::json& sum) { return sum.is_string(); });
+  if (!summed && !text.ends_with("\n}\n")) return fmt::format("is cut off in its part \"{}\"", last_name(text));
+  if (!summed) return fmt::format("its part \"{}\" was changed or damaged", kSums);
+  for (const auto& [name, sum] : sums.items()) {
+    const auto line = find_line(text, name);
+    if (!line || sha256_of(*line) != sum.get<std::string>())
+      return fmt::format("its part \"{}\" was changed or damaged", name);
+  }
+  // Each part is as it was: what is wrong lies between them, in the sums, or at the end.
+  return fmt::format("its part \"{}\" was changed or damaged", kWhole);
+}
+
+}  // namespace
+
+std::string sealed_text(const std::vector<SealedPart>& parts) {
+  std::string text(kBegin);
+  nlohmann::json sums = nlohmann::json::object();
+  for (const auto& [name, value] : parts) {
+    const std::string line = line_of(name, value);
+    sums[name] = sha256_of(line);
+    text += line + ",\n";
+  }
+  text += line_of(kSums, sums) + ",\n";
+  return text + end_of(text);
+}
+
+Result<nlohmann::json> unseal(const std::string& text) {
+  const std::size_t end = text.rfind(fmt::format("\n\"{}\": ", kWhole));
+  if (end == std::string::npos || text.substr(end + 1) != end_of(text.substr(0, end + 1)))
+    return Error{Errc::bad_format, damage(text)};
+  nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object()) return Error{Errc::bad_format, "is no object of JSON"};
+  json.erase(std::string(kSums));
+  json.erase(std::string(kWhole));
+  return json;
+}
+
+}  // namespace birdseye::host

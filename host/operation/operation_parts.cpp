@@ -1,0 +1,158 @@
+#include "host/operation/operation_parts.hpp"
+
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "calibration/geometry/camera_parameters.hpp"
+#include "host/files/packed_floats.hpp"
+#include "host/files/text_files.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Json = nlohmann::json;
+
+Json rows_of(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    rows.push_back(Json::array());
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c) rows.back().push_back(matrix(r, c));
+  }
+  return rows;
+}
+
+template <typename Matrix>
+Matrix matrix_of(const Json& rows) {
+  Matrix matrix;
+  for (Eigen::Index r = 0; r < matrix.rows(); ++r) {
+    for (Eigen::Index c = 0; c < matrix.cols(); ++c)
+      matrix(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
+  }
+  return matrix;
+}
+
+std::optional<double> figure_of(const Json& json, const char* name) {
+  return json.contains(name) ? std::optional(json.at(name).get<double>()) : std::nullopt;
+}
+
+void enter(Json& json, const char* name, const std::optional<double>& figure) {
+  if (figure) json[name] = *figure;
+}
+
+Instruments instruments_of(const Json& json) {
+  Instruments out;
+  json.at("tracker").get_to(out.tracker);
+  if (json.contains("camera")) json.at("camera").get_to(out.camera);
+  return out;
+}
+
+}  // namespace
+
+Json json_of(const CalibratedScope& found) {
+  const CameraModel& camera = found.scope.camera();
+  const CameraVector parameters = parameters_of(camera);
+  Json json{{"made_utc", found.made_utc},
+            {"made_from", found.by_board ? "board" : "record"},
+            {"tracker", found.found_with.tracker},
+            {"camera", found.found_with.camera},
+            {"lens",
+             {{"width_px", camera.width_px},
+              {"height_px", camera.height_px},
+              {"fx_fy_cx_cy_k1_k2_p1_p2_k3", std::vector<double>(parameters.begin(), parameters.end())}}},
+            {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
+  if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
+  const ScopeFigures& figures = found.scope.figures();
+  enter(json, "camera_rms_px", figures.camera_rms_px);
+  enter(json, "held_out_px", figures.held_out_px);
+  enter(json, "held_out_mm", figures.held_out_mm);
+  return json;
+}
+
+Json json_of(const RegisteredPatient& found) {
+  Json json{{"made_utc", found.made_utc},
+            {"made_from", "touched fiducials"},
+            {"tracker", found.found_with.tracker},
+            {"tracker_from_patient", rows_of(found.tracker_from_patient.matrix())},
+            {"fre_mm", found.fre_mm},
+            {"fiducials_in_patient_mm", Json::array()}};
+  for (const Eigen::Vector3d& place : found.fiducials_in_patient_mm)
+    json["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
+  return json;
+}
+
+Json json_of(const DeformedOrgan& found) {
+  const DisplacementField& field = found.field;
+  // A vector of three floats is three floats: Eigen adds nothing between them.
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  const std::span<const float> values(reinterpret_cast<const float*>(field.displacement_mm.data()),
+                                      3 * field.displacement_mm.size());
+  Json json{{"made_utc", found.made_utc},
+            {"made_from", "views"},
+            {"size", field.size},
+            {"patient_from_lattice", rows_of(field.patient_from_lattice.matrix())},
+            {"displacement_mm_float32_zlib_base64", packed_floats(values)}};
+  enter(json, "seen_rms_mm", found.seen_rms_mm);
+  if (found.target) json["target"] = {{"rms_mm", found.target->rms_mm}, {"radius95_mm", found.target->radius95_mm}};
+  return json;
+}
+
+Result<CalibratedScope> calibrated_of(const Json& json) {
+  const Json& lens = json.at("lens");
+  CameraModel camera;
+  lens.at("width_px").get_to(camera.width_px);
+  lens.at("height_px").get_to(camera.height_px);
+  const auto parameters = lens.at("fx_fy_cx_cy_k1_k2_p1_p2_k3").get<std::array<double, CameraModel::kParameters>>();
+  set_parameters(camera, parameters.data());
+  std::optional<CameraMatrix> covariance;
+  if (lens.contains("covariance")) covariance = matrix_of<CameraMatrix>(lens.at("covariance"));
+  const auto hand_eye = matrix_of<Eigen::Matrix4d>(json.at("camera_from_sensor"));
+  if (auto rigid = check_rigid(hand_eye, "camera_from_sensor"); !rigid) return rigid.error();
+  auto scope = ScopeSetup::of_values(
+      camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye),
+      {figure_of(json, "camera_rms_px"), figure_of(json, "held_out_px"), figure_of(json, "held_out_mm")});
+  if (!scope) return scope.error();
+  return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(),
+                         json.at("made_from").get<std::string>() == "board", instruments_of(json)};
+}
+
+Result<RegisteredPatient> registered_of(const Json& json) {
+  const auto matrix = matrix_of<Eigen::Matrix4d>(json.at("tracker_from_patient"));
+  if (auto rigid = check_rigid(matrix, "tracker_from_patient"); !rigid) return rigid.error();
+  RegisteredPatient out{Transform<Tracker, Patient>::from_matrix(matrix),
+                        json.at("fre_mm").get<double>(),
+                        {},
+                        instruments_of(json),
+                        json.at("made_utc").get<std::string>()};
+  const Json& places = json.at("fiducials_in_patient_mm");
+  out.fiducials_in_patient_mm.reserve(places.size());
+  for (const Json& place : places)
+    out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
+                                             place.at(2).get<double>());
+  if (out.fiducials_in_patient_mm.size() < 3)
+    return Error{Errc::bad_format, "names fewer than three fiducials; register anew"};
+  return out;
+}
+
+Result<DeformedOrgan> deformed_of(const Json& json) {
+  DeformedOrgan out;
+  json.at("made_utc").get_to(out.made_utc);
+  DisplacementField& field = out.field;
+  json.at("size").get_to(field.size);
+  const std::size_t points = grid_count(field.size);
+  const auto values = unpacked_floats(json.at("displacement_mm_float32_zlib_base64").get<std::string>(), 3 * points);
+  if (!values) return values.error();
+  field.displacement_mm.reserve(points);
+  for (std::size_t i = 0; i < values->size(); i += 3)
+    field.displacement_mm.emplace_back((*values)[i], (*values)[i + 1], (*values)[i + 2]);
+  field.patient_from_lattice.matrix() = matrix_of<Eigen::Matrix4d>(json.at("patient_from_lattice"));
+  if (auto sound = check_sound(field); !sound) return sound.error();
+  out.seen_rms_mm = figure_of(json, "seen_rms_mm");
+  if (json.contains("target")) {
+    const Json& target = json.at("target");
+    out.target = {target.at("rms_mm").get<double>(), target.at("radius95_mm").get<double>()};
+  }
+  return out;
+}
+
+}  // namespace birdseye::host

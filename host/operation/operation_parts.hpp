@@ -1,0 +1,19 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "host/operation/findings.hpp"
+
+/// What an operation found, as JSON: what is read back is the same to the bit. What is not known is not there.
+namespace birdseye::host {
+
+nlohmann::json json_of(const CalibratedScope& found);
+nlohmann::json json_of(const RegisteredPatient& found);
+nlohmann::json json_of(const DeformedOrgan& found);
+
+/// Throw what nlohmann throws; refuse numbers that make no sense.
+Result<CalibratedScope> calibrated_of(const nlohmann::json& json);
+Result<RegisteredPatient> registered_of(const nlohmann::json& json);
+Result<DeformedOrgan> deformed_of(const nlohmann::json& json);
+
+}  // namespace birdseye::host

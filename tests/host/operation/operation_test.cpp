@@ -1,0 +1,270 @@
+// What a window keeps of an operation, and what is refused of it: not one bit may be other than it was.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "drivers/system/wait.hpp"
+#include "host/files/sealed_text.hpp"
+#include "host/operation/calibration_step.hpp"
+#include "host/operation/operation_keeper.hpp"
+#include "tests/support/live_operation.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::contents_of;
+using birdseye::testing::kCamera;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kTracker;
+using birdseye::testing::kTrackerFromPatient;
+using birdseye::testing::Scratch;
+
+/// With all that there can be in one.
+Operation whole_operation() {
+  Operation out;
+  out.ct_sha256 = "1";
+  out.labels_sha256 = "2";
+  out.record_sha256 = "3";
+  out.made_utc = "2026-11-22T10:00:00Z";
+  calibration::HandEyeResult found;
+  found.camera_from_sensor = Transform<Camera, Sensor>(kTrackerFromPatient.rotation(), {1.0 / 3, -120, 250});
+  found.held_out_px = 3;
+  found.held_out_mm = 0.6;
+  const CameraMatrix covariance = CameraMatrix::Identity() / 7;
+  out.calibrated = {
+      ScopeSetup::of_hand_eye({768, 576, 500.1, 500, 384, 288, -0.1, 0.2, 1e-4, -1e-5, 0.3}, 0.3, found, covariance),
+      "2026-11-22T09:35:00Z",
+      true,
+      {kTracker, kCamera, 0}};
+  out.registered = {kTrackerFromPatient, 0.3, kFiducials, {kTracker, {}, 0}, "2026-11-22T09:50:00Z"};
+  DisplacementField field;
+  field.size = {3, 2, 2};
+  for (int i = 0; i < 12; ++i) field.displacement_mm.emplace_back(0.1F * static_cast<float>(i % 5), -1.0F / 3, 0.0F);
+  field.patient_from_lattice = Eigen::Translation3d(-50, -50, -50) * Eigen::Scaling(100.0);
+  out.deformed =
+      std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}, "2026-11-22T09:55:00Z"});
+  return out;
+}
+
+TEST(Operation, IsReadBackToTheBit) {
+  const Scratch scratch;
+  const Operation kept = whole_operation();
+  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->record_sha256, "3");
+  EXPECT_EQ(read->made_utc, kept.made_utc);
+  EXPECT_EQ(read->calibrated->scope.camera(), kept.calibrated->scope.camera());
+  EXPECT_EQ(read->calibrated->scope.camera_from_sensor().matrix(),
+            kept.calibrated->scope.camera_from_sensor().matrix());
+  EXPECT_EQ(*read->calibrated->scope.camera_covariance(), *kept.calibrated->scope.camera_covariance());
+  EXPECT_EQ(read->calibrated->scope.figures().held_out_px, 3);
+  EXPECT_EQ(read->calibrated->scope.figures().held_out_mm, 0.6);
+  EXPECT_TRUE(read->calibrated->by_board);
+  EXPECT_EQ(read->calibrated->found_with.camera, kCamera);
+  EXPECT_EQ(read->registered->tracker_from_patient.matrix(), kTrackerFromPatient.matrix());
+  EXPECT_EQ(read->registered->found_with.tracker, kTracker);
+  EXPECT_EQ(read->registered->made_utc, "2026-11-22T09:50:00Z");
+  EXPECT_EQ(read->registered->fiducials_in_patient_mm, kFiducials);
+  EXPECT_EQ(read->deformed->field.displacement_mm, kept.deformed->field.displacement_mm);
+  EXPECT_EQ(read->deformed->field.patient_from_lattice.matrix(), kept.deformed->field.patient_from_lattice.matrix());
+  EXPECT_EQ(read->deformed->target->radius95_mm, 1.2);
+  EXPECT_TRUE(read_operation(scratch / "operation.json")) << "the file itself is named as well as its folder";
+}
+
+/// The names of the part that a place of the text lies in; of a comma or an end of line, of the two about it.
+std::vector<std::string> parts_at(const std::string& text, std::size_t at) {
+  std::vector<std::string> out;
+  for (const std::size_t place : {at, std::min(at + 2, text.size() - 1)}) {
+    const std::size_t line = text.rfind('\n', place == 0 ? 0 : place - 1);
+    const std::size_t name = line == std::string::npos ? 0 : line + 2;
+    out.push_back(text.substr(name, text.find('"', name) - name));
+  }
+  return out;
+}
+
+TEST(Operation, OneBitThatIsChangedAnywhereIsRefusedWithTheNameOfItsPart) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  const std::string text = contents_of(scratch / "operation.json");
+  const std::size_t sums = text.find("\n\"sha256\"");
+  ASSERT_NE(sums, std::string::npos);
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    std::string changed = text;
+    changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
+    const auto read = read_operation(scratch.file("changed.json", changed));
+    ASSERT_FALSE(read) << "byte " << at << " of " << text.size() << " was changed and nobody noticed";
+    const std::string& why = read.error().what;
+    EXPECT_NE(why.find("changed.json"), std::string::npos) << why;
+    if (at < 3 || at > sums) continue;  // no part, or its sum
+    const auto names = parts_at(text, at);
+    EXPECT_TRUE(
+        std::any_of(names.begin(), names.end(),
+                    [&why](const std::string& name) { return why.find("\"" + name + "\"") != std::string::npos; }))
+        << "byte " << at << ", in " << names.front() << ": " << why;
+  }
+}
+
+TEST(Operation, AHalfWrittenFileIsRefusedWithTheNameOfThePartItEndsIn) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  const std::string text = contents_of(scratch / "operation.json");
+  for (std::size_t length = 0; length < text.size(); ++length)
+    ASSERT_FALSE(read_operation(scratch.file("cut.json", text.substr(0, length)))) << length;
+  const auto cut = read_operation(scratch.file("cut.json", text.substr(0, text.find("\"fre_mm\""))));
+  EXPECT_NE(cut.error().what.find("cut off in its part \"registered\""), std::string::npos) << cut.error().what;
+  // A part that is whole, of another operation, does not fit the rest.
+  Operation other = whole_operation();
+  other.registered->fre_mm = 0.1;
+  ASSERT_TRUE(write_operation(scratch.path(), other));
+  const std::string others = contents_of(scratch / "operation.json");
+  const auto part = [](const std::string& from) {
+    const std::size_t at = from.find("\n\"registered\"");
+    return from.substr(at, from.find('\n', at + 1) - at);
+  };
+  std::string mixed = text;
+  mixed.replace(mixed.find(part(text)), part(text).size(), part(others));
+  const auto read = read_operation(scratch.file("mixed.json", mixed));
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().what.find("\"registered\" was changed"), std::string::npos) << read.error().what;
+}
+
+TEST(Operation, TheCopiesBesideItAreForOthersAndAreNotRead) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  for (const char* const copy : {"patient_from_tracker.txt", "camera_from_sensor.txt", "camera.yaml", "field.mha"}) {
+    ASSERT_TRUE(std::filesystem::exists(scratch / copy)) << copy;
+    (void)scratch.file(copy, "1 0 0 20\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  }
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->registered->tracker_from_patient.matrix(), kTrackerFromPatient.matrix());
+  // What is taken back is taken away there too.
+  Operation less = whole_operation();
+  less.calibrated.reset();
+  less.registered.reset();
+  less.deformed.reset();
+  ASSERT_TRUE(write_operation(scratch.path(), less));
+  for (const char* const copy : {"patient_from_tracker.txt", "camera_from_sensor.txt", "camera.yaml", "field.mha"})
+    EXPECT_FALSE(std::filesystem::exists(scratch / copy)) << copy;
+}
+
+/// Where the power goes, there is a temporary file that was begun, and the former operation.
+TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  const std::string text = contents_of(scratch / "operation.json");
+  for (const std::size_t length : {std::size_t{0}, text.size() / 2, text.size()}) {
+    (void)scratch.file("operation.json.part", text.substr(0, length));
+    (void)scratch.file("part-field.mha", "ObjectType");
+    const auto read = read_operation(scratch.path());
+    ASSERT_TRUE(read) << read.error().what;
+    Operation next = whole_operation();
+    next.registered->fre_mm = 0.2;
+    ASSERT_TRUE(write_operation(scratch.path(), next));
+    EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 0.2);
+    EXPECT_FALSE(std::filesystem::exists(scratch / "operation.json.part"));
+    EXPECT_FALSE(std::filesystem::exists(scratch / "part-field.mha"));
+  }
+}
+
+TEST(Operation, AFileOf010OrOfALaterVersionIsRefusedInWords) {
+  const Scratch scratch;
+  (void)scratch.file("operation.json", R"({
+  "calibrated": {"camera_rms_px": 0.3, "hand_eye_mm": 0.6, "made_utc": "2026-11-22T09:35:00Z", "tracked_rms_px": 1.2},
+  "ct_checksum": "1234567890abcdef",
+  "deformed": false,
+  "made_utc": "2026-11-22T10:00:00Z"
+})");
+  const auto old = read_operation(scratch.path());
+  ASSERT_FALSE(old);
+  EXPECT_NE(old.error().what.find("earlier version"), std::string::npos) << old.error().what;
+  EXPECT_NE(old.error().what.find("register anew"), std::string::npos) << old.error().what;
+  const auto later = read_operation(
+      scratch.file("later.json", sealed_text({{"format", {{"name", "birdseye operation"}, {"version", 3}}}})));
+  ASSERT_FALSE(later);
+  EXPECT_NE(later.error().what.find("is of version 3"), std::string::npos) << later.error().what;
+  const auto other =
+      read_operation(scratch.file("other.json", sealed_text({{"format", {{"name", "something"}, {"version", 2}}}})));
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("is no operation"), std::string::npos) << other.error().what;
+}
+
+void wait_for(const OperationKeeper& keeper) {
+  for (int i = 0; i < 1000 && keeper.writing(); ++i) sleep_for(Duration::from_ms(10));
+  ASSERT_FALSE(keeper.writing());
+}
+
+TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
+  const Scratch scratch;
+  Operation one;
+  one.ct_sha256 = "1";
+  one.registered = {kTrackerFromPatient, 0.3, kFiducials};
+  OperationKeeper(scratch.path(), {}).keep(one);
+  ASSERT_TRUE(has_operation(scratch.path()));
+  Operation other = one;
+  other.registered->fre_mm = 7;
+  OperationKeeper keeper(scratch.path(), scratch.path());
+  keeper.keep(other);
+  const auto kept = keeper.take_up("1", "");
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ((*kept)->registered->fre_mm, 0.3);
+  EXPECT_FALSE((*keeper.take_up("1", "")).has_value()) << "once";
+  keeper.keep(other);
+  wait_for(keeper);
+  keeper.tick();
+  EXPECT_EQ(keeper.fault(), "");
+  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
+  OperationKeeper wrong(scratch.path(), scratch.path());
+  EXPECT_FALSE(wrong.take_up("2", ""));
+  wrong.keep(one);
+  wait_for(wrong);
+  EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
+}
+
+TEST(OperationKeeper, OfOtherLabelsNothingIsTakenUp) {
+  const Scratch scratch;
+  OperationKeeper(scratch.path(), {}).keep(whole_operation());
+  EXPECT_TRUE(OperationKeeper({}, scratch.path()).take_up("1", "2"));
+  EXPECT_TRUE(OperationKeeper({}, scratch.path()).take_up("1", "")) << "none are shown";
+  const auto other = OperationKeeper({}, scratch.path()).take_up("1", "3");
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().what.find("is of other labels"), std::string::npos) << other.error().what;
+}
+
+TEST(OperationKeeper, SaysWhatCannotBeKept) {
+  const Scratch scratch;
+  OperationKeeper keeper(scratch.file("a file", ""), {});
+  keeper.keep(whole_operation());
+  wait_for(keeper);
+  keeper.tick();
+  EXPECT_NE(keeper.fault().find("operation.json"), std::string::npos) << keeper.fault();
+}
+
+/// A figure that is not known is none in the files either.
+TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
+  const Scratch scratch;
+  Operation one;
+  one.ct_sha256 = "1";
+  one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, {}), "2026-11-22T09:35:00Z",
+                    true};
+  OperationKeeper(scratch.path(), {}).keep(one);
+  const auto read = read_operation(scratch.path());
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_FALSE(read->calibrated->scope.figures().camera_rms_px.has_value());
+  EXPECT_FALSE(read->calibrated->scope.figures().held_out_px.has_value());
+  EXPECT_TRUE(read->calibrated->scope.figures().held_out_mm.has_value());
+  EXPECT_TRUE(read->calibrated->by_board);
+
+  CalibrationStep step;
+  step.take_up(*read->calibrated, "taken up");
+  EXPECT_FALSE(step.found().has_value()) << "nothing could be drawn by it";
+  EXPECT_FALSE(step.note().done) << "the window still asks for a calibration";
+  EXPECT_NE(step.note().line.find("calibrate anew"), std::string::npos) << step.note().line;
+}
+
+}  // namespace
+}  // namespace birdseye::host
