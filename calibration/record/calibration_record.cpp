@@ -246,17 +246,16 @@ std::optional<IdentityDifference> first_difference(const Identity& recorded, con
   return std::nullopt;
 }
 
-std::string misfit(const std::string& what, const Identity& recorded, const Identity& told) {
+std::string misfit(const std::string& what, const Identity& recorded, const Identity& told, const std::string& of) {
   if (recorded.empty())
     return fmt::format(
-        "the record does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind "
-        "HOST",
-        what);
+        "{} does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind HOST",
+        of, what);
   const auto other = first_difference(recorded, told);
   if (!other) return {};
   if (other->told.empty())
-    return fmt::format("the record is of {} {} {}; this one does not tell its", what, other->name, other->recorded);
-  return fmt::format("the record is of {} {} {}; this one's is {}", what, other->name, other->recorded, other->told);
+    return fmt::format("{} is of {} {} {}; this one does not tell its", of, what, other->name, other->recorded);
+  return fmt::format("{} is of {} {} {}; this one's is {}", of, what, other->name, other->recorded, other->told);
 }
 
 }  // namespace birdseye::calibration

@@ -92,7 +92,8 @@ std::optional<IdentityDifference> first_difference(const Identity& recorded, con
 
 /// Why a record made with one instrument is not to be used with another, in words; empty where all that the record
 /// knows is as the instrument says. A record that knows nothing fits nothing, and what the instrument does not say
-/// cannot fit. what: "tracker", "camera".
-std::string misfit(const std::string& what, const Identity& recorded, const Identity& told);
+/// cannot fit. what: "tracker", "camera". of: what was made with it.
+std::string misfit(const std::string& what, const Identity& recorded, const Identity& told,
+                   const std::string& of = "the record");
 
 }  // namespace birdseye::calibration

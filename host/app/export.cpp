@@ -9,11 +9,14 @@
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/export_lens.hpp"
+#include "host/app/overlay_options.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/identity_json.hpp"
+#include "host/operation/operation.hpp"
+#include "host/overlay/ct_sha256.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 
@@ -25,7 +28,7 @@ namespace fs = std::filesystem;
 
 struct ExportOptions {
   VolumeSource volume;
-  fs::path registration, views, deformation, model_pose, out, json;
+  fs::path operation, registration, views, deformation, model_pose, out, json;
   std::string frame = "tracker";
   bool identify = false;
 };
@@ -50,6 +53,14 @@ Result<Registered> read_registered(ExportOptions options) {
     options.deformation = options.views / "field.mha";
     if (fs::exists(options.views / "pose.txt", ignored)) options.model_pose = options.views / "pose.txt";
   }
+  std::optional<Operation> operation;
+  if (!options.operation.empty()) {
+    auto kept = read_operation(options.operation);
+    if (!kept) return kept.error();
+    if (kept->registered) read.patient_from_tracker = kept->registered->tracker_from_patient.inverse();
+    if (kept->deformed) read.field = kept->deformed->field;
+    operation = *std::move(kept);
+  }
   if (!options.registration.empty()) {
     const auto matrix = read_pose(options.registration);
     if (!matrix) return matrix.error();
@@ -72,6 +83,10 @@ Result<Registered> read_registered(ExportOptions options) {
     read.volume = std::move(imported->volume);
     read.identity = std::move(imported->patient);
   }
+  if (operation && read.volume) {
+    if (auto same = check_patient(*operation, ct_sha256(*read.volume), ""); !same)
+      return same.error().with_context("--operation " + options.operation.string());
+  }
   if (read.field && read.volume) {
     if (auto covers = check_covers(*read.field, *read.volume); !covers)
       return covers.error().with_context(options.deformation.string());
@@ -89,7 +104,8 @@ Result<RestMap> map_of(const ExportOptions& options, const Registered& registere
     map.ct_from_seen = (ct_from_patient * *registered.patient_from_tracker).matrix();
   } else {
     return Error{Errc::bad_value,
-                 "--frame tracker needs --registration, as register fiducials writes it; or give --frame patient"};
+                 "--frame tracker needs --registration, as register fiducials writes it, or an --operation that was "
+                 "registered; or give --frame patient"};
   }
   if (registered.field) map.field = &*registered.field;
   return map;
@@ -156,9 +172,12 @@ Result<void> remove_earlier_export(const fs::path& folder) {
 
 Result<ExitCode> run(const ExportOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
-  if (options.registration.empty() && options.views.empty() && options.deformation.empty()) {
-    return Error{Errc::bad_value,
-                 "give what was registered: --registration of register fiducials, --views of register views, or both"};
+  if (options.registration.empty() && options.views.empty() && options.deformation.empty() &&
+      options.operation.empty()) {
+    return Error{
+        Errc::bad_value,
+        "give what was registered: --registration of register fiducials, --views of register views, or both; or "
+        "the --operation that a live window kept"};
   }
   const auto registered = read_registered(options);
   if (!registered) return registered.error();
@@ -224,10 +243,18 @@ void add_export(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& command =
       *app.add_subcommand("export", "the registered, deformed CT for 3D Slicer and other programs on ITK");
-  command.add_option("--registration", options->registration, "patient_from_tracker, of register fiducials");
-  CLI::Option* const views = command.add_option("--views", options->views, "folder of register views");
-  command.add_option("--deformation", options->deformation, "a displacement field by itself, LPS mm")->excludes(views);
-  command.add_option("--model-pose", options->model_pose, "patient_from_model, a 4x4 matrix")->excludes(views);
+  CLI::Option* const operation =
+      command.add_option("--operation", options->operation, kOperationHelp)->type_name("FOLDER|FILE");
+  command.add_option("--registration", options->registration, "patient_from_tracker, of register fiducials")
+      ->excludes(operation);
+  CLI::Option* const views =
+      command.add_option("--views", options->views, "folder of register views")->excludes(operation);
+  command.add_option("--deformation", options->deformation, "a displacement field by itself, LPS mm")
+      ->excludes(views)
+      ->excludes(operation);
+  command.add_option("--model-pose", options->model_pose, "patient_from_model, a 4x4 matrix")
+      ->excludes(views)
+      ->excludes(operation);
   command.add_option("--volume", options->volume.path, "the CT: exported as it is seen");
   add_ct_options(command, options->volume);
   command.add_option("--frame", options->frame, "where the CT is brought: tracker (default) or patient")

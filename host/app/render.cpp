@@ -14,6 +14,7 @@
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/operation.hpp"
 #include "host/overlay/margins.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
@@ -32,7 +33,7 @@ struct RenderOptions {
   VolumeSource volume;
   ShownChoice shown;
   OverlayLook look;  ///< but for its render settings
-  std::filesystem::path camera, pose, path, deformation, over, out, movie, json;
+  std::filesystem::path operation, camera, pose, path, deformation, over, out, movie, json;
   std::string transfer = "abdomen", size = "900x900", engine = "cpu", display = kDisplays[0];
   double clip = 0.5;
   double step_mm = 0.7, seconds = 4;
@@ -42,16 +43,26 @@ struct RenderOptions {
 };
 
 /// Where it is seen from, and through what.
-Result<void> look(RenderScene& scene, const RenderOptions& options) {
+Result<void> look(RenderScene& scene, const RenderOptions& options, const std::optional<Operation>& operation) {
   const bool posed = !options.pose.empty() || !options.path.empty();
   if (options.camera.empty() && !posed) return look_from_the_front(scene, options.size, options.clip);
-  if (options.camera.empty() || !posed) {
-    return Error{Errc::bad_value,
-                 "--camera and --pose (or --path) go together; give both, or neither for a view of the whole volume"};
+  if ((options.camera.empty() && !operation) || !posed) {
+    return Error{
+        Errc::bad_value,
+        "--camera (or --operation) and --pose (or --path) go together; give both, or neither for a view of the "
+        "whole volume"};
   }
-  auto camera = read_camera(options.camera);
-  if (!camera) return camera.error();
-  scene.camera = *camera;
+  if (operation) {
+    if (!operation->calibrated) {
+      return Error{Errc::bad_value, fmt::format("--operation {}: has no calibration; give --camera in its place",
+                                                options.operation.string())};
+    }
+    scene.camera = operation->calibrated->scope.camera();
+  } else {
+    auto camera = read_camera(options.camera);
+    if (!camera) return camera.error();
+    scene.camera = *camera;
+  }
   if (!options.path.empty()) {
     auto path = read_path(options.path);
     if (!path) return path.error();
@@ -91,12 +102,24 @@ void straighten(RenderScene& scene, const std::string& display) {
 
 Result<RenderScene> scene_of(const RenderOptions& options) {
   RenderScene scene;
-  auto volume = read_shown(options.volume, options.shown);
+  std::optional<Operation> operation;
+  if (!options.operation.empty()) {
+    auto kept = read_operation(options.operation);
+    if (!kept) return kept.error();
+    operation = *std::move(kept);
+  }
+  ShownChoice choice = options.shown;
+  choice.summed = operation.has_value();
+  auto volume = read_shown(options.volume, choice);
   if (!volume) return volume.error();
   print_notes(volume->notes);
+  if (operation) {
+    if (auto same = check_patient(*operation, volume->ct_sha256, volume->labels_sha256); !same)
+      return same.error().with_context("--operation " + options.operation.string());
+  }
   scene.volume = std::move(volume->volume);
   scene.margins = std::move(volume->margins);
-  if (auto looked = look(scene, options); !looked) return looked.error();
+  if (auto looked = look(scene, options, operation); !looked) return looked.error();
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
   scene.behind = *std::move(behind);
@@ -109,7 +132,11 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
     scene.settings.clip = ClipPlane{normal.normalized(), options.clip_plane[3] / normal.norm()};
   }
   scene.film_s = options.seconds;
-  if (options.deformation.empty()) return scene;
+  if (operation && operation->deformed) scene.deformation = operation->deformed->field;
+  if (options.deformation.empty()) {
+    if (scene.margins && scene.deformation) scene.margins = deformed(*scene.margins, *scene.deformation);
+    return scene;
+  }
   if (*std::min_element(scene.volume.size.begin(), scene.volume.size.end()) < 2) {
     return Error{Errc::unsupported,
                  fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.path.string())};
@@ -214,7 +241,12 @@ void add_render(CLI::App& app, CommandStatus& status) {
       ->check(CLI::IsMember(std::vector<std::string>(std::begin(kDisplays), std::end(kDisplays))))
       ->needs(camera);
   CLI::Option* const pose = command.add_option("--pose", options->pose, "camera_from_patient, a 4x4 matrix, mm");
-  command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
+  CLI::Option* const deformation = command.add_option("--deformation", options->deformation,
+                                                      "ITK displacement field, LPS mm (.mha, .nrrd, .nii.gz)");
+  command.add_option("--operation", options->operation, kOperationHelp)
+      ->type_name("FOLDER|FILE")
+      ->excludes(camera)
+      ->excludes(deformation);
   CLI::Option* const over =
       command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
   for (CLI::Option* const option : add_look_options(command, options->look)) option->needs(over);

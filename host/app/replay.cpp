@@ -38,16 +38,28 @@ struct ReplayOptions {
   int every = 10;
 };
 
-Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayTrust& trust) {
+Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup, const ReplayTrust& trust,
+              const std::map<std::string, std::string>& remedies) {
   Verdict verdict;
+  for (const auto& [why_not, remedy] : remedies) {
+    const auto frames = done.reasons.find(why_not);
+    if (frames == done.reasons.end()) continue;
+    verdict.add(Grade::fail,
+                fmt::format("{} of {} frames carry no overlay: {}; {}", frames->second, done.frames, why_not, remedy));
+  }
   if (done.overlaid == 0) {
     verdict.add(Grade::fail, done.frames == 0 ? "the recording has no frames" : "no frame carries an overlay");
   } else {
     const double hidden = 100 * (1 - static_cast<double>(done.overlaid) / static_cast<double>(done.frames));
     verdict.judge("frames without an overlay", hidden, "%", 10, 50, "see frames.csv for the reasons");
   }
-  if (done.other_size > 0)
-    verdict.add(Grade::marginal, fmt::format("{} frames are of another size than the camera's", done.other_size));
+  if (done.other_size > 0) {
+    verdict.add(Grade::fail, fmt::format("{} of {} frames are of another size than the camera was calibrated at; give "
+                                         "the calibration of the camera that took them",
+                                         done.other_size, done.frames));
+  }
+  for (const std::string& caution : setup.cautions) verdict.add(Grade::marginal, caution);
+  for (const std::string& unproven : setup.hardware.unproven()) verdict.add(Grade::marginal, unproven);
   if (reader.frames_lost() > 0)
     verdict.add(Grade::marginal, fmt::format("{} frames are cut short or missing", reader.frames_lost()));
   for (const std::string& note : reader.notes()) verdict.add(Grade::marginal, note);
@@ -62,6 +74,7 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
                          {"frames_overlaid", done.overlaid},
                          {"frames_overlaid_whole", done.whole},
                          {"frames_of_other_size", done.other_size},
+                         {"frames_of_other_hardware", done.other_hardware},
                          {"reasons_of_frames", done.reasons},
                          {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
                          {"engine", engine},
@@ -74,18 +87,21 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
   return json;
 }
 
-/// All of the recording through the overlay.
-Result<void> play(RecordingReader& reader, ReplayPlayer& player, const std::string& scope, Progress& progress) {
+/// All of the recording through the overlay. remedies: for why no overlay was drawn, what to do about it.
+Result<void> play(RecordingReader& reader, ReplayHardware& hardware, ReplayPlayer& player,
+                  std::map<std::string, std::string>& remedies, Progress& progress) {
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
     const auto event = reader.next(Deadline::after(Duration::from_ms(30'000)));
     if (!event && event.error().code == Errc::disconnected) return {};
     if (!event) return event.error();
     if (!*event) continue;
-    if (const auto* birds = std::get_if<wire::Birds>(&**event)) player.take(*birds, scope);
+    if (const auto* birds = std::get_if<wire::Birds>(&**event)) player.take(*birds);
+    hardware.take(**event);
     const auto* frame = std::get_if<wire::VideoFrame>(&**event);
     if (frame == nullptr) continue;
-    if (auto taken = player.take(*frame); !taken) return taken;
+    if (!hardware.why_not().empty()) remedies[hardware.why_not()] = hardware.remedy();
+    if (auto taken = player.take(*frame, hardware.why_not()); !taken) return taken;
     if (player.done().frames % 20 == 0) progress(fmt::format("{} frames", player.done().frames));
   }
 }
@@ -94,11 +110,17 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
   if (!reader) return reader.error();
-  const auto setup = read_replay_setup(options.inputs);
+  auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
-  const auto shown = read_shown(options.volume, options.shown);
+  ShownChoice choice = options.shown;
+  choice.summed = setup->operation.has_value();
+  const auto shown = read_shown(options.volume, choice);
   if (!shown) return shown.error();
   print_notes(shown->notes);
+  if (setup->operation) {
+    if (auto same = check_patient(*setup->operation, shown->ct_sha256, shown->labels_sha256); !same)
+      return same.error().with_context("--operation " + options.inputs.operation.string());
+  }
   const Volume* const volume = &shown->volume;
   const auto transfer = load_transfer_function(options.transfer);
   if (!transfer) return transfer.error();
@@ -106,11 +128,16 @@ Result<ExitCode> run(const ReplayOptions& options) {
   const auto engine = make_engine(options.engine, *volume, *transfer);
   if (!engine) return engine.error();
   if (!(*engine)->choice().empty()) fmt::print(stderr, "{}\n", (*engine)->choice());
+  std::optional<DisplacementField> field;
   if (!options.deformation.empty()) {
-    const auto field = read_field(options.deformation);
-    if (!field) return field.error();
-    if (auto covers = check_covers(*field, *volume); !covers)
+    auto read = read_field(options.deformation);
+    if (!read) return read.error();
+    if (auto covers = check_covers(*read, *volume); !covers)
       return covers.error().with_context(options.deformation.string());
+    field = *std::move(read);
+  }
+  if (setup->operation && setup->operation->deformed) field = setup->operation->deformed->field;
+  if (field) {
     (*engine)->deform(*field);
     if (margins) margins = deformed(*margins, *field);
   }
@@ -122,13 +149,14 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  ReplayPlayer player({options.out, options.every, options.film_hz, options.look}, setup->setup(), trust.figures,
-                      **engine, std::move(margins));
-  if (auto played = play(**reader, player, options.scope, progress); !played) return played.error();
+  ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope}, setup->setup(),
+                      trust.figures, **engine, std::move(margins));
+  std::map<std::string, std::string> remedies;
+  if (auto played = play(**reader, setup->hardware, player, remedies, progress); !played) return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
-  const Verdict verdict = judge(player.done(), **reader, trust);
+  const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies);
   const std::string json = text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), verdict));
   const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
@@ -144,29 +172,31 @@ Result<ExitCode> run(const ReplayOptions& options) {
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 
-void add_inputs(CLI::App& command, ReplayInputs& inputs) {
+/// Gives those that an operation stands in place of.
+std::vector<CLI::Option*> add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("recording", inputs.recording, "a session recording (a folder), or a .igs.mha")->required();
   command.add_option("--transform", inputs.transform, "of a .igs.mha: which transform is the scope's");
-  command.add_option("--calibration,--record", inputs.calibration,
-                     "the calibration record (default: the recording's own)");
-  command.add_option("--camera", inputs.camera,
-                     "lens (of OpenCV, ROS or Kalibr), in place of the calibration record's");
-  command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm");
-  command.add_option("--registration", inputs.patient_from_tracker, "patient_from_tracker, of register fiducials");
-  command.add_option("--tracker-from-patient", inputs.tracker_from_patient, "its inverse, as the demo writes it");
+  std::vector<CLI::Option*> out{
+      command.add_option("--calibration,--record", inputs.calibration,
+                         "the calibration record (default: the recording's own)"),
+      command.add_option("--camera", inputs.camera,
+                         "lens (of OpenCV, ROS or Kalibr), in place of the calibration record's"),
+      command.add_option("--camera-from-sensor", inputs.camera_from_sensor, "hand-eye, a 4x4 matrix, mm"),
+      command.add_option("--registration", inputs.patient_from_tracker, "patient_from_tracker, of register fiducials"),
+      command.add_option("--tracker-from-patient", inputs.tracker_from_patient, "its inverse, as the demo writes it")};
   CLI::Option* const fiducials = command.add_option(
       "--fiducials", inputs.fiducials, "markers in the CT, which the pointer touches in the recording: registers anew");
   command.add_option("--tip", inputs.tip, "the pointer's tip, x y z, mm (default: the calibration record's)")
       ->needs(fiducials);
   command.add_option("--pointer", inputs.pointer, "the bird that touches (default pointer)")->needs(fiducials);
   command.add_option("--touched", inputs.touched_s, "from and to, s: when it touches")->expected(2)->needs(fiducials);
-  command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views");
-  command.add_option("--rod-angle", inputs.rod_angle_deg,
-                     "of a scope whose rod turns, degrees, as it was read off when it was recorded");
-  command.add_option("--camera-rms-px", inputs.camera_rms_px,
-                     "how well the lens is known, where no calibration record says");
-  command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye");
-  command.add_option("--fre-mm", inputs.fre_mm, "and the registration");
+  out.insert(out.end(),
+             {fiducials, command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views"),
+              command.add_option("--camera-rms-px", inputs.camera_rms_px,
+                                 "how well the lens is known, where no calibration record says"),
+              command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye"),
+              command.add_option("--fre-mm", inputs.fre_mm, "and the registration")});
+  return out;
 }
 
 }  // namespace
@@ -175,13 +205,16 @@ void add_replay(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<ReplayOptions>();
   options->look.render.step_mm = 1.2;
   CLI::App& command = *app.add_subcommand("replay", "draw the CT over a recording, the same to the bit each time");
-  add_inputs(command, options->inputs);
+  std::vector<CLI::Option*> replaced = add_inputs(command, options->inputs);
   command.add_option("--volume", options->volume.path, "the CT")->required();
   add_ct_options(command, options->volume);
   add_shown_options(command, options->shown);
   add_look_options(command, options->look);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default tumour-and-vessels)");
-  command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm");
+  replaced.push_back(command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm"));
+  CLI::Option* const operation =
+      command.add_option("--operation", options->inputs.operation, kOperationHelp)->type_name("FOLDER|FILE");
+  for (CLI::Option* const option : replaced) operation->excludes(option);
   command.add_option("--engine", options->engine, "auto, cpu, gl or slices (default cpu)")
       ->check(CLI::IsMember(engine_names()));
   command.add_option("--step-mm", options->look.render.step_mm, "between samples along a ray")

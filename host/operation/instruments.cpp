@@ -12,12 +12,16 @@ void ConnectedInstruments::set_link(bool connected) {
   vouched_ = false;
 }
 
-void ConnectedInstruments::take(const wire::Health& health) {
+void take_identities(const wire::Health& health, Instruments& told) {
   for (const wire::InstrumentHealth& instrument : health.instruments) {
     if (instrument.identity.empty()) continue;
-    if (instrument.name == "tracker") now_.tracker = instrument.identity;
-    if (instrument.name == "camera") now_.camera = instrument.identity;
+    if (instrument.name == "tracker") told.tracker = instrument.identity;
+    if (instrument.name == "camera") told.camera = instrument.identity;
   }
+}
+
+void ConnectedInstruments::take(const wire::Health& health) {
+  take_identities(health, now_);
 }
 
 InstrumentMatch ConnectedInstruments::match(const Instruments& found_with, DependsOn depends_on) const {

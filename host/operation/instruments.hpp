@@ -14,6 +14,9 @@ struct Instruments {
   std::uint64_t link = 0;  ///< by which of this window's connections they were told; 0: an earlier window's
 };
 
+/// Enters what the appliance tells of them; of what it does not tell, what was known stays.
+void take_identities(const wire::Health& health, Instruments& told);
+
 /// What a finding depends on: hand-eye and lens on both instruments, a registration by touches on the tracker alone.
 enum class DependsOn : std::uint8_t { tracker, tracker_and_camera };
 

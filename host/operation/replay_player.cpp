@@ -29,6 +29,12 @@ std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& d
   return row + "\n";
 }
 
+OverlayGate::Decision refused_for(const std::string& reason) {
+  OverlayGate::Decision out;
+  out.reason = reason;
+  return out;
+}
+
 }  // namespace
 
 ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
@@ -38,19 +44,36 @@ ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustF
   if (margins) painter_.set_margins(std::make_shared<const Margins>(*std::move(margins)));
 }
 
-void ReplayPlayer::take(const wire::Birds& birds, const std::string& scope) {
+void ReplayPlayer::take(const wire::Birds& birds) {
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name == scope) painter_.take(birds.acquired, bird.tracker_from_sensor);
+    if (bird.name == output_.scope) painter_.take(birds.acquired, bird.tracker_from_sensor);
   }
 }
 
-Result<void> ReplayPlayer::take(const wire::VideoFrame& frame) {
+OverlayGate::Decision ReplayPlayer::decide(const wire::VideoFrame& frame, const std::string& other_hardware) {
+  if (!other_hardware.empty()) {
+    held_back_ = true;
+    ++done_.other_hardware;
+    return refused_for(other_hardware);
+  }
+  // As in the window: what was believed before has nothing to fade from.
+  if (std::exchange(held_back_, false)) painter_.set_setup(painter_.setup(), painter_.figures());
+  return painter_.decide(frame);
+}
+
+Result<void> ReplayPlayer::take(const wire::VideoFrame& frame, const std::string& other_hardware) {
   ++done_.frames;
   if (!painter_.fits(frame)) {
     ++done_.other_size;
+    const CameraModel& camera = painter_.setup()->camera();
+    const OverlayGate::Decision none =
+        refused_for(fmt::format("the video is {}x{}; the camera was calibrated at {}x{}", frame.width_px,
+                                frame.height_px, camera.width_px, camera.height_px));
+    ++done_.reasons[none.reason];
+    done_.table += row_of(frame, none, std::nullopt);
     return {};
   }
-  const OverlayGate::Decision decision = painter_.decide(frame);
+  const OverlayGate::Decision decision = decide(frame, other_hardware);
   const auto painted = painter_.paint(frame, decision, engine_, output_.look);
   const std::vector<std::uint8_t>& rgb = painted ? painted->rgb : *frame.rgb;
   if (painted) ++done_.overlaid;

@@ -19,11 +19,13 @@ struct ReplayOutput {
   int every = 10;      ///< of the frames, one in so many is written as a picture
   double film_hz = 0;  ///< 0: no film
   OverlayLook look;
+  std::string scope = "scope";  ///< its bird
 };
 
 /// What became of the frames so far.
 struct Replayed {
   std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
+  std::size_t other_hardware = 0;  ///< of which the setup does not hold with the instruments
   std::map<std::string, std::size_t> reasons;
   std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
   std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
@@ -36,10 +38,11 @@ class ReplayPlayer {
   ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
                std::optional<Margins> margins = std::nullopt);
 
-  /// The poses of the bird of that name tell how they scatter.
-  void take(const wire::Birds& birds, const std::string& scope);
-  /// Fails where a picture or the film cannot be written.
-  Result<void> take(const wire::VideoFrame& frame);
+  /// The poses of the scope tell how they scatter.
+  void take(const wire::Birds& birds);
+  /// Fails where a picture or the film cannot be written. other_hardware: why the setup does not hold with the
+  /// instruments that the frame is of; empty where it does.
+  Result<void> take(const wire::VideoFrame& frame, const std::string& other_hardware = {});
   /// Ends the film.
   Result<void> finish();
 
@@ -48,7 +51,10 @@ class ReplayPlayer {
  private:
   ReplayOutput output_;
   Engine& engine_;
+  OverlayGate::Decision decide(const wire::VideoFrame& frame, const std::string& other_hardware);
+
   FramePainter painter_;
+  bool held_back_ = false;
   std::optional<Film> film_;
   Replayed done_;
 };

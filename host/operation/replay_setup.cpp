@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "calibration/record/calibration_record.hpp"
+#include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/files/named_points.hpp"
 #include "host/files/record_file.hpp"
@@ -30,21 +31,37 @@ Result<void> look_through(const ReplayInputs& inputs, const Take& take) {
   }
 }
 
-/// The record that was in force when it was recorded, if one was.
-Result<std::optional<CalibrationRecord>> record_of(const ReplayInputs& inputs) {
+/// What the recording itself says.
+struct Told {
+  Instruments first;   ///< the first identities that it tells
+  std::string record;  ///< the last record that was in force; empty: none was
+};
+
+Result<Told> told_by(const ReplayInputs& inputs) {
+  Told told;
+  const auto looked = look_through(inputs, [&told](const wire::Event& event) {
+    if (const auto* health = std::get_if<wire::Health>(&event)) {
+      Instruments now;
+      take_identities(*health, now);
+      if (told.first.tracker.empty()) told.first.tracker = now.tracker;
+      if (told.first.camera.empty()) told.first.camera = now.camera;
+    }
+    const auto* calibration = std::get_if<wire::Calibration>(&event);
+    if (calibration != nullptr && calibration->in_force) told.record = calibration->record;
+  });
+  if (!looked) return looked.error();
+  return told;
+}
+
+/// The one that is named, or that was in force when it was recorded, if one was.
+Result<std::optional<CalibrationRecord>> record_of(const ReplayInputs& inputs, const Told& told) {
   if (!inputs.calibration.empty()) {
     auto record = read_record(inputs.calibration);
     if (!record) return record.error();
     return std::optional(*std::move(record));
   }
-  std::string text;
-  const auto looked = look_through(inputs, [&text](const wire::Event& event) {
-    const auto* told = std::get_if<wire::Calibration>(&event);
-    if (told != nullptr && told->in_force) text = told->record;
-  });
-  if (!looked) return looked.error();
-  if (text.empty()) return std::optional<CalibrationRecord>();
-  auto record = calibration::parse_record(text);
+  if (told.record.empty()) return std::optional<CalibrationRecord>();
+  auto record = calibration::parse_record(told.record);
   if (!record) return record.error().with_context(inputs.recording.string() + ": its calibration record");
   return std::optional(*std::move(record));
 }
@@ -145,15 +162,50 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
   return {};
 }
 
+/// By what a window kept, and by nothing else.
+Result<ReplaySetup> setup_of_operation(const ReplayInputs& inputs, const Told& told) {
+  auto operation = read_operation(inputs.operation);
+  if (!operation) return operation.error();
+  const std::string path = inputs.operation.string();
+  if (!operation->calibrated || !operation->registered) {
+    return Error{Errc::bad_value, fmt::format("{}: has no {}; give the --out folder of a live that reached its overlay",
+                                              path, operation->calibrated ? "registration" : "calibration")};
+  }
+  const RegisteredPatient& registered = *operation->registered;
+  ReplaySetup out{operation->calibrated->scope, registered.tracker_from_patient, registered, {}, registered.fre_mm, 0};
+  const std::string remedy = "give the operation that was done with these instruments (--operation)";
+  out.hardware = ReplayHardware(
+      {{"the operation's calibration", operation->calibrated->found_with, DependsOn::tracker_and_camera, remedy},
+       {"the operation's registration", registered.found_with, DependsOn::tracker, remedy}},
+      told.first, false);
+  if (!told.record.empty() && !operation->calibrated->by_board) {
+    const auto record = calibration::parse_record(told.record);
+    if (!record || calibration::sha256_of(calibration::record_text(*record)) != operation->record_sha256)
+      out.cautions.emplace_back("the recording has another calibration record than the operation was calibrated by");
+  }
+  out.operation = *std::move(operation);
+  return out;
+}
+
 }  // namespace
 
 Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
-  const auto record = record_of(inputs);
+  const auto told = told_by(inputs);
+  if (!told) return told.error();
+  if (!inputs.operation.empty()) return setup_of_operation(inputs, *told);
+  const auto record = record_of(inputs, *told);
   if (!record) return record.error();
   auto scope = scope_of(inputs, *record);
   if (!scope) return scope.error();
   ReplaySetup out{*std::move(scope), {}, {}, {}, inputs.fre_mm, 0, !inputs.camera.empty()};
   if (auto taken = take_registration(inputs, *record, out); !taken) return taken.error();
+  if (!out.scope_from_files) {
+    out.hardware = ReplayHardware({{"the calibration record",
+                                    {(*record)->tracker, (*record)->camera},
+                                    DependsOn::tracker_and_camera,
+                                    "give the record of these instruments (--calibration)"}},
+                                  told->first, inputs.calibration.empty());
+  }
   return out;
 }
 

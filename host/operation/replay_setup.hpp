@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host/operation/findings.hpp"
+#include "host/operation/operation.hpp"
+#include "host/operation/replay_hardware.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
@@ -14,6 +15,7 @@ namespace birdseye::host {
 struct ReplayInputs {
   std::filesystem::path recording;
   std::string transform;              ///< of a PLUS sequence
+  std::filesystem::path operation;    ///< what a window kept, in place of all that follows
   std::filesystem::path calibration;  ///< a record; without it and a camera, the recording's own
   std::filesystem::path camera, camera_from_sensor;
   std::filesystem::path patient_from_tracker, tracker_from_patient;
@@ -34,6 +36,9 @@ struct ReplaySetup {
   std::optional<double> fre_mm;                    ///< of the touches, or as it is stated
   std::size_t touches = 0;
   bool scope_from_files = false;  ///< lens and hand-eye, in place of a calibration record, which states its figures
+  std::optional<Operation> operation{};
+  ReplayHardware hardware{};            ///< a person's own files hold with any: who gives them answers for them
+  std::vector<std::string> cautions{};  ///< in words, each a reason not to call the replay a pass
 
   [[nodiscard]] Setup setup() const { return scope.registered(tracker_from_patient * patient_from_model); }
 };

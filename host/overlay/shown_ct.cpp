@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "host/files/files_sha256.hpp"
+#include "host/overlay/ct_sha256.hpp"
 #include "host/volume/import.hpp"
 #include "host/volume/labels.hpp"
 
@@ -15,7 +17,13 @@ Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice
   auto ct = import_with_notes(source);
   if (!ct) return ct.error();
   ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};
+  if (choice.summed) shown.ct_sha256 = ct_sha256(shown.volume);
   if (choice.labels.empty()) return shown;
+  if (choice.summed) {
+    auto sum = files_sha256(choice.labels);
+    if (!sum) return sum.error();
+    shown.labels_sha256 = *std::move(sum);
+  }
   const std::string file = choice.labels.string();
   const auto labels = import_named_labels(choice.labels, shown.volume, all_of({choice.keep, choice.margin_of}));
   if (!labels) return labels.error();

@@ -19,6 +19,7 @@ struct ShownChoice {
   std::vector<LabelChoice> keep;       ///< labels to draw, by name or number; empty: all of the CT is drawn
   std::vector<LabelChoice> margin_of;  ///< labels about which shells are drawn
   std::vector<double> margins_mm;      ///< how far the shells lie from them; empty: none are drawn
+  bool summed = false;                 ///< asks for the sums of what is read, to compare with an operation's
 };
 
 /// A CT to draw.
@@ -26,6 +27,8 @@ struct ShownCt {
   Volume volume;
   std::optional<Margins> margins;
   std::vector<std::string> notes;  ///< what its reader should know, a line each
+  std::string ct_sha256{};         ///< of all of the CT; where it was asked for
+  std::string labels_sha256{};     ///< of their files; empty where there are none
 };
 
 /// Errors name the file. Errc::bad_value where a choice needs a segmentation and none is named.

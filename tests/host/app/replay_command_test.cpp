@@ -4,8 +4,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "host/operation/operation.hpp"
+#include "host/overlay/ct_sha256.hpp"
 #include "host/recording/recording_writer.hpp"
+#include "host/volume/import.hpp"
 #include "tests/support/command.hpp"
+#include "tests/support/example_record.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
@@ -144,6 +148,208 @@ TEST(ReplayCommand, WhatCannotBeReplayedIsRefused) {
   refused("replay " + ct + " --volume " + ct + registration, {"holds no recording"});
   refused(all + " --fiducials " + scratch.file("f.txt", "0 0 0\n1 0 0\n0 1 0\n"), {"--tip"});
   refused(all + registration + " --deformation " + (scratch / "none.mha").string(), {"none.mha"});
+}
+
+const calibration::Identity kBird{{"unit_serial", "4711"}}, kOtherBird{{"unit_serial", "4712"}};
+const calibration::Identity kHead{{"serial", "A1"}}, kOtherHead{{"serial", "B2"}};
+
+wire::Health health_of(const calibration::Identity& tracker, const calibration::Identity& camera) {
+  wire::Health health;
+  health.state = "ready";
+  health.instruments = {{"tracker", "running", "", 0, tracker}, {"camera", "running", "", 0, camera}};
+  return health;
+}
+
+/// Eight frames that look at small_ct's ball. Before each stands what an appliance tells then, if anything.
+void record_told(const fs::path& folder, const std::map<int, std::vector<wire::Event>>& told) {
+  auto writer = host::RecordingWriter::create({.folder = folder, .source = "test"});
+  ASSERT_TRUE(writer) << writer.error().what;
+  for (int n = 0; n < 8; ++n) {
+    if (told.contains(n)) {
+      for (const wire::Event& event : told.at(n)) ASSERT_TRUE((*writer)->add(event));
+    }
+    wire::VideoFrame frame;
+    frame.info.sequence = static_cast<std::uint64_t>(n);
+    frame.info.acquired = frame.info.arrived = {1'000'000'000 + 40'000'000 * n};
+    frame.width_px = 64;
+    frame.height_px = 48;
+    frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(3 * 64 * 48, std::uint8_t{20});
+    frame.info.pose.kind = PoseKind::interpolated;
+    frame.info.pose.tracker_from_sensor =
+        Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, -80));
+    ASSERT_TRUE((*writer)->add(frame));
+  }
+  ASSERT_TRUE((*writer)->finish("done"));
+}
+
+wire::Calibration record_of(int width_px, const calibration::Identity& camera) {
+  wire::Calibration out;
+  out.in_force = true;
+  out.record = calibration::record_text(testing::example_record(width_px, 48, kBird, camera));
+  return out;
+}
+
+/// What becomes of a replay: its frames.csv's reasons, and the figures.
+struct Replayed {
+  nlohmann::json figures;
+  std::vector<std::string> reasons;  ///< of frames, in order; empty: with an overlay
+  std::string output;
+};
+
+Replayed replay(const Scratch& scratch, const std::string& recording, const std::string& arguments) {
+  const std::string ct = fs::exists(scratch / "ct") ? (scratch / "ct").string() : small_ct(scratch);
+  const auto result = run("birdseye", "replay " + (scratch / recording).string() + " --volume " + ct + " --out " +
+                                          (scratch / "o").string() + " " + arguments);
+  Replayed out;
+  out.output = result.output;
+  EXPECT_TRUE(result.code == 0 || result.code == 3) << result.output;
+  if (result.code != 0 && result.code != 3) return out;
+  out.figures = read_json(scratch / "o/replay.json");
+  std::istringstream table(contents_of(scratch / "o/frames.csv"));
+  std::string line;
+  std::getline(table, line);
+  while (std::getline(table, line)) {
+    std::istringstream row(line);
+    std::string cell;
+    for (int i = 0; i < 5; ++i) std::getline(row, cell, ',');
+    out.reasons.push_back(cell);
+  }
+  EXPECT_EQ(out.reasons.size(), 8U);
+  return out;
+}
+
+TEST(ReplayCommand, ARecordOfAnotherInstrumentDrawsNothing) {
+  const Scratch scratch;
+  record_told(scratch / "r", {{0, {health_of(kBird, kHead)}}});
+  const std::string registration = "--registration " + scratch.file("reg.txt", kIdentityPose) + " --calibration ";
+  const auto by = [&](const calibration::Identity& tracker, const calibration::Identity& camera) {
+    return replay(scratch, "r",
+                  registration + scratch.file("record.json", calibration::record_text(
+                                                                 testing::example_record(64, 48, tracker, camera))));
+  };
+  const Replayed own = by(kBird, kHead);
+  EXPECT_EQ(own.figures["frames_overlaid"], 8) << own.output;
+  EXPECT_EQ(own.figures["verdict"], "pass") << own.output;
+  const Replayed other_camera = by(kBird, kOtherHead);
+  EXPECT_EQ(other_camera.figures["frames_overlaid"], 0);
+  EXPECT_EQ(other_camera.figures["verdict"], "fail");
+  EXPECT_EQ(other_camera.reasons[3], "the calibration record is of camera serial B2; this one's is A1");
+  EXPECT_NE(other_camera.output.find("give the record of these instruments (--calibration)"), std::string::npos)
+      << other_camera.output;
+  EXPECT_EQ(by(kOtherBird, kHead).reasons[0],
+            "the calibration record is of tracker unit_serial 4712; this one's is 4711");
+  // Of a record that says nothing, nothing is known.
+  const Replayed unknown = by({}, kHead);
+  EXPECT_EQ(unknown.figures["frames_overlaid"], 8);
+  EXPECT_EQ(unknown.figures["verdict"], "marginal");
+  EXPECT_NE(unknown.output.find("nothing tells whether the calibration record is of the recording's tracker"),
+            std::string::npos)
+      << unknown.output;
+}
+
+TEST(ReplayCommand, FramesAfterTheCameraWasExchangedBearNoOverlay) {
+  const Scratch scratch;
+  wire::Calibration withdrawn;
+  withdrawn.why_not = "the record is of camera serial A1, this one's is B2";
+  const std::string registration = "--registration " + scratch.file("reg.txt", kIdentityPose);
+  record_told(scratch / "exchanged", {{0, {health_of(kBird, kHead), record_of(64, kHead)}},
+                                      {3, {health_of(kBird, kOtherHead)}},
+                                      {6, {health_of(kBird, kHead)}}});
+  const Replayed exchanged = replay(scratch, "exchanged", registration);
+  EXPECT_EQ(exchanged.figures["frames_of_other_hardware"], 3) << exchanged.output;
+  EXPECT_EQ(exchanged.figures["verdict"], "fail");
+  EXPECT_EQ(exchanged.reasons[2], "");
+  EXPECT_NE(exchanged.reasons[3].find("serial A1"), std::string::npos) << exchanged.reasons[3];
+  EXPECT_EQ(exchanged.figures["frames_overlaid"].get<int>(), 5) << "and the rest does";
+  record_told(scratch / "withdrawn", {{0, {health_of(kBird, kHead), record_of(64, kHead)}}, {5, {withdrawn}}});
+  const Replayed held_back = replay(scratch, "withdrawn", registration);
+  EXPECT_EQ(held_back.figures["frames_overlaid"], 5) << held_back.output;
+  EXPECT_NE(held_back.reasons[5].find("the appliance withdrew its calibration record"), std::string::npos);
+  // By a person's own files nobody asks.
+  const Replayed own = replay(scratch, "exchanged",
+                              registration + " --camera " + scratch.file("camera.yaml", kReplayCamera) +
+                                  " --camera-from-sensor " + scratch.file("hand_eye.txt", kIdentityPose));
+  EXPECT_EQ(own.figures["frames_overlaid"], 8) << own.output;
+}
+
+TEST(ReplayCommand, FramesOfAnotherSizeBearNoOverlay) {
+  const Scratch scratch;
+  record_told(scratch / "r", {{0, {health_of(kBird, kHead), record_of(128, kHead)}}});
+  const Replayed done = replay(scratch, "r", "--registration " + scratch.file("reg.txt", kIdentityPose));
+  EXPECT_EQ(done.figures["frames_overlaid"], 0);
+  EXPECT_EQ(done.figures["verdict"], "fail");
+  EXPECT_EQ(done.reasons[0], "the video is 64x48; the camera was calibrated at 128x48");
+  EXPECT_NE(done.output.find("8 of 8 frames are of another size"), std::string::npos) << done.output;
+}
+
+TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
+  const Scratch scratch;
+  record_told(scratch / "r", {{0, {health_of(kBird, kHead)}}, {6, {health_of(kOtherBird, kHead)}}});
+  const std::string ct = small_ct(scratch);
+  host::Operation kept;
+  kept.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
+  kept.made_utc = "2026-11-22T10:00:00Z";
+  kept.calibrated = {*host::ScopeSetup::of_record(testing::example_record(64, 48, kBird, kHead)),
+                     "2026-11-22T09:30:00Z",
+                     true,
+                     {kBird, kHead, 0}};
+  kept.registered = {{}, 0.3, {{0, 0, 0}, {30, 0, 0}, {0, 50, 0}, {10, 0, 70}}, {kBird, {}, 0}};
+  ASSERT_TRUE(host::write_operation(scratch.path(), kept));
+  const std::string arguments = "--operation " + scratch.path().string();
+  const Replayed done = replay(scratch, "r", arguments);
+  EXPECT_EQ(done.figures["frames_overlaid"], 6) << done.output;
+  EXPECT_EQ(done.reasons[6], "the operation's calibration is of tracker unit_serial 4711; this one's is 4712");
+  EXPECT_EQ(done.figures["fre_mm"], 0.3);
+  // The copies beside it are nobody's word.
+  const std::string pictures = done.figures["pictures_crc32"];
+  (void)scratch.file("patient_from_tracker.txt", "1 0 0 20\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  EXPECT_EQ(replay(scratch, "r", arguments).figures["pictures_crc32"], pictures);
+  const auto refused = [&](const std::string& command, const std::vector<std::string>& words) {
+    expect_refused("birdseye", command, words, scratch / "none");
+  };
+  const std::string by_operation = " --volume " + ct + " --operation " + scratch.path().string();
+  refused("replay " + (scratch / "r").string() + by_operation + " --registration " +
+              scratch.file("reg.txt", kIdentityPose) + " --out " + (scratch / "none").string(),
+          {"--operation", "excludes", "--registration"});
+  // Another CT in its place, and a folder whose operation somebody edited.
+  fs::remove_all(scratch / "ct");
+  small_ct(scratch, 8);
+  refused("replay " + (scratch / "r").string() + by_operation + " --out " + (scratch / "none").string(),
+          {"--operation", "is of another CT"});
+  refused("export" + by_operation + " --out " + (scratch / "none").string(), {"--operation", "is of another CT"});
+  refused("render" + by_operation + " --pose " + scratch.file("pose.txt", kIdentityPose) + " --out " +
+              (scratch / "none").string() + ".png",
+          {"--operation", "is of another CT"});
+  std::string edited = contents_of(scratch / "operation.json");
+  edited.replace(edited.find("\"fre_mm\":0.3"), 12, "\"fre_mm\":0.1");
+  (void)scratch.file("operation.json", edited);
+  refused("export" + by_operation + " --out " + (scratch / "none").string(), {"\"registered\" was changed"});
+}
+
+TEST(ReplayCommand, ExportAndRenderTakeWhatAWindowKept) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  host::Operation kept;
+  kept.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
+  kept.calibrated = {*host::ScopeSetup::of_record(testing::example_record(64, 48, kBird, kHead)),
+                     "2026-11-22T09:30:00Z", true};
+  kept.registered = {
+      Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {100, 0, 0}), 0.3, {{0, 0, 0}, {30, 0, 0}, {0, 50, 0}}};
+  fs::create_directories(scratch / "kept");
+  ASSERT_TRUE(host::write_operation(scratch / "kept", kept));
+  const std::string by_operation = " --volume " + ct + " --operation " + (scratch / "kept/operation.json").string();
+  const auto exported = run("birdseye", "export" + by_operation + " --out " + (scratch / "slicer").string());
+  ASSERT_EQ(exported.code, 0) << exported.output;
+  const auto seen = host::import_volume(scratch / "slicer/ct.nrrd");
+  ASSERT_TRUE(seen) << seen.error().what;
+  EXPECT_NEAR((seen->patient_from_voxel.translation() - host::import_volume(ct)->patient_from_voxel.translation()).x(),
+              100, 1e-3);
+  const auto rendered =
+      run("birdseye", "render" + by_operation + " --transfer abdomen --pose " +
+                          scratch.file("pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 80\n0 0 0 1\n") + " --json " +
+                          (scratch / "render.json").string() + " --out " + (scratch / "picture.png").string());
+  ASSERT_EQ(rendered.code, 0) << rendered.output;
+  EXPECT_EQ(read_json(scratch / "render.json")["width_px"], 64);
 }
 
 }  // namespace
