@@ -102,7 +102,7 @@ struct DemoOptions {
 /// The chosen CT as the simulator can read it, which knows no series. With the host's own checks: what would be stacked
 /// wrongly is refused here, with the reason.
 Result<fs::path> simple_ct(const VolumeSource& source, const fs::path& out) {
-  const auto ct = import_with_notes(source);
+  const auto ct = import_body(source);
   if (!ct) return ct.error();
   print_notes(ct->notes);
   const Volume& volume = ct->volume;
@@ -198,7 +198,7 @@ void add_demo(CLI::App& app, CommandStatus& status) {
   CLI::Option* const ct =
       command.add_option("--ct", options->ct.path, "a CT to operate on, in place of the procedural patient");
   add_ct_options(command, options->ct);
-  for (const char* name : {"--series", "--untilt"}) command.get_option(name)->needs(ct);
+  for (const char* name : {"--series", "--untilt", "--spacing", "--orientation"}) command.get_option(name)->needs(ct);
   command.add_option("--seed", cart.seed, "everything random follows from it");
   command
       .add_option(

@@ -77,7 +77,7 @@ Result<Registered> read_registered(ExportOptions options) {
     read.field = *std::move(field);
   }
   if (!options.volume.path.empty()) {
-    auto imported = import_with_notes(options.volume);
+    auto imported = import_body(options.volume);
     if (!imported) return imported.error();
     print_notes(imported->notes);
     read.volume = std::move(imported->volume);

@@ -69,7 +69,7 @@ Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayS
 }
 
 nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const TrustFigures& figures,
-                       const std::string& engine, const Verdict& verdict) {
+                       const std::string& engine, const std::vector<std::string>& notes, const Verdict& verdict) {
   nlohmann::json json = {{"frames", done.frames},
                          {"frames_overlaid", done.overlaid},
                          {"frames_overlaid_whole", done.whole},
@@ -80,6 +80,7 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
                          {"engine", engine},
                          {"fre_mm", *figures.fre_mm},
                          {"touches", setup.touches},
+                         {"notes", notes},
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
   if (figures.scope.camera_rms_px) json["camera_rms_px"] = *figures.scope.camera_rms_px;
@@ -157,7 +158,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
   const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies);
-  const std::string json = text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), verdict));
+  const std::string json =
+      text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), shown->notes, verdict));
   const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},
@@ -196,6 +198,8 @@ std::vector<CLI::Option*> add_inputs(CLI::App& command, ReplayInputs& inputs) {
                                  "how well the lens is known, where no calibration record says"),
               command.add_option("--hand-eye-rms-px", inputs.held_out_px, "and hand-eye"),
               command.add_option("--fre-mm", inputs.fre_mm, "and the registration")});
+  command.add_option("--rod-angle", inputs.rod_angle_deg,
+                     "of a scope whose rod turns, degrees, as it was read off when it was recorded");
   return out;
 }
 

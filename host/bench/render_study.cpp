@@ -156,7 +156,8 @@ Result<void> write_scene(const std::filesystem::path& folder, const TimedCase& c
   const Eigen::Vector3d origin = volume.patient_from_voxel.translation();
   std::string mha = fmt::format(
       "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nDimSize = {} {} {}\n"
-      "ElementSpacing = {} {} {}\nOffset = {} {} {}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n",
+      "TransformMatrix = 1 0 0 0 1 0 0 0 1\nElementSpacing = {} {} {}\nOffset = {} {} {}\nElementType = MET_SHORT\n"
+      "ElementDataFile = LOCAL\n",
       c.size[0], c.size[1], c.size[2], spacing.x(), spacing.y(), spacing.z(), origin.x(), origin.y(), origin.z());
   mha.append(reinterpret_cast<const char*>(volume.hu.data()), volume.hu.size() * sizeof(std::int16_t));
   nlohmann::json transfer = nlohmann::json::array();

@@ -228,9 +228,10 @@ Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
     if (const auto done = correct_by_field(files, input); !done) return done.error();
   }
   if (!files.volume.path.empty()) {
-    auto volume = import_volume(files.volume);
-    if (!volume) return volume.error();
-    input.volume = *std::move(volume);
+    auto imported = import_body(files.volume);
+    if (!imported) return imported.error();
+    input.volume = std::move(imported->volume);
+    std::move(imported->notes.begin(), imported->notes.end(), std::back_inserter(input.notes));
   }
   if (!files.surface.empty()) {
     auto surface = read_surface(files.surface);

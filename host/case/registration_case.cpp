@@ -80,7 +80,7 @@ class CaseTable {
 Result<void> only_known_keys(const fs::path& file, const std::string& table, const toml::value& content) {
   static const std::map<std::string, std::vector<std::string>> kKnown = {
       {"", {"volume", "model", "view", "target", "landmark", "points", "truth"}},
-      {"volume", {"path", "series", "untilt", "label", "label_values", "transfer"}},
+      {"volume", {"path", "series", "untilt", "spacing", "orientation", "label", "label_values", "transfer"}},
       {"model",
        {"control_points", "level", "optimiser", "initial", "refine_pose", "pose_prior", "unknowns", "similarity",
         "most_evaluations"}},
@@ -130,9 +130,23 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   const auto untilt = table.get<bool>("untilt", false);
   if (!untilt) return untilt.error();
   source.untilt = *untilt;
-  auto ct = import_volume(source);
+  if (table.has("spacing")) {
+    const auto spacing = table.get<std::vector<double>>("spacing");
+    if (!spacing) return spacing.error();
+    if (spacing->size() != 3) return table.wrong("spacing", "is three numbers, mm");
+    source.spacing_mm = Eigen::Vector3d::Map(spacing->data());
+  }
+  const auto orientation = table.get<std::string>("orientation", "");
+  if (!orientation) return orientation.error();
+  source.orientation = *orientation;
+  if (!source.orientation.empty() && !axes_of_letters(source.orientation)) {
+    return table.wrong("orientation",
+                       "is one of R and L, one of A and P and one of I and S, in the order of i, j, k, as \"LPS\"");
+  }
+  auto ct = import_body(source);
   if (!ct) return ct.error();
-  out.ct = *std::move(ct);
+  out.ct = std::move(ct->volume);
+  out.notes = std::move(ct->notes);
   const auto transfer = table.get<std::string>("transfer", "liver");
   if (!transfer) return transfer.error();
   out.transfer = *transfer;

@@ -15,7 +15,7 @@ constexpr Duration kCtWithin = Duration::from_ms(320'000);  // the decoder's own
 
 std::vector<Check> check_ct(const VolumeSource& ct) {
   Check check{kInputs, "CT", CheckState::good, "", ""};
-  const auto imported = import_with_notes(ct);
+  const auto imported = import_body(ct);
   if (!imported) {
     check.state = CheckState::bad;
     check.found = imported.error().what;

@@ -103,7 +103,7 @@ Result<void> check_labels_named(const PatientFiles& files) {
 Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_token& stop) {
   if (auto named = check_labels_named(files); !named) return named.error();
   PatientPlan plan;
-  auto ct = import_with_notes(files.ct, stop);
+  auto ct = import_body(files.ct, stop);
   if (!ct) return ct.error();
   plan.ct = std::move(ct->volume);
   plan.identity = std::move(ct->patient);

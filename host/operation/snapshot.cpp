@@ -32,6 +32,9 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   };
   if (!snapshot.patient.ct.series.empty()) add("--series", snapshot.patient.ct.series);
   if (snapshot.patient.ct.untilt) out.emplace_back("--untilt");
+  if (const auto& mm = snapshot.patient.ct.spacing_mm)
+    add("--spacing", fmt::format("{},{},{}", number(mm->x()), number(mm->y()), number(mm->z())));
+  if (!snapshot.patient.ct.orientation.empty()) add("--orientation", snapshot.patient.ct.orientation);
   if (!snapshot.patient.shown.empty()) {
     add("--labels", whole(snapshot.patient.labels));
     add("--keep", joined(snapshot.patient.shown, ","));

@@ -14,7 +14,7 @@ Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice
     return Error{Errc::bad_value, "--margins and --margin-of go together: how many mm, about which labels"};
   if (!choice.labels.empty() && choice.keep.empty() && choice.margins_mm.empty())
     return Error{Errc::bad_value, "--labels does nothing by itself: give --show too, or --margins with --margin-of"};
-  auto ct = import_with_notes(source);
+  auto ct = import_body(source);
   if (!ct) return ct.error();
   ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};
   if (choice.summed) shown.ct_sha256 = ct_sha256(shown.volume);

@@ -7,6 +7,7 @@
 #include "host/dicom/refused.hpp"
 #include "host/dicom/series.hpp"
 #include "host/volume/image_file.hpp"
+#include "host/volume/stated_geometry.hpp"
 #include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
@@ -24,6 +25,6 @@ Result<DicomScan> scan_dicom(const VolumeSource& source, const Announce& announc
 Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& announce, int copies);
 /// A DICOM segmentation, a folder that holds one, or a series whose values are labels.
 Result<ImageFile> decode_dicom_labels(const std::filesystem::path& path, const Announce& announce, int copies);
-Result<ImageFile> decode_image_file(const std::filesystem::path& path, int components);
+Result<ImageFile> decode_image_file(const VolumeSource& source, int components, GeometryFrom from);
 
 }  // namespace birdseye::host

@@ -1,5 +1,6 @@
 #include "host/volume/image_file.hpp"
 
+#include <fmt/format.h>
 #include <tbb/info.h>
 
 #include <cmath>
@@ -49,13 +50,17 @@ void send_image(const Send& send, const ImageFile& image) {
   }
 }
 
-Result<ImageFile> decode(const VolumeSource& source, int components, const Announce& announce, int copies) {
+Result<ImageFile> decode(const VolumeSource& source, int components, GeometryFrom from, const Announce& announce,
+                         int copies) {
   const fs::path& path = source.path;
-  if (holds_dicom(path)) return decode_dicom(source, announce, copies);
+  if (holds_dicom(path)) {
+    if (auto stated = check_stated(source, from, {}); !stated) return stated.error();
+    return decode_dicom(source, announce, copies);
+  }
   announce(path);
   if (!source.series.empty())
     return refused(Errc::bad_value, path, "is one volume, of which --series cannot choose; leave it out");
-  auto image = decode_image_file(path, components);
+  auto image = decode_image_file(source, components, from);
   if (!image || components != 1) return image;
   auto names = nifti_label_names(path);
   if (!names) return names.error();
@@ -136,9 +141,22 @@ Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
   if (!image.origin_mm.allFinite() || image.origin_mm.cwiseAbs().maxCoeff() > kFurthest_mm) {
     return refused(Errc::bad_value, path, "has no sensible place in the patient; export it again");
   }
-  if (!image.spacing_mm.allFinite() || !(image.spacing_mm.minCoeff() > 0) ||
-      image.spacing_mm.maxCoeff() > kFurthest_mm) {
+  // The grid of a displacement field may be as wide as its author likes.
+  constexpr double kLeastSpacing_mm = 0.02, kWidestSpacing_mm = 20;
+  const double least_mm = image.spacing_mm.minCoeff(), widest_mm = image.spacing_mm.maxCoeff();
+  if (!image.spacing_mm.allFinite() || !(least_mm > 0) || widest_mm > kFurthest_mm)
     return refused(Errc::bad_value, path, "has no sensible voxel spacing; export it again");
+  if (image.components == 1 && least_mm < kLeastSpacing_mm) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("has voxels {:.4g} mm apart, and those of a CT are {:.2g} to {:.2g} mm apart; is it in "
+                               "metres? Export it in mm",
+                               least_mm, kLeastSpacing_mm, kWidestSpacing_mm));
+  }
+  if (image.components == 1 && widest_mm > kWidestSpacing_mm) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("has voxels {:.4g} mm apart, and those of a CT are {:.2g} to {:.2g} mm apart; is it in "
+                               "another unit than mm? Export it in mm",
+                               widest_mm, kLeastSpacing_mm, kWidestSpacing_mm));
   }
   if (!image.axes.allFinite() || !(image.axes.transpose() * image.axes).isIdentity(1e-3)) {
     return refused(Errc::unsupported, path, "its axes are sheared or have no length; resample it first");
@@ -171,14 +189,16 @@ Result<ImageFile> read_apart(const fs::path& path, int components, const std::st
 
 Result<ImageFile> read_image(const VolumeSource& source, int components, const std::stop_token& stop) {
   const int copies = tbb::info::default_concurrency();
+  const GeometryFrom from = components == 1 ? GeometryFrom::file_or_person : GeometryFrom::file;
   return read_apart(source.path, components, stop,
-                    [&](const Announce& announce) { return decode(source, components, announce, copies); });
+                    [&](const Announce& announce) { return decode(source, components, from, announce, copies); });
 }
 
 Result<ImageFile> read_labels_file(const fs::path& path, const std::stop_token& stop) {
   const int copies = tbb::info::default_concurrency();
   return read_apart(path, 1, stop, [&](const Announce& announce) {
-    return holds_dicom(path) ? decode_dicom_labels(path, announce, copies) : decode(path, 1, announce, copies);
+    return holds_dicom(path) ? decode_dicom_labels(path, announce, copies)
+                             : decode(path, 1, GeometryFrom::file, announce, copies);
   });
 }
 

@@ -4,11 +4,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cmath>
 #include <fstream>
+#include <initializer_list>
 #include <map>
+#include <sstream>
 #include <string_view>
+#include <vector>
 
 #include "calibration/base/lower_case.hpp"
+#include "host/dicom/refused.hpp"
+#include "host/volume/image_file.hpp"
+#include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
@@ -41,44 +49,168 @@ Fields header_fields(std::istream& file, char sign, const std::string& last) {
   return fields;
 }
 
-std::string unstated_by_nrrd(const Fields& fields) {
-  static constexpr std::array<std::string_view, 6> kSpaces = {
-      "right-anterior-superior", "ras", "left-anterior-superior", "las", "left-posterior-superior", "lps"};
-  const auto space = fields.find("space");
-  if (space == fields.end())
-    return "does not say which way its axes point (it has no \"space\", as left-posterior-superior); export it from "
-           "a program that says so, as 3D Slicer";
-  if (std::find(kSpaces.begin(), kSpaces.end(), lower_case(space->second)) == kSpaces.end())
-    return fmt::format(
-        "is in the space \"{}\", which says nothing of the patient; export it in left-posterior-superior",
-        space->second.substr(0, 80));
-  if (!fields.contains("space directions"))
-    return "does not say how far apart its voxels are (it has no \"space directions\"); export it again";
-  return {};
+/// The numbers of a list as "1 1 2" or "(1,0,0) (0,1,0)"; fewer where one is no number.
+std::vector<double> numbers_in(std::string text) {
+  for (char& c : text) {
+    if (c == '(' || c == ')' || c == ',') c = ' ';
+  }
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (double number = 0; words >> number;) numbers.push_back(number);
+  return numbers;
 }
 
-std::string unstated_by_meta_image(const Fields& fields) {
-  const auto dimensions = fields.find("ndims");
-  if (dimensions == fields.end() || dimensions->second.size() != 1 || dimensions->second < "1" ||
-      dimensions->second > "9")
-    return "does not say how many dimensions it has (NDims); export it again";
-  if (!fields.contains("elementspacing") && !fields.contains("elementsize"))
-    return "does not say how far apart its voxels are (it has no ElementSpacing); add the line, or export it again";
-  return {};
+bool are_spacings(const std::vector<double>& numbers) {
+  return numbers.size() >= 3 &&
+         std::all_of(numbers.begin(), numbers.begin() + 3, [](double mm) { return std::isfinite(mm) && mm > 0; });
+}
+
+GeometryGaps gaps_of_nrrd(const Fields& fields) {
+  static constexpr std::array<std::string_view, 6> kSpaces = {
+      "right-anterior-superior", "ras", "left-anterior-superior", "las", "left-posterior-superior", "lps"};
+  const auto value = [&fields](const char* name) {
+    const auto found = fields.find(name);
+    return found == fields.end() ? std::string() : found->second;
+  };
+  GeometryGaps gaps;
+  const std::string space = value("space"), directions = value("space directions");
+  if (directions.empty()) {
+    if (!are_spacings(numbers_in(value("spacings")))) {
+      gaps.spacing =
+          "does not say how far apart its voxels are (it has neither \"space directions\" nor \"spacings\" of its "
+          "axes)";
+    }
+    gaps.orientation = "does not say which way its axes point (it has no \"space directions\")";
+  }
+  if (space.empty()) {
+    gaps.orientation = "does not say which way its axes point (it has no \"space\", as left-posterior-superior)";
+  } else if (std::find(kSpaces.begin(), kSpaces.end(), lower_case(space)) == kSpaces.end()) {
+    gaps.orientation = fmt::format(
+        "does not say which way its axes point (it is in the space \"{}\", which says nothing of the patient)",
+        space.substr(0, 80));
+  }
+  // The reader passes units over.
+  const std::string units = lower_case(value("space units") + " " + value("units"));
+  std::string spaced = units;
+  std::replace(spaced.begin(), spaced.end(), '"', ' ');
+  std::istringstream words(spaced);
+  for (std::string unit; words >> unit;) {
+    if (unit != "mm" && unit.rfind("millimet", 0) != 0)
+      gaps.beyond = fmt::format("has lengths in {}; export it in mm", trimmed(units).substr(0, 80));
+  }
+  return gaps;
+}
+
+/// Letters of MetaImage's AnatomicalOrientation, which say where axes come from, as those where the axes point to.
+std::string turned_letters(const std::string& from) {
+  static constexpr std::string_view kFrom = "RLAPIS", kTo = "LRPASI";
+  std::string to;
+  for (const char letter : from) {
+    const auto at = kFrom.find(static_cast<char>(std::toupper(static_cast<unsigned char>(letter))));
+    if (at == std::string_view::npos) return {};
+    to += kTo[at];
+  }
+  return to;
+}
+
+GeometryGaps gaps_of_meta_image(const Fields& fields) {
+  const auto value = [&fields](std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+      if (const auto found = fields.find(name); found != fields.end()) return found->second;
+    }
+    return std::string();
+  };
+  GeometryGaps gaps;
+  const std::string dimensions = value({"ndims"});
+  if (dimensions.size() != 1 || dimensions < "1" || dimensions > "9") {
+    gaps.beyond = "does not say how many dimensions it has (NDims); export it again";
+    return gaps;
+  }
+  if (dimensions < "3") return gaps;  // a picture, which is refused as such
+  const auto apart = numbers_in(value({"elementspacing"})), wide = numbers_in(value({"elementsize"}));
+  if (!are_spacings(apart) && !are_spacings(wide)) {
+    gaps.spacing = "does not say how far apart its voxels are (it has no ElementSpacing of its axes)";
+  } else if (are_spacings(apart) && are_spacings(wide) &&
+             !std::equal(apart.begin(), apart.begin() + 3, wide.begin(),
+                         [](double a, double b) { return std::abs(a - b) < 1e-3 * a; })) {
+    gaps.spacing = fmt::format("says two spacings of its voxels: ElementSpacing {}, ElementSize {}",
+                               value({"elementspacing"}), value({"elementsize"}));
+  }
+  const auto turn = numbers_in(value({"transformmatrix", "rotation", "orientation"}));
+  if (turn.empty()) {
+    gaps.orientation = "does not say which way its axes point (it has no TransformMatrix)";
+    return gaps;
+  }
+  const std::string letters = turned_letters(value({"anatomicalorientation"}));
+  if (turn.size() != 9 || !axes_of_letters(letters)) return gaps;
+  Eigen::Affine3d axes = Eigen::Affine3d::Identity();
+  axes.linear() = Eigen::Matrix3d::Map(turn.data());
+  if (const std::string by_turn = orientation_letters(axes); by_turn != letters) {
+    gaps.orientation = fmt::format("says two orientations: {} by its TransformMatrix, {} by its AnatomicalOrientation",
+                                   by_turn, letters);
+  }
+  return gaps;
+}
+
+std::string mm_of(const Eigen::Vector3d& mm) {
+  return fmt::format("{:.4g} x {:.4g} x {:.4g} mm", mm.x(), mm.y(), mm.z());
 }
 
 }  // namespace
 
-std::string unstated_geometry(const std::filesystem::path& path) {
+GeometryGaps text_header_gaps(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string first(4, '\0');
   file.read(first.data(), static_cast<std::streamsize>(first.size()));
-  if (first == "NRRD") return unstated_by_nrrd(header_fields(file, ':', ""));
+  if (first == "NRRD") return gaps_of_nrrd(header_fields(file, ':', ""));
   const std::string ending = lower_case(path.extension().string());
   if (ending != ".mha" && ending != ".mhd") return {};
   file.clear();
   file.seekg(0);
-  return unstated_by_meta_image(header_fields(file, '=', "elementdatafile"));
+  return gaps_of_meta_image(header_fields(file, '=', "elementdatafile"));
+}
+
+Result<void> check_stated(const VolumeSource& source, GeometryFrom from, const GeometryGaps& gaps) {
+  const auto& path = source.path;
+  if (!gaps.beyond.empty()) return refused(Errc::bad_format, path, gaps.beyond);
+  const auto judge = [&](const std::string& gap, bool stated, const char* what, const char* option) -> Result<void> {
+    if (stated && gap.empty()) {
+      return refused(Errc::bad_value, path, fmt::format("says {} itself: leave {} out", what, option));
+    }
+    if (stated || gap.empty()) return {};
+    return refused(Errc::bad_format, path,
+                   fmt::format("{}; export it again by a program that writes it, as 3D Slicer{}", gap,
+                               from == GeometryFrom::file ? "" : fmt::format(", or state it: {}", option)));
+  };
+  if (auto known =
+          judge(gaps.spacing, source.spacing_mm.has_value(), "how far apart its voxels are", "--spacing x,y,z (mm)");
+      !known) {
+    return known;
+  }
+  return judge(gaps.orientation, !source.orientation.empty(), "which way its axes point",
+               "--orientation, as --orientation LPS");
+}
+
+void put_stated(const VolumeSource& source, const VoxelPlace* place, ImageFile& image) {
+  if (source.spacing_mm) {
+    image.spacing_mm = *source.spacing_mm;
+    image.notes.push_back(
+        fmt::format("its spacing, {}, was stated by a person (--spacing): the file does not say it, or says two",
+                    mm_of(image.spacing_mm)));
+  }
+  if (source.orientation.empty()) return;
+  if (place != nullptr) {
+    image.axes = place->axes;
+    image.origin_mm = place->origin_mm;
+  } else {
+    image.axes = *axes_of_letters(source.orientation);
+    image.origin_mm.setZero();
+  }
+  image.notes.push_back(fmt::format(
+      "its orientation, {}, was stated by a person (--orientation): {}", source.orientation,
+      place != nullptr ? "the file says two"
+                       : "the file does not say it, nor where the patient's origin is, which is taken to be "
+                         "the first voxel"));
 }
 
 }  // namespace birdseye::host

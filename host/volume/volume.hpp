@@ -4,7 +4,9 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host/dicom/patient_identity.hpp"
@@ -35,5 +37,7 @@ struct Volume {
 
 /// Which way each voxel axis mostly points, as three letters of R/L, A/P, I/S: "LPS" for DICOM's own axes.
 std::string orientation_letters(const Eigen::Affine3d& patient_from_voxel);
+/// Columns: which way the voxel axes point by three such letters; empty where they are none, as "LPP".
+std::optional<Eigen::Matrix3d> axes_of_letters(std::string_view letters);
 
 }  // namespace birdseye::host

@@ -241,6 +241,10 @@ ROWS = [
         lambda folder: volumes.write_mha(folder / "ct.mha", cut=5000), says=["ct.mha", "ends|cut|short"]),
     Row("volume info", "wrong", "a NIfTI file without a frame of coordinates", "refused: what to do", info_of("ct.nii"), 2,
         nifti("ct.nii", form=(0, 0)), says=["ct.nii"]),
+    Row("volume info", "odd", "the same, --orientation RAS", "read; the note says that a person stated it",
+        info_of("ct.nii") + " --orientation RAS", 0, nifti("ct.nii", form=(0, 0)), says=["RAS, was stated by a person"], writes=ONE),
+    Row("volume info", "wrong", "--orientation for a file that says its own", "refused: leave it out", info_of("ct.nii.gz") + " --orientation LPS", 2,
+        nifti(), says=["leave --orientation"]),
     Row("volume info", "wrong", "a voxel that is not a number", "refused", info_of("ct.nii"), 2, nifti_of_floats_with_nan,
         says=["ct.nii", "finite|number"]),
     Row("volume info", "wrong", "an empty folder", "refused: the folder is named", INFO, 2, lambda folder: (folder / "ct").mkdir(), says=["ct"]),
@@ -252,8 +256,10 @@ ROWS = [
         nifti("ct.nii", scale=0.001), says=["metres"]),
     *[Row("volume info", "wrong", f"hostile {name}", expected, info_of(f"$DATA/hostile/{name}"), 2, data=[f"hostile/{name}"], says=says)
       for name, expected, says in (
-          ("nocode.nii", "refused, with the remedy", ["nocode.nii"]), ("conflict.nii", "refused, with the remedy", ["conflict.nii"]),
-          ("nospace.nrrd", "refused, with the remedy", ["nospace.nrrd"]), ("nospc.mha", "refused, with the remedy", ["nospc.mha"]),
+          ("nocode.nii", "refused, with the remedy", ["qform nor its sform", "--orientation"]),
+          ("conflict.nii", "refused, with the remedy", ["RAS and LAS", "--orientation"]),
+          ("nospace.nrrd", "refused, with the remedy", ['no "space"', "--orientation"]),
+          ("nospc.mha", "refused, with the remedy", ["nospc.mha", "--"]),
           ("hang.nii", "refused at once", ["hang.nii"]), ("hang.mha", "refused at once", ["hang.mha"]),
           ("rss4g.dcm", "refused, with little memory", ["rss4g.dcm"]))],
     Row("volume info", "good", "20 real slices in JPEG 2000, with empty UIDs", "512 x 512 x 20, spacing 0.977, 0.977, 2 mm",

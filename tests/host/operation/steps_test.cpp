@@ -116,7 +116,7 @@ TEST(PatientStep, OfTwoPatientsTheSecondIsRead) {
   const Scratch first, second;
   PatientFiles files, others;
   files.ct = birdseye::testing::small_ct(first);
-  others.ct = birdseye::testing::small_ct(second, 8);
+  others.ct = birdseye::testing::small_ct(second, 11);
   PatientStep step("tumour-and-vessels", "cpu");
   step.load(files);
   step.load(others);  // while the first is read

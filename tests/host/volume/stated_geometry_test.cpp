@@ -1,13 +1,17 @@
 #include "host/volume/stated_geometry.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <array>
 #include <cstring>
-#include <fstream>
+#include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
+#include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -22,31 +26,51 @@ const std::string kMeta = "ObjectType = Image\nNDims = 3\nDimSize = 4 3 2\nEleme
 
 TEST(StatedGeometry, ATextHeaderSaysWhereTheVoxelsLieOrWhatItLacks) {
   const Scratch scratch;
-  for (const auto& [name, header, lacks] : std::vector<std::array<std::string, 3>>{
-           {"a.nrrd", kNrrd + "space: left-posterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,2)\n\n", ""},
-           {"b.nrrd", kNrrd + "space: RAS\r\nspace directions: (1,0,0) (0,1,0) (0,0,2)\r\n\r\n", ""},
-           {"c.nrrd", kNrrd + "space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,2)\n\n", "\"space\""},
-           {"d.nrrd", kNrrd + "spacings: 1 1 2\n\n", "\"space\""},
-           {"e.nrrd", kNrrd + "space: scanner-xyz\nspace directions: (1,0,0) (0,1,0) (0,0,2)\n\n", "scanner-xyz"},
-           {"f.nrrd", kNrrd + "space: LPS\nspacings: 1 1 2\n\n", "space directions"},
-           {"g.mha", kMeta + "ElementSpacing = 1 1 2\nElementDataFile = LOCAL\n", ""},
-           {"h.mha", kMeta + "ElementDataFile = LOCAL\nElementSpacing = 1 1 2\n", "ElementSpacing"},
-           {"i.mhd", "NDims = -1e308\nElementSpacing = 1 1 2\nElementDataFile = i.raw\n", "NDims"},
-           {"j.nii", "anything", ""}}) {
-    const std::string told = unstated_geometry(scratch.file(name, header));
-    EXPECT_EQ(told.empty(), lacks.empty()) << name << ": " << told;
-    EXPECT_NE(told.find(lacks), std::string::npos) << name << ": " << told;
+  const std::string directions = "space directions: (1,0,0) (0,1,0) (0,0,2)\n";
+  const std::string turn = "TransformMatrix = 1 0 0 0 1 0 0 0 1\n", local = "ElementDataFile = LOCAL\n";
+  struct Header {
+    std::string name, text, spacing, orientation, beyond;  // what is said of each gap; empty: there is none
+  };
+  for (const Header& h : std::vector<Header>{
+           {"a.nrrd", kNrrd + "space: left-posterior-superior\n" + directions + "\n", "", "", ""},
+           {"b.nrrd", kNrrd + "space: RAS\r\nspace directions: (1,0,0) (0,1,0) (0,0,2)\r\n\r\n", "", "", ""},
+           {"c.nrrd", kNrrd + "space dimension: 3\n" + directions + "\n", "", "\"space\"", ""},
+           {"d.nrrd", kNrrd + "spacings: 1 1 2\n\n", "", "\"space\"", ""},
+           {"e.nrrd", kNrrd + "space: scanner-xyz\n" + directions + "\n", "", "scanner-xyz", ""},
+           {"f.nrrd", kNrrd + "space: LPS\nspacings: 1 1 2\n\n", "", "space directions", ""},
+           {"k.nrrd", kNrrd + "space: LPS\nspacings: 1 1 nan\n\n", "spacings", "space directions", ""},
+           {"l.nrrd", kNrrd + "space: LPS\nspace units: \"m\" \"m\" \"m\"\n" + directions + "\n", "", "", "in mm"},
+           {"m.nrrd", kNrrd + "space: LPS\nspace units: \"mm\" \"mm\" \"mm\"\n" + directions + "\n", "", "", ""},
+           {"g.mha", kMeta + turn + "ElementSpacing = 1 1 2\n" + local, "", "", ""},
+           {"h.mha", kMeta + turn + local + "ElementSpacing = 1 1 2\n", "ElementSpacing", "", ""},
+           {"n.mha", kMeta + turn + "ElementSpacing = 1 1 0\n" + local, "ElementSpacing", "", ""},
+           {"o.mha", kMeta + turn + "ElementSpacing = 1 1 2\nElementSize = 1 1 3\n" + local, "ElementSize", "", ""},
+           {"p.mha", kMeta + "ElementSpacing = 1 1 2\n" + local, "", "TransformMatrix", ""},
+           {"q.mha", kMeta + turn + "AnatomicalOrientation = RAI\nElementSpacing = 1 1 2\n" + local, "", "", ""},
+           {"r.mha", kMeta + turn + "AnatomicalOrientation = LAI\nElementSpacing = 1 1 2\n" + local, "",
+            "LPS by its TransformMatrix, RPS by", ""},
+           {"i.mhd", "NDims = -1e308\nElementSpacing = 1 1 2\nElementDataFile = i.raw\n", "", "", "NDims"},
+           {"j.nii", "anything", "", "", ""}}) {
+    const GeometryGaps gaps = text_header_gaps(scratch.file(h.name, h.text));
+    for (const auto& [told, lacks] :
+         {std::pair{gaps.spacing, h.spacing}, {gaps.orientation, h.orientation}, {gaps.beyond, h.beyond}}) {
+      EXPECT_EQ(told.empty(), lacks.empty()) << h.name << ": " << told;
+      EXPECT_NE(told.find(lacks), std::string::npos) << h.name << ": " << told;
+    }
   }
 }
 
-/// A NIfTI-1 file of 4 x 3 x 2 voxels: the codes of its two geometries, and by how much they lie apart along x.
-std::string nifti(std::int16_t quaternion, std::int16_t matrix, float apart_mm) {
-  std::string file(352 + 48, '\0');
+using Size = std::array<int, 3>;
+
+/// A NIfTI-1 file of water: the codes of its two geometries, by how much they lie apart along x, and which way the
+/// sform's x points.
+std::string nifti(std::int16_t quaternion, std::int16_t matrix, float apart_mm, float x_way = 1,
+                  const Size& size = {4, 3, 2}) {
+  std::string file(352 + 2 * grid_count(size), '\0');
   const auto put = [&file](std::size_t at, auto value) { std::memcpy(file.data() + at, &value, sizeof value); };
   put(0, std::int32_t{348});
-  for (int axis = 0; axis < 8; ++axis)
-    put(40 + 2 * static_cast<std::size_t>(axis),
-        std::array<std::int16_t, 8>{3, 4, 3, 2, 1, 1, 1, 1}[static_cast<std::size_t>(axis)]);
+  put(40, std::int16_t{3});
+  for (std::size_t axis = 0; axis < 7; ++axis) put(42 + 2 * axis, static_cast<std::int16_t>(axis < 3 ? size[axis] : 1));
   put(70, std::int16_t{4});
   put(72, std::int16_t{16});
   for (std::size_t at = 76; at < 92; at += 4) put(at, 1.0F);
@@ -57,11 +81,22 @@ std::string nifti(std::int16_t quaternion, std::int16_t matrix, float apart_mm) 
   put(254, matrix);
   for (std::size_t k = 0; k < 3; ++k) {
     put(268 + 4 * k, 10.0F);
-    put(280 + 20 * k, 1.0F);
+    put(280 + 20 * k, k == 0 ? x_way : 1.0F);
     put(292 + 16 * k, k == 0 ? 10.0F + apart_mm : 10.0F);
   }
   std::memcpy(file.data() + 344, "n+1", 4);
   return file;
+}
+
+std::string with_number(std::string file, std::size_t at, float value) {
+  std::memcpy(file.data() + at, &value, sizeof value);
+  return file;
+}
+
+void expect_refused(const Result<Volume>& read, const std::string& name, const std::string& why) {
+  ASSERT_FALSE(read) << name;
+  EXPECT_NE(read.error().what.find(name), std::string::npos) << read.error().what;
+  EXPECT_NE(read.error().what.find(why), std::string::npos) << read.error().what;
 }
 
 TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
@@ -70,15 +105,147 @@ TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
   EXPECT_TRUE(import_volume(fs::path(scratch.file("by_matrix.nii", nifti(0, 2, 30.0F)))));
   EXPECT_TRUE(import_volume(fs::path(scratch.file("by_quaternion.nii", nifti(1, 0, 30.0F)))));
   EXPECT_TRUE(import_volume(fs::path(scratch.file("rounded.nii", nifti(1, 1, 0.01F)))));
-  for (const auto& [name, text, why] :
-       std::vector<std::array<std::string, 3>>{{"none.nii", nifti(0, 0, 0.0F), "neither its qform nor its sform"},
-                                               {"two.nii", nifti(1, 1, 12.0F), "12.0 mm apart"},
-                                               {"far.nii", nifti(1, 1, 3.4e38F), "header"}}) {
-    const auto read = import_volume(fs::path(scratch.file(name, text)));
-    ASSERT_FALSE(read) << name;
-    EXPECT_NE(read.error().what.find(name), std::string::npos) << read.error().what;
-    EXPECT_NE(read.error().what.find(why), std::string::npos) << read.error().what;
+  for (const auto& [name, text, why] : std::vector<std::array<std::string, 3>>{
+           {"none.nii", nifti(0, 0, 0.0F), "neither its qform nor its sform"},
+           {"two.nii", nifti(1, 1, 12.0F), "12.0 mm apart"},
+           {"mirrored.nii", nifti(1, 1, 0.0F, -1), "differ (RAS and LAS)"},
+           {"wide.nii", nifti(0, 1, 0.0F, 3), "two spacings"},
+           {"unspaced.nii", with_number(nifti(1, 0, 0.0F), 88, 0), "a pixdim is not above 0"},
+           {"sheared.nii", with_number(nifti(0, 1, 0.0F), 284, 0.5F), "sheared"},
+           {"far.nii", nifti(1, 1, 3.4e38F), "header"}}) {
+    expect_refused(import_volume(fs::path(scratch.file(name, text))), name, why);
   }
+}
+
+/// Of a file in the scratch folder, with what a person states.
+VolumeSource stated(const fs::path& path, const std::optional<Eigen::Vector3d>& spacing_mm,
+                    const std::string& orientation) {
+  VolumeSource source(path);
+  source.spacing_mm = spacing_mm;
+  source.orientation = orientation;
+  return source;
+}
+
+std::string voxels(const Size& size) {
+  return std::string(2 * grid_count(size), '\0');
+}
+
+// The attacker's files, and the same defects in a volume that is large enough for a CT.
+TEST(StatedGeometry, WhatAFileDoesNotSayAPersonMayStateAndNothingElse) {
+  const Scratch scratch;
+  const Size size{60, 60, 60};
+  const Eigen::Vector3d thick(1, 1, 2);
+  const std::string nrrd = "NRRD0004\ntype: short\ndimension: 3\nsizes: 60 60 60\nendian: little\nencoding: raw\n";
+  const std::string meta =
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nDimSize = 60 60 60\n"
+      "ElementType = MET_SHORT\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 5 6 7\n";
+  const fs::path nocode = scratch.file("nocode.nii", nifti(0, 0, 0.0F, 1, size));
+  const fs::path conflict = scratch.file("conflict.nii", nifti(1, 1, 59.0F, -1, size));
+  const fs::path nospace = scratch.file("nospace.nrrd", nrrd + "spacings: 1 1 2\n\n" + voxels(size));
+  const fs::path nospacing = scratch.file("nospc.mha", meta + "ElementDataFile = LOCAL\n" + voxels(size));
+  const fs::path whole =
+      scratch.file("whole.mha", meta + "ElementSpacing = 1 1 2\nElementDataFile = LOCAL\n" + voxels(size));
+  for (const auto& [path, why, option] : {std::tuple{nocode, "neither its qform nor its sform", "--orientation"},
+                                          {conflict, "its qform and its sform differ (RAS and LAS)", "--orientation"},
+                                          {nospace, "it has no \"space\"", "--orientation"},
+                                          {nospacing, "it has no ElementSpacing", "--spacing"}}) {
+    const auto read = import_volume(path);
+    expect_refused(read, path.string(), why);
+    EXPECT_NE(read.error().what.find(option), std::string::npos) << read.error().what;
+    // No option states where labels lie.
+    const auto labels = read_labels_file(path);
+    ASSERT_FALSE(labels);
+    EXPECT_NE(labels.error().what.find(why), std::string::npos) << labels.error().what;
+    EXPECT_EQ(labels.error().what.find(option), std::string::npos) << labels.error().what;
+  }
+
+  auto read = import_with_notes(stated(nocode, std::nullopt, "PIL"));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(orientation_letters(read->volume.patient_from_voxel), "PIL");
+  EXPECT_EQ(read->volume.patient_from_voxel.translation(), Eigen::Vector3d::Zero());
+  ASSERT_EQ(read->notes.size(), 1U);
+  EXPECT_NE(read->notes.front().find("its orientation, PIL, was stated by a person"), std::string::npos);
+  // Of two that the file says, the one that is stated, with its place: RAS grows from the right, LAS from the left.
+  for (const auto& [letters, first_x_mm] : {std::pair{"RAS", -10.0}, {"LAS", -69.0}}) {
+    read = import_with_notes(stated(conflict, std::nullopt, letters));
+    ASSERT_TRUE(read) << read.error().what;
+    EXPECT_EQ(orientation_letters(read->volume.patient_from_voxel), letters);
+    EXPECT_NEAR(read->volume.patient_from_voxel.translation().x(), first_x_mm, 1e-4);
+  }
+  expect_refused(import_volume(stated(conflict, std::nullopt, "LPS")), "conflict.nii", "neither of these");
+  read = import_with_notes(stated(nospace, std::nullopt, "LPS"));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->volume.spacing_mm, thick);
+  read = import_with_notes(stated(nospacing, thick, ""));
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(read->volume.spacing_mm, thick);
+  EXPECT_EQ(read->volume.patient_from_voxel.linear().diagonal(), thick);
+  EXPECT_EQ(read->volume.patient_from_voxel.translation(), Eigen::Vector3d(5, 6, 7));
+  ASSERT_EQ(read->notes.size(), 1U);
+  EXPECT_NE(read->notes.front().find("its spacing, 1 x 1 x 2 mm, was stated by a person"), std::string::npos);
+
+  ASSERT_TRUE(import_volume(whole));
+  expect_refused(import_volume(stated(whole, thick, "")), "whole.mha", "itself: leave --spacing");
+  expect_refused(import_volume(stated(whole, std::nullopt, "LPS")), "whole.mha", "itself: leave --orientation");
+  expect_refused(import_volume(stated(nospace, thick, "LPS")), "nospace.nrrd", "itself: leave --spacing");
+  expect_refused(import_volume(stated(nospacing, std::nullopt, "LPS")), "nospc.mha", "ElementSpacing");
+}
+
+TEST(StatedGeometry, LettersNameEachOfThe48AxesOnce) {
+  int named = 0;
+  const std::string all = "RLAPIS";
+  for (const char i : all) {
+    for (const char j : all) {
+      for (const char k : all) {
+        const std::string letters{i, j, k};
+        const auto axes = axes_of_letters(letters);
+        if (!axes) continue;
+        ++named;
+        Eigen::Affine3d turn = Eigen::Affine3d::Identity();
+        turn.linear() = *axes;
+        EXPECT_EQ(orientation_letters(turn), letters);
+      }
+    }
+  }
+  EXPECT_EQ(named, 48);
+  for (const char* none : {"", "LP", "LPSS", "lps", "LRS", "LPX"}) EXPECT_FALSE(axes_of_letters(none)) << none;
+}
+
+/// A MetaImage of so many voxels a side, so far apart, with so many HU in each.
+std::string cube(int side, double apart_mm, std::int16_t hu) {
+  std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n";
+  text += fmt::format(
+      "DimSize = {0} {0} {0}\nElementType = MET_SHORT\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\n"
+      "ElementSpacing = {1} {1} {1}\nElementDataFile = LOCAL\n",
+      side, apart_mm);
+  const std::size_t at = text.size();
+  text.resize(at + 2 * grid_count({side, side, side}));
+  for (std::size_t i = at; i < text.size(); i += sizeof hu) std::memcpy(text.data() + i, &hu, sizeof hu);
+  return text;
+}
+
+TEST(StatedGeometry, VoxelsAndBodiesThatNoCtHasAreRefused) {
+  const Scratch scratch;
+  const auto file = [&](const char* name, int side, double apart_mm, std::int16_t hu = 0) {
+    return fs::path(scratch.file(name, cube(side, apart_mm, hu)));
+  };
+  EXPECT_TRUE(import_volume(file("least.mha", 4, 0.02)));
+  EXPECT_TRUE(import_volume(file("widest.mha", 4, 20)));
+  expect_refused(import_volume(file("fine.mha", 4, 0.019)), "fine.mha", "metres");
+  expect_refused(import_volume(file("coarse.mha", 4, 20.1)), "coarse.mha", "another unit");
+  const auto body = [](const fs::path& path) -> Result<Volume> {
+    auto read = import_body(path);
+    if (!read) return read.error();
+    return read->volume;
+  };
+  EXPECT_TRUE(body(file("small.mha", 21, 1)));
+  EXPECT_TRUE(body(file("large.mha", 149, 20)));
+  // A look at it is no registration.
+  EXPECT_TRUE(import_volume(scratch.path() / "small.mha"));
+  EXPECT_TRUE(import_volume(file("tiny.mha", 60, 0.3)));
+  expect_refused(body(scratch.path() / "tiny.mha"), "tiny.mha", "a body of 18 mm");
+  expect_refused(body(file("giant.mha", 151, 20)), "giant.mha", "a body of 3020 mm");
+  expect_refused(body(file("air.mha", 60, 1, -1000)), "air.mha", "nothing but air");
 }
 
 }  // namespace

@@ -137,8 +137,10 @@ TEST(Import, RefusesWithAReason) {
     // What the reader leaves as it was must not be taken for voxels.
     std::ofstream out(scratch / "garbled.mha", std::ios::binary);
     out << "ObjectType = Image\nNDims = 3\nBinaryData = True\nCompressedData = True\nCompressedDataSize = 9\n"
-           "ElementSpacing = 1 1 1\nDimSize = 6 5 4\nElementType = MET_SHORT\nElementDataFile = LOCAL\nno stream";
+           "TransformMatrix = 1 0 0 0 1 0 0 0 1\nElementSpacing = 1 1 1\nDimSize = 6 5 4\nElementType = "
+           "MET_SHORT\nElementDataFile = LOCAL\nno stream";
     std::ofstream(scratch / "list.mhd") << "ObjectType = Image\nNDims = 3\nBinaryData = True\nElementSpacing = 1 1 1\n"
+                                           "TransformMatrix = 1 0 0 0 1 0 0 0 1\n"
                                            "DimSize = 6 5 2\nElementType = MET_SHORT\nElementDataFile = LIST\n"
                                            "nowhere1.raw\nnowhere2.raw\n";
   }

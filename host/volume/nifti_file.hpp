@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "host/volume/stated_geometry.hpp"
+
+namespace birdseye::host {
+
+/// The parts of a NIfTI-1 header that the toolkit believes unseen: it turns voxels that are not finite into zeros, ends
+/// a file that is cut short in zeros too, and takes one of two places that differ.
+class NiftiFile {
+ public:
+  /// Empty where the file is no single-file or paired NIfTI-1, nor an Analyze file.
+  static std::optional<NiftiFile> open(const std::filesystem::path& path);
+
+  /// Whether its numbers are finite, and those of places no further off than a patient may lie: the reader takes for
+  /// ever over 1e38 mm.
+  [[nodiscard]] bool header_is_sound() const;
+
+  /// What the header lacks, or says twice differently, of where the voxels lie.
+  [[nodiscard]] GeometryGaps gaps() const;
+
+  [[nodiscard]] bool says_a_place() const;
+
+  /// Of a header that says two orientations, the place of the voxels by the one that a person says is right. Empty
+  /// where not exactly one of the two has these letters.
+  [[nodiscard]] std::optional<VoxelPlace> place_by(const std::string& letters) const;
+
+  /// Of so many numbers, by bitpix.
+  [[nodiscard]] std::size_t bytes_of(std::size_t count) const;
+
+  /// What is wrong with the voxels, of so many bytes; empty where they are whole and finite.
+  [[nodiscard]] std::string fault(std::size_t image_bytes) const;
+
+ private:
+  static constexpr std::int32_t kHeaderBytes = 348;
+
+  /// Not Analyze, which has texts where NIfTI says a place.
+  [[nodiscard]] bool is_nifti() const;
+  [[nodiscard]] double unit_mm() const;
+  /// Of a place in the header's own frame and unit.
+  [[nodiscard]] VoxelPlace in_patient(const Eigen::Matrix<double, 3, 4>& map) const;
+  [[nodiscard]] Eigen::Matrix<double, 3, 4> matrix_map() const;      ///< from voxel indices, RAS
+  [[nodiscard]] Eigen::Matrix<double, 3, 4> quaternion_map() const;  ///< from voxel indices, RAS
+  [[nodiscard]] Eigen::Vector3d spacing() const;
+  [[nodiscard]] std::array<int, 3> size() const;
+  /// How far the corner that moves most lies from itself by another map.
+  [[nodiscard]] double corners_apart(const Eigen::Matrix<double, 3, 4>& a, const Eigen::Matrix<double, 3, 4>& b) const;
+
+  template <typename T>
+  [[nodiscard]] T ordered(const char* at) const {
+    std::array<char, sizeof(T)> bytes{};
+    std::memcpy(bytes.data(), at, sizeof(T));
+    if (swapped_) std::reverse(bytes.begin(), bytes.end());
+    return std::bit_cast<T>(bytes);
+  }
+  template <typename T>
+  [[nodiscard]] T number(std::size_t at) const {
+    return ordered<T>(header_.data() + at);
+  }
+
+  std::array<char, kHeaderBytes> header_{};
+  bool swapped_ = false, offset_is_sound_ = true;
+  std::size_t offset_ = 0;
+  std::filesystem::path voxels_;
+};
+
+}  // namespace birdseye::host
