@@ -302,6 +302,10 @@ void add_live(CLI::App& app, CommandStatus& status) {
       ->check(CLI::IsMember(deformation_kinds()));
   command->add_option("--faults", options->cart.faults, "with --simulate: a script of faults")->type_name("FILE");
   command
+      ->add_option("--fix-reference", options->cart.reference,
+                   "with --simulate: patient or table, what a third bird, reference, is fixed on")
+      ->check(CLI::IsMember({"patient", "table"}));
+  command
       ->add_option("--video", options->video,
                    "with --simulate: the size of its video (default 512x384, which two "
                    "cores trace and overlay in time)")

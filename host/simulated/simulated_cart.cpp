@@ -35,11 +35,12 @@ Result<CartSheet> read_sheet(const std::filesystem::path& path) {
 
 Result<void> write_appliance_config(const std::filesystem::path& path, const SimulatedCartSettings& settings,
                                     const std::filesystem::path& tty, const std::filesystem::path& socket, int port) {
-  return write_file(path, fmt::format(R"([tracker]
+  return write_file(
+      path, fmt::format(R"([tracker]
 device = "{}"
 baud = 115200
-birds = 2
-names = ["scope", "pointer"]
+birds = {}
+names = ["scope", "pointer"{}]
 rate_hz = 103.3
 frozen_after = 0
 most_speed_mm_s = 6000
@@ -64,8 +65,9 @@ max_gap_ms = 60
 smoothing_ms = {}
 wait_ms = {}
 )",
-                                      tty.string(), socket.string(), settings.width_px, settings.height_px,
-                                      settings.video_rate_hz, port, settings.smoothing_ms, settings.wait_ms));
+                        tty.string(), settings.reference.empty() ? 2 : 3,
+                        settings.reference.empty() ? "" : ", \"reference\"", socket.string(), settings.width_px,
+                        settings.height_px, settings.video_rate_hz, port, settings.smoothing_ms, settings.wait_ms));
 }
 
 }  // namespace
@@ -146,6 +148,7 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   if (settings.strokes) command.emplace_back("--strokes");
   if (settings.views) command.emplace_back("--views");
   if (settings.drop_late) command.emplace_back("--drop-late");
+  if (!settings.reference.empty()) command.insert(command.end(), {"--reference", settings.reference});
   if (!settings.faults.empty()) command.insert(command.end(), {"--faults", settings.faults.string()});
   auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child,
                                        ChildProcess::Signals::with_us, ChildProcess::Life::ours);

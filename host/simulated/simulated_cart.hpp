@@ -37,6 +37,7 @@ struct SimulatedCartSettings {
   int smoothing_ms = 40, wait_ms = 90;  ///< [pose] of birdseyed: frames wait for the poses that are averaged
   bool drop_late = false;  ///< true: frames that a busy machine has no time to trace are left out; else they come late
   std::filesystem::path faults;  ///< script of faults, or empty
+  std::string reference;         ///< patient or table, where a third bird is fixed on it; or empty
 };
 
 /// What an operator of the cart knows without the truth: the board, the pointer, how many fiducials there are.

@@ -15,9 +15,14 @@ namespace birdseye::host {
 
 /// The truth, which the simulator knows and only reports read.
 struct SimulatedTruth {
-  CameraModel camera;
-  Eigen::Vector3d tumour_centre_in_patient_mm;  ///< in the operation: deformed, where the liver is
-  std::map<std::uint64_t, Transform<Camera, Patient>> camera_from_patient;  ///< by the frame's sequence
+  /// How it is while a frame is exposed: the patient may have moved, the liver with the breath, and the lens may have
+  /// been zoomed.
+  struct Frame {
+    CameraModel camera;
+    Transform<Camera, Patient> camera_from_patient;
+    Eigen::Vector3d tumour_centre_in_patient_mm;  ///< deformed, where the liver is
+  };
+  std::map<std::uint64_t, Frame> frames;  ///< by sequence
 };
 
 /// How far an overlay puts the tumour's centre from where it truly is.

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <map>
 #include <string>
 
 #include "drivers/system/interrupt.hpp"
@@ -67,7 +68,13 @@ int main(int argc, char** argv) {
   run.add_option("--camera-delay-ms", cart.camera_delay_ms,
                  "from exposure to arrival, of frames that then bear no stamp (default: stamped)")
       ->check(CLI::Range(0.0, 1000.0));
-  run.add_option("--faults", cart.faults, "script of faults of either instrument (TOML)");
+  run.add_option("--faults", cart.faults,
+                 "script of faults of either instrument, and of what befalls the operation (TOML)");
+  const std::map<std::string, hw_sim::ReferenceOn> fixed_on{{"patient", hw_sim::ReferenceOn::patient},
+                                                            {"table", hw_sim::ReferenceOn::table}};
+  run.add_option("--reference", cart.reference, "patient or table: fix a third bird on it")
+      ->transform(CLI::CheckedTransformer(fixed_on))
+      ->type_name("ON");
   run.add_option("--size", size, "WIDTHxHEIGHT of the video");
   run.add_option("--dwell-s", cart.pace.dwell_s, "how long the scope is held still at each station over the board")
       ->check(CLI::Range(0.1, 20.0));

@@ -32,6 +32,12 @@ void EmbreeScene::add(const Mesh& mesh, unsigned id, const std::vector<Vector3f>
   smooth_[id] = {mesh.triangles, mesh.normals, rest};
 }
 
+void EmbreeScene::replace(const Mesh& mesh, unsigned id, const std::vector<Vector3f>& rest) {
+  rtcDetachGeometry(scene_, id);
+  add(mesh, id, rest);
+  commit();
+}
+
 Vector3f EmbreeScene::normal(const RTCRayHit8& packet, int lane) const {
   const Smooth& mesh = smooth_[packet.hit.geomID[lane]];
   if (mesh.normals.empty()) return {packet.hit.Ng_x[lane], packet.hit.Ng_y[lane], packet.hit.Ng_z[lane]};

@@ -21,6 +21,8 @@ class EmbreeScene {
 
   /// rest: where each vertex was before the mesh was deformed; empty where it was not.
   void add(const Mesh& mesh, unsigned id, const std::vector<Eigen::Vector3f>& rest = {});
+  /// Puts a mesh in the place of the one with this id, and commits.
+  void replace(const Mesh& mesh, unsigned id, const std::vector<Eigen::Vector3f>& rest);
   void commit() { rtcCommitScene(scene_); }
   [[nodiscard]] RTCScene get() const { return scene_; }
 

@@ -35,7 +35,8 @@ constexpr float kReferenceMm = 100;  // where a lamp of strength one gives light
 class EmbreeLaparoscope final : public Laparoscope {
  public:
   EmbreeLaparoscope(const LaparoscopeSettings& settings, RTCDevice device)
-      : camera_(settings.lens),
+      : usual_lens_(settings.lens),
+        camera_(settings.lens),
         lamp_(settings.lamp_in_camera_mm.cast<float>()),
         exposure_(static_cast<float>(1.55 * std::pow(settings.well_lit_mm / kReferenceMm, 2))),
         noise_level_(static_cast<float>(settings.noise)),
@@ -48,18 +49,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     rays_.resize(pixels);
     light_.resize(pixels, Vector3f::Zero());
     field_.resize(pixels);
-    const double radius = 0.53 * camera.width_px;
-    for (int y = 0; y < camera.height_px; ++y) {
-      for (int x = 0; x < camera.width_px; ++x) {
-        const std::size_t at = pixel(x, y);
-        const auto ray = unproject(camera, Eigen::Vector2d(x, y));
-        const double r = std::hypot(x - camera.cx_px, y - camera.cy_px);
-        // The round field stop, a pixel or two soft, and the fall of light towards its edge.
-        const double stop = std::clamp((radius - r) / 2.0, 0.0, 1.0);
-        field_[at] = ray ? static_cast<float>(stop * (1 - 0.45 * std::pow(r / radius, 2.5))) : 0.0F;
-        rays_[at] = ray ? Vector3f(ray->normalized().cast<float>()) : Vector3f(0, 0, 1);
-      }
-    }
+    lay_rays();
     for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = static_cast<float>(hashed_normal(seed_ + 32, i));
     for (std::size_t i = 0; i < gamma_.size(); ++i) {
       const double share = static_cast<double>(i) / static_cast<double>(gamma_.size() - 1);
@@ -74,6 +64,9 @@ class EmbreeLaparoscope final : public Laparoscope {
 
   void set_cavity(const Cavity& cavity) override {
     traced_scene_ = nullptr;
+    organ_ = cavity.organ;
+    rest_mm_ = cavity.rest_mm;
+    change_ = {};
     coat_ = std::make_unique<CavityCoat>(texture_, cavity);
     cavity_ = std::make_unique<EmbreeScene>(device_);
     cavity_->add(cavity.organ, kOrganGeometry, cavity.rest_mm);
@@ -98,6 +91,30 @@ class EmbreeLaparoscope final : public Laparoscope {
     table.triangles = {{0, 2, 1}, {0, 3, 2}};
     bench_->add(table, 0);
     bench_->commit();
+  }
+
+  void change_organ(const OrganChange& change) override {
+    if (change == change_) return;
+    change_ = change;
+    traced_scene_ = nullptr;
+    Mesh organ = organ_;
+    std::vector<Vector3f> rest_mm = rest_mm_;
+    if (rest_mm.empty() && change != OrganChange{}) rest_mm = organ.vertices;
+    if (change.hollow) {
+      hollow_out(*change.hollow, organ, rest_mm);
+    }
+    for (Vector3f& vertex : organ.vertices) vertex += change.shift_mm.cast<float>();
+    cavity_->replace(organ, kOrganGeometry, rest_mm);
+  }
+
+  void zoom(double factor) override {
+    CameraModel zoomed = usual_lens_;
+    zoomed.fx_px *= factor;
+    zoomed.fy_px *= factor;
+    if (zoomed == camera_) return;
+    camera_ = zoomed;
+    traced_scene_ = nullptr;
+    lay_rays();
   }
 
   std::vector<std::uint8_t> look_into_cavity(const Transform<Camera, Patient>& camera_from_patient,
@@ -156,6 +173,23 @@ class EmbreeLaparoscope final : public Laparoscope {
   }
 
  private:
+  /// The ray and the light of each pixel.
+  void lay_rays() {
+    const CameraModel& camera = camera_;
+    const double radius = 0.53 * camera.width_px * camera.fx_px / usual_lens_.fx_px;
+    for (int y = 0; y < camera.height_px; ++y) {
+      for (int x = 0; x < camera.width_px; ++x) {
+        const std::size_t at = pixel(x, y);
+        const auto ray = unproject(camera, Eigen::Vector2d(x, y));
+        const double r = std::hypot(x - camera.cx_px, y - camera.cy_px);
+        // The round field stop, a pixel or two soft, and the fall of light towards its edge.
+        const double stop = std::clamp((radius - r) / 2.0, 0.0, 1.0);
+        field_[at] = ray ? static_cast<float>(stop * (1 - 0.45 * std::pow(r / radius, 2.5))) : 0.0F;
+        rays_[at] = ray ? Vector3f(ray->normalized().cast<float>()) : Vector3f(0, 0, 1);
+      }
+    }
+  }
+
   [[nodiscard]] std::size_t pixel(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.width_px) + static_cast<std::size_t>(x);
   }
@@ -307,7 +341,7 @@ class EmbreeLaparoscope final : public Laparoscope {
     }
   }
 
-  CameraModel camera_;
+  CameraModel usual_lens_, camera_;
   Vector3f lamp_;  ///< in the camera frame
   float exposure_, noise_level_;
   double blur_px_;
@@ -320,6 +354,9 @@ class EmbreeLaparoscope final : public Laparoscope {
   std::vector<float> field_;    ///< how much of the light reaches each pixel, 0 outside the round field
   std::array<float, 1U << 16U> noise_{};
   std::array<std::uint8_t, 4096> gamma_{};
+  Mesh organ_;  ///< as the cavity was set
+  std::vector<Vector3f> rest_mm_;
+  OrganChange change_;
   std::unique_ptr<EmbreeScene> cavity_, bench_;
   const EmbreeScene* traced_scene_ = nullptr;
   Eigen::Matrix4d traced_pose_ = Eigen::Matrix4d::Zero();

@@ -9,6 +9,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "hw-sim/camera/hollow.hpp"
 #include "hw-sim/phantom/mesh.hpp"
 
 namespace birdseye::hw_sim {
@@ -39,6 +40,13 @@ struct Cavity {
   double blood = 0;             ///< the share of the organ's surface that blood covers, which stays on the tissue
 };
 
+/// How the organ differs from that of the cavity.
+struct OrganChange {
+  std::optional<Hollow> hollow = {};
+  Eigen::Vector3d shift_mm = Eigen::Vector3d::Zero();  ///< of all of it, hollow too
+  bool operator==(const OrganChange&) const = default;
+};
+
 struct LaparoscopeSettings {
   CameraModel lens = {};
   std::uint64_t seed = 1;  ///< of texture and noise
@@ -59,6 +67,11 @@ class Laparoscope {
 
   virtual void set_cavity(const Cavity& cavity) = 0;
   virtual void set_bench(const Chessboard& board) = 0;
+  /// Changes the organ of the cavity that was set, from how it was set: changes do not add up.
+  virtual void change_organ(const OrganChange& change) = 0;
+  /// Magnifies the picture about the lens's centre, from the lens of the settings, the field's edge with it: what a
+  /// zoom between the scope and its chip does.
+  virtual void zoom(double factor) = 0;
 
   /// RGB, width * height * 3 bytes. The same pose and sequence give the same bytes. Not for two threads at once.
   virtual std::vector<std::uint8_t> look_into_cavity(const Transform<Camera, Patient>& camera_from_patient,

@@ -18,7 +18,7 @@ void announce(const nlohmann::json& event) {
 void announce(const FaultEvent& event) {
   announce({{"event", "fault"},
             {"name", fault_name(event.kind)},
-            {"of", event.target == FaultTarget::tracker ? "tracker" : "camera"},
+            {"of", target_name(event.target)},
             {"phase", event.begin ? "begin" : "end"},
             {"monotonic_ns", event.at_ns}});
 }

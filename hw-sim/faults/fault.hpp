@@ -10,7 +10,7 @@
 namespace birdseye::hw_sim {
 
 /// Every fault that a script can name. Some are a tracker's, some a camera's, some either's
-/// (docs/manual/simulated-minibird.md).
+/// (docs/manual/simulated-minibird.md); the last befall the operation itself (docs/manual/simulator.md).
 enum class FaultKind {
   drop_byte,
   duplicate_byte,
@@ -36,11 +36,22 @@ enum class FaultKind {
   garbage,
   size_change,
   torn_frame,
+  transmitter_bumped,
+  bed_tilted,
+  patient_moved,
+  reference_moved,
+  breathing,
+  resected,
+  lens_zoomed,
+  scope_turned,
 };
 
 std::string_view fault_name(FaultKind kind);
 
-enum class FaultTarget { tracker, camera };
+enum class FaultTarget { tracker, camera, world };
+
+/// The name that the enumerator has.
+std::string_view target_name(FaultTarget target);
 
 /// One fault of a script. values: all parameters that the kind has, given or by default.
 struct Fault {

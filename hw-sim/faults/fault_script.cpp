@@ -98,6 +98,7 @@ class Reader {
 
   /// Whom it befalls: who can have it, who is there, and what the entry says.
   std::optional<FaultTarget> target_of(const toml::value& entry, const FaultSpec& spec) {
+    if (spec.of_world && instruments_ == Instruments::both && !entry.contains("of")) return FaultTarget::world;
     bool tracker = spec.of_tracker && instruments_ != Instruments::camera;
     bool camera = spec.of_camera && instruments_ != Instruments::tracker;
     if (entry.contains("of")) {
@@ -112,6 +113,11 @@ class Reader {
     if (tracker && camera) {
       fail(entry,
            fmt::format("{}: either instrument can have it; add of = \"tracker\" or \"camera\"", fault_name(spec.kind)));
+      return std::nullopt;
+    }
+    if (spec.of_world) {
+      fail(entry, fmt::format("{}: befalls the operation and no instrument; give it to birdseye-sim cart, without of",
+                              fault_name(spec.kind)));
       return std::nullopt;
     }
     if (!tracker && !camera) {
@@ -147,6 +153,11 @@ class Reader {
     return drawn;
   }
 
+  std::vector<Fault>& faults_of(FaultTarget target) {
+    if (target == FaultTarget::world) return script.world;
+    return target == FaultTarget::tracker ? script.tracker : script.camera;
+  }
+
   void read_fault(const toml::value& entry) {
     const FaultSpec* const spec = spec_of(entry);
     if (spec == nullptr) return;
@@ -173,7 +184,7 @@ class Reader {
     const auto target = target_of(entry, *spec);
     for (const double at_s : times_of(entry)) {
       fault.at_s = at_s;
-      if (target) (*target == FaultTarget::tracker ? script.tracker : script.camera).push_back(fault);
+      if (target) faults_of(*target).push_back(fault);
     }
   }
 
@@ -202,7 +213,7 @@ Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instrum
     if (const std::string problems = reader.problems(); !problems.empty()) {
       return Error{Errc::bad_value, fmt::format("{}: {}", path.string(), problems)};
     }
-    for (auto* faults : {&reader.script.tracker, &reader.script.camera}) {
+    for (auto* faults : {&reader.script.tracker, &reader.script.camera, &reader.script.world}) {
       std::stable_sort(faults->begin(), faults->end(), [](const Fault& a, const Fault& b) { return a.at_s < b.at_s; });
     }
     return std::move(reader.script);

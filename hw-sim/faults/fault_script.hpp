@@ -8,12 +8,12 @@
 
 namespace birdseye::hw_sim {
 
-/// The faults of a file, for each instrument in the order of their times.
+/// The faults of a file, for each instrument and for the operation in the order of their times.
 struct FaultScript {
-  std::vector<Fault> tracker, camera;
+  std::vector<Fault> tracker, camera, world;
 };
 
-/// The instruments that a script's faults can befall.
+/// What a script's faults can befall: an instrument that runs alone, or a whole cart.
 enum class Instruments { tracker, camera, both };
 
 /// Reads a script (TOML, docs/manual/simulated-minibird.md). Times drawn at random follow from seed, unless the script

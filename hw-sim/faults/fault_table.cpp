@@ -14,31 +14,49 @@ constexpr ParameterSpec kGap[] = {{"chance", 0.1, 0, 1}, {"frames", 5, 1, 1'000'
 constexpr ParameterSpec kGarbage[] = {{"chance", 0.1, 0, 1}, {"bytes", 64, 1, 4096, true}};
 constexpr ParameterSpec kTorn[] = {{"chance", 0.1, 0, 1}, {"part", 0.5, 0, 0.99}};
 
+constexpr ParameterSpec kBump[] = {{"mm", 20, 0, 300}, {"deg", 5, 0, 90}, {"over_s", 0.2, 0, 600}};
+constexpr ParameterSpec kTilt[] = {{"deg", 8, -30, 30}, {"over_s", 3, 0, 600}};
+constexpr ParameterSpec kMoved[] = {{"mm", 10, 0, 300}, {"deg", 3, 0, 90}, {"over_s", 1, 0, 600}};
+constexpr ParameterSpec kSlipped[] = {{"mm", 15, 0, 300}, {"deg", 10, 0, 180}, {"over_s", 0.1, 0, 600}};
+constexpr ParameterSpec kBreath[] = {{"mm", 10, 0, 50}, {"period_s", 4, 1, 30}};
+constexpr ParameterSpec kResected[] = {
+    {"width_mm", 40, 5, 150}, {"depth_mm", 20, 1, 60}, {"aside_mm", 35, -100, 100}, {"over_s", 0, 0, 600}};
+constexpr ParameterSpec kZoomed[] = {{"factor", 1.3, 0.5, 3}, {"over_s", 0.5, 0, 600}};
+constexpr ParameterSpec kTurned[] = {{"deg", 30, -180, 180}, {"over_s", 0.5, 0, 600}};
+
 constexpr FaultSpec kTable[] = {
-    {FaultKind::drop_byte, true, false, WithoutEnd::once, kChance},
-    {FaultKind::duplicate_byte, true, false, WithoutEnd::once, kChance},
-    {FaultKind::corrupt_byte, true, false, WithoutEnd::once, kChance},
-    {FaultKind::wrong_phase_bit, true, false, WithoutEnd::once, kChance},
-    {FaultKind::line_noise, true, false, WithoutEnd::once, kChance},
-    {FaultKind::lost_record, true, false, WithoutEnd::once, kChance},
-    {FaultKind::stuck_stream, true, false, WithoutEnd::refused, {}},
-    {FaultKind::frozen_pose, true, false, WithoutEnd::refused, {}},
-    {FaultKind::saturated, true, false, WithoutEnd::refused, {}},
-    {FaultKind::zero_matrix, true, false, WithoutEnd::refused, {}},
-    {FaultKind::hemisphere_flip, true, false, WithoutEnd::refused, {}},
-    {FaultKind::metal_distortion, true, false, WithoutEnd::for_good, kMetal},
-    {FaultKind::power_cycle, true, false, WithoutEnd::refused, kPower},
-    {FaultKind::drift_step, true, false, WithoutEnd::for_good, kPpm},
-    {FaultKind::clock_step, true, true, WithoutEnd::for_good, kStepMs},
-    {FaultKind::unplug, true, true, WithoutEnd::refused, {}},
-    {FaultKind::drop_frames, false, true, WithoutEnd::once, kChance},
-    {FaultKind::sequence_gap, false, true, WithoutEnd::once, kGap},
-    {FaultKind::silence, false, true, WithoutEnd::refused, {}},
-    {FaultKind::late_frames, false, true, WithoutEnd::refused, kLateMs},
-    {FaultKind::duplicate_frames, false, true, WithoutEnd::once, kChance},
-    {FaultKind::garbage, false, true, WithoutEnd::once, kGarbage},
-    {FaultKind::size_change, false, true, WithoutEnd::refused, {}},
-    {FaultKind::torn_frame, false, true, WithoutEnd::once, kTorn},
+    {FaultKind::drop_byte, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::duplicate_byte, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::corrupt_byte, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::wrong_phase_bit, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::line_noise, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::lost_record, true, false, false, WithoutEnd::once, kChance},
+    {FaultKind::stuck_stream, true, false, false, WithoutEnd::refused, {}},
+    {FaultKind::frozen_pose, true, false, false, WithoutEnd::refused, {}},
+    {FaultKind::saturated, true, false, false, WithoutEnd::refused, {}},
+    {FaultKind::zero_matrix, true, false, false, WithoutEnd::refused, {}},
+    {FaultKind::hemisphere_flip, true, false, false, WithoutEnd::refused, {}},
+    {FaultKind::metal_distortion, true, false, false, WithoutEnd::for_good, kMetal},
+    {FaultKind::power_cycle, true, false, false, WithoutEnd::refused, kPower},
+    {FaultKind::drift_step, true, false, false, WithoutEnd::for_good, kPpm},
+    {FaultKind::clock_step, true, true, false, WithoutEnd::for_good, kStepMs},
+    {FaultKind::unplug, true, true, false, WithoutEnd::refused, {}},
+    {FaultKind::drop_frames, false, true, false, WithoutEnd::once, kChance},
+    {FaultKind::sequence_gap, false, true, false, WithoutEnd::once, kGap},
+    {FaultKind::silence, false, true, false, WithoutEnd::refused, {}},
+    {FaultKind::late_frames, false, true, false, WithoutEnd::refused, kLateMs},
+    {FaultKind::duplicate_frames, false, true, false, WithoutEnd::once, kChance},
+    {FaultKind::garbage, false, true, false, WithoutEnd::once, kGarbage},
+    {FaultKind::size_change, false, true, false, WithoutEnd::refused, {}},
+    {FaultKind::torn_frame, false, true, false, WithoutEnd::once, kTorn},
+    {FaultKind::transmitter_bumped, false, false, true, WithoutEnd::for_good, kBump},
+    {FaultKind::bed_tilted, false, false, true, WithoutEnd::for_good, kTilt},
+    {FaultKind::patient_moved, false, false, true, WithoutEnd::for_good, kMoved},
+    {FaultKind::reference_moved, false, false, true, WithoutEnd::for_good, kSlipped},
+    {FaultKind::breathing, false, false, true, WithoutEnd::for_good, kBreath},
+    {FaultKind::resected, false, false, true, WithoutEnd::for_good, kResected},
+    {FaultKind::lens_zoomed, false, false, true, WithoutEnd::for_good, kZoomed},
+    {FaultKind::scope_turned, false, false, true, WithoutEnd::for_good, kTurned},
 };
 
 }  // namespace

@@ -14,70 +14,19 @@
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
-#include "hw-sim/phantom/json_file.hpp"
 #include "hw-sim/world/frame_camera.hpp"
+#include "hw-sim/world/truth_files.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
 
-/// What an operator knows: the board, the pointer, how many markers there are, how long it takes.
-nlohmann::json sheet_of(const World& world) {
-  nlohmann::json sheet;
-  sheet["board"] =
-      fmt::format("chessboard:{}x{}:{:g}mm", world.board().columns, world.board().rows, world.board().square_mm);
-  sheet["tip_in_sensor_mm"] = json_of(world.tip_in_pointer_mm());
-  sheet["fiducials"] = world.truth().fiducials_mm.size();
-  for (const Stage& stage : world.stages())
-    sheet["stages"].push_back({{"name", stage.name}, {"begins_s", stage.begins_s}});
-  return sheet;
-}
-
-nlohmann::json truth_of(const World& world, const DeformationSettings& settings, const DrawnDeformation& deformation,
-                        const CameraModel& lens) {
-  nlohmann::json truth;
-  truth["deformation"] = {{"kind", name_of(settings.kind)}, {"amplitude_mm", settings.amplitude_mm}};
-  truth["tumour_centre_in_patient_mm"] = json_of(world.truth().tumour_centre_mm);
-  truth["tumour_centre_moved_to_mm"] = json_of(deformation.map->deformed_of(world.truth().tumour_centre_mm));
-  for (const Eigen::Vector3d& f : world.truth().fiducials_mm) truth["fiducials_in_patient_mm"].push_back(json_of(f));
-  truth["tracker_from_patient"] = json_of(world.tracker_from_patient().matrix());
-  truth["tracker_from_marker"] = json_of(world.tracker_from_marker().matrix());
-  truth["camera_from_sensor"] = json_of(world.camera_from_sensor().matrix());
-  truth["tip_in_sensor_mm"] = json_of(world.tip_in_pointer_mm());
-  truth["camera"] = {{"width_px", lens.width_px},
-                     {"height_px", lens.height_px},
-                     {"fx_px", lens.fx_px},
-                     {"fy_px", lens.fy_px},
-                     {"cx_px", lens.cx_px},
-                     {"cy_px", lens.cy_px},
-                     {"k1", lens.k1},
-                     {"k2", lens.k2},
-                     {"p1", lens.p1},
-                     {"p2", lens.p2},
-                     {"k3", lens.k3}};
-  return truth;
-}
-
-std::string frames_csv(const World& world, double rate_hz) {
-  std::string csv = "sequence,world_s";
-  for (int i = 0; i < 16; ++i) csv += fmt::format(",camera_from_patient_{}{}", i / 4, i % 4);
-  csv += '\n';
-  const auto frames = static_cast<std::uint64_t>(std::ceil(world.ends_s() * rate_hz));
-  for (std::uint64_t sequence = 0; sequence < frames; ++sequence) {
-    const double world_s = static_cast<double>(sequence) / rate_hz;
-    const Eigen::Matrix4d m = (world.tracker_from_camera(world_s).inverse() * world.tracker_from_patient()).matrix();
-    csv += fmt::format("{},{:.6f}", sequence, world_s);
-    for (int i = 0; i < 16; ++i) csv += fmt::format(",{:.9g}", m(i / 4, i % 4));
-    csv += '\n';
-  }
-  return csv;
-}
-
-/// The flock of two, scope and pointer. Before zero_ns is set, and until then, the world stands still.
+/// The flock: scope, pointer, and the reference where there is one. Before zero_ns is set, and until then, the world
+/// stands still.
 TrackerScript tracker_of(const CartSettings& settings, const World& world, std::vector<Fault> faults,
                          const std::atomic<std::int64_t>& zero_ns) {
   TrackerSettings tracker;
-  tracker.unit.birds = 2;
+  tracker.unit.birds = world.reference() == ReferenceOn::nothing ? 2 : 3;
   tracker.noise = settings.noise;
   tracker.distortion_mm = settings.distortion_mm;
   tracker.seed = settings.seed;
@@ -89,6 +38,10 @@ TrackerScript tracker_of(const CartSettings& settings, const World& world, std::
     if (bird == 0) {
       const auto scope = world.tracker_from_sensor(world_s);
       return {scope.rotation(), scope.translation()};
+    }
+    if (bird == 2) {
+      const auto reference = world.tracker_from_reference(world_s);
+      return {reference.rotation(), reference.translation()};
     }
     const auto pointer = world.tracker_from_pointer(world_s);
     return {pointer.rotation(), pointer.translation()};
@@ -118,22 +71,18 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
     cavity.organ = deformed(liver->surface, *deformation->map);
     cavity.rest_mm = liver->surface.vertices;
   }
-  const auto world = World::create(*truth, liver->surface, lens, settings.seed, settings.pace, &cavity.organ);
+  const auto world = World::create(*truth, liver->surface, lens, settings.seed, settings.pace, &cavity.organ,
+                                   Happenings(faults.world), settings.reference);
   if (!world) return world.error();
   const auto laparoscope = Laparoscope::create({.lens = lens, .seed = settings.seed});
   if (!laparoscope) return laparoscope.error();
   (*laparoscope)->set_cavity(cavity);
   (*laparoscope)->set_bench(world->board());
 
-  std::error_code error;
-  std::filesystem::create_directories(settings.folder / "truth", error);
-  for (const Result<void>& written :
-       {write_json(settings.folder / "truth" / "truth.json",
-                   truth_of(*world, settings.deformation, *deformation, lens)),
-        write_text(settings.folder / "truth" / "frames.csv", frames_csv(*world, settings.rate_hz)),
-        write_json(settings.folder / "cart.json", sheet_of(*world))}) {
-    if (!written) return written.error();
-  }
+  const Eigen::Vector3d tumour_mm = deformation->map->deformed_of(truth->tumour_centre_mm);
+  if (auto written = write_truth(settings.folder, *world, {lens, settings.rate_hz, settings.deformation, tumour_mm});
+      !written)
+    return written.error();
 
   auto terminal = open_terminal(settings.tty);
   if (!terminal) return std::move(terminal).error();
@@ -159,9 +108,16 @@ Result<void> run_cart(const CartSettings& settings, const std::atomic<bool>& sto
   world_zero_ns = zero_ns;
   tracker.align(zero_ns);
   (*camera)->start(zero_ns);
+  FaultTimeline befalling(faults.world, FaultTarget::world);
+  befalling.begin(zero_ns);
+  const auto tell = [&befalling] {
+    befalling.advance(device_now().ns);
+    for (const FaultEvent& event : befalling.take_events()) announce(event);
+  };
   for (const Stage& stage : world->stages()) {
     const std::int64_t begins_ns = zero_ns + static_cast<std::int64_t>(stage.begins_s * 1e9);
     while (!stop && device_now().ns < begins_ns) {
+      tell();
       sleep_until(std::min(Deadline(DeviceTime{begins_ns}), Deadline::after(Duration::from_ms(20))));
     }
     // The end is when the last frame is out, which a slow machine may see later than the script has it.

@@ -25,7 +25,9 @@ struct CartSettings {
   bool drop_late = false;      ///< true: frames that are not traced in time are left out
   DeformationSettings deformation = {.amplitude_mm = 0};  ///< of the liver since the CT
   double distortion_mm = 0;                               ///< of the tracker's field, where it is largest
-  std::filesystem::path faults;  ///< script of faults of either instrument, from the world's time 0 on; or empty
+  std::filesystem::path faults;  ///< script of faults of either instrument and of the operation, from the world's time
+                                 ///< 0 on; or empty
+  ReferenceOn reference = ReferenceOn::nothing;  ///< what a third bird is fixed on
 };
 
 /// Runs the operation once, in real time, and announces its stages as JSON lines on standard output. It begins a second

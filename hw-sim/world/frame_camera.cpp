@@ -72,8 +72,6 @@ void FrameCamera::render(const std::stop_token& stop) {
   PatientTracers patient;
   if (settings_.drop_late) patient.observe(true);
   std::int64_t tracing_ns = 0;
-  const Transform<Marker, Tracker> marker_from_tracker = world_.tracker_from_marker().inverse();
-  const Transform<Patient, Tracker> patient_from_tracker = world_.tracker_from_patient().inverse();
   for (std::uint64_t sequence = 0; sequence < frames_; ++sequence) {
     {
       std::unique_lock lock(mutex_);
@@ -84,9 +82,12 @@ void FrameCamera::render(const std::stop_token& stop) {
     const std::int64_t began_ns = device_now().ns;
     const double world_s = static_cast<double>(sequence) / settings_.rate_hz;
     const Transform<Tracker, Camera> pose = world_.tracker_from_camera(world_s);
-    Rendered rendered{sequence, world_.at_bench(world_s)
-                                    ? laparoscope_.look_at_bench((marker_from_tracker * pose).inverse(), sequence)
-                                    : laparoscope_.look_into_cavity((patient_from_tracker * pose).inverse(), sequence)};
+    laparoscope_.zoom(world_.zoom(world_s));
+    laparoscope_.change_organ(world_.organ(world_s));
+    Rendered rendered{
+        sequence, world_.at_bench(world_s)
+                      ? laparoscope_.look_at_bench(pose.inverse() * world_.tracker_from_marker(world_s), sequence)
+                      : laparoscope_.look_into_cavity(pose.inverse() * world_.tracker_from_patient(world_s), sequence)};
     tracing_ns = device_now().ns - began_ns;
     {
       const std::lock_guard lock(mutex_);

@@ -14,6 +14,7 @@
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/look_at.hpp"
 #include "hw-sim/phantom/implants.hpp"
+#include "hw-sim/world/ease.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -28,11 +29,6 @@ constexpr double kCarryS = 2;                             // of the scope from t
 constexpr double kViewDwellS = 0.8, kViewMoveS = 0.45;    // of the scope about the liver
 constexpr double kSweepS = 7;                             // there and back
 constexpr double kRangeMm = 700;                          // of the transmitter
-
-double ease(double u) {
-  u = std::clamp(u, 0.0, 1.0);
-  return u * u * (3 - 2 * u);
-}
 
 Vector3d rotation_vector(const Vector3d& axis_deg) {
   return axis_deg * kRadPerDeg;
@@ -49,8 +45,10 @@ Transform<To, From> between(const Transform<To, From>& a, const Transform<To, Fr
 }  // namespace
 
 Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const CameraModel& lens, std::uint64_t seed,
-                            const Pace& pace, const Mesh* moved) {
+                            const Pace& pace, const Mesh* moved, Happenings happenings, ReferenceOn reference) {
   World world;
+  world.happenings_ = std::move(happenings);
+  world.reference_ = reference;
   world.dwell_s_ = pace.dwell_s;
   world.truth_ = truth;
   // The bird sits on the scope's handle, its axes askew, 280 mm behind the lens.
@@ -68,6 +66,11 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   world.tracker_from_patient_ = Transform<Tracker, Patient>(rotation, Vector3d(-(rotation * transmitter)));
   world.tracker_from_marker_ =
       Transform<Tracker, Marker>(rotation_exp(rotation_vector({5, 4, 35})), Vector3d(330, -150, 140));
+
+  // On the lower chest, which the breath hardly lifts, or on the table's rail, beside the hip.
+  const Vector3d from_liver = reference == ReferenceOn::table ? Vector3d(150, 130, -120) : Vector3d(80, -150, 130);
+  world.patient_from_reference_ =
+      Transform<Patient, Sensor>(rotation_exp(rotation_vector({12, -20, 35})), truth.liver_centre_mm + from_liver);
 
   // What the scope looks at: the point of the liver's face that the line from the tumour towards the port goes through.
   const Vector3d outward = towards_scope();
@@ -166,11 +169,13 @@ Result<void> World::check_range() const {
   constexpr double kEveryS = 0.05;
   for (int i = 0; i * kEveryS < ends_s(); ++i) {
     const double t = i * kEveryS;
-    for (const Vector3d& p : {tracker_from_sensor(t).translation(), tracker_from_pointer(t).translation()}) {
+    std::vector<Vector3d> birds{tracker_from_sensor(t).translation(), tracker_from_pointer(t).translation()};
+    if (reference_ != ReferenceOn::nothing) birds.push_back(tracker_from_reference(t).translation());
+    for (const Vector3d& p : birds) {
       if (p.x() < 20 || p.norm() > kRangeMm) {
         return Error{Errc::bad_value,
                      fmt::format("at {:.1f} s a bird would be at ({:.0f}, {:.0f}, {:.0f}) mm, out of the tracker's "
-                                 "range; use a CT of a smaller region",
+                                 "range; use a CT of a smaller region, or a script in which less moves",
                                  t, p.x(), p.y(), p.z())};
       }
     }
@@ -222,12 +227,22 @@ Transform<Tracker, Camera> World::sway(double world_s) const {
   return between(swaying, stations_.front(), ease((world_s - calibrate_s_ + kToStationS) / kToStationS));
 }
 
-Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
+/// Where the table and the patient on it have gone since the beginning, the transmitter as it was then.
+Transform<Tracker, Tracker> World::carried(double world_s) const {
+  const Vector3d table_mm = truth_.liver_centre_mm + Vector3d(0, 140, 0);
+  const Transform<Patient, Patient> moved =
+      happenings_.table(world_s, table_mm) * happenings_.patient(world_s, table_mm);
+  if (moved.matrix() == Eigen::Matrix4d::Identity()) return {};  // to the last bit
+  return tracker_from_patient_ * moved * tracker_from_patient_.inverse();
+}
+
+/// With the transmitter as it was at first. The bird goes as scripted; a camera that turns against it goes its own way.
+Transform<Tracker, Camera> World::scripted_camera(double world_s) const {
   if (world_s < calibrate_s_) return sway(std::max(0.0, world_s));
-  if (world_s >= look_s_) return sweep(std::min(world_s, ends_s_) - look_s_);
-  if (world_s >= views_s_) return about(world_s - views_s_);
+  if (world_s >= look_s_) return carried(world_s) * sweep(std::min(world_s, ends_s_) - look_s_);
+  if (world_s >= views_s_) return carried(world_s) * about(world_s - views_s_);
   if (world_s >= touch_s_) {
-    const Transform<Tracker, Camera> there = views_.empty() ? sweep(0) : views_.front();
+    const Transform<Tracker, Camera> there = carried(world_s) * (views_.empty() ? sweep(0) : views_.front());
     return between(stations_.back(), there, ease((world_s - touch_s_) / kCarryS));
   }
   const double beat = std::max(0.0, world_s - calibrate_s_) / (dwell_s_ + kMoveS);
@@ -238,11 +253,46 @@ Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
   return between(stations_[station], stations_[next], ease((into_s - dwell_s_) / kMoveS));
 }
 
+Transform<Tracker, Camera> World::tracker_from_camera(double world_s) const {
+  return happenings_.transmitter(world_s) * scripted_camera(world_s) * happenings_.scope(world_s).inverse();
+}
+
 Transform<Tracker, Sensor> World::tracker_from_sensor(double world_s) const {
-  return tracker_from_camera(world_s) * camera_from_sensor_;
+  return happenings_.transmitter(world_s) * scripted_camera(world_s) * camera_from_sensor_;
+}
+
+Transform<Tracker, Sensor> World::tracker_from_reference(double world_s) const {
+  const Vector3d table_mm = truth_.liver_centre_mm + Vector3d(0, 140, 0);
+  const Transform<Tracker, Patient> on =
+      reference_ == ReferenceOn::table
+          ? happenings_.transmitter(world_s) * tracker_from_patient_ * happenings_.table(world_s, table_mm)
+          : tracker_from_patient(world_s);
+  return on * patient_from_reference_ * happenings_.reference(world_s);
+}
+
+Transform<Camera, Sensor> World::camera_from_sensor(double world_s) const {
+  return happenings_.scope(world_s) * camera_from_sensor_;
+}
+
+Transform<Tracker, Patient> World::tracker_from_patient(double world_s) const {
+  return happenings_.transmitter(world_s) * carried(world_s) * tracker_from_patient_;
+}
+
+Transform<Tracker, Marker> World::tracker_from_marker(double world_s) const {
+  return happenings_.transmitter(world_s) * tracker_from_marker_;
+}
+
+OrganChange World::organ(double world_s) const {
+  const Vector3d out = towards_scope();
+  return {.hollow = happenings_.hollow(world_s, look_at_in_patient_mm_, out, out.cross(Vector3d::UnitZ()).normalized()),
+          .shift_mm = happenings_.breath_mm(world_s)};
 }
 
 Transform<Tracker, Pointer> World::tracker_from_pointer(double world_s) const {
+  return happenings_.transmitter(world_s) * carried(world_s) * scripted_pointer(world_s);
+}
+
+Transform<Tracker, Pointer> World::scripted_pointer(double world_s) const {
   const double beat = std::max(0.0, world_s - touch_s_) / (kTouchDwellS + kTouchMoveS);
   const std::size_t last = tip_stops_in_tracker_mm_.size() - 1;
   const auto stop = std::min(static_cast<std::size_t>(beat), last);
@@ -251,7 +301,7 @@ Transform<Tracker, Pointer> World::tracker_from_pointer(double world_s) const {
   const std::size_t next = std::min(stop + 1, last);
   Vector3d tip = tip_stops_in_tracker_mm_[stop] + u * (tip_stops_in_tracker_mm_[next] - tip_stops_in_tracker_mm_[stop]);
   if (stroke_.lasts_s() > 0 && world_s > stroke_s_)
-    tip = tracker_from_patient_ * stroke_.tip_in_patient_mm(world_s - stroke_s_);
+    tip = tracker_from_patient_ * (stroke_.tip_in_patient_mm(world_s - stroke_s_) + happenings_.breath_mm(world_s));
   // The hand holds the pointer from in front of the patient, a little differently at each place.
   const auto hold = [](std::size_t i) {
     const auto a = static_cast<double>(i);

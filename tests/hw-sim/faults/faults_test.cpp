@@ -80,6 +80,20 @@ TEST(FaultScript, RefusesWhatIsNoScript) {
   EXPECT_EQ(read_fault_script("/nonexistent", Instruments::both, 1).error().code, Errc::not_found);
 }
 
+TEST(FaultScript, GivesTheOperationWhatBefallsItOnlyInACart) {
+  const std::string text = "[[fault]]\nname = \"bed_tilted\"\nat_s = 4\ndeg = 5\n";
+  const Scratch scratch;
+  const auto script = read_fault_script(scratch.file("f.toml", text), Instruments::both, 1);
+  ASSERT_TRUE(script) << script.error().what;
+  EXPECT_TRUE(script->tracker.empty() && script->camera.empty());
+  ASSERT_EQ(script->world.size(), 1U);
+  EXPECT_DOUBLE_EQ(script->world[0].value("deg"), 5);
+  EXPECT_DOUBLE_EQ(script->world[0].value("over_s"), 3);
+  for (const Instruments alone : {Instruments::tracker, Instruments::camera})
+    EXPECT_NE(problem(text, alone).find("line 1: bed_tilted: befalls the operation"), std::string::npos);
+  EXPECT_NE(problem(text + "of = \"tracker\"\n").find("without of"), std::string::npos);
+}
+
 TEST(FaultScript, TimesDrawnAtRandomFollowFromTheSeed) {
   const Scratch scratch;
   const auto times = [&](std::uint64_t seed) {
@@ -100,12 +114,12 @@ TEST(FaultScript, TimesDrawnAtRandomFollowFromTheSeed) {
 }
 
 TEST(FaultTable, HasEveryKindOnce) {
-  for (int kind = 0; kind <= static_cast<int>(FaultKind::torn_frame); ++kind) {
+  for (int kind = 0; kind <= static_cast<int>(FaultKind::scope_turned); ++kind) {
     const FaultSpec* const spec = fault_spec(fault_name(static_cast<FaultKind>(kind)));
     ASSERT_NE(spec, nullptr) << fault_name(static_cast<FaultKind>(kind));
     EXPECT_EQ(static_cast<int>(spec->kind), kind);
   }
-  EXPECT_EQ(fault_table().size(), static_cast<std::size_t>(FaultKind::torn_frame) + 1);
+  EXPECT_EQ(fault_table().size(), static_cast<std::size_t>(FaultKind::scope_turned) + 1);
 }
 
 TEST(FaultTimeline, BeginsEndsAndTellsOfIt) {
