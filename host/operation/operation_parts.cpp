@@ -63,6 +63,7 @@ Json json_of(const CalibratedScope& found) {
             {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
   if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
   const ScopeFigures& figures = found.scope.figures();
+  if (figures.hand_eye_covariance) json["hand_eye_covariance"] = rows_of(*figures.hand_eye_covariance);
   enter(json, "camera_rms_px", figures.camera_rms_px);
   enter(json, "held_out_px", figures.held_out_px);
   enter(json, "held_out_mm", figures.held_out_mm);
@@ -108,9 +109,11 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
   if (lens.contains("covariance")) covariance = matrix_of<CameraMatrix>(lens.at("covariance"));
   const auto hand_eye = matrix_of<Eigen::Matrix4d>(json.at("camera_from_sensor"));
   if (auto rigid = check_rigid(hand_eye, "camera_from_sensor"); !rigid) return rigid.error();
-  auto scope = ScopeSetup::of_values(
-      camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye),
-      {figure_of(json, "camera_rms_px"), figure_of(json, "held_out_px"), figure_of(json, "held_out_mm")});
+  ScopeFigures figures{figure_of(json, "camera_rms_px"), figure_of(json, "held_out_px"),
+                       figure_of(json, "held_out_mm")};
+  if (json.contains("hand_eye_covariance"))
+    figures.hand_eye_covariance = matrix_of<Eigen::Matrix<double, 6, 6>>(json.at("hand_eye_covariance"));
+  auto scope = ScopeSetup::of_values(camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye), figures);
   if (!scope) return scope.error();
   return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(),
                          json.at("made_from").get<std::string>() == "board", instruments_of(json)};

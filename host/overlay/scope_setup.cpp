@@ -106,9 +106,9 @@ Result<ScopeSetup> ScopeSetup::of_values(const CameraModel& camera,
   if (auto sound = check(camera); !sound) return sound.error();
   ScopeSetup out;
   out.camera_ = camera;
-  out.camera_covariance_ = camera_covariance;
   out.camera_from_sensor_ = camera_from_sensor;
   out.figures_ = figures;
+  out.figures_.camera_covariance = camera_covariance;
   return out;
 }
 
