@@ -12,6 +12,7 @@
 #include "host/app/overlay_options.hpp"
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/identity_json.hpp"
@@ -65,6 +66,10 @@ Result<Registered> read_registered(ExportOptions options) {
     const auto matrix = read_pose(options.registration);
     if (!matrix) return matrix.error();
     read.patient_from_tracker = Transform<Patient, Tracker>::from_matrix(*matrix);
+  }
+  for (const fs::path* file : {&options.model_pose, &options.deformation}) {
+    if (file->empty()) continue;
+    if (auto same = check_against_sheet(*file); !same) return same.error();
   }
   if (!options.model_pose.empty()) {
     const auto matrix = read_pose(options.model_pose);

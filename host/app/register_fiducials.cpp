@@ -5,11 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/verdict.hpp"
+#include "calibration/record/sha256.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/results.hpp"
 #include "host/case/fiducial_registration.hpp"
 #include "host/case/fiducial_report.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 
@@ -55,11 +58,21 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   if (!out) return out.error();
   const Verdict verdict = judge_fiducials(*out);
   const bool failed = verdict.grade == Grade::fail;
-  if (auto written = write_files(
-          {{failed ? std::filesystem::path() : options.out, pose_text(out->patient_from_tracker().matrix())},
-           {options.map, options.map.empty() ? "" : png_of(fiducials_map(*input, *out).view())},
-           {options.report, options.report.empty() ? "" : fiducials_page(*input, *out, verdict).html()},
-           {options.json, text_of(fiducials_json(*input, *out, verdict))}});
+  const std::string pose = pose_text(out->patient_from_tracker().matrix());
+  nlohmann::json json = fiducials_json(*input, *out, verdict);
+  json["made_utc"] = utc_now();
+  json["software"] = "birdseye " BIRDSEYE_VERSION;
+  if (!failed) json["sha256"]["out"] = calibration::sha256_of(pose);
+  for (const auto& [name, path] : {std::pair{"ct", options.files.ct}, {"tracker", options.files.tracker}}) {
+    const auto sum = files_sha256(path);
+    if (!sum) return sum.error();
+    json["sha256"][name] = *sum;
+  }
+  if (auto written =
+          write_files({{failed ? std::filesystem::path() : options.out, pose},
+                       {options.map, options.map.empty() ? "" : png_of(fiducials_map(*input, *out).view())},
+                       {options.report, options.report.empty() ? "" : fiducials_page(*input, *out, verdict).html()},
+                       {options.json, text_of(json)}});
       !written) {
     return written.error();
   }

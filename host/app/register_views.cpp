@@ -10,6 +10,8 @@
 #include <numbers>
 #include <regex>
 
+#include "calibration/record/sha256.hpp"
+#include "drivers/system/clock.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/case/error_picture.hpp"
@@ -18,6 +20,7 @@
 #include "host/case/registration_report.hpp"
 #include "host/case/registration_verdict.hpp"
 #include "host/case/run_registration.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -301,6 +304,15 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   json["reasons"] = verdict.reasons;
   if (auto made = make_empty_of_results(options.out); !made) return made.error();
   if (auto written = write_field(options.out / "field.mha", found.field); !written) return written.error();
+  const std::string pose =
+      "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given poses, mm\n" +
+      pose_text(found.patient_from_model.matrix());
+  const auto field_sum = files_sha256(options.out / "field.mha");
+  if (!field_sum) return field_sum.error();
+  json["made_utc"] = utc_now();
+  json["software"] = "birdseye " BIRDSEYE_VERSION;
+  json["sha256"]["field.mha"] = *field_sum;
+  if (c.refine_pose) json["sha256"]["pose.txt"] = calibration::sha256_of(pose);
   auto files = pictures_of(c, *transfer, found);
   if (!files) return files.error();
   if (const auto errors = expected_error_picture(c, *result))
@@ -308,12 +320,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   files->push_back({"trace.svg", trace_svg(found.trace)});
   files->push_back({"report.html", registration_report(c, found, verdict, json)});
   files->push_back({"result.json", text_of(json)});
-  if (c.refine_pose) {
-    files->push_back({"pose.txt",
-                      "# patient_from_model: a deformed place of the model's frame -> the patient frame of the given "
-                      "poses, mm\n" +
-                          pose_text(found.patient_from_model.matrix())});
-  }
+  if (c.refine_pose) files->push_back({"pose.txt", pose});
   for (FileText& file : *files) file.path = options.out / file.path;
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();

@@ -11,6 +11,7 @@
 #include "host/app/ct_options.hpp"
 #include "host/app/overlay_options.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -141,6 +142,7 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
     return Error{Errc::unsupported,
                  fmt::format("{}: a single slice cannot be deformed; give a volume", options.volume.path.string())};
   }
+  if (auto same = check_against_sheet(options.deformation); !same) return same.error();
   auto field = read_field(options.deformation);
   if (!field) return field.error();
   if (auto covers = check_covers(*field, scene.volume); !covers)

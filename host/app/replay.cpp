@@ -14,6 +14,7 @@
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/overlay_options.hpp"
+#include "host/files/files_sha256.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/replay_player.hpp"
@@ -111,6 +112,10 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
   auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
   if (!reader) return reader.error();
+  for (const fs::path* file : {&options.inputs.patient_from_model, &options.deformation}) {
+    if (file->empty()) continue;
+    if (auto same = check_against_sheet(*file); !same) return same.error();
+  }
   auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
   ShownChoice choice = options.shown;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <vector>
 
@@ -49,6 +50,21 @@ Result<std::string> files_sha256(const fs::path& path) {
     listed += fmt::format("{} {}\n", *sum, file.lexically_relative(path).string());
   }
   return calibration::sha256_of(listed);
+}
+
+Result<void> check_against_sheet(const fs::path& path) {
+  const fs::path sheet = path.parent_path() / "result.json";
+  std::ifstream in(sheet);
+  const nlohmann::json json = in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
+  const std::string name = path.filename().string();
+  if (!json.is_object() || !json.contains("sha256") || !json["sha256"].is_object() || !json["sha256"].contains(name))
+    return {};
+  const auto sum = files_sha256(path);
+  if (!sum) return sum.error();
+  if (json["sha256"][name] == *sum) return {};
+  return Error{Errc::bad_format, fmt::format("{}: is not the file of which {} tells: it was changed since, or is of "
+                                             "another registration; register again",
+                                             path.string(), sheet.string())};
 }
 
 }  // namespace birdseye::host

@@ -4,6 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calibration/record/sha256.hpp"
+#include "host/files/files_sha256.hpp"
+#include "host/files/text_files.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -33,6 +36,52 @@ TEST(WriteFiles, WhereOneCannotBeWrittenNoneIsReplaced) {
   EXPECT_FALSE(write_files({{path, "new"}, {scratch / "no folder" / "b.txt", "new"}}));
   EXPECT_EQ(birdseye::testing::contents_of(path), "former");
   EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+}
+
+TEST(PoseText, OneThatWasEditedIsRefusedAndOneOfAnotherProgramIsNot) {
+  const birdseye::testing::Scratch scratch;
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+  pose(0, 3) = 1.0 / 3;
+  const std::string text = pose_text(pose);
+  ASSERT_EQ(*read_pose(scratch.file("pose.txt", text)), pose);
+  EXPECT_EQ(
+      *read_pose(scratch.file("dos.txt", "# with ends of lines as DOS has them\r\n1 0 0 " +
+                                             std::string("0.33333333333333331\r\n0 1 0 0\r\n0 0 1 0\r\n0 0 0 1\r\n"
+                                                         "# sha256 of the four lines: ") +
+                                             text.substr(text.size() - 65, 64) + "\r\n")),
+      pose);
+  std::string edited = text;
+  edited.replace(edited.find("0.3333"), 6, "20.333");
+  const auto read = read_pose(scratch.file("pose.txt", edited));
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().what.find("pose.txt: was changed since"), std::string::npos) << read.error().what;
+  EXPECT_TRUE(read_pose(scratch.file("pose.txt", edited.substr(0, edited.find('#'))))) << "somebody's own statement";
+}
+
+TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {
+  const birdseye::testing::Scratch scratch;
+  const std::string field = scratch.file("field.mha", "displacements");
+  EXPECT_TRUE(check_against_sheet(field)) << "no sheet tells of it";
+  (void)scratch.file("result.json", R"({"verdict": "pass"})");
+  EXPECT_TRUE(check_against_sheet(field)) << "nor did those of earlier versions";
+  (void)scratch.file("result.json",
+                     R"({"sha256": {"field.mha": ")" + calibration::sha256_of("displacements") + R"("}})");
+  EXPECT_TRUE(check_against_sheet(field));
+  (void)scratch.file("field.mha", "displacementt");
+  const auto edited = check_against_sheet(field);
+  ASSERT_FALSE(edited);
+  EXPECT_NE(edited.error().what.find("field.mha: is not the file of which"), std::string::npos) << edited.error().what;
+}
+
+TEST(FilesSha256, OfAFolderNamesAndContentsCount) {
+  const birdseye::testing::Scratch scratch;
+  (void)scratch.file("liver.nii", "a");
+  (void)scratch.file("tumour.nii", "b");
+  const std::string both = *files_sha256(scratch.path());
+  (void)scratch.file("liver.nii", "b");
+  (void)scratch.file("tumour.nii", "a");
+  EXPECT_NE(*files_sha256(scratch.path()), both);
+  EXPECT_FALSE(files_sha256(scratch / "none"));
 }
 
 }  // namespace
