@@ -92,18 +92,22 @@ Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progre
   return found;
 }
 
-Result<std::vector<calibration::TimedRotation>> read_rotations(const fs::path& path, const PoseReading& how,
-                                                               Verdict& odd) {
-  const auto set = read_pose_set(path, how);
+Result<PoseSet> read_timed(const fs::path& path, const PoseReading& how, Verdict& odd) {
+  auto set = read_pose_set(path, how);
   if (!set) return set.error();
   if (!set->timed)
     return Error{Errc::bad_value,
                  fmt::format("{}: its poses bear no times, only an order; give a CSV with times", path.string())};
-  std::vector<calibration::TimedRotation> rows;
-  for (const TimedPose& pose : set->poses) rows.push_back({pose.time_s, pose.tracker_from_sensor.quaternion()});
   for (const std::string& line : by_kind(set->rejected))
     odd.add(Grade::pass, fmt::format("{}: rejected {}", path.filename().string(), line));
   for (const std::string& note : set->notes) odd.add(Grade::pass, path.filename().string() + ": " + note);
+  return set;
+}
+
+std::vector<calibration::TimedRotation> rotations_of(const PoseSet& set) {
+  std::vector<calibration::TimedRotation> rows;
+  rows.reserve(set.poses.size());
+  for (const TimedPose& pose : set.poses) rows.push_back({pose.time_s, pose.tracker_from_sensor.quaternion()});
   return rows;
 }
 
@@ -111,16 +115,17 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& o
   auto how = pose_reading(options.poses_are);
   if (!how) return how.error();
   how->transform = options.transform;
-  const auto a = read_rotations(options.poses, *how, odd);
+  const auto a = read_timed(options.poses, *how, odd);
   if (!a) return a.error();
   how->transform = options.eye_transform;
   how->option_prefix = "eye-";
   how->field.reset();
   how->inverted = false;
   how->most_error_mm.reset();  // what the camera saw is not the tracker's
-  const auto b = read_rotations(options.eye_poses, *how, odd);
+  const auto b = read_timed(options.eye_poses, *how, odd);
   if (!b) return b.error();
-  auto latency = calibration::find_latency(*a, *b, options.settings);
+  if (auto two = refuse_alike(options.poses, *a, options.eye_poses, *b); !two) return two.error();
+  auto latency = calibration::find_latency(rotations_of(*a), rotations_of(*b), options.settings);
   if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
   LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}, {}};
   found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",

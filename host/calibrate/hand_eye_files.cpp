@@ -108,6 +108,7 @@ Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
   if (eye->timed && files.board_poses.empty()) {
     const auto sensor = read_pose_set(files.poses, files.of_sensor);
     if (!sensor) return sensor.error();
+    if (auto two = refuse_alike(files.poses, *sensor, files.eye_poses, *eye); !two) return two.error();
     if (sensor->timed) return read_streams(*sensor, *eye);
   }
   HandEyeRecording out;

@@ -94,6 +94,15 @@ std::optional<double> time_by_name(const fs::path& file) {
   return static_cast<double>(std::stoll(stem)) / kNsPerSecond;
 }
 
+Result<void> refuse_alike(const fs::path& a, const PoseSet& of_a, const fs::path& b, const PoseSet& of_b) {
+  const auto pose_of = [](const TimedPose& one) { return one.tracker_from_sensor.matrix(); };
+  if (!std::ranges::equal(of_a.poses, of_b.poses, {}, pose_of, pose_of)) return {};
+  return Error{Errc::bad_value,
+               fmt::format("{} and {}: hold the same poses to the last digit: one of the two stands in "
+                           "the other's place",
+                           a.string(), b.string())};
+}
+
 Result<PoseSet> read_pose_set(const fs::path& path, const PoseReading& how) {
   std::error_code ignored;
   const bool folder = fs::is_directory(path, ignored);

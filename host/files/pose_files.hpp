@@ -69,6 +69,10 @@ struct PoseReading {
 /// rejected by name, never used; a file that yields no pose is an error. Rotations are passed on as recorded (to 1e-3).
 Result<PoseSet> read_pose_set(const std::filesystem::path& path, const PoseReading& how = {});
 
+/// Refuses two files whose poses are alike to the last digit: one was given in the other's place.
+Result<void> refuse_alike(const std::filesystem::path& a, const PoseSet& of_a, const std::filesystem::path& b,
+                          const PoseSet& of_b);
+
 /// The time that a file's name tells: where it is a whole number of nanoseconds since 1970, of 16 digits or more.
 std::optional<double> time_by_name(const std::filesystem::path& file);
 

@@ -307,6 +307,11 @@ TEST(CalibrateHandEyeCommand, BothStreamsInvertedAreNoHandEye) {
   EXPECT_EQ(said.code, 0) << said.output;
   EXPECT_LT((translation() - truth_mm).norm(), 0.01);
 
+  for (const char* kind : {"hand-eye", "latency"}) {
+    expect_refused("birdseye",
+                   std::string("calibrate ") + kind + hand + " --eye-poses " + (scratch / "hand.csv").string(),
+                   {"hand.csv and ", "the same poses to the last digit"});
+  }
   const std::string of_tracker = " --poses-are sensor_from_tracker";
   for (const std::string& both : {hand + eye_inverted + of_tracker, hand_inverted + eye_inverted}) {
     const auto wrong = run("birdseye", command + both);
