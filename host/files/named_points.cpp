@@ -161,6 +161,15 @@ Result<StatedPoint> point_of_columns(const Columns& columns, const Fields& field
   return out;
 }
 
+/// A line that counts the point before its three numbers, as "1 253.5 -38.5 -1109.6".
+bool is_counted(const Fields& fields) {
+  const auto digits = [](const std::string& field) {
+    return !field.empty() && std::ranges::all_of(field, [](char c) { return c >= '0' && c <= '9'; });
+  };
+  return fields.size() == 4 && std::ranges::all_of(fields, is_number) && digits(fields[0]) &&
+         !(digits(fields[1]) && digits(fields[2]) && digits(fields[3]));
+}
+
 /// The part of a remark behind "key =".
 std::optional<std::string> value_of(const std::string& remark, std::string_view key) {
   const auto equals = remark.find('=');
@@ -186,8 +195,20 @@ class TableOfPoints {
       if (columns_->frame != StatedFrame::none) out_.frame = columns_->frame;
       return {};
     }
+    if (first) counted_ = is_counted(row.fields);
+    std::string count;
+    if (!columns_ && counted_) {
+      if (!is_counted(row.fields) || !counts_.insert(row.fields[0]).second)
+        return Error{Errc::bad_format,
+                     fmt::format("the lines begin with a number that counts the points, and here is none, or one that "
+                                 "stood before; {}",
+                                 kLineOfAPoint)};
+      count = row.fields[0];
+      row.fields.erase(row.fields.begin());
+    }
     auto point = columns_ ? point_of_columns(*columns_, row.fields) : point_of_words(std::move(row.fields));
     if (!point) return point.error();
+    if (!count.empty()) point->name = count;
     out_.points.push_back(*std::move(point));
     return {};
   }
@@ -219,6 +240,8 @@ class TableOfPoints {
   StatedPoints out_;
   std::optional<Columns> columns_;
   bool fcsv_ = false;
+  bool counted_ = false;
+  std::set<std::string> counts_;
 };
 
 /// By its first bytes.
@@ -293,7 +316,15 @@ Result<NamedPoints> read_named_points(const fs::path& path, PointsOf of) {
     if (!point.name.empty()) names.insert(point.name);
     out.names.push_back(std::move(point.name));
   }
-  if (names.size() < out.places_mm.size()) out.names.clear();
+  if (names.size() < out.places_mm.size()) {
+    const auto twice = std::ranges::find_if(
+        out.names, [&](const std::string& name) { return !name.empty() && std::ranges::count(out.names, name) > 1; });
+    if (twice != out.names.end()) {
+      out.notes.push_back(
+          fmt::format("{}: \"{}\" is the name of more than one point: its names are not used", path.string(), *twice));
+    }
+    out.names.clear();
+  }
   return out;
 }
 

@@ -33,6 +33,7 @@ TEST(NamedPoints, TablesOfAllKindsAreTheSamePoints) {
       {"header.csv", "\xEF\xBB\xBFid,Name,X,Y,Z,note\n1,left ear,1.5,2,3,sharp\n2,right ear,4,5,6,\n"},
       {"metres.csv", "name;x [m];y [m];z [m]\nleft ear;0,0015;0,002;0,003\nright ear;0,004;0,005;0,006\n"},
       {"ras.csv", "label,r,a,s\nleft ear,-1.5,-2,3\nright ear,-4,-5,6\n"},
+      {"counted.txt", "1 1.5 2 3\n2 4 5.0 6\n"},
       {"comma.txt", "1,5 2,0 3,0\n4,0 5,0 6,0\n"},
       {"spreadsheet.csv", "1,5;2;3\n4;5;6\n"},
       {"slicer.fcsv", kFcsv},
@@ -45,7 +46,8 @@ TEST(NamedPoints, TablesOfAllKindsAreTheSamePoints) {
     EXPECT_LT((read->places_mm[1] - Eigen::Vector3d(4, 5, 6)).norm(), 1e-12) << name;
     const bool nameless =
         name == "plain.txt" || name == "remark.txt" || name == "comma.txt" || name == "spreadsheet.csv";
-    EXPECT_EQ(read->names, nameless ? Names{} : (Names{"left ear", "right ear"})) << name;
+    const Names names = name == "counted.txt" ? Names{"1", "2"} : Names{"left ear", "right ear"};
+    EXPECT_EQ(read->names, nameless ? Names{} : names) << name;
   }
 }
 
@@ -77,6 +79,8 @@ TEST(NamedPoints, NamesThatStandTwiceAreNone) {
   const auto read = read_named_points(scratch.file("a.txt", "ear 1 2 3\near 4 5 6\n"), PointsOf::patient);
   ASSERT_TRUE(read);
   EXPECT_TRUE(read->names.empty());
+  ASSERT_EQ(read->notes.size(), 1U);
+  EXPECT_NE(read->notes[0].find("\"ear\" is the name of more than one point"), std::string::npos) << read->notes[0];
 }
 
 TEST(NamedPoints, WhatIsNoListOfPointsIsRefusedWithTheRemedy) {
@@ -84,6 +88,8 @@ TEST(NamedPoints, WhatIsNoListOfPointsIsRefusedWithTheRemedy) {
   const std::vector<std::array<std::string, 3>> files{
       {"two.txt", "1 2\n", "line 1: 2 numbers where a point has three; give x y z"},
       {"four.txt", "1 2 3\n1 2 3 4\n", "line 2: 4 numbers where a point has three; give x y z"},
+      {"count.txt", "1 1.5 2 3\n1 4.5 5 6\n", "line 2: the lines begin with a number that counts the points"},
+      {"uncounted.txt", "1 1.5 2 3\n4.5 5 6\n", "line 2: the lines begin with a number that counts the points"},
       {"words.txt", "once upon a time\n", "name,x,y,z"},
       {"nan.txt", "nan 1 2\n", "line 1: \"nan\" is not finite"},
       {"lacks.csv", "name,x,y\na,1,2\n", "x, y and z are not named there, each once"},
