@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "calibration/base/units.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -151,6 +153,40 @@ double least_fre_mm(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
   return search ? search->best_mm() : std::numeric_limits<double>::infinity();
 }
 
+/// Why no order fits, where a mirrored file or another unit explains it; else the error as it is.
+Error explained(const Error& error, Points ct_in_patient_mm, Points touched_in_tracker_mm) {
+  constexpr double kGoodFre_mm = 5;
+  if (error.code != Errc::degenerate) return error;
+  std::vector<Eigen::Vector3d> other(touched_in_tracker_mm.begin(), touched_in_tracker_mm.end());
+  for (Eigen::Vector3d& point : other) point.x() *= -1;
+  if (const double fre_mm = least_fre_mm(ct_in_patient_mm, other); fre_mm < kGoodFre_mm) {
+    return {Errc::degenerate,
+            fmt::format("the touched points fit markers of the CT to {:.2f} mm only if they are mirrored: one of the "
+                        "two files has one axis with the wrong sign, or two axes exchanged",
+                        fre_mm)};
+  }
+  struct Unit {
+    double mm;
+    const char* name;
+  };
+  for (const Unit& unit : {Unit{10, "cm"}, {kMmPerInch, "inches"}, {1000, "metres"}}) {
+    for (std::size_t i = 0; i < other.size(); ++i) other[i] = unit.mm * touched_in_tracker_mm[i];
+    if (const double fre_mm = least_fre_mm(ct_in_patient_mm, other); fre_mm < kGoodFre_mm) {
+      return {Errc::degenerate, fmt::format("the touched points fit markers of the CT to {:.2f} mm if they are in {}: "
+                                            "give mm",
+                                            fre_mm, unit.name)};
+    }
+    std::vector<Eigen::Vector3d> ct(ct_in_patient_mm.begin(), ct_in_patient_mm.end());
+    for (Eigen::Vector3d& point : ct) point *= unit.mm;
+    if (const double fre_mm = least_fre_mm(ct, touched_in_tracker_mm); fre_mm < kGoodFre_mm) {
+      return {Errc::degenerate,
+              fmt::format("the touched points fit the CT's to {:.2f} mm if the CT's are in {}: give mm", fre_mm,
+                          unit.name)};
+    }
+  }
+  return error;
+}
+
 std::vector<Eigen::Vector3d> without(Points points, std::size_t left_out) {
   std::vector<Eigen::Vector3d> out(points.begin(), points.end());
   out.erase(out.begin() + static_cast<std::ptrdiff_t>(left_out));
@@ -185,7 +221,7 @@ std::optional<std::size_t> odd_touch(Points ct_in_patient_mm, Points touched_in_
 
 Result<MatchedFit> match_and_fit(Points ct_in_patient_mm, Points touched_in_tracker_mm) {
   const auto found = searched(ct_in_patient_mm, touched_in_tracker_mm);
-  if (!found) return found.error();
+  if (!found) return explained(found.error(), ct_in_patient_mm, touched_in_tracker_mm);
   const AssignmentSearch& search = *found;
   if (search.ambiguous()) {
     return Error{Errc::degenerate,
