@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "calibration/base/lower_case.hpp"
 #include "calibration/base/units.hpp"
 #include "host/case/points_in_ct.hpp"
 #include "host/files/field_files.hpp"
@@ -133,6 +134,21 @@ void judge_places(Verdict& verdict, const FiducialsFound& out) {
                                   "The CT has {}",
                                   out.ct_reach));
   }
+  if (out.ct_outside.empty() && out.markers_seen) {
+    const MarkersSeen& seen = *out.markers_seen;
+    if (seen.only_turned()) {
+      verdict.add(Grade::fail,
+                  fmt::format("the CT shows a marker at {} of the {} places of the CT's file, and at {} with the other "
+                              "sign of x and y",
+                              seen.as_given, seen.places, seen.turned),
+                  "the file is in RAS: give LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, "
+                  "which say their frame");
+    } else if (seen.none()) {
+      verdict.add(Grade::pass,
+                  "the CT shows no marker of a usual kind at any place of the CT's file: look whether they lie where "
+                  "the file says");
+    }
+  }
   if (!out.targets_outside.empty()) {
     verdict.add(Grade::marginal,
                 fmt::format("target{} {} lie{} {}", out.targets_outside.size() > 1 ? "s" : "",
@@ -150,7 +166,13 @@ nlohmann::json rows_of(const Eigen::Matrix4d& m) {
 /// Brings the CT's points into the order of the touches of the same names, and leaves names where it did.
 Result<void> pair_by_name(const FiducialFiles& files, const std::vector<std::string>& ct_names, FiducialInput& input) {
   const auto index_of = [&](const std::string& name) {
-    return static_cast<std::size_t>(std::find(ct_names.begin(), ct_names.end(), name) - ct_names.begin());
+    const auto same = std::find(ct_names.begin(), ct_names.end(), name);
+    if (same != ct_names.end()) return static_cast<std::size_t>(same - ct_names.begin());
+    const auto alike = [&](const std::string& other) { return lower_case(other) == lower_case(name); };
+    const auto one = std::find_if(ct_names.begin(), ct_names.end(), alike);
+    if (std::ranges::count_if(ct_names, alike) != 1 || std::ranges::count_if(input.names, alike) != 1)
+      return ct_names.size();
+    return static_cast<std::size_t>(one - ct_names.begin());
   };
   const auto known = [&](const std::string& name) { return index_of(name) < ct_names.size(); };
   if (files.match || ct_names.empty() || std::none_of(input.names.begin(), input.names.end(), known)) {
@@ -220,7 +242,10 @@ Result<FiducialInput> read_fiducials(const FiducialFiles& files) {
     auto read = read_named_points(part.path, part.of);
     if (!read) return read.error();
     part.points_mm = std::move(read->places_mm);
-    if (part.names != nullptr) *part.names = std::move(read->names);
+    if (part.names != nullptr) {
+      if (auto sound = refuse_doubles(part.path, part.points_mm, read->names); !sound) return sound.error();
+      *part.names = std::move(read->names);
+    }
     std::move(read->notes.begin(), read->notes.end(), std::back_inserter(input.notes));
   }
   if (const auto paired = pair_by_name(files, ct_names, input); !paired) return paired.error();
@@ -245,6 +270,8 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   FiducialsFound out;
   auto fitted = fit_fiducials(files, input);
   if (!fitted) return fitted.error();
+  if (auto two = refuse_one_file_twice(files.ct, files.tracker, input.ct_mm, input.touched_mm); !two)
+    return two.error();
   out.fit = *std::move(fitted);
   out.localisation = files.localisation_mm
                          ? calibration::LocalisationError{*files.localisation_mm, *files.localisation_mm, 0}
@@ -252,7 +279,9 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   out.shape = calibration::compare_shapes(input.ct_mm, input.touched_mm, files.localisation_mm);
   out.ct_spread_mm = spread_of(input.ct_mm);
   out.misfit_advice = misfit_advice(input, out.shape);
-  out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
+  // Of a mirrored file no touch is the wrong one.
+  if (!is_mirrored(out.shape))
+    out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
   const calibration::TargetError predicted(input.ct_mm, out.localisation.rms_mm);
   for (const Eigen::Vector3d& target : input.targets_mm) out.tre_mm.push_back(predicted.rms_mm(target));
   if (input.volume) {
@@ -261,6 +290,7 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
     out.targets_outside = points_outside(*input.volume, input.targets_mm);
     out.ras = look_like_ras(*input.volume, input.ct_mm);
     out.ct_reach = reach_of(*input.volume);
+    out.markers_seen = look_for_markers(*input.volume, input.ct_mm);
   }
   if (input.surface) {
     auto refined = refine_on_surface(
@@ -277,13 +307,15 @@ Verdict judge_fiducials(const FiducialsFound& out) {
   // What a fiducial registration error means for a skin-marker registration of the liver.
   verdict.judge("fiducial registration error", out.fit.fre_rms_mm, "mm", 2, kLargestFre_mm,
                 out.fit.fre_rms_mm > kLargestFre_mm ? out.misfit_advice : "touch the worst marker again");
+  // More markers make no fit of points that are none of one another.
+  const bool fits = out.fit.fre_rms_mm <= kLargestFre_mm;
   for (std::size_t i = 0; i < out.tre_mm.size(); ++i) {
     verdict.judge(fmt::format("predicted error at target {}", i + 1), out.tre_mm[i], "mm", 3, 5,
-                  "place markers round the target");
+                  fits ? "place markers round the target" : "");
   }
   if (out.range && out.tre_mm.empty()) {
     verdict.judge("predicted error over the CT, median", out.range->median_mm, "mm", 3, 5,
-                  "place markers round what will be operated on, and name it with --targets");
+                  fits ? "place markers round what will be operated on, and name it with --targets" : "");
   }
   judge_shape(verdict, out);
   judge_places(verdict, out);

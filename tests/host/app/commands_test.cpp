@@ -178,7 +178,8 @@ TEST(Commands, RegisterFiducialsRefusesBadInputInOneLine) {
 TEST(Commands, WritesAllItsFilesOrNone) {
   const Scratch scratch;
   const std::string four = scratch.file("four.txt", kFour);
-  const std::string common = "register fiducials --ct " + four + " --tracker " + four + " --out ";
+  const std::string common = "register fiducials --ct " + four + " --tracker " +
+                             scratch.file("touched.txt", "7 0 1\n107 0 1\n7 80 1\n17 20 61\n") + " --out ";
   expect_refused("birdseye", common + (scratch / "m.txt").string() + " --json /nonexistent/r.json",
                  {"/nonexistent/r.json", "permissions"}, scratch / "m.txt");
   EXPECT_FALSE(fs::exists(scratch / "m.txt.part"));

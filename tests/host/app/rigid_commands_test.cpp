@@ -93,6 +93,18 @@ TEST(RigidCommands, FromTheCtToTheTarget) {
   EXPECT_EQ(none.code, 3) << none.output;
   EXPECT_NE(none.output.find("no marker within 10 mm of (0.0, 0.0, 0.0) mm"), std::string::npos) << none.output;
 
+  // The file in RAS, whose places lie in tissue too.
+  Points ras = *host::read_points(points, host::PointsOf::patient);
+  const std::string as_touched = scratch.file("as_touched.txt", text_of(touched(ras)));
+  for (Eigen::Vector3d& place : ras) place.head<2>() *= -1;
+  const auto turned =
+      run("birdseye", "register fiducials --ct " + scratch.file("ras.txt", text_of(ras)) + " --tracker " + as_touched +
+                          " --volume " + ct + " --out " + (scratch / "ras_out.txt").string());
+  EXPECT_EQ(turned.code, 3) << turned.output;
+  EXPECT_NE(turned.output.find("the CT shows a marker at 0 of the 6 places of the CT's file, and at 6 with the other"),
+            std::string::npos)
+      << turned.output;
+
   // Five of six touched, in another order.
   Points five(truth->fiducials_mm.rbegin(), truth->fiducials_mm.rbegin() + 5);
   const std::string common = "register fiducials --ct " + points + " --tracker " +
@@ -206,6 +218,61 @@ TEST(RigidCommands, PointsThatDoNotFitAreNotWrittenAndTheReasonIsNamed) {
     EXPECT_FALSE(fs::exists(out));
     EXPECT_EQ(result.output.find("of an earlier run"), std::string::npos) << result.output;
   }
+}
+
+TEST(RigidCommands, OneFileTwiceAndOneMarkerTwiceAreRefused) {
+  const Scratch scratch;
+  const std::string out = (scratch / "o.txt").string(), markers = scratch.file("p.txt", text_of(kMarkers));
+  const auto refuse = [&](const std::string& ct, const std::string& tracker, const std::vector<std::string>& words) {
+    testing::expect_refused("birdseye", "register fiducials --ct " + ct + " --tracker " + tracker + " --out " + out,
+                            words, out);
+  };
+  refuse(markers, markers, {"p.txt and ", "the same points to the last digit"});
+  Points twice = kMarkers, touched_twice = touched(kMarkers);
+  twice.push_back(twice[2] + Eigen::Vector3d(0.3, 0, 0));
+  touched_twice.push_back(touched_twice[2]);
+  refuse(scratch.file("twice.txt", text_of(twice)), scratch.file("t.txt", text_of(touched_twice)),
+         {"twice.txt: points 3 and 7 are 0.30 mm apart, and are one marker"});
+  refuse(markers + " --match", scratch.file("named.txt", "a 0 0 1\nb 90 0 1\nc 0 90 1\nd 0.5 0 1\n"),
+         {"named.txt: points a and d are 0.50 mm apart"});
+}
+
+TEST(RigidCommands, AMirroredFileIsToldInAnyOrderToo) {
+  const Scratch scratch;
+  Points mirrored = kMarkers, cm = touched(kMarkers);
+  for (Eigen::Vector3d& point : mirrored) point.x() *= -1;
+  for (Eigen::Vector3d& point : cm) point /= 10;
+  std::swap(mirrored[0], mirrored[3]);
+  std::swap(cm[0], cm[3]);
+  const std::string common = "register fiducials --out " + (scratch / "o.txt").string() + " --ct " +
+                             scratch.file("p.txt", text_of(kMarkers)) + " --tracker ";
+  testing::expect_refused("birdseye", common + scratch.file("m.txt", text_of(touched(mirrored))) + " --match",
+                          {"only if they are mirrored"});
+  testing::expect_refused("birdseye", common + scratch.file("cm.txt", text_of(cm)) + " --match",
+                          {"if they are in cm: give mm"});
+  // In the files' order, no single touch is to blame, and no more markers help.
+  std::swap(mirrored[0], mirrored[3]);
+  const auto told = run("birdseye", common + scratch.file("t.txt", text_of(touched(mirrored))) + " --targets " +
+                                        scratch.file("targets.txt", "10 -60 30\n"));
+  EXPECT_EQ(told.code, 3) << told.output;
+  EXPECT_NE(told.output.find("mirrored"), std::string::npos) << told.output;
+  EXPECT_EQ(told.output.find("again"), std::string::npos) << told.output;  // touch it, or them, again
+  EXPECT_EQ(told.output.find("place markers"), std::string::npos) << told.output;
+}
+
+TEST(RigidCommands, NamesPairWhateverTheirCase) {
+  const Scratch scratch;
+  std::string ct, tracker;
+  const Points seen = touched(kMarkers);
+  for (std::size_t i = 0; i < kMarkers.size(); ++i) {
+    const Eigen::Vector3d &p = kMarkers[i], &t = seen[kMarkers.size() - 1 - i];
+    ct += fmt::format("{} {} {} {}\n", static_cast<char>('A' + i), p.x(), p.y(), p.z());
+    tracker += fmt::format("{} {} {} {}\n", static_cast<char>('f' - i), t.x(), t.y(), t.z());
+  }
+  const auto result = run("birdseye", "register fiducials --ct " + scratch.file("p.txt", ct) + " --tracker " +
+                                          scratch.file("t.txt", tracker) + " --out " + (scratch / "o.txt").string());
+  EXPECT_EQ(result.code, 0) << result.output;
+  EXPECT_NE(result.output.find("paired by their names"), std::string::npos) << result.output;
 }
 
 TEST(RigidCommands, AFileOfAnEarlierRunIsNotTakenForThisRunsResult) {
