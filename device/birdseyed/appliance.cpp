@@ -132,6 +132,7 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.camera_drift_ppm = counters.camera_drift_ppm;
   health.tracker_time_sigma_ms = counters.tracker_time_sigma_ms;
   health.clock = read_wall_clock();
+  health.reference = config_.tracker.reference;
   health.recording = recorder_ ? recorder_->text() : not_recording_;
   const std::lock_guard lock(told_mutex_);
   health.state = name_of(board_.state());

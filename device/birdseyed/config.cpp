@@ -83,6 +83,11 @@ void read_birds(ConfigSection& section, Config& config) {
   }
   if (!section.failed("birds") && static_cast<int>(names.size()) != unit.birds)
     section.fail("names", fmt::format("{} names for {} birds", names.size(), unit.birds));
+  std::string& reference = config.tracker.reference;
+  section.text("reference", reference);
+  if (!reference.empty() &&
+      (reference == names.front() || std::find(names.begin(), names.end(), reference) == names.end()))
+    section.fail("reference", fmt::format("\"{}\" is none of the names of birds after the scope's", reference));
 }
 
 void read_tracker(ConfigSection& section, Config& config) {

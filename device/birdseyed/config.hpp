@@ -15,6 +15,7 @@ namespace birdseye::device {
 struct TrackerConfig {
   drivers::LineSettings line;
   drivers::minibird::MiniBirdSettings minibird;
+  std::string reference;  ///< the bird that is fixed on patient or table, by its name; empty: there is none
 };
 
 struct WireConfig {

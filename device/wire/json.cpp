@@ -48,6 +48,7 @@ void each_of_health(AnyHealth& health, const Each& each) {
   each("latency_ms_p99_frame", health.latency_ms_p99_frame);
   each("clock", health.clock);
   each("recording", health.recording);
+  each("reference", health.reference);
 }
 
 }  // namespace

@@ -103,6 +103,7 @@ struct Health {
   double latency_ms_p99_tracker = 0, latency_ms_p99_tracker_beside_frames = 0, latency_ms_p99_frame = 0;
   WallClock clock;
   std::string recording;  ///< the appliance recording's file, or why there is none; empty: none was asked for
+  std::string reference;  ///< the bird that is fixed on patient or table; empty: there is none
 };
 
 /// What became of the camera's exposure, gain, white balance and focus, which a client had held or let go.

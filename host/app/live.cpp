@@ -346,6 +346,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--rod-angle", options->live.rod_angle_deg,
                       "of a scope whose rod turns, degrees, as it is read off; Page Up and Page Down turn it on");
   command->add_option("--pointer", options->live.pointer, "the pointer's bird (default pointer)");
+  command->add_option("--reference", options->live.reference,
+                      "the bird that is fixed on patient or table (default: the one that the appliance names, if any)");
   command->add_option("--transfer", options->live.transfer, "transfer function: a preset, or a file");
   command->add_option("--engine", options->live.engine, "cpu, gl, slices or auto (default cpu)")
       ->check(CLI::IsMember({"cpu", "gl", "slices", "auto"}));

@@ -17,6 +17,7 @@
 #include "host/files/files_sha256.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/reference_sensor.hpp"
 #include "host/operation/replay_player.hpp"
 #include "host/operation/replay_setup.hpp"
 #include "host/overlay/margins.hpp"
@@ -90,18 +91,29 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
 }
 
 /// All of the recording through the overlay. remedies: for why no overlay was drawn, what to do about it.
-Result<void> play(RecordingReader& reader, ReplayHardware& hardware, ReplayPlayer& player,
+Result<void> play(RecordingReader& reader, const ReplayOptions& options, ReplayHardware& hardware, ReplayPlayer& player,
                   std::map<std::string, std::string>& remedies, Progress& progress) {
+  ReferenceSensor reference;
+  reference.use(options.inputs.reference, options.scope);
+  std::string why_bare;  // nobody is there to look whether the registration still holds
   for (;;) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; what was drawn before is there"};
     const auto event = reader.next(Deadline::after(Duration::from_ms(30'000)));
     if (!event && event.error().code == Errc::disconnected) return {};
     if (!event) return event.error();
     if (!*event) continue;
-    if (const auto* birds = std::get_if<wire::Birds>(&**event)) player.take(*birds);
-    hardware.take(**event);
-    const auto* frame = std::get_if<wire::VideoFrame>(&**event);
+    ReferenceSensor::Relative relative = reference.take(**event);
+    if (relative.news != ReferenceSensor::News::none && why_bare.empty())
+      why_bare = fmt::format("the reference \"{}\" was lost, came off or was pushed: register anew from there on",
+                             reference.name());
+    if (const auto* birds = std::get_if<wire::Birds>(&relative.event)) player.take(*birds);
+    hardware.take(relative.event);
+    auto* const frame = std::get_if<wire::VideoFrame>(&relative.event);
     if (frame == nullptr) continue;
+    if (!why_bare.empty()) {
+      frame->info.pose = PoseAnswer();
+      frame->info.pose.reason = why_bare;
+    }
     if (!hardware.why_not().empty()) remedies[hardware.why_not()] = hardware.remedy();
     if (auto taken = player.take(*frame, hardware.why_not()); !taken) return taken;
     if (player.done().frames % 20 == 0) progress(fmt::format("{} frames", player.done().frames));
@@ -158,7 +170,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope}, setup->setup(),
                       trust.figures, **engine, std::move(margins));
   std::map<std::string, std::string> remedies;
-  if (auto played = play(**reader, setup->hardware, player, remedies, progress); !played) return played.error();
+  if (auto played = play(**reader, options, setup->hardware, player, remedies, progress); !played)
+    return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
@@ -196,6 +209,8 @@ std::vector<CLI::Option*> add_inputs(CLI::App& command, ReplayInputs& inputs) {
   command.add_option("--tip", inputs.tip, "the pointer's tip, x y z, mm (default: the calibration record's)")
       ->needs(fiducials);
   command.add_option("--pointer", inputs.pointer, "the bird that touches (default pointer)")->needs(fiducials);
+  command.add_option("--reference", inputs.reference,
+                     "the bird that was fixed on patient or table: poses are taken relative to it");
   command.add_option("--touched", inputs.touched_s, "from and to, s: when it touches")->expected(2)->needs(fiducials);
   out.insert(out.end(),
              {fiducials, command.add_option("--model-pose", inputs.patient_from_model, "pose.txt of register views"),

@@ -17,10 +17,11 @@ constexpr std::size_t kFewestFiducials = 3;
 }  // namespace
 
 bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments& found_with) {
-  if (held_back_) {
+  if (held_back_ || !confirmed_) {
     touches_.clear();
     registered_.reset();
     held_back_ = false;
+    confirmed_ = true;
   }
   if (wanted != 0 && touches_.size() >= wanted) return false;
   if (touches_.empty()) found_with_ = found_with;
@@ -36,7 +37,7 @@ bool FiducialStep::take_back(std::size_t which) {
 
 void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted) {
   if (held_back_) return;
-  confirmed_ = true;
+  if (touches_.empty()) confirmed_ = true;  // there is nothing in doubt
   registered_.reset();
   fault_.clear();
   fits_poorly_ = false;
@@ -76,16 +77,17 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
 }
 
 void FiducialStep::doubt() {
-  if (registered_) confirmed_ = false;
+  if (registered_ || !touches_.empty()) confirmed_ = false;
 }
 
 bool FiducialStep::judge(const ConnectedInstruments& connected) {
   if (!registered_ && touches_.empty()) return false;
   const InstrumentMatch match = connected.match(found_with_, DependsOn::tracker);
   person_may_say_ = match.person_may_say;
-  const bool changes = match.holds == held_back_;
+  const bool turns = match.holds == held_back_;
+  const bool changes = turns || (!match.holds && note_.line != match.why_not);
   if (!match.holds) {
-    if (changes) {
+    if (turns) {
       line_ = note_.line;
       done_ = note_.done;
     }

@@ -15,7 +15,8 @@ namespace birdseye::host {
 /// The registration of the patient by fiducials that the pointer touches.
 class FiducialStep {
  public:
-  /// One more; false: all that are wanted are touched (wanted 0: as many as come). fit() is due then.
+  /// One more; false: all that are wanted are touched (wanted 0: as many as come). fit() is due then. Where what was
+  /// touched before is held back or in doubt, a new touch begins anew.
   /// found_with: by which it was touched.
   bool add(const Touch& touch, std::size_t wanted, const Instruments& found_with);
   /// One is taken back, from 0; false: there is none. fit() is due then.
@@ -28,7 +29,7 @@ class FiducialStep {
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);
   /// Somebody has looked, and the registration holds.
   void confirm() { confirmed_ = true; }
-  /// Whether the registration holds is to be looked at anew.
+  /// Whether the registration holds, and what was touched towards one, is to be looked at anew.
   void doubt();
   /// Holds back, touches and all, what was found with another tracker, and gives it back where that has come again.
   /// True: what is registered is no more what it was.

@@ -8,7 +8,8 @@ void ConnectedInstruments::set_link(bool connected) {
   if (connected == connected_) return;
   connected_ = connected;
   // The first messages of a connection may have been taken before its word: what they told stays.
-  now_ = connected ? Instruments{now_.tracker, now_.camera, now_.link + 1} : Instruments{{}, {}, now_.link};
+  now_ = connected ? Instruments{now_.tracker, now_.camera, now_.link + 1, now_.reference}
+                   : Instruments{{}, {}, now_.link, now_.reference};
   vouched_ = false;
 }
 
@@ -37,6 +38,11 @@ InstrumentMatch ConnectedInstruments::match(const Instruments& found_with, Depen
     if (vouched_ || found_with.link == now_.link) return {true, false, ""};
     return {false, true, words("held_untold", what)};
   };
+  if (depends_on == DependsOn::tracker && found_with.reference != now_.reference) {
+    if (now_.reference.empty()) return {false, false, words("held_reference_gone", found_with.reference)};
+    if (found_with.reference.empty()) return {false, false, words("held_reference_new", now_.reference)};
+    return {false, false, words("held_reference_other", found_with.reference, now_.reference)};
+  }
   InstrumentMatch tracker = match_one(words("instrument_tracker"), found_with.tracker, now_.tracker);
   if (depends_on == DependsOn::tracker) return tracker;
   InstrumentMatch camera = match_one(words("instrument_camera"), found_with.camera, now_.camera);

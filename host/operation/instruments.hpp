@@ -11,13 +11,15 @@ namespace birdseye::host {
 /// The instruments that something was found with. An identity is empty where nobody has told it.
 struct Instruments {
   calibration::Identity tracker, camera;
-  std::uint64_t link = 0;  ///< by which of this window's connections they were told; 0: an earlier window's
+  std::uint64_t link = 0;   ///< by which of this window's connections they were told; 0: an earlier window's
+  std::string reference{};  ///< the bird of that tracker that poses were relative to; empty: none
 };
 
 /// Enters what the appliance tells of them; of what it does not tell, what was known stays.
 void take_identities(const wire::Health& health, Instruments& told);
 
-/// What a finding depends on: hand-eye and lens on both instruments, a registration by touches on the tracker alone.
+/// What a finding depends on: hand-eye and lens on both instruments, a registration by touches on the tracker alone,
+/// and on the reference sensor.
 enum class DependsOn : std::uint8_t { tracker, tracker_and_camera };
 
 /// Whether what was found with some hardware holds with what is connected now.
@@ -33,6 +35,8 @@ class ConnectedInstruments {
   /// The link came or went. Of the instruments behind another connection nothing is known before they are told.
   void set_link(bool connected);
   void take(const wire::Health& health);
+  /// The reference that poses are relative to from now on; empty: none. A person's word does not make one of another.
+  void set_reference(const std::string& name) { now_.reference = name; }
   /// A person says that the instruments are those from before, of whatever nobody tells of.
   void vouch() { vouched_ = true; }
 

@@ -12,9 +12,10 @@ namespace birdseye::host {
 namespace {
 
 /// Why there is no overlay by what the fiducials give.
-std::string why_unregistered(const FiducialStep& fiducials) {
+std::string why_unregistered(const FiducialStep& fiducials, const std::string& why_doubted) {
   if (fiducials.held_back()) return words("why_registration_held", fiducials.note().line);
-  return fiducials.confirmed() ? words("why_unregistered") : words("why_unconfirmed");
+  if (fiducials.confirmed()) return words("why_unregistered");
+  return why_doubted.empty() ? words("why_unconfirmed") : why_doubted;
 }
 
 // Whoever was away from the patient for so long does not know what was moved meanwhile.
@@ -26,6 +27,7 @@ LiveWorkflow::LiveWorkflow(LiveSettings settings)
     : settings_(std::move(settings)),
       patient_(settings_.transfer, settings_.engine),
       keeper_(settings_.out, settings_.resume) {
+  use_reference(settings_.reference);
   if (!settings_.patient.ct.path.empty()) load(settings_.patient);
 }
 
@@ -78,6 +80,7 @@ void LiveWorkflow::set_link(bool connected, const std::string& words, bool may_r
     // Behind another connection may stand another appliance: it has to send its record first.
     if (!connected && calibration_.withdraw_record(host::words("held_no_link"))) follow_held_back();
     if (!connected) record_tip_in_pointer_mm_.reset();
+    if (!connected) reference_.lose();
     judge_instruments();
   }
   connection_.set_link(connected, words, picture_.frame().has_value(), may_retry);
@@ -93,6 +96,30 @@ void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::V
 }
 
 void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
+  if (reference_.in_use()) {
+    const ReferenceSensor::Relative relative = reference_.take(event);
+    take(relative.news);
+    take_relative(relative.event, now, clock);
+  } else {
+    take_relative(event, now, clock);
+  }
+  // Over the board the scope is calibrated in the tracker's frame: a reference may not lie on the patient yet.
+  calibration_.push(event);
+}
+
+void LiveWorkflow::use_reference(const std::string& name) {
+  reference_.use(name, settings_.scope);
+  instruments_.set_reference(name);
+}
+
+/// The reference does not tell any more where the patient is: only a landmark does.
+void LiveWorkflow::take(ReferenceSensor::News news) {
+  if (news == ReferenceSensor::News::none) return;
+  doubt_registration(news == ReferenceSensor::News::moved ? words("why_reference_moved", reference_.name())
+                                                          : words("why_reference_lost", reference_.name()));
+}
+
+void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
     note_pause(now);
     if (!frozen_) {
@@ -106,6 +133,7 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
   } else if (const auto* health = std::get_if<wire::Health>(&event)) {
     connection_.take(*health);
     instruments_.take(*health);
+    if (settings_.reference.empty()) use_reference(health->reference);
     judge_instruments();
   } else if (const auto* status = std::get_if<wire::Status>(&event)) {
     connection_.take(*status);
@@ -114,7 +142,6 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
   } else if (const auto* pedal = std::get_if<wire::Pedal>(&event)) {
     if (pedal->pressed) primary(now);
   }
-  calibration_.push(event);
 }
 
 void LiveWorkflow::take(const wire::Birds& birds) {
@@ -188,13 +215,21 @@ void LiveWorkflow::follow_held_back() {
   update_setup();
 }
 
-/// Patient or transmitter may have been moved while nobody saw it: only a landmark tells.
+/// Patient or transmitter may have been moved while nobody saw it: only a landmark tells. A reference sees it, and says
+/// so where it was lost meanwhile.
 void LiveWorkflow::note_pause(HostTime now) {
   const bool paused = video_came_ && now - *video_came_ > kPause;
   video_came_ = now;
-  if (!paused || !fiducials_.registered_or_held_back()) return;
+  if (paused && !reference_.in_use() && fiducials_.registered_or_held_back()) doubt_registration("");
+}
+
+void LiveWorkflow::doubt_registration(const std::string& why) {
+  if (!fiducials_.registered_or_held_back() && fiducials_.touches().empty()) return;
+  why_doubted_ = why;
   fiducials_.doubt();
-  check_ = run_ = {};
+  if (!fiducials_.registered_or_held_back()) return update_setup();
+  run_ = {};
+  check_ = {false, why};
   (return_to_ ? *return_to_ : step_) = LiveStep::check;
   update_setup();
 }
@@ -239,6 +274,7 @@ void LiveWorkflow::fit() {
     fiducials_.fit(std::nullopt, settings_.fiducials);
   }
   asked_to_take_back_.reset();
+  if (fiducials_.confirmed()) why_doubted_.clear();
   forget_views(words("note_views_touched_anew"));
   update_setup();
   const bool all_fit = fiducials_.note().done && !fiducials_.fits_poorly();
@@ -290,7 +326,7 @@ void LiveWorkflow::update_setup() {
                               is_other_patients() ? words("patient_other") : words("patient_unconfirmed"));
   if (calibration_.held_back())
     return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
-  if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_));
+  if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_, why_doubted_));
   const ScopeSetup turned = settings_.rod_angle_deg ? scope->scope.turned_to(*settings_.rod_angle_deg) : scope->scope;
   TrustFigures figures = trust_figures(turned.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   const DeformedOrgan* const deformed = deformation_.found().get();
@@ -407,6 +443,7 @@ void LiveWorkflow::primary(HostTime now) {
       break;
     case LiveStep::check:
       fiducials_.confirm();
+      why_doubted_.clear();
       update_setup();
       return go_on();
     case LiveStep::run:
@@ -419,7 +456,7 @@ void LiveWorkflow::stroke() {
   if (strokes_.stroking()) return strokes_.end();
   if (!settings_.tip_in_pointer_mm && !record_tip_in_pointer_mm_) return strokes_.refuse(words("note_no_tip"));
   if (!fiducials_.registered() || !fiducials_.confirmed()) {
-    return strokes_.refuse(words("note_no_stroke", why_unregistered(fiducials_)));
+    return strokes_.refuse(words("note_no_stroke", why_unregistered(fiducials_, why_doubted_)));
   }
   strokes_.begin(views_.views().size());
 }

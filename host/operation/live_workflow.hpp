@@ -17,6 +17,7 @@
 #include "host/operation/patient_step.hpp"
 #include "host/operation/place_picks.hpp"
 #include "host/operation/pointer_tip.hpp"
+#include "host/operation/reference_sensor.hpp"
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/overlay/live_picture.hpp"
@@ -27,6 +28,7 @@ struct LiveSettings {
   PatientFiles patient;
   std::string transfer = "tumour-and-vessels", engine = "cpu";
   std::string scope = "scope", pointer = "pointer";  ///< birds, by their names
+  std::string reference;  ///< the bird that is fixed on patient or table; empty: the one that the appliance names
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
   std::optional<double> rod_angle_deg;  ///< of a scope whose rod turns, as it is read off; empty: nobody has said it
@@ -96,6 +98,10 @@ class LiveWorkflow {
                                                       const RenderSettings& settings) const;
 
  private:
+  void take_relative(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock);
+  void use_reference(const std::string& name);
+  void take(ReferenceSensor::News news);
+  void doubt_registration(const std::string& why);
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
   void fit();
@@ -120,6 +126,8 @@ class LiveWorkflow {
   std::optional<LiveStep> return_to_;   ///< once what is held back comes back
   std::optional<HostTime> video_came_;  ///< the newest frame
   ConnectedInstruments instruments_;
+  ReferenceSensor reference_;
+  std::string why_doubted_;  ///< why somebody has to look whether the registration holds; empty: as usual
   std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force
   bool frozen_ = false;
   std::string resume_fault_;

@@ -43,6 +43,7 @@ OperationView LiveWorkflow::view() const {
   out.link = connection_.link();
   out.has_rod = calibration_.found() && calibration_.found()->scope.has_rod();
   if (out.has_rod) out.rod_angle_deg = settings_.rod_angle_deg;
+  out.reference = reference_.name();
   out.board_named = settings_.pattern.has_value();
   out.guiding = calibration_.guiding();
   if (step_ == LiveStep::calibrate) {

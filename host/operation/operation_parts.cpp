@@ -44,6 +44,7 @@ Instruments instruments_of(const Json& json) {
   Instruments out;
   json.at("tracker").get_to(out.tracker);
   if (json.contains("camera")) json.at("camera").get_to(out.camera);
+  if (json.contains("reference")) json.at("reference").get_to(out.reference);
   return out;
 }
 
@@ -77,6 +78,7 @@ Json json_of(const RegisteredPatient& found) {
             {"tracker_from_patient", rows_of(found.tracker_from_patient.matrix())},
             {"fre_mm", found.fre_mm},
             {"fiducials_in_patient_mm", Json::array()}};
+  if (!found.found_with.reference.empty()) json["reference"] = found.found_with.reference;
   for (const Eigen::Vector3d& place : found.fiducials_in_patient_mm)
     json["fiducials_in_patient_mm"].push_back({place.x(), place.y(), place.z()});
   return json;

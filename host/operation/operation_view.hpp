@@ -43,6 +43,7 @@ struct OperationView {
   std::string fault;
 
   LinkState link;
+  std::string reference;  ///< the bird that all poses are relative to; empty: none
 
   std::optional<double> rod_angle_deg;  ///< as somebody has said it; empty: nobody has, or there is no rod
   std::optional<GuideState> guide;      ///< in its step, while it guides

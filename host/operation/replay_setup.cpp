@@ -10,6 +10,7 @@
 #include "host/files/text_files.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/pointer_tip.hpp"
+#include "host/operation/reference_sensor.hpp"
 #include "host/recording/recording_reader.hpp"
 
 namespace birdseye::host {
@@ -111,11 +112,16 @@ Result<void> register_anew(const ReplayInputs& inputs, const std::optional<Calib
   const auto tip = tip_of(inputs, record);
   if (!tip) return tip.error();
   PointerTip pointer;
+  ReferenceSensor reference;
+  reference.use(inputs.reference, "");
   std::optional<DeviceTime> first;
   std::vector<Eigen::Vector3d> touched_in_tracker_mm;
   const auto looked = look_through(inputs, [&](const wire::Event& event) {
-    const auto* birds = std::get_if<wire::Birds>(&event);
-    if (birds == nullptr) return;
+    if (!std::holds_alternative<wire::Birds>(event)) return;
+    const ReferenceSensor::Relative relative = reference.take(event);
+    // Touches from before and after it moved are of two patients.
+    if (relative.news != ReferenceSensor::News::none) touched_in_tracker_mm.clear();
+    const auto* birds = std::get_if<wire::Birds>(&relative.event);
     if (!first) first = birds->acquired;
     const double at_s = (birds->acquired - *first).seconds();
     if (!inputs.touched_s.empty() && (at_s < inputs.touched_s[0] || at_s > inputs.touched_s[1])) return;

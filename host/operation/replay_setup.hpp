@@ -21,6 +21,7 @@ struct ReplayInputs {
   std::filesystem::path patient_from_tracker, tracker_from_patient;
   std::filesystem::path fiducials, tip;      ///< markers in the CT; the pointer's tip, where the record has none
   std::string pointer = "pointer";           ///< the bird that touched them
+  std::string reference;                     ///< the bird that poses are taken relative to; empty: none
   std::vector<double> touched_s;             ///< from and to, s of the recording: when; empty: any time
   std::filesystem::path patient_from_model;  ///< of `register views`
   std::optional<double> rod_angle_deg;       ///< of a record whose scope's rod turns; empty: nothing is drawn by it

@@ -35,12 +35,11 @@ Result<CartSheet> read_sheet(const std::filesystem::path& path) {
 
 Result<void> write_appliance_config(const std::filesystem::path& path, const SimulatedCartSettings& settings,
                                     const std::filesystem::path& tty, const std::filesystem::path& socket, int port) {
-  return write_file(
-      path, fmt::format(R"([tracker]
+  return write_file(path, fmt::format(R"([tracker]
 device = "{}"
 baud = 115200
 birds = {}
-names = ["scope", "pointer"{}]
+names = ["scope", "pointer"{}
 rate_hz = 103.3
 frozen_after = 0
 most_speed_mm_s = 6000
@@ -65,9 +64,10 @@ max_gap_ms = 60
 smoothing_ms = {}
 wait_ms = {}
 )",
-                        tty.string(), settings.reference.empty() ? 2 : 3,
-                        settings.reference.empty() ? "" : ", \"reference\"", socket.string(), settings.width_px,
-                        settings.height_px, settings.video_rate_hz, port, settings.smoothing_ms, settings.wait_ms));
+                                      tty.string(), settings.reference.empty() ? 2 : 3,
+                                      settings.reference.empty() ? "]" : ", \"reference\"]\nreference = \"reference\"",
+                                      socket.string(), settings.width_px, settings.height_px, settings.video_rate_hz,
+                                      port, settings.smoothing_ms, settings.wait_ms));
 }
 
 }  // namespace

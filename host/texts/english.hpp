@@ -319,6 +319,16 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_unconfirmed",
      "nobody has looked whether the registration still holds: point at landmarks in step 6, then press Space"},
 
+    // The bird that is fixed on patient or table
+    {"reference_absent", "the reference \"{}\" is not seen"},
+    {"why_reference_lost",
+     "the reference \"{}\" was not seen for a moment: point at landmarks in step 6, then press Space; or register "
+     "anew"},
+    {"why_reference_moved",
+     "the reference \"{}\" came off or was pushed: fix it, point at landmarks in step 6, and press Space if they fit; "
+     "else "
+     "register anew"},
+
     // What is held back, for other instruments are connected than those that it was found with
     {"instrument_tracker", "tracker"},
     {"instrument_camera", "camera"},
@@ -326,6 +336,9 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"held_record", "the appliance has withdrawn its record ({})"},
     {"held_other", "it was found with the {} whose {} is {}, and this one's is {}"},
     {"held_other_untold", "it was found with the {} whose {} is {}, and this one does not say its own"},
+    {"held_reference_gone", "it was found with the reference \"{}\", and none is used now"},
+    {"held_reference_new", "it was found without a reference, and \"{}\" is used now"},
+    {"held_reference_other", "it was found with the reference \"{}\", and \"{}\" is used now"},
     {"held_untold", "nothing says whether the {} is the one that it was found with"},
     {"instruments_ask",
      "Are tracker and camera the same as before? The server does not say. Space: yes, the same. If not: "
@@ -339,6 +352,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"banner_whole", "overlay; {}"},
     {"banner_target", "target within ±{:.1f} mm"},
     {"banner_no_target", "target out of view"},
+    {"banner_no_reference", "motion of patient or transmitter is not seen: there is no reference"},
     {"banner_unmatched", "overlay, not matched with the video: {} if the organ has not moved since the CT"},
     {"banner_unwatched", "overlay, and nothing watches whether the organ moves; {}"},
     {"banner_cut", "overlay, a part of the CT is cut away; {}"},

@@ -47,7 +47,8 @@ Banner banner_of(const PanelContext& context) {
   return {words("banner_none", shown.reason)};
 }
 
-/// The safety of the picture, in words, sign and colour, over its upper edge.
+/// The safety of the picture, in words, sign and colour, over its upper edge; and in a line of its own below what an
+/// overlay without a reference sensor takes for granted.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
   const Banner banner = banner_of(context);
@@ -63,6 +64,12 @@ void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), kGround);
   list->AddRectFilled(from, ImVec2(from.x + 6 * scale, from.y + high), ink);
   list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ink, text.c_str());
+  if (!context.shown.overlaid || !context.operation.reference.empty()) return;
+  const std::string unseen = fmt::format("{} {}", sign_of(Grade::marginal), words("banner_no_reference"));
+  const float low = from.y + high, beside = 14 * scale + ImGui::CalcTextSize(unseen.c_str()).x + 14 * scale;
+  list->AddRectFilled(ImVec2(from.x, low), ImVec2(from.x + std::min(wide, beside), low + high), kGround);
+  list->AddText(ImVec2(from.x + 14 * scale, low + 5 * scale),
+                ImGui::GetColorU32(colour(colour_of(Grade::marginal, theme))), unseen.c_str());
 }
 
 /// Where the target is drawn, and how far from there it may be. Gives what that takes of the screen.

@@ -117,6 +117,13 @@ TEST(Config, AMistakeHidesNoOtherAndIsToldOnce) {
   EXPECT_EQ(std::count(what.begin(), what.end(), '\n'), 5) << what;
 }
 
+TEST(Config, ABirdMayBeTheReference) {
+  const auto config = read(replaced("birds = 2", "birds = 2\nreference = \"pointer\""));
+  ASSERT_TRUE(config) << config.error().what;
+  EXPECT_EQ(config->tracker.reference, "pointer");
+  EXPECT_EQ(read(kSound)->tracker.reference, "");
+}
+
 TEST(Config, EveryMistakeIsNamed) {
   const std::pair<std::string, std::string> cases[] = {
       {replaced("rate_hz", "rate_herz"), "rate_herz: unknown key"},
@@ -126,6 +133,8 @@ TEST(Config, EveryMistakeIsNamed) {
       {replaced("port = 18945", "port = 99999"), "[wire] port"},
       {replaced("device = \"/dev/ttyUSB0\"", ""), "[tracker] device: is missing"},
       {replaced("birds = 2", "birds = 3"), "2 names for 3 birds"},
+      {replaced("birds = 2", "birds = 2\nreference = \"table\""), "[tracker] reference: \"table\" is none of"},
+      {replaced("birds = 2", "birds = 2\nreference = \"scope\""), "[tracker] reference: \"scope\" is none of"},
       {replaced("birds = 2", "birds = 2\nbaud = 9600"), "does not fit into 9600 baud"},
       {replaced("birds = 2", "birds = 2\nrecord = \"matrix\""), "record"},
       {replaced("birds = 2", "birds = 2\nbaud = 31250"), "31250 is none of 2400"},
