@@ -425,7 +425,7 @@ TEST_F(Referenced, ARegistrationWithoutAReferenceIsNotUsedWithOne) {
 
 TEST_F(Referenced, TheOperationThatIsKeptNamesTheReference) {
   Operation kept;
-  kept.ct_checksum = "0";
+  kept.ct_sha256 = std::string(64, '0');
   kept.made_utc = "2026-11-22T10:00:00Z";
   kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0, "reference"}};
   ASSERT_TRUE(write_operation(scratch_.path(), kept));
