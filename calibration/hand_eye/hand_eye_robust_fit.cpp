@@ -111,7 +111,8 @@ class RobustFitter {
       const double squared = distance_squared(found_.summed[i], *without, found_.noise, freedom_);
       if (squared <= limit) continue;
       out_.stations[stations_.used[i].index].distance_squared = squared;
-      reasons[i] = fmt::format("off by {:.1f} sigmas", std::sqrt(squared / 6));
+      reasons[i] =
+          fmt::format("off by {:.1f} sigmas, where chance allows {:.1f}", std::sqrt(squared), std::sqrt(limit));
       ++found;
     }
     if (found == 0 || stations_.used.size() - found < kFewest + 1) return false;
@@ -125,7 +126,11 @@ class RobustFitter {
   bool drop_odd_one() {
     const std::size_t count = found_.summed.size();
     if (count < kFewest + 2 || count > kFew) return false;
-    const double limit = distance_limit(kOddChance / static_cast<double>(count), freedom_.of_residuals(count - 1));
+    // The noise is two variances, position's and angle's, each of which rests on half of the residuals and on what
+    // estimate_noise adds: taken to rest on all, good stations were left out twice as often as kOddChance says.
+    const double residuals = freedom_.of_residuals(count - 1);
+    const double limit = distance_limit(kOddChance / static_cast<double>(count),
+                                        std::min(residuals, residuals / 2 + kNoisePriorFreedom));
     std::vector<std::string> reasons(count);
     double farthest = limit;
     for (std::size_t i = 0; i < count; ++i) {
@@ -138,7 +143,8 @@ class RobustFitter {
       if (!(squared > farthest)) continue;
       farthest = squared;
       reasons.assign(count, "");
-      reasons[i] = fmt::format("off by {:.1f} sigmas of the others", std::sqrt(squared / 6));
+      reasons[i] = fmt::format("off by {:.1f} sigmas of the others, where chance allows {:.1f}", std::sqrt(squared),
+                               std::sqrt(limit));
       out_.stations[stations_.used[i].index].distance_squared = squared;
     }
     if (!(farthest > limit)) return false;
