@@ -261,7 +261,7 @@ NumberedDots number_dots(const Pattern& pattern, const std::vector<Dot>& dots) {
 
 /// Where the dots' places, mirrored, can be numbered.
 bool is_mirrored(const Pattern& pattern, std::vector<GridPoint> lattice, const std::vector<DotBlob>& blobs) {
-  if (pattern.larger_dots.empty()) return false;
+  if (pattern.larger_dots.empty() && !pattern.asymmetric) return false;
   for (GridPoint& point : lattice) point.place.x() *= -1;
   auto dots = dots_of(pattern, lattice, blobs);
   return why_not_numbered(pattern, dots, numberings(pattern, dots)).empty();

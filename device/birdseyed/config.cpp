@@ -86,8 +86,10 @@ void read_birds(ConfigSection& section, Config& config) {
   std::string& reference = config.tracker.reference;
   section.text("reference", reference);
   if (!reference.empty() &&
-      (reference == names.front() || std::find(names.begin(), names.end(), reference) == names.end()))
+      (names.empty() || reference == names.front() || std::find(names.begin(), names.end(), reference) == names.end()))
     section.fail("reference", fmt::format("\"{}\" is none of the names of birds after the scope's", reference));
+  if (const auto unnamed = std::find(names.begin(), names.end(), ""); unnamed != names.end())
+    section.fail("names", fmt::format("bird {} has no name", unnamed - names.begin() + 1));
 }
 
 void read_tracker(ConfigSection& section, Config& config) {

@@ -292,12 +292,16 @@ TEST(DetectDots, WhatCannotBeNumberedIsRejectedInWords) {
 }
 
 TEST(DetectDots, AGridSeenFromBehindIsNamed) {
-  const auto pattern = parse_pattern(kMarked);
-  cv::Mat mirrored;
-  cv::flip(render(*pattern, {.tilt_deg = 20, .distance_mm = 105}).grey, mirrored, 1);
-  const Detection seen = detect(*pattern, view_of(mirrored), "");
-  EXPECT_FALSE(seen.view);
-  EXPECT_NE(seen.rejected.find("seen from behind"), std::string::npos) << seen.rejected;
+  for (const char* spec : {kMarked, "dots:4x10:5mm:asymmetric"}) {
+    const auto pattern = parse_pattern(spec);
+    const cv::Mat grey = render(*pattern, {.tilt_deg = 20, .distance_mm = 105}).grey;
+    EXPECT_TRUE(detect(*pattern, view_of(grey), "").view) << spec;
+    cv::Mat mirrored;
+    cv::flip(grey, mirrored, 1);
+    const Detection seen = detect(*pattern, view_of(mirrored), "");
+    EXPECT_FALSE(seen.view) << spec;
+    EXPECT_NE(seen.rejected.find("seen from behind"), std::string::npos) << seen.rejected;
+  }
 }
 
 /// Blur, noise, light, tilt and turn as they come.

@@ -135,6 +135,7 @@ TEST(Config, EveryMistakeIsNamed) {
       {replaced("birds = 2", "birds = 3"), "2 names for 3 birds"},
       {replaced("birds = 2", "birds = 2\nreference = \"table\""), "[tracker] reference: \"table\" is none of"},
       {replaced("birds = 2", "birds = 2\nreference = \"scope\""), "[tracker] reference: \"scope\" is none of"},
+      {replaced("\"scope\", \"pointer\"", "\"scope\", \"\""), "[tracker] names: bird 2 has no name"},
       {replaced("birds = 2", "birds = 2\nbaud = 9600"), "does not fit into 9600 baud"},
       {replaced("birds = 2", "birds = 2\nrecord = \"matrix\""), "record"},
       {replaced("birds = 2", "birds = 2\nbaud = 31250"), "31250 is none of 2400"},
