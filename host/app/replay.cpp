@@ -132,7 +132,11 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (!setup) return setup.error();
   ShownChoice choice = options.shown;
   choice.summed = setup->operation.has_value();
-  const auto shown = read_shown(options.volume, choice);
+  const auto fiducials_inside = [&](const Volume& ct) -> Result<void> {
+    if (!setup->by_touches) return {};
+    return check_places(setup->by_touches->fiducials_in_patient_mm, ct).with_context(options.inputs.fiducials.string());
+  };
+  const auto shown = read_shown(options.volume, choice, fiducials_inside);
   if (!shown) return shown.error();
   print_notes(shown->notes);
   if (setup->operation) {

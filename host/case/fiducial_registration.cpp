@@ -11,11 +11,11 @@
 
 #include "calibration/base/lower_case.hpp"
 #include "calibration/base/units.hpp"
-#include "host/case/points_in_ct.hpp"
 #include "host/files/field_files.hpp"
 #include "host/files/named_points.hpp"
 #include "host/files/picture.hpp"
 #include "host/registration/rigid/point_matching.hpp"
+#include "host/registration/rigid/points_in_ct.hpp"
 #include "host/volume/import.hpp"
 
 namespace birdseye::host {
@@ -25,15 +25,7 @@ namespace {
 using calibration::OddPointsVerdict;
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr double kLargestFre_mm = 5;   // beyond it nothing is written
 constexpr double kLeastSpread_mm = 5;  // of markers on a patient
-// A scale that chance makes in so many sets: marginal below the one, fail below the other.
-constexpr double kChanceOfScale = 0.01, kLeastChanceOfScale = 0.001;
-
-bool is_mirrored(const calibration::PointShape& shape) {
-  return shape.handedness == calibration::Handedness::mirrored && shape.mirrored_fre_rms_mm < kLargestFre_mm;
-}
-
 Result<calibration::PointFit<Patient, Tracker>> fit_fiducials(const FiducialFiles& files, FiducialInput& input) {
   const auto named = [&](const Error& error) {
     return error.with_context(fmt::format("{}, {}", files.ct.string(), files.tracker.string()));
@@ -75,10 +67,10 @@ std::string scale_advice(double scale) {
 }
 
 /// What to do where the points do not fit one another, by their shapes.
-std::string misfit_advice(const FiducialInput& input, const calibration::PointShape& shape) {
+std::string misfit_advice(const FiducialInput& input, bool mirrored) {
   const double ratio = spread_of(input.ct_mm) / spread_of(input.touched_mm);
   if (ratio > 5 || ratio < 0.2) return scale_advice(ratio);
-  if (is_mirrored(shape)) {
+  if (mirrored) {
     return "one of the two files is mirrored: one axis has the wrong sign, or two axes are exchanged (between 3D "
            "Slicer's RAS and LPS, two have the other sign: that mirrors nothing)";
   }
@@ -93,28 +85,26 @@ std::string list_of(const std::vector<std::size_t>& indices) {
 }
 
 void judge_shape(Verdict& verdict, const FiducialsFound& out) {
-  const calibration::PointShape& shape = out.shape;
-  const double fre_mm = std::min(shape.fre_rms_mm, shape.mirrored_fre_rms_mm);
+  const FiducialJudgement& judged = out.judged;
+  const calibration::PointShape& shape = judged.shape;
   if (out.ct_spread_mm < kLeastSpread_mm) {
     verdict.add(Grade::fail, fmt::format("the markers lie within {:.2g} mm of one another", out.ct_spread_mm),
                 "are both files in metres? Give mm");
   }
-  if (is_mirrored(shape)) {
+  if (judged.mirrored) {
     verdict.add(Grade::fail,
                 fmt::format("mirrored, the touched points fit the CT's to {:.2f} mm; as they are, to {:.2f} mm",
                             shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
                 out.misfit_advice);
-  } else if (shape.handedness == calibration::Handedness::cannot_tell && fre_mm < kLargestFre_mm &&
-             out.fit.residuals_mm.size() > 3) {
+  } else if (judged.handedness_open) {
     verdict.add(Grade::marginal,
                 fmt::format("the markers lie so nearly in a plane that their mirror image fits as well ({:.2f} mm; as "
                             "they are, {:.2f} mm): whether a file is mirrored cannot be told",
                             shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
                 "touch one more marker, off the plane of the others");
   }
-  // A touch that is off makes a scale of its own.
-  if (shape.scale_chance < kChanceOfScale && fre_mm < kLargestFre_mm && out.odd.named.empty()) {
-    verdict.add(shape.scale_chance < kLeastChanceOfScale ? Grade::fail : Grade::marginal,
+  if (judged.scale != Grade::pass) {
+    verdict.add(judged.scale,
                 fmt::format("lengths in the CT are {:.4g} times those that were touched (sigma {:.2g})", shape.scale,
                             shape.scale_sigma),
                 scale_advice(shape.scale));
@@ -123,16 +113,16 @@ void judge_shape(Verdict& verdict, const FiducialsFound& out) {
 
 void judge_places(Verdict& verdict, const FiducialsFound& out) {
   constexpr std::string_view kWhere = "outside of the CT, or in the air beside the patient";
-  if (!out.ct_outside.empty()) {
+  if (!out.judged.outside.empty()) {
     verdict.add(Grade::fail,
-                fmt::format("by the CT's file, fiducial{} {} lie{} {}", out.ct_outside.size() > 1 ? "s" : "",
-                            list_of(out.ct_outside), out.ct_outside.size() > 1 ? "" : "s", kWhere),
-                out.ras
+                fmt::format("by the CT's file, fiducial{} {} lie{} {}", out.judged.outside.size() > 1 ? "s" : "",
+                            list_of(out.judged.outside), out.judged.outside.size() > 1 ? "" : "s", kWhere),
+                out.judged.ras
                     ? "the file looks like RAS: with the other sign of x and y all its markers lie in the CT. Give "
                       "LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, which say their frame"
                     : fmt::format("is this the CT that the markers were found in, and are they in mm, patient LPS? "
                                   "The CT has {}",
-                                  out.ct_reach));
+                                  out.judged.ct_reach));
   }
   if (out.ct_outside.empty() && out.markers_seen) {
     const MarkersSeen& seen = *out.markers_seen;
@@ -153,7 +143,7 @@ void judge_places(Verdict& verdict, const FiducialsFound& out) {
     verdict.add(Grade::marginal,
                 fmt::format("target{} {} lie{} {}", out.targets_outside.size() > 1 ? "s" : "",
                             list_of(out.targets_outside), out.targets_outside.size() > 1 ? "" : "s", kWhere),
-                fmt::format("are the targets in mm, patient LPS? The CT has {}", out.ct_reach));
+                fmt::format("are the targets in mm, patient LPS? The CT has {}", out.judged.ct_reach));
   }
 }
 
@@ -276,20 +266,17 @@ Result<FiducialsFound> register_fiducials(const FiducialFiles& files, FiducialIn
   out.localisation = files.localisation_mm
                          ? calibration::LocalisationError{*files.localisation_mm, *files.localisation_mm, 0}
                          : calibration::localisation_error_of(out.fit.fre_rms_mm, input.ct_mm.size());
-  out.shape = calibration::compare_shapes(input.ct_mm, input.touched_mm, files.localisation_mm);
+  out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
+  out.judged = judge_fiducial_points(input.ct_mm, input.touched_mm, files.localisation_mm, out.odd,
+                                     input.volume ? &*input.volume : nullptr);
+  if (out.judged.mirrored) out.odd = {};  // of a mirrored file no touch is the wrong one
   out.ct_spread_mm = spread_of(input.ct_mm);
-  out.misfit_advice = misfit_advice(input, out.shape);
-  // Of a mirrored file no touch is the wrong one.
-  if (!is_mirrored(out.shape))
-    out.odd = calibration::find_odd_points(input.ct_mm, input.touched_mm, files.localisation_mm);
+  out.misfit_advice = misfit_advice(input, out.judged.mirrored);
   const calibration::TargetError predicted(input.ct_mm, out.localisation.rms_mm);
   for (const Eigen::Vector3d& target : input.targets_mm) out.tre_mm.push_back(predicted.rms_mm(target));
   if (input.volume) {
     out.range = target_error_range(predicted, *input.volume);
-    out.ct_outside = points_outside(*input.volume, input.ct_mm);
     out.targets_outside = points_outside(*input.volume, input.targets_mm);
-    out.ras = look_like_ras(*input.volume, input.ct_mm);
-    out.ct_reach = reach_of(*input.volume);
     out.markers_seen = look_for_markers(*input.volume, input.ct_mm);
   }
   if (input.surface) {
@@ -346,12 +333,12 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
     json["tre_mm_max"] = out.range->most_mm;
   }
   json["names"] = input.names;
-  json["scale"] = out.shape.scale;
-  json["scale_sigma"] = out.shape.scale_sigma;
-  json["mirrored_fre_rms_mm"] = out.shape.mirrored_fre_rms_mm;
+  json["scale"] = out.judged.shape.scale;
+  json["scale_sigma"] = out.judged.shape.scale_sigma;
+  json["mirrored_fre_rms_mm"] = out.judged.shape.mirrored_fre_rms_mm;
   if (input.volume) {
     json["ct_outside"] = json["targets_outside"] = nlohmann::json::array();
-    for (const std::size_t i : out.ct_outside) json["ct_outside"].push_back(i + 1);
+    for (const std::size_t i : out.judged.outside) json["ct_outside"].push_back(i + 1);
     for (const std::size_t i : out.targets_outside) json["targets_outside"].push_back(i + 1);
   }
   json["outliers"] = json["suspects"] = nlohmann::json::array();

@@ -12,9 +12,9 @@
 #include "calibration/points/odd_points.hpp"
 #include "calibration/points/point_error.hpp"
 #include "calibration/points/point_fit.hpp"
-#include "calibration/points/point_shape.hpp"
 #include "host/case/fiducial_checks.hpp"
 #include "host/files/picture.hpp"
+#include "host/registration/rigid/fiducial_judgement.hpp"
 #include "host/registration/rigid/surface.hpp"
 #include "host/registration/rigid/surface_refinement.hpp"
 #include "host/report/target_error_map.hpp"
@@ -49,12 +49,10 @@ struct FiducialsFound {
   calibration::PointFit<Patient, Tracker> fit;
   calibration::LocalisationError localisation;
   calibration::OddPoints odd;
-  calibration::PointShape shape;
-  double ct_spread_mm = 0;  ///< root mean square distance of the CT's markers from their middle
-  std::vector<std::size_t> ct_outside, targets_outside;  ///< by index: those that are nowhere at the CT's patient
-  bool ras = false;                         ///< the CT's markers would all be in it if their file is in RAS
-  std::optional<MarkersSeen> markers_seen;  ///< at the places of the CT's markers; none without a CT
-  std::string ct_reach;                     ///< where the CT lies, in words; empty without a CT
+  FiducialJudgement judged;
+  double ct_spread_mm = 0;                   ///< root mean square distance of the CT's markers from their middle
+  std::vector<std::size_t> targets_outside;  ///< by index: those that are nowhere at the CT's patient
+  std::optional<MarkersSeen> markers_seen;   ///< at the places of the CT's markers; none without a CT
   std::vector<double> tre_mm;
   std::optional<TargetErrorRange> range;
   std::optional<SurfaceRefinement> refinement;

@@ -115,7 +115,7 @@ Result<void> DemoSession::end_calibrating_and_register() {
   if (!found) {
     return Error{found.error().code, fmt::format("calibration: {}", fmt::join(calibrated->verdict.reasons, "; "))};
   }
-  const auto fit = register_by_touches(*patient_->fiducials_in_patient_mm, touches_in_tracker_mm_);
+  const auto fit = register_by_touches(*patient_->fiducials_in_patient_mm, touches_in_tracker_mm_, &patient_->ct);
   if (!fit) return fit.error().with_context("registration");
   const ScopeSetup& scope = found->scope;
   figures.camera_rms_px = calibrated->stations.lens->rms_px;

@@ -23,7 +23,7 @@ bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments
     held_back_ = false;
     confirmed_ = true;
   }
-  if (wanted != 0 && touches_.size() >= wanted) return false;
+  if (wanted != 0 && touches_.size() >= wanted && !may_add_) return false;
   if (touches_.empty()) found_with_ = found_with;
   touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
   return true;
@@ -35,12 +35,14 @@ bool FiducialStep::take_back(std::size_t which) {
   return true;
 }
 
-void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted) {
+void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted,
+                       const Volume* ct) {
   if (held_back_) return;
   if (touches_.empty()) confirmed_ = true;  // there is nothing in doubt
   registered_.reset();
   fault_.clear();
-  fits_poorly_ = false;
+  fits_poorly_ = may_add_ = false;
+  doubt_.clear();
   odd_.reset();
   for (TouchedFiducial& touch : touches_) touch.residual_mm.reset();
   note_ = {false, words("note_touched", touches_.size())};
@@ -48,8 +50,9 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   std::vector<Eigen::Vector3d> places;
   places.reserve(touches_.size());
   for (const TouchedFiducial& touch : touches_) places.push_back(touch.tip_in_tracker_mm);
-  const auto found = register_by_touches(*markers_in_patient_mm, places);
-  fits_poorly_ = !found || found->registered.fre_mm > kGoodFit_mm;
+  const auto found = register_by_touches(*markers_in_patient_mm, places, ct);
+  // A mirrored file, a wrong scale: no touch is to blame.
+  fits_poorly_ = found ? found->registered.fre_mm > kGoodFit_mm : found.error().code != Errc::unsupported;
   if (found) registered_ = found->registered;
   if (fits_poorly_ && touches_.size() > kFewestFiducials) {
     odd_ = odd_touch(*markers_in_patient_mm, places,
@@ -61,7 +64,10 @@ void FiducialStep::fit(const std::optional<std::vector<Eigen::Vector3d>>& marker
   }
   for (std::size_t i = 0; i < touches_.size(); ++i) touches_[i].residual_mm = found->residuals_mm[i];
   registered_->found_with = found_with_;
+  doubt_ = found->doubt;
+  may_add_ = !doubt_.empty() && touches_.size() < markers_in_patient_mm->size();
   note_.line = words("note_touched_fre", touches_.size(), registered_->fre_mm);
+  if (!doubt_.empty()) note_.line = words("note_doubt", note_.line, doubt_);
   note_.done = touches_.size() >= std::max(kFewestFiducials + 1, wanted);
 }
 

@@ -15,15 +15,18 @@ namespace birdseye::host {
 /// The registration of the patient by fiducials that the pointer touches.
 class FiducialStep {
  public:
-  /// One more; false: all that are wanted are touched (wanted 0: as many as come). fit() is due then. Where what was
-  /// touched before is held back or in doubt, a new touch begins anew.
+  /// One more; false: all that are wanted are touched (wanted 0: as many as come), and the fit asks for none. fit() is
+  /// due then. Where what was touched before is held back or in doubt, a new touch begins anew.
   /// found_with: by which it was touched.
   bool add(const Touch& touch, std::size_t wanted, const Instruments& found_with);
   /// One is taken back, from 0; false: there is none. fit() is due then.
   bool take_back(std::size_t which);
   /// By the markers of the CT, empty as long as they are looked for. Three give a fit, one more, and as many as are
   /// wanted, make it done.
-  void fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted);
+  /// Refuses, as fault(), touches that are mirrored or of another scale, and markers outside of the CT. ct: null where
+  /// there is none.
+  void fit(const std::optional<std::vector<Eigen::Vector3d>>& markers_in_patient_mm, std::size_t wanted,
+           const Volume* ct);
   /// An earlier window's registration, which counts for nothing before confirm(): patient or transmitter may have been
   /// moved meanwhile. Not where fiducials were touched anew; false then. Touches too few for a fit are dropped.
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);
@@ -47,6 +50,8 @@ class FiducialStep {
   [[nodiscard]] const std::string& fault() const { return fault_; }
   /// The touches do not fit the markers as touches do: one or more are off, or a marker is none.
   [[nodiscard]] bool fits_poorly() const { return fits_poorly_; }
+  /// All that are wanted are touched, and nothing speaks against them.
+  [[nodiscard]] bool fits() const { return note_.done && !fits_poorly_ && doubt_.empty(); }
   /// Of those that fit poorly the one that is off, from 0: without it the others fit, and without another plainly
   /// worse. Empty: it cannot be told.
   [[nodiscard]] const std::optional<std::size_t>& odd() const { return odd_; }
@@ -57,9 +62,10 @@ class FiducialStep {
   std::optional<RegisteredPatient> registered_;
   Instruments found_with_;  ///< all touches, or what was taken up
   bool confirmed_ = true, held_back_ = false, person_may_say_ = false;
-  std::string fault_, line_;  ///< line_: of what is held back, as it was found
-  bool done_ = false;         ///< and whether the step was done by it
-  bool fits_poorly_ = false;
+  std::string fault_, line_;                    ///< line_: of what is held back, as it was found
+  bool done_ = false;                           ///< and whether the step was done by it
+  bool fits_poorly_ = false, may_add_ = false;  ///< may_add_: one more than wanted, which the fit asks for
+  std::string doubt_;                           ///< of a fit, in words; empty: none
   std::optional<std::size_t> odd_;
   StepNote note_;
 };

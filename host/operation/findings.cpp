@@ -1,10 +1,26 @@
 #include "host/operation/findings.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "calibration/points/odd_points.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/guide/guided_calibration.hpp"
+#include "host/operation/step_states.hpp"
+#include "host/registration/rigid/fiducial_judgement.hpp"
 #include "host/registration/rigid/point_matching.hpp"
+#include "host/registration/rigid/points_in_ct.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
+
+namespace {
+
+std::string mirrored_words(const calibration::PointShape& shape) {
+  return words("fiducials_mirrored", shape.mirrored_fre_rms_mm, shape.fre_rms_mm);
+}
+
+}  // namespace
 
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc) {
   if (found.verdict.grade == Grade::fail) {
@@ -19,17 +35,43 @@ Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, cons
 }
 
 Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,
-                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm) {
+                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm, const Volume* ct) {
   const auto found = match_and_fit(markers_in_patient_mm, touched_in_tracker_mm);
+  if (!found || found->fit.fre_rms_mm > kGoodFit_mm) {
+    const auto mirrored = find_mirrored(markers_in_patient_mm, touched_in_tracker_mm);
+    if (mirrored) return Error{Errc::unsupported, mirrored_words(mirrored->shape)};
+  }
   if (!found) return found.error();
   TouchFit out;
   out.registered.tracker_from_patient = found->fit.to_from.inverse();
   out.registered.fre_mm = found->fit.fre_rms_mm;
   out.registered.made_utc = utc_now();
-  for (const std::size_t marker : found->ct_of_touch)
-    out.registered.fiducials_in_patient_mm.push_back(markers_in_patient_mm[marker]);
+  auto& fiducials = out.registered.fiducials_in_patient_mm;
+  for (const std::size_t marker : found->ct_of_touch) fiducials.push_back(markers_in_patient_mm[marker]);
   out.residuals_mm = found->fit.residuals_mm;
+  const auto odd = calibration::find_odd_points(fiducials, touched_in_tracker_mm);
+  const auto judged = judge_fiducial_points(fiducials, touched_in_tracker_mm, std::nullopt, odd, nullptr);
+  if (judged.mirrored) return Error{Errc::unsupported, mirrored_words(judged.shape)};
+  if (judged.scale == Grade::fail) return Error{Errc::unsupported, words("fiducials_scale", judged.shape.scale)};
+  if (judged.scale == Grade::marginal) out.doubt = words("fiducials_scale", judged.shape.scale);
+  if (judged.handedness_open) out.doubt = words("fiducials_flat");
+  if (ct == nullptr) return out;
+  if (auto inside = check_places(fiducials, *ct); !inside) return inside.error();
   return out;
+}
+
+Result<void> check_places(std::span<const Eigen::Vector3d> fiducials_in_patient_mm, const Volume& ct) {
+  const auto outside = points_outside(ct, fiducials_in_patient_mm);
+  if (outside.empty()) return {};
+  std::vector<std::string> places;
+  places.reserve(outside.size());
+  for (const std::size_t i : outside) {
+    const Eigen::Vector3d& mm = fiducials_in_patient_mm[i];
+    places.push_back(words("fiducial_place", mm.x(), mm.y(), mm.z()));
+  }
+  const std::string why =
+      look_like_ras(ct, fiducials_in_patient_mm) ? words("fiducials_ras") : words("fiducials_other", reach_of(ct));
+  return Error{Errc::unsupported, words("fiducials_outside", fmt::format("{}", fmt::join(places, ", ")), why)};
 }
 
 TrustFigures trust_figures(const ScopeFigures& scope, const RegisteredPatient& registered,

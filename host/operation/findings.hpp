@@ -11,6 +11,7 @@
 #include "host/operation/instruments.hpp"
 #include "host/overlay/scope_setup.hpp"
 #include "host/overlay/trust.hpp"
+#include "host/volume/volume.hpp"
 
 /// What the steps of an operation find: values, which later steps are given, whoever found them.
 namespace birdseye::host {
@@ -47,10 +48,16 @@ struct DeformedOrgan {
 struct TouchFit {
   RegisteredPatient registered;
   std::vector<double> residuals_mm;  ///< of the touched points, in their order
+  std::string doubt;                 ///< what cannot be told by these touches, with the remedy; empty: nothing
 };
-/// By points that the pointer touched, of which nobody has said which is which. Refuses what match_and_fit refuses.
+/// By points that the pointer touched, of which nobody has said which is which. Refuses what match_and_fit refuses, and
+/// what judge_fiducial_points fails (Errc::unsupported): touches that are mirrored or of another scale, fiducials
+/// outside of the CT's body.
+/// ct: null where it is not at hand; check_places is due then.
 Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in_patient_mm,
-                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm);
+                                     std::span<const Eigen::Vector3d> touched_in_tracker_mm, const Volume* ct);
+/// Refuses fiducials that lie outside of the CT's body, by their places.
+Result<void> check_places(std::span<const Eigen::Vector3d> fiducials_in_patient_mm, const Volume& ct);
 
 /// By what the gate judges an overlay of this scope and this registration. target_in_patient_mm: in the CT as it was
 /// taken.

@@ -70,7 +70,7 @@ void LiveWorkflow::tick() {
   update_setup();
   keep();
   if (step_ != LiveStep::calibrate) return;
-  const bool all_touched = settings_.fiducials != 0 && fiducials_.note().done && !fiducials_.fits_poorly();
+  const bool all_touched = settings_.fiducials != 0 && fiducials_.fits();
   go_to(all_touched ? LiveStep::views : LiveStep::fiducials);
 }
 
@@ -269,16 +269,16 @@ void LiveWorkflow::take(const CheckedSurface& checked) {
 void LiveWorkflow::fit() {
   // Nothing is registered with a CT of which nobody has said whose it is.
   if (patient_confirmed_ || !patient_.plan()) {
-    fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials);
+    fiducials_.fit(patient_.markers_in_patient_mm(), settings_.fiducials,
+                   patient_.plan() ? &patient_.plan()->ct : nullptr);
   } else {
-    fiducials_.fit(std::nullopt, settings_.fiducials);
+    fiducials_.fit(std::nullopt, settings_.fiducials, nullptr);
   }
   asked_to_take_back_.reset();
   if (fiducials_.confirmed()) why_doubted_.clear();
   forget_views(words("note_views_touched_anew"));
   update_setup();
-  const bool all_fit = fiducials_.note().done && !fiducials_.fits_poorly();
-  if (all_fit && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
+  if (fiducials_.fits() && settings_.fiducials != 0 && step_ == LiveStep::fiducials) go_to(LiveStep::views);
 }
 
 /// Views are of the poses that they were kept with, touches are where the former registration had them, and a

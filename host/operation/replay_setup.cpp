@@ -129,7 +129,7 @@ Result<void> register_anew(const ReplayInputs& inputs, const std::optional<Calib
       touched_in_tracker_mm.push_back(touch->tip_in_tracker_mm);
   });
   if (!looked) return looked.error();
-  auto fit = register_by_touches(*markers, touched_in_tracker_mm);
+  auto fit = register_by_touches(*markers, touched_in_tracker_mm, nullptr);
   out.touches = touched_in_tracker_mm.size();
   if (!fit) {
     return Error{fit.error().code,

@@ -9,13 +9,17 @@
 
 namespace birdseye::host {
 
-Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice) {
+Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice,
+                           const std::function<Result<void>(const Volume&)>& check) {
   if (choice.margins_mm.empty() != choice.margin_of.empty())
     return Error{Errc::bad_value, "--margins and --margin-of go together: how many mm, about which labels"};
   if (!choice.labels.empty() && choice.keep.empty() && choice.margins_mm.empty())
     return Error{Errc::bad_value, "--labels does nothing by itself: give --show too, or --margins with --margin-of"};
   auto ct = import_body(source);
   if (!ct) return ct.error();
+  if (check) {
+    if (auto sound = check(ct->volume); !sound) return sound.error();
+  }
   ShownCt shown{std::move(ct->volume), std::nullopt, std::move(ct->notes)};
   if (choice.summed) shown.ct_sha256 = ct_sha256(shown.volume);
   if (choice.labels.empty()) return shown;

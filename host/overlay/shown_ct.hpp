@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,6 +33,8 @@ struct ShownCt {
 };
 
 /// Errors name the file. Errc::bad_value where a choice needs a segmentation and none is named.
-Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice);
+/// check: of all of the CT, whatever of it is to be drawn; an error of it is given back.
+Result<ShownCt> read_shown(const VolumeSource& source, const ShownChoice& choice,
+                           const std::function<Result<void>(const Volume&)>& check = nullptr);
 
 }  // namespace birdseye::host

@@ -273,6 +273,20 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_making", "making the patient"},
     {"note_starting", "starting tracker, camera and appliance"},
     {"note_touched", "{} touched"},
+    {"fiducials_mirrored",
+     "the touches are a mirror image of the fiducials: mirrored, they fit to {:.2f} mm, as they are, to {:.2f} mm. The "
+     "handedness of the CT or of the fiducials' file is wrong: one axis has the wrong sign, or two are exchanged"},
+    {"fiducials_scale",
+     "lengths in the CT are {:.4g} times those that were touched: is the spacing of the CT right, and the scale of the "
+     "tracker?"},
+    {"fiducials_flat", "they are so flat that a mirror image fits as well: touch one more, off their plane"},
+    {"fiducials_outside", "outside of the CT's body: fiducials at {} mm. {}"},
+    {"fiducial_place", "({:.0f}, {:.0f}, {:.0f})"},
+    {"fiducials_ras",
+     "With the other sign of x and y all of them are in it: the file looks like RAS. Give LPS (x and y with the other "
+     "sign)"},
+    {"fiducials_other", "Are they of this CT, in mm, patient LPS? The CT has {}"},
+    {"note_doubt", "{}; {}"},
     {"note_touched_fre", "{} touched, FRE {:.2f} mm"},
     {"note_taken_up_fre", "{}, FRE {:.2f} mm"},
     {"note_calibrated_anew", "the scope was calibrated anew: keep views again"},

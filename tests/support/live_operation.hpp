@@ -27,7 +27,7 @@ inline const Transform<Tracker, Patient> kTrackerFromPatient(
 
 inline LiveSettings operation_settings(const Scratch& scratch) {
   LiveSettings out;
-  out.patient.ct = small_ct(scratch);
+  out.patient.ct = ct_of_tissue(scratch);
   std::ofstream fiducials(scratch / "fiducials.txt");
   for (const Eigen::Vector3d& f : kFiducials) fiducials << f.transpose() << '\n';
   out.patient.fiducials = scratch / "fiducials.txt";

@@ -30,6 +30,22 @@ inline std::string small_ct(const Scratch& scratch, double radius_mm = 12) {
   return (scratch / "ct").string();
 }
 
+/// A CT of tissue from -20 to 94 mm along each axis, with a brighter ball in its corner, as a DICOM series.
+inline std::string ct_of_tissue(const Scratch& scratch, double radius_mm = 30) {
+  hw_sim::Grid grid;
+  grid.size = {20, 20, 20};
+  grid.spacing_mm = {6, 6, 6};
+  grid.origin_mm = {-20, -20, -20};
+  std::vector<std::int16_t> hu;
+  for (int k = 0; k < 20; ++k) {
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i) hu.push_back(grid.point(i, j, k).norm() < radius_mm ? 200 : -100);
+    }
+  }
+  EXPECT_TRUE(hw_sim::write_dicom_series(scratch / "ct", grid, hu, 1));
+  return (scratch / "ct").string();
+}
+
 /// Spherical markers at these places of soft tissue, as a DICOM series.
 inline hw_sim::Grid write_ct_with_markers(const std::filesystem::path& folder,
                                           std::span<const Eigen::Vector3d> markers_in_patient_mm) {

@@ -19,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::contents_of;
+using testing::ct_of_tissue;
 using testing::expect_refused;
 using testing::read_json;
 using testing::run;
@@ -117,7 +118,7 @@ TEST(ReplayCommand, RegistersAnewByTheTouchesInTheRecording) {
   const Scratch scratch;
   record(scratch / "r");
   // The markers 5 mm to the side of where they were touched, in another order.
-  const auto result = run("birdseye", inputs(scratch, small_ct(scratch)) + " --fiducials " +
+  const auto result = run("birdseye", inputs(scratch, ct_of_tissue(scratch)) + " --fiducials " +
                                           scratch.file("ct.txt", "5 50 0\n5 0 0\n15 0 70\n35 0 0\n") + " --tip " +
                                           scratch.file("tip.txt", "0 0 0\n") + " --out " + (scratch / "o").string());
   ASSERT_EQ(result.code, 0) << result.output;

@@ -78,14 +78,15 @@ TEST(RegisterByTouches, TellsWhichFiducialEachTouchWas) {
   const std::vector<std::size_t> order{2, 0, 1};
   std::vector<Eigen::Vector3d> touched;
   for (const std::size_t i : order) touched.emplace_back(kTrackerFromPatient * kFiducials[i]);
-  const auto found = register_by_touches(kFiducials, touched);
+  const auto found = register_by_touches(kFiducials, touched, nullptr);
   ASSERT_TRUE(found) << found.error().what;
   ASSERT_EQ(found->registered.fiducials_in_patient_mm.size(), order.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     EXPECT_EQ(found->registered.fiducials_in_patient_mm[i], kFiducials[order[i]]);
   EXPECT_LT(found->registered.fre_mm, 1e-9);
   EXPECT_LT((found->registered.tracker_from_patient.translation() - kTrackerFromPatient.translation()).norm(), 1e-9);
-  EXPECT_FALSE(register_by_touches(kFiducials, std::vector<Eigen::Vector3d>(touched.begin(), touched.begin() + 2)));
+  EXPECT_FALSE(
+      register_by_touches(kFiducials, std::vector<Eigen::Vector3d>(touched.begin(), touched.begin() + 2), nullptr));
 }
 
 TEST(ReplayTrust, OfTouchesIsWhatALiveOperationWouldJudgeBy) {
@@ -98,6 +99,49 @@ TEST(ReplayTrust, OfTouchesIsWhatALiveOperationWouldJudgeBy) {
   EXPECT_GT(*trust.figures.target_mm, 0);
   EXPECT_EQ(trust.figures.scope.held_out_px, 2);
   EXPECT_EQ(trust.figures.fre_mm, 0.4);
+}
+
+/// Of tissue from -20 mm to 80 mm along x and y, 60 mm along z.
+Volume body() {
+  Volume out;
+  out.size = {51, 51, 41};
+  out.spacing_mm = {2, 2, 2};
+  out.patient_from_voxel = Eigen::Translation3d(-20, -20, -20) * Eigen::Scaling(2.0);
+  out.hu.assign(grid_count(out.size), 40);
+  return out;
+}
+
+/// The places of the patient, each x and y times a sign, and all lengths times a scale, as the tracker has them.
+std::vector<Eigen::Vector3d> touches(const std::vector<Eigen::Vector3d>& places_mm, double scale, double x, double y) {
+  std::vector<Eigen::Vector3d> out;
+  out.reserve(places_mm.size());
+  for (const Eigen::Vector3d& p : places_mm)
+    out.emplace_back(kTrackerFromPatient * Eigen::Vector3d(scale * x * p.x(), scale * y * p.y(), scale * p.z()));
+  return out;
+}
+
+TEST(RegisterByTouches, RefusesWhatCannotBeAndSaysWhatItLooksLike) {
+  std::vector<Eigen::Vector3d> five = kFiducials;
+  five.emplace_back(60, 60, 35);
+  const Volume ct = body();
+  const auto told = [&](const std::vector<Eigen::Vector3d>& markers, const std::vector<Eigen::Vector3d>& touched) {
+    const auto found = register_by_touches(markers, touched, &ct);
+    return found ? "registered " + found->doubt : found.error().what;
+  };
+  EXPECT_EQ(told(five, touches(five, 1, 1, 1)), "registered ");
+  EXPECT_NE(told(five, touches(five, 1, -1, 1)).find("a mirror image of the fiducials"), std::string::npos);
+  EXPECT_NE(told(five, touches(five, 1.02, 1, 1)).find("lengths in the CT are 0.9804 times"), std::string::npos);
+  // RAS fits as well as LPS: nothing but the CT tells.
+  std::vector<Eigen::Vector3d> ras;
+  for (const Eigen::Vector3d& p : five) ras.emplace_back(-p.x(), -p.y(), p.z());
+  const std::string looks = told(ras, touches(five, 1, 1, 1));
+  EXPECT_NE(looks.find("outside of the CT's body: fiducials at (-60, -5, 0), "), std::string::npos) << looks;
+  EXPECT_NE(looks.find("looks like RAS"), std::string::npos) << looks;
+  EXPECT_TRUE(register_by_touches(ras, touches(five, 1, 1, 1), nullptr));
+  std::vector<Eigen::Vector3d> far = five;
+  for (Eigen::Vector3d& p : far) p.z() += 500;
+  const std::string other = told(far, touches(five, 1, 1, 1));
+  EXPECT_NE(other.find("Are they of this CT"), std::string::npos) << other;
 }
 
 TEST(ReplayTrust, OfFilesNamesEachFigureThatNothingSays) {

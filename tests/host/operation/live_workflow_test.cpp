@@ -262,7 +262,7 @@ TEST(LiveWorkflow, AnotherPatientsRegistrationIsNotTakenUp) {
   register_into(scratch.path(), scratch);
   LiveSettings wrong = resumed(scratch, scratch.path());
   wrong.out = scratch.path();
-  birdseye::testing::small_ct(scratch, 11);  // in the first one's place
+  birdseye::testing::ct_of_tissue(scratch, 25);  // in the first one's place
   LiveWorkflow workflow(wrong);
   load(workflow);
   EXPECT_NE(workflow.view().fault.find("is of another CT"), std::string::npos) << workflow.view().fault;

@@ -137,17 +137,17 @@ TEST(FiducialStep, FitsWhatIsTouchedOnceTheMarkersAreKnown) {
   FiducialStep step;
   for (const Eigen::Vector3d& fiducial : kFiducials) {
     EXPECT_TRUE(step.add(touch_at(fiducial), 4, {}));
-    step.fit(std::nullopt, 4);
+    step.fit(std::nullopt, 4, nullptr);
   }
   EXPECT_FALSE(step.add(touch_at(Eigen::Vector3d::Zero()), 4, {})) << "all are touched";
   EXPECT_FALSE(step.registered().has_value());
   EXPECT_EQ(step.note().line, "4 touched");
-  step.fit(kFiducials, 4);
+  step.fit(kFiducials, 4, nullptr);
   ASSERT_TRUE(step.registered().has_value()) << step.fault();
   EXPECT_TRUE(step.note().done);
   EXPECT_LT(*step.touches()[2].residual_mm, 1e-6);
   EXPECT_TRUE(step.take_back(3));
-  step.fit(kFiducials, 4);
+  step.fit(kFiducials, 4, nullptr);
   EXPECT_TRUE(step.registered().has_value());
   EXPECT_FALSE(step.note().done) << "three leave open which is which";
 }
@@ -158,7 +158,7 @@ FiducialStep touched_with_one_off(const std::vector<Eigen::Vector3d>& markers, s
   FiducialStep step;
   for (std::size_t i = 0; i < markers.size(); ++i)
     step.add(touch_at(markers[i] + (i == which ? off_mm : Eigen::Vector3d::Zero())), markers.size(), {});
-  step.fit(markers, markers.size());
+  step.fit(markers, markers.size(), nullptr);
   return step;
 }
 
@@ -170,7 +170,7 @@ TEST(FiducialStep, NamesTheTouchThatIsOff) {
     EXPECT_TRUE(step.fits_poorly());
     ASSERT_EQ(step.odd(), which);
     ASSERT_TRUE(step.take_back(which));
-    step.fit(five, five.size());
+    step.fit(five, five.size(), nullptr);
     EXPECT_FALSE(step.fits_poorly());
     EXPECT_FALSE(step.odd().has_value());
     EXPECT_LT(step.registered()->fre_mm, 1e-6);
@@ -181,6 +181,38 @@ TEST(FiducialStep, NamesTheTouchThatIsOff) {
   EXPECT_FALSE(far_off.registered().has_value());
   EXPECT_EQ(far_off.odd(), 2U);
   EXPECT_FALSE(FiducialStep().take_back(0));
+}
+
+TEST(FiducialStep, OfFlatMarkersItAsksForOneMoreOffTheirPlane) {
+  std::vector<Eigen::Vector3d> markers{{0, 0, 0}, {90, 5, 1}, {20, 70, 0}, {85, 100, 2}};
+  const auto touch_four = [&] {
+    FiducialStep step;
+    for (std::size_t i = 0; i < 4; ++i) step.add(touch_at(markers[i] + Eigen::Vector3d(0, 0, i == 2 ? 0.8 : 0)), 4, {});
+    step.fit(markers, 4, nullptr);
+    return step;
+  };
+  FiducialStep step = touch_four();
+  EXPECT_TRUE(step.registered().has_value());
+  EXPECT_FALSE(step.fits());
+  EXPECT_NE(step.note().line.find("touch one more, off their plane"), std::string::npos) << step.note().line;
+  EXPECT_FALSE(step.add(touch_at({30, 30, 60}), 4, {})) << "the CT has no more";
+  markers.emplace_back(30, 30, 60);
+  step = touch_four();
+  ASSERT_TRUE(step.add(touch_at(markers.back()), 4, {}));
+  step.fit(markers, 4, nullptr);
+  EXPECT_TRUE(step.fits()) << step.note().line;
+  EXPECT_FALSE(step.add(touch_at({30, 30, 60}), 4, {})) << "all are touched";
+}
+
+TEST(FiducialStep, WhatIsMirroredIsNotRegistered) {
+  FiducialStep step;
+  for (const Eigen::Vector3d& fiducial : kFiducials)
+    step.add(touch_at({-fiducial.x(), fiducial.y(), fiducial.z()}), 4, {});
+  step.fit(kFiducials, 4, nullptr);
+  EXPECT_FALSE(step.registered().has_value());
+  EXPECT_FALSE(step.fits());
+  EXPECT_NE(step.fault().find("mirror image"), std::string::npos) << step.fault();
+  EXPECT_FALSE(step.fits_poorly()) << "no touch is to blame";
 }
 
 TEST(FiducialStep, WhereItCannotBeToldWhichTouchIsOffItNamesNone) {
@@ -205,7 +237,7 @@ TEST(FiducialStep, WhatIsTakenUpIsNotConfirmedAndDoesNotReplaceAFit) {
   EXPECT_TRUE(step.confirmed());
   FiducialStep fitted;
   for (const Eigen::Vector3d& fiducial : kFiducials) fitted.add(touch_at(fiducial), 0, {});
-  fitted.fit(kFiducials, 0);
+  fitted.fit(kFiducials, 0, nullptr);
   EXPECT_FALSE(fitted.take_up(kept, "taken up"));
   EXPECT_TRUE(fitted.confirmed());
 }

@@ -1,4 +1,4 @@
-#include "host/case/points_in_ct.hpp"
+#include "host/registration/rigid/points_in_ct.hpp"
 
 #include <gtest/gtest.h>
 
