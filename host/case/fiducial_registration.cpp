@@ -124,7 +124,7 @@ void judge_places(Verdict& verdict, const FiducialsFound& out) {
                                   "The CT has {}",
                                   out.judged.ct_reach));
   }
-  if (out.ct_outside.empty() && out.markers_seen) {
+  if (out.judged.outside.empty() && out.markers_seen) {
     const MarkersSeen& seen = *out.markers_seen;
     if (seen.only_turned()) {
       verdict.add(Grade::fail,

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "calibration/points/odd_points.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/guide/guided_calibration.hpp"
 #include "host/operation/step_states.hpp"
