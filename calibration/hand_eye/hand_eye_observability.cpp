@@ -176,19 +176,6 @@ double rotation_misfit_deg(std::span<const SummedStation> stations) {
   return median_of(out);
 }
 
-/// A board of a chessboard's kind is found in a mirrored picture too, and its pose is then the mirror image of the true
-/// one; mirrored poses of a tracker fit the pictures no better. Which axis is mirrored makes no difference: hand-eye
-/// takes up the rotation between them.
-double mirrored_misfit_deg(std::span<const SummedStation> stations) {
-  const Eigen::DiagonalMatrix<double, 3> mirror(-1, 1, 1);
-  std::vector<SummedStation> mirrored(stations.begin(), stations.end());
-  for (SummedStation& s : mirrored) {
-    s.camera_from_marker = {Eigen::Matrix3d(mirror * s.camera_from_marker.rotation() * mirror),
-                            Eigen::Vector3d(mirror * s.camera_from_marker.translation())};
-  }
-  return rotation_misfit_deg(mirrored);
-}
-
 void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
   const double as_given = rotation_misfit_deg(in.stations);
   if (as_given < kBadFitDeg) return;
@@ -197,19 +184,7 @@ void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
     s.chain.tracker_from_sensor = {s.chain.tracker_from_sensor.rotation().transpose(), Eigen::Vector3d::Zero()};
     s.chain.tracker_from_body = {s.chain.tracker_from_body.rotation().transpose(), Eigen::Vector3d::Zero()};
   }
-  const double if_inverted = rotation_misfit_deg(inverted), if_mirrored = mirrored_misfit_deg(in.stations);
-  if (if_mirrored < if_inverted && if_mirrored <= as_given / kFarBetter) {
-    found.solvable = false;
-    found.findings.push_back(
-        {Grade::fail,
-         fmt::format(
-             "the pictures or the poses are mirrored: they fit to {:.1f} degrees as given, to {:.1f} with one of "
-             "them mirrored",
-             as_given, if_mirrored),
-         "turn the mirroring off where the pictures are made; if the poses have a left-handed frame, bring them into a "
-         "right-handed one"});
-    return;
-  }
+  const double if_inverted = rotation_misfit_deg(inverted);
   if (if_inverted > as_given / kFarBetter) return;
   found.solvable = false;
   found.findings.push_back(

@@ -7,8 +7,6 @@
 #include <fstream>
 #include <sstream>
 
-#include "calibration/record/sha256.hpp"
-
 namespace birdseye::host {
 
 namespace {
@@ -57,32 +55,6 @@ Result<std::vector<NumberRow>> read_rows(const fs::path& path, bool headed = fal
 
 }  // namespace
 
-namespace {
-
-constexpr const char* kSumRemark = "# sha256 of the four lines: ";
-
-std::string matrix_text(const Eigen::Matrix4d& m) {
-  std::string text;
-  for (int i = 0; i < 4; ++i)
-    text += fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}\n", m(i, 0), m(i, 1), m(i, 2), m(i, 3));
-  return text;
-}
-
-/// Empty: files of other programs state none.
-std::optional<std::string> stated_sum(const fs::path& path) {
-  std::ifstream in(path);
-  std::string line;
-  while (std::getline(in, line)) {
-    if (!line.starts_with(kSumRemark)) continue;
-    line.erase(0, std::string(kSumRemark).size());
-    if (line.ends_with('\r')) line.pop_back();
-    return line;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& m, const std::string& where) {
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() > 0 &&
@@ -108,13 +80,6 @@ Result<Eigen::Matrix4d> read_pose(const fs::path& path) {
                                                  row.line, row.numbers.size())};
     }
     for (int j = 0; j < 4; ++j) m(i, j) = row.numbers[static_cast<std::size_t>(j)];
-  }
-  if (const auto sum = stated_sum(path); sum && *sum != calibration::sha256_of(matrix_text(m))) {
-    return Error{
-        Errc::bad_format,
-        fmt::format("{}: was changed since birdseye wrote it: its SHA-256 does not fit; if that is meant, take "
-                    "away its last line, and it is your statement",
-                    path.string())};
   }
   return check_rigid(m, path.string());
 }
@@ -154,8 +119,10 @@ Result<std::vector<Transform<Camera, Patient>>> read_path(const fs::path& path) 
 }
 
 std::string pose_text(const Eigen::Matrix4d& m) {
-  const std::string text = matrix_text(m);
-  return text + kSumRemark + calibration::sha256_of(text) + "\n";
+  std::string text;
+  for (int i = 0; i < 4; ++i)
+    text += fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}\n", m(i, 0), m(i, 1), m(i, 2), m(i, 3));
+  return text;
 }
 
 }  // namespace birdseye::host

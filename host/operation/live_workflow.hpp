@@ -32,7 +32,7 @@ struct LiveSettings {
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
   std::optional<double> rod_angle_deg;  ///< of a scope whose rod turns, as it is read off; empty: nobody has said it
-  std::size_t fiducials = 0;                         ///< how many to touch; 0: as many as are wanted
+  std::size_t fiducials = 0;            ///< how many to touch; 0: as many as are wanted
   std::string patient_id;        ///< of the patient on the table, where another system knows it; else a person is asked
   std::filesystem::path out;     ///< where results go; empty: none are kept
   std::filesystem::path resume;  ///< out of an earlier window, to go on from; or empty

@@ -54,8 +54,8 @@ FramePose FramePainter::pose_of(const wire::VideoFrame& frame,
   out.camera_from_patient = camera_from_patient;
   out.position_sigma_mm = frame.info.pose.position_sigma_mm;
   out.jitter_mm = jitter_.rms_mm();
-  // Without single poses the sensor's own speed has to do, which knows nothing of its turning.
-  out.target_speed_mm_s = std::max(frame.info.pose.speed_mm_s, jitter_.speed_mm_s().value_or(0));
+  // Before there are enough poses the sensor's own speed has to do, which knows nothing of its turning.
+  out.target_speed_mm_s = jitter_.speed_mm_s().value_or(frame.info.pose.speed_mm_s);
   out.time_sigma =
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds()));
   out.latency_known = frame.info.latency.has_value();

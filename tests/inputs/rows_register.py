@@ -71,6 +71,13 @@ def same_point(places, touched):
     return places, [touched[0]] * len(touched)
 
 
+def numbered(folder):
+    fiducials(folder)
+    for name in ("ct.txt", "touched.txt"):
+        lines = (folder / name).read_text().splitlines()
+        (folder / name).write_text("".join(f"{number} {line}\n" for number, line in enumerate(lines, 1)))
+
+
 def comments(folder):
     fiducials(folder, header="# x y z, mm, LPS\r\n")
 
@@ -172,6 +179,8 @@ ROWS = [
         "pass", writes=BOTH, check=close(1.0)),
     Row("register fiducials", "good", "points of both files with names, in different orders, more in the CT", "paired by name", FIDUCIALS, 0,
         both_named, "pass", says=["paired by their names", "\\(right ear\\)"], writes=BOTH, check=close(1.0)),
+    Row("register fiducials", "good", "numbered points, in both files", "read", FIDUCIALS, 0, numbered, "pass", writes=BOTH,
+        check=close(1.0)),
     Row("register fiducials", "odd", "a spreadsheet's CSV with a header, semicolons and decimal commas", "read", FIDUCIALS, 0, spreadsheet,
         "pass", writes=BOTH, check=close(1.0)),
     Row("register fiducials", "wrong", "the CT's points in RAS, with the CT at hand", "fail: they look like RAS, and what to do", IN_CT, 3,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <utility>
 
 #include "calibration/record/calibration_record.hpp"
 
@@ -38,6 +39,18 @@ inline calibration::CalibrationRecord example_record(int width_px, int height_px
   record.hand_eye = hand_eye;
   record.tip = TipEntry{provenance, {1, 2, 1.0 / 3}, Eigen::Matrix3d::Identity() / 9, 0.3};
   record.latency = LatencyEntry{provenance, 83.1, 82.6, 83.6, 12};
+  return record;
+}
+
+/// Of a straight scope, whose figures alone say how well it is calibrated.
+inline calibration::CalibrationRecord straight_scope_record(int width_px = 768, int height_px = 576,
+                                                            calibration::Identity tracker = {},
+                                                            calibration::Identity camera = {}) {
+  calibration::CalibrationRecord record = example_record(width_px, height_px, std::move(tracker), std::move(camera));
+  record.lens->rod_angle_deg.reset();
+  record.lens->covariance.setZero();
+  record.hand_eye->rod.reset();
+  record.hand_eye->covariance.setZero();
   return record;
 }
 

@@ -77,16 +77,6 @@ class Hand {
   std::int64_t time_ms_ = 1000;
 };
 
-/// Of a straight scope, whose figures alone say how well it is calibrated.
-inline calibration::CalibrationRecord straight_scope_record(int width_px = 768, int height_px = 576) {
-  calibration::CalibrationRecord record = example_record(width_px, height_px, {}, {});
-  record.lens->rod_angle_deg.reset();
-  record.lens->covariance.setZero();
-  record.hand_eye->rod.reset();
-  record.hand_eye->covariance.setZero();
-  return record;
-}
-
 /// The appliance sends the scope's calibration record.
 inline void give_record(LiveWorkflow& workflow,
                         const calibration::CalibrationRecord& record = straight_scope_record()) {

@@ -115,31 +115,6 @@ TEST(HandEyeInput, InvertedPoses) {
   expect_fail(bench.input, "seem to be inverted", "--poses-are sensor_from_tracker");
 }
 
-TEST(HandEyeInput, MirroredPosesAndPictures) {
-  const auto mirrored = [](const auto& pose, int axis) {
-    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-    signs[axis] = -1;
-    const Eigen::DiagonalMatrix<double, 3> mirror(signs);
-    return std::pair<Eigen::Matrix3d, Eigen::Vector3d>(mirror * pose.rotation() * mirror, mirror * pose.translation());
-  };
-  for (const int axis : {0, 1, 2}) {
-    HandEyeBench bench(kGood);
-    for (HandEyeStation& s : bench.input.stations) {
-      const auto [rotation, translation] = mirrored(s.tracker_from_sensor, axis);
-      s.tracker_from_sensor = {rotation, translation};
-    }
-    expect_fail(bench.input, "the pictures or the poses are mirrored", "turn the mirroring off");
-  }
-  HandEyeScene scene = kGood;
-  scene.poses_only = true;
-  HandEyeBench bench(scene);
-  for (HandEyeStation& s : bench.input.stations) {
-    const auto [rotation, translation] = mirrored(*s.camera_from_marker, 0);
-    s.camera_from_marker = Transform<Camera, Marker>(rotation, translation);
-  }
-  expect_fail(bench.input, "the pictures or the poses are mirrored", "turn the mirroring off");
-}
-
 TEST(HandEyeInput, ABoardOfAnotherSize) {
   const auto scaled = [](double by) {
     HandEyeBench bench(kGood);

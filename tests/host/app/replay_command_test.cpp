@@ -186,7 +186,7 @@ void record_told(const fs::path& folder, const std::map<int, std::vector<wire::E
 wire::Calibration record_of(int width_px, const calibration::Identity& camera) {
   wire::Calibration out;
   out.in_force = true;
-  out.record = calibration::record_text(testing::example_record(width_px, 48, kBird, camera));
+  out.record = calibration::record_text(testing::straight_scope_record(width_px, 48, kBird, camera));
   return out;
 }
 
@@ -225,8 +225,8 @@ TEST(ReplayCommand, ARecordOfAnotherInstrumentDrawsNothing) {
   const std::string registration = "--registration " + scratch.file("reg.txt", kIdentityPose) + " --calibration ";
   const auto by = [&](const calibration::Identity& tracker, const calibration::Identity& camera) {
     return replay(scratch, "r",
-                  registration + scratch.file("record.json", calibration::record_text(
-                                                                 testing::example_record(64, 48, tracker, camera))));
+                  registration + scratch.file("record.json", calibration::record_text(testing::straight_scope_record(
+                                                                 64, 48, tracker, camera))));
   };
   const Replayed own = by(kBird, kHead);
   EXPECT_EQ(own.figures["frames_overlaid"], 8) << own.output;
@@ -290,7 +290,7 @@ TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
   host::Operation kept;
   kept.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
   kept.made_utc = "2026-11-22T10:00:00Z";
-  kept.calibrated = {*host::ScopeSetup::of_record(testing::example_record(64, 48, kBird, kHead)),
+  kept.calibrated = {*host::ScopeSetup::of_record(testing::straight_scope_record(64, 48, kBird, kHead)),
                      "2026-11-22T09:30:00Z",
                      true,
                      {kBird, kHead, 0}};
@@ -332,7 +332,7 @@ TEST(ReplayCommand, ExportAndRenderTakeWhatAWindowKept) {
   const std::string ct = small_ct(scratch);
   host::Operation kept;
   kept.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
-  kept.calibrated = {*host::ScopeSetup::of_record(testing::example_record(64, 48, kBird, kHead)),
+  kept.calibrated = {*host::ScopeSetup::of_record(testing::straight_scope_record(64, 48, kBird, kHead)),
                      "2026-11-22T09:30:00Z", true};
   kept.registered = {
       Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {100, 0, 0}), 0.3, {{0, 0, 0}, {30, 0, 0}, {0, 50, 0}}};

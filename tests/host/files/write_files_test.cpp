@@ -6,7 +6,6 @@
 
 #include "calibration/record/sha256.hpp"
 #include "host/files/files_sha256.hpp"
-#include "host/files/text_files.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -36,26 +35,6 @@ TEST(WriteFiles, WhereOneCannotBeWrittenNoneIsReplaced) {
   EXPECT_FALSE(write_files({{path, "new"}, {scratch / "no folder" / "b.txt", "new"}}));
   EXPECT_EQ(birdseye::testing::contents_of(path), "former");
   EXPECT_FALSE(std::filesystem::exists(path + ".part"));
-}
-
-TEST(PoseText, OneThatWasEditedIsRefusedAndOneOfAnotherProgramIsNot) {
-  const birdseye::testing::Scratch scratch;
-  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
-  pose(0, 3) = 1.0 / 3;
-  const std::string text = pose_text(pose);
-  ASSERT_EQ(*read_pose(scratch.file("pose.txt", text)), pose);
-  EXPECT_EQ(
-      *read_pose(scratch.file("dos.txt", "# with ends of lines as DOS has them\r\n1 0 0 " +
-                                             std::string("0.33333333333333331\r\n0 1 0 0\r\n0 0 1 0\r\n0 0 0 1\r\n"
-                                                         "# sha256 of the four lines: ") +
-                                             text.substr(text.size() - 65, 64) + "\r\n")),
-      pose);
-  std::string edited = text;
-  edited.replace(edited.find("0.3333"), 6, "20.333");
-  const auto read = read_pose(scratch.file("pose.txt", edited));
-  ASSERT_FALSE(read);
-  EXPECT_NE(read.error().what.find("pose.txt: was changed since"), std::string::npos) << read.error().what;
-  EXPECT_TRUE(read_pose(scratch.file("pose.txt", edited.substr(0, edited.find('#'))))) << "somebody's own statement";
 }
 
 TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {

@@ -53,7 +53,7 @@ wire::VideoFrame tissue(std::uint64_t number, const PoseAnswer& pose) {
 }
 
 calibration::CalibrationRecord record() {
-  auto out = birdseye::testing::example_record(kVideoWidth, kVideoHeight, {}, {});
+  auto out = birdseye::testing::straight_scope_record(kVideoWidth, kVideoHeight, {}, {});
   out.lens->camera = {kVideoWidth, kVideoHeight, 620, 620, 384, 288, -0.2, 0.05, 0, 0, 0};
   out.lens->rms_px = 0.3;
   out.hand_eye->held_out_px = 1;
@@ -209,16 +209,16 @@ TEST_F(LiveWindowPictures, MarginsWithHowFarOffTheyMayBeAmongAllFigures) {
   LiveSettings settings = operation_settings(scratch);
   hw_sim::Grid grid;
   grid.size = {20, 20, 20};
-  grid.spacing_mm = {2, 2, 2};
+  grid.spacing_mm = {6, 6, 6};
   grid.origin_mm = {-20, -20, -20};
   std::vector<std::int16_t> labels;
   for (int k = 0; k < 20; ++k) {
     for (int j = 0; j < 20; ++j) {
       for (int i = 0; i < 20; ++i)
-        labels.push_back((grid.point(i, j, k) - Eigen::Vector3d(2, 0, 0)).norm() < 5 ? 4 : 0);
+        labels.push_back((grid.point(i, j, k) - Eigen::Vector3d(2, 0, 0)).norm() < 12 ? 4 : 0);
     }
   }
-  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "labels", grid, labels, 2));
+  ASSERT_TRUE(hw_sim::write_dicom_series(scratch / "labels", grid, labels, 1));
   settings.patient.labels = scratch / "labels";
   settings.patient.organ = settings.patient.targets = {4};
   settings.patient.landmarks.clear();
