@@ -310,7 +310,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_fre_unknown", "how well the fiducials fit is not known"},
     {"why_fre", "the fiducials fit to {:.1f} mm only"},
     {"why_target_unknown", "how far the target may be off is not known"},
-    {"why_error", "the target may be off by {:.0f} mm; E shows by what"},
+    {"why_error", "the target may be off by {:.0f} mm, by all that is counted"},
     {"why_target", "fiducials as these leave the target open by {:.0f} mm: touch others, round about it"},
     {"why_no_pose", "no pose"},
     {"why_predicted", "the pose is predicted {:.0f} ms ahead"},

@@ -59,7 +59,7 @@ TEST(OverlayGate, AllThatAddsToTheTargetsErrorCounts) {
   budget.motion = MotionError{3, 6};
   const auto decision = gate.decide({1'000'000'000}, sound(), budget);
   EXPECT_EQ(decision.strength, 0);
-  EXPECT_EQ(decision.reason, "the target may be off by 8 mm; E shows by what");
+  EXPECT_EQ(decision.reason, "the target may be off by 8 mm, by all that is counted");
   ASSERT_TRUE(decision.expected.has_value());
 }
 
