@@ -133,7 +133,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ShownChoice choice = options.shown;
   choice.summed = setup->operation.has_value();
   const auto fiducials_inside = [&](const Volume& ct) -> Result<void> {
-    if (!setup->by_touches) return {};
+    if (!setup->by_touches || options.inputs.fiducials.empty()) return {};  // a window's were looked at there
     return check_places(setup->by_touches->fiducials_in_patient_mm, ct).with_context(options.inputs.fiducials.string());
   };
   const auto shown = read_shown(options.volume, choice, fiducials_inside);

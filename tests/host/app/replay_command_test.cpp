@@ -314,7 +314,7 @@ TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
           {"--operation", "excludes", "--registration"});
   // Another CT in its place, and a folder whose operation somebody edited.
   fs::remove_all(scratch / "ct");
-  small_ct(scratch, 8);
+  small_ct(scratch, 11);
   refused("replay " + (scratch / "r").string() + by_operation + " --out " + (scratch / "none").string(),
           {"--operation", "is of another CT"});
   refused("export" + by_operation + " --out " + (scratch / "none").string(), {"--operation", "is of another CT"});
