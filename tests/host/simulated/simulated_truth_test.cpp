@@ -33,7 +33,8 @@ Eigen::Vector2d bright_middle_px(const std::vector<std::uint8_t>& rgb, const Cam
   double weight = 0;
   for (int y = 0; y < lens.height_px; ++y) {
     for (int x = 0; x < lens.width_px; ++x) {
-      const double light = rgb[3 * (static_cast<std::size_t>(y) * lens.width_px + x)];
+      const double light = rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(lens.width_px) +
+                                    static_cast<std::size_t>(x))];
       sum += light * Eigen::Vector2d(x, y);
       weight += light;
     }
