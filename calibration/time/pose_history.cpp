@@ -90,8 +90,8 @@ PoseHistory::Range PoseHistory::around(DeviceTime time, std::ptrdiff_t first_aft
     return sample(i + 1).acquired - sample(i).acquired <= settings_.max_gap;
   };
   // For a prediction at least two, to tell the speed, and the window's whole width before the newest.
-  const DeviceTime from =
-      predicted ? sample(count - 1).acquired - settings_.smoothing - settings_.smoothing : time - settings_.smoothing;
+  const Duration before_newest = std::max(settings_.smoothing + settings_.smoothing, settings_.least_predicted_from);
+  const DeviceTime from = predicted ? sample(count - 1).acquired - before_newest : time - settings_.smoothing;
   if (predicted && range.begin > 0 && joined(range.begin - 1)) --range.begin;
   while (range.begin > 0 && sample(range.begin - 1).acquired >= from && joined(range.begin - 1)) --range.begin;
   while (range.end < count && sample(range.end).acquired - time <= settings_.smoothing && joined(range.end - 1)) {

@@ -41,8 +41,10 @@ class PoseHistory {
     double acceleration_mm_s2 = 500;                   ///< of a hand, per axis: how predictions grow worse with time
     /// Half the width of a window of samples to which a line is fitted (position along it, rotation about one axis), to
     /// average the tracker's noise. 0 interpolates between the two neighbours. A prediction is made from the whole
-    /// window's width before the newest sample.
+    /// window's width before the newest sample, and from no less than least_predicted_from: of two neighbours' noise it
+    /// would be many times as much.
     Duration smoothing{0};
+    Duration least_predicted_from = Duration::from_ms(60);
   };
 
   PoseHistory() = default;

@@ -346,6 +346,9 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command->add_option("--rod-angle", options->live.rod_angle_deg,
                       "of a scope whose rod turns, degrees, as it is read off; Page Up and Page Down turn it on");
   command->add_option("--pointer", options->live.pointer, "the pointer's bird (default pointer)");
+  command->add_flag("!--no-motion-check", options->live.video_must_agree,
+                    "of a scene without any pattern, as a plain phantom: do not wait until the video has been seen to "
+                    "move as the scope's poses say");
   command->add_option("--reference", options->live.reference,
                       "the bird that is fixed on patient or table (default: the one that the appliance names, if any)");
   command->add_option("--transfer", options->live.transfer, "transfer function: a preset, or a file");

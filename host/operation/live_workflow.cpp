@@ -122,6 +122,7 @@ void LiveWorkflow::take(ReferenceSensor::News news) {
 void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
   if (const auto* frame = std::get_if<wire::VideoFrame>(&event)) {
     note_pause(now);
+    watch_motion(*frame);
     if (!frozen_) {
       std::optional<RelatedTime<HostTime>> stamped;
       if (clock) stamped = {clock->host_from_device(frame->info.acquired), clock->host.sigma};
@@ -149,6 +150,7 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != settings_.scope) continue;
     views_.take(birds.acquired, bird.tracker_from_sensor);
+    video_.take(birds.acquired, bird.tracker_from_sensor);
     if (!setup || !patient_.plan()) continue;
     views_.average(*setup);
     picture_.take(birds.acquired, bird.tracker_from_sensor);
@@ -257,6 +259,16 @@ void LiveWorkflow::watch_surface(HostTime now) {
   watch_.offer({*picture_.frame(), *seen_from}, pose_mm, now);
 }
 
+void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
+  // The board's squares look alike, one after the other.
+  const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
+  if (!settings_.video_must_agree || !scope || !video_.take(frame, *scope)) return;
+  // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
+  if (video_.state() == VideoAgreement::differs && fiducials_.registered_or_held_back())
+    return doubt_registration(words("why_video_differs"));
+  update_setup();
+}
+
 void LiveWorkflow::take(const CheckedSurface& checked) {
   if (!deformation_.found() || !motion_.take(checked)) return;
   if (motion_.moved_mm()) {
@@ -327,13 +339,20 @@ void LiveWorkflow::update_setup() {
   if (calibration_.held_back())
     return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
   if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_, why_doubted_));
-  const ScopeSetup turned = settings_.rod_angle_deg ? scope->scope.turned_to(*settings_.rod_angle_deg) : scope->scope;
+  const ScopeSetup turned = *scope_as_it_is();
   TrustFigures figures = trust_figures(turned.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   const DeformedOrgan* const deformed = deformation_.found().get();
   figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
   if (deformed != nullptr) figures.motion_error = deformed->target;
   figures.moved_mm = motion_.moved_mm();
+  if (settings_.video_must_agree) figures.video = video_.state();
   picture_.set_setup(turned.registered(registered->tracker_from_patient), figures);
+}
+
+std::optional<ScopeSetup> LiveWorkflow::scope_as_it_is() const {
+  const auto& found = calibration_.found();
+  if (!found) return std::nullopt;
+  return settings_.rod_angle_deg ? found->scope.turned_to(*settings_.rod_angle_deg) : found->scope;
 }
 
 void LiveWorkflow::turn_rod(double by_deg) {

@@ -21,6 +21,7 @@
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/overlay/live_picture.hpp"
+#include "host/overlay/video_motion.hpp"
 
 namespace birdseye::host {
 
@@ -32,7 +33,10 @@ struct LiveSettings {
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with
   std::optional<Eigen::Vector3d> tip_in_pointer_mm;  ///< else by the record
   std::optional<double> rod_angle_deg;  ///< of a scope whose rod turns, as it is read off; empty: nobody has said it
-  std::size_t fiducials = 0;            ///< how many to touch; 0: as many as are wanted
+  /// Nothing is drawn before the video has been seen to move as the scope's poses say. False: of a scene without any
+  /// pattern, which shows no motion.
+  bool video_must_agree = true;
+  std::size_t fiducials = 0;     ///< how many to touch; 0: as many as are wanted
   std::string patient_id;        ///< of the patient on the table, where another system knows it; else a person is asked
   std::filesystem::path out;     ///< where results go; empty: none are kept
   std::filesystem::path resume;  ///< out of an earlier window, to go on from; or empty
@@ -117,7 +121,10 @@ class LiveWorkflow {
   void show_shape();
   void show_margins();
   void update_setup();
+  /// As it is calibrated, with its rod as it is turned now. Empty: it is not.
+  [[nodiscard]] std::optional<ScopeSetup> scope_as_it_is() const;
   void watch_surface(HostTime now);
+  void watch_motion(const wire::VideoFrame& frame);
   void take_up();
   void keep();
 
@@ -152,6 +159,7 @@ class LiveWorkflow {
   WatchedSurface matched_;  ///< what the deformation is, or is being, found by
   SurfaceWatch watch_;
   OrganMotion motion_;
+  VideoMotion video_;
   StepNote check_, run_;
   OperationKeeper keeper_;
   LivePicture picture_;

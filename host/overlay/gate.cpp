@@ -25,6 +25,8 @@ std::string OverlayGate::doubt_of_figures() const {
 std::string OverlayGate::doubt(const PoseAnswer& pose, const std::optional<ErrorBudget>& expected) const {
   if (!pose.tracker_from_sensor) return pose.reason.empty() ? words("why_no_pose") : pose.reason;
   if (std::string why = doubt_of_figures(); !why.empty()) return why;
+  if (figures_.video == VideoAgreement::differs) return words("why_video_differs");
+  if (figures_.video == VideoAgreement::untold) return words("why_video_untold");
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
     return words("why_predicted", pose.age.seconds() * 1e3);
   }

@@ -28,6 +28,13 @@ struct ScopeFigures {
   bool rod_angle_missing = false;
 };
 
+/// Whether the video is seen to move as the scope's poses say.
+enum class VideoAgreement {
+  untold,   ///< the video has not shown enough yet
+  agrees,   ///< it does
+  differs,  ///< it does not: the scope is turned in its holder, or another; or something has moved
+};
+
 /// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
 struct MotionError {
   double rms_mm = 0, radius95_mm = 0;
@@ -46,6 +53,8 @@ struct TrustFigures {
   /// How far the video shows the organ off the surface that is drawn, where that is more than chance. Empty: nothing
   /// says that it has moved.
   std::optional<double> moved_mm = std::nullopt;
+  /// Empty: nobody looks, as where there is no video that moves.
+  std::optional<VideoAgreement> video = std::nullopt;
 };
 
 /// The one place where a figure that nobody knows counts as perfect: whoever gives a lens, a hand-eye or a pose in

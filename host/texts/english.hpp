@@ -315,6 +315,10 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_no_pose", "no pose"},
     {"why_predicted", "the pose is predicted {:.0f} ms ahead"},
     {"why_scatter", "the tracker scatters by {:.1f} mm"},
+    {"why_video_differs",
+     "the video does not move as the scope's poses say (scope turned or exchanged, or something has moved): check a "
+     "landmark in step 6, or calibrate"},
+    {"why_video_untold", "the video has not shown yet that it moves as the scope's poses say: move the scope about"},
     {"why_moved", "the organ has moved since the views ({:.0f} mm): keep views anew (or undo the deformation)"},
     {"check_unknown_surface", "how well the deformed surface is known was not estimated"},
     {"check_unknown_hand_eye", "how far hand-eye is off in mm is not known"},

@@ -2,20 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
+#include <optional>
 
 namespace birdseye::testing {
 
 namespace {
 
 constexpr int kSteadyColumns = 3;
-
-std::vector<std::string> lines_of(const std::filesystem::path& path) {
-  std::vector<std::string> lines;
-  std::ifstream in(path);
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
-}
 
 std::string cell(const std::optional<double>& value, const char* unit, int digits) {
   return value ? fmt::format("{:.{}f}{}", *value, digits, unit) : std::string("-");
@@ -33,30 +26,6 @@ std::vector<std::string> table_lines(const std::vector<FaultRow>& rows) {
         cell(row.recovery_s, " s", 2), cell(row.others_percent, " %", 0)));
   }
   return lines;
-}
-
-std::vector<std::string> table_of_page(const std::filesystem::path& page, const std::string& name) {
-  std::vector<std::string> table;
-  bool within = false;
-  for (const std::string& line : lines_of(page)) {
-    if (within && line.empty()) break;
-    if (within) table.push_back(line);
-    if (line == "<!-- " + name + " -->") within = true;
-  }
-  return table;
-}
-
-void replace_table(const std::filesystem::path& page, const std::string& name, const std::vector<std::string>& lines) {
-  const auto old = lines_of(page);
-  std::ofstream out(page);
-  bool within = false;
-  for (const std::string& line : old) {
-    if (within && !line.empty()) continue;
-    within = line == "<!-- " + name + " -->";
-    out << line << '\n';
-    if (!within) continue;
-    for (const std::string& fresh : lines) out << fresh << '\n';
-  }
 }
 
 std::string unmeasured(const std::string& line) {

@@ -12,6 +12,7 @@
 #include "tests/e2e/appliance_faults.hpp"
 #include "tests/e2e/fault_judge.hpp"
 #include "tests/e2e/fault_page.hpp"
+#include "tests/support/page_table.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::testing {

@@ -140,6 +140,27 @@ TEST(PoseHistory, APredictionKnowsHowItGetsWorse) {
   }
 }
 
+TEST(PoseHistory, APredictionIsNotOfTwoNeighboursNoise) {
+  constexpr double kNoise_mm = 0.5, kAhead_s = 0.02;
+  std::mt19937 rng(6);
+  std::normal_distribution<double> noise(0, kNoise_mm);
+  double squares = 0;
+  constexpr int kTrials = 400;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    PoseHistory history;
+    double t_s = 0;
+    for (int i = 0; i < 20; ++i) {
+      t_s = i * kPeriodNs * 1e-9;
+      history.push({std::llround(t_s * 1e9)}, {}, {Eigen::Matrix3d::Identity(), {50 * t_s + noise(rng), 0, 0}});
+    }
+    const PoseAnswer answer = history.at({std::llround((t_s + kAhead_s) * 1e9)});
+    const double error = answer.tracker_from_sensor->translation().x() - 50 * (t_s + kAhead_s);
+    squares += error * error / kTrials;
+  }
+  // By the two newest it would be 3.6 times the noise.
+  EXPECT_LT(std::sqrt(squares), 1.5 * kNoise_mm);
+}
+
 TEST(PoseHistory, RefusesSamplesOutOfOrderAndStaysBounded) {
   PoseHistory::Settings settings;
   settings.capacity = 10;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 namespace birdseye::host {
 namespace {
@@ -38,6 +39,20 @@ TEST(OverlayGate, DrawsNothingOverABadCalibration) {
   EXPECT_NE(decision.reason.find("9.0 mm"), std::string::npos);
   gate.set_figures(kGood);
   EXPECT_EQ(gate.decide({1'000'000'000}, sound()).strength, 1);
+}
+
+TEST(OverlayGate, WhatTheVideoDoesNotShowIsNotDrawn) {
+  TrustFigures figures = kGood;
+  for (const auto& [video, strength] :
+       {std::pair{VideoAgreement::untold, 0.0}, {VideoAgreement::differs, 0.0}, {VideoAgreement::agrees, 1.0}}) {
+    figures.video = video;
+    OverlayGate gate;
+    gate.set_figures(figures);
+    const auto decision = gate.decide({0}, sound());
+    EXPECT_EQ(decision.strength, strength);
+    EXPECT_EQ(decision.believed, strength > 0) << "nor is a view kept by it";
+    EXPECT_EQ(decision.reason.empty(), strength > 0);
+  }
 }
 
 TEST(OverlayGate, FiducialsThatLeaveTheTargetOpenAreNotDrawnBy) {

@@ -1,0 +1,256 @@
+#include "host/overlay/video_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+#include <utility>
+#include <vector>
+
+#include "calibration/base/median.hpp"
+#include "calibration/geometry/rotations.hpp"
+#include "calibration/picture/picture_mat.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Relative = Transform<Camera, Camera>;
+
+constexpr Duration kEvery = Duration::from_ms(200), kLongest = Duration::from_ms(3000);
+constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
+constexpr int kWorkingWidthPx = 320;                  // more tells no more of the motion, and takes longer
+constexpr std::size_t kPlaces = 80, kFewest = 15;
+constexpr double kFieldShare = 0.42;  // of the picture's height: inside the round field of any laparoscope
+constexpr double kThereAndBackPx = 0.7, kFollowedPx = 1.5;
+constexpr double kNearest_mm = 15, kFarthest_mm = 600;  // what a laparoscope sees lies between
+constexpr double kTurned_rad = 15 * M_PI / 180;
+constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
+constexpr double kPlainly = 3;         // so many times as far off would be plain
+constexpr int kOddInRow = 2, kMostWanted = 32;
+
+/// Where nothing is to be followed: outside the field, and in reflections, which go with the lamp.
+cv::Mat places_allowed(const cv::Mat& grey) {
+  cv::Mat mask = cv::Mat::zeros(grey.size(), CV_8U);
+  cv::circle(mask, {grey.cols / 2, grey.rows / 2}, static_cast<int>(kFieldShare * grey.rows), 255, cv::FILLED);
+  cv::Mat glare = grey > 240;
+  cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
+  mask.setTo(0, glare);
+  return mask;
+}
+
+/// From a place to a line's part between two others.
+double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const Eigen::Vector2d along = to - from;
+  const double squared = along.squaredNorm();
+  const double share = squared > 0 ? std::clamp((place - from).dot(along) / squared, 0.0, 1.0) : 0.0;
+  return (place - from - share * along).norm();
+}
+
+/// A place in two pictures, as directions of unit Z.
+struct Followed {
+  Eigen::Vector3d then, now;
+};
+
+/// The median distance from the lines, of unit focal length. Empty where most places would be behind the camera.
+std::optional<double> median_off(const std::vector<Followed>& places, const Relative& now_from_then) {
+  std::vector<double> off;
+  off.reserve(places.size());
+  for (const Followed& place : places) {
+    // From the nearest depth on at which the place is before the camera in both pictures.
+    const double ahead = (now_from_then.rotation() * place.then).z();
+    if (!(ahead > 0)) continue;
+    const double nearest_mm = std::max(kNearest_mm, (kNearest_mm - now_from_then.translation().z()) / ahead);
+    if (nearest_mm >= kFarthest_mm) continue;
+    const Eigen::Vector3d nearest = now_from_then * Eigen::Vector3d(nearest_mm * place.then);
+    const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(kFarthest_mm * place.then);
+    off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
+  }
+  if (2 * off.size() <= places.size()) return std::nullopt;
+  return median_of(std::move(off));
+}
+
+/// As a hand-eye that is turned about an axis of the camera would have it.
+Relative turned(const Relative& motion, Eigen::Index axis, double by_rad) {
+  const Relative turn(rotation_exp(Eigen::Vector3d(by_rad * Eigen::Vector3d::Unit(axis))), Eigen::Vector3d::Zero());
+  return turn * motion * turn.inverse();
+}
+
+PoseHistory averaged_poses() {
+  PoseHistory::Settings settings;
+  settings.capacity = 512;
+  settings.smoothing = kAverage;
+  return PoseHistory(settings);
+}
+
+bool same(const ScopeSetup& a, const ScopeSetup& b) {
+  return a.camera() == b.camera() && a.camera_from_sensor().matrix() == b.camera_from_sensor().matrix();
+}
+
+}  // namespace
+
+struct VideoMotion::Waiting {
+  DeviceTime at;
+  cv::Mat grey;
+  double scale = 1;  ///< pixels of the frame in one of grey
+};
+
+struct VideoMotion::Key {
+  DeviceTime at;
+  Transform<Camera, Tracker> camera_from_tracker;
+  std::vector<cv::Point2f> places;  ///< in the key's picture
+  cv::Mat newest;                   ///< the last picture that they were followed to
+  std::vector<cv::Point2f> now;     ///< and where they are in it
+  std::array<bool, 3> told{};       ///< by pictures since, about each axis
+};
+
+VideoMotion::VideoMotion() : poses_(averaged_poses()) {}
+
+VideoMotion::~VideoMotion() = default;
+
+void VideoMotion::reset() {
+  waiting_.reset();
+  key_.reset();
+  looked_at_.reset();
+  told_ = {};
+  wanted_ = 1;
+  odd_ = 0;
+  state_ = VideoAgreement::untold;
+  off_px_.reset();
+}
+
+void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+  // Of another clock than those before: they are of no use any more.
+  if (const auto newest = poses_.newest(); newest && acquired < *newest) {
+    reset();
+    poses_ = averaged_poses();
+  }
+  poses_.push(acquired, Duration{0}, tracker_from_sensor);
+}
+
+bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
+  bool changed = false;
+  if (of_ && !same(*of_, scope)) {
+    changed = state_ != VideoAgreement::untold;
+    reset();
+  }
+  of_ = scope;
+  const DeviceTime at = frame.info.acquired;
+  if (waiting_) {
+    const auto newest = poses_.newest();
+    if (newest && *newest >= waiting_->at + kAverage) {
+      changed = look(*waiting_, scope);
+      waiting_.reset();
+    } else if (at - waiting_->at > kEvery || at < waiting_->at) {
+      waiting_.reset();  // no poses come
+    }
+  }
+  const CameraModel& camera = scope.camera();
+  const bool due = !looked_at_ || at - *looked_at_ >= kEvery || at < *looked_at_;
+  if (waiting_ || !due || frame.width_px != camera.width_px || frame.height_px != camera.height_px) return changed;
+  looked_at_ = at;
+  auto next = std::make_unique<Waiting>();
+  next->at = at;
+  const cv::Mat rgb = mat_of(RgbView{*frame.rgb, frame.width_px, frame.height_px});
+  next->scale = std::max(1.0, static_cast<double>(frame.width_px) / kWorkingWidthPx);
+  cv::Mat small;
+  cv::resize(rgb, small, {}, 1 / next->scale, 1 / next->scale, cv::INTER_AREA);
+  cv::cvtColor(small, next->grey, cv::COLOR_RGB2GRAY);
+  waiting_ = std::move(next);
+  return changed;
+}
+
+/// True: state() is another now.
+bool VideoMotion::look(const Waiting& picture, const ScopeSetup& scope) {
+  const PoseAnswer pose = poses_.at(picture.at);
+  if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) {
+    key_.reset();
+    return false;
+  }
+  const Transform<Camera, Tracker> camera_from_tracker =
+      scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
+  if (key_) follow(picture);
+  const VideoAgreement before = state_;
+  const bool told = key_ && key_->places.size() >= kFewest && judge(camera_from_tracker, scope);
+  if (key_ && key_->places.size() >= kFewest && picture.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
+    return state_ != before;
+  key_ = std::make_unique<Key>();
+  key_->at = picture.at;
+  key_->camera_from_tracker = camera_from_tracker;
+  cv::goodFeaturesToTrack(picture.grey, key_->places, kPlaces, 0.01, 8, places_allowed(picture.grey));
+  key_->now = key_->places;
+  key_->newest = picture.grey;
+  return state_ != before;
+}
+
+/// To the next picture; what is not found there, or leads back to another place, is let go.
+void VideoMotion::follow(const Waiting& picture) {
+  if (key_->places.empty() || key_->newest.size() != picture.grey.size()) return key_.reset();
+  const cv::Size window(15, 15);
+  constexpr int kLevels = 3;
+  std::vector<cv::Point2f> there, back;
+  std::vector<std::uint8_t> found, found_back;
+  std::vector<float> unused;
+  cv::calcOpticalFlowPyrLK(key_->newest, picture.grey, key_->now, there, found, unused, window, kLevels);
+  cv::calcOpticalFlowPyrLK(picture.grey, key_->newest, there, back, found_back, unused, window, kLevels);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    if (found[i] == 0 || found_back[i] == 0 || cv::norm(back[i] - key_->now[i]) > kThereAndBackPx) continue;
+    key_->places[kept] = key_->places[i];
+    key_->now[kept++] = there[i];
+  }
+  // Where most are lost at once the picture is another, and what is left is chance.
+  if (2 * kept < there.size()) return key_.reset();
+  key_->places.resize(kept);
+  key_->now.resize(kept);
+  key_->newest = picture.grey;
+}
+
+/// True: the picture does not agree.
+bool VideoMotion::judge(const Transform<Camera, Tracker>& now, const ScopeSetup& scope) {
+  const auto& held_out_px = scope.figures().held_out_px;
+  if (!held_out_px) return false;  // nothing says how far off a picture may be
+  const CameraModel& camera = scope.camera();
+  const double scale = static_cast<double>(camera.width_px) / key_->newest.cols;
+  const auto ray = [&](const cv::Point2f& small) {
+    return unproject(camera, Eigen::Vector2d((small.x + 0.5) * scale - 0.5, (small.y + 0.5) * scale - 0.5));
+  };
+  std::vector<Followed> places;
+  places.reserve(key_->places.size());
+  for (std::size_t i = 0; i < key_->places.size(); ++i) {
+    const auto then = ray(key_->places[i]), later = ray(key_->now[i]);
+    if (then && later) places.push_back({*then, *later});
+  }
+  if (places.size() < kFewest) return false;
+  const Relative motion = now * key_->camera_from_tracker.inverse();
+  const auto off = median_off(places, motion);
+  if (!off) return false;
+  off_px_ = *off * camera.fx_px;
+  std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const auto right = median_off(places, turned(motion, axis, kTurned_rad));
+    const auto left = median_off(places, turned(motion, axis, -kTurned_rad));
+    if (right && left) otherwise_px[static_cast<std::size_t>(axis)] = std::min(*right, *left) * camera.fx_px;
+  }
+  // The errors of hand-eye and of two poses, of two axes, with a probability of 99.9 %, for many pictures are asked;
+  // how well a place is found; and what of the motion itself is not as it is modelled.
+  const double still_px = std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale);
+  const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
+  if (*off_px_ > allowed_px) {
+    odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
+    if (odd_ < kOddInRow) return true;
+    if (state_ != VideoAgreement::differs) wanted_ = std::min(2 * wanted_, kMostWanted);
+    state_ = VideoAgreement::differs;
+    told_ = {};
+    return true;
+  }
+  odd_ = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!(otherwise_px[axis] > std::max(still_px, kPlainly * *off_px_))) continue;
+    if (!std::exchange(key_->told[axis], true)) ++told_[axis];
+  }
+  if (std::ranges::all_of(told_, [this](int times) { return times >= wanted_; })) state_ = VideoAgreement::agrees;
+  return false;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "calibration/time/pose_history.hpp"
+#include "device/wire/messages.hpp"
+#include "host/overlay/scope_setup.hpp"
+#include "host/overlay/trust.hpp"
+
+namespace birdseye::host {
+
+/// Whether the video moves as the scope's poses, by its calibration, say that it must. Places of the tissue are
+/// followed from a picture to later ones; where a place may lie in the later picture, at whatever depth, the poses
+/// tell: on a line (the epipolar line). Needs no registration.
+///
+/// A picture that agrees tells only of what would have been seen otherwise: agreement is said once, about each axis, a
+/// hand-eye that is turned by 15 degrees would have had the places off their lines. After a picture that did not agree,
+/// twice as much is asked for.
+class VideoMotion {
+ public:
+  VideoMotion();
+  ~VideoMotion();
+
+  /// A pose of the scope's sensor, as they come.
+  void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  /// A frame, as they come, and the scope that took it; of another than before all is forgotten. Five a second are
+  /// looked at, each once the poses after it have come. True: state() is another now.
+  bool take(const wire::VideoFrame& frame, const ScopeSetup& scope);
+
+  [[nodiscard]] VideoAgreement state() const { return state_; }
+  /// Of the last picture that could tell, the median of how far the places lie off their lines; empty before one could.
+  [[nodiscard]] const std::optional<double>& off_px() const { return off_px_; }
+
+ private:
+  void reset();
+  struct Key;
+  struct Waiting;
+
+  bool look(const Waiting& picture, const ScopeSetup& scope);
+  void follow(const Waiting& picture);
+  bool judge(const Transform<Camera, Tracker>& now, const ScopeSetup& scope);
+
+  std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
+  PoseHistory poses_;
+  std::optional<DeviceTime> looked_at_;
+  std::unique_ptr<Waiting> waiting_;  ///< the newest picture that is looked at, until the poses after it have come
+  std::unique_ptr<Key> key_;          ///< the picture in which the places that are followed were chosen
+  std::array<int, 3> told_{};         ///< how often it agreed, by axis of the camera
+  int wanted_ = 1;                    ///< so often about each; twice as often each time that it has differed
+  int odd_ = 0;                       ///< pictures in a row that do not agree
+  VideoAgreement state_ = VideoAgreement::untold;
+  std::optional<double> off_px_;
+};
+
+}  // namespace birdseye::host
