@@ -228,9 +228,9 @@ Result<ExitCode> run(LiveOptions& options) {
   if (!window) return window.error();
   const HostTime asked = host_now();
   if (auto prepared = prepare(options); !prepared) return prepared.error();
-  std::optional<LiveLog> log;
+  std::optional<DecisionLog> log;
   if (!options.live.out.empty()) {
-    auto opened = LiveLog::open(options.live.out);
+    auto opened = DecisionLog::open(options.live.out);
     if (!opened) return opened.error();
     log = *std::move(opened);
   }

@@ -34,7 +34,7 @@ struct ReplayOptions {
   VolumeSource volume;
   ShownChoice shown;
   OverlayLook look;
-  fs::path deformation, out, json;
+  fs::path deformation, out, json, live_log;
   std::string transfer = "tumour-and-vessels", engine = "cpu", scope = "scope";
   double film_hz = 0;
   int every = 10;
@@ -163,6 +163,12 @@ Result<ExitCode> run(const ReplayOptions& options) {
     (*engine)->deform(*field);
     if (margins) margins = deformed(*margins, *field);
   }
+  std::map<std::uint64_t, LoggedDecision> live;
+  if (!options.live_log.empty()) {
+    auto decisions = read_decisions(options.live_log);
+    if (!decisions) return decisions.error().with_context("--live-log");
+    for (LoggedDecision& decision : *decisions) live.insert_or_assign(decision.sequence, std::move(decision));
+  }
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error)
@@ -171,8 +177,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope}, setup->setup(),
-                      trust.figures, **engine, std::move(margins));
+  ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope, std::move(live)},
+                      setup->setup(), trust.figures, **engine, std::move(margins));
   std::map<std::string, std::string> remedies;
   if (auto played = play(**reader, options, setup->hardware, player, remedies, progress); !played)
     return played.error();
@@ -253,6 +259,10 @@ void add_replay(CLI::App& app, CommandStatus& status) {
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--film", options->film_hz, "also overlay.mp4, of so many frames a second")
       ->check(CLI::Range(1.0, 1000.0));
+  command
+      .add_option("--live-log", options->live_log,
+                  "what live --out wrote: frames.csv then says of each frame what the window decided, too")
+      ->type_name("FOLDER|FILE");
   command.add_option("--json", options->json, "write the figures to this file too");
   command.callback([options, &status] {
     const auto done = run(*options);

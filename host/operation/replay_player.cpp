@@ -15,20 +15,6 @@ namespace birdseye::host {
 
 namespace {
 
-/// Of the table: a frame, why it carries the overlay that it does, and from where it was drawn.
-std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
-                   const std::optional<FramePainter::Painted>& painted) {
-  std::string reason = decision.reason;
-  std::replace(reason.begin(), reason.end(), ',', ';');
-  std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
-                                to_string(frame.info.pose.kind), decision.strength, reason);
-  if (painted) {
-    const Eigen::Matrix4d m = painted->camera_from_patient.matrix();
-    for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));
-  }
-  return row + "\n";
-}
-
 OverlayGate::Decision refused_for(const std::string& reason) {
   OverlayGate::Decision out;
   out.reason = reason;
@@ -36,6 +22,24 @@ OverlayGate::Decision refused_for(const std::string& reason) {
 }
 
 }  // namespace
+
+/// Of the table: a frame, why it carries the overlay that it does, and from where it was drawn.
+std::string ReplayPlayer::row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
+                                 const std::optional<FramePainter::Painted>& painted) const {
+  std::string reason = decision.reason;
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
+                                to_string(frame.info.pose.kind), decision.strength, reason);
+  const auto& expected = decision.expected;
+  row += expected ? fmt::format("{:.3f},{:.3f},", expected->rms_mm(), expected->radius95_mm()) : ",,";
+  const auto live = output_.live.find(frame.info.sequence);
+  row += live == output_.live.end() ? ",," : fmt::format("{:.3f},{},", live->second.strength, live->second.reason);
+  if (painted) {
+    const Eigen::Matrix4d m = painted->camera_from_patient.matrix();
+    for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));
+  }
+  return row + "\n";
+}
 
 ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
                            std::optional<Margins> margins)

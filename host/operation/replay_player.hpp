@@ -9,6 +9,7 @@
 
 #include "device/wire/messages.hpp"
 #include "host/files/film.hpp"
+#include "host/operation/decision_log.hpp"
 #include "host/overlay/frame_painter.hpp"
 
 namespace birdseye::host {
@@ -20,6 +21,8 @@ struct ReplayOutput {
   double film_hz = 0;  ///< 0: no film
   OverlayLook look;
   std::string scope = "scope";  ///< its bird
+  /// What the live window decided then, by the frames' numbers.
+  std::map<std::uint64_t, LoggedDecision> live;
 };
 
 /// What became of the frames so far.
@@ -28,7 +31,8 @@ struct Replayed {
   std::size_t other_hardware = 0;  ///< of which the setup does not hold with the instruments
   std::map<std::string, std::size_t> reasons;
   std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
-  std::string table = "sequence,acquired_ns,pose,strength,reason,camera_from_patient\n";
+  std::string table =
+      "sequence,acquired_ns,pose,strength,reason,expected_mm,circle_mm,live_strength,live_reason,camera_from_patient\n";
 };
 
 /// Draws every frame of a recording, writes some as pictures and, where asked, all as a film.
@@ -51,6 +55,8 @@ class ReplayPlayer {
  private:
   ReplayOutput output_;
   Engine& engine_;
+  [[nodiscard]] std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
+                                   const std::optional<FramePainter::Painted>& painted) const;
   OverlayGate::Decision decide(const wire::VideoFrame& frame, const std::string& other_hardware);
 
   FramePainter painter_;

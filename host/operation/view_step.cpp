@@ -18,7 +18,7 @@ constexpr std::size_t kMostViews = 12;
 constexpr double kApartMm = 5, kTurnedDeg = 30;
 // A hand's motion is a line to some hundredths of a millimetre for so long, and twelve measurements of a miniBIRD lie
 // within it.
-constexpr Duration kHalfWindow = Duration::from_ms(60);
+constexpr Duration kAveragedHalf = Duration::from_ms(60);
 
 bool same_place(const Transform<Camera, Patient>& a, const Transform<Camera, Patient>& b) {
   const Transform<Camera, Camera> moved = a * b.inverse();
@@ -27,7 +27,7 @@ bool same_place(const Transform<Camera, Patient>& a, const Transform<Camera, Pat
 
 PoseHistory::Settings averaging() {
   PoseHistory::Settings settings;
-  settings.smoothing = kHalfWindow;
+  settings.smoothing = kAveragedHalf;
   return settings;
 }
 
@@ -66,7 +66,7 @@ void ViewStep::average(const Setup& setup) {
   for (; averaged_ < views_.size(); ++averaged_) {
     KeptView& view = views_[averaged_];
     const DeviceTime exposed = view.frame.info.acquired;
-    if (!scope_.newest() || *scope_.newest() < exposed + kHalfWindow) return;
+    if (!scope_.newest() || *scope_.newest() < exposed + kAveragedHalf) return;
     const PoseAnswer pose = scope_.at(exposed);
     if (pose.tracker_from_sensor) view.camera_from_patient = setup.camera_from_patient(*pose.tracker_from_sensor);
   }

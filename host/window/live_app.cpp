@@ -34,7 +34,7 @@ std::vector<SliceMark> slice_marks(const OperationView& operation) {
 }  // namespace
 
 LiveApp::LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
-                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
+                 PatientFiles simulated, std::optional<LiveScript> script, std::optional<DecisionLog> log,
                  std::unique_ptr<Publisher> publisher)
     : window_(std::move(window)),
       source_(std::move(source)),
@@ -194,9 +194,19 @@ void LiveApp::draw() {
     while (Duration{swapped.ns - swaps_.front().ns} > Duration::from_ms(2000)) swaps_.pop_front();
     facts_.frames_per_s = static_cast<double>(swaps_.size()) / 2;
     if (log_) {
-      const auto& mark = operation_.target;
-      log_->add(sequence, age_ms, shown.strength, operation_.shapes, mark ? mark->error.rms_mm() : 0,
-                shown.overlaid ? picture.camera_from_patient() : std::optional<Transform<Camera, Patient>>());
+      LoggedDecision decision;
+      decision.sequence = sequence;
+      decision.age_ms = age_ms;
+      decision.strength = shown.strength;
+      decision.shape = operation_.shapes;
+      decision.reason = shown.reason;
+      const PoseAnswer& pose = picture.frame()->info.pose;
+      decision.pose = pose.kind;
+      decision.pose_sigma_mm = pose.position_sigma_mm;
+      decision.pose_age_ms = pose.age.seconds() * 1e3;
+      decision.expected = picture.decision().expected;
+      if (shown.overlaid) decision.camera_from_patient = picture.camera_from_patient();
+      log_->add(decision);
     }
   }
   grant(wishes);

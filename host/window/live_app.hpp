@@ -4,12 +4,12 @@
 #include <optional>
 #include <string>
 
+#include "host/operation/decision_log.hpp"
 #include "host/operation/live_source.hpp"
 #include "host/operation/live_workflow.hpp"
 #include "host/operation/publisher.hpp"
 #include "host/window/age_strip.hpp"
 #include "host/window/inset_view.hpp"
-#include "host/window/live_log.hpp"
 #include "host/window/live_panels.hpp"
 #include "host/window/live_script.hpp"
 #include "host/window/live_window.hpp"
@@ -36,7 +36,7 @@ class LiveApp {
  public:
   /// simulated: the patient that the source makes, to be read once it is there. publisher: null, nobody is told.
   LiveApp(std::unique_ptr<LiveWindow> window, std::unique_ptr<LiveSource> source, LiveSettings settings,
-          PatientFiles simulated, std::optional<LiveScript> script, std::optional<LiveLog> log,
+          PatientFiles simulated, std::optional<LiveScript> script, std::optional<DecisionLog> log,
           std::unique_ptr<Publisher> publisher);
 
   /// How the overlay is drawn, and the window, before anybody asks for something else. identify: snapshots name the
@@ -49,7 +49,7 @@ class LiveApp {
   /// How the operation stands, and what its overlay is drawn by.
   [[nodiscard]] OperationView operation() const { return workflow_.view(); }
   [[nodiscard]] const std::optional<Setup>& setup() const { return workflow_.picture().setup(); }
-  [[nodiscard]] std::optional<LiveLog>& log() { return log_; }
+  [[nodiscard]] std::optional<DecisionLog>& log() { return log_; }
 
  private:
   void take_events();
@@ -75,7 +75,7 @@ class LiveApp {
   OperationView operation_;  ///< as it stood when it was last looked at
   PatientFiles simulated_;
   std::optional<LiveScript> script_;
-  std::optional<LiveLog> log_;
+  std::optional<DecisionLog> log_;
   std::unique_ptr<Publisher> publisher_;
   LiveFigures figures_;
   PanelFacts facts_;

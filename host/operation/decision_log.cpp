@@ -1,0 +1,175 @@
+#include "host/operation/decision_log.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "host/simulated/simulated_truth.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+constexpr const char* kFile = "frames.csv";
+constexpr const char* kHeader =
+    "sequence,age_ms,strength,shape,expected_mm,reason,circle_mm,fiducials_mm,hand_eye_mm,lens_mm,pose_mm,time_mm,"
+    "motion_mm,pose,pose_sigma_mm,pose_age_ms,camera_from_patient (16 numbers, row by row; none: no overlay)";
+constexpr std::size_t kBeforeMatrix = 16;
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> out(1);
+  for (const char c : line) {
+    if (c == ',') {
+      out.emplace_back();
+    } else {
+      out.back() += c;
+    }
+  }
+  return out;
+}
+
+std::optional<double> number_in(const std::string& cell) {
+  double out = 0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), out);
+  if (error != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+  return out;
+}
+
+std::optional<ErrorBudget> budget_of(const std::vector<std::string>& cells) {
+  ErrorBudget out;
+  const auto circle_mm = number_in(cells[6]);
+  const std::array parts{&out.fiducials_mm, &out.hand_eye_mm, &out.lens_mm, &out.pose_mm, &out.time_mm};
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const auto part_mm = number_in(cells[7 + i]);
+    if (!part_mm) return std::nullopt;
+    *parts[i] = *part_mm;
+  }
+  if (!circle_mm) return std::nullopt;
+  if (cells[12].empty()) return out;
+  const auto motion_mm = number_in(cells[12]);
+  if (!motion_mm) return std::nullopt;
+  const double rigid_mm = out.radius95_mm();  // the circle's, but for the motion
+  out.motion = MotionError{*motion_mm, std::sqrt(std::max(0.0, *circle_mm * *circle_mm - rigid_mm * rigid_mm))};
+  return out;
+}
+
+std::optional<LoggedDecision> decision_of(const std::vector<std::string>& cells) {
+  if (cells.size() != kBeforeMatrix && cells.size() != kBeforeMatrix + 16) return std::nullopt;
+  LoggedDecision out;
+  const auto sequence = number_in(cells[0]), age_ms = number_in(cells[1]), strength = number_in(cells[2]),
+             shape = number_in(cells[3]);
+  if (!sequence || !age_ms || !strength || !shape || *sequence < 0 || *shape < 0) return std::nullopt;
+  out.sequence = static_cast<std::uint64_t>(*sequence);
+  out.age_ms = *age_ms;
+  out.strength = *strength;
+  out.shape = static_cast<std::uint64_t>(*shape);
+  if (!cells[4].empty() && !(out.expected = budget_of(cells))) return std::nullopt;
+  out.reason = cells[5];
+  for (const PoseKind kind : {PoseKind::exact, PoseKind::interpolated, PoseKind::predicted})
+    if (cells[13] == to_string(kind)) out.pose = kind;
+  out.pose_sigma_mm = number_in(cells[14]).value_or(0);
+  out.pose_age_ms = number_in(cells[15]).value_or(0);
+  if (cells.size() == kBeforeMatrix) return out;
+  Eigen::Matrix4d m;
+  for (std::size_t i = 0; i < 16; ++i) {
+    const auto number = number_in(cells[kBeforeMatrix + i]);
+    if (!number) return std::nullopt;
+    m(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = *number;
+  }
+  out.camera_from_patient = Transform<Camera, Patient>::from_matrix(m);
+  return out;
+}
+
+}  // namespace
+
+Result<DecisionLog> DecisionLog::open(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  DecisionLog log;
+  log.folder_ = folder;
+  log.file_.open(folder / kFile, std::ios::trunc);
+  if (error || !log.file_)
+    return Error{Errc::unreadable, folder.string() + ": cannot be written; choose another --out"};
+  log.file_ << kHeader << '\n';
+  return log;
+}
+
+void DecisionLog::add(const LoggedDecision& decision) {
+  std::string reason = decision.reason;
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  std::replace(reason.begin(), reason.end(), '\n', ' ');
+  const auto& expected = decision.expected;
+  file_ << fmt::format("{},{:.2f},{:.3f},{},{},{}", decision.sequence, decision.age_ms, decision.strength,
+                       decision.shape, expected ? fmt::format("{:.3f}", expected->rms_mm()) : "", reason);
+  if (expected) {
+    file_ << fmt::format(",{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{}", expected->radius95_mm(),
+                         expected->fiducials_mm, expected->hand_eye_mm, expected->lens_mm, expected->pose_mm,
+                         expected->time_mm, expected->motion ? fmt::format("{:.3f}", expected->motion->rms_mm) : "");
+  } else {
+    file_ << ",,,,,,,";
+  }
+  if (decision.pose == PoseKind::refused) {
+    file_ << fmt::format(",{},,", to_string(decision.pose));
+  } else {
+    file_ << fmt::format(",{},{:.3f},{:.2f}", to_string(decision.pose), decision.pose_sigma_mm, decision.pose_age_ms);
+  }
+  if (decision.camera_from_patient) {
+    const Eigen::Matrix4d m = decision.camera_from_patient->matrix();
+    for (int i = 0; i < 16; ++i) file_ << fmt::format(",{:.9g}", m(i / 4, i % 4));
+  }
+  file_ << '\n';
+}
+
+Result<void> DecisionLog::close() {
+  file_.close();
+  if (file_) return {};
+  return Error{Errc::io, (folder_ / kFile).string() + ": not all of it could be written; is the disk full?"};
+}
+
+Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& path) {
+  const std::filesystem::path file = std::filesystem::is_directory(path) ? path / kFile : path;
+  std::ifstream in(file);
+  std::string line;
+  if (!in || !std::getline(in, line))
+    return Error{Errc::unreadable, file.string() + ": cannot be read; give the folder that live --out wrote"};
+  if (line != kHeader)
+    return Error{Errc::bad_format,
+                 file.string() + ": is no table of a live window's decisions; give the folder that live --out wrote"};
+  std::vector<LoggedDecision> out;
+  while (std::getline(in, line)) {
+    auto decision = decision_of(cells_of(line));
+    // A window that was killed leaves its last line cut short.
+    if (!decision && in.peek() == std::ifstream::traits_type::eof()) break;
+    if (!decision)
+      return Error{Errc::bad_format,
+                   fmt::format("{}: line {} is no frame's decision; give the file as the window wrote it",
+                               file.string(), out.size() + 2)};
+    out.push_back(*std::move(decision));
+  }
+  return out;
+}
+
+Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
+    const std::filesystem::path& log_folder, const std::filesystem::path& truth_folder, const CameraModel& camera,
+    const std::function<Eigen::Vector3d(std::uint64_t shape)>& tumour_in_patient_mm) {
+  const auto truth = read_simulated_truth(truth_folder);
+  if (!truth) return truth.error();
+  const auto decisions = read_decisions(log_folder);
+  if (!decisions) return decisions.error();
+  std::map<std::uint64_t, LoggedErrors> errors;
+  for (const LoggedDecision& decision : *decisions) {
+    if (!decision.camera_from_patient) continue;
+    const auto error = overlay_error(*truth, decision.sequence, camera, *decision.camera_from_patient,
+                                     tumour_in_patient_mm(decision.shape));
+    if (!error)
+      return Error{Errc::bad_format, fmt::format("the truth lacks frame {}, which was overlaid", decision.sequence)};
+    errors[decision.shape].mm.push_back(error->target_mm);
+    if (decision.expected) errors[decision.shape].expected_mm.push_back(decision.expected->rms_mm());
+  }
+  return errors;
+}
+
+}  // namespace birdseye::host

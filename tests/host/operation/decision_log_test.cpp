@@ -1,0 +1,96 @@
+#include "host/operation/decision_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+LoggedDecision drawn() {
+  LoggedDecision out;
+  out.sequence = 7;
+  out.age_ms = 81.25;
+  out.strength = 1;
+  out.shape = 2;
+  out.pose = PoseKind::interpolated;
+  out.pose_sigma_mm = 0.125;
+  out.pose_age_ms = -12.5;
+  out.expected = ErrorBudget{1, 2, 0.5, 0.25, 0.125, MotionError{1.5, 3}};
+  out.camera_from_patient = Transform<Camera, Patient>(
+      Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix(), Eigen::Vector3d(1, -2, 100));
+  return out;
+}
+
+LoggedDecision withheld() {
+  LoggedDecision out;
+  out.sequence = 8;
+  out.age_ms = 90;
+  out.shape = 2;
+  out.reason = "the tracker scatters, by 9.0 mm";
+  return out;
+}
+
+TEST(DecisionLog, SaysOfEachFrameWhyAndByWhichFigures) {
+  const testing::Scratch scratch;
+  {
+    auto log = DecisionLog::open(scratch / "out");
+    ASSERT_TRUE(log);
+    log->add(drawn());
+    log->add(withheld());
+    ASSERT_TRUE(log->close());
+  }
+  const auto read = read_decisions(scratch / "out");
+  ASSERT_TRUE(read) << read.error().what;
+  ASSERT_EQ(read->size(), 2U);
+  const LoggedDecision &a = (*read)[0], &b = (*read)[1];
+  EXPECT_EQ(a.sequence, 7U);
+  EXPECT_EQ(a.age_ms, 81.25);
+  EXPECT_EQ(a.strength, 1);
+  EXPECT_EQ(a.shape, 2U);
+  EXPECT_EQ(a.reason, "");
+  EXPECT_EQ(a.pose, PoseKind::interpolated);
+  EXPECT_EQ(a.pose_sigma_mm, 0.125);
+  EXPECT_EQ(a.pose_age_ms, -12.5);
+  ASSERT_TRUE(a.expected && a.expected->motion && a.camera_from_patient);
+  EXPECT_NEAR(a.expected->rms_mm(), drawn().expected->rms_mm(), 1e-3);
+  EXPECT_NEAR(a.expected->radius95_mm(), drawn().expected->radius95_mm(), 2e-3);
+  EXPECT_EQ(a.expected->hand_eye_mm, 2);
+  EXPECT_TRUE(a.camera_from_patient->matrix().isApprox(drawn().camera_from_patient->matrix(), 1e-6));
+  EXPECT_EQ(b.reason, "the tracker scatters; by 9.0 mm");
+  EXPECT_EQ(b.strength, 0);
+  EXPECT_EQ(b.pose, PoseKind::refused);
+  EXPECT_FALSE(b.expected) << "what is not known is absent";
+  EXPECT_FALSE(b.camera_from_patient);
+}
+
+TEST(DecisionLog, ALineThatIsCutShortIsTheLastOrAnError) {
+  const testing::Scratch scratch;
+  {
+    auto log = DecisionLog::open(scratch / "out");
+    ASSERT_TRUE(log);
+    log->add(drawn());
+    log->add(withheld());
+  }
+  std::ofstream(scratch / "out/frames.csv", std::ios::app) << "9,80.0";
+  auto read = read_decisions(scratch / "out");
+  ASSERT_TRUE(read) << "the window was killed as it wrote";
+  EXPECT_EQ(read->size(), 2U);
+  std::ofstream(scratch / "out/frames.csv", std::ios::app) << "\n9,80.0\n";
+  read = read_decisions(scratch / "out");
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().what.find("line 4"), std::string::npos) << read.error().what;
+}
+
+TEST(DecisionLog, AnotherTableIsRefused) {
+  const testing::Scratch scratch;
+  const auto read = read_decisions(scratch.file("frames.csv", "sequence,acquired_ns\n1,2\n"));
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().what.find("live --out"), std::string::npos);
+  EXPECT_FALSE(read_decisions(scratch / "none"));
+}
+
+}  // namespace
+}  // namespace birdseye::host
