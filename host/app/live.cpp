@@ -168,6 +168,7 @@ nlohmann::json json_of(const LiveFigures& figures, const OperationView& operatio
                       {"appliance_says", operation.link.appliance_says},
                       {"picture_says", figures.picture_says}};
   if (const auto& fre = operation.fre_mm) json["fre_mm"] = *fre;
+  if (operation.patient && !operation.patient->notes.empty()) json["notes"] = operation.patient->notes;
   if (figures.window_s) json["window_s"] = *figures.window_s;
   if (figures.ct_s) json["ct_s"] = *figures.ct_s;
   if (figures.fiducials_s) json["fiducials_s"] = *figures.fiducials_s;
@@ -268,6 +269,7 @@ Result<ExitCode> run(LiveOptions& options) {
   json["reasons"] = verdict.reasons;
   if (auto written = write_file(options.json, text_of(json)); !written) return written.error();
   for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  if (const auto patient = app.operation().patient) print_notes(patient->notes);
   if (!ran) return ran.error();
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }

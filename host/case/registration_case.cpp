@@ -158,7 +158,7 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   auto labels = import_named_labels(*label, out.ct, *wanted);
   if (!labels) return labels.error();
   out.notes.insert(out.notes.end(), labels->notes.begin(), labels->notes.end());
-  const auto values = values_of_labels(labels->names, *wanted);
+  const auto values = values_of_labels(labels->names, *wanted, &out.notes);
   if (!values) return values.error().with_context(label->string());
   out.labels = std::move(labels->volume);
   out.label_values = *values;

@@ -19,10 +19,10 @@ namespace birdseye::host {
 
 namespace {
 
-/// The values of labels, or why not, naming the file.
+/// The values of labels, or why not, naming the file. plan: gets the notes.
 Result<std::vector<int>> values_in(const LabelVolume& labels, const PatientFiles& files,
-                                   const std::vector<LabelChoice>& wanted) {
-  return values_of_labels(labels.names, wanted).with_context(files.labels.string());
+                                   const std::vector<LabelChoice>& wanted, PatientPlan& plan) {
+  return values_of_labels(labels.names, wanted, &plan.notes).with_context(files.labels.string());
 }
 
 Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std::stop_token& stop) {
@@ -32,27 +32,27 @@ Result<void> read_labels(const PatientFiles& files, PatientPlan& plan, const std
   plan.notes.insert(plan.notes.end(), labels->notes.begin(), labels->notes.end());
   const Volume& volume = labels->volume;
   if (!files.shown.empty()) {
-    const auto shown = values_in(*labels, files, files.shown);
+    const auto shown = values_in(*labels, files, files.shown, plan);
     if (!shown) return shown.error();
     auto kept = keep_labels(plan.ct, volume, *shown);
     if (!kept) return kept.error();
     plan.shown = *std::move(kept);
   }
   for (const LabelChoice& target : files.targets) {
-    const auto values = values_in(*labels, files, {target});
+    const auto values = values_in(*labels, files, {target}, plan);
     if (!values) return values.error();
     const auto centre = label_centroid_mm(volume, *values);
     if (!centre) return centre.error();
     plan.landmarks.push_back({words("label_name", target.text), *centre});
   }
   if (!files.margins_mm.empty()) {
-    const auto targets = values_in(*labels, files, files.targets);
+    const auto targets = values_in(*labels, files, files.targets, plan);
     if (!targets) return targets.error();
     auto margins = margins_about(volume, *targets, files.margins_mm);
     if (!margins) return margins.error().with_context(files.labels.string());
     plan.margins = *std::move(margins);
   }
-  auto organ = values_in(*labels, files, files.organ);
+  auto organ = values_in(*labels, files, files.organ, plan);
   if (!organ) return organ.error();
   const auto of_organ = [&organ](std::int16_t label) {
     return std::find(organ->begin(), organ->end(), label) != organ->end();

@@ -12,6 +12,7 @@
 #include "host/volume/decoder_process.hpp"
 #include "host/volume/nifti_label_names.hpp"
 #include "host/volume/series_list.hpp"
+#include "host/volume/slicer_label_names.hpp"
 
 namespace birdseye::host {
 
@@ -60,9 +61,12 @@ Result<ImageFile> decode(const VolumeSource& source, int components, GeometryFro
   announce(path);
   if (!source.series.empty())
     return refused(Errc::bad_value, path, "is one volume, of which --series cannot choose; leave it out");
+  if (components != 1) return decode_image_file(source, components, from);
+  auto by_slicer = slicer_label_names(path);
+  if (!by_slicer) return by_slicer.error();
   auto image = decode_image_file(source, components, from);
-  if (!image || components != 1) return image;
-  auto names = nifti_label_names(path);
+  if (!image) return image;
+  auto names = by_slicer->empty() ? nifti_label_names(path) : std::move(by_slicer);
   if (!names) return names.error();
   image->label_names = *std::move(names);
   return image;

@@ -78,8 +78,9 @@ Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, 
     }
     if (!found && number) values.push_back(*number);
     if (found && !number && names.empty() && notes != nullptr) {
-      notes->push_back(fmt::format("the labels have no names: '{}' is taken for {}, as TotalSegmentator 2 counts", one,
-                                   values.back()));
+      std::string note = fmt::format("the labels have no names: '{}' is taken for {}, as TotalSegmentator 2 counts",
+                                     one, values.back());
+      if (std::find(notes->begin(), notes->end(), note) == notes->end()) notes->push_back(std::move(note));
     }
     if (found || number) continue;
     return Error{Errc::not_found,

@@ -34,8 +34,9 @@ bool is_chosen(const LabelChoice& choice, const NamedLabel& label);
 /// The values of the voxels that belong to one of these. Of names, capitals count as small
 /// letters, blanks and hyphens as underscores. Where a segmentation has no list of its labels, names are those of
 /// TotalSegmentator 2 (totalsegmentator_names). Errc::not_found names the first that is none, and some that are.
-/// notes: gets a line where names were taken to be TotalSegmentator's.
+/// notes: gets a line for each name that was taken to be TotalSegmentator's, which whoever sees the structure has to be
+/// told.
 Result<std::vector<int>> values_of_labels(const std::vector<NamedLabel>& names, std::span<const LabelChoice> wanted,
-                                          std::vector<std::string>* notes = nullptr);
+                                          std::vector<std::string>* notes);
 
 }  // namespace birdseye::host

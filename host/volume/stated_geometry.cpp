@@ -8,46 +8,19 @@
 #include <cmath>
 #include <fstream>
 #include <initializer_list>
-#include <map>
 #include <sstream>
 #include <string_view>
 #include <vector>
 
 #include "calibration/base/lower_case.hpp"
 #include "host/dicom/refused.hpp"
+#include "host/volume/header_fields.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/volume.hpp"
 
 namespace birdseye::host {
 
 namespace {
-
-using Fields = std::map<std::string, std::string>;
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const auto first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-/// The lines "name<sign>value" at the begin of a file, names in small letters, up to a blank line or the field `last`.
-Fields header_fields(std::istream& file, char sign, const std::string& last) {
-  constexpr int kLongestHeader = 1 << 20;
-  Fields fields;
-  std::string line;
-  for (int bytes = 0; bytes < kLongestHeader; bytes += static_cast<int>(line.size()) + 1) {
-    line.clear();
-    for (char c = 0; line.size() < kLongestHeader && file.get(c) && c != '\n';) line += c;
-    if (trimmed(line).empty()) break;
-    const auto at = line.find(sign);
-    if (at == std::string::npos) continue;
-    const std::string name = lower_case(std::string(trimmed(std::string_view(line).substr(0, at))));
-    fields[name] = trimmed(std::string_view(line).substr(at + 1));
-    if (name == last) break;
-  }
-  return fields;
-}
 
 /// The numbers of a list as "1 1 2" or "(1,0,0) (0,1,0)"; fewer where one is no number.
 std::vector<double> numbers_in(std::string text) {
@@ -65,7 +38,7 @@ bool are_spacings(const std::vector<double>& numbers) {
          std::all_of(numbers.begin(), numbers.begin() + 3, [](double mm) { return std::isfinite(mm) && mm > 0; });
 }
 
-GeometryGaps gaps_of_nrrd(const Fields& fields) {
+GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
   static constexpr std::array<std::string_view, 6> kSpaces = {
       "right-anterior-superior", "ras", "left-anterior-superior", "las", "left-posterior-superior", "lps"};
   const auto value = [&fields](const char* name) {
@@ -96,7 +69,7 @@ GeometryGaps gaps_of_nrrd(const Fields& fields) {
   std::istringstream words(spaced);
   for (std::string unit; words >> unit;) {
     if (unit != "mm" && unit.rfind("millimet", 0) != 0)
-      gaps.beyond = fmt::format("has lengths in {}; export it in mm", trimmed(units).substr(0, 80));
+      gaps.beyond = fmt::format("has lengths in {}; export it in mm", without_blanks(units).substr(0, 80));
   }
   return gaps;
 }
@@ -113,7 +86,7 @@ std::string turned_letters(const std::string& from) {
   return to;
 }
 
-GeometryGaps gaps_of_meta_image(const Fields& fields) {
+GeometryGaps gaps_of_meta_image(const HeaderFields& fields) {
   const auto value = [&fields](std::initializer_list<const char*> names) {
     for (const char* name : names) {
       if (const auto found = fields.find(name); found != fields.end()) return found->second;

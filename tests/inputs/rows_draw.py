@@ -36,6 +36,14 @@ def labels(folder):
     volumes.write_nifti(folder / "labels.nii.gz", volumes.labels())
 
 
+def slicer_labels(segments):
+    """The liver's voxels have 5; segments are the lines of 3D Slicer, each "Segment0_Name:=..." and so on."""
+    def make(folder):
+        ct(folder)
+        volumes.write_nrrd(folder / "labels.seg.nrrd", values=volumes.labels(), lines="\n".join(segments) + "\n")
+    return make
+
+
 def field_that_folds(folder):
     ct(folder)
     numbers = volumes.array.array("f")
@@ -108,6 +116,15 @@ ROWS = [
         says=["liver.seg.dcm: is of patient B2, and the CT of patient A1"]),
     Row("render", "good", "labels without names, --show liver", "taken to be TotalSegmentator's, which is said",
         RENDER + " --labels labels.nii.gz --show liver", 0, labels, says=["TotalSegmentator"], writes=["ct.png"]),
+    Row("render", "good", "a segmentation of 3D Slicer, --show segment_1", "that one, by Slicer's name",
+        RENDER + " --labels labels.seg.nrrd --show segment_1", 0, slicer_labels(["Segment0_Name:=Segment_1", "Segment0_LabelValue:=5"]),
+        says_not=["TotalSegmentator"], writes=["ct.png"]),
+    Row("render", "odd", "one that calls 5 the spleen, --show liver", "refused: the names that it has",
+        RENDER + " --labels labels.seg.nrrd --show liver", 2, slicer_labels(["Segment0_Name:=spleen", "Segment0_LabelValue:=5"]),
+        says=["no label 'liver'; it has spleen"]),
+    Row("render", "wrong", "one of Slicer before 4.11: names without values", "refused: save it again",
+        RENDER + " --labels labels.seg.nrrd --show liver", 2, slicer_labels(["Segment0_Name:=liver"]),
+        says=["SegmentN_LabelValue", "4.11"]),
     Row("render", "odd", "a label that the file has not", "refused: the file is named", RENDER + " --labels labels.nii.gz --show spleen", 2, labels,
         says=["labels.nii.gz"]),
     Row("render", "odd", "a picture to draw over of another size", "refused: both sizes", SEEN + " --over frame.png", 2, small_frame,

@@ -93,13 +93,13 @@ def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0, sh
     Path(path).write_bytes(gzip.compress(everything, 1) if str(path).endswith(".gz") else everything)
 
 
-def write_nrrd(path, space="left-posterior-superior", lines=""):
+def write_nrrd(path, space="left-posterior-superior", lines="", values=None):
     x, y, z = ORIGIN_MM
     head = ("NRRD0004\ntype: short\ndimension: 3\n" + (f"space: {space}\n" if space else "") +
             f"sizes: {COLUMNS} {ROWS} {SLICES}\n" +
             (f"space directions: (2,0,0) (0,2,0) (0,0,2)\nspace origin: ({x},{y},{z})\n" if space else "spacings: 2 2 2\n") +
             f"kinds: domain domain domain\nendian: little\nencoding: raw\n{lines}\n")
-    Path(path).write_bytes(head.encode() + hounsfield().tobytes())
+    Path(path).write_bytes(head.encode() + (hounsfield() if values is None else values).tobytes())
 
 
 def write_mha(path, values=None, cut=0, direction="1 0 0 0 1 0 0 0 1"):

@@ -111,7 +111,7 @@ using Places = std::set<std::array<int, 3>>;
 
 /// The voxels of these labels.
 Places places_of(const LabelVolume& labels, const std::vector<LabelChoice>& wanted) {
-  const auto values = values_of_labels(labels.names, wanted);
+  const auto values = values_of_labels(labels.names, wanted, nullptr);
   EXPECT_TRUE(values) << values.error().what;
   Places places;
   if (!values) return places;
@@ -296,8 +296,8 @@ TEST(DicomSeg, OfAnotherPatientInTheFolderOfTheCtIsRefused) {
 TEST(LabelNames, AreChosenWhateverTheirCapitalsAndBlanks) {
   const std::vector<NamedLabel> names{{1, "Liver", {1, 4}}, {2, "Portal Vein", {2, 4}}, {3, "Tumour", {3}}};
   const std::vector<LabelChoice> wanted{"liver", "portal_vein", 3, 9};
-  EXPECT_EQ(*values_of_labels(names, wanted), (std::vector<int>{1, 4, 2, 4, 3, 9}));
-  const auto none = values_of_labels(names, std::vector<LabelChoice>{"spleen"});
+  EXPECT_EQ(*values_of_labels(names, wanted, nullptr), (std::vector<int>{1, 4, 2, 4, 3, 9}));
+  const auto none = values_of_labels(names, std::vector<LabelChoice>{"spleen"}, nullptr);
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().what.find("has no label 'spleen'; it has Liver, Portal Vein, Tumour"), std::string::npos);
 }
@@ -308,8 +308,8 @@ TEST(LabelNames, AreTotalSegmentatorsWhereTheFileHasNone) {
   EXPECT_EQ(*values_of_labels({}, wanted, &notes), (std::vector<int>{5, 64, 1, 117}));
   ASSERT_EQ(notes.size(), 4U);
   EXPECT_NE(notes[0].find("'liver' is taken for 5, as TotalSegmentator 2 counts"), std::string::npos) << notes[0];
-  EXPECT_FALSE(values_of_labels({}, std::vector<LabelChoice>{"tumour"}));
-  const auto unnamed = values_of_labels({{5, "", {5}}}, std::vector<LabelChoice>{"liver"});
+  EXPECT_FALSE(values_of_labels({}, std::vector<LabelChoice>{"tumour"}, nullptr));
+  const auto unnamed = values_of_labels({{5, "", {5}}}, std::vector<LabelChoice>{"liver"}, nullptr);
   ASSERT_FALSE(unnamed) << "a list of segments that are not TotalSegmentator's";
   EXPECT_NE(unnamed.error().what.find("names none of its labels; give the label's number"), std::string::npos);
 }
@@ -360,7 +360,7 @@ TEST(LabelNames, OfANiftiFileAreItsOwnBeforeAnybodyElses) {
   ASSERT_TRUE(named) << named.error().what;
   EXPECT_EQ(places_of(*named, {"liver_tumor"}).size(), 42U);
   EXPECT_TRUE(places_of(*named, {"liver_vessels"}).empty());
-  EXPECT_FALSE(values_of_labels(named->names, std::vector<LabelChoice>{"liver"}));
+  EXPECT_FALSE(values_of_labels(named->names, std::vector<LabelChoice>{"liver"}, nullptr));
 }
 
 /// What a NIfTI file's labels are called, or why not.
@@ -440,7 +440,7 @@ class MaskFolder : public ::testing::Test {
   }
   /// How many voxels have a structure.
   static std::ptrdiff_t count(const LabelVolume& labels, const char* name) {
-    const auto values = values_of_labels(labels.names, std::vector<LabelChoice>{name});
+    const auto values = values_of_labels(labels.names, std::vector<LabelChoice>{name}, nullptr);
     EXPECT_TRUE(values) << values.error().what;
     return std::count_if(labels.volume.hu.begin(), labels.volume.hu.end(), [&](std::int16_t value) {
       return std::find(values->begin(), values->end(), value) != values->end();
@@ -458,7 +458,7 @@ TEST_F(MaskFolder, IsASegmentationWithTheFilesNames) {
   EXPECT_EQ(count(*labels, "My tumour"), 4) << "which is within the liver";
   EXPECT_EQ(count(*labels, "portal_vein_and_splenic_vein"), 2 * 4);
   EXPECT_EQ(count(*labels, "5"), 4 * 5 * 4) << "the liver's number";
-  const auto none = values_of_labels(labels->names, std::vector<LabelChoice>{"spleen"});
+  const auto none = values_of_labels(labels->names, std::vector<LabelChoice>{"spleen"}, nullptr);
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().what.find("liver, my_tumour, portal"), std::string::npos) << none.error().what;
 }

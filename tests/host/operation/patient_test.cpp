@@ -50,6 +50,9 @@ TEST(Patient, LabelsNeedThoseOfTheOrgan) {
   const auto named = read_patient(files);
   ASSERT_TRUE(named) << named.error().what;
   EXPECT_EQ(named->organ, (std::vector<int>{5}));
+  EXPECT_EQ(named->notes, std::vector<std::string>{"the labels have no names: 'liver' is taken for 5, as "
+                                                   "TotalSegmentator 2 counts"})
+      << "the window's, which whoever confirms the patient reads";
   files.organ = {"lever"};
   EXPECT_NE(read_patient(files).error().what.find("'lever' is none of TotalSegmentator's"), std::string::npos);
 }
