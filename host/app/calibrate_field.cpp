@@ -83,7 +83,9 @@ Result<void> check_use(const CLI::App& field, const CalibrateFieldOptions& optio
     if (auto fine = refuse_given(field, {"--grid-spec"}, "goes with --poses"); !fine) return fine;
   }
   if (!options.grid.empty()) {
-    if (auto fine = refuse_given(field, {"--tool", "--time-unit", "--poses-are"}, "goes with --poses or --pair"); !fine)
+    if (auto fine = refuse_given(field, {"--tool", "--time-unit", "--column-major", "--poses-are"},
+                                 "goes with --poses or --pair");
+        !fine)
       return fine;
   }
   if (options.pair.empty()) return refuse_given(field, {"--distance"}, "goes with --pair");

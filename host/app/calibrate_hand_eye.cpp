@@ -15,6 +15,7 @@
 #include "host/calibrate/picture_views.hpp"
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/column_names.hpp"
 #include "host/files/text_files.hpp"
 #include "host/guide/live_hand_eye.hpp"
 #include "host/link/appliance_hardware.hpp"
@@ -32,6 +33,7 @@ struct CalibrateHandEyeOptions {
   LivePlan plan;
   PoseOptions poses_are;
   std::string eye_direction;  ///< empty where it is not said: marker_from_camera
+  std::string eye_time_unit;  ///< empty where it is not said: as of all files
   std::vector<double> at;
   std::string pixel_aspect = "1";
   double position_sigma_mm = 0, angle_sigma_deg = 0;
@@ -69,7 +71,7 @@ Result<void> check_use(const CLI::App& command, const CalibrateHandEyeOptions& o
       return fine;
   } else if (auto fine = refuse_given(command,
                                       {"--poses", "--transform", "--body", "--board-poses", "--unit", "--time-unit",
-                                       "--poses-are", "--max-error", "--size"},
+                                       "--column-major", "--poses-are", "--max-error", "--size"},
                                       recorded ? "goes with files, and --recording takes their place"
                                                : "goes with files, and --live takes none");
              !fine) {
@@ -81,7 +83,7 @@ Result<void> check_use(const CLI::App& command, const CalibrateHandEyeOptions& o
   }
   if (files.points.empty() && !files.size.empty()) return Error{Errc::bad_value, "--size goes with --points"};
   if (files.eye_poses.empty())
-    return refuse_given(command, {"--eye-transform", "--eye-poses-are"}, "goes with --eye-poses");
+    return refuse_given(command, {"--eye-transform", "--eye-time-unit", "--eye-poses-are"}, "goes with --eye-poses");
   return refuse_given(command, {"--board"}, "goes with pictures, and --eye-poses takes their place");
 }
 
@@ -121,6 +123,7 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   for (PoseReading* tracked : {&files.of_sensor, &files.of_board}) {
     tracked->mm_per_unit = how->mm_per_unit;
     tracked->s_per_unit = how->s_per_unit;
+    tracked->column_major = how->column_major;
     tracked->inverted = how->inverted;
     tracked->field = how->field;
     tracked->most_error_mm = how->most_error_mm;
@@ -128,7 +131,8 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   files.of_board.option_prefix = "board-";
   files.of_eye.option_prefix = "eye-";
   files.of_eye.mm_per_unit = how->mm_per_unit;
-  files.of_eye.s_per_unit = how->s_per_unit;
+  files.of_eye.s_per_unit = options.eye_time_unit.empty() ? how->s_per_unit : seconds_per(options.eye_time_unit);
+  files.of_eye.column_major = how->column_major;
   files.of_eye.inverted = options.eye_direction == "camera_from_marker";
   return {};
 }
@@ -322,6 +326,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->add_option("--eye-poses", files.eye_poses,
                    "instead of pictures, poses of the camera in the board's frame; by time if both have times")
       ->type_name("PATH");
+  add_eye_time_unit(*command, options->eye_time_unit);
   command
       ->add_option("--eye-poses-are", options->eye_direction,
                    "what --eye-poses are: marker_from_camera, where the camera is in the board's frame (default), or "

@@ -11,6 +11,8 @@
 #include "host/app/results.hpp"
 #include "host/calibrate/latency_report.hpp"
 #include "host/calibrate/latency_streams.hpp"
+#include "host/calibrate/time_hint.hpp"
+#include "host/files/column_names.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/pose_files.hpp"
 #include "host/link/appliance_hardware.hpp"
@@ -24,7 +26,7 @@ using calibration::Latency;
 
 struct CalibrateLatencyOptions {
   fs::path recording, poses, eye_poses;
-  std::string server, transform, eye_transform;
+  std::string server, transform, eye_transform, eye_time_unit;
   PoseOptions poses_are;
   std::optional<double> delay_ms;
   LatencySource source;
@@ -117,6 +119,8 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& o
   how->transform = options.transform;
   const auto a = read_timed(options.poses, *how, odd);
   if (!a) return a.error();
+  const auto sensor_s_per_unit = how->s_per_unit;
+  if (!options.eye_time_unit.empty()) how->s_per_unit = seconds_per(options.eye_time_unit);
   how->transform = options.eye_transform;
   how->option_prefix = "eye-";
   how->field.reset();
@@ -126,7 +130,13 @@ Result<LatencyFound> of_files(const CalibrateLatencyOptions& options, Verdict& o
   if (!b) return b.error();
   if (auto two = refuse_alike(options.poses, *a, options.eye_poses, *b); !two) return two.error();
   auto latency = calibration::find_latency(rotations_of(*a), rotations_of(*b), options.settings);
-  if (!latency) return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
+  if (!latency) {
+    const TimedFile of_sensor{options.poses.string(), "--time-unit", *a, sensor_s_per_unit.value_or(1)};
+    const TimedFile of_eye{options.eye_poses.string(), "--eye-time-unit", *b, how->s_per_unit.value_or(1)};
+    if (const std::string hint = hint_on_time_units(of_sensor, of_eye); !hint.empty())
+      return Error{Errc::bad_value, hint};
+    return Error{latency.error().code, latency.error().what + " (a: --poses, b: --eye-poses)"};
+  }
   LatencyFound found{*std::move(latency), {"poses", "eye poses", "rad/s"}, {}, {{"method", "poses"}}, {}};
   found.advice = fmt::format("the times of {} are {:.2f} ms too {} against those of {}: {} that",
                              options.eye_poses.filename().string(), std::abs(found.latency.offset_ms),
@@ -160,7 +170,8 @@ Result<void> check(const CLI::App& command, const CalibrateLatencyOptions& optio
   }
   if (files) return refuse_given(command, {"--bird", "--seconds", "--delay-ms"}, "goes with --server or --recording");
   if (auto fine = refuse_given(command, kPoseOptions, "goes with --poses"); !fine) return fine;
-  if (auto fine = refuse_given(command, {"--transform", "--eye-transform"}, "goes with --poses (--bird names a bird)");
+  if (auto fine = refuse_given(command, {"--transform", "--eye-transform", "--eye-time-unit"},
+                               "goes with --poses (--bird names a bird)");
       !fine)
     return fine;
   if (options.recording.empty()) return {};
@@ -225,6 +236,7 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   command.add_option("--transform,--tool", options->transform, "whose poses, where --poses holds those of several");
   command.add_option("--eye-transform,--eye-tool", options->eye_transform, "the same of --eye-poses");
   add_pose_options(command, options->poses_are);
+  add_eye_time_unit(command, options->eye_time_unit);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
   command.callback([options, &command, &status] {

@@ -49,7 +49,8 @@ Result<void> check(const CLI::App& tip, const CalibrateTipOptions& options) {
     return Error{Errc::bad_value, "--field goes with --poses: an appliance corrects by its own [calibration] field"};
   if (auto fine = refuse_given(tip, {"--reference", "--body", "--max-error"}, "goes with --poses"); !fine) return fine;
   if (!options.spin.empty()) return {};
-  return refuse_given(tip, {"--unit", "--time-unit", "--poses-are", "--transform"}, "goes with --poses or --spin");
+  return refuse_given(tip, {"--unit", "--time-unit", "--column-major", "--poses-are", "--transform"},
+                      "goes with --poses or --spin");
 }
 
 Result<TipInput> read_input(const CalibrateTipOptions& options) {

@@ -12,11 +12,18 @@ void add_unit_options(CLI::App& command, PoseOptions& options) {
       ->check(CLI::IsMember({"mm", "cm", "m", "in"}));
   command.add_option("--time-unit", options.time_unit, "of the times in tables of poses whose header names no unit")
       ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
+  command.add_flag("--column-major", options.column_major,
+                   "matrices in files of poses are written column by column, as OpenGL's and MATLAB's");
   command
       .add_option("--poses-are", options.direction,
                   "what the tracker's poses are: tracker_from_sensor, where the sensor is in the tracker's frame "
                   "(default), or its inverse sensor_from_tracker")
       ->check(CLI::IsMember({"tracker_from_sensor", "sensor_from_tracker"}));
+}
+
+void add_eye_time_unit(CLI::App& command, std::string& unit) {
+  command.add_option("--eye-time-unit", unit, "the same as --time-unit, of --eye-poses alone")
+      ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
 }
 
 void add_pose_options(CLI::App& command, PoseOptions& options) {
@@ -35,6 +42,7 @@ Result<PoseReading> pose_reading(const PoseOptions& options) {
   PoseReading how;
   how.mm_per_unit = mm_per(options.unit).value_or(1);
   how.s_per_unit = seconds_per(options.time_unit);
+  how.column_major = options.column_major;
   how.inverted = options.direction == "sensor_from_tracker";
   how.most_error_mm = options.most_error_mm;
   if (options.field.empty()) return how;

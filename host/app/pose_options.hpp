@@ -14,17 +14,22 @@ namespace birdseye::host {
 struct PoseOptions {
   std::string unit;  ///< empty where it is not said: mm
   std::string time_unit;
+  bool column_major = false;
   std::string direction;        ///< empty where it is not said: tracker_from_sensor
   std::filesystem::path field;  ///< empty: poses are as recorded
   std::optional<double> most_error_mm;
 };
 
 /// The options that say how files of poses are to be read: what does not read such files refuses them.
-inline constexpr std::initializer_list<const char*> kPoseOptions = {"--unit", "--time-unit", "--poses-are", "--field",
-                                                                    "--max-error"};
+inline constexpr std::initializer_list<const char*> kPoseOptions = {"--unit",      "--time-unit", "--column-major",
+                                                                    "--poses-are", "--field",     "--max-error"};
 
-/// Adds `--unit`, `--time-unit` and `--poses-are`: of commands that make the map of the field themselves.
+/// Adds `--unit`, `--time-unit`, `--column-major` and `--poses-are`: of commands that make the map of the field
+/// themselves.
 void add_unit_options(CLI::App& command, PoseOptions& options);
+
+/// Adds `--eye-time-unit`. unit must outlive the command's parsing.
+void add_eye_time_unit(CLI::App& command, std::string& unit);
 
 /// Adds these and `--field` and `--max-error`. options must outlive the command's parsing.
 void add_pose_options(CLI::App& command, PoseOptions& options);

@@ -7,6 +7,7 @@
 #include "calibration/hand_eye/pose_streams.hpp"
 #include "host/calibrate/hand_eye_pictures.hpp"
 #include "host/calibrate/station_poses.hpp"
+#include "host/calibrate/time_hint.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/text_files.hpp"
 
@@ -83,13 +84,19 @@ void judge_at(const std::optional<Eigen::Vector3d>& asked_mm, HandEyeRecording& 
                                              "origin (--at X,Y,Z judges elsewhere)"));
 }
 
-Result<HandEyeRecording> read_streams(const PoseSet& sensor, const PoseSet& eye) {
+Result<HandEyeRecording> read_streams(const HandEyeFiles& files, const PoseSet& sensor, const PoseSet& eye) {
   std::vector<calibration::StampedSensor> sensors;
   for (const TimedPose& pose : sensor.poses) sensors.push_back({pose.time_s, pose.tracker_from_sensor});
   std::vector<calibration::StampedView> views;
   for (const TimedPose& pose : eye.poses) views.push_back({pose.time_s, view_of(pose)});
   auto paired = calibration::pair_pose_streams(sensors, views);
-  if (!paired) return paired.error();
+  if (!paired) {
+    const TimedFile of_sensor{files.poses.string(), "--time-unit", sensor, files.of_sensor.s_per_unit.value_or(1)};
+    const TimedFile of_eye{files.eye_poses.string(), "--eye-time-unit", eye, files.of_eye.s_per_unit.value_or(1)};
+    const std::string hint = hint_on_time_units(of_sensor, of_eye);
+    if (hint.empty()) return paired.error();
+    return Error{Errc::bad_value, hint};
+  }
   HandEyeRecording out;
   tell_by_kind("of the sensor: ", sensor.rejected, out.notes);
   tell_by_kind("of the camera: ", eye.rejected, out.notes);
@@ -109,7 +116,7 @@ Result<HandEyeRecording> read_eye_poses(const HandEyeFiles& files) {
     const auto sensor = read_pose_set(files.poses, files.of_sensor);
     if (!sensor) return sensor.error();
     if (auto two = refuse_alike(files.poses, *sensor, files.eye_poses, *eye); !two) return two.error();
-    if (sensor->timed) return read_streams(*sensor, *eye);
+    if (sensor->timed) return read_streams(files, *sensor, *eye);
   }
   HandEyeRecording out;
   tell_by_kind("of the camera: ", eye->rejected, out.notes);

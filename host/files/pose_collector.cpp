@@ -96,7 +96,12 @@ ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3
   return out;
 }
 
-ReadPose read_matrix(std::string_view text, double mm_per_unit) {
+std::string written_other_way(bool column_major) {
+  return column_major ? "it is written row by row: leave --column-major out"
+                      : "it is written column by column: say --column-major, or write it row by row";
+}
+
+ReadPose read_matrix(std::string_view text, double mm_per_unit, bool column_major) {
   std::array<double, 16> numbers{};
   std::size_t count = 0;
   ReadPose out;
@@ -115,7 +120,13 @@ ReadPose read_matrix(std::string_view text, double mm_per_unit) {
     out.problem = count == 0 ? "missing" : fmt::format("{} numbers where a 4x4 matrix has 16", count);
     return out;
   }
-  return checked_pose(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data()), mm_per_unit);
+  const Eigen::Map<const Eigen::Matrix4d> by_columns(numbers.data());
+  const Eigen::Matrix4d by_rows = by_columns.transpose();
+  out = checked_pose(column_major ? by_columns : by_rows, mm_per_unit);
+  if (out.problem.empty() || !checked_pose(column_major ? by_rows : by_columns, mm_per_unit).problem.empty())
+    return out;
+  out.problem = written_other_way(column_major);
+  return out;
 }
 
 ReadPose corrected(ReadPose pose, const PoseReading& how) {

@@ -31,8 +31,10 @@ struct ReadPose {
 ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit);
 /// quaternion: as recorded, of length one to 1e-3.
 ReadPose checked_pose(const Eigen::Quaterniond& quaternion, const Eigen::Vector3d& position, double mm_per_unit);
-/// text: 16 numbers, row by row, separated by blanks.
-ReadPose read_matrix(std::string_view text, double mm_per_unit);
+/// Why a matrix that was read column by column, or row by row, is none: it is written the other way.
+std::string written_other_way(bool column_major);
+/// text: 16 numbers separated by blanks, row by row, or column by column.
+ReadPose read_matrix(std::string_view text, double mm_per_unit, bool column_major = false);
 
 /// As how.inverted turns it round, and as the map of the field corrects it, or the problem that it lies where the field
 /// was not mapped. No map: as it is.

@@ -45,7 +45,7 @@ FilePose pose_of_file(const fs::path& file, const PoseReading& how) {
   while (std::getline(in, line)) {
     if (!line.starts_with('#')) text += line + "\n";
   }
-  ReadPose matrix = read_matrix(text, how.mm_per_unit);
+  ReadPose matrix = read_matrix(text, how.mm_per_unit, how.column_major);
   if (matrix.problem.empty() || file.extension() != ".csv") return {corrected(std::move(matrix), how), std::nullopt};
   const auto table = read_pose_table(file, how);
   if (!table) return {{{}, matrix.problem}, std::nullopt};
@@ -123,11 +123,16 @@ Result<PoseSet> read_pose_set(const fs::path& path, const PoseReading& how) {
                              "leave it out beside --body",
                              path.string())};
   }
+  if (!how.body.empty() && how.column_major)
+    return Error{Errc::bad_value, fmt::format("{}: --column-major goes with matrices: leave it out", path.string())};
   if (!how.body.empty()) return read_body_poses(path, how);
   if (folder && fs::exists(path / kRecordedEvents, ignored)) return read_sequence(path / kRecordedTracker, how);
   const bool sequence = !many && is_sequence(path), log = !many && !sequence && is_ndi_log(path);
   if (how.s_per_unit && (many || sequence || log))
     return Error{Errc::bad_value, fmt::format("{}: --time-unit goes with tables: leave it out", path.string())};
+  if (how.column_major && (sequence || log))
+    return Error{Errc::bad_value,
+                 fmt::format("{}: --column-major goes with matrices in text: leave it out", path.string())};
   if (log && how.mm_per_unit != 1)
     return Error{Errc::bad_value, fmt::format("{}: an NDI log is in mm: leave --unit out", path.string())};
   if (sequence) return read_sequence(path, how);

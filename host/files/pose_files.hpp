@@ -54,6 +54,8 @@ struct PoseReading {
   std::filesystem::path body = {};
   /// Of the times of a table whose header names no unit; empty: seconds, or what numbers too large for seconds must be.
   std::optional<double> s_per_unit = {};
+  /// Matrices are written column by column, as of OpenGL and MATLAB.
+  bool column_major = false;
   /// The file holds sensor_from_tracker: each pose is inverted.
   bool inverted = false;
   /// What stands before "tool" and "transform" in the options that name it, for messages: "board-" of --board-tool.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "calibration/base/lower_case.hpp"
 #include "calibration/base/median.hpp"
@@ -43,15 +44,16 @@ struct PoseColumns {
   std::optional<double> mm_per;  ///< as the header tells
   std::optional<double> s_per;
   std::optional<std::size_t> picture;  ///< the name of the one that was taken there
-  bool matrix = false;                 ///< rows are 4x4 or 3x4 matrices, row by row, and nothing else
+  bool matrix = false;                 ///< rows are 4x4 or 3x4 matrices, after a time, and nothing else
   [[nodiscard]] bool timed() const { return at[kTime].has_value(); }
 };
 
 /// Columns of a table without a header, by their count.
 PoseColumns columns_by_count(std::size_t count) {
   PoseColumns out;
-  out.matrix = count == 12 || count == 16;
+  out.matrix = count == 12 || count == 13 || count == 16 || count == 17;
   out.count = out.matrix || count == 7 ? count : kPoseColumns;
+  if (count == 13 || count == 17) out.at[kTime] = 0;
   const std::size_t first = out.count == 7 ? 1 : 0;
   for (std::size_t c = first; c < kPoseColumns && !out.matrix; ++c) out.at[c] = c - first;
   return out;
@@ -63,6 +65,25 @@ bool names_pictures(const ColumnName& name) {
                                                    "imagename", "imagefile", "picturefile", "name"};
   const std::string joined = fmt::format("{}", fmt::join(name.words, ""));
   return std::ranges::find(kNames, joined) != kNames.end();
+}
+
+/// The columns that are angles of a turn, or a vector of one, of a header that names a position and no whole
+/// quaternion.
+Fields angles_in(const Fields& header, const PoseColumns& columns) {
+  static const std::set<std::string> kAngles{
+      "yaw", "pitch", "roll", "azimuth", "elevation", "heading", "rx",    "ry",   "rz",     "alpha", "beta", "gamma",
+      "phi", "theta", "psi",  "rotx",    "roty",      "rotz",    "euler", "rvec", "rotvec", "az",    "el",   "angle"};
+  Fields angles;
+  if (columns.at[kPoseColumns - 1] || !columns.at[1] || !columns.at[2] || !columns.at[3]) return angles;
+  for (std::size_t i = 0; i < header.size(); ++i) {
+    const ColumnName name = column_name(header[i]);
+    const bool named = std::ranges::any_of(name.words, [](const auto& word) { return kAngles.contains(word); });
+    // rotation_x with no w beside it is no part of a quaternion.
+    const bool part = std::find(columns.at.begin() + 4, columns.at.end(), i) != columns.at.end() &&
+                      std::ranges::any_of(name.words, [](const auto& word) { return word.starts_with("rot"); });
+    if (named || part) angles.push_back(header[i]);
+  }
+  return angles;
 }
 
 /// What each column of a header is. A name that is exactly ours goes before others that mean the same.
@@ -104,6 +125,13 @@ Result<PoseColumns> columns_by_name(const Fields& header) {
     }
     out.mm_per = mm_per(unit);
   }
+  if (const auto angles = angles_in(header, out); !angles.empty()) {
+    return Error{
+        Errc::unsupported,
+        fmt::format("its header has angles ({}): programs turn by them in different orders and units, and they "
+                    "are not read; export quaternions (qx,qy,qz,qw), or 4x4 matrices",
+                    fmt::join(angles, ", "))};
+  }
   std::vector<std::string_view> lacking;
   for (std::size_t c = 1; c < kPoseColumns; ++c) {
     if (!out.at[c]) lacking.push_back(kPoseNames[c]);
@@ -123,6 +151,14 @@ struct Chosen {
   std::string tool;
 };
 
+/// The numbers of a matrix, with its last row 0 0 0 1 where it is left out.
+std::string with_last_row(Fields numbers, bool by_columns) {
+  for (std::size_t i = 0; numbers.size() < 16 && i < 4; ++i)
+    numbers.insert(by_columns ? numbers.begin() + static_cast<std::ptrdiff_t>(4 * i + 3) : numbers.end(),
+                   i < 3 ? "0" : "1");
+  return fmt::format("{}", fmt::join(numbers, " "));
+}
+
 class PoseTable {
  public:
   PoseTable(const fs::path& path, const PoseReading& how, std::optional<Chosen> chosen)
@@ -141,7 +177,9 @@ class PoseTable {
       ++repeated_headers_;
       return {};
     }
-    if (!columns_) start(columns_by_count(row.fields.size()));
+    if (!columns_) {
+      if (auto started = start(columns_by_count(row.fields.size())); !started) return started;
+    }
     take_pose(row);
     return {};
   }
@@ -171,25 +209,28 @@ class PoseTable {
   /// A remark may be the header, as "# timestamp tx ty tz qx qy qz qw".
   Result<void> take_remark(const TextRow& row) {
     if (columns_) return {};
-    if (auto columns = columns_by_name(row.fields)) {
-      header_ = row.fields;
-      start(*columns);
-    }
-    return {};
+    auto columns = columns_by_name(row.fields);
+    if (!columns && columns.error().code == Errc::unsupported) return columns.error().with_context(path_.string());
+    if (!columns) return {};
+    header_ = row.fields;
+    return start(*columns);
   }
 
   Result<void> take_header(const TextRow& row) {
     auto columns = columns_by_name(row.fields);
     if (!columns) return columns.error().with_context(path_.string());
     header_ = row.fields;
-    start(*columns);
-    return {};
+    return start(*columns);
   }
 
-  void start(const PoseColumns& columns) {
+  Result<void> start(const PoseColumns& columns) {
+    if (how_.column_major && !columns.matrix) {
+      return Error{Errc::bad_value, fmt::format("{}: --column-major goes with matrices: leave it out", path_.string())};
+    }
     columns_ = columns;
     collector_.emplace(columns.timed(), how_.most_error_mm);
     s_per_ = columns.s_per.value_or(how_.s_per_unit.value_or(1));
+    return {};
   }
 
   void take_pose(const TextRow& row) {
@@ -202,7 +243,9 @@ class PoseTable {
       return collector_->reject(
           name, absent ? problem
                        : fmt::format("{} numbers where a row has {}{}", fields.size(), columns_->count,
-                                     header_.empty() ? "; without a header all rows have 7, 8, 12 or 16" : ""));
+                                     header_.empty()
+                                         ? "; without a header all rows have 7 or 8, or 12, 13, 16 or 17 of a matrix"
+                                         : ""));
     }
     double time_s = place;
     if (columns_->timed()) {
@@ -234,8 +277,7 @@ class PoseTable {
   [[nodiscard]] ReadPose pose_of_row(const Fields& fields) const {
     const double mm_per_unit = columns_->mm_per.value_or(how_.mm_per_unit);
     if (columns_->matrix)
-      return read_matrix(fmt::format("{}{}", fmt::join(fields, " "), columns_->count == 12 ? " 0 0 0 1" : ""),
-                         mm_per_unit);
+      return matrix_of_row({fields.begin() + (columns_->timed() ? 1 : 0), fields.end()}, mm_per_unit);
     std::array<double, kPoseColumns> v{};
     for (std::size_t c = 1; c < kPoseColumns; ++c) {
       const ReadNumber number = read_number(fields[*columns_->at[c]]);
@@ -243,6 +285,15 @@ class PoseTable {
       v[c] = number.value;
     }
     return checked_pose(Eigen::Quaterniond(v[7], v[4], v[5], v[6]), Eigen::Vector3d(v[1], v[2], v[3]), mm_per_unit);
+  }
+
+  [[nodiscard]] ReadPose matrix_of_row(const Fields& numbers, double mm_per_unit) const {
+    const bool by_columns = how_.column_major;
+    ReadPose out = read_matrix(with_last_row(numbers, by_columns), mm_per_unit, by_columns);
+    if (!out.problem.empty() &&
+        read_matrix(with_last_row(numbers, !by_columns), mm_per_unit, !by_columns).problem.empty())
+      out.problem = written_other_way(by_columns);
+    return out;
   }
 
   const fs::path& path_;

@@ -95,7 +95,7 @@ def points_found_before(folder):
     (folder / "camera.yaml").write_text(boards.lens_yaml())
 
 
-def stream(folder, late_s=0.05):
+def stream(folder, late_s=0.05, eye_unit_s=1.0, sensor_line=motion.table_line):
     """Poses of the sensor and of the eye, by two clocks, while the scope is turned about all axes."""
     def eye(t):
         return motion.product(motion.shift(20 + 15 * math.sin(1.1 * t), 12 + 12 * math.sin(1.7 * t + 1), 95 + 8 * math.sin(0.9 * t)),
@@ -105,12 +105,27 @@ def stream(folder, late_s=0.05):
     lines, eyes = [], []
     for k in range(30 * 40):
         t = k / 40
-        lines.append(motion.table_line(motion.product(boards.TRACKER_FROM_BOARD, eye(t), boards.CAMERA_FROM_SENSOR), 1000 + t))
+        lines.append(sensor_line(motion.product(boards.TRACKER_FROM_BOARD, eye(t), boards.CAMERA_FROM_SENSOR), 1000 + t))
     for k in range(30 * 25):
         t = k / 25
-        eyes.append(motion.table_line(eye(t), 1000 + t + late_s))
+        eyes.append(motion.table_line(eye(t), (1000 + t + late_s) / eye_unit_s))
     (folder / "sensor.csv").write_text("".join(lines))
     (folder / "eye.csv").write_text("".join(eyes))
+
+
+def matrix_row(pose, time_s):
+    """A time and 16 numbers, row by row."""
+    return f"{time_s:.6f}," + ",".join(f"{v:.9g}" for row in pose for v in row) + "\n"
+
+
+def matrix_column_row(pose, time_s):
+    """The same, column by column."""
+    return matrix_row([list(column) for column in zip(*pose)], time_s)
+
+
+def angles_line(pose, time_s):
+    """Only whether the header is understood matters."""
+    return ("t,x,y,z,yaw,pitch,roll\n" if time_s == 1000 else "") + f"{time_s:.6f},{pose[0][3]},{pose[1][3]},{pose[2][3]},0.1,0.2,0.3\n"
 
 
 STREAM = "birdseye calibrate hand-eye --poses sensor.csv --eye-poses eye.csv --out hand_eye.txt --json hand_eye.json"
@@ -125,6 +140,16 @@ ROWS = [
         writes=BOTH, check=close_to_truth(0.2)),
     Row("calibrate hand-eye", "good", "two streams of poses, the eye's clock 50 ms late",
         "pass; the offset is found; to 1 mm", STREAM, 0, stream, "pass", says=["50"], writes=BOTH, check=close_to_truth(1.0)),
+    Row("calibrate hand-eye", "good", "the eye's times in ms, said by --eye-time-unit ms", "pass; to 1 mm", STREAM + " --eye-time-unit ms", 0,
+        lambda folder: stream(folder, eye_unit_s=1e-3), "pass", writes=BOTH, check=close_to_truth(1.0)),
+    Row("calibrate hand-eye", "odd", "the same, and nobody says so", "refused: --eye-time-unit ms", STREAM, 2,
+        lambda folder: stream(folder, eye_unit_s=1e-3), says=["eye.csv seem to be in milliseconds", "--eye-time-unit ms"]),
+    Row("calibrate hand-eye", "good", "the sensor's poses as a time and a 4x4 matrix in a row", "pass; to 1 mm", STREAM, 0,
+        lambda folder: stream(folder, sensor_line=matrix_row), "pass", writes=BOTH, check=close_to_truth(1.0)),
+    Row("calibrate hand-eye", "odd", "the same matrices column by column", "refused: --column-major", STREAM, 2,
+        lambda folder: stream(folder, sensor_line=matrix_column_row), says=["column by column: say --column-major"]),
+    Row("calibrate hand-eye", "wrong", "turns as yaw, pitch and roll", "refused: quaternions or matrices", STREAM, 2,
+        lambda folder: stream(folder, sensor_line=angles_line), says=["angles \\(yaw, pitch, roll\\)", "quaternions"]),
     Row("calibrate hand-eye", "good", "the lens as ROS' camera_info", "pass, as with OpenCV's", HAND_EYE, 0, ros_lens, "pass",
         writes=BOTH, check=close_to_truth(0.5)),
     Row("calibrate hand-eye", "good", "poses in metres, said by --unit m", "pass, in mm", HAND_EYE + " --unit m", 0,

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "calibration/field/field_fit.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/field_files.hpp"
@@ -48,6 +50,57 @@ TEST(PoseTables, PosesWithoutTimesCountByTheirOrder) {
     EXPECT_FALSE(set->timed);
     EXPECT_NE(joined(set->notes).find("no times: its poses count by their order"), std::string::npos);
   }
+}
+
+TEST(PoseTables, AMatrixMayFollowItsTime) {
+  for (const char* text : {"1.5,0,-1,0,1,1,0,0,2,0,0,1,3,0,0,0,1\n2.5 1 0 0 4 0 1 0 5 0 0 1 6 0 0 0 1\n",
+                           "1.5 0 -1 0 1 1 0 0 2 0 0 1 3\n2.5 1 0 0 4 0 1 0 5 0 0 1 6\n"}) {
+    const auto set = read(text);
+    expect_the_two(set, text);
+    EXPECT_TRUE(set->timed);
+    EXPECT_EQ(set->poses[0].time_s, 1.5);
+  }
+}
+
+TEST(PoseTables, MatricesByColumnsAreReadOrRefusedWithTheRemedy) {
+  const std::vector<std::string> by_columns{"0,1,0,0,-1,0,0,0,0,0,1,0,1,2,3,1\n1 0 0 0 0 1 0 0 0 0 1 0 4 5 6 1\n",
+                                            "0 1 0 -1 0 0 0 0 1 1 2 3\n1 0 0 0 1 0 0 0 1 4 5 6\n",
+                                            "7 0 1 0 0 -1 0 0 0 0 0 1 0 1 2 3 1\n8 1 0 0 0 0 1 0 0 0 0 1 0 4 5 6 1\n"};
+  PoseReading how;
+  how.column_major = true;
+  for (const std::string& text : by_columns) {
+    expect_the_two(read(text, how), text);
+    const auto unsaid = read(text);
+    ASSERT_FALSE(unsaid) << text;
+    EXPECT_NE(unsaid.error().what.find("it is written column by column: say --column-major"), std::string::npos)
+        << unsaid.error().what;
+  }
+  const auto by_rows = read("0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1\n1 0 0 4 0 1 0 5 0 0 1 6 0 0 0 1\n", how);
+  ASSERT_FALSE(by_rows);
+  EXPECT_NE(by_rows.error().what.find("written row by row: leave --column-major out"), std::string::npos);
+  const auto quaternions = read("1,2,3,0,0,0,1\n", how);
+  ASSERT_FALSE(quaternions);
+  EXPECT_NE(quaternions.error().what.find("--column-major goes with matrices"), std::string::npos);
+  const Scratch scratch;
+  std::filesystem::create_directory(scratch / "poses");
+  (void)scratch.file("poses/1.txt", "0 1 0 0\n-1 0 0 0\n0 0 1 0\n1 2 3 1\n");
+  (void)scratch.file("poses/2.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n4 5 6 1\n");
+  expect_the_two(read_pose_set(scratch / "poses", how), "a folder");
+}
+
+TEST(PoseTables, AnglesAreRefusedByTheirNames) {
+  for (const auto& [header, angles] : std::vector<std::pair<std::string, std::string>>{
+           {"t,x,y,z,yaw,pitch,roll\n", "(yaw, pitch, roll)"},
+           {"x;y;z;Azimuth (deg);Elevation (deg);Roll (deg)\n", "(Azimuth (deg), Elevation (deg), Roll (deg))"},
+           {"# time tx ty tz rx ry rz\n", "(rx, ry, rz)"},
+           {"t,x,y,z,rot_x,rot_y,rot_z\n", "(rot_x, rot_y, rot_z)"}}) {
+    const auto set = read(header + "0,1,2,3,0.1,0.2,0.3\n");
+    ASSERT_FALSE(set) << header;
+    EXPECT_NE(set.error().what.find(angles), std::string::npos) << set.error().what;
+    EXPECT_NE(set.error().what.find("export quaternions"), std::string::npos) << set.error().what;
+  }
+  EXPECT_TRUE(read("x,y,z,qx,qy,qz,qw,yaw,pitch,roll\n1,2,3,0,0,0,1,0,0,0\n")) << "beside a quaternion they do no harm";
+  EXPECT_TRUE(read("# no roll, pitch alone\n1,2,3,0,0,0,1\n")) << "words of a remark";
 }
 
 TEST(PoseTables, HeadersOfOtherPrograms) {
