@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numeric>
 
+#include "calibration/field/field_fit_parts.hpp"
 #include "calibration/points/point_fit.hpp"
 
 namespace birdseye::calibration {
@@ -98,7 +99,7 @@ Result<FieldCheck> check_field(const std::string& when, std::span<const CheckedP
   if (!fit) return fit.error();
   FieldCheck check;
   check.when = when;
-  double squares = 0, along = 0, arms = 0;
+  double squares = 0, along = 0, arms = 0, spread = 0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const Eigen::Vector3d arm = fit->rotation * (from[i] - from_mean);
     const double off = (to[i] - to_mean - arm).norm();
@@ -106,13 +107,26 @@ Result<FieldCheck> check_field(const std::string& when, std::span<const CheckedP
     squares += off * off;
     along += arm.dot(to[i] - to_mean);
     arms += arm.squaredNorm();
+    spread += (to[i] - to_mean).squaredNorm();
     if (off >= check.worst_mm) {
       check.worst_mm = off;
       check.worst_place = places[i].name;
     }
   }
+  // Of another unit alone: touches in the wrong order shrink the fit too, but do not make it good.
+  constexpr double kGoodFit = 0.02;
+  const double ratio = along / arms, left = spread - along * along / arms;
+  for (const bool of_plate : {false, true}) {
+    const std::string unit = detail::unit_of(of_plate ? ratio : 1 / ratio);
+    if (unit.empty() || left > kGoodFit * spread) continue;
+    return Error{
+        Errc::bad_value,
+        fmt::format("the places are {:.4g} times as far apart by the tracker as on the plate: {} seem to be in "
+                    "{}; give both in mm",
+                    ratio, of_plate ? "the plate's" : "those that were measured", unit)};
+  }
   check.rms_mm = std::sqrt(squares / static_cast<double>(places.size()));
-  check.scale_percent = 100 * (along / arms - 1);
+  check.scale_percent = 100 * (ratio - 1);
   return check;
 }
 

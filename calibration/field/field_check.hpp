@@ -27,7 +27,7 @@ struct FieldCheck {
   std::vector<double> off_mm;  ///< each place; empty where it comes from a history
 };
 
-/// Refuses fewer than four places, and places on a line.
+/// Refuses fewer than four places, places on a line, and places of which one of both is in cm, inches or metres.
 Result<FieldCheck> check_field(const std::string& when, std::span<const CheckedPlace> places);
 
 /// Limits of a chart of single values (W. A. Shewhart; sigma from the mean moving range over 1.128): those of the

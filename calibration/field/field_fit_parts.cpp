@@ -109,6 +109,14 @@ double mapped_part(const std::vector<double>& sigmas_mm) {
   return static_cast<double>(mapped) / static_cast<double>(sigmas_mm.size());
 }
 
+std::string unit_of(double mm_per_unit) {
+  constexpr double kNear = 1.1;
+  for (const auto& [unit_mm, name] : {std::pair{10.0, "cm"}, {kMmPerInch, "inches"}, {1000.0, "metres"}}) {
+    if (mm_per_unit < unit_mm * kNear && mm_per_unit > unit_mm / kNear) return name;
+  }
+  return {};
+}
+
 }  // namespace detail
 
 namespace {
@@ -124,15 +132,6 @@ constexpr double kLittleGain = 0.9;  // of the error before: the map takes away 
 constexpr double kFewOutliers = 0.1, kManyOutliers = 0.25;
 constexpr double kMostlyMapped = 0.6;           // of the box
 constexpr double kLeastDirectionSpread = 0.02;  // a body that is turned by 30 deg about two axes has 0.06
-
-/// "cm" for 10 of them in one, where mm were taken for granted; nothing where the factor is no unit's.
-std::string unit_of(double mm_per_unit) {
-  constexpr double kNear = 1.1;
-  for (const auto& [unit_mm, name] : {std::pair{10.0, "cm"}, {kMmPerInch, "inches"}, {1000.0, "metres"}}) {
-    if (mm_per_unit < unit_mm * kNear && mm_per_unit > unit_mm / kNear) return name;
-  }
-  return {};
-}
 
 /// Metal moves no level of a grid as a whole, and stretches hardly anything evenly: such is the board, or its table.
 void judge_board(const FieldFit& fit, Verdict& verdict) {
@@ -175,9 +174,9 @@ void judge_distance(double stated_mm, double measured_mm, Verdict& verdict) {
   if (off <= kSoundScale) return;
   std::string step =
       "measure the distance between the sensors' centres again, and move metal away from the transmitter";
-  if (const std::string unit = unit_of(ratio); !unit.empty()) {
+  if (const std::string unit = detail::unit_of(ratio); !unit.empty()) {
     step = fmt::format("--distance is in mm: {:.4g} seems to be in {}", stated_mm, unit);
-  } else if (const std::string of_poses = unit_of(1 / ratio); !of_poses.empty()) {
+  } else if (const std::string of_poses = detail::unit_of(1 / ratio); !of_poses.empty()) {
     step = fmt::format("the lengths of the poses seem to be in {}: say so with --unit", of_poses);
   }
   verdict.add(

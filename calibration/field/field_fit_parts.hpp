@@ -35,6 +35,8 @@ std::vector<bool> far_off(std::span<const Eigen::Vector3d> errors_mm, const std:
 double rms(std::span<const Eigen::Vector3d> errors, const std::vector<bool>& used);
 /// Fills before and held-out figures from the residuals.
 void sum_up(FieldFit& fit);
+/// "cm" for 10 of them in one, where mm were taken for granted; nothing where the factor is no unit's.
+std::string unit_of(double mm_per_unit);
 double mapped_part(const std::vector<double>& sigmas_mm);
 
 }  // namespace birdseye::calibration::detail

@@ -245,8 +245,8 @@ ROWS = [
         lambda folder: plate(folder, bend_mm=4.0), "fail", says=["metal"], writes=["history.csv", "check.json"]),
     Row("calibrate field check", "odd", "two divots were touched in the wrong order", "fail",
         CHECK_ONE, 3, lambda folder: plate(folder, swap=True), "fail", writes=["history.csv"]),
-    Row("calibrate field check", "wrong", "touches in metres", "fail: no plate of that size", CHECK_ONE, 3,
-        lambda folder: plate(folder, metres=True), "fail", says=["mm"], writes=["history.csv"]),
+    Row("calibrate field check", "wrong", "touches in metres", "refused: metres; the history is left alone", CHECK_ONE, 2,
+        lambda folder: plate(folder, metres=True), says=["were measured seem to be in metres"]),
     Row("calibrate field check", "wrong", "a history that is none", "refused; the file is left alone", CHECK_ONE, 2, damaged_history,
         says=["history.csv"]),
 

@@ -50,6 +50,19 @@ TEST(FieldCheck, SaysHowFarThePlateIsOff) {
   EXPECT_GT(off->worst_mm, 2);
 }
 
+TEST(FieldCheck, PlacesInAnotherUnitAreRefusedByName) {
+  for (const auto& [scale, said] :
+       std::vector<std::pair<double, const char*>>{{1e-3, "those that were measured seem to be in metres"},
+                                                   {0.1, "those that were measured seem to be in cm"},
+                                                   {1 / 25.4, "those that were measured seem to be in inches"},
+                                                   {1000, "the plate's seem to be in metres"}}) {
+    const auto check = check_field("today", touched(3, 0.2 * scale, scale));
+    ASSERT_FALSE(check) << scale;
+    EXPECT_NE(check.error().what.find(said), std::string::npos) << check.error().what;
+  }
+  EXPECT_TRUE(check_field("today", touched(3, 0.2, 1.5))) << "a bent field";
+}
+
 TEST(FieldCheck, TooFewPlacesOrOnALineAreRefused) {
   auto three = touched(1, 0);
   three.resize(3);
