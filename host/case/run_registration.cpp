@@ -2,8 +2,10 @@
 
 #include <utility>
 
+#include "host/case/view_pose_check.hpp"
 #include "host/registration/geometry/geometry_registration.hpp"
 #include "host/registration/views/rendered_registration.hpp"
+#include "host/registration/views/tissue.hpp"
 
 namespace birdseye::host {
 
@@ -18,6 +20,9 @@ Result<CaseRegistration> run_registration(const RegistrationCase& c, const Trans
                                           bool estimate_uncertainty,
                                           const std::function<void(const std::string&)>& tell) {
   const Volume* const labels = c.labels ? &*c.labels : nullptr;
+  if (std::string fault = fault_of_poses(c.views, c.ct, tissue_voxels(c.ct, labels, c.label_values, transfer));
+      !fault.empty())
+    return Error{Errc::not_found, std::move(fault)};
   if (c.optimiser == "geometry") {
     auto organ = organ_at_rest(c.ct, labels, c.label_values, transfer);
     if (!organ) return organ.error();
