@@ -65,6 +65,13 @@ Findings search_whole(const Volume& ct, const VolumeMarkersOptions& options, con
         fmt::format("a registration needs three: are shape and size right? {} thing{} of about the size passed over; "
                     "point at a marker that was missed by --near",
                     out.found.passed_over, out.found.passed_over == 1 ? "" : "s"));
+    if (const auto other = other_size(ct, search); other && other->count > static_cast<int>(n)) {
+      out.verdict.reasons.push_back(
+          fmt::format("{} {} of {:.4g} mm {} seen, and {} of {:.1f} mm: is --diameter {:.2g} "
+                      "meant?",
+                      n == 0 ? "no" : std::to_string(n), name_of(shape.kind), shape.diameter_mm, n > 1 ? "are" : "is",
+                      other->count, other->diameter_mm, other->diameter_mm));
+    }
     const std::size_t posts = shape.kind == MarkerKind::post ? 0 : find_hollow_posts(ct, {}).markers.size();
     if (posts > 0)
       out.verdict.reasons.push_back(fmt::format("hollow posts are seen ({}): find them by --shape post", posts));

@@ -174,14 +174,83 @@ class Finder {
   std::vector<Vector3d> others_;
 };
 
+std::vector<std::int16_t> thresholds_of(const MarkerSearch& search) {
+  if (search.threshold_hu) return {*search.threshold_hu};
+  return {300, 700, 1500};
+}
+
+/// The shape by so much larger.
+MarkerShape scaled(MarkerShape shape, double by) {
+  shape.diameter_mm *= by;
+  shape.hole_mm *= by;
+  shape.height_mm *= by;
+  return shape;
+}
+
+/// The marker that a component may be, of whatever size its volume tells.
+std::optional<MarkerFit> fit_of_any_size(const Volume& ct, const Component& c, const MarkerShape& asked) {
+  constexpr double kMost = 5;
+  const double by = std::cbrt(static_cast<double>(c.voxels) * ct.spacing_mm.prod() / asked.volume_mm3());
+  if (by > kMost || by < 1 / kMost || at_border(ct, c)) return std::nullopt;
+  const MarkerShape shape = scaled(asked, by);
+  if (!check(shape) || size_of(ct, c, shape) != Size::one) return std::nullopt;
+  auto fit = fit_marker(ct, shape, ct.patient_from_voxel * c.centre_voxel(), directions_of(ct, c));
+  // The volume over a threshold tells a size poorly: the fit may be of another one.
+  constexpr double kNear = 2, kLeastContrast_hu = 80;
+  if (!fit || fit->explained < kExplained || std::max(fit->scale, 1 / fit->scale) > kNear ||
+      fit->contrast_hu < kLeastContrast_hu) {
+    return std::nullopt;
+  }
+  return fit;
+}
+
+/// The size of the most markers, those of one place counted once.
+std::optional<OtherSize> commonest_size(const std::vector<MarkerFit>& fits) {
+  constexpr double kAlike = 1.2;
+  constexpr int kFewest = 3;
+  OtherSize best;
+  for (const MarkerFit& of : fits) {
+    double sum_mm = 0;
+    int count = 0;
+    for (const MarkerFit& fit : fits) {
+      if (fit.diameter_mm > kAlike * of.diameter_mm || of.diameter_mm > kAlike * fit.diameter_mm) continue;
+      sum_mm += fit.diameter_mm;
+      ++count;
+    }
+    if (count > best.count) best = {sum_mm / count, count};
+  }
+  return best.count >= kFewest ? std::optional(best) : std::nullopt;
+}
+
 }  // namespace
+
+std::optional<OtherSize> other_size(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop) {
+  if (search.shape.kind == MarkerKind::post) return std::nullopt;
+  std::vector<MarkerFit> fits;
+  for (const std::int16_t threshold : thresholds_of(search)) {
+    const std::vector<Component> components = bright_components(ct, threshold);
+    std::vector<std::optional<MarkerFit>> found(components.size());
+    tbb::parallel_for(std::size_t{0}, components.size(), [&](std::size_t n) {
+      if (!stop.stop_requested()) found[n] = fit_of_any_size(ct, components[n], search.shape);
+    });
+    for (const auto& fit : found) {
+      if (fit && std::ranges::none_of(fits, [&](const MarkerFit& other) {
+            return (other.centre_in_patient_mm - fit->centre_in_patient_mm).norm() < other.diameter_mm / 2;
+          }))
+        fits.push_back(*fit);
+    }
+  }
+  std::erase_if(fits, [&](MarkerFit fit) {
+    fit.scale = fit.diameter_mm / search.shape.diameter_mm;
+    return has_size(ct, search.shape, fit);
+  });
+  return commonest_size(fits);
+}
 
 FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop) {
   if (search.shape.kind == MarkerKind::post) return find_hollow_posts(ct, post_search(search.shape), stop);
   Finder finder(ct, search.shape, stop);
-  std::vector<std::int16_t> thresholds{300, 700, 1500};
-  if (search.threshold_hu) thresholds = {*search.threshold_hu};
-  for (const std::int16_t threshold : thresholds) {
+  for (const std::int16_t threshold : thresholds_of(search)) {
     if (!stop.stop_requested()) finder.look(bright_components(ct, threshold));
   }
   return finder.finish();

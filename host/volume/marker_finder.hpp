@@ -20,4 +20,14 @@ struct MarkerSearch {
 /// stop: ends the search; what was found until then is returned.
 FoundMarkers find_markers(const Volume& ct, const MarkerSearch& search = {}, const std::stop_token& stop = {});
 
+/// Markers of the shape, but of another size.
+struct OtherSize {
+  double diameter_mm = 0;
+  int count = 0;
+};
+
+/// Which other size the most markers of this shape have, at least three: what was asked for where its size was wrong.
+/// Sizes from a fifth to five times as large are looked for. Empty where there are no three; not of posts.
+std::optional<OtherSize> other_size(const Volume& ct, const MarkerSearch& search, const std::stop_token& stop = {});
+
 }  // namespace birdseye::host

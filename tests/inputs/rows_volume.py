@@ -276,7 +276,7 @@ ROWS = [
     Row("volume markers", "good", "five balls of 8 mm in a CT", "pass; each to 0.4 mm", MARKERS, 0, series, "pass",
         writes=["markers.txt", "markers.png"], check=markers_close),
     Row("volume markers", "odd", "the diameter was given too large by half", "not a pass: none, or told that the size does not fit",
-        MARKERS.replace("--diameter 8", "--diameter 12"), 3, series, "fail", writes=["markers.*"]),
+        MARKERS.replace("--diameter 8", "--diameter 12"), 3, series, "fail", says=["no ball of 12 mm is seen, and 5 of 8"], writes=["markers.*"]),
     Row("volume markers", "odd", "--near, off by 6 mm in RAS coordinates", "fail: nothing there within 10 mm",
         "birdseye volume markers ct --near 40,43,120 --out markers.txt", 3, series, "fail", says=["10 mm"], writes=["markers.txt"]),
     Row("volume markers", "good", "--near, 3 mm off three of the balls", "pass; the three centres",

@@ -226,6 +226,24 @@ TEST(Markers, FilesAreReadWhileTheyAreLookedFor) {
   done = true;
 }
 
+TEST(Markers, TheSizeOfMostOfThemIsToldWhereTheStatedOneIsWrong) {
+  Scene scene({0.8, 0.8, 1});
+  const MarkerShape small{MarkerKind::ball, 4, 0, 0};
+  for (const double x : {-40.0, -20.0, 0.0, 20.0, 40.0})
+    scene.put(small, {x + 0.3, -3 - 0.02 * x, 0.4 * x}, Vector3d::UnitZ(), 2500);
+  scene.put({MarkerKind::ball, 12, 0, 0}, {0, 20, 30}, Vector3d::UnitZ(), 1200);  // one thing of another size
+  scene.noise(25, 5);
+  for (const double stated_mm : {2.0, 8.0, 10.0, 16.0}) {
+    const MarkerSearch search{{MarkerKind::ball, stated_mm, 0, 0}, std::nullopt};
+    EXPECT_LT(find_markers(scene.ct, search).markers.size(), 3U) << stated_mm;
+    const auto other = other_size(scene.ct, search);
+    ASSERT_TRUE(other) << stated_mm;
+    EXPECT_EQ(other->count, 5) << stated_mm;
+    EXPECT_NEAR(other->diameter_mm, 4, 0.4) << stated_mm;
+  }
+  EXPECT_FALSE(other_size(scene.ct, {small, std::nullopt})) << "the stated size is no other, and one thing tells none";
+}
+
 TEST(Markers, SizesThatNoMarkerHasAreRefused) {
   EXPECT_TRUE(check({MarkerKind::ball, 8, 0, 0}));
   EXPECT_FALSE(check({MarkerKind::ball, 0, 0, 0}));
