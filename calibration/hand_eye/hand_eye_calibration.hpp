@@ -135,6 +135,9 @@ struct HandEyeResult {
 /// not `solved` and its observability says why. May be called again and again while stations come in.
 Result<HandEyeResult> calibrate_hand_eye(const HandEyeInput& input);
 
+/// Whether a station that is used stands out all the same, as the verdict names it.
+bool is_odd(const HandEyeResult& result, const HandEyeStationFit& station);
+
 /// The verdict on a result; the limits are constants in hand_eye_verdict.cpp.
 Verdict judge(const HandEyeResult& result);
 

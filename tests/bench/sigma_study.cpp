@@ -141,8 +141,8 @@ std::vector<Stated> hand_eye_stated(const HandEyeResult& found, const Transform<
   return {{distance, std::sqrt(found.region_limit)}, {off.head<2>().norm(), 2.448 * found.sigma_at_board_mm()}};
 }
 
-std::vector<Stated> stations_trial(bool own_lens, unsigned seed) {
-  HandEyeBench bench({.stations = 20, .corner_px = 0.2, .position_mm = 1.8, .angle_deg = 0.5, .seed = seed});
+std::vector<Stated> stations_trial(int stations, bool own_lens, unsigned seed) {
+  HandEyeBench bench({.stations = stations, .corner_px = 0.2, .position_mm = 1.8, .angle_deg = 0.5, .seed = seed});
   if (own_lens) {
     BoardScene board;
     board.noise_px = 0.3;
@@ -153,8 +153,33 @@ std::vector<Stated> stations_trial(bool own_lens, unsigned seed) {
     bench.input.camera_covariance = lens->covariance;
   }
   const auto found = calibrate_hand_eye(bench.input);
-  if (!found || !found->solved) return {};
-  return hand_eye_stated(*found, bench.camera_from_sensor);
+  if (!found || !found->solved || found->observability.board_scale <= 0) return {};
+  auto stated = hand_eye_stated(*found, bench.camera_from_sensor);
+  stated.push_back(
+      {std::abs(found->observability.board_scale - 1), kNormal95 * found->observability.board_scale_sigma});
+  return stated;
+}
+
+/// How many good stations of many calibrations are left out, and how many are named odd.
+void study_good_stations(int trials) {
+  for (const int stations : {6, 12, 20, 40}) {
+    int taken = 0, left_out = 0, odd = 0, losing = 0;
+    for (int seed = 1; seed <= trials; ++seed) {
+      const HandEyeBench bench({.stations = stations,
+                                .corner_px = 0.2,
+                                .position_mm = 1.8,
+                                .angle_deg = 0.5,
+                                .seed = static_cast<unsigned>(seed)});
+      const auto found = calibrate_hand_eye(bench.input);
+      if (!found || !found->solved) continue;
+      taken += stations;
+      left_out += static_cast<int>(found->outliers.size());
+      losing += found->outliers.empty() ? 0 : 1;
+      odd += static_cast<int>(std::ranges::count_if(found->stations, [&](const auto& s) { return is_odd(*found, s); }));
+    }
+    fmt::print("| {} good stations | {} of {} left out, in {} of {} calibrations; {} named odd |\n", stations, left_out,
+               taken, losing, trials, odd);
+  }
 }
 
 std::vector<Stated> stream_trial(const HandEyeStreamScene& scene) {
@@ -242,11 +267,14 @@ int run(int trials, const std::string& only) {
     study("lens of no model, 15 views", lens, trials, [](unsigned s) { return lens_trial({.foreign = true}, s); });
     study("lens, board bent by 0.2 mm", lens, trials, [](unsigned s) { return lens_trial({.bent_mm = 0.2}, s); });
   }
-  const std::vector<std::string> hand_eye{"all six", "at the board"};
+  const std::vector<std::string> hand_eye{"all six", "at the board", "board's size"};
   if (wanted("hand-eye stations")) {
-    study("hand-eye stations", hand_eye, trials, [](unsigned s) { return stations_trial(false, s); });
-    study("hand-eye stations, lens calibrated", hand_eye, trials, [](unsigned s) { return stations_trial(true, s); });
+    study("20 hand-eye stations", hand_eye, trials, [](unsigned s) { return stations_trial(20, false, s); });
+    study("8 hand-eye stations", hand_eye, trials, [](unsigned s) { return stations_trial(8, false, s); });
+    study("20 hand-eye stations, lens calibrated", hand_eye, trials,
+          [](unsigned s) { return stations_trial(20, true, s); });
   }
+  if (wanted("good stations")) study_good_stations(trials);
   if (wanted("hand-eye stream")) {
     const std::vector<std::string> figures{"all six", "at the board", "clock offset"};
     for (const auto& [lasting_s, bent_mm] : {std::pair(0.1, 0.0), {1.5, 0.0}, {1.5, 2.0}, {5.0, 2.0}}) {
