@@ -147,6 +147,13 @@ def case(folder, **changes):
     (folder / "case.toml").write_text(text)
 
 
+def inverted_case(folder):
+    case(folder)
+    for k in range(2):
+        pose = folder / f"view{k}.txt"
+        pose.write_text(motion.matrix_text(motion.inverse(motion.read_matrix(pose))))
+
+
 def case_but(old, new):
     return lambda folder: case(folder, **{old: new})
 
@@ -220,6 +227,8 @@ ROWS = [
         case_but("[model]\n", "[model]\ncontroll_points = 3\n"), says=["controll_points"]),
     Row("register views", "wrong", "an optimiser that there is not", "refused: those that there are", VIEWS, 2,
         case_but("[model]\n", '[model]\noptimiser = "magic"\n'), says=["optimiser", "geometry"]),
+    Row("register views", "odd", "poses of patient_from_camera", "fail: they are inverted", VIEWS, 3, inverted_case, "fail",
+        says=["seem to be inverted"], writes=["out/result.json"]),
     Row("register views", "wrong", "views of a board, with no organ in them", "fail: no view tells where the organ is", VIEWS, 3, case,
         "fail", says=["no place of the surface"], writes=["out/result.json"], slow=True),
     Row("register views", "wrong", "hostile deep_case.toml", "refused at once",
