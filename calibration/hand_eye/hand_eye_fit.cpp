@@ -140,7 +140,7 @@ ChainFit fit_chain(std::span<const SummedStation> stations, const ChainState& st
     }
     if (i + 1 == kIterations) out.converged = out.converged || stalled;
   }
-  out.covariance = inverse_information(normal.information);
+  out.covariance = (robust ? kRobustCovariance : 1) * inverse_information(normal.information);
   for (const SummedStation& s : stations)
     out.residuals.push_back(chain_residual(s.chain, s.camera_from_marker, out.state).value);
   return out;
@@ -219,6 +219,7 @@ std::optional<FitWithout> fit_without(std::span<const SummedStation> stations, s
     if (!step.allFinite()) return std::nullopt;
     out.state = stepped(out.state, step, freedom);
   }
+  if (robust) out.covariance *= kRobustCovariance;
   return out;
 }
 

@@ -39,6 +39,10 @@ struct ChainFit {
 
 /// Degrees of freedom of the t distribution that takes the place of the normal one where stations may be outliers.
 inline constexpr double kRobustFreedom = 4;
+/// The answer's covariance over the inverse of the normal equations, where those are weighed by that distribution and
+/// the residuals are normal: E[w] E[w^2 q / 6] / E[w + w' q / 3]^2, q of chi squared with six degrees of freedom, w(q)
+/// the weight (P. Huber, Robust Statistics, 1981, 6.6 and 7.6). The weights are over one for most residuals.
+inline constexpr double kRobustCovariance = 1.2297;
 
 /// The normal equations of all stations at a state. Each station's residual is weighed by the inverse of its
 /// covariance, which includes that of the view: the board's pose at each station is eliminated (Schur complement).

@@ -70,7 +70,7 @@ HandEyeScene mini_bird(unsigned seed) {
 TEST(HandEyeCalibration, HoldsWhatItStatesWithTheMiniBirdsNoise) {
   constexpr int kTrials = 100;
   int inside = 0, passed_over = 0;
-  double angle = 0, shift = 0, stated_angle = 0, stated_shift = 0;
+  double angle = 0, shift = 0, stated_angle = 0, stated_shift = 0, size_squared_sigmas = 0;
   for (unsigned seed = 0; seed < kTrials; ++seed) {
     const HandEyeBench bench(mini_bird(seed));
     const auto result = calibrate_hand_eye(bench.input);
@@ -82,16 +82,20 @@ TEST(HandEyeCalibration, HoldsWhatItStatesWithTheMiniBirdsNoise) {
     shift += error.tail<3>().squaredNorm() / kTrials;
     stated_angle += result->covariance.topLeftCorner<3, 3>().trace() / kTrials;
     stated_shift += result->covariance.bottomRightCorner<3, 3>().trace() / kTrials;
+    const auto& board = result->observability;
+    size_squared_sigmas += std::pow((board.board_scale - 1) / board.board_scale_sigma, 2) / kTrials;
     EXPECT_NE(judge(*result).grade, Grade::fail);
   }
   EXPECT_LT(std::sqrt(angle) * kDegPerRad, 0.25);
   EXPECT_LT(std::sqrt(shift), 1.5);
   EXPECT_NEAR(std::sqrt(stated_angle / angle), 1, 0.15);
   EXPECT_NEAR(std::sqrt(stated_shift / shift), 1, 0.15);
+  EXPECT_NEAR(std::sqrt(size_squared_sigmas), 1, 0.1) << "of the board's size";
   EXPECT_GE(inside, 90);
   EXPECT_LE(inside, 99);
   EXPECT_LE(passed_over, 2);  // of 3000
   RecordProperty("inside_95", inside);
+  RecordProperty("size_sigmas", std::to_string(std::sqrt(size_squared_sigmas)));
   RecordProperty("rms_mm", std::to_string(std::sqrt(shift)));
   RecordProperty("rms_deg", std::to_string(std::sqrt(angle) * kDegPerRad));
 }
