@@ -50,26 +50,31 @@ void draw_side(PanelContext& context) {
   ImGui::End();
 }
 
-/// How old the pictures were when they came to the screen, with what its axes are.
+/// How old the pictures were when they came to the screen. What it is and what its axes are stand above and below it,
+/// for a line through them hides both.
 void draw_ages(const PanelContext& context) {
   constexpr float kFullMs = 160;
   const PanelLayout& at = context.at;
   const std::vector<float> ages = context.facts.ages->newest();
-  const ImVec2 size((at.wide - at.side) * 0.42F, at.strip - 20 * at.scale);
-  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0, nullptr, 0, kFullMs, size);
-  const ImVec2 low = ImGui::GetItemRectMin(), high = ImGui::GetItemRectMax();
+  const float gap = 5 * at.scale, line = ImGui::GetTextLineHeight() + 2;
+  const ImVec2 low = ImGui::GetCursorScreenPos();
+  const ImVec2 high(low.x + (at.wide - at.side) * 0.42F, low.y + at.strip - 20 * at.scale);
+  ImGui::BeginGroup();
+  ImGui::SetCursorScreenPos(ImVec2(low.x, low.y + line));
+  ImGui::PlotLines("##ages", ages.data(), static_cast<int>(ages.size()), 0, nullptr, 0, kFullMs,
+                   ImVec2(high.x - low.x, high.y - low.y - 2 * line));
+  ImGui::EndGroup();
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImU32 ink = ImGui::GetColorU32(colour(context.theme.text));
-  const float gap = 5 * at.scale, line = ImGui::GetTextLineHeight();
   const auto write = [&](const std::string& text, float part, float y) {
     const float wide = ImGui::CalcTextSize(text.c_str()).x;
     list->AddText(ImVec2(low.x + gap + part * (high.x - low.x - 2 * gap - wide), y), ink, text.c_str());
   };
-  write(words("axis_ms", kFullMs), 0, low.y + 2);
-  write(words("ages_title"), 0.5F, low.y + 2);
-  write(words("axis_ms", 0.0F), 0, high.y - line - 2);
-  write(words("axis_pictures", AgeStrip::kShown), 0.5F, high.y - line - 2);
-  write(words("axis_now"), 1, high.y - line - 2);
+  write(words("axis_ms", kFullMs), 0, low.y);
+  write(words("ages_title"), 0.5F, low.y);
+  write(words("axis_ms", 0.0F), 0, high.y - line + 2);
+  write(words("axis_pictures", AgeStrip::kShown), 0.5F, high.y - line + 2);
+  write(words("axis_now"), 1, high.y - line + 2);
 }
 
 /// What tells whoever looks after the cart how it does.
