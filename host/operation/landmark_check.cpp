@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -16,11 +18,15 @@ CheckReading check_by_landmarks(const Eigen::Vector3d& tip_in_tracker_mm, const 
                                 const DeformedOrgan* deformed) {
   CheckReading reading;
   reading.tip_in_patient_mm = registered.tracker_from_patient.inverse() * tip_in_tracker_mm;
+  constexpr double kSamePlace_mm = 0.5;
   const auto consider = [&](const std::string& name, const Eigen::Vector3d& place_mm) {
     const double distance_mm = (as_shown_mm(place_mm, deformed) - reading.tip_in_patient_mm).norm();
     if (!reading.nearest.empty() && distance_mm >= reading.distance_mm) return;
     reading.nearest = name;
     reading.distance_mm = distance_mm;
+    reading.fitted = std::ranges::any_of(registered.fiducials_in_patient_mm, [&](const Eigen::Vector3d& fitted_mm) {
+      return (fitted_mm - place_mm).norm() < kSamePlace_mm;
+    });
   };
   for (const NamedPoint& landmark : landmarks) consider(landmark.name, landmark.place_mm);
   for (std::size_t i = 0; i < markers_in_patient_mm.size(); ++i)

@@ -18,6 +18,9 @@ std::string why_unregistered(const FiducialStep& fiducials, const std::string& w
   return why_doubted.empty() ? words("why_unconfirmed") : why_doubted;
 }
 
+// What is off by more is not drawn by, whatever the figures say: the gate's limit of the target's expected error.
+constexpr double kMostCheckedOff_mm = OverlayGate::Settings().most_target_mm;
+
 // Whoever was away from the patient for so long does not know what was moved meanwhile.
 constexpr Duration kPause = Duration::from_ms(10'000);
 
@@ -231,6 +234,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   fiducials_.doubt();
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
+  checked_.reset();
   check_ = {false, why};
   (return_to_ ? *return_to_ : step_) = LiveStep::check;
   update_setup();
@@ -297,6 +301,7 @@ void LiveWorkflow::fit() {
 /// deformation takes in what that was off by: another setup's is no better than none.
 void LiveWorkflow::forget_views(const std::string& why) {
   check_ = run_ = {};  // they were of the setup that is no more
+  checked_.reset();
   const bool touched = strokes_.stroking() || strokes_.places() > 0;
   if (views_.views().empty() && !touched && !deformation_.found() && !deformation_.running()) return;
   views_.forget(why);
@@ -305,6 +310,7 @@ void LiveWorkflow::forget_views(const std::string& why) {
 }
 
 void LiveWorkflow::show_shape() {
+  checked_.reset();
   ++shapes_;
   watch_.forget();
   motion_ = {};
@@ -461,13 +467,30 @@ void LiveWorkflow::primary(HostTime now) {
       }
       break;
     case LiveStep::check:
-      fiducials_.confirm();
-      why_doubted_.clear();
-      update_setup();
-      return go_on();
+      return confirm_by_landmark();
     case LiveStep::run:
       return hide_or_show_overlay();
   }
+}
+
+/// Somebody has looked. What the pointer says then is kept: of a landmark that was not fitted it tells how far the
+/// registration is off, and where that is too far nothing is confirmed.
+void LiveWorkflow::confirm_by_landmark() {
+  constexpr double kPointedAt_mm = 30;  // further away another place is meant
+  const auto reading = check_reading();
+  const bool pointed = reading && !reading->nearest.empty() && reading->distance_mm <= kPointedAt_mm;
+  if (pointed && !reading->fitted) {
+    if (reading->distance_mm > kMostCheckedOff_mm) {
+      check_ = {false, words("note_check_off", reading->distance_mm, reading->nearest)};
+      return;
+    }
+    checked_ = {reading->nearest, reading->distance_mm};
+    check_ = {false, words("note_checked", reading->distance_mm, reading->nearest)};
+  }
+  fiducials_.confirm();
+  why_doubted_.clear();
+  update_setup();
+  go_on();
 }
 
 void LiveWorkflow::stroke() {

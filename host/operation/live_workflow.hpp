@@ -123,6 +123,8 @@ class LiveWorkflow {
   void update_setup();
   /// As it is calibrated, with its rod as it is turned now. Empty: it is not.
   [[nodiscard]] std::optional<ScopeSetup> scope_as_it_is() const;
+  [[nodiscard]] std::optional<CheckReading> check_reading() const;
+  void confirm_by_landmark();
   void watch_surface(HostTime now);
   void watch_motion(const wire::VideoFrame& frame);
   void take_up();
@@ -160,6 +162,7 @@ class LiveWorkflow {
   SurfaceWatch watch_;
   OrganMotion motion_;
   VideoMotion video_;
+  std::optional<CheckedLandmark> checked_;  ///< of the registration and the deformation that are shown
   StepNote check_, run_;
   OperationKeeper keeper_;
   LivePicture picture_;

@@ -86,15 +86,21 @@ OperationView LiveWorkflow::view() const {
   out.drawn_by = patient_.drawn_by();
   out.shapes = shapes_;
   if (!out.patient) return out;
-  const DeformedOrgan* const deformed = out.deformed.get();
-  if (const auto tip_mm = pointer_.in_tracker_mm(); tip_mm && registered) {
-    out.check = check_by_landmarks(*tip_mm, *registered, patient_.landmarks(),
-                                   markers ? *markers : std::vector<Eigen::Vector3d>(), deformed);
-  }
+  out.check = check_reading();
+  out.checked = checked_;
   if (const auto seen_from = picture_.seen_from(); seen_from && step_ == LiveStep::views)
     out.view_advice = views_.advice(*seen_from, target_in_patient_mm(*out.patient));
   out.target = picture_.target();
   return out;
+}
+
+std::optional<CheckReading> LiveWorkflow::check_reading() const {
+  const auto tip_mm = pointer_.in_tracker_mm();
+  const auto registered = fiducials_.registered();
+  if (!tip_mm || !registered || !patient_.plan()) return std::nullopt;
+  const auto& markers = patient_.markers_in_patient_mm();
+  return check_by_landmarks(*tip_mm, *registered, patient_.landmarks(),
+                            markers ? *markers : std::vector<Eigen::Vector3d>(), deformation_.found().get());
 }
 
 std::optional<ImageRgba> LiveWorkflow::ct_seen_from(const CameraModel& camera,

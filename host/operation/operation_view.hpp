@@ -71,7 +71,8 @@ struct OperationView {
   std::shared_ptr<const DeformedOrgan> deformed;
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
-  std::optional<CheckReading> check;  ///< empty: no pointer is seen, or the patient is not registered
+  std::optional<CheckedLandmark> checked;  ///< by which the registration was looked at; empty: by none yet
+  std::optional<CheckReading> check;       ///< empty: no pointer is seen, or the patient is not registered
 
   /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the
   /// tracker's noise, and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.

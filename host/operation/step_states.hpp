@@ -33,6 +33,13 @@ struct CheckReading {
   Eigen::Vector3d tip_in_patient_mm;
   std::string nearest;  ///< landmark or fiducial; empty: there is none
   double distance_mm = 0;
+  bool fitted = false;  ///< it is a fiducial that the registration was fitted to, which says nothing of it
+};
+
+/// A landmark that was not fitted, and how far from it the pointer was when a person said that it fits.
+struct CheckedLandmark {
+  std::string name;
+  double off_mm = 0;
 };
 
 }  // namespace birdseye::host

@@ -192,6 +192,9 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"no_pointer", "No pointer is seen, or the patient is not registered."},
     {"tip_at", "The tip is at ({:.1f}, {:.1f}, {:.1f}) mm of the CT."},
     {"from_nearest", "{:.1f} mm from {}"},
+    {"from_fitted", "{:.1f} mm from {}, which the registration was fitted to: point at one that was not touched."},
+    {"note_checked", "{:.1f} mm from {}"},
+    {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 
     // Run, and how the overlay is drawn
     {"overlay_shown", "overlay (O)"},
@@ -367,11 +370,12 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"banner_frozen", "FROZEN: this is no live picture"},
     {"banner_stale", "NOT LIVE: {}"},
     {"banner_simulated", "SIMULATED - {}"},
-    {"banner_whole", "overlay; {}"},
     {"banner_target", "target within ±{:.1f} mm"},
     {"banner_no_target", "target out of view"},
     {"banner_no_reference", "motion of patient or transmitter is not seen: there is no reference"},
     {"banner_unmatched", "overlay, not matched with the video: {} if the organ has not moved since the CT"},
+    {"banner_unchecked", "overlay, checked by no landmark that was not touched to register; {}"},
+    {"banner_checked", "overlay, {:.1f} mm from {} when it was checked; {}"},
     {"banner_unwatched", "overlay, and nothing watches whether the organ moves; {}"},
     {"banner_cut", "overlay, a part of the CT is cut away; {}"},
     {"banner_opacity", "its opacity is 0"},

@@ -32,7 +32,8 @@ Banner whole_overlay(const OperationView& operation, const OverlayLook& look) {
   if (look.render.clip) return {words("banner_cut", error)};
   if (!operation.deformed) return {words("banner_unmatched", error)};
   if (!operation.watched) return {words("banner_unwatched", error)};
-  return {words("banner_whole", error), Grade::pass};
+  if (!operation.checked) return {words("banner_unchecked", error)};
+  return {words("banner_checked", operation.checked->off_mm, operation.checked->name, error), Grade::pass};
 }
 
 Banner banner_of(const PanelContext& context) {

@@ -240,10 +240,8 @@ bool Rehearsal::register_patient() {
   return true;
 }
 
-bool Rehearsal::check(double most_mm) {
+bool Rehearsal::check() {
   rest_at(truth.target_mm, 60);
-  const auto reading = workflow_->view().check;
-  if (!reading || !(reading->distance_mm <= most_mm)) return false;
   workflow_->primary(HostTime{time_ms_ * kNsPerMs});
   rest_at({0, 0, 200}, 1);
   return workflow_->view().step == host::LiveStep::run;

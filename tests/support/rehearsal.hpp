@@ -83,8 +83,8 @@ class Rehearsal {
   bool begin();
   /// The patient is confirmed, and each of the fiducials touched; true: the window registered.
   bool register_patient();
-  /// The surgeon holds the pointer at the target and goes on where the window says less than this; true: gone on.
-  bool check(double most_mm = 5);
+  /// The surgeon holds the pointer at the target and presses Space, whatever the window says; true: it goes on.
+  bool check();
   /// The scope looks at the target for a while.
   Watched watch(double seconds);
 

@@ -85,10 +85,7 @@ Outcome from_the_start(const Lie& lie) {
     return none;
   }
   if (!operation.check()) {
-    const auto reading = operation.workflow().view().check;
-    none.said = {reading
-                     ? fmt::format("check: the pointer is {:.0f} mm from {}", reading->distance_mm, reading->nearest)
-                     : "check: no landmark is near"};
+    none.said = {operation.workflow().view().note(host::LiveStep::check).line};
     return none;
   }
   operation.watch(0.4);
@@ -204,7 +201,7 @@ std::vector<Row> of_registration() {
             o.beside_mm = {{0, 0, 0}, {25, 0, 0}};
           }),
       row(
-          "all fiducials shifted with the skin by 10 mm", Must::refuse, "check: the pointer is 10 mm",
+          "all fiducials shifted with the skin by 10 mm", Must::refuse, "the pointer is 10 mm from tumour",
           [](Rehearsal& o) { o.beside_mm.assign(6, Vector(10, 0, 0)); }, "by the landmark that was not fitted"),
       row(
           "the tip of another pointer, 15 mm longer", Must::refuse, "FRE",
@@ -451,6 +448,23 @@ void settle(const std::string& name, const std::vector<Row>& rows) {
   for (const std::string& line : lines) here.push_back(unmeasured(line));
   for (const std::string& line : table_of_page(page, name)) there.push_back(unmeasured(line));
   EXPECT_EQ(here, there) << page << " is stale: ./run lies";
+}
+
+TEST(Lies, WithoutOneTheCheckedLandmarkStandsOnTheScreen) {
+  Rehearsal operation(1);
+  ASSERT_TRUE(operation.begin() && operation.register_patient());
+  EXPECT_FALSE(operation.workflow().view().checked) << "nobody has checked yet";
+  ASSERT_TRUE(operation.check());
+  const auto checked = operation.workflow().view().checked;
+  ASSERT_TRUE(checked);
+  EXPECT_EQ(checked->name, "tumour");
+  EXPECT_LT(checked->off_mm, 4);
+  operation.watch(0.4);
+  const Watched seen = operation.watch(8);
+  EXPECT_GT(seen.green.size(), 0.95 * static_cast<double>(seen.frames));
+  move_patient(operation);
+  operation.watch(1);
+  EXPECT_FALSE(operation.workflow().view().checked) << "what has moved is to be checked anew";
 }
 
 TEST(Lies, OfTheRegistration) {

@@ -465,7 +465,9 @@ TEST(LandmarkCheck, NamesTheNearestWhereTheCtIsShown) {
   };
   EXPECT_EQ(at({30, 30, 22}, nullptr).nearest, "tumour");
   EXPECT_NEAR(at({30, 30, 22}, nullptr).distance_mm, 2, 1e-9);
+  EXPECT_FALSE(at({30, 30, 22}, nullptr).fitted);
   EXPECT_EQ(at({59, 5, 0}, nullptr).nearest, "fiducial 2");
+  EXPECT_TRUE(at({59, 5, 0}, nullptr).fitted) << "what it was fitted to tells nothing of a registration";
   DeformedOrgan moved;
   moved.field.size = {2, 2, 2};
   moved.field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
