@@ -4,8 +4,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <array>
-#include <numeric>
 
 #include "calibration/geometry/camera_model.hpp"
 
@@ -81,6 +79,19 @@ std::size_t views_that_see(std::span<const VideoView> views, const Convention& b
   }));
 }
 
+/// How many of the views have the organ in the middle of their picture.
+std::size_t views_that_look_at(std::span<const VideoView> views, const Convention& by,
+                               const std::vector<Eigen::Vector3d>& places_mm) {
+  constexpr double kOffAxis = 0.1, kBetweenPlaces_mm = 5;
+  return static_cast<std::size_t>(std::ranges::count_if(views, [&](const VideoView& view) {
+    const Eigen::Isometry3d pose(by.right(view.camera_from_patient.matrix()));
+    return std::ranges::any_of(places_mm, [&pose](const Eigen::Vector3d& place_mm) {
+      const Eigen::Vector3d there = pose * place_mm;
+      return there.z() > 0 && there.head<2>().norm() < kOffAxis * there.z() + kBetweenPlaces_mm;
+    });
+  }));
+}
+
 /// Whether all eyes are where the patient frame's origin is, to 2 mm: no scope looks from there, but a translation in
 /// metres says so.
 bool at_origin(std::span<const VideoView> views) {
@@ -96,12 +107,15 @@ std::string fault_of_poses(std::span<const VideoView> views, const Volume& ct,
   const std::vector<Eigen::Vector3d> places_mm = places_of(ct, tissue);
   const bool tiny = at_origin(views);
   const std::size_t as_given = views_that_see(views, {}, places_mm);
-  // A single view that looks away is a matter of that view.
-  if (!tiny && 2 * as_given > views.size()) return {};
+  // A single view that looks away is a matter of that view. By chance all may see the organ by wrong poses too, at the
+  // rim of their pictures.
+  const bool none_see = 2 * as_given <= views.size(), none_look = views_that_look_at(views, {}, places_mm) == 0;
+  if (!tiny && !none_see && !none_look) return {};
   std::vector<Convention> others;
   for (unsigned bits = 1; bits < 16; ++bits) {
     const Convention by{(bits & 1U) != 0, (bits & 2U) != 0, (bits & 4U) != 0, (bits & 8U) != 0};
-    if (by.metres == tiny && views_that_see(views, by, places_mm) == views.size()) others.push_back(by);
+    if (by.metres != tiny || views_that_see(views, by, places_mm) != views.size()) continue;
+    if (tiny || none_see || 2 * views_that_look_at(views, by, places_mm) > views.size()) others.push_back(by);
   }
   if (others.empty()) return {};
   const int fewest = std::ranges::min_element(others, {}, &Convention::faults)->faults();
@@ -109,8 +123,9 @@ std::string fault_of_poses(std::span<const VideoView> views, const Volume& ct,
   std::string words = others.front().words();
   for (std::size_t i = 1; i < others.size(); ++i) words += fmt::format("; or {}", others[i].words());
   return fmt::format("{} by the poses as they are given; they seem {}",
-                     tiny ? "all views look from the origin of the patient's frame"
-                          : fmt::format("{} of {} views see the organ", as_given, views.size()),
+                     tiny       ? "all views look from the origin of the patient's frame"
+                     : none_see ? fmt::format("{} of {} views see the organ", as_given, views.size())
+                                : "no view has the organ in its middle",
                      words);
 }
 

@@ -4,49 +4,49 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace birdseye::host {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::Not;
 
-const Eigen::Vector3d kOrgan_mm(60, -35, 310);
-
-/// A ball of 40 mm somewhere in a CT.
+/// A ball of 40 mm at that place of a CT.
 struct Scene {
   Volume ct;
   std::vector<std::uint8_t> tissue;
   std::vector<VideoView> views;
 
-  Scene() {
+  explicit Scene(const Eigen::Vector3d& organ_mm = {180, -35, 310}) {
     constexpr int kSize = 50;
     constexpr double kStep_mm = 4;
     ct.size = {kSize, kSize, kSize};
     ct.spacing_mm.setConstant(kStep_mm);
     ct.patient_from_voxel =
-        Eigen::Translation3d(kOrgan_mm - Eigen::Vector3d::Constant(kStep_mm * kSize / 2)) * Eigen::Scaling(kStep_mm);
+        Eigen::Translation3d(organ_mm - Eigen::Vector3d::Constant(kStep_mm * kSize / 2)) * Eigen::Scaling(kStep_mm);
     for (int k = 0; k < kSize; ++k) {
       for (int j = 0; j < kSize; ++j) {
         for (int i = 0; i < kSize; ++i) {
-          const bool in = (ct.patient_from_voxel * Eigen::Vector3d(i, j, k) - kOrgan_mm).norm() < 40;
+          const bool in = (ct.patient_from_voxel * Eigen::Vector3d(i, j, k) - organ_mm).norm() < 40;
           tissue.push_back(in ? 1 : 0);
         }
       }
     }
     const std::vector<Eigen::Vector3d> ports{{0, -1, 0.2}, {0.4, -0.9, 0}, {-0.5, -0.8, -0.1}, {0, -0.8, 0.6}};
     views.reserve(ports.size());
-    for (const Eigen::Vector3d& from : ports) views.push_back(look(kOrgan_mm + 110 * from.normalized()));
+    for (const Eigen::Vector3d& from : ports) views.push_back(look(organ_mm, organ_mm + 110 * from.normalized()));
   }
 
   /// A camera of this place that looks at the organ.
-  static VideoView look(const Eigen::Vector3d& eye_mm) {
+  static VideoView look(const Eigen::Vector3d& organ_mm, const Eigen::Vector3d& eye_mm) {
     VideoView view;
     view.name = "view";
     view.camera = {640, 480, 550, 550, 320, 240};
-    const Eigen::Vector3d forward = (kOrgan_mm - eye_mm).normalized();
+    const Eigen::Vector3d forward = (organ_mm - eye_mm).normalized();
     const Eigen::Vector3d right = forward.cross(Eigen::Vector3d::UnitZ()).normalized();
     Eigen::Matrix3d axes;
     axes << right.transpose(), forward.cross(right).transpose(), forward.transpose();
@@ -87,6 +87,13 @@ TEST(ViewPoses, AnotherConventionIsNamedWithTheRemedy) {
   EXPECT_THAT(
       scene.said([](const auto& pose) -> Eigen::Matrix4d { return pose * Eigen::Vector4d(-1, -1, 1, 1).asDiagonal(); }),
       HasSubstr("to be of a patient frame in RAS"));
+}
+
+TEST(ViewPoses, InvertedOnesAreNamedWhereAllSeeTheOrganByChance) {
+  const Scene scene({60, -35, 310});
+  EXPECT_THAT(
+      scene.said([](const auto& pose) -> Eigen::Matrix4d { return pose.inverse(); }),
+      HasSubstr("no view has the organ in its middle by the poses as they are given; they seem to be inverted"));
 }
 
 TEST(ViewPoses, OneViewThatLooksAwayIsNoConvention) {
