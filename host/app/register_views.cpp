@@ -115,6 +115,20 @@ void add_further(nlohmann::json& json, const RegistrationCase& c, const ViewRegi
   }
 }
 
+/// What the matches between the views say of the lens, and of the view that agrees least.
+void add_agreement(nlohmann::json& json, const RegistrationCase& c, const ViewAgreement& agreement) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  json["agreement"] = {{"matches", agreement.matches},
+                       {"focal_too_long", agreement.focal.share},
+                       {"focal_sigma", agreement.focal.sigma}};
+  if (!agreement.odd) return;
+  json["agreement"]["odd"] = {{"view", c.views[agreement.odd->view].name},
+                              {"eye_off_mm", agreement.odd->off.eye_mm},
+                              {"turned_deg", agreement.odd->off.turn_rad * kDegrees},
+                              {"others_eye_sigma_mm", agreement.odd->others.eye_mm},
+                              {"others_angle_sigma_deg", agreement.odd->others.angle_rad * kDegrees}};
+}
+
 /// By how much the views' poses were off, and by how much each was moved.
 void add_poses(nlohmann::json& json, const RegistrationCase& c, const AdjustedPoses& adjusted) {
   constexpr double kDegrees = 180 / std::numbers::pi;
@@ -170,6 +184,7 @@ nlohmann::json json_of(const RegistrationCase& c, const ViewRegistration& found,
                         {"off_mm", found.held_out->off_mm},
                         {"expected_off_mm", found.held_out->expected_off_mm}};
   }
+  if (found.agreement) add_agreement(json, c, *found.agreement);
   add_further(json, c, found);
   for (std::size_t n = 0; n < c.views.size(); ++n) {
     json["per_view"].push_back({{"view", c.views[n].name}});

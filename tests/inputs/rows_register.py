@@ -165,6 +165,16 @@ def case_without(name):
     return make
 
 
+def simulated(seed, change="true", options=""):
+    """A simulated case of small pictures, with one thing changed, is registered."""
+    return (f"birdseye-sim case --out case --seed {seed} --size 384x288 {options}>/dev/null 2>&1 && {change} && "
+            "birdseye register views --case case/case.toml --out out")
+
+
+LONGER_LENS = "sed -i -e 's/2[.]991[0-9]*e+02/3.1416e+02/' -e 's/3[.]009[0-9]*e+02/3.1600e+02/' case/camera.yaml"
+NEARER_VIEW = "awk 'NR == 3 { $4 -= 15 } { print }' case/view2.txt > moved.txt && mv moved.txt case/view2.txt"
+EXCHANGED_VIEWS = "mv case/view1.txt moved.txt && mv case/view3.txt case/view1.txt && mv moved.txt case/view3.txt"
+
 VIEWS = "birdseye register views --case case.toml --out out"
 
 ROWS = [
@@ -220,6 +230,17 @@ ROWS = [
     Row("register views", "good", "a simulated case of three views", "pass; a field, a report; the error is less than before",
         "birdseye-sim case --out case --seed 2 --views 4 --size 512x384 >/dev/null 2>&1 && birdseye register views --case case/case.toml --out out", 0,
         verdict="pass", says=["report\\.html: "], writes=["case/*", "out/*"], slow=True),
+    Row("register views", "good", "poses of a tracker whose records are averaged", "pass; says that the lens is taken for exact",
+        simulated(3, options="--pose-noise-mm 0.5 --pose-noise-deg 0.1 "), 0, verdict="pass", says=["if the lens is as its camera file says"],
+        writes=["case/*", "out/*"], slow=True),
+    Row("register views", "wrong", "the camera's file has focal lengths that are 5 % too long", "fail: the lens; to calibrate it again",
+        simulated(1, LONGER_LENS), 3, verdict="fail", says=["focal lengths.*shorter", "calibrate the camera again"],
+        writes=["case/*", "out/*"], slow=True),
+    Row("register views", "odd", "one of five poses is 15 mm off along its line of sight", "fail: the view is named",
+        simulated(2, NEARER_VIEW), 3, verdict="fail", says=["view2\\.png does not agree with the other views"], writes=["case/*", "out/*"],
+        slow=True),
+    Row("register views", "odd", "two views have each other's pose", "fail: one of the two is named", simulated(2, EXCHANGED_VIEWS), 3,
+        verdict="fail", says=["view[13]\\.png"], writes=["case/*", "out/*"], slow=True),
     Row("register views", "wrong", "a CT that is not there", "refused: the path is named", VIEWS, 2, case_without("ct.nii.gz"), says=["ct.nii.gz"]),
     Row("register views", "wrong", "a pose that is not there", "refused: the path is named", VIEWS, 2, case_without("view1.txt"),
         says=["view1.txt"]),

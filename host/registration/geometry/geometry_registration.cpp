@@ -20,6 +20,7 @@
 #include "host/registration/geometry/pose_adjustment.hpp"
 #include "host/registration/geometry/similarity_points.hpp"
 #include "host/registration/geometry/stereo.hpp"
+#include "host/registration/geometry/view_agreement.hpp"
 
 namespace birdseye::host {
 
@@ -78,6 +79,16 @@ Result<void> check_lenses(std::size_t views, const std::vector<std::optional<Cam
       return Error{Errc::bad_value, "a lens's covariance is none; calibrate the lens again"};
   }
   return {};
+}
+
+/// Of the focal length, as a share of it: the largest that a lens's calibration states, 0 where none does.
+double stated_focal_sigma(const std::vector<VideoView>& views,
+                          const std::vector<std::optional<CameraMatrix>>& covariances) {
+  double most = 0;
+  for (std::size_t n = 0; n < covariances.size(); ++n) {
+    if (covariances[n]) most = std::max(most, std::sqrt((*covariances[n])(0, 0)) / views[n].camera.fx_px);
+  }
+  return most;
 }
 
 /// Places whose error is none would be believed against everything else.
@@ -173,6 +184,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
   }
 
   if (settings.watch.cancelled()) return called_off();
+  const std::vector<PinholeView> as_given = seen_by;
   std::optional<CommonPoseError> common;
   if (auto adjusted = adjusted_poses(seen_by, rest, settings.watch)) {
     common = adjusted->common;
@@ -271,6 +283,11 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     out.expected = expected_errors(distance, found, seen_by, settings.targets_at_rest_mm);
     if (out.expected->surface) out.uncertainty_mm = out.expected->surface->rms_mm;
     out.held_out = held_out_view(distance, seen_by, found, touches, settings.matched);
+    out.agreement = view_agreement(as_given, seen_by, surface);
+    const auto& stated = settings.camera_covariances;
+    out.lens_error_counted =
+        !stated.empty() && std::ranges::all_of(stated, [](const auto& c) { return c.has_value(); });
+    if (out.agreement) out.agreement->stated_focal_sigma = stated_focal_sigma(views, settings.camera_covariances);
   }
   return out;
 }

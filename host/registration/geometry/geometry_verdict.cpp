@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
 
+#include "calibration/base/median.hpp"
 #include "host/registration/geometry/pose_adjustment.hpp"
 
 namespace birdseye::host {
@@ -36,6 +40,45 @@ std::optional<double> nothing_moved_beyond_mm(const ViewRegistration& found) {
   return *expected.seen_moved_mm + expected.seen->radius95_mm;
 }
 
+/// The view whose outline is much further off than the others' are, where it is off by more than outlines may be.
+std::optional<std::size_t> worst_outline(const std::vector<std::optional<double>>& off_mm) {
+  constexpr double kLeast_mm = 0.8, kTimes = 4;
+  const auto worst = std::ranges::max_element(off_mm);  // none is less than any
+  if (worst == off_mm.end() || !*worst) return std::nullopt;
+  std::vector<double> others_mm;
+  for (auto other = off_mm.begin(); other != off_mm.end(); ++other) {
+    if (*other && other != worst) others_mm.push_back(**other);
+  }
+  if (others_mm.empty() || **worst <= std::max(kLeast_mm, kTimes * median_of(std::move(others_mm))))
+    return std::nullopt;
+  return static_cast<std::size_t>(worst - off_mm.begin());
+}
+
+/// Lens and poses that the matches between the views belie. Empty: they bear them out, or do not tell.
+std::optional<Verdict> belied(const std::vector<VideoView>& views, const ViewAgreement& agreement) {
+  constexpr double kFocal = 0.02, kSigmas = 5;  // of typical poses and an exact lens, 0.4 to 1.1 % were found
+  const FocalError& focal = agreement.focal;
+  if (std::abs(focal.share) > std::max(kFocal, kSigmas * std::hypot(focal.sigma, agreement.stated_focal_sigma))) {
+    return Verdict{Grade::fail,
+                   {fmt::format("the views fit one another better by focal lengths that are {:.1f} % {} than the "
+                                "camera's file has them: the lens is not this one, or it was zoomed since: calibrate "
+                                "the camera again, and take its file",
+                                100 * std::abs(focal.share), focal.share > 0 ? "shorter" : "longer")},
+                   {}};
+  }
+  if (const auto& odd = agreement.odd) {
+    return Verdict{
+        Grade::fail,
+        {fmt::format("{} does not agree with the other views, which put it {:.1f} mm and {:.1f} degrees from "
+                     "where its pose has it, while their own poses err by {:.1f} mm and {:.1f} degrees along "
+                     "each axis: its pose or its lens is another's: check them, or leave this view out",
+                     views[odd->view].name, odd->off.eye_mm, odd->off.turn_rad * 180 / std::numbers::pi,
+                     odd->others.eye_mm, odd->others.angle_rad * 180 / std::numbers::pi)},
+        {}};
+  }
+  return std::nullopt;
+}
+
 /// Touches and matched places that the result is not at odds with.
 std::size_t others_that_fit(const ViewRegistration& found) {
   const auto fits = [](const PlaceFit& fit) { return !fit.thought_wrong(); };
@@ -55,6 +98,17 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
             {fmt::format("{}: the organ's outline there is {:.1f} mm off what all views together say: check its "
                          "picture and its pose",
                          views[n].name, *off_mm)},
+            {}};
+  }
+  if (found.agreement) {
+    if (auto verdict = belied(views, *found.agreement)) return *std::move(verdict);
+  }
+  if (const auto worst = worst_outline(found.outline_off_mm)) {
+    return {Grade::fail,
+            {fmt::format("{} does not agree with the other views: the organ's outline there is {:.1f} mm off what all "
+                         "views together say, over four times as much as in the others: check its pose and its lens, "
+                         "or leave this view out",
+                         views[*worst].name, *found.outline_off_mm[*worst])},
             {}};
   }
   if (found.adjusted && found.adjusted->noise.eye_mm >= kMostPoseNoise.eye_mm) {
@@ -122,6 +176,8 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
   }
   std::string reason = fmt::format("{} is known within {:.1f} mm (95 %), by {} places of the surface", what,
                                    target.radius95_mm, *found.stereo_points);
+  if (!found.lens_error_counted)
+    reason += ", if the lens is as its camera file says, which does not state how well it is known";
   if (beyond_mm) reason += fmt::format("; nothing moved beyond {:.1f} mm where the surface is seen", *beyond_mm);
   return {Grade::pass, {reason}, {}};
 }

@@ -30,13 +30,15 @@ double sigma_px(const PinholeView& view) {
 struct Reprojection {
   const PinholeView& view;
   const PinholeView& other;
-  Eigen::Vector3d ray;  ///< of the view's camera, unit depth
+  Eigen::Vector3d ray;  ///< of the view's camera as it was given, unit depth
   Eigen::Vector2d found_px;
 
   template <typename T>
-  bool operator()(const T* of_view, const T* of_other, const T* depth_mm, T* off) const {
+  bool operator()(const T* of_view, const T* of_other, const T* depth_mm, const T* log_focal, T* off) const {
+    using std::exp;
     using Vector = Eigen::Matrix<T, 3, 1>;
-    const Vector ray_t = ray.cast<T>();
+    const T focal = exp(log_focal[0]);
+    const Vector ray_t(ray.x() / focal, ray.y() / focal, T(1));
     Vector turned;
     const std::array<T, 3> back{-of_view[0], -of_view[1], -of_view[2]};
     ceres::AngleAxisRotatePoint(back.data(), ray_t.data(), turned.data());
@@ -48,8 +50,8 @@ struct Reprojection {
     ceres::AngleAxisRotatePoint(of_other, from_eye.data(), seen.data());
     if (seen.z() < T(1)) return false;
     const double sigma = sigma_px(other);
-    off[0] = (seen.x() / seen.z() * other.fx_px + other.cx_px - found_px.x()) / sigma;
-    off[1] = (seen.y() / seen.z() * other.fy_px + other.cy_px - found_px.y()) / sigma;
+    off[0] = (seen.x() / seen.z() * other.fx_px * focal + other.cx_px - found_px.x()) / sigma;
+    off[1] = (seen.y() / seen.z() * other.fy_px * focal + other.cy_px - found_px.y()) / sigma;
     return true;
   }
 };
@@ -68,7 +70,18 @@ struct PosePrior {
   }
 };
 
-using Cost = ceres::AutoDiffCostFunction<Reprojection, 2, 6, 6, 1>;
+/// What the focal lengths err by, in standard deviations.
+struct FocalPrior {
+  double sigma;
+
+  template <typename T>
+  bool operator()(const T* log_focal, T* off) const {
+    off[0] = log_focal[0] / sigma;
+    return true;
+  }
+};
+
+using Cost = ceres::AutoDiffCostFunction<Reprojection, 2, 6, 6, 1, 1>;
 
 Reprojection reprojection(const std::vector<PinholeView>& views, const TextureMatch& match) {
   const PinholeView& view = views[match.view];
@@ -98,13 +111,22 @@ void PoseBundle::solve(const PoseNoise& noise, double scale) {
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (const TextureMatch& match : matches_) {
     problem.AddResidualBlock(new Cost(new Reprojection(reprojection(views_, match))), &robust,
-                             changes_[match.view].data(), changes_[match.other_view].data(), &depths_mm_[match.place]);
+                             changes_[match.view].data(), changes_[match.other_view].data(), &depths_mm_[match.place],
+                             &log_focal_);
     ordering->AddElementToGroup(&depths_mm_[match.place], 0);
   }
-  for (Change& change : changes_) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PosePrior, 6, 6>(new PosePrior{noise}), nullptr,
-                             change.data());
-    ordering->AddElementToGroup(change.data(), 1);
+  for (std::size_t n = 0; n < changes_.size(); ++n) {
+    double* const change = changes_[n].data();
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PosePrior, 6, 6>(new PosePrior{known_of(n, noise)}),
+                             nullptr, change);
+    ordering->AddElementToGroup(change, 1);
+  }
+  ordering->AddElementToGroup(&log_focal_, 1);
+  if (focal_sigma_ > 0) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<FocalPrior, 1, 1>(new FocalPrior{focal_sigma_}), nullptr,
+                             &log_focal_);
+  } else {
+    problem.SetParameterBlockConstant(&log_focal_);
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
@@ -115,11 +137,54 @@ void PoseBundle::solve(const PoseNoise& noise, double scale) {
   ceres::Solve(options, &problem, &summary);
 }
 
+void PoseBundle::find_focal_error(double sigma) {
+  focal_sigma_ = sigma;
+}
+
+FocalError PoseBundle::focal_error(const PoseNoise& noise, double scale) const {
+  if (!(focal_sigma_ > 0)) return {};
+  // Too long by that share, where the true ones are shorter.
+  return {std::expm1(-log_focal_), std::sqrt(posterior(noise, scale).covariance(unknowns() - 1, unknowns() - 1))};
+}
+
+void PoseBundle::set_free(std::size_t view) {
+  free_ = view;
+}
+
+PoseNoise PoseBundle::known_of(std::size_t view, const PoseNoise& noise) const {
+  constexpr PoseNoise kNothing{100, 0.5};
+  return free_ == view ? kNothing : noise;
+}
+
+PoseMove PoseBundle::moved_by(std::size_t view) const {
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> change(changes_[view].data());
+  return {change.tail<3>().norm(), change.head<3>().norm()};
+}
+
+double PoseBundle::deviations(std::size_t view, const PoseNoise& noise, double scale) const {
+  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> change(changes_[view].data());
+  Eigen::Matrix<double, 6, 6> covariance =
+      posterior(noise, scale).covariance.block<6, 6>(first_of(view), first_of(view));
+  covariance.diagonal().head<3>().array() += noise.angle_rad * noise.angle_rad;
+  covariance.diagonal().tail<3>().array() += noise.eye_mm * noise.eye_mm;
+  return std::sqrt(change.dot(covariance.ldlt().solve(change)));
+}
+
+Eigen::Vector3d PoseBundle::ray_of(const TextureMatch& match) const {
+  const Eigen::Vector3d ray = reprojection(views_, match).ray;
+  return {ray.x() / std::exp(log_focal_), ray.y() / std::exp(log_focal_), 1};
+}
+
+Eigen::Index PoseBundle::unknowns() const {
+  return first_of(changes_.size()) + (focal_sigma_ > 0 ? 1 : 0);
+}
+
 PoseNoise PoseBundle::noise(const PoseNoise& prior, double scale) const {
   constexpr double kFewest = 1;
   const Eigen::VectorXd open = posterior(prior, scale).covariance.diagonal();
   double angles = 0, shifts_mm2 = 0, of_angles = 0, of_shifts = 0;
   for (std::size_t n = 0; n < changes_.size(); ++n) {
+    if (free_ == n) continue;
     const Eigen::Map<const Eigen::Matrix<double, 6, 1>> change(changes_[n].data());
     angles += change.head<3>().squaredNorm();
     shifts_mm2 += change.tail<3>().squaredNorm();
@@ -130,25 +195,28 @@ PoseNoise PoseBundle::noise(const PoseNoise& prior, double scale) const {
 }
 
 PoseBundle::Posterior PoseBundle::posterior(const PoseNoise& noise, double scale) const {
-  const Eigen::Index unknowns = first_of(changes_.size());
+  const Eigen::Index unknowns = this->unknowns();
   Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(unknowns, unknowns);
   for (std::size_t n = 0; n < changes_.size(); ++n) {
-    precision.diagonal().segment<3>(first_of(n)).setConstant(1 / (noise.angle_rad * noise.angle_rad));
-    precision.diagonal().segment<3>(first_of(n) + 3).setConstant(1 / (noise.eye_mm * noise.eye_mm));
+    const PoseNoise known = known_of(n, noise);
+    precision.diagonal().segment<3>(first_of(n)).setConstant(1 / (known.angle_rad * known.angle_rad));
+    precision.diagonal().segment<3>(first_of(n) + 3).setConstant(1 / (known.eye_mm * known.eye_mm));
   }
+  if (focal_sigma_ > 0) precision(unknowns - 1, unknowns - 1) = 1 / (focal_sigma_ * focal_sigma_);
   Posterior out;
   out.places.resize(depths_mm_.size(), {Eigen::RowVectorXd::Zero(unknowns), 0});
   for (const TextureMatch& match : matches_) {
     const Cost cost(new Reprojection(reprojection(views_, match)));
     Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_view, by_other;
-    Eigen::Vector2d by_depth, off;
-    const std::array<const double*, 3> at{changes_[match.view].data(), changes_[match.other_view].data(),
-                                          &depths_mm_[match.place]};
-    std::array<double*, 3> jacobians{by_view.data(), by_other.data(), by_depth.data()};
+    Eigen::Vector2d by_depth, by_focal, off;
+    const std::array<const double*, 4> at{changes_[match.view].data(), changes_[match.other_view].data(),
+                                          &depths_mm_[match.place], &log_focal_};
+    std::array<double*, 4> jacobians{by_view.data(), by_other.data(), by_depth.data(), by_focal.data()};
     if (!cost.Evaluate(at.data(), off.data(), jacobians.data())) continue;
-    Eigen::MatrixXd by_changes = Eigen::MatrixXd::Zero(2, unknowns);
+    Eigen::Matrix2Xd by_changes = Eigen::Matrix2Xd::Zero(2, unknowns);
     by_changes.middleCols<6>(first_of(match.view)) = by_view;
     by_changes.middleCols<6>(first_of(match.other_view)) = by_other;
+    if (focal_sigma_ > 0) by_changes.col(unknowns - 1) = by_focal;
     const double weight = 1 / (1 + off.squaredNorm() / (scale * scale));  // Cauchy's
     precision += weight * by_changes.transpose() * by_changes;
     Place& place = out.places[match.place];
@@ -180,7 +248,7 @@ CommonPoseError PoseBundle::common_error(const PoseNoise& noise, double scale) c
   for (const TextureMatch* match : one_of) {
     const Place& place = found.places[match->place];
     const Eigen::Matrix3d patient_from_camera = poses[match->view].rotation().transpose();
-    const Eigen::Vector3d ray = reprojection(views_, *match).ray;
+    const Eigen::Vector3d ray = ray_of(*match);
     Eigen::Matrix3Xd place_by_changes = patient_from_camera * ray * (-place.by_changes / place.by_depth);
     const Eigen::Index at = first_of(match->view);
     place_by_changes.middleCols<3>(at) += patient_from_camera * cross_matrix(depths_mm_[match->place] * ray);
@@ -193,13 +261,22 @@ CommonPoseError PoseBundle::common_error(const PoseNoise& noise, double scale) c
   return {about_mm, motion_by_changes * found.covariance * motion_by_changes.transpose()};
 }
 
-std::size_t PoseBundle::agreeing() const {
+bool PoseBundle::agrees(const TextureMatch& match) const {
   constexpr double kMost = kAgrees_px / kMatch_px;
-  return static_cast<std::size_t>(std::count_if(matches_.begin(), matches_.end(), [&](const TextureMatch& match) {
-    Eigen::Vector2d off;
-    return reprojection(views_, match)(changes_[match.view].data(), changes_[match.other_view].data(),
-                                       &depths_mm_[match.place], off.data()) &&
-           off.norm() < kMost;
+  Eigen::Vector2d off;
+  return reprojection(views_, match)(changes_[match.view].data(), changes_[match.other_view].data(),
+                                     &depths_mm_[match.place], &log_focal_, off.data()) &&
+         off.norm() < kMost;
+}
+
+std::size_t PoseBundle::agreeing() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(matches_, [&](const TextureMatch& match) { return agrees(match); }));
+}
+
+std::size_t PoseBundle::agreeing(std::size_t view) const {
+  return static_cast<std::size_t>(std::ranges::count_if(matches_, [&](const TextureMatch& match) {
+    return (match.view == view || match.other_view == view) && agrees(match);
   }));
 }
 
@@ -219,7 +296,7 @@ std::vector<Eigen::Vector3d> PoseBundle::places_mm() const {
   std::vector<Eigen::Vector3d> out(depths_mm_.size(), Eigen::Vector3d::Zero());
   const std::vector<Transform<Camera, Patient>> poses = this->poses();
   for (const TextureMatch& match : matches_) {
-    const Eigen::Vector3d ray = reprojection(views_, match).ray;
+    const Eigen::Vector3d ray = ray_of(match);
     out[match.place] = poses[match.view].inverse() * Eigen::Vector3d(depths_mm_[match.place] * ray);
   }
   return out;

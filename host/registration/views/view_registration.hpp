@@ -103,6 +103,31 @@ struct AdjustedPoses {
   std::size_t matches = 0;  ///< of places between two views, those that agree
 };
 
+/// By what share the focal lengths of all views are too long, and its standard deviation.
+struct FocalError {
+  double share = 0, sigma = 0;
+};
+
+/// By how much a pose is moved.
+struct PoseMove {
+  double eye_mm = 0, turn_rad = 0;
+};
+
+/// The view that the others put furthest from where its pose has it.
+struct OddView {
+  std::size_t view = 0;
+  PoseMove off;
+  PoseNoise others;  ///< of the other views' poses
+};
+
+/// What places that were matched between the views say of lens and poses, once the surface is found.
+struct ViewAgreement {
+  FocalError focal;
+  double stated_focal_sigma = 0;  ///< of that share, as the cameras' calibration states it; 0 where it does not
+  std::optional<OddView> odd;     ///< of three views or more
+  std::size_t matches = 0;        ///< those that agree
+};
+
 /// What a deformation brings over none in views that it was not fitted to, each under the lamp that suits it: nats a
 /// pixel, the mean over the views and its standard error.
 struct HeldOutGain {
@@ -142,6 +167,11 @@ struct ViewRegistration {
   std::vector<std::optional<double>> outline_off_mm;
   /// Only with optimiser geometry, three views or more and enough to compare.
   std::optional<HeldOutView> held_out;
+  /// Only with optimiser geometry, two views or more and enough matches.
+  std::optional<ViewAgreement> agreement;
+  /// Whether `expected` counts what the lens's error does: false where a view's camera does not state that error. Only
+  /// with optimiser geometry.
+  bool lens_error_counted = true;
   /// The poses by which the result was found; none: the given ones. Only with optimiser geometry.
   std::optional<AdjustedPoses> adjusted;
   /// Of the settings' touches and matched points; only with optimiser geometry, and none where the result folds.

@@ -101,6 +101,58 @@ TEST(RegistrationVerdict, NamesAViewThatDoesNotBearOutTheOthers) {
   EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
 }
 
+TEST(RegistrationVerdict, FailsALensThatTheMatchesBetweenTheViewsBelie) {
+  ViewRegistration found = well_found();
+  found.agreement.emplace();
+  found.agreement->focal = {0.049, 0.003};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "4.9 % shorter"));
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "calibrate the camera again"));
+  found.agreement->focal.share = -0.049;
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "4.9 % longer"));
+  // Within what a calibration states, what the matches leave open, or what patches of a bent surface err by.
+  found.agreement->stated_focal_sigma = 0.01;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.agreement->stated_focal_sigma = 0;
+  found.agreement->focal.sigma = 0.01;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.agreement->focal = {0.019, 0.001};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+TEST(RegistrationVerdict, FailsAViewThatTheOthersPutElsewhere) {
+  ViewRegistration found = well_found();
+  found.agreement.emplace();
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.agreement->odd = OddView{1, {14.6, 0.01}, {0.5, 0.002}};
+  const Verdict verdict = verdict_of(with_target(), found);
+  EXPECT_EQ(verdict.grade, Grade::fail);
+  EXPECT_TRUE(says(verdict, "view1.png does not agree with the other views, which put it 14.6 mm"))
+      << verdict.reasons.front();
+  EXPECT_TRUE(says(verdict, "leave this view out"));
+}
+
+TEST(RegistrationVerdict, FailsAViewWhoseOutlineIsFurtherOffThanTheOthersAre) {
+  ViewRegistration found = well_found();
+  found.outline_off_mm = {0.2, 0.9, std::nullopt};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::fail);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "view1.png does not agree with the other views"));
+  found.outline_off_mm = {0.24, 0.9, 0.24};  // all views are off by as much, as with blood on the organ
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.outline_off_mm = {0.1, 0.7, 0.1};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  found.outline_off_mm = {std::nullopt, 0.9, std::nullopt};
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+}
+
+TEST(RegistrationVerdict, SaysWhereTheLensIsTakenForExact) {
+  ViewRegistration found = well_found();
+  EXPECT_FALSE(says(verdict_of(with_target(), found), "lens"));
+  found.lens_error_counted = false;
+  EXPECT_EQ(verdict_of(with_target(), found).grade, Grade::pass);
+  EXPECT_TRUE(says(verdict_of(with_target(), found), "if the lens is as its camera file says"));
+}
+
 TEST(RegistrationVerdict, PassesNoTargetThatThePriorAloneTellsOf) {
   ViewRegistration found = well_found();
   found.expected->targets.front().left_of_prior = 0.9;

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
 
 #include "calibration/geometry/rotations.hpp"
+#include "host/registration/geometry/view_agreement.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -244,6 +247,79 @@ TEST(CommonPoseError, ViewsWithoutItSeeAPlaceWhereItIs) {
     EXPECT_LT(std::hypot(seen.x_px - truly.x_px, seen.y_px - truly.y_px), 0.15);
     EXPECT_GT(std::hypot(seen.x_px - as_given.x_px, seen.y_px - as_given.y_px), 1);
   }
+}
+
+/// What poses err by that are exact, averaged, or of single records.
+constexpr std::array kPoseNoises{PoseNoise{0, 0}, PoseNoise{0.7, 0.1 * kDegree}, PoseNoise{3, 0.5 * kDegree}};
+
+std::vector<PinholeView> erring(const std::vector<PinholeView>& truth, const PoseNoise& by, Noise& noise) {
+  std::vector<PinholeView> out;
+  for (const PinholeView& view : truth) out.push_back(noise.erring(view, by));
+  return out;
+}
+
+TEST(ViewAgreement, TellsAWrongFocalLengthFromPosesThatErr) {
+  Noise noise;
+  const std::vector<PinholeView> truth = five_views();
+  for (const PoseNoise& of_poses : kPoseNoises) {
+    for (const double share : {0.05, -0.07}) {
+      std::vector<PinholeView> given = erring(truth, of_poses, noise);
+      for (PinholeView& view : given) {
+        view.fx_px *= 1 + share;
+        view.fy_px *= 1 + share;
+      }
+      const auto found = view_agreement(given, matches_of(truth, noise, 0.4, 0.2));
+      ASSERT_TRUE(found);
+      EXPECT_NEAR(found->focal.share, share, 4 * found->focal.sigma) << of_poses.eye_mm;
+      EXPECT_GT(std::abs(found->focal.share), 5 * found->focal.sigma) << of_poses.eye_mm;
+    }
+  }
+}
+
+TEST(ViewAgreement, AccusesNeitherLensNorViewWhereAllPosesErrAlike) {
+  constexpr int kDraws = 10;
+  Noise noise;
+  const std::vector<PinholeView> truth = five_views();
+  for (const PoseNoise& of_poses : kPoseNoises) {
+    for (int draw = 0; draw < kDraws; ++draw) {
+      const auto found = view_agreement(erring(truth, of_poses, noise), matches_of(truth, noise, 0.4, 0.2));
+      ASSERT_TRUE(found);
+      EXPECT_LT(std::abs(found->focal.share), 4 * found->focal.sigma) << of_poses.eye_mm;
+      EXPECT_FALSE(found->odd) << of_poses.eye_mm << ": view " << found->odd->view;
+    }
+  }
+}
+
+TEST(ViewAgreement, NamesTheViewThatIsOffAlongItsLineOfSight) {
+  constexpr double kOff_mm = 15;
+  Noise noise;
+  const std::vector<PinholeView> truth = five_views();
+  for (const PoseNoise& of_poses : std::span(kPoseNoises).first(2)) {
+    for (std::size_t n = 0; n < truth.size(); ++n) {
+      std::vector<PinholeView> given = erring(truth, of_poses, noise);
+      const Transform<Camera, Patient>& pose = given[n].camera_from_patient;
+      given[n] = moved(given[n], {pose.rotation(), Eigen::Vector3d(pose.translation().x(), pose.translation().y(),
+                                                                   pose.translation().z() + kOff_mm)});
+      const auto found = view_agreement(given, matches_of(truth, noise, 0.4, 0.2));
+      ASSERT_TRUE(found && found->odd);
+      EXPECT_EQ(found->odd->view, n);
+      EXPECT_NEAR(found->odd->off.eye_mm, kOff_mm, 4) << of_poses.eye_mm;
+      EXPECT_LT(found->odd->others.eye_mm, 2) << of_poses.eye_mm;
+      EXPECT_LT(std::abs(found->focal.share), 5 * found->focal.sigma) << of_poses.eye_mm;
+    }
+  }
+}
+
+TEST(ViewAgreement, OfTwoViewsOrFewMatchesNamesNone) {
+  Noise noise;
+  std::vector<PinholeView> two = five_views();
+  two.resize(2);
+  std::vector<PinholeView> given = two;
+  given[0] = noise.erring(given[0], {8, 0.01});
+  const auto found = view_agreement(given, matches_of(two, noise, 0.4, 0));
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->odd);
+  EXPECT_FALSE(view_agreement(given, std::vector<TextureMatch>{}));
 }
 
 }  // namespace
