@@ -54,29 +54,12 @@ std::optional<std::size_t> worst_outline(const std::vector<std::optional<double>
   return static_cast<std::size_t>(worst - off_mm.begin());
 }
 
-/// Lens and poses that the matches between the views belie. Empty: they bear them out, or do not tell.
-std::optional<Verdict> belied(const std::vector<VideoView>& views, const ViewAgreement& agreement) {
-  constexpr double kFocal = 0.02, kSigmas = 5;  // of typical poses and an exact lens, 0.4 to 1.1 % were found
+/// Whether the matches between the views speak for other focal lengths, by more than they and the lens's calibration
+/// leave open.
+bool focal_belied(const ViewAgreement& agreement) {
+  constexpr double kLeast = 0.02, kSigmas = 5;  // of exact lenses and poses that err, up to 1.1 % were found
   const FocalError& focal = agreement.focal;
-  if (std::abs(focal.share) > std::max(kFocal, kSigmas * std::hypot(focal.sigma, agreement.stated_focal_sigma))) {
-    return Verdict{Grade::fail,
-                   {fmt::format("the views fit one another better by focal lengths that are {:.1f} % {} than the "
-                                "camera's file has them: the lens is not this one, or it was zoomed since: calibrate "
-                                "the camera again, and take its file",
-                                100 * std::abs(focal.share), focal.share > 0 ? "shorter" : "longer")},
-                   {}};
-  }
-  if (const auto& odd = agreement.odd) {
-    return Verdict{
-        Grade::fail,
-        {fmt::format("{} does not agree with the other views, which put it {:.1f} mm and {:.1f} degrees from "
-                     "where its pose has it, while their own poses err by {:.1f} mm and {:.1f} degrees along "
-                     "each axis: its pose or its lens is another's: check them, or leave this view out",
-                     views[odd->view].name, odd->off.eye_mm, odd->off.turn_rad * 180 / std::numbers::pi,
-                     odd->others.eye_mm, odd->others.angle_rad * 180 / std::numbers::pi)},
-        {}};
-  }
-  return std::nullopt;
+  return std::abs(focal.share) > std::max(kLeast, kSigmas * std::hypot(focal.sigma, agreement.stated_focal_sigma));
 }
 
 /// Touches and matched places that the result is not at odds with.
@@ -91,6 +74,16 @@ std::size_t others_that_fit(const ViewRegistration& found) {
 Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistration& found, JudgedBy by) {
   constexpr double kLost_mm = 15, kFits_mm = 2;
   constexpr double kHeldOut_mm = 0.5, kHeldOutTimes = 3;
+  if (found.agreement && focal_belied(*found.agreement)) {
+    const double share = found.agreement->focal.share;
+    return {
+        Grade::fail,
+        {fmt::format("the views fit one another better by focal lengths that are {:.1f} % {} than the camera's file "
+                     "has them: it is another lens's file, or the lens was zoomed since: calibrate the camera "
+                     "again, and give its new file",
+                     100 * std::abs(share), share > 0 ? "shorter" : "longer")},
+        {}};
+  }
   for (std::size_t n = 0; n < found.outline_off_mm.size(); ++n) {
     const std::optional<double>& off_mm = found.outline_off_mm[n];
     if (!off_mm || *off_mm < kFits_mm) continue;
@@ -100,15 +93,15 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
                          views[n].name, *off_mm)},
             {}};
   }
-  if (found.agreement) {
-    if (auto verdict = belied(views, *found.agreement)) return *std::move(verdict);
-  }
-  if (const auto worst = worst_outline(found.outline_off_mm)) {
+  if (found.agreement && found.agreement->odd) {
+    const OddView& odd = *found.agreement->odd;
+    constexpr double kDegrees = 180 / std::numbers::pi;
     return {Grade::fail,
-            {fmt::format("{} does not agree with the other views: the organ's outline there is {:.1f} mm off what all "
-                         "views together say, over four times as much as in the others: check its pose and its lens, "
-                         "or leave this view out",
-                         views[*worst].name, *found.outline_off_mm[*worst])},
+            {fmt::format("{} does not agree with the other views, which put it {:.1f} mm and {:.1f} degrees from where "
+                         "its pose has it, while their own poses err by {:.1f} mm and {:.1f} degrees along each axis: "
+                         "check its pose and its camera's file, or leave this view out",
+                         views[odd.view].name, odd.off.eye_mm, odd.off.turn_rad * kDegrees, odd.others.eye_mm,
+                         odd.others.angle_rad * kDegrees)},
             {}};
   }
   if (found.adjusted && found.adjusted->noise.eye_mm >= kMostPoseNoise.eye_mm) {
@@ -157,6 +150,14 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
                            *found.stereo_points, kFewest, lacks, views_to_add(*expected))},
               {}};
     }
+  }
+  if (const auto worst = worst_outline(found.outline_off_mm)) {
+    return {Grade::marginal,
+            {fmt::format("{} does not agree with the other views: the organ's outline there is {:.1f} mm off what all "
+                         "views together say, over four times as much as in the others: check its pose and its "
+                         "camera's file, or leave this view out",
+                         views[*worst].name, *found.outline_off_mm[*worst])},
+            {}};
   }
   if (const auto& held_out = found.held_out;
       held_out && held_out->off_mm > std::max(kHeldOut_mm, kHeldOutTimes * held_out->expected_off_mm)) {

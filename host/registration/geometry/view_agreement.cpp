@@ -4,6 +4,7 @@
 #include <array>
 #include <numbers>
 
+#include "host/registration/geometry/pose_adjustment.hpp"
 #include "host/registration/geometry/pose_bundle.hpp"
 
 namespace birdseye::host {
@@ -31,7 +32,7 @@ PoseNoise solved(PoseBundle& bundle, PoseNoise noise) {
 }
 
 /// The view, if the others put it elsewhere than its pose does, by more than they leave open and than their own poses
-/// err. Of a view with few matches they say nothing.
+/// err. Nothing is said of a view with few matches, and where the others do not agree among themselves either.
 std::optional<OddView> odd_view(const std::vector<PinholeView>& given, std::span<const TextureMatch> matches,
                                 const PoseNoise& noise) {
   constexpr double kDeviations = 8, kLeastEye_mm = 2, kLeastTurn_rad = kDegree;
@@ -43,7 +44,9 @@ std::optional<OddView> odd_view(const std::vector<PinholeView>& given, std::span
     bundle.set_free(n);
     const PoseNoise others = solved(bundle, noise);
     const PoseMove off = bundle.moved_by(n);
-    if ((off.eye_mm < kLeastEye_mm && off.turn_rad < kLeastTurn_rad) || bundle.agreeing(n) < kFewest) continue;
+    if (off.eye_mm < kLeastEye_mm && off.turn_rad < kLeastTurn_rad) continue;
+    if (others.eye_mm > kUsualPoseNoise.eye_mm || others.angle_rad > kUsualPoseNoise.angle_rad) continue;
+    if (bundle.agreeing(n) < kFewest) continue;
     const double deviations = bundle.deviations(n, others, kScale);
     if (deviations <= most) continue;
     most = deviations;
@@ -57,24 +60,29 @@ std::optional<OddView> odd_view(const std::vector<PinholeView>& given, std::span
 std::optional<ViewAgreement> view_agreement(const std::vector<PinholeView>& given,
                                             std::span<const TextureMatch> matches) {
   constexpr std::size_t kFewest = 40, kFewestViews = 3;
-  constexpr PoseNoise kUsual{1, 0.25 * kDegree};
+  constexpr PoseNoise kStart{1, 0.25 * kDegree};
   constexpr double kFocalSigma = 0.2;
   if (given.size() < 2 || matches.size() < kFewest) return std::nullopt;
   ViewAgreement out;
   PoseBundle bundle(given, matches);
   bundle.find_focal_error(kFocalSigma);
-  const PoseNoise noise = solved(bundle, kUsual);
+  const PoseNoise noise = solved(bundle, kStart);
   out.matches = bundle.agreeing();
   if (out.matches < kFewest) return std::nullopt;
   out.focal = bundle.focal_error(noise, kScale);
-  if (given.size() >= kFewestViews) out.odd = odd_view(given, matches, kUsual);
+  if (given.size() >= kFewestViews) out.odd = odd_view(given, matches, kStart);
   return out;
 }
 
 std::optional<ViewAgreement> view_agreement(const std::vector<PinholeView>& given,
                                             const std::vector<PinholeView>& placed, const SeenSurface& surface) {
-  constexpr MatchSettings kSettings{.span_mm = 6, .beside_px = 3, .grid_px = 36};
-  return view_agreement(given, texture_matches(placed, surface, kSettings).found);
+  constexpr std::size_t kMany = 200;
+  TextureMatches matches;
+  for (const double grid_px : {36.0, 18.0}) {
+    matches = texture_matches(placed, surface, {.span_mm = 6, .beside_px = 3, .grid_px = grid_px});
+    if (matches.found.size() >= kMany) break;
+  }
+  return view_agreement(given, matches.found);
 }
 
 }  // namespace birdseye::host

@@ -113,7 +113,7 @@ struct PoseMove {
   double eye_mm = 0, turn_rad = 0;
 };
 
-/// The view that the others put furthest from where its pose has it.
+/// A view that the others put elsewhere than its pose does, by more than chance.
 struct OddView {
   std::size_t view = 0;
   PoseMove off;
@@ -124,7 +124,7 @@ struct OddView {
 struct ViewAgreement {
   FocalError focal;
   double stated_focal_sigma = 0;  ///< of that share, as the cameras' calibration states it; 0 where it does not
-  std::optional<OddView> odd;     ///< of three views or more
+  std::optional<OddView> odd;     ///< the oddest; none is: empty
   std::size_t matches = 0;        ///< those that agree
 };
 

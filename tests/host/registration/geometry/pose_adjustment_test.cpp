@@ -277,7 +277,7 @@ TEST(ViewAgreement, TellsAWrongFocalLengthFromPosesThatErr) {
 }
 
 TEST(ViewAgreement, AccusesNeitherLensNorViewWhereAllPosesErrAlike) {
-  constexpr int kDraws = 10;
+  constexpr int kDraws = 4;
   Noise noise;
   const std::vector<PinholeView> truth = five_views();
   for (const PoseNoise& of_poses : kPoseNoises) {
