@@ -173,7 +173,7 @@ def simulated(seed, change="true", options=""):
 
 LONGER_LENS = "sed -i -e 's/2[.]991[0-9]*e+02/3.1416e+02/' -e 's/3[.]009[0-9]*e+02/3.1600e+02/' case/camera.yaml"
 NEARER_VIEW = "awk 'NR == 3 { $4 -= 15 } { print }' case/view2.txt > moved.txt && mv moved.txt case/view2.txt"
-EXCHANGED_VIEWS = "mv case/view1.txt moved.txt && mv case/view3.txt case/view1.txt && mv moved.txt case/view3.txt"
+EXCHANGED_VIEWS = "mv case/view0.txt moved.txt && mv case/view2.txt case/view0.txt && mv moved.txt case/view2.txt"
 
 VIEWS = "birdseye register views --case case.toml --out out"
 
@@ -239,8 +239,9 @@ ROWS = [
     Row("register views", "odd", "one of five poses is 15 mm off along its line of sight", "marginal or fail: the view is named",
         simulated(2, NEARER_VIEW), 0, verdict="marginal", says=["view2\\.png does not agree with the other views"], writes=["case/*", "out/*"],
         slow=True),
-    Row("register views", "odd", "two views have each other's pose", "fail: one of the two is named", simulated(2, EXCHANGED_VIEWS), 3,
-        verdict="fail", says=["view[13]\\.png"], writes=["case/*", "out/*"], slow=True),
+    Row("register views", "odd", "two views have each other's pose", "marginal or fail: one of the two is named",
+        simulated(4, EXCHANGED_VIEWS, "--deformation push --amplitude-mm 12 --push-width-mm 40 "), 0, verdict="marginal",
+        says=["view[02]\\.png does not agree with the other views"], writes=["case/*", "out/*"], slow=True),
     Row("register views", "wrong", "a CT that is not there", "refused: the path is named", VIEWS, 2, case_without("ct.nii.gz"), says=["ct.nii.gz"]),
     Row("register views", "wrong", "a pose that is not there", "refused: the path is named", VIEWS, 2, case_without("view1.txt"),
         says=["view1.txt"]),

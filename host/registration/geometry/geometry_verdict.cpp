@@ -54,12 +54,23 @@ std::optional<std::size_t> worst_outline(const std::vector<std::optional<double>
   return static_cast<std::size_t>(worst - off_mm.begin());
 }
 
+constexpr double kFocalLeast = 0.02, kFocalSigmas = 5;  // of exact lenses and poses that err, up to 1.5 % were found
+
+/// What a target's error leaves out where a camera's file does not state how well its lens is known.
+std::string if_the_lens_is_right(std::size_t views, const std::optional<ViewAgreement>& agreement) {
+  constexpr std::size_t kFewest = 3;  // two views fit a wrong lens too, by another organ
+  std::string out = ", if the lens is as its camera file says, which states no error";
+  if (!agreement || views < kFewest) return out + ": so few views do not tell";
+  return out + fmt::format(": the views bear its focal lengths out to {:.0f} %",
+                           100 * std::max(kFocalLeast, kFocalSigmas * agreement->focal.sigma));
+}
+
 /// Whether the matches between the views speak for other focal lengths, by more than they and the lens's calibration
 /// leave open.
 bool focal_belied(const ViewAgreement& agreement) {
-  constexpr double kLeast = 0.02, kSigmas = 5;  // of exact lenses and poses that err, up to 1.1 % were found
   const FocalError& focal = agreement.focal;
-  return std::abs(focal.share) > std::max(kLeast, kSigmas * std::hypot(focal.sigma, agreement.stated_focal_sigma));
+  return std::abs(focal.share) >
+         std::max(kFocalLeast, kFocalSigmas * std::hypot(focal.sigma, agreement.stated_focal_sigma));
 }
 
 /// Touches and matched places that the result is not at odds with.
@@ -177,8 +188,7 @@ Verdict geometry_verdict(const std::vector<VideoView>& views, const ViewRegistra
   }
   std::string reason = fmt::format("{} is known within {:.1f} mm (95 %), by {} places of the surface", what,
                                    target.radius95_mm, *found.stereo_points);
-  if (!found.lens_error_counted)
-    reason += ", if the lens is as its camera file says, which does not state how well it is known";
+  if (!found.lens_error_counted) reason += if_the_lens_is_right(views.size(), found.agreement);
   if (beyond_mm) reason += fmt::format("; nothing moved beyond {:.1f} mm where the surface is seen", *beyond_mm);
   return {Grade::pass, {reason}, {}};
 }
