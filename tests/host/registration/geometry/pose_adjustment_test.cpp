@@ -295,7 +295,7 @@ TEST(ViewAgreement, NamesTheViewThatIsOffAlongItsLineOfSight) {
   Noise noise;
   const std::vector<PinholeView> truth = five_views();
   for (const PoseNoise& of_poses : std::span(kPoseNoises).first(2)) {
-    for (std::size_t n = 0; n < truth.size(); ++n) {
+    for (std::size_t n = 0; n < truth.size(); n += 2) {
       std::vector<PinholeView> given = erring(truth, of_poses, noise);
       const Transform<Camera, Patient>& pose = given[n].camera_from_patient;
       given[n] = moved(given[n], {pose.rotation(), Eigen::Vector3d(pose.translation().x(), pose.translation().y(),
