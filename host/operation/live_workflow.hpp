@@ -132,13 +132,14 @@ class LiveWorkflow {
 
   LiveSettings settings_;
   LiveStep step_ = LiveStep::connect;
-  std::optional<LiveStep> return_to_;   ///< once what is held back comes back
+  std::optional<LiveStep> return_to_;  ///< once what is held back comes back
+  bool frozen_ = false, patient_confirmed_ = false;
+  bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
   ConnectedInstruments instruments_;
   ReferenceSensor reference_;
   std::string why_doubted_;  ///< why somebody has to look whether the registration holds; empty: as usual
   std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force
-  bool frozen_ = false;
   std::string resume_fault_;
   std::string record_sha256_;  ///< of the last record that was in force
   std::uint64_t shapes_ = 0;
@@ -146,8 +147,6 @@ class LiveWorkflow {
   ConnectionStep connection_;
   CalibrationStep calibration_;
   PatientStep patient_;
-  bool simulated_ = false;  ///< nobody lies there
-  bool patient_confirmed_ = false;
   std::optional<HostTime> confirmed_at_;  ///< by Space or the pedal
   PlacePicks picks_;
   std::string pick_line_;
