@@ -88,7 +88,7 @@ ROWS = [
     Row("demo", "wrong", "--ct that is a text", "refused at once; no half a demo is left", "birdseye demo --ct notes.txt --out out", 2,
         lambda folder: (folder / "notes.txt").write_text("hello\n"), says=["notes.txt"]),
     Row("demo", "good", "a tracker without noise, a liver that has not moved", "pass; a report",
-        "birdseye demo --noise none --deformation-mm 0 --out out", 0, says=["pass"], writes=["out/*"], slow=True),
+        "birdseye demo --noise none --deformation-mm 0 --out out", 0, verdict="pass", writes=["out/*"], slow=True),
 
     Row("birdseyed --check", "good", "the configuration of a simulated cart", "sound", CHECK, 0, cart),
     Row("birdseyed --check", "odd", "two faults in one file", "both are told, with their lines", CHECK, 2,
