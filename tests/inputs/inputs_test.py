@@ -8,6 +8,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).parent))
+import page
 import running
 from judge import KINDS, Outcome, Row, faults
 from rows import all_rows
@@ -52,6 +53,12 @@ class Judge(unittest.TestCase):
             outcome = running.run(row, Path(programs), None)
         self.assertEqual((outcome.exit, outcome.files, outcome.empty_files, outcome.errors), (2, ["c"], ["b"], "birdseye: no\n"))
         self.assertIn("the figures cannot be read", outcome.figures)
+
+    def test_the_page_names_no_folder_of_this_run(self):
+        said = f"birdseye: {page.data_folder()}/hostile/x and /tmp/inputs-ab_1/work/y: no\n"
+        table = page.table([(REFUSAL, dataclasses.replace(REFUSED, output=said, errors=said), [])])
+        self.assertIn("hostile/x and y: no", table)
+        self.assertNotIn("/work/", table)
 
     def test_the_rows(self):
         """Each kind is a quarter at least, no row stands twice, and a row on public recordings names them."""

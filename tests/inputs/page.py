@@ -58,7 +58,7 @@ def _happened(row, outcome, told):
     return text
 
 
-def _shown(command):
+def _typed(command):
     """The command line as a user would type it."""
     text = re.sub(r"\$DATA/", "", command)
     return f"`{_cell(text)}`"
@@ -73,7 +73,7 @@ def table(results):
             text += f"\n## {command}\n\n| | input | a user would expect | what happened | s |\n|---|---|---|---|---|\n"
         happened = _happened(row, outcome, told) if outcome else f"not run: {told[0]}"
         seconds = f"{outcome.seconds:.1f}" if outcome else ""
-        text += f"| {row.kind} | {_cell(row.input)}: {_shown(row.run)} | {_cell(row.expected)} | {_cell(happened)} | {seconds} |\n"
+        text += f"| {row.kind} | {_cell(row.input)}: {_typed(row.run)} | {_cell(row.expected)} | {_cell(happened)} | {seconds} |\n"
     return text
 
 
