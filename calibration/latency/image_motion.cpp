@@ -7,6 +7,7 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
+#include "calibration/picture/field_mask.hpp"
 #include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::calibration {
@@ -14,16 +15,9 @@ namespace birdseye::calibration {
 namespace {
 
 constexpr int kWorkingWidthPx = 384;  // more tells no more of the motion of the whole, and takes longer
-constexpr double kFieldShare = 0.42;  // of the picture's height: inside the round field of any laparoscope
 constexpr int kCorners = 120, kFewestFollowed = 12;
 constexpr double kLeastShareAgreed = 0.4;
 constexpr double kLongestHoleS = 0.2;
-
-cv::Mat field_mask(const cv::Size& size) {
-  cv::Mat mask = cv::Mat::zeros(size, CV_8U);
-  cv::circle(mask, {size.width / 2, size.height / 2}, static_cast<int>(kFieldShare * size.height), 255, cv::FILLED);
-  return mask;
-}
 
 }  // namespace
 

@@ -9,6 +9,7 @@
 
 #include "calibration/base/median.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "calibration/picture/field_mask.hpp"
 #include "calibration/picture/picture_mat.hpp"
 
 namespace birdseye::host {
@@ -21,7 +22,6 @@ constexpr Duration kEvery = Duration::from_ms(200), kLongest = Duration::from_ms
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
 constexpr int kWorkingWidthPx = 320;                  // more tells no more of the motion, and takes longer
 constexpr std::size_t kPlaces = 80, kFewest = 15;
-constexpr double kFieldShare = 0.42;  // of the picture's height: inside the round field of any laparoscope
 constexpr double kThereAndBackPx = 0.7, kFollowedPx = 1.5;
 constexpr double kNearest_mm = 15, kFarthest_mm = 600;  // what a laparoscope sees lies between
 constexpr double kTurned_rad = 15 * M_PI / 180;
@@ -31,8 +31,7 @@ constexpr int kOddInRow = 2, kMostWanted = 32;
 
 /// Where nothing is to be followed: outside the field, and in reflections, which go with the lamp.
 cv::Mat places_allowed(const cv::Mat& grey) {
-  cv::Mat mask = cv::Mat::zeros(grey.size(), CV_8U);
-  cv::circle(mask, {grey.cols / 2, grey.rows / 2}, static_cast<int>(kFieldShare * grey.rows), 255, cv::FILLED);
+  cv::Mat mask = field_mask(grey.size());
   cv::Mat glare = grey > 240;
   cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
   mask.setTo(0, glare);
