@@ -208,15 +208,7 @@ void expect_complete(const std::vector<Round>& rounds) {
 
 /// Writes the page's table, or holds it against what is there.
 void settle(const std::string& name, const std::vector<FaultRow>& rows) {
-  const auto lines = table_lines(rows);
-  for (const std::string& line : lines) std::printf("%s\n", line.c_str());
-  if (const char* page = std::getenv("BIRDSEYE_FAULTS_PAGE")) return replace_table(page, name, lines);
-  const char* source = std::getenv("BIRDSEYE_SOURCE_DIR");
-  const auto page = std::filesystem::path(source != nullptr ? source : ".") / "docs/manual/faults.md";
-  std::vector<std::string> here, there;
-  for (const std::string& line : lines) here.push_back(unmeasured(line));
-  for (const std::string& line : table_of_page(page, name)) there.push_back(unmeasured(line));
-  EXPECT_EQ(here, there) << page << " is stale: ./run faults";
+  settle_table("faults.md", "BIRDSEYE_FAULTS_PAGE", "./run faults", name, table_lines(rows), unmeasured);
 }
 
 TEST(FaultTable, TheInstrumentsFaultsAreNamedDoNotLieAndPass) {
