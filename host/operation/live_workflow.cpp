@@ -18,12 +18,6 @@ std::string why_unregistered(const FiducialStep& fiducials, const std::string& w
   return why_doubted.empty() ? words("why_unconfirmed") : why_doubted;
 }
 
-// What is off by more is not drawn by, whatever the figures say: the gate's limit of the target's expected error.
-constexpr double kMostCheckedOff_mm = OverlayGate::Settings().most_target_mm;
-
-// Whoever was away from the patient for so long does not know what was moved meanwhile.
-constexpr Duration kPause = Duration::from_ms(10'000);
-
 }  // namespace
 
 LiveWorkflow::LiveWorkflow(LiveSettings settings)
@@ -113,13 +107,6 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
 void LiveWorkflow::use_reference(const std::string& name) {
   reference_.use(name, settings_.scope);
   instruments_.set_reference(name);
-}
-
-/// The reference does not tell any more where the patient is: only a landmark does.
-void LiveWorkflow::take(ReferenceSensor::News news) {
-  if (news == ReferenceSensor::News::none) return;
-  doubt_registration(news == ReferenceSensor::News::moved ? words("why_reference_moved", reference_.name())
-                                                          : words("why_reference_lost", reference_.name()));
 }
 
 void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
@@ -220,26 +207,6 @@ void LiveWorkflow::follow_held_back() {
   update_setup();
 }
 
-/// Patient or transmitter may have been moved while nobody saw it: only a landmark tells. A reference sees it, and says
-/// so where it was lost meanwhile.
-void LiveWorkflow::note_pause(HostTime now) {
-  const bool paused = video_came_ && now - *video_came_ > kPause;
-  video_came_ = now;
-  if (paused && !reference_.in_use() && fiducials_.registered_or_held_back()) doubt_registration("");
-}
-
-void LiveWorkflow::doubt_registration(const std::string& why) {
-  if (!fiducials_.registered_or_held_back() && fiducials_.touches().empty()) return;
-  why_doubted_ = why;
-  fiducials_.doubt();
-  if (!fiducials_.registered_or_held_back()) return update_setup();
-  run_ = {};
-  checked_.reset();
-  check_ = {false, why};
-  (return_to_ ? *return_to_ : step_) = LiveStep::check;
-  update_setup();
-}
-
 bool LiveWorkflow::asks_for_instruments() const {
   return connection_.note().done && (calibration_.person_may_say() || fiducials_.person_may_say());
 }
@@ -247,39 +214,6 @@ bool LiveWorkflow::asks_for_instruments() const {
 void LiveWorkflow::confirm_instruments() {
   instruments_.vouch();
   judge_instruments();
-}
-
-/// The newest frame, if it is time for another check. Of a motion that is known the check goes on: it may pass.
-void LiveWorkflow::watch_surface(HostTime now) {
-  const auto seen_from = picture_.seen_from();
-  if (!seen_from) return;
-  std::optional<double> pose_mm;
-  if (const auto& hand_eye_mm = picture_.figures().scope.held_out_mm) {
-    // Of a pose, each axis: its position's error, or where its angles' too have the target, which the jitter counts.
-    const double one_mm = std::max(picture_.frame()->info.pose.position_sigma_mm,
-                                   picture_.jitter().rms_mm().value_or(0) / std::sqrt(3.0));
-    pose_mm = std::hypot(*hand_eye_mm, std::sqrt(2.0) * one_mm);  // this view's, and that of a kept one
-  }
-  watch_.offer({*picture_.frame(), *seen_from}, pose_mm, now);
-}
-
-void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
-  // The board's squares look alike, one after the other.
-  const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
-  if (!settings_.video_must_agree || !scope || !video_.take(frame, *scope)) return;
-  // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
-  if (video_.state() == VideoAgreement::differs && fiducials_.registered_or_held_back())
-    return doubt_registration(words("why_video_differs"));
-  update_setup();
-}
-
-void LiveWorkflow::take(const CheckedSurface& checked) {
-  if (!deformation_.found() || !motion_.take(checked)) return;
-  if (motion_.moved_mm()) {
-    views_.forget(words("note_views_organ_moved"));
-    strokes_.forget();
-  }
-  update_setup();
 }
 
 void LiveWorkflow::fit() {
@@ -471,26 +405,6 @@ void LiveWorkflow::primary(HostTime now) {
     case LiveStep::run:
       return hide_or_show_overlay();
   }
-}
-
-/// Somebody has looked. What the pointer says then is kept: of a landmark that was not fitted it tells how far the
-/// registration is off, and where that is too far nothing is confirmed.
-void LiveWorkflow::confirm_by_landmark() {
-  constexpr double kPointedAt_mm = 30;  // further away another place is meant
-  const auto reading = check_reading();
-  const bool pointed = reading && !reading->nearest.empty() && reading->distance_mm <= kPointedAt_mm;
-  if (pointed && !reading->fitted) {
-    if (reading->distance_mm > kMostCheckedOff_mm) {
-      check_ = {false, words("note_check_off", reading->distance_mm, reading->nearest)};
-      return;
-    }
-    checked_ = {reading->nearest, reading->distance_mm};
-    check_ = {false, words("note_checked", reading->distance_mm, reading->nearest)};
-  }
-  fiducials_.confirm();
-  why_doubted_.clear();
-  update_setup();
-  go_on();
 }
 
 void LiveWorkflow::stroke() {
