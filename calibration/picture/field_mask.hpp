@@ -4,7 +4,8 @@
 
 namespace birdseye {
 
-/// Inside the round field of any laparoscope: the radius of a circle about the picture's middle, of the picture's height.
+/// Inside the round field of any laparoscope: the radius of a circle about the picture's middle, of the picture's
+/// height.
 inline constexpr double kFieldShare = 0.42;
 
 /// White within that circle, black around it.

@@ -360,7 +360,7 @@ void LiveWorkflow::go_on() {
   if (!view().note(step_).done && (!may_be_skipped || deformation_.running())) return;
   // Nobody has looked yet whether what was taken up holds: that is not to be skipped.
   if (step_ == LiveStep::check && !fiducials_.confirmed()) return;
-  if (step_ == LiveStep::check) check_.done = true;
+  if (step_ == LiveStep::check) check_ = {true, checked_ ? check_.line : words("note_unchecked")};
   go_to(static_cast<LiveStep>(static_cast<int>(step_) + 1));
 }
 

@@ -83,6 +83,10 @@ double registration_error_mm(double fre_mm, std::span<const Eigen::Vector3d> fid
   return calibration::TargetError(fiducials_mm, localisation.upper95_mm).rms_mm(target_mm);
 }
 
+double times_apart_s(Duration time_sigma, bool latency_known) {
+  return std::hypot(time_sigma.seconds(), latency_known ? 0 : kUnknownLatency.seconds());
+}
+
 double ErrorBudget::rigid_mm() const {
   return std::sqrt(fiducials_mm * fiducials_mm + hand_eye_mm * hand_eye_mm + lens_mm * lens_mm + pose_mm * pose_mm +
                    time_mm * time_mm);
@@ -109,8 +113,7 @@ std::optional<ErrorBudget> error_budget(const CameraModel& camera, const FramePo
   const double pose_mm = std::max(std::sqrt(3.0) * pose.position_sigma_mm, pose.jitter_mm.value_or(0));
   const double counted_mm = pose_in_hand_eye_mm(out.hand_eye_mm, target_in_camera_mm, figures.scope);
   out.pose_mm = std::sqrt(std::max(0.0, pose_mm * pose_mm - counted_mm * counted_mm));
-  const double apart_s = std::hypot(pose.time_sigma.seconds(), pose.latency_known ? 0 : kUnknownLatency.seconds());
-  out.time_mm = pose.target_speed_mm_s.value_or(0) * apart_s;
+  out.time_mm = pose.target_speed_mm_s.value_or(0) * times_apart_s(pose.time_sigma, pose.latency_known);
   out.motion = figures.motion_error;
   return out;
 }

@@ -77,6 +77,9 @@ struct FramePose {
   bool latency_known = false;               ///< the frame's time is corrected by a measured latency
 };
 
+/// By how much the times of a frame and of its pose may differ, one sigma. time_sigma: as far as that is stated.
+double times_apart_s(Duration time_sigma, bool latency_known);
+
 /// How far off the target may be drawn, as the sum of what is known to add to it: root mean squares of the error's
 /// length in space, mm.
 struct ErrorBudget {

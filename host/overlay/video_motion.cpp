@@ -90,13 +90,13 @@ bool same(const ScopeSetup& a, const ScopeSetup& b) {
 
 struct VideoMotion::Waiting {
   DeviceTime at;
+  double times_apart_s = 0;  ///< of the frame and the poses
   cv::Mat grey;
-  double scale = 1;  ///< pixels of the frame in one of grey
 };
 
 struct VideoMotion::Key {
   DeviceTime at;
-  Transform<Camera, Tracker> camera_from_tracker;
+  SeenFrom from;
   std::vector<cv::Point2f> places;  ///< in the key's picture
   cv::Mat newest;                   ///< the last picture that they were followed to
   std::vector<cv::Point2f> now;     ///< and where they are in it
@@ -137,7 +137,7 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
   const DeviceTime at = frame.info.acquired;
   if (waiting_) {
     const auto newest = poses_.newest();
-    if (newest && *newest >= waiting_->at + kAverage) {
+    if (newest && *newest >= waiting_->at + kAverage + kAverage) {
       changed = look(*waiting_, scope);
       waiting_.reset();
     } else if (at - waiting_->at > kEvery || at < waiting_->at) {
@@ -151,31 +151,55 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
   auto next = std::make_unique<Waiting>();
   next->at = at;
   const cv::Mat rgb = mat_of(RgbView{*frame.rgb, frame.width_px, frame.height_px});
-  next->scale = std::max(1.0, static_cast<double>(frame.width_px) / kWorkingWidthPx);
+  next->times_apart_s = times_apart_s(
+      Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
+      frame.info.latency.has_value());
+  const double scale = std::max(1.0, static_cast<double>(frame.width_px) / kWorkingWidthPx);
   cv::Mat small;
-  cv::resize(rgb, small, {}, 1 / next->scale, 1 / next->scale, cv::INTER_AREA);
+  cv::resize(rgb, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
   cv::cvtColor(small, next->grey, cv::COLOR_RGB2GRAY);
   waiting_ = std::move(next);
   return changed;
 }
 
+std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& picture, const ScopeSetup& scope) const {
+  std::array<std::optional<Transform<Camera, Tracker>>, 3> at;  // before, at and after the picture
+  for (int i = -1; i <= 1; ++i) {
+    const PoseAnswer pose = poses_.at(picture.at + Duration{i * kAverage.ns});
+    if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) return std::nullopt;
+    at[static_cast<std::size_t>(i + 1)] = scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
+  }
+  SeenFrom out{*at[1]};
+  // Where the camera speeds up the average of its poses is off, and where it is fast so is what it sees of another
+  // time.
+  const Transform<Tracker, Camera> back = at[1]->inverse();
+  for (const Eigen::Vector3d& place_mm : {Eigen::Vector3d(0, 0, 100), Eigen::Vector3d(40, 0, 100)}) {
+    const Eigen::Vector3d before = *at[0] * (back * place_mm), after = *at[2] * (back * place_mm);
+    if (!(before.z() > kNearest_mm && after.z() > kNearest_mm)) return std::nullopt;
+    const Eigen::Vector2d from = before.hnormalized(), to = after.hnormalized(), middle = place_mm.hnormalized();
+    const double bend = ((from + to) / 2 - middle).norm();
+    const double rate_s = (to - from).norm() / (2 * kAverage.seconds());
+    out.unsure_px =
+        std::max(out.unsure_px, scope.camera().fx_px * std::hypot(bend, 2 * rate_s * picture.times_apart_s));
+  }
+  return out;
+}
+
 /// True: state() is another now.
 bool VideoMotion::look(const Waiting& picture, const ScopeSetup& scope) {
-  const PoseAnswer pose = poses_.at(picture.at);
-  if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) {
+  const auto from = seen_from(picture, scope);
+  if (!from) {
     key_.reset();
     return false;
   }
-  const Transform<Camera, Tracker> camera_from_tracker =
-      scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
   if (key_) follow(picture);
   const VideoAgreement before = state_;
-  const bool told = key_ && key_->places.size() >= kFewest && judge(camera_from_tracker, scope);
+  const bool told = key_ && key_->places.size() >= kFewest && judge(*from, scope);
   if (key_ && key_->places.size() >= kFewest && picture.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
     return state_ != before;
   key_ = std::make_unique<Key>();
   key_->at = picture.at;
-  key_->camera_from_tracker = camera_from_tracker;
+  key_->from = *from;
   cv::goodFeaturesToTrack(picture.grey, key_->places, kPlaces, 0.01, 8, places_allowed(picture.grey));
   key_->now = key_->places;
   key_->newest = picture.grey;
@@ -206,7 +230,7 @@ void VideoMotion::follow(const Waiting& picture) {
 }
 
 /// True: the picture does not agree.
-bool VideoMotion::judge(const Transform<Camera, Tracker>& now, const ScopeSetup& scope) {
+bool VideoMotion::judge(const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return false;  // nothing says how far off a picture may be
   const CameraModel& camera = scope.camera();
@@ -221,7 +245,7 @@ bool VideoMotion::judge(const Transform<Camera, Tracker>& now, const ScopeSetup&
     if (then && later) places.push_back({*then, *later});
   }
   if (places.size() < kFewest) return false;
-  const Relative motion = now * key_->camera_from_tracker.inverse();
+  const Relative motion = now.camera_from_tracker * key_->from.camera_from_tracker.inverse();
   const auto off = median_off(places, motion);
   if (!off) return false;
   off_px_ = *off * camera.fx_px;
@@ -232,8 +256,9 @@ bool VideoMotion::judge(const Transform<Camera, Tracker>& now, const ScopeSetup&
     if (right && left) otherwise_px[static_cast<std::size_t>(axis)] = std::min(*right, *left) * camera.fx_px;
   }
   // The errors of hand-eye and of two poses, of two axes, with a probability of 99.9 %, for many pictures are asked;
-  // how well a place is found; and what of the motion itself is not as it is modelled.
-  const double still_px = std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale);
+  // how well a place is found; how sure the two poses are; and what of the motion itself is not as it is modelled.
+  const double still_px =
+      std::hypot(std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale), now.unsure_px + key_->from.unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;

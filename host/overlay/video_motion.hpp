@@ -37,10 +37,16 @@ class VideoMotion {
   void reset();
   struct Key;
   struct Waiting;
+  /// Where a picture was seen from.
+  struct SeenFrom {
+    Transform<Camera, Tracker> camera_from_tracker;
+    double unsure_px = 0;  ///< how far the camera's motion may have places off
+  };
 
+  [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& picture, const ScopeSetup& scope) const;
   bool look(const Waiting& picture, const ScopeSetup& scope);
   void follow(const Waiting& picture);
-  bool judge(const Transform<Camera, Tracker>& now, const ScopeSetup& scope);
+  bool judge(const SeenFrom& now, const ScopeSetup& scope);
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
   PoseHistory poses_;

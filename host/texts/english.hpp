@@ -194,6 +194,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"from_nearest", "{:.1f} mm from {}"},
     {"from_fitted", "{:.1f} mm from {}, which the registration was fitted to: point at one that was not touched."},
     {"note_checked", "{:.1f} mm from {}"},
+    {"note_unchecked", "gone on without a landmark"},
     {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 
     // Run, and how the overlay is drawn
@@ -319,9 +320,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_predicted", "the pose is predicted {:.0f} ms ahead"},
     {"why_scatter", "the tracker scatters by {:.1f} mm"},
     {"why_video_differs",
-     "the video does not move as the scope's poses say (scope turned or exchanged, or something has moved): check a "
-     "landmark in step 6, or calibrate"},
-    {"why_video_untold", "the video has not shown yet that it moves as the scope's poses say: move the scope about"},
+     "video and poses do not agree: move the scope slowly; if that does not help, check a landmark or calibrate"},
+    {"why_video_untold", "move the scope about: the video has not shown yet that it goes with the scope's poses"},
     {"why_moved", "the organ has moved since the views ({:.0f} mm): keep views anew (or undo the deformation)"},
     {"check_unknown_surface", "how well the deformed surface is known was not estimated"},
     {"check_unknown_hand_eye", "how far hand-eye is off in mm is not known"},

@@ -157,7 +157,7 @@ void with_reference(Rehearsal& o) {
   o.reference_name = "reference";
 }
 
-constexpr const char* kVideo = "the video does not move as the scope's poses say";
+constexpr const char* kVideo = "video and poses do not agree";
 
 std::vector<Row> of_registration() {
   const auto row = [](const char* lie, Must must, const char* say, const Lie& tell, const char* note = "") {

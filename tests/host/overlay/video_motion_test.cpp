@@ -29,7 +29,9 @@ ScopeSetup scope_with(const Transform<Camera, Sensor>& camera_from_sensor) {
 struct LookingAbout {
   Transform<Camera, Sensor> camera_from_sensor{rotation_exp(Vector(0.2, -0.1, 0.4)), Vector(5, -3, -300)};
   Transform<Camera, Sensor> told = camera_from_sensor;
-  double haste = 1;                                 ///< 0: it rests
+  double haste = 1;   ///< 0: it rests
+  double late_s = 0;  ///< of the pictures' stamps
+  bool latency_measured = true;
   std::function<Vector(double t_s)> scene_moves{};  ///< against the tracker
   bool pattern = true;
   VideoMotion motion;
@@ -52,7 +54,8 @@ struct LookingAbout {
                                              Vector(sensor.translation() + normal3(position_mm))));
       if (i % 4 != 0) continue;
       wire::VideoFrame frame;
-      frame.info.acquired = {std::llround(t_s * 1e9)};
+      frame.info.acquired = {std::llround((t_s + late_s) * 1e9)};
+      if (latency_measured) frame.info.latency = Duration{0};
       frame.width_px = kScope.width_px;
       frame.height_px = kScope.height_px;
       const Vector moved = scene_moves ? scene_moves(t_s) : Vector::Zero().eval();
@@ -114,6 +117,19 @@ TEST(VideoMotion, WhatMovesIsSeenAndHasToAgreeTwiceAsOftenAfter) {
   EXPECT_EQ(about.motion.state(), VideoAgreement::differs) << "half a second is not enough to believe it again";
   about.look(11.5, 20);
   EXPECT_EQ(about.motion.state(), VideoAgreement::agrees);
+}
+
+/// A grabber hands its pictures on 20 ms late, and a scope moves fast.
+TEST(VideoMotion, ALatencyThatNobodyMeasuredIsNoHandEyeThatIsOff) {
+  for (const bool measured : {false, true}) {
+    LookingAbout about;
+    about.haste = 3;
+    about.late_s = 0.02;
+    about.latency_measured = measured;
+    about.look(0, 20);
+    // Where it is said to have been measured, the stamps are wrong.
+    EXPECT_EQ(about.motion.state() == VideoAgreement::differs, measured);
+  }
 }
 
 TEST(VideoMotion, AnotherCalibrationBeginsAnew) {
