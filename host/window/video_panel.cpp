@@ -73,14 +73,15 @@ void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
                 ImGui::GetColorU32(colour(colour_of(Grade::marginal, theme))), unseen.c_str());
 }
 
-/// Where the target is drawn, and how far from there it may be. Gives what that takes of the screen.
-ScreenBox draw_target(const TargetMark& mark, ImVec2 corner, float fit, float scale) {
+/// Where the target is drawn, and how far from there it may be. checked: by a landmark. Gives what that takes of the
+/// screen.
+ScreenBox draw_target(const TargetMark& mark, bool checked, ImVec2 corner, float fit, float scale) {
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const ImVec2 middle(corner.x + fit * static_cast<float>(mark.at_px.x() + 0.5),
                       corner.y + fit * static_cast<float>(mark.at_px.y() + 0.5));
   const float radius = fit * static_cast<float>(mark.radius_px);
   const Theme& theme = theme_over_video();
-  const ImU32 ink = ImGui::GetColorU32(colour(mark.error.motion ? theme.good : theme.warn));
+  const ImU32 ink = ImGui::GetColorU32(colour(mark.error.motion && checked ? theme.good : theme.warn));
   list->AddCircle(middle, radius, IM_COL32(0, 0, 0, 160), 0, 3.5F * scale);
   list->AddCircle(middle, radius, ink, 0, 1.5F * scale);
   const std::string text = mark.error.motion ? words("target_error", mark.error.radius95_mm())
@@ -146,7 +147,8 @@ void draw_picture(PanelContext& context, ImVec2 from, ImVec2 size) {
     const ImVec2 corner(from.x + (size.x - shape.x) / 2, from.y + (size.y - shape.y) / 2);
     ImGui::SetCursorScreenPos(corner);
     ImGui::Image(texture(context.window.picture(LiveWindow::Slot::video)), shape);
-    if (context.operation.target && shown.overlaid) target = draw_target(*context.operation.target, corner, fit, scale);
+    if (context.operation.target && shown.overlaid)
+      target = draw_target(*context.operation.target, context.operation.checked.has_value(), corner, fit, scale);
   }
   draw_banner(context, from, size.x);
   const float legend_high = draw_margin_legend(context, ImVec2(from.x + gap, from.y + size.y - gap));
