@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <utility>
@@ -164,10 +165,10 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
 
 std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& picture, const ScopeSetup& scope) const {
   std::array<std::optional<Transform<Camera, Tracker>>, 3> at;  // before, at and after the picture
-  for (int i = -1; i <= 1; ++i) {
-    const PoseAnswer pose = poses_.at(picture.at + Duration{i * kAverage.ns});
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const PoseAnswer pose = poses_.at(picture.at + Duration{(static_cast<std::int64_t>(i) - 1) * kAverage.ns});
     if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) return std::nullopt;
-    at[static_cast<std::size_t>(i + 1)] = scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
+    at[i] = scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
   }
   SeenFrom out{*at[1]};
   // Where the camera speeds up the average of its poses is off, and where it is fast so is what it sees of another
