@@ -8,6 +8,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/base/verdict.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/round_field.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::calibration {
@@ -30,7 +31,8 @@ struct LensEntry {
   /// Of fx fy cx cy k1 k2 p1 p2 k3; rows of terms that were not solved for are zero.
   Eigen::Matrix<double, CameraModel::kParameters, CameraModel::kParameters> covariance;
   double rms_px = 0, held_out_px = 0;
-  std::optional<double> rod_angle_deg;  ///< of an oblique scope, against the camera head
+  std::optional<double> rod_angle_deg;    ///< of an oblique scope, against the camera head
+  std::optional<RoundField> round_field;  ///< as its pictures showed it; empty: they showed no edge, or nobody looked
 };
 
 /// How the rod of an oblique scope turns in the camera head: the model of RodScope. Angles as the person read them off.

@@ -39,10 +39,12 @@ struct CameraInput {
   int width_px = 0, height_px = 0;
   std::string note;             ///< how the pattern was read, where otherwise than told
   std::vector<fs::path> files;  ///< the pictures, for the report
+  std::optional<RoundField> round_field;
 };
 
 CameraInput input_of_views(PictureViews views) {
-  CameraInput out{std::move(views.used), {}, views.width_px, views.height_px, views.note, std::move(views.files)};
+  CameraInput out{std::move(views.used), {}, views.width_px, views.height_px, views.note, std::move(views.files),
+                  views.round_field};
   for (const auto& [name, reason] : views.rejected) out.rejected.push_back({0, name, reason});
   return out;
 }
@@ -97,8 +99,9 @@ void finish_without(const CameraOptions& options, const Error& error, const Came
   finish_calibration(options.paths, {}, std::move(json), HtmlPage("Camera calibration"), verdict, status);
 }
 
-void finish_with(const CameraOptions& options, const CameraCalibration& found, nlohmann::json json, HtmlPage page,
-                 const Verdict& verdict, CommandStatus& status) {
+void finish_with(const CameraOptions& options, const CameraInput& input, const CameraCalibration& found,
+                 nlohmann::json json, HtmlPage page, const Verdict& verdict, CommandStatus& status) {
+  if (input.round_field) json["round_field_radius_px"] = input.round_field->radius_px;
   if (options.rod_angle_deg) json["rod_angle_deg"] = *options.rod_angle_deg;
   std::string made_from =
       fmt::format("{}, {} views", options.board.empty() ? options.points.string() : options.board, found.views.size());
@@ -107,8 +110,9 @@ void finish_with(const CameraOptions& options, const CameraCalibration& found, n
     made_from += fmt::format(", pixel aspect {:.4g}", found.pixel_aspect);
   }
   const RecordEntry entry{made_from, [&](CalibrationRecord& record, const Provenance& provenance) {
-                            enter_lens(record, {provenance, found.camera, name_of(found.model), found.covariance,
-                                                found.rms_px, found.held_out_px, options.rod_angle_deg});
+                            enter_lens(record,
+                                       {provenance, found.camera, name_of(found.model), found.covariance, found.rms_px,
+                                        found.held_out_px, options.rod_angle_deg, input.round_field});
                           }};
   finish_calibration(options.paths, lens_text(found), std::move(json), std::move(page), verdict, status, entry);
 }
@@ -127,7 +131,7 @@ void calibrate_one(const CameraOptions& options, const CameraCalibrationSettings
   add_camera_to(page, *found, input.files);
   Verdict verdict = judge_camera(*found);
   tell_note(input, verdict);
-  finish_with(options, *found, camera_json(*found), std::move(page), verdict, status);
+  finish_with(options, input, *found, camera_json(*found), std::move(page), verdict, status);
 }
 
 /// All views, pictures in which nothing was found among them, that their partners may be told.
@@ -178,7 +182,7 @@ void calibrate_two(const CameraOptions& options, const CameraCalibrationSettings
   } else {
     for (const auto& path : {options.right_out, options.right_from_left_out}) tell_not_written(path);
   }
-  finish_with(options, found->left, std::move(json), std::move(page), verdict, status);
+  finish_with(options, left, found->left, std::move(json), std::move(page), verdict, status);
 }
 
 void run_camera(const CameraOptions& options, CommandStatus& status) {

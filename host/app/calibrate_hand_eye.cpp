@@ -199,6 +199,7 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
     }
     out.lens = std::move(session->lens);
   }
+  out.round_field = session->round_field;
   return out;
 }
 
@@ -215,7 +216,7 @@ RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecord
             if (const auto& lens = recording.lens) {
               record.hand_eye.reset();  // the new one is entered below
               enter_lens(record, {provenance, lens->camera, name_of(lens->model), lens->covariance, lens->rms_px,
-                                  lens->held_out_px, std::nullopt});
+                                  lens->held_out_px, std::nullopt, recording.round_field});
             }
             const calibration::HandEyeResult& r = found.result;
             record.hand_eye = calibration::HandEyeEntry{provenance,    r.camera_from_sensor, r.covariance, r.rms_px,

@@ -8,6 +8,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/camera/camera_calibration.hpp"
+#include "calibration/geometry/round_field.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "host/files/pose_files.hpp"
 
@@ -35,6 +36,7 @@ struct HandEyeRecording {
   std::vector<std::string> pictures;                   ///< names of all that were read, used or not
   std::vector<std::filesystem::path> picture_files;    ///< theirs, for the report; none of points found before
   std::optional<calibration::CameraCalibration> lens;  ///< calibrated from the same images; of a stereo scope, the left
+  std::optional<RoundField> round_field;               ///< that the same images agree on; empty: they show no edge
   Verdict camera_verdict;                              ///< on that
   double stream_offset_s =
       0;  ///< offset of two streams' clocks, found from their motion; the solver's offset adds to it

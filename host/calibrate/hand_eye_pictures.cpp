@@ -148,6 +148,7 @@ Result<void> read_hand_eye_pictures(const HandEyeFiles& files, HandEyeRecording&
   if (!pictures->note.empty()) out.notes.push_back(pictures->note);
   for (const auto& rejected : pictures->rejected) out.notes.push_back(rejected.name + ": " + rejected.reason);
   out.picture_files = pictures->files;
+  out.round_field = pictures->round_field;
   const std::vector<PatternView> left = every_view(*pictures);
   std::optional<RightPictures> right;
   if (!files.right_images.empty() || !files.right_points.empty()) {

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/detect/detect.hpp"
+#include "calibration/picture/field_edge.hpp"
 #include "host/files/name_order.hpp"
 #include "host/files/name_pattern.hpp"
 #include "host/files/picture.hpp"
@@ -78,6 +79,7 @@ Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or
 struct Looked {
   int width_px = 0, height_px = 0;  // 0: not read
   calibration::Detection detection;
+  std::optional<RoundField> round_field;
 };
 
 /// The picture as square pixels would show it: the axis along which pixels are longer gets more of them.
@@ -104,6 +106,8 @@ Looked look(const calibration::Pattern& pattern, const fs::path& path, double pi
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;
+  if (grey.isContinuous())
+    looked.round_field = calibration::find_round_field({{grey.data, grey.total()}, grey.cols, grey.rows});
   const cv::Mat square = with_square_pixels(grey, pixel_aspect);
   looked.detection =
       detect(pattern, {{square.data, square.total()}, square.cols, square.rows}, path.filename().string());
@@ -191,6 +195,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
   if (const std::string note = inset_note(pattern, looked); !note.empty())
     views.note += fmt::format("{}{}", views.note.empty() ? "" : "; ", note);
   std::string first;
+  std::vector<RoundField> fields;
   for (std::size_t i = 0; i < looked.size(); ++i) {
     const std::string name = (*pictures)[i].filename().string();
     Looked& one = looked[i];
@@ -207,6 +212,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
                    fmt::format("{} is {}x{} px and {} is {}x{} px: give pictures of one camera mode", first,
                                views.width_px, views.height_px, name, one.width_px, one.height_px)};
     }
+    if (one.round_field) fields.push_back(*one.round_field);
     if (one.detection.view) {
       views.used.push_back(std::move(*one.detection.view));
     } else {
@@ -214,6 +220,7 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
     }
   }
   if (first.empty()) return none_readable(views.rejected);
+  views.round_field = calibration::agreed_round_field(fields, looked.size());
   return views;
 }
 
@@ -222,7 +229,7 @@ Result<PictureViews> read_found_views(const fs::path& folder, const std::string&
   if (!views) return views.error();
   const auto px = size.empty() ? size_beside(folder) : size_of(size);
   if (!px) return px.error();
-  return PictureViews{*std::move(views), {}, px->x(), px->y(), {}, {}};
+  return PictureViews{*std::move(views), {}, px->x(), px->y(), {}, {}, {}};
 }
 
 std::string picture_of_view(const std::vector<fs::path>& files, const std::string& view) {

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibration/base/result.hpp"
 #include "calibration/detect/pattern.hpp"
 #include "calibration/detect/pattern_view.hpp"
+#include "calibration/geometry/round_field.hpp"
 
 namespace birdseye::host {
 
@@ -19,6 +21,7 @@ struct PictureViews {
   int width_px = 0, height_px = 0;
   std::string note;  ///< that the pattern was read otherwise than it was told; empty where it was not
   std::vector<std::filesystem::path> files;  ///< of all pictures, for reports; empty where points were found before
+  std::optional<RoundField> round_field;     ///< that the pictures agree on; empty: they show no edge
 };
 
 /// The picture of a view, made small enough for a page, as data_url() gives it; empty where no file or more than one

@@ -6,6 +6,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/base/verdict.hpp"
 #include "calibration/camera/camera_calibration.hpp"
+#include "calibration/geometry/round_field.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 
 namespace birdseye::host {
@@ -15,6 +16,7 @@ struct GuidedStations {
   calibration::HandEyeInput input;
   int width_px = 0, height_px = 0;
   std::optional<calibration::CameraCalibration> lens;  ///< where it was found here
+  std::optional<RoundField> round_field;               ///< that their pictures agree on; empty: they show no edge
   std::string lens_fault;                              ///< why none was, in words
   std::string ended;                                   ///< why, in words
 };

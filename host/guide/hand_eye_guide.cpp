@@ -4,6 +4,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/hand_eye/view_pose.hpp"
+#include "calibration/picture/field_edge.hpp"
 #include "drivers/system/clock.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
@@ -85,6 +86,7 @@ GuidedStations HandEyeGuide::finish() {
   if (const std::string words = stations_.rests().left_out_words(); !words.empty()) tell_.lasting(words);
   tell_.lasting(words("guide_working_out", session_.ended));
   find_lens_or_say({});
+  session_.round_field = calibration::agreed_round_field(round_fields_, session_.input.stations.size());
   return std::move(session_);
 }
 
@@ -101,6 +103,10 @@ Result<void> HandEyeGuide::add(LiveStation taken) {
   const std::size_t number = session_.input.stations.size() + 1;
   taken.view.name = fmt::format("station {}", number);
   if (auto kept = keep(taken, number); !kept) return kept;
+  const wire::VideoFrame& frame = taken.frame;
+  const auto grey = grey_of({*frame.rgb, frame.width_px, frame.height_px});
+  if (const auto field = calibration::find_round_field({grey, frame.width_px, frame.height_px}))
+    round_fields_.push_back(*field);
   state_.stations = number;
   tell_.lasting(words("guide_station", number, taken.view.points_px.size()));
   HandEyeStation station;

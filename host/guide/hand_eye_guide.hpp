@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "calibration/detect/pattern.hpp"
 #include "device/wire/messages.hpp"
@@ -62,6 +63,7 @@ class HandEyeGuide {
   HostTime next_look_;
   Eigen::Vector3d extent_mm_;
   GuidedStations session_;
+  std::vector<RoundField> round_fields_;  ///< of the stations whose picture shows an edge
   GuideState state_;
 };
 

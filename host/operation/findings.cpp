@@ -29,7 +29,8 @@ Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, cons
   const auto& lens = found.stations.lens;
   return CalibratedScope{
       ScopeSetup::of_hand_eye(*found.stations.input.camera, lens ? std::optional(lens->rms_px) : std::nullopt,
-                              found.hand_eye, lens ? std::optional(lens->covariance) : std::nullopt),
+                              found.hand_eye, lens ? std::optional(lens->covariance) : std::nullopt)
+          .with_round_field(found.stations.round_field),
       made_utc, true};
 }
 

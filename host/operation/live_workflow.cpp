@@ -286,6 +286,7 @@ void LiveWorkflow::update_setup() {
   if (deformed != nullptr) figures.motion_error = deformed->target;
   figures.moved_mm = motion_.moved_mm();
   if (settings_.video_must_agree) figures.video = video_.state();
+  figures.field = field_.state();
   picture_.set_setup(turned.registered(registered->tracker_from_patient), figures);
 }
 

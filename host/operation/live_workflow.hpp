@@ -20,6 +20,7 @@
 #include "host/operation/reference_sensor.hpp"
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
+#include "host/overlay/field_watch.hpp"
 #include "host/overlay/live_picture.hpp"
 #include "host/overlay/video_motion.hpp"
 
@@ -161,6 +162,7 @@ class LiveWorkflow {
   SurfaceWatch watch_;
   OrganMotion motion_;
   VideoMotion video_;
+  FieldWatch field_;
   std::optional<CheckedLandmark> checked_;  ///< of the registration and the deformation that are shown
   StepNote check_, run_;
   OperationKeeper keeper_;

@@ -62,6 +62,7 @@ void LiveWorkflow::watch_surface(HostTime now) {
 void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   // The board's squares look alike, one after the other.
   const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
+  if (scope && field_.take(frame, *scope)) update_setup();
   if (!settings_.video_must_agree || !scope || !video_.take(frame, *scope)) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
   if (video_.state() == VideoAgreement::differs && fiducials_.registered_or_held_back())

@@ -25,6 +25,8 @@ std::string OverlayGate::doubt_of_figures() const {
 std::string OverlayGate::doubt(const PoseAnswer& pose, const std::optional<ErrorBudget>& expected) const {
   if (!pose.tracker_from_sensor) return pose.reason.empty() ? words("why_no_pose") : pose.reason;
   if (std::string why = doubt_of_figures(); !why.empty()) return why;
+  if (figures_.field == calibration::FieldSize::larger) return words("why_zoomed_in");
+  if (figures_.field == calibration::FieldSize::smaller) return words("why_zoomed_out");
   if (figures_.video == VideoAgreement::differs) return words("why_video_differs");
   if (figures_.video == VideoAgreement::untold) return words("why_video_untold");
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {

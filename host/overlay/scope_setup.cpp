@@ -43,6 +43,7 @@ std::optional<ScopeSetup> ScopeSetup::of_record(const calibration::CalibrationRe
   if (!record.lens || !record.hand_eye) return std::nullopt;
   ScopeSetup out;
   out.camera_ = record.lens->camera;
+  out.round_field_ = record.lens->round_field;
   out.camera_from_sensor_ = record.hand_eye->camera_from_sensor;
   out.figures_ = {record.lens->rms_px, if_measured(record.hand_eye->held_out_px), record.hand_eye->held_out_mm};
   if (!record.lens->covariance.isZero(0)) out.figures_.camera_covariance = record.lens->covariance;
@@ -67,6 +68,12 @@ ScopeSetup ScopeSetup::turned_to(double rod_angle_deg) const {
     constexpr double kSameAngle_deg = 2;
     out.figures_.rod_angle_missing = !(std::abs(std::remainder(turned_deg, 360)) <= kSameAngle_deg);
   }
+  return out;
+}
+
+ScopeSetup ScopeSetup::with_round_field(const std::optional<RoundField>& field) const {
+  ScopeSetup out = *this;
+  out.round_field_ = field;
   return out;
 }
 

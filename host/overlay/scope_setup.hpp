@@ -7,6 +7,7 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/rod.hpp"
+#include "calibration/geometry/round_field.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "host/overlay/trust.hpp"
 
@@ -66,11 +67,15 @@ class ScopeSetup {
   [[nodiscard]] const CameraModel& camera() const { return camera_; }
   [[nodiscard]] const Transform<Camera, Sensor>& camera_from_sensor() const { return camera_from_sensor_; }
   [[nodiscard]] const ScopeFigures& figures() const { return figures_; }
+  /// As the lens's pictures showed it; empty: nothing says so.
+  [[nodiscard]] const std::optional<RoundField>& round_field() const { return round_field_; }
   /// How well the lens is known; empty: nothing says so.
   [[nodiscard]] const std::optional<CameraMatrix>& camera_covariance() const { return figures_.camera_covariance; }
   /// The same scope with its rod at an angle, as a person reads it off. A scope without a rod stays as it is; one that
   /// was calibrated at one angle only holds at that angle, give or take two degrees.
   [[nodiscard]] ScopeSetup turned_to(double rod_angle_deg) const;
+  /// The same scope, of whose lens the edge of the picture's round field is known.
+  [[nodiscard]] ScopeSetup with_round_field(const std::optional<RoundField>& field) const;
   /// Whether the scope's rod can be at other angles than now.
   [[nodiscard]] bool has_rod() const { return rod_.has_value(); }
   /// At which the rod was when the scope was calibrated; 0 without a rod.
@@ -87,6 +92,7 @@ class ScopeSetup {
   ScopeSetup() = default;
 
   CameraModel camera_;
+  std::optional<RoundField> round_field_;
   Transform<Camera, Sensor> camera_from_sensor_;
   std::optional<Rod> rod_;
   ScopeFigures figures_;

@@ -13,6 +13,10 @@ namespace {
 // half a frame of 25 Hz.
 constexpr Duration kUnknownLatency = Duration::from_ms(20);
 
+// Hand-eye's error is estimated of some twenty stations, two axes each: with a probability of 95 % it is no more than
+// so many times that, by chi-square with 40 degrees of freedom.
+constexpr double kOfFewStations = 1.23;
+
 /// Of a covariance of hand-eye, the error of a point straight ahead across the line of sight, each axis.
 double across_mm(const Eigen::Matrix<double, 6, 6>& covariance, double distance_mm) {
   Eigen::Matrix<double, 2, 6> by = Eigen::Matrix<double, 2, 6>::Zero();  // turned by w, (0, 0, d) goes by w x (0, 0, d)
@@ -107,11 +111,12 @@ std::optional<ErrorBudget> error_budget(const CameraModel& camera, const FramePo
   const Eigen::Vector3d target_in_camera_mm = pose.camera_from_patient * *figures.target_in_patient_mm;
   ErrorBudget out;
   out.fiducials_mm = *figures.target_mm;
-  out.hand_eye_mm = hand_eye_error_mm(camera, target_in_camera_mm, figures.scope);
+  const double hand_eye_mm = hand_eye_error_mm(camera, target_in_camera_mm, figures.scope);
+  out.hand_eye_mm = kOfFewStations * hand_eye_mm;
   out.lens_mm = lens_error_mm(camera, target_in_camera_mm, figures.scope);
   // A pose's own sigma is an axis's, and counts what the hand may have done since; the jitter counts the angles.
   const double pose_mm = std::max(std::sqrt(3.0) * pose.position_sigma_mm, pose.jitter_mm.value_or(0));
-  const double counted_mm = pose_in_hand_eye_mm(out.hand_eye_mm, target_in_camera_mm, figures.scope);
+  const double counted_mm = pose_in_hand_eye_mm(hand_eye_mm, target_in_camera_mm, figures.scope);
   out.pose_mm = std::sqrt(std::max(0.0, pose_mm * pose_mm - counted_mm * counted_mm));
   out.time_mm = pose.target_speed_mm_s.value_or(0) * times_apart_s(pose.time_sigma, pose.latency_known);
   out.motion = figures.motion_error;

@@ -7,6 +7,7 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/picture/field_edge.hpp"
 #include "calibration/time/clock.hpp"
 
 namespace birdseye::host {
@@ -55,6 +56,8 @@ struct TrustFigures {
   std::optional<double> moved_mm = std::nullopt;
   /// Empty: nobody looks, as where there is no video that moves.
   std::optional<VideoAgreement> video = std::nullopt;
+  /// Of the video, against the lens's calibration.
+  calibration::FieldSize field = calibration::FieldSize::cannot_tell;
 };
 
 /// The one place where a figure that nobody knows counts as perfect: whoever gives a lens, a hand-eye or a pose in

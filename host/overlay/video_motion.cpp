@@ -19,7 +19,7 @@ namespace {
 
 using Relative = Transform<Camera, Camera>;
 
-constexpr Duration kEvery = Duration::from_ms(200), kLongest = Duration::from_ms(3000);
+constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms(3000);
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
 constexpr int kWorkingWidthPx = 320;                  // more tells no more of the motion, and takes longer
 constexpr std::size_t kPlaces = 80, kFewest = 15;
@@ -107,6 +107,12 @@ struct VideoMotion::Key {
 VideoMotion::VideoMotion() : poses_(averaged_poses()) {}
 
 VideoMotion::~VideoMotion() = default;
+
+/// What has agreed before tells nothing of what comes.
+void VideoMotion::forget_agreement() {
+  told_ = {};
+  state_ = VideoAgreement::untold;
+}
 
 void VideoMotion::reset() {
   waiting_.reset();
@@ -224,7 +230,10 @@ void VideoMotion::follow(const Waiting& picture) {
     key_->now[kept++] = there[i];
   }
   // Where most are lost at once the picture is another, and what is left is chance.
-  if (2 * kept < there.size()) return key_.reset();
+  if (2 * kept < there.size()) {
+    if (state_ == VideoAgreement::agrees) forget_agreement();
+    return key_.reset();
+  }
   key_->places.resize(kept);
   key_->now.resize(kept);
   key_->newest = picture.grey;
@@ -263,7 +272,11 @@ bool VideoMotion::judge(const SeenFrom& now, const ScopeSetup& scope) {
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
-    if (odd_ < kOddInRow) return true;
+    if (odd_ < kOddInRow) {
+      // The next picture tells. Until then nothing says that this one is right.
+      if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::untold;
+      return true;
+    }
     if (state_ != VideoAgreement::differs) wanted_ = std::min(2 * wanted_, kMostWanted);
     state_ = VideoAgreement::differs;
     told_ = {};

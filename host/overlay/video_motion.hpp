@@ -25,7 +25,7 @@ class VideoMotion {
 
   /// A pose of the scope's sensor, as they come.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
-  /// A frame, as they come, and the scope that took it; of another than before all is forgotten. Five a second are
+  /// A frame, as they come, and the scope that took it; of another than before all is forgotten. Ten a second are
   /// looked at, each once the poses after it have come. True: state() is another now.
   bool take(const wire::VideoFrame& frame, const ScopeSetup& scope);
 
@@ -35,6 +35,7 @@ class VideoMotion {
 
  private:
   void reset();
+  void forget_agreement();
   struct Key;
   struct Waiting;
   /// Where a picture was seen from.

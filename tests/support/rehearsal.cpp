@@ -11,7 +11,9 @@
 
 #include "calibration/camera/camera_calibration.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "calibration/picture/field_edge.hpp"
 #include "drivers/system/wait.hpp"
+#include "host/files/picture.hpp"
 #include "hw-sim/minibird/record_encoder.hpp"
 #include "tests/support/board_views.hpp"
 #include "tests/support/hand_eye_bench.hpp"
@@ -64,6 +66,7 @@ calibration::CalibrationRecord calibrated(unsigned seed, const RehearsedNoise& n
                                        smaller(found_lens->covariance),
                                        found_lens->rms_px / kSmaller,
                                        found_lens->rms_px / kSmaller,
+                                       std::nullopt,
                                        std::nullopt};
   record.hand_eye = calibration::HandEyeEntry{provenance,
                                               found->camera_from_sensor,
@@ -92,7 +95,11 @@ Rehearsal::Rehearsal(unsigned seed, const RehearsedNoise& noise) : noise_(noise)
   markers_mm = truth.fiducials_mm;
   landmark_mm = truth.target_mm;
   record = calibrated(seed, noise_, truth);
-  scene_ = std::make_unique<TexturedScene>(truth.target_mm);
+  // A field that the sensor holds from side to side, and cuts above and below.
+  scene_ = std::make_unique<TexturedScene>(truth.target_mm, 0.46 * truth.lens.width_px / truth.lens.fx_px);
+  const auto first = scene_->picture(truth.lens, true_view());
+  const auto grey = host::grey_of(RgbView{first, truth.lens.width_px, truth.lens.height_px});
+  record.lens->round_field = calibration::find_round_field(GreyView{grey, truth.lens.width_px, truth.lens.height_px});
   tracker = {{"model", "miniBIRD 800"}, {"unit_serial", "4711"}};
   camera = {{"card", "Storz"}, {"serial", "A1"}};
   record.tracker = tracker;

@@ -64,7 +64,8 @@ std::vector<std::uint8_t> TexturedScene::picture(const CameraModel& camera,
     for (int y = 0; y < camera.height_px; ++y) {
       for (int x = 0; x < camera.width_px; ++x) {
         const auto ray = unproject(camera, Eigen::Vector2d(x, y));
-        rays_.push_back(ray ? ray->normalized() : Eigen::Vector3d::Zero());
+        const bool seen = ray && (field_ == 0 || ray->head<2>().norm() < field_);
+        rays_.push_back(seen ? ray->normalized() : Eigen::Vector3d::Zero());
       }
     }
   }

@@ -14,7 +14,8 @@ namespace birdseye::testing {
 class TexturedScene {
  public:
   /// middle_mm: of both, in the patient's frame.
-  explicit TexturedScene(const Eigen::Vector3d& middle_mm) : middle_mm_(middle_mm) {}
+  /// field: of the scope that looks, the tangent of half its angle; it is dark around. 0: no edge is seen.
+  explicit TexturedScene(const Eigen::Vector3d& middle_mm, double field = 0) : middle_mm_(middle_mm), field_(field) {}
 
   /// moved_mm: of the thing within, not of the room. The picture is RGB, rows from the top.
   std::vector<std::uint8_t> picture(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
@@ -22,6 +23,7 @@ class TexturedScene {
 
  private:
   Eigen::Vector3d middle_mm_;
+  double field_;
   CameraModel camera_;                 ///< that rays_ are of
   std::vector<Eigen::Vector3d> rays_;  ///< of length 1, camera frame; zero where the lens shows nothing
 };

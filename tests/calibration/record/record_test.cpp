@@ -7,8 +7,10 @@ namespace birdseye::calibration {
 namespace {
 
 CalibrationRecord example() {
-  return testing::example_record(640, 480, {{"model", "miniBIRD"}, {"bird1_sensor_serial", "4711"}},
-                                 {{"model", "Scope cam"}});
+  CalibrationRecord record = testing::example_record(640, 480, {{"model", "miniBIRD"}, {"bird1_sensor_serial", "4711"}},
+                                                     {{"model", "Scope cam"}});
+  record.lens->round_field = RoundField{{311.5, 1.0 / 3}, 280};
+  return record;
 }
 
 TEST(CalibrationRecord, IsReadBackExactly) {
@@ -19,6 +21,7 @@ TEST(CalibrationRecord, IsReadBackExactly) {
   EXPECT_EQ(read->tracker, example().tracker);
   EXPECT_EQ(read->lens->camera, example().lens->camera);
   EXPECT_EQ(read->lens->covariance, example().lens->covariance);
+  EXPECT_EQ(read->lens->round_field, example().lens->round_field);
   EXPECT_EQ(read->hand_eye->camera_from_sensor.matrix(), example().hand_eye->camera_from_sensor.matrix());
   ASSERT_TRUE(read->hand_eye->rod);
   const RodEntry& rod = *read->hand_eye->rod;

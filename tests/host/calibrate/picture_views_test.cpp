@@ -5,6 +5,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "tests/support/rendered_board.hpp"
 #include "tests/support/scratch.hpp"
@@ -49,6 +50,23 @@ TEST(PictureViews, AFolderIsReadByTheNumbersInItsNames) {
   EXPECT_EQ(views->height_px, 400);
   EXPECT_TRUE(views->rejected.empty());
   for (const auto& view : views->used) EXPECT_EQ(view.ids.size(), 35U);
+  EXPECT_FALSE(views->round_field) << "no edge is seen";
+}
+
+/// The edge that most pictures show is the lens's; one that was taken through another coupler is outvoted.
+TEST(PictureViews, TheRoundFieldIsThatOfMostPictures) {
+  const Scratch scratch;
+  for (int i = 0; i < 5; ++i) {
+    cv::Mat picture = board(480, 400), field = cv::Mat::zeros(picture.size(), CV_8U);
+    cv::circle(field, {238, 203}, i == 3 ? 170 : 215, 255, cv::FILLED);
+    picture.setTo(6, field == 0);
+    write(scratch, std::to_string(i) + ".png", picture);
+  }
+  const auto views = read_picture_views(pattern(), {scratch.path()});
+  ASSERT_TRUE(views) << views.error().what;
+  ASSERT_TRUE(views->round_field);
+  EXPECT_NEAR(views->round_field->radius_px, 215, 2);
+  EXPECT_LT((views->round_field->centre_px - Eigen::Vector2d(238, 203)).norm(), 3);
 }
 
 /// Close-ups of a board of an odd count of columns, of which most show no end of a row.

@@ -43,6 +43,7 @@ GuidedStations stations_over_a_board() {
 TEST(CalibratedByBoard, HasTheFiguresOfItsLensAndOfHandEye) {
   GuidedStations stations = stations_over_a_board();
   find_lens(stations);
+  stations.round_field = RoundField{{320, 240}, 280};
   ASSERT_TRUE(stations.lens.has_value()) << stations.lens_fault;
   const auto solved = calibrate_guided(stations);
   ASSERT_TRUE(solved) << solved.error().what;
@@ -53,6 +54,7 @@ TEST(CalibratedByBoard, HasTheFiguresOfItsLensAndOfHandEye) {
   EXPECT_EQ(found->scope.figures().camera_rms_px, stations.lens->rms_px);
   EXPECT_EQ(found->scope.figures().held_out_px, solved->hand_eye.held_out_px);
   EXPECT_EQ(found->scope.camera().fx_px, stations.lens->camera.fx_px);
+  EXPECT_EQ(found->scope.round_field(), stations.round_field);
   // A lens that is given is not judged, and states no figure.
   stations.lens.reset();
   const auto given = calibrated_by_board(*calibrate_guided(stations), "");

@@ -238,9 +238,17 @@ std::vector<Row> of_hardware() {
           [](Rehearsal& o) {
             o.record.hand_eye->rod = calibration::RodEntry{0, {0, 0, 1}, {0, 0, 0}, 1};
           }),
+      row("lens zoomed by 1.3, before", Must::refuse, "the round field is larger", [](Rehearsal& o) { zoom(o, 1.3); }),
+      row("lens zoomed out by 0.8, before", Must::refuse, "the round field is smaller",
+          [](Rehearsal& o) { zoom(o, 0.8); }),
       row(
-          "lens zoomed by 1.3, before", Must::unseen, "", [](Rehearsal& o) { zoom(o, 1.3); },
-          "places that are followed do not tell it; the edge of the round field does, which nothing looks at yet"),
+          "lens zoomed by 1.3, before, and the sensor holds no edge of the field", Must::unseen, "",
+          [](Rehearsal& o) {
+            o.record.lens->round_field.reset();
+            zoom(o, 1.3);
+          },
+          "a scope whose round field the sensor holds; nothing else in the picture tells a longer lens from a nearer "
+          "organ"),
       row(
           "lens refocused, 2 % longer, before", Must::withhold, "", [](Rehearsal& o) { zoom(o, 1.02); },
           "less than the circle states"),
@@ -264,7 +272,7 @@ std::vector<Row> while_running() {
   constexpr const char* kOnlyReference = "a reference sensor, within 0.1 s";
   return {
       row("scope turned in its holder by 30 degrees", Must::end, kVideo, turn_in_holder),
-      row("lens zoomed by 1.3", Must::end, kVideo, [](Rehearsal& o) { zoom(o, 1.3); }),
+      row("lens zoomed by 1.3", Must::end, "the round field is larger", [](Rehearsal& o) { zoom(o, 1.3); }),
       row(
           "lens refocused, 2 % longer", Must::withhold, "", [](Rehearsal& o) { zoom(o, 1.02); },
           "less than the circle states"),

@@ -35,7 +35,8 @@ Operation whole_operation() {
   found.held_out_mm = 0.6;
   const CameraMatrix covariance = CameraMatrix::Identity() / 7;
   out.calibrated = {
-      ScopeSetup::of_hand_eye({768, 576, 500.1, 500, 384, 288, -0.1, 0.2, 1e-4, -1e-5, 0.3}, 0.3, found, covariance),
+      ScopeSetup::of_hand_eye({768, 576, 500.1, 500, 384, 288, -0.1, 0.2, 1e-4, -1e-5, 0.3}, 0.3, found, covariance)
+          .with_round_field(RoundField{{383.5, 1.0 / 3}, 280}),
       "2026-11-22T09:35:00Z",
       true,
       {kTracker, kCamera, 0}};
@@ -61,6 +62,7 @@ TEST(Operation, IsReadBackToTheBit) {
   EXPECT_EQ(read->calibrated->scope.camera_from_sensor().matrix(),
             kept.calibrated->scope.camera_from_sensor().matrix());
   EXPECT_EQ(*read->calibrated->scope.camera_covariance(), *kept.calibrated->scope.camera_covariance());
+  EXPECT_EQ(read->calibrated->scope.round_field(), kept.calibrated->scope.round_field());
   EXPECT_EQ(read->calibrated->scope.figures().held_out_px, 3);
   EXPECT_EQ(read->calibrated->scope.figures().held_out_mm, 0.6);
   EXPECT_TRUE(read->calibrated->by_board);
