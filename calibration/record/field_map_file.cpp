@@ -32,6 +32,7 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
   json.at("software").get_to(notes.software);
   json.at("made_from").get_to(notes.made_from);
   json.at("held_out_mm").get_to(notes.held_out_mm);
+  if (json.contains("tracker")) json.at("tracker").get_to(notes.tracker);
   const auto grade = grade_of(json.at("verdict").get<std::string>());
   if (!grade) return no_map("or one whose verdict was fail");
   notes.grade = *grade;
@@ -42,11 +43,24 @@ Result<FieldMapFile> map_of(const nlohmann::json& json) {
 
 }  // namespace
 
+Identity field_of_tracker(const Identity& tracker) {
+  Identity out = tracker;
+  std::erase_if(out, [](const auto& named) { return named.first.starts_with("bird"); });
+  return out;
+}
+
+std::string field_misfit(const Identity& of_map, const Identity& tracker) {
+  if (of_map.empty()) return {};
+  const std::string why = misfit("tracker", of_map, tracker, "the field's map");
+  return why.empty() ? why : why + ": map this tracker's field (birdseye calibrate field --bind HOST:PORT)";
+}
+
 std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
   nlohmann::json json{{"format", kFieldMapFormat},        {"version", kVersion},
                       {"made_utc", notes.made_utc},       {"software", notes.software},
                       {"made_from", notes.made_from},     {"verdict", name_of(notes.grade)},
                       {"held_out_mm", notes.held_out_mm}, {"map", map.data()}};
+  if (!notes.tracker.empty()) json["tracker"] = notes.tracker;
   json["checksum"] = checksum_of(json.dump());
   return json.dump(1) + "\n";
 }

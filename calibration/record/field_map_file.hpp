@@ -5,6 +5,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/base/verdict.hpp"
 #include "calibration/geometry/field_map.hpp"
+#include "calibration/record/calibration_record.hpp"
 
 namespace birdseye::calibration {
 
@@ -15,7 +16,13 @@ struct FieldMapNotes {
   std::string made_from;  ///< how many measurements of what, in words
   Grade grade = Grade::pass;
   double held_out_mm = 0;
+  Identity tracker = {};  ///< whose field it is; empty: it does not say
 };
+
+/// What tells one field from another of what a tracker says it is: unit and transmitter, not the sensors.
+Identity field_of_tracker(const Identity& tracker);
+/// Why poses of a tracker must not be corrected by a map; empty where they may, or where the map says of no tracker.
+std::string field_misfit(const Identity& of_map, const Identity& tracker);
 
 /// JSON with a checksum over all of it.
 std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes);

@@ -227,6 +227,7 @@ void read_field_map(const std::string& path, ConfigSection& section, Config& con
   auto parsed = calibration::parse_field_map(*text);
   if (!parsed) return section.fail("field", parsed.error().with_context(path).what);
   config.core.field = std::move(parsed->map);
+  config.core.field_of = std::move(parsed->notes.tracker);
 }
 
 void read_calibration_record(const std::string& path, ConfigSection& section, Config& config) {

@@ -67,6 +67,7 @@ void Core::note(const InstrumentChanged& changed) {
   calibration_.note(changed);
   const bool running = changed.state == InstrumentState::running;
   if (changed.instrument == Instrument::tracker) {
+    if (running && settings_.field) field_fault_ = calibration::field_misfit(settings_.field_of, changed.identity);
     // What was half received will not be completed, and a unit that starts again has another beat.
     if (assembler_) add(counted_, assembler_->counters());
     assembler_.reset();
@@ -98,8 +99,15 @@ void Core::tell(Instrument instrument, const std::vector<ClockEvent>& events) {
 BirdReading Core::corrected(const BirdReading& reading) {
   const auto& pose = reading.pose;
   if (!settings_.field || !pose || !pose->position_mm || !pose->rotation) return reading;
-  const auto corrected = settings_.field->correct({*pose->rotation, *pose->position_mm});
   BirdReading out = reading;
+  if (!field_fault_.empty()) {
+    ++unmapped_;
+    out.pose.reset();
+    out.doubt = field_fault_;
+    out.kind = DoubtKind::unmapped;
+    return out;
+  }
+  const auto corrected = settings_.field->correct({*pose->rotation, *pose->position_mm});
   if (corrected) {
     out.pose->rotation = corrected->tracker_from_sensor.rotation();
     out.pose->position_mm = corrected->tracker_from_sensor.translation();

@@ -26,6 +26,7 @@ struct CoreSettings {
   FrameClock::Settings frame_clock;
   std::string calibration;                     ///< a calibration record's text; empty: none
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
+  calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
 };
 
 /// What the appliance knows and says. Pure: the same events in the same order give the same packets, byte for byte.
@@ -84,6 +85,7 @@ class Core {
   std::optional<drivers::minibird::MeasurementAssembler> assembler_;
   drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
   std::uint64_t clock_events_ = 0, unmapped_ = 0;
+  std::string field_fault_;  ///< why the map is not of this tracker's field
   std::vector<BirdState> birds_;
   PoseHistory scope_;
   FrameClock frame_clock_;

@@ -13,6 +13,7 @@
 #include "host/calibrate/field_pictures.hpp"
 #include "host/files/field_files.hpp"
 #include "host/files/pose_collector.hpp"
+#include "host/link/appliance_hardware.hpp"
 
 namespace birdseye::host {
 
@@ -26,6 +27,7 @@ struct CalibrateFieldOptions {
   std::string grid_spec, kind = "auto";
   std::optional<double> distance_mm;
   bool held_alike = false;
+  std::string bind;
   std::vector<std::string> tools;
   PoseOptions poses_are;
   ResultPaths results;
@@ -185,14 +187,21 @@ HtmlPage page_of(const Fitted& fitted) {
 }
 
 void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandStatus& status) {
+  calibration::Identity tracker;
+  if (!options.bind.empty()) {
+    auto told = ask_hardware(options.bind, {"tracker"});
+    if (!told) return status.refuse(told.error());
+    tracker = (*told)["tracker"];
+  }
   const auto fitted = fit(field, options);
   if (!fitted) return status.refuse(fitted.error());
   for (const std::string& line : by_kind(fitted->rejected)) fmt::print("rejected {}\n", line);
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);
-  const calibration::FieldMapNotes notes{utc_now(), "birdseye " BIRDSEYE_VERSION, fitted->made_from, verdict.grade,
-                                         fitted->fit.held_out_mm};
+  const calibration::FieldMapNotes notes{
+      utc_now(),     "birdseye " BIRDSEYE_VERSION, fitted->made_from,
+      verdict.grade, fitted->fit.held_out_mm,      calibration::field_of_tracker(tracker)};
   finish_calibration(options.results, field_map_text(fitted->fit.map, notes), json_of(*fitted), page_of(*fitted),
                      verdict, status);
 }
@@ -222,6 +231,10 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
                   "the sensor was turned the same way at each place: orientation is mapped too");
   field->add_option("--kind", options->kind, "which functions; auto: those with the least held-out error")
       ->check(CLI::IsMember({"auto", "polynomial", "bernstein", "rbf"}));
+  field
+      ->add_option("--bind", options->bind,
+                   "an appliance whose tracker the field is of; with another one birdseyed uses no pose")
+      ->type_name("HOST:PORT");
   add_result_options(*field, options->results, "the map, for [calibration] field of birdseyed (JSON)", false);
   CLI::App* check = add_calibrate_field_check(*field, status);
   field->callback([options, field, check, &status] {

@@ -91,6 +91,8 @@ class Rehearsal {
   [[nodiscard]] host::LiveWorkflow& workflow() { return *workflow_; }
   /// The scope has looked elsewhere, long enough for what was followed to be lost.
   void forget_video();
+  /// Half of the organ is cut away.
+  void resect() { scene_->halve(); }
   void tell_instruments();
   void give_record();
 

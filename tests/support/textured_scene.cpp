@@ -76,7 +76,8 @@ std::vector<std::uint8_t> TexturedScene::picture(const CameraModel& camera,
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     if (rays_[i].isZero()) continue;
     const Eigen::Vector3d along = back.rotation() * rays_[i];
-    const auto thing = reach(from, along, thing_mm, kThing_mm, false);
+    auto thing = reach(from, along, thing_mm, kThing_mm, false);
+    if (thing && halved_ && (from + *thing * along - thing_mm).x() > 0) thing.reset();
     const auto room = thing ? std::nullopt : reach(from, along, middle_mm_, kRoom_mm, true);
     if (!thing && !room) continue;
     const Eigen::Vector3d at = from + (thing ? *thing : *room) * along - (thing ? thing_mm : middle_mm_);

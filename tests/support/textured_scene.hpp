@@ -21,9 +21,13 @@ class TexturedScene {
   std::vector<std::uint8_t> picture(const CameraModel& camera, const Transform<Camera, Patient>& camera_from_patient,
                                     const Eigen::Vector3d& moved_mm = Eigen::Vector3d::Zero());
 
+  /// Half of the thing is cut away, and what lies behind it is seen.
+  void halve() { halved_ = true; }
+
  private:
   Eigen::Vector3d middle_mm_;
   double field_;
+  bool halved_ = false;
   CameraModel camera_;                 ///< that rays_ are of
   std::vector<Eigen::Vector3d> rays_;  ///< of length 1, camera frame; zero where the lens shows nothing
 };

@@ -60,6 +60,33 @@ TEST(CoreWithAFieldMap, CorrectsEveryPose) {
   EXPECT_EQ(mapped.counters().tracker.of(drivers::minibird::DoubtKind::unmapped), 0U);
 }
 
+/// The map of another cart's field moves poses by what bends another room's.
+TEST(CoreWithAFieldMap, PublishesNoPoseOfAnotherTracker) {
+  CoreSettings settings = with(map());
+  settings.field_of = {{"model", "miniBIRD 800"}, {"unit_serial", "4711"}};
+  auto events = session(6, 1);
+  const auto named = [&](const std::string& serial) {
+    for (RawEvent& event : events) {
+      auto* changed = std::get_if<InstrumentChanged>(&event);
+      if (changed != nullptr && changed->instrument == Instrument::tracker)
+        changed->identity = {{"model", "miniBIRD 800"}, {"unit_serial", serial}, {"bird1_sensor_serial", "9"}};
+    }
+  };
+  const auto poses = [&] {
+    Core core(settings);
+    std::size_t out = 0;
+    for (const auto& birds : only<wire::Birds>(told(core, events))) out += birds.birds.size();
+    return std::pair{out, core.status_text()};
+  };
+  named("4711");
+  EXPECT_GT(poses().first, 500U);
+  named("4712");
+  const auto [published, status] = poses();
+  EXPECT_EQ(published, 0U);
+  EXPECT_NE(status.find("the field's map is of tracker unit_serial 4711; this one's is 4712"), std::string::npos)
+      << status;
+}
+
 TEST(CoreWithAFieldMap, FramesHaveTheCorrectedPose) {
   const auto events = session(6, 2);
   Core core(with(map()));

@@ -15,6 +15,7 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "tests/host/operation/read_lies.hpp"
 #include "tests/support/page_table.hpp"
 #include "tests/support/rehearsal.hpp"
 
@@ -347,6 +348,9 @@ std::vector<Row> while_running() {
             };
           },
           "the check of the deformed surface, once views are kept; a breath hold"),
+      row(
+          "half of the organ is resected", Must::unseen, "", [](Rehearsal& o) { o.resect(); },
+          "the person who cuts; the check of the deformed surface, where it holds views against the video"),
       row("the organ is shifted by 25 mm, as by a retractor", Must::end, kVideo,
           [](Rehearsal& o) { o.organ_motion = [](double at_s) { return Vector(25 * std::min(1.0, at_s), 0, 0); }; }),
   };
@@ -381,6 +385,11 @@ std::vector<Row> of_files() {
            };
          });
        }},
+      {"labels of another CT", Must::refuse, "labels.nrrd", "", [] { return Outcome{{of_labels_of_another_ct()}}; }},
+      {"a recording whose camera was exchanged, replayed", Must::refuse, "camera serial", "",
+       [] { return Outcome{{of_a_recording_of_another_camera()}}; }},
+      {"the field map of another cart", Must::refuse, "the field's map is of tracker", "its poses are not published",
+       [] { return Outcome{{of_another_carts_field_map()}}; }},
   };
 }
 
