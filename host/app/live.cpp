@@ -193,7 +193,7 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
   // What is on the screen at the end is judged.
   const auto last = by_shape->find(operation.shapes);
   if (last == by_shape->end()) {
-    verdict.add(Grade::fail, "no frame bore an overlay");
+    verdict.add(Grade::fail, why_not_judged(*by_shape));
     return {};
   }
   const LoggedErrors& errors = last->second;

@@ -172,4 +172,12 @@ Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
   return errors;
 }
 
+std::string why_not_judged(const std::map<std::uint64_t, LoggedErrors>& errors_by_shape) {
+  std::size_t frames = 0;
+  for (const auto& [shape, errors] : errors_by_shape) frames += errors.mm.size();
+  if (frames == 0) return "no frame bore an overlay";
+  return fmt::format(
+      "no frame bore an overlay after the CT was last deformed, undone or read; {} frames bore one before", frames);
+}
+
 }  // namespace birdseye::host

@@ -61,4 +61,7 @@ Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
     const std::filesystem::path& log_folder, const std::filesystem::path& truth_folder, const CameraModel& camera,
     const std::function<Eigen::Vector3d(std::uint64_t shape)>& tumour_in_patient_mm);
 
+/// Why the CT as it is shown at the end cannot be judged by these errors, which are of other shapes of it.
+std::string why_not_judged(const std::map<std::uint64_t, LoggedErrors>& errors_by_shape);
+
 }  // namespace birdseye::host

@@ -92,5 +92,12 @@ TEST(DecisionLog, AnotherTableIsRefused) {
   EXPECT_FALSE(read_decisions(scratch / "none"));
 }
 
+TEST(DecisionLog, SaysWhetherOverlaysWereOfAnotherShapeOrThereWereNone) {
+  EXPECT_EQ(why_not_judged({}), "no frame bore an overlay");
+  LoggedErrors before;
+  before.mm = {7, 8, 9};
+  EXPECT_NE(why_not_judged({{1, before}}).find("3 frames bore one before"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace birdseye::host
