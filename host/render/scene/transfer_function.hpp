@@ -43,6 +43,8 @@ class TransferFunction {
 /// Loads a preset by its name, or a JSON file {"points": [{"hu":, "rgb": [r, g, b], "extinction_per_mm":}, ...]}.
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path);
 std::vector<std::string> transfer_presets();
+/// The preset that shows vessels and tumour, each kind in a colour of its own.
+inline constexpr const char* kTumourAndVessels = "tumour-and-vessels";
 /// The text of a file that load_transfer_function reads back exactly.
 std::string transfer_text(const TransferFunction& transfer);
 

@@ -79,6 +79,7 @@ TEST(Theme, WhatTheOverlayShowsIsToldApartByEveryEye) {
       EXPECT_GT(apart(tumour, vessel), 20);
       EXPECT_GT(apart(vessel, liver), 20);
     }
+    EXPECT_GT(apart(veins, portal), 20);
     EXPECT_GT(apart(tumour, liver), 20);
     // The shell next to the tumour, against the tumour, its outline, which is of the colours between, and the vessels.
     for (int hu = 160; hu <= 500; hu += 20) EXPECT_GT(apart(margin_colour(0).cast<float>(), colour_at(hu)), 20) << hu;
