@@ -46,13 +46,18 @@ std::string words_of(const std::vector<PlaceFit>& touches) {
 
 }  // namespace
 
+std::string DeformationStep::why_too_few(std::size_t views, bool touched) {
+  if (views >= (touched ? kFewestBesideTouches : kFewestViews)) return {};
+  return words("note_few_views", views, kEnoughViews);
+}
+
 void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& camera,
                             std::shared_ptr<const PatientPlan> patient,
                             std::shared_ptr<const TransferFunction> transfer, std::vector<SeenPoint> touches,
                             const std::optional<CameraMatrix>& camera_covariance) {
   if (running()) return;
-  if (kept.size() < (touches.empty() ? kFewestViews : kFewestBesideTouches)) {
-    note_.line = words("note_few_views", kept.size(), kEnoughViews);
+  if (std::string why = why_too_few(kept.size(), !touches.empty()); !why.empty()) {
+    note_.line = std::move(why);
     return;
   }
   std::vector<VideoView> views;
@@ -79,7 +84,9 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
     settings.touches = touches;
     settings.camera_covariances.assign(views.size(), camera_covariance);
     settings.gather_touches = true;
-    settings.progress = say;
+    settings.round_done = [&say](std::size_t round, std::size_t rounds, std::size_t places) {
+      say(words("match_round", round, rounds, places));
+    };
     settings.watch.cancelled = [&stop] { return stop.stop_requested(); };
     // On one core: the others have the live picture to draw.
     tbb::task_arena one(1);

@@ -21,6 +21,8 @@ namespace birdseye::host {
 /// Matches the CT with views. The thread that does it has copies of all it is given, and shares what is never changed.
 class DeformationStep {
  public:
+  /// Why begin() would refuse so many views, in words; empty: it would not.
+  static std::string why_too_few(std::size_t views, bool touched);
   /// touches: places of the organ's surface as it lies now, patient mm, whose neighbours err alike. camera_covariance:
   /// empty, how well the lens is known does not count in what is to be expected.
   void begin(std::span<const KeptView> views, const CameraModel& camera, std::shared_ptr<const PatientPlan> patient,

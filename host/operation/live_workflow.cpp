@@ -9,17 +9,6 @@
 
 namespace birdseye::host {
 
-namespace {
-
-/// Why there is no overlay by what the fiducials give.
-std::string why_unregistered(const FiducialStep& fiducials, const std::string& why_doubted) {
-  if (fiducials.held_back()) return words("why_registration_held", fiducials.note().line);
-  if (fiducials.confirmed()) return words("why_unregistered");
-  return why_doubted.empty() ? words("why_unconfirmed") : why_doubted;
-}
-
-}  // namespace
-
 LiveWorkflow::LiveWorkflow(LiveSettings settings)
     : settings_(std::move(settings)),
       patient_(settings_.transfer, settings_.engine),
@@ -278,7 +267,7 @@ void LiveWorkflow::update_setup() {
                               is_other_patients() ? words("patient_other") : words("patient_unconfirmed"));
   if (calibration_.held_back())
     return picture_.set_setup(std::nullopt, {}, words("why_calibration_held", calibration_.note().line));
-  if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered(fiducials_, why_doubted_));
+  if (!may) return picture_.set_setup(std::nullopt, {}, why_unregistered());
   const ScopeSetup turned = *scope_as_it_is();
   TrustFigures figures = trust_figures(turned.figures(), *registered, target_in_patient_mm(*patient_.plan()));
   const DeformedOrgan* const deformed = deformation_.found().get();
@@ -385,6 +374,7 @@ void LiveWorkflow::primary(HostTime now) {
     case LiveStep::calibrate:
       return calibration_.guiding() ? calibration_.end() : calibration_.begin(settings_.scope, settings_.pattern);
     case LiveStep::fiducials:
+      if (simulated_) break;  // its operator touches them
       if (const auto held = pointer_.held(); held && fiducials_.add(*held, settings_.fiducials, instruments_.now())) {
         fit();
         keep();
@@ -393,7 +383,7 @@ void LiveWorkflow::primary(HostTime now) {
     case LiveStep::views:
       return views_.keep(picture_.frame(), picture_.seen_from());
     case LiveStep::deform:
-      if (deformation_.running()) return deformation_.cancel();
+      if (deformation_.running()) return;  // cancel_matching() is for a key of its own
       if (setup && patient_.plan() && patient_.transfer()) {
         matched_ = {views_.views(), setup->camera(), nullptr, nullptr};
         deformation_.begin(matched_.views, matched_.camera, patient_.plan(), patient_.transfer(),
@@ -413,7 +403,7 @@ void LiveWorkflow::stroke() {
   if (strokes_.stroking()) return strokes_.end();
   if (!settings_.tip_in_pointer_mm && !record_tip_in_pointer_mm_) return strokes_.refuse(words("note_no_tip"));
   if (!fiducials_.registered() || !fiducials_.confirmed()) {
-    return strokes_.refuse(words("note_no_stroke", why_unregistered(fiducials_, why_doubted_)));
+    return strokes_.refuse(words("note_no_stroke", why_unregistered()));
   }
   strokes_.begin(views_.views().size());
 }

@@ -72,6 +72,8 @@ class LiveWorkflow {
   void drop_marker(const Eigen::Vector3d& place_in_patient_mm);
   /// The space bar and the pedal. A press within a second of that which confirmed the patient does nothing.
   void primary(HostTime now);
+  /// The matching that runs. Space and the pedal do not do it: a foot that presses twice would.
+  void cancel_matching() { deformation_.cancel(); }
   void undo();  ///< the last thing of the present step
   /// One touch, from 0. Where views or a deformation are dropped with it, it is asked for twice.
   void take_back(std::size_t touch);
@@ -107,6 +109,9 @@ class LiveWorkflow {
   void use_reference(const std::string& name);
   void take(ReferenceSensor::News news);
   void doubt_registration(const std::string& why);
+  [[nodiscard]] std::string why_unregistered() const;
+  void doubt_steps(OperationView& out) const;
+  [[nodiscard]] std::string why_primary_refused() const;
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
   void fit();

@@ -18,6 +18,13 @@ constexpr Duration kPause = Duration::from_ms(10'000);
 
 }  // namespace
 
+/// Why there is no overlay by what the fiducials give.
+std::string LiveWorkflow::why_unregistered() const {
+  if (fiducials_.held_back()) return words("why_registration_held", fiducials_.note().line);
+  if (fiducials_.confirmed()) return words("why_unregistered");
+  return why_doubted_.empty() ? words("why_unconfirmed") : why_doubted_;
+}
+
 /// The reference does not tell any more where the patient is: only a landmark does.
 void LiveWorkflow::take(ReferenceSensor::News news) {
   if (news == ReferenceSensor::News::none) return;
@@ -77,6 +84,35 @@ void LiveWorkflow::take(const CheckedSurface& checked) {
     strokes_.forget();
   }
   update_setup();
+}
+
+/// A step that was done once may not look done while something speaks against what it found, or against what it was
+/// found by.
+void LiveWorkflow::doubt_steps(OperationView& out) const {
+  const auto doubt = [&out](LiveStep step, const std::string& why) {
+    StepNote& note = out.notes[static_cast<std::size_t>(step)];
+    if (note.done && note.doubt.empty()) note.doubt = why;
+  };
+  if (const auto& health = out.link.health) {
+    for (const wire::InstrumentHealth& one : health->instruments)
+      if (one.state != "running") doubt(LiveStep::connect, words("instrument", one.name, one.state));
+  }
+  std::string why;  // what speaks against a step, and so against those that build on it
+  if (calibration_.held_back()) {
+    why = words("why_calibration_held", calibration_.note().line);
+  } else if (settings_.video_must_agree && video_.state() == VideoAgreement::differs) {
+    why = words("why_video_differs");
+  }
+  doubt(LiveStep::calibrate, why);
+  if (why.empty() && (fiducials_.held_back() || !fiducials_.confirmed())) why = why_unregistered();
+  if (why.empty() && fiducials_.registered() && fiducials_.fits_poorly()) why = words("doubt_fit");
+  doubt(LiveStep::fiducials, why);
+  doubt(LiveStep::views, why);
+  if (motion_.moved_mm()) doubt(LiveStep::deform, words("why_moved", *motion_.moved_mm()));
+  doubt(LiveStep::deform, why.empty() && deformation_.with_care() ? deformation_.note().line : why);
+  doubt(LiveStep::check, why);
+  if (motion_.moved_mm()) doubt(LiveStep::check, words("why_moved", *motion_.moved_mm()));
+  doubt(LiveStep::run, picture_.setup() ? picture_.decision().reason : picture_.why_no_setup());
 }
 
 /// Somebody has looked. What the pointer says then is kept: of a landmark that was not fitted it tells how far the

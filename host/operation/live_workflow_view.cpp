@@ -19,9 +19,31 @@ std::string LiveWorkflow::lost_with_registration() const {
   return fmt::format("{}", fmt::join(lost, ", "));
 }
 
+/// Only where a press would do nothing: what it would do else, primary() does.
+std::string LiveWorkflow::why_primary_refused() const {
+  if (frozen_ || asks_for_instruments() || asks_for_patient()) return {};
+  const std::string no_setup = picture_.why_no_setup();
+  switch (step_) {
+    case LiveStep::fiducials:
+      if (fiducials_.note().done) return {};
+      if (simulated_) return words("touch_simulated");
+      return pointer_.held() ? std::string() : words("why_no_pointer");
+    case LiveStep::views:
+      return views_.note().done ? std::string() : views_.why_refused(picture_.seen_from());
+    case LiveStep::deform:
+      if (deformation_.running()) return words("match_runs");
+      if (deformation_.note().done && !motion_.moved_mm()) return {};
+      if (!no_setup.empty()) return no_setup;
+      return DeformationStep::why_too_few(views_.views().size(), strokes_.places() > 0);
+    default:
+      return {};
+  }
+}
+
 OperationView LiveWorkflow::view() const {
   OperationView out;
   out.step = step_;
+  out.simulated = simulated_;
   out.notes = {
       connection_.note(), calibration_.note(), fiducials_.note(), views_.note(), deformation_.note(), check_, run_};
   out.stroking = strokes_.stroking();
@@ -85,12 +107,19 @@ OperationView LiveWorkflow::view() const {
   out.transfer = patient_.transfer();
   out.drawn_by = patient_.drawn_by();
   out.shapes = shapes_;
+  doubt_steps(out);
+  out.primary_refused = why_primary_refused();
   if (!out.patient) return out;
   out.check = check_reading();
   out.checked = checked_;
   if (const auto seen_from = picture_.seen_from(); seen_from && step_ == LiveStep::views)
     out.view_advice = views_.advice(*seen_from, target_in_patient_mm(*out.patient));
   out.target = picture_.target();
+  out.expected = picture_.decision().expected;
+  if (out.deformed && !out.patient->landmarks.empty()) {
+    const Eigen::Vector3d at_rest_mm = target_in_patient_mm(*out.patient);
+    out.target_moved_mm = (as_shown_mm(at_rest_mm, out.deformed.get()) - at_rest_mm).norm();
+  }
   return out;
 }
 

@@ -23,6 +23,7 @@ namespace birdseye::host {
 struct OperationView {
   LiveStep step = LiveStep::connect;
   bool frozen = false;
+  bool simulated = false;             ///< by the simulated cart, whose operator touches the fiducials and nothing else
   bool watched = false;               ///< whether the video is held against the deformed surface
   bool asks_for_instruments = false;  ///< whether tracker and camera are the same as before, for nothing tells it
   bool overlay_hidden = false;        ///< a person has switched it off
@@ -41,6 +42,8 @@ struct OperationView {
   bool patient_confirmed = false;   ///< a person has compared name, ID and date with the patient on the table
   std::array<StepNote, kLiveSteps> notes;
   std::string fault;
+  std::string
+      primary_refused;  ///< why Space and the pedal would do nothing now; empty: they do what primary_words() says
 
   LinkState link;
   std::string reference;  ///< the bird that all poses are relative to; empty: none
@@ -69,6 +72,7 @@ struct OperationView {
 
   std::string deform_progress;  ///< how far it is, in its step
   std::shared_ptr<const DeformedOrgan> deformed;
+  std::optional<double> target_moved_mm;  ///< by the deformation; empty: there is none, or no landmark is the target
   std::string surface_check;  ///< what the video says of the deformed surface; empty: there is none, or no check yet
 
   std::optional<CheckedLandmark> checked;  ///< by which the registration was looked at; empty: by none yet
@@ -77,6 +81,8 @@ struct OperationView {
   /// Of the first landmark, else of the CT's middle. From what is known: the fiducials, hand-eye held out, the
   /// tracker's noise, and the deformation, where there is one. Empty where no overlay is drawn, or it is out of view.
   std::optional<TargetMark> target;
+
+  std::optional<ErrorBudget> expected;  ///< of the newest frame, seen or out of view; empty: a part of it is not known
 
   std::shared_ptr<const PatientPlan> patient;  ///< null: it is not read yet
   std::string patient_fault;                   ///< why this CT cannot be that of the patient on the table
@@ -88,6 +94,10 @@ struct OperationView {
 
   [[nodiscard]] const StepNote& note(LiveStep which) const { return notes[static_cast<std::size_t>(which)]; }
 };
+
+/// Where slices of the CT are opened at: the target where a landmark is one, and while fiducials are touched the first
+/// of these. Empty: there is neither.
+std::optional<Eigen::Vector3d> first_place_mm(const OperationView& operation);
 
 /// What the space bar and the pedal do in the present step.
 std::string primary_words(const OperationView& operation);

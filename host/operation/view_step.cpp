@@ -35,21 +35,20 @@ PoseHistory::Settings averaging() {
 
 ViewStep::ViewStep() : scope_(averaging()) {}
 
-void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
-                    const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
-  if (views_.size() >= kMostViews) {
-    note_.line = words("note_most_views", kMostViews);
-    return;
-  }
-  if (!frame || !camera_from_patient) {
-    note_.line = words("note_no_overlay");
-    return;
-  }
+std::string ViewStep::why_refused(const std::optional<Transform<Camera, Patient>>& camera_from_patient) const {
+  if (views_.size() >= kMostViews) return words("why_most_views", kMostViews);
+  if (!camera_from_patient) return words("why_no_overlay");
   const auto there = std::find_if(views_.begin(), views_.end(), [&](const KeptView& view) {
     return same_place(view.camera_from_patient, *camera_from_patient);
   });
-  if (there != views_.end()) {
-    note_.line = words("note_same_place", there - views_.begin() + 1, kApartMm);
+  return there == views_.end() ? std::string() : words("why_same_place", there - views_.begin() + 1, kApartMm);
+}
+
+void ViewStep::keep(const std::optional<wire::VideoFrame>& frame,
+                    const std::optional<Transform<Camera, Patient>>& camera_from_patient) {
+  const auto seen_from = frame ? camera_from_patient : std::nullopt;
+  if (const std::string why = why_refused(seen_from); !why.empty()) {
+    note_.line = words("note_not_kept", why);
     return;
   }
   views_.push_back({*frame, *camera_from_patient});

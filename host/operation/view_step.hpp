@@ -30,6 +30,8 @@ class ViewStep {
   /// taken is refused: it tells no depth.
   void keep(const std::optional<wire::VideoFrame>& frame,
             const std::optional<Transform<Camera, Patient>>& camera_from_patient);
+  /// Why keep() would refuse it, in words; empty: it would not.
+  [[nodiscard]] std::string why_refused(const std::optional<Transform<Camera, Patient>>& camera_from_patient) const;
   /// A measurement of the scope's bird.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   /// Gives each kept view the pose on which the measurements before and after its frame agree, as soon as they have

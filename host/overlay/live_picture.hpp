@@ -75,6 +75,8 @@ class LivePicture {
   /// Without a setup nothing is drawn, and why_none says why, in words.
   void set_setup(std::optional<Setup> setup, const TrustFigures& figures, const std::string& why_none = {});
   [[nodiscard]] const std::optional<Setup>& setup() const { return painter_.setup(); }
+  /// In words; empty: there is one.
+  [[nodiscard]] std::string why_no_setup() const { return setup() ? std::string() : why_no_setup_; }
   [[nodiscard]] const TrustFigures& figures() const { return painter_.figures(); }
 
   /// A pose of the scope's sensor, as they come.

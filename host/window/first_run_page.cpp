@@ -24,6 +24,7 @@ constexpr const char* kSimulateKey = "space";
 constexpr const char* kCloseKey = "q";
 constexpr const char* kKeysKey = "?";  // F1, as LiveWindow::keys names it
 constexpr const char* kRoomKey = "l";
+constexpr const char* kHowKey = "e";
 
 struct Seen {
   Eigen::Vector3f colour;
@@ -44,8 +45,8 @@ Seen seen_as(CheckState state, const Theme& theme) {
   return {theme.quiet, "?"};
 }
 
-/// State, name, and what was found over what to do.
-void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale) {
+/// State, name, and what was found; how: over what to do.
+void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale, bool how) {
   if (!ImGui::BeginTable("checks", 3)) return;
   ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 125 * scale);
   ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 155 * scale);
@@ -59,7 +60,7 @@ void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale
     say(theme.text, check.name);
     ImGui::TableNextColumn();
     say(theme.text, check.found);
-    if (!check.remedy.empty()) say(theme.quiet, check.remedy);
+    if (how && !check.remedy.empty()) say(theme.quiet, check.remedy);
     ImGui::Dummy(ImVec2(0, 12 * scale));
   }
   ImGui::EndTable();
@@ -77,13 +78,17 @@ std::optional<FirstRunChoice> draw_buttons(float scale) {
   return asked;
 }
 
-std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale, bool keys) {
+std::optional<FirstRunChoice> draw_foot(const Theme& theme, float scale, bool keys, bool how) {
   ImGui::Separator();
   ImGui::Dummy(ImVec2(0, 6 * scale));
   if (keys) say(theme.text, words("first_keys"));
-  say(theme.quiet,
-      words("first_all", "birdseye live --server HOST:PORT --ct PATH --labels FILE --organ NAMES --board SPEC"));
-  say(theme.quiet, words("first_doctor", "birdseye doctor"));
+  if (how) {
+    say(theme.quiet,
+        words("first_all", "birdseye live --server HOST:PORT --ct PATH --labels FILE --organ NAMES --board SPEC"));
+    say(theme.quiet, words("first_doctor", "birdseye doctor"));
+  } else {
+    say(theme.text, words("first_who"));
+  }
   say(theme.quiet, words("first_simulated"));
   ImGui::Dummy(ImVec2(0, 8 * scale));
   return draw_buttons(scale);
@@ -95,6 +100,7 @@ struct Page {
   std::string lacking;
   std::vector<Check> checks;
   bool keys = false;  ///< all of them are shown
+  bool how = false;   ///< what is missing is given, for whoever set the cart up
   float rows_high = 0, foot_high = 0;
 };
 
@@ -117,11 +123,11 @@ std::optional<FirstRunChoice> draw_page(const LiveWindow& window, Page& page) {
   ImGui::BeginChild("rows", ImVec2(0, std::max(40 * scale, std::min(page.rows_high, room))));
   ImGui::Dummy(ImVec2(0, 8 * scale));
   if (page.checks.empty()) say(theme.quiet, words("first_asking"));
-  draw_rows(page.checks, theme, scale);
+  draw_rows(page.checks, theme, scale, page.how);
   page.rows_high = ImGui::GetCursorPosY();
   ImGui::EndChild();
   const float above = ImGui::GetCursorPosY();
-  const auto asked = draw_foot(theme, scale, page.keys);
+  const auto asked = draw_foot(theme, scale, page.keys, page.how);
   page.foot_high = ImGui::GetCursorPosY() - above;
   ImGui::End();
   return asked;
@@ -141,6 +147,7 @@ Result<std::optional<FirstRunChoice>> turn(LiveWindow& window, Page& page, const
   keys.push_back(act.key);
   for (const std::string& key : keys) {
     if (!asked) asked = choice_of_key(key);
+    if (key == kHowKey) page.how = !page.how;
     if (key == kKeysKey) page.keys = !page.keys;
     if (key == kRoomKey) window.set_room(window.room() == Room::dark ? Room::light : Room::dark);
   }

@@ -108,7 +108,7 @@ void LiveApp::take_events() {
 void LiveApp::note_simulator() {
   SimulatedCart* const cart = source_->cart();
   if (cart == nullptr || sheet_read_) return;
-  sheet_read_ = facts_.simulated = true;
+  sheet_read_ = true;
   const CartSheet& sheet = cart->sheet();
   if (const auto pattern = calibration::parse_pattern(sheet.board))
     workflow_.set_sheet(*pattern, sheet.tip_in_pointer_mm, static_cast<std::size_t>(sheet.fiducials));
@@ -254,6 +254,7 @@ void LiveApp::grant(const PanelWishes& asked) {
   if (wishes.retry || begins) source_->retry();
   if (wishes.primary) workflow_.primary(host_now());
   if (wishes.next) workflow_.go_on();
+  if (wishes.cancel) workflow_.cancel_matching();
   if (wishes.undo) workflow_.undo();
   if (wishes.take_back) workflow_.take_back(*wishes.take_back);
   if (wishes.stroke) workflow_.stroke();
@@ -298,7 +299,7 @@ void LiveApp::grant_slices(const PanelWishes& wishes) {
     facts_.slices.reset();
   } else if (const auto& patient = operation_.patient; wishes.slices && patient) {
     facts_.slices.emplace(std::shared_ptr<const Volume>(patient, &patient->ct));
-    if (!operation_.markers_in_patient_mm.empty()) facts_.slices->go_to(operation_.markers_in_patient_mm.front());
+    if (const auto place_mm = first_place_mm(operation_)) facts_.slices->go_to(*place_mm);
     slices_changed_ = true;
   }
   if (!facts_.slices) return;

@@ -12,7 +12,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr float kSidePx = 330, kStripPx = 118;
+constexpr float kSidePx = 330, kStripPx = 62, kFiguresPx = 150;  // the strip, and with all figures in it
 
 void draw_steps(PanelContext& context) {
   constexpr std::array<TextKey<0>, kLiveSteps> kNames{"step_connect", "step_calibrate", "step_fiducials", "step_views",
@@ -20,12 +20,18 @@ void draw_steps(PanelContext& context) {
   const Theme& theme = context.theme;
   for (std::size_t i = 0; i < kLiveSteps; ++i) {
     const auto step = static_cast<LiveStep>(i);
-    const bool here = context.operation.step == step, done = context.operation.note(step).done;
-    ImGui::PushStyleColor(ImGuiCol_Text, colour(here ? theme.text : done ? theme.good : theme.quiet));
-    const std::string label = fmt::format("{}  {} {}###step{}", i + 1, words(kNames[i]), done ? kGoodSign : "", i);
+    const StepNote& note = context.operation.note(step);
+    // That the video stands still, the line over the picture says.
+    const bool stands = step == LiveStep::run && note.done && context.shown.stale;
+    const bool here = context.operation.step == step, doubted = stands || !note.doubt.empty();
+    const Eigen::Vector3f& told = doubted ? theme.warn : note.done ? theme.good : theme.quiet;
+    ImGui::PushStyleColor(ImGuiCol_Text, colour(here && !doubted ? theme.text : told));
+    const char* const sign = doubted ? kWarnSign : note.done ? kGoodSign : "";
+    const std::string label = fmt::format("{}  {} {}###step{}", i + 1, words(kNames[i]), sign, i);
     if (ImGui::Selectable(label.c_str(), here)) context.wishes.step = step;
     ImGui::PopStyleColor();
   }
+  for (const std::string& why : doubts_of(context.operation)) say(theme.warn, fmt::format("{} {}", kWarnSign, why));
 }
 
 void draw_side(PanelContext& context) {
@@ -41,11 +47,16 @@ void draw_side(PanelContext& context) {
   ImGui::BeginChild("step", ImVec2(0, std::max(40 * at.scale, at.high - ImGui::GetCursorPosY() - below)), false,
                     ImGuiWindowFlags_NoBackground);
   if (context.facts.keys) say(context.theme.text, words("all_keys"));
+  if (const std::string& why = context.operation.primary_refused; !why.empty())
+    say(context.theme.warn, fmt::format("{} {}", kWarnSign, why));
   draw_step(context);
   ImGui::EndChild();
   ImGui::SetCursorPosY(at.high - below);
   const std::string primary = label_of(primary_words(context.operation), "primary");
+  const bool waits = !context.operation.primary_refused.empty();
+  ImGui::BeginDisabled(waits);
   if (ImGui::Button(primary.c_str(), ImVec2(-1, button))) context.wishes.primary = true;
+  ImGui::EndDisabled();
   say(context.theme.quiet, words("keys"));
   ImGui::End();
 }
@@ -77,6 +88,21 @@ void draw_ages(const PanelContext& context) {
   write(words("axis_now"), 1, high.y - line + 2);
 }
 
+/// FRE, and what the error to be expected at the target is made of.
+void draw_parts(const PanelContext& context) {
+  const Theme& theme = context.theme;
+  const OperationView& operation = context.operation;
+  if (operation.fre_mm) say(theme.text, words("fre", *operation.fre_mm));
+  if (!operation.fre_mm) return;
+  if (!operation.expected) return say(theme.quiet, words("parts_unknown"));
+  const ErrorBudget& error = *operation.expected;
+  const std::string parts = error.motion ? words("parts", error.rms_mm(), error.fiducials_mm, error.hand_eye_mm,
+                                                 error.pose_mm, error.lens_mm, error.time_mm, error.motion->rms_mm)
+                                         : words("parts_unmoved", error.rms_mm(), error.fiducials_mm, error.hand_eye_mm,
+                                                 error.pose_mm, error.lens_mm, error.time_mm);
+  say(theme.text, parts);
+}
+
 /// What tells whoever looks after the cart how it does.
 void draw_figures(const PanelContext& context) {
   const PanelFacts& facts = context.facts;
@@ -86,6 +112,7 @@ void draw_figures(const PanelContext& context) {
   say(theme.quiet, words("rates", facts.frames_per_s, facts.frames_skipped, context.operation.engine_name));
   if (const auto& health = context.operation.link.health)
     say(theme.quiet, words("tracker_rate", health->tracker_rate_hz, health->doubted));
+  draw_parts(context);
 }
 
 void draw_strip(PanelContext& context) {
@@ -96,8 +123,10 @@ void draw_strip(PanelContext& context) {
   ImGui::SetNextWindowPos(ImVec2(at.side, at.high - at.strip));
   ImGui::SetNextWindowSize(ImVec2(at.wide - at.side, at.strip));
   ImGui::Begin("strip", nullptr, kPanel);
-  draw_ages(context);
-  ImGui::SameLine();
+  if (facts.details) {
+    draw_ages(context);
+    ImGui::SameLine();
+  }
   ImGui::BeginGroup();
   if (!operation.fault.empty()) say(theme.bad, fmt::format("{} {}", kBadSign, operation.fault));
   if (facts.details) draw_figures(context);
@@ -163,6 +192,15 @@ const char* sign_of(Grade grade) {
   return grade == Grade::pass ? kGoodSign : grade == Grade::marginal ? kWarnSign : kBadSign;
 }
 
+std::vector<std::string> doubts_of(const OperationView& operation) {
+  std::vector<std::string> out;
+  out.reserve(kLiveSteps);
+  for (const StepNote& note : operation.notes) {
+    if (!note.doubt.empty() && std::find(out.begin(), out.end(), note.doubt) == out.end()) out.push_back(note.doubt);
+  }
+  return out;
+}
+
 int side_px(float scale) {
   return static_cast<int>(kSidePx * scale);
 }
@@ -171,6 +209,7 @@ void add_key(const std::string& key, const OperationView& operation, const Panel
   if (key == "space") wishes.primary = true;
   if (key == "enter") wishes.next = true;
   if (key == "backspace") wishes.undo = true;
+  if (key == "escape") wishes.cancel = true;
   if (key == "t") wishes.stroke = true;
   constexpr double kRodNotch_deg = 5;
   if (key == "pageup") wishes.turn_rod_deg = kRodNotch_deg;
@@ -202,9 +241,9 @@ PanelWishes draw_panels(const LiveWindow& window, const OperationView& operation
   PanelWishes wishes;
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   const float scale = window.scale();
+  const float strip = (facts.details ? kFiguresPx : kStripPx) * scale;
   PanelContext context{
-      window, operation, shown, facts, theme_of(facts.room), {size.x, size.y, kSidePx * scale, kStripPx * scale, scale},
-      wishes};
+      window, operation, shown, facts, theme_of(facts.room), {size.x, size.y, kSidePx * scale, strip, scale}, wishes};
   draw_side(context);
   draw_video(context);
   draw_strip(context);

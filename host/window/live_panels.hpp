@@ -17,6 +17,7 @@ namespace birdseye::host {
 /// What a person asked for in a frame of the window.
 struct PanelWishes {
   bool primary = false, next = false, undo = false, stroke = false, freeze = false, snapshot = false;
+  bool cancel = false;                                                   ///< the matching that runs
   bool hide_or_show = false;                                             ///< the overlay
   bool slices = false;                                                   ///< opened, or closed
   bool inset = false;                                                    ///< the small picture shown, or not any more
@@ -49,7 +50,6 @@ struct PanelFacts {
   const HuHistogram* histogram = nullptr;
   TransferEditor* editor = nullptr;
   bool recorded = false;       ///< the source is a recording
-  bool simulated = false;      ///< it is the simulated cart, whose operator touches the fiducials and nothing else
   bool keys = false;           ///< all keys are shown
   bool details = false;        ///< all figures are shown, not only that of the target
   bool pseudonymised = false;  ///< the patient's name and ID are not shown: the picture is to be kept
@@ -63,6 +63,8 @@ struct PanelFacts {
   bool inset = true;
 };
 
+/// Why steps that were done are doubted now, each reason once; the sides of the window show them beneath the steps.
+std::vector<std::string> doubts_of(const OperationView& operation);
 /// How wide the workflow beside the video is.
 int side_px(float scale);
 /// Draws workflow, picture and strip, and reads keys and buttons. shown: what of the picture may be shown now.

@@ -138,7 +138,8 @@ bool LiveWindow::closed() const {
 std::vector<std::string> LiveWindow::keys() const {
   std::vector<std::string> pressed;
   if (ImGui::GetIO().WantTextInput) return pressed;
-  constexpr std::array<std::pair<int, const char*>, 12> kNamed{{{GLFW_KEY_SPACE, "space"},
+  constexpr std::array<std::pair<int, const char*>, 13> kNamed{{{GLFW_KEY_SPACE, "space"},
+                                                                {GLFW_KEY_ESCAPE, "escape"},
                                                                 {GLFW_KEY_PAGE_UP, "pageup"},
                                                                 {GLFW_KEY_PAGE_DOWN, "pagedown"},
                                                                 {GLFW_KEY_ENTER, "enter"},

@@ -50,7 +50,8 @@ class LiveWindow final : public GlContext {
   /// How often it stood still.
   [[nodiscard]] int stood_still() const { return cover_ ? cover_->covered() : 0; }
   [[nodiscard]] bool closed() const;
-  /// Keys that were pressed before begin_frame(), unless into a field of text: "space", "enter", "backspace", "+", "-",
+  /// Keys that were pressed before begin_frame(), unless into a field of text: "space", "enter", "escape", "backspace",
+  /// "+", "-",
   /// "?", small letters and digits.
   [[nodiscard]] std::vector<std::string> keys() const;
 

@@ -52,8 +52,12 @@ void draw_hole(OverlayLook& look, bool& changed) {
 
 void draw_margin_choice(const PanelContext& context, OverlayLook& look, bool& changed) {
   const auto& plan = context.operation.patient;
-  if (plan == nullptr || !plan->margins) return say(context.theme.quiet, words("no_margins"));
+  if (plan == nullptr || !plan->margins) {
+    if (context.facts.details) say(context.theme.quiet, words("no_margins"));
+    return;
+  }
   changed = ImGui::Checkbox(label_of(words("margins"), "margins").c_str(), &look.margins) || changed;
+  if (!look.margins) return;
   for (std::size_t i = 0; i < plan->margins->size(); ++i) {
     const float side = 0.7F * ImGui::GetTextLineHeight();
     draw_margin_sign(i, ImGui::GetCursorScreenPos(), side);
@@ -67,9 +71,13 @@ void draw_margin_choice(const PanelContext& context, OverlayLook& look, bool& ch
 }  // namespace
 
 void draw_margin_sign(std::size_t shell, const ImVec2& at, float side) {
+  draw_colour_sign(margin_colour(shell).cast<float>(), at, side);
+}
+
+void draw_colour_sign(const Eigen::Vector3f& rgb, const ImVec2& at, float side) {
   const ImVec2 from(at.x, at.y + 0.25F * side), to(at.x + side, at.y + 1.25F * side);
   ImDrawList* const list = ImGui::GetWindowDrawList();
-  list->AddRectFilled(from, to, ImGui::GetColorU32(colour(margin_colour(shell).cast<float>())));
+  list->AddRectFilled(from, to, ImGui::GetColorU32(colour(rgb)));
   list->AddRect(from, to, IM_COL32(128, 128, 128, 255));  // a white one on white, a black one on black
 }
 
@@ -114,14 +122,14 @@ void draw_look(PanelContext& context) {
     }
     ImGui::EndCombo();
   }
-  if (facts.histogram != nullptr && facts.editor != nullptr)
-    context.wishes.transfer = facts.editor->draw(*facts.histogram, scale);
   if (context.operation.frozen) say(context.theme.warn, fmt::format("{} {}", kWarnSign, words("banner_frozen")));
   if (ImGui::Button(label_of(words("snapshot"), "snapshot").c_str())) context.wishes.snapshot = true;
   ImGui::SameLine();
   const bool dark = facts.room == Room::dark;
   if (ImGui::Button(label_of(dark ? words("light_room") : words("dark_room"), "room").c_str()))
     context.wishes.room = dark ? Room::light : Room::dark;
+  if (facts.details && facts.histogram != nullptr && facts.editor != nullptr)
+    context.wishes.transfer = facts.editor->draw(*facts.histogram, scale);
 }
 
 }  // namespace birdseye::host

@@ -3,6 +3,7 @@
 #include <imgui.h>
 
 #include <string>
+#include <vector>
 
 #include "host/operation/operation_view.hpp"
 #include "host/overlay/live_picture.hpp"
@@ -42,10 +43,15 @@ void say(const Eigen::Vector3f& rgb, const std::string& text);
 const Eigen::Vector3f& colour_of(Grade grade, const Theme& theme);
 const char* sign_of(Grade grade);
 
-/// A small square of a margin's colour, of that side, beside a line of text.
+/// A small square of a colour, of that side, beside a line of text.
+void draw_colour_sign(const Eigen::Vector3f& rgb, const ImVec2& at, float side);
+/// The same of a margin's colour.
 void draw_margin_sign(std::size_t shell, const ImVec2& at, float side);
 /// How far off the margins may be: as far as the target that they lie about.
 std::string margin_error_words(const OperationView& operation);
+
+/// What the deformation did to the target, and how far off it may be by that, in lines; empty: there is none.
+std::vector<std::string> deformation_words(const OperationView& operation);
 
 // The panels, each in a file of its own.
 void draw_patient_card(PanelContext& context);

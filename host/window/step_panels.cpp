@@ -13,7 +13,7 @@ namespace birdseye::host {
 namespace {
 
 const Eigen::Vector3f& done_or_not(const PanelContext& context, LiveStep step) {
-  return context.operation.note(step).done ? context.theme.good : context.theme.warn;
+  return context.operation.note(step).holds() ? context.theme.good : context.theme.warn;
 }
 
 void draw_connect(PanelContext& context) {
@@ -127,7 +127,7 @@ void draw_fit(const PanelContext& context) {
 void draw_fiducials(PanelContext& context) {
   const OperationView& operation = context.operation;
   const Theme& theme = context.theme;
-  say(theme.text, context.facts.simulated ? words("touch_simulated") : words("touch_each"));
+  if (!operation.simulated) say(theme.text, words("touch_each"));
   if (!operation.markers_seen) {
     if (operation.patient != nullptr) say(theme.quiet, words("markers_searched"));
   } else if (operation.fiducials_wanted != 0) {
@@ -150,9 +150,9 @@ void draw_fiducials(PanelContext& context) {
   }
 }
 
-/// From where the next view would tell most.
+/// From where the next view would tell most; empty: from nowhere else.
 std::string words_of(const ViewAdvice& advice) {
-  if (!advice.look_from_deg) return words("advice_here");
+  if (!advice.look_from_deg) return {};
   const double right = advice.look_from_deg->x(), down = advice.look_from_deg->y();
   const std::string across = right > 0 ? words("advice_right", right) : words("advice_left", -right);
   const std::string along = down > 0 ? words("advice_lower", down) : words("advice_upper", -down);
@@ -169,29 +169,49 @@ void draw_views(PanelContext& context) {
   if (ImGui::Button(stroke.c_str())) context.wishes.stroke = true;
   if (!operation.stroke_line.empty()) say(operation.stroking ? theme.good : theme.warn, operation.stroke_line);
   const auto& advice = operation.view_advice;
-  if (!advice) return say(theme.warn, fmt::format("{} {}", kWarnSign, words("no_view_now")));
-  say(theme.text, words_of(*advice));
+  if (!advice) return;  // why no view can be kept stands above
+  const std::string from = words_of(*advice);
+  if (!from.empty()) say(theme.text, from);
+  if (from.empty() && operation.primary_refused.empty()) say(theme.text, words("advice_here"));
   if (context.facts.details) say(theme.quiet, words("view_gain", 100 * advice->gain_now, 100 * advice->gain_best));
   say(theme.quiet, words("undo_view"));
 }
 
+}  // namespace
+
+std::vector<std::string> deformation_words(const OperationView& operation) {
+  std::vector<std::string> out;
+  if (operation.deformed == nullptr) return out;
+  if (operation.target_moved_mm) out.push_back(words("deform_moved", *operation.target_moved_mm));
+  const auto& error = operation.deformed->target;
+  out.push_back(error ? words("deform_error", error->radius95_mm) : words("deform_error_unknown"));
+  return out;
+}
+
+namespace {
+
 void draw_deform(PanelContext& context) {
   const OperationView& operation = context.operation;
   const Theme& theme = context.theme;
-  say(theme.text, words("match_views"));
+  if (!operation.deformed && !operation.deforming) say(theme.text, words("match_views"));
   const StepNote& note = operation.note(LiveStep::deform);
   if (operation.deformed && !operation.deformed_with_care && !context.facts.details) {
     say(theme.good, fmt::format("{} {}", kGoodSign, words("deform_found")));
   } else {
-    say(!note.done ? theme.quiet : operation.deformed_with_care ? theme.warn : theme.good, note.line);
+    say(!note.done ? theme.quiet : !note.holds() || operation.deformed_with_care ? theme.warn : theme.good, note.line);
   }
-  if (operation.deforming) say(theme.text, operation.deform_progress);
-  if (operation.deformed) say(theme.quiet, words("undo_deform"));
+  if (operation.deforming) {
+    if (!operation.deform_progress.empty()) say(theme.text, operation.deform_progress);
+    if (ImGui::Button(label_of(words("cancel_match"), "cancel").c_str())) context.wishes.cancel = true;
+  }
+  if (!operation.deformed) return;
+  for (const std::string& line : deformation_words(operation)) say(theme.text, line);
+  say(theme.quiet, words("undo_deform"));
 }
 
 void draw_check(PanelContext& context) {
   const Theme& theme = context.theme;
-  say(theme.text, context.facts.simulated ? words("point_simulated") : words("point_at_landmark"));
+  say(theme.text, context.operation.simulated ? words("point_simulated") : words("point_at_landmark"));
   draw_slice_buttons(context);
   const auto& reading = context.operation.check;
   if (!reading) return say(theme.warn, fmt::format("{} {}", kWarnSign, words("no_pointer")));

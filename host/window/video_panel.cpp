@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "host/overlay/margins.hpp"
 #include "host/texts/texts.hpp"
@@ -48,29 +50,42 @@ Banner banner_of(const PanelContext& context) {
   return {words("banner_none", shown.reason)};
 }
 
-/// The safety of the picture, in words, sign and colour, over its upper edge; and in a line of its own below what an
-/// overlay without a reference sensor takes for granted.
+/// What watches whether patient, transmitter and organ move, while the overlay runs; empty: the line above says that
+/// nothing is to be believed.
+std::optional<Banner> watch_of(const OperationView& operation, const ShownPicture& shown) {
+  if (!shown.overlaid && (operation.step != LiveStep::run || operation.unconfirmed || !operation.fre_mm)) return {};
+  if (shown.stale) return {};
+  const bool seen = !operation.reference.empty();
+  const std::string reference = seen ? words("watch_reference", operation.reference) : words("watch_no_reference");
+  const std::string organ = operation.watched ? words("watch_organ") : words("watch_no_organ");
+  return Banner{words("watch", reference, organ), seen && operation.watched ? Grade::pass : Grade::marginal};
+}
+
+/// The safety of the picture, in words, sign and colour, over its upper edge; and in a line of its own below what
+/// watches whether patient and organ move.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
   const Banner banner = banner_of(context);
   std::string text = banner.text;
   if (context.operation.rod_angle_deg) text = words("banner_rod", *context.operation.rod_angle_deg, text);
   if (context.facts.recorded) text = words("banner_recording", text);
-  if (context.facts.simulated) text = words("banner_simulated", text);
+  if (context.operation.simulated) text = words("banner_simulated", text);
   if (banner.grade) text = fmt::format("{} {}", sign_of(*banner.grade), text);
-  const Theme& theme = theme_over_video();
+  const Theme& theme = context.theme;  // a dark line dazzles nobody in a dark room, and hides in a light one
+  const ImU32 ground = ImGui::GetColorU32(colour(theme.background));
   const ImU32 ink = ImGui::GetColorU32(colour(banner.grade ? colour_of(*banner.grade, theme) : theme.text));
   ImDrawList* const list = ImGui::GetWindowDrawList();
   const float high = kBannerPx * scale;
-  list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), kGround);
+  list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), ground);
   list->AddRectFilled(from, ImVec2(from.x + 6 * scale, from.y + high), ink);
   list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ink, text.c_str());
-  if (!context.shown.overlaid || !context.operation.reference.empty()) return;
-  const std::string unseen = fmt::format("{} {}", sign_of(Grade::marginal), words("banner_no_reference"));
+  const auto watch = watch_of(context.operation, context.shown);
+  if (!watch) return;
+  const std::string unseen = fmt::format("{} {}", sign_of(*watch->grade), watch->text);
   const float low = from.y + high, beside = 14 * scale + ImGui::CalcTextSize(unseen.c_str()).x + 14 * scale;
-  list->AddRectFilled(ImVec2(from.x, low), ImVec2(from.x + std::min(wide, beside), low + high), kGround);
+  list->AddRectFilled(ImVec2(from.x, low), ImVec2(from.x + std::min(wide, beside), low + high), ground);
   list->AddText(ImVec2(from.x + 14 * scale, low + 5 * scale),
-                ImGui::GetColorU32(colour(colour_of(Grade::marginal, theme))), unseen.c_str());
+                ImGui::GetColorU32(colour(colour_of(*watch->grade, theme))), unseen.c_str());
 }
 
 /// Where the target is drawn, and how far from there it may be. checked: by a landmark. Gives what that takes of the
@@ -123,6 +138,31 @@ float draw_margin_legend(const PanelContext& context, ImVec2 lower_left) {
   return high;
 }
 
+/// Which colour is what, beneath the picture's lower edge's other legend. How high that is, with what lies below it.
+float draw_vessel_legend(const PanelContext& context, ImVec2 lower_left) {
+  const auto& drawn_by = context.operation.drawn_by;
+  const bool preset = context.facts.preset == kTumourAndVessels && !context.facts.preset_changed;
+  if (!context.shown.overlaid || !preset || drawn_by == nullptr || context.facts.look.opacity <= 0) return 0;
+  constexpr int kPortal_hu = 220, kHepatic_hu = 160, kTumour_hu = 350;  // rendering.md has the ranges
+  const std::array<std::pair<std::string, int>, 3> rows{{{words("legend_portal"), kPortal_hu},
+                                                         {words("legend_hepatic"), kHepatic_hu},
+                                                         {words("legend_tumour"), kTumour_hu}}};
+  const float gap = 6 * context.at.scale, line = ImGui::GetTextLineHeight(), side = 0.7F * line;
+  float wide = 0;
+  for (const auto& [name, hu] : rows) wide = std::max(wide, ImGui::CalcTextSize(name.c_str()).x + side + 3 * gap);
+  const float high = line * static_cast<float>(rows.size()) + 2 * gap;
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  list->AddRectFilled(ImVec2(lower_left.x, lower_left.y - high), ImVec2(lower_left.x + wide, lower_left.y), kGround);
+  ImVec2 at(lower_left.x + gap, lower_left.y - high + gap);
+  for (const auto& [name, hu] : rows) {
+    const TransferFunction::Entry& entry = drawn_by->at(hu);
+    draw_colour_sign({entry.r, entry.g, entry.b}, at, side);
+    list->AddText(ImVec2(at.x + side + gap, at.y), ImGui::GetColorU32(colour(theme_over_video().text)), name.c_str());
+    at.y += line;
+  }
+  return high;
+}
+
 /// The CT from outside, in a corner that leaves the target free.
 void draw_inset(PanelContext& context, const ScreenBox& area, const std::optional<ScreenBox>& target) {
   const std::uintptr_t inset = context.window.picture(LiveWindow::Slot::inset);
@@ -151,7 +191,10 @@ void draw_picture(PanelContext& context, ImVec2 from, ImVec2 size) {
       target = draw_target(*context.operation.target, context.operation.checked.has_value(), corner, fit, scale);
   }
   draw_banner(context, from, size.x);
-  const float legend_high = draw_margin_legend(context, ImVec2(from.x + gap, from.y + size.y - gap));
+  const ImVec2 lower_left(from.x + gap, from.y + size.y - gap);
+  const float margins_high = draw_margin_legend(context, lower_left);
+  const float legend_high =
+      margins_high + draw_vessel_legend(context, ImVec2(lower_left.x, lower_left.y - margins_high));
   const ScreenBox area{{from.x + gap, from.y + kBannerPx * scale + gap},
                        {from.x + size.x - gap, from.y + size.y - gap - legend_high}};
   draw_inset(context, area, target);

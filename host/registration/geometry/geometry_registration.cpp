@@ -266,6 +266,7 @@ Result<ViewRegistration> register_geometry(const std::vector<VideoView>& views, 
     settings.progress(fmt::format("round {} of {}: {} places by stereo, {} by outlines; most believed: {}",
                                   out.evaluations, kRounds.size(), *out.stereo_points, by_outlines.size(),
                                   found.fits.front().prior().name));
+    settings.round_done(static_cast<std::size_t>(out.evaluations), kRounds.size(), points.size());
   }
   if (settings.watch.cancelled()) return called_off();
   out.field = field_over(ct, found.mean);

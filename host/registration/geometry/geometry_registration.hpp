@@ -38,6 +38,10 @@ struct GeometrySettings {
   std::function<Result<DisplacementField>(const std::vector<VideoView>& views)> by_similarity;
   /// Called with a line for a person now and then.
   std::function<void(const std::string&)> progress = [](const std::string&) {};
+  /// Called after each round with its number, from 1, how many there are, and the places of the surface that were
+  /// found.
+  std::function<void(std::size_t round, std::size_t rounds, std::size_t places)> round_done =
+      [](std::size_t, std::size_t, std::size_t) {};
   RegistrationWatch watch;
 };
 

@@ -180,6 +180,9 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const CameraModel& camera = workflow.picture().setup()->camera();
   EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
   EXPECT_TRUE(mark->error.motion.has_value());
+  EXPECT_NEAR(workflow.view().target_moved_mm.value_or(-1), 4, 1e-3);
+  ASSERT_TRUE(workflow.view().expected.has_value());
+  EXPECT_EQ(workflow.view().expected->motion->rms_mm, 0.7);
   const double fiducials_mm =
       calibration::TargetError(kFiducials, calibration::localisation_error_of(0.3, 4).upper95_mm).rms_mm({30, 30, 20});
   const double rigid_mm = std::sqrt((fiducials_mm * fiducials_mm + 1.5 * square(1.23 * 0.5)) * 5.99 / 3);
@@ -222,6 +225,7 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   EXPECT_EQ(workflow.view().fault, "");
   EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
   EXPECT_EQ(workflow.view().step, LiveStep::check);  // not the run: the patient may have been moved
+  EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).holds()) << "nobody has looked yet";
   EXPECT_FALSE(workflow.picture().setup().has_value()) << "without the scope's record there is no overlay";
   give_record(workflow);
   EXPECT_FALSE(workflow.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
@@ -232,6 +236,29 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   ASSERT_TRUE(workflow.picture().setup().has_value());
   const auto& found = workflow.picture().setup()->tracker_from_patient();
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
+}
+
+TEST(OperationView, SlicesOpenAtTheTargetButAtAFiducialWhileTheseAreTouched) {
+  OperationView operation;
+  operation.step = LiveStep::run;
+  EXPECT_FALSE(first_place_mm(operation).has_value());
+  operation.markers_in_patient_mm = {{1, 2, 3}};
+  EXPECT_EQ(*first_place_mm(operation), Eigen::Vector3d(1, 2, 3)) << "where there is no target";
+  operation.landmarks = {{"tumour", {30, 30, 20}}};
+  EXPECT_EQ(*first_place_mm(operation), Eigen::Vector3d(30, 30, 20));
+  operation.step = LiveStep::fiducials;
+  EXPECT_EQ(*first_place_mm(operation), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(OperationView, TheButtonSaysWaitWhereAPressWouldDoNothing) {
+  OperationView operation;
+  operation.step = LiveStep::fiducials;
+  EXPECT_EQ(primary_words(operation), "take this point");
+  operation.simulated = true;
+  EXPECT_EQ(primary_words(operation), "wait for the touches");
+  operation.step = LiveStep::deform;
+  operation.deforming = true;
+  EXPECT_EQ(primary_words(operation), "matching: wait") << "a foot that presses twice must not cancel it";
 }
 
 TEST(LiveWorkflow, WhatIsToBeTakenUpIsNotWrittenOverBefore) {

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
+#include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "tests/support/live_operation.hpp"
 
@@ -70,10 +73,11 @@ TEST(OrganMotion, WhatCannotBeToldChangesNothingAndIsToldAfterTenSeconds) {
   EXPECT_TRUE(motion.moved_mm().has_value());
 }
 
-/// The scope at its place, looking at the CT's middle.
-wire::VideoFrame frame_at(const LiveWorkflow& workflow, int at_s) {
+/// The scope at its place, or so many mm beside it, looking at the CT's middle.
+wire::VideoFrame frame_at(const LiveWorkflow& workflow, int at_s, double beside_mm = 0) {
   const Setup& setup = *workflow.picture().setup();
-  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(), Eigen::Vector3d(-30, -30, 80));
+  const Transform<Camera, Patient> camera_from_patient(Eigen::Matrix3d::Identity(),
+                                                       Eigen::Vector3d(-30 + beside_mm, -30, 80));
   wire::VideoFrame frame;
   frame.width_px = setup.camera().width_px;
   frame.height_px = setup.camera().height_px;
@@ -132,6 +136,10 @@ TEST_F(DeformedOperation, LosesItsOverlayWhereTheOrganMovesAndGetsItBack) {
   EXPECT_FALSE(withdrawn.overlaid);
   EXPECT_NE(withdrawn.reason.find("the organ has moved since the views"), std::string::npos) << withdrawn.reason;
   EXPECT_TRUE(workflow.view().organ_moved);
+  EXPECT_TRUE(workflow.view().note(LiveStep::deform).done);
+  EXPECT_FALSE(workflow.view().note(LiveStep::deform).holds()) << "no tick while the alarm stands";
+  EXPECT_NE(workflow.view().note(LiveStep::deform).doubt.find("the organ has moved"), std::string::npos);
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).holds()) << "of which nothing is doubted";
   EXPECT_FALSE(workflow.view().target.has_value());
   workflow.take(said(kCannotTell, 3));
   EXPECT_FALSE(shown_after(workflow, 4).overlaid);
@@ -141,6 +149,7 @@ TEST_F(DeformedOperation, LosesItsOverlayWhereTheOrganMovesAndGetsItBack) {
   const ShownPicture back = shown_after(workflow, 6);
   EXPECT_TRUE(back.overlaid) << back.reason;
   EXPECT_EQ(back.strength, 1);
+  EXPECT_TRUE(workflow.view().note(LiveStep::deform).holds());
 }
 
 TEST_F(DeformedOperation, KeepsViewsAnewThoughItsOverlayIsWithdrawn) {
@@ -149,12 +158,48 @@ TEST_F(DeformedOperation, KeepsViewsAnewThoughItsOverlayIsWithdrawn) {
   workflow.go_to(LiveStep::views);
   workflow.primary(HostTime{0});
   ASSERT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept");
+  EXPECT_EQ(workflow.view().primary_refused, "view 1 was kept from here: move the scope by 5 mm or more");
   workflow.take(said(kMoved, 1));
   workflow.take(said(kMoved, 2));
   EXPECT_NE(workflow.view().note(LiveStep::views).line.find("moved since"), std::string::npos);
   EXPECT_FALSE(shown_after(workflow, 3).overlaid);
   workflow.primary(HostTime{0});
   EXPECT_EQ(workflow.view().note(LiveStep::views).line, "1 views kept") << "the old one is not among them";
+}
+
+TEST_F(DeformedOperation, SpaceLeavesTheMatchingAloneAndAKeyOfItsOwnCancelsIt) {
+  LiveWorkflow& workflow = *workflow_;
+  workflow.go_to(LiveStep::deform);
+  workflow.undo();
+  workflow.go_to(LiveStep::views);
+  std::mt19937 random(1);
+  for (int n = 1; n <= 2; ++n) {
+    wire::VideoFrame frame = frame_at(workflow, n, 10.0 * n);
+    auto noise = std::make_shared<std::vector<std::uint8_t>>(frame.rgb->size());
+    for (std::uint8_t& byte : *noise) byte = static_cast<std::uint8_t>(random());
+    frame.rgb = noise;
+    workflow.take(frame, HostTime{n * 1000 * kMs}, std::nullopt);
+    workflow.primary(HostTime{0});
+  }
+  ASSERT_EQ(workflow.view().note(LiveStep::views).line, "2 views kept");
+  workflow.go_to(LiveStep::deform);
+  // The pictures are noise, and so nothing is found: in words other than those of a matching that was called off.
+  const auto end_of = [&workflow] {
+    for (int i = 0; i < 6000 && workflow.view().deforming; ++i) sleep_for(Duration::from_ms(10));
+    workflow.tick();
+    EXPECT_FALSE(workflow.view().deforming);
+    return workflow.view().note(LiveStep::deform).line;
+  };
+  ASSERT_EQ(workflow.view().primary_refused, "");
+  workflow.primary(HostTime{0});
+  ASSERT_TRUE(workflow.view().deforming);
+  EXPECT_NE(workflow.view().primary_refused, "");
+  workflow.primary(HostTime{0});
+  EXPECT_EQ(end_of().find("called off"), std::string::npos);
+  workflow.primary(HostTime{0});
+  workflow.cancel_matching();
+  const std::string line = end_of();
+  EXPECT_NE(line.find("called off"), std::string::npos) << line;
 }
 
 TEST_F(DeformedOperation, GetsItsOverlayBackWhereTheDeformationIsUndone) {

@@ -60,7 +60,7 @@ TEST_F(Language, AnotherOneMayOrderFiguresAnew) {
   ASSERT_TRUE(speak_text(R"({"from_nearest": "{1}: noch {0:.1f} mm", "do_go_on": "weiter"})"));
   EXPECT_EQ(words("from_nearest", 2.345, "Tumor"), "Tumor: noch 2.3 mm");
   EXPECT_EQ(words("do_go_on"), "weiter");
-  EXPECT_EQ(words("do_cancel"), "cancel") << "what the file leaves out stays";
+  EXPECT_EQ(words("do_begin"), "begin") << "what the file leaves out stays";
 }
 
 TEST_F(Language, AFileThatIsNoneChangesNothing) {
@@ -68,7 +68,7 @@ TEST_F(Language, AFileThatIsNoneChangesNothing) {
        {"", "[]", "{\"go_on\": \"weiter\"", R"({"do_go_on": 3})", R"({"no_such_key": "weiter"})",
         R"({"do_go_on": "weiter {}"})", R"({"from_nearest": "{:.1f} mm"})", R"({"from_nearest": "{} mm von {}"})",
         R"({"from_nearest": "{:.1f} mm von {"})", R"({"from_nearest": "{:.1f} mm {:>99999999}"})",
-        R"({"do_go_on": "weiter", "do_cancel": "}"})"}) {
+        R"({"do_go_on": "weiter", "do_begin": "}"})"}) {
     const auto spoken = speak_text(wrong);
     ASSERT_FALSE(spoken) << wrong;
     EXPECT_NE(spoken.error().what.find("language.json: "), std::string::npos) << spoken.error().what;
