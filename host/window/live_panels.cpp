@@ -12,7 +12,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr float kSidePx = 330, kStripPx = 62, kFiguresPx = 150;  // the strip, and with all figures in it
+constexpr float kSidePx = 330, kStripPx = 62, kFiguresPx = 216;  // the strip, and with all figures in it
 
 void draw_steps(PanelContext& context) {
   constexpr std::array<TextKey<0>, kLiveSteps> kNames{"step_connect", "step_calibrate", "step_fiducials", "step_views",
@@ -115,6 +115,19 @@ void draw_figures(const PanelContext& context) {
   draw_parts(context);
 }
 
+/// What watches whether patient, transmitter and organ move, while the overlay runs. Not where the line over the
+/// picture says that nothing is to be believed.
+void draw_watch(const PanelContext& context) {
+  const OperationView& operation = context.operation;
+  const bool runs = operation.step == LiveStep::run && operation.fre_mm && !operation.unconfirmed;
+  if (context.shown.stale || (!context.shown.overlaid && !runs)) return;
+  const bool seen = !operation.reference.empty(), all = seen && operation.watched;
+  const std::string reference = seen ? words("watch_reference", operation.reference) : words("watch_no_reference");
+  const std::string organ = operation.watched ? words("watch_organ") : words("watch_no_organ");
+  say(all ? context.theme.good : context.theme.warn,
+      fmt::format("{} {}", all ? kGoodSign : kWarnSign, words("watch", reference, organ)));
+}
+
 void draw_strip(PanelContext& context) {
   const PanelLayout& at = context.at;
   const PanelFacts& facts = context.facts;
@@ -129,6 +142,7 @@ void draw_strip(PanelContext& context) {
   }
   ImGui::BeginGroup();
   if (!operation.fault.empty()) say(theme.bad, fmt::format("{} {}", kBadSign, operation.fault));
+  draw_watch(context);
   if (facts.details) draw_figures(context);
   if (operation.surface_told && !facts.details) {
     if (!operation.organ_moved) say(theme.quiet, words("surface_holds"));

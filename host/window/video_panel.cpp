@@ -50,19 +50,7 @@ Banner banner_of(const PanelContext& context) {
   return {words("banner_none", shown.reason)};
 }
 
-/// What watches whether patient, transmitter and organ move, while the overlay runs; empty: the line above says that
-/// nothing is to be believed.
-std::optional<Banner> watch_of(const OperationView& operation, const ShownPicture& shown) {
-  if (!shown.overlaid && (operation.step != LiveStep::run || operation.unconfirmed || !operation.fre_mm)) return {};
-  if (shown.stale) return {};
-  const bool seen = !operation.reference.empty();
-  const std::string reference = seen ? words("watch_reference", operation.reference) : words("watch_no_reference");
-  const std::string organ = operation.watched ? words("watch_organ") : words("watch_no_organ");
-  return Banner{words("watch", reference, organ), seen && operation.watched ? Grade::pass : Grade::marginal};
-}
-
-/// The safety of the picture, in words, sign and colour, over its upper edge; and in a line of its own below what
-/// watches whether patient and organ move.
+/// The safety of the picture, in words, sign and colour, over its upper edge.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
   const Banner banner = banner_of(context);
@@ -79,13 +67,6 @@ void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   list->AddRectFilled(from, ImVec2(from.x + wide, from.y + high), ground);
   list->AddRectFilled(from, ImVec2(from.x + 6 * scale, from.y + high), ink);
   list->AddText(ImVec2(from.x + 14 * scale, from.y + 5 * scale), ink, text.c_str());
-  const auto watch = watch_of(context.operation, context.shown);
-  if (!watch) return;
-  const std::string unseen = fmt::format("{} {}", sign_of(*watch->grade), watch->text);
-  const float low = from.y + high, beside = 14 * scale + ImGui::CalcTextSize(unseen.c_str()).x + 14 * scale;
-  list->AddRectFilled(ImVec2(from.x, low), ImVec2(from.x + std::min(wide, beside), low + high), ground);
-  list->AddText(ImVec2(from.x + 14 * scale, low + 5 * scale),
-                ImGui::GetColorU32(colour(colour_of(*watch->grade, theme))), unseen.c_str());
 }
 
 /// Where the target is drawn, and how far from there it may be. checked: by a landmark. Gives what that takes of the
