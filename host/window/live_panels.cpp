@@ -149,8 +149,8 @@ void draw_strip(PanelContext& context) {
   } else if (!operation.surface_check.empty()) {
     say(operation.organ_moved ? theme.warn : theme.quiet, operation.surface_check);
   }
-  if (!facts.details) say(theme.quiet, words("details"));
   if (!facts.said.empty()) say(theme.quiet, facts.said);
+  if (!facts.details) say(theme.quiet, words("details"));  // last: where there is no room, it is the one to go
   ImGui::EndGroup();
   ImGui::End();
 }

@@ -341,12 +341,16 @@ TEST_F(Referenced, OneThatComesOffTakesTheOverlayAwayWithin150msUntilSomebodyHas
   EXPECT_EQ(workflow_->view().step, LiveStep::check);
   EXPECT_NE(workflow_->view().note(LiveStep::check).line.find("register anew"), std::string::npos);
   EXPECT_TRUE(workflow_->view().unconfirmed);
+  const StepNote fiducials = workflow_->view().note(LiveStep::fiducials);
+  EXPECT_TRUE(fiducials.done && !fiducials.holds());
+  EXPECT_NE(fiducials.doubt.find("came off or was pushed"), std::string::npos) << fiducials.doubt;
   room_.patient_from_reference = fixed;  // somebody has put it back
   pass(2000);
   EXPECT_FALSE(overlaid()) << "whether just there, nobody has said";
   workflow_->primary(HostTime{room_.time_ms * kMs});
   pass(1000);
   EXPECT_TRUE(overlaid()) << reason();
+  EXPECT_TRUE(workflow_->view().note(LiveStep::fiducials).holds()) << "somebody has looked";
 }
 
 TEST_F(Referenced, TouchesFromBeforeItCameOffAreNotMixedWithNewOnes) {
