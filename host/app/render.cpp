@@ -91,6 +91,19 @@ Result<Picture> behind_of(const CameraModel& camera, const std::filesystem::path
   return picture;
 }
 
+/// A picture does not tell which camera took it: whoever gives one to be drawn over answers for it, and is told for
+/// what.
+void tell_unproven(const RenderOptions& options, const Operation& operation) {
+  std::string camera;
+  for (const auto& [name, value] : operation.calibrated->found_with.camera)
+    camera += fmt::format("{}{} {}", camera.empty() ? " (" : ", ", name, value);
+  if (!camera.empty()) camera += ")";
+  fmt::print(
+      "nothing tells whether {} was taken with the operation's scope and camera{}, and with --pose: that is as you "
+      "say\n",
+      options.over.string(), camera);
+}
+
 /// Where lines are to be shown straight: the picture behind resampled, and a lens to draw with that bends none.
 void straighten(RenderScene& scene, const std::string& display) {
   if (display == kDisplays[0]) return;
@@ -124,6 +137,8 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
   scene.behind = *std::move(behind);
+  if (operation && operation->calibrated && options.camera.empty() && !options.over.empty())
+    tell_unproven(options, *operation);
   straighten(scene, options.display);
   scene.settings.step_mm = options.step_mm;
   if (!options.clip_plane.empty()) {
