@@ -36,14 +36,15 @@ const std::map<std::string, Points>& presets() {
         {180, {0.85, 0.45, 0.3}, 0}}},
       {"skin", {{-600, {0.85, 0.66, 0.55}, 0}, {-300, {0.88, 0.70, 0.58}, 1}, {3071, {0.95, 0.80, 0.70}, 1}}},
       {"vessel", {{130, {0.75, 0.15, 0.15}, 0}, {180, {0.85, 0.20, 0.20}, 0.4}, {350, {1.0, 0.55, 0.45}, 1}}},
-      // Portal veins blue, hepatic veins vermilion (both of Okabe and Ito's palette, 2008), a tumour that has taken up
-      // contrast medium green: told apart by HU, once all but their labels is left out.
+      // Portal veins blue, hepatic veins pale violet, a tumour that has taken up contrast medium green: told apart by
+      // HU, once all but their labels is left out. At its rim a portal vein has the HU of a hepatic one: of another hue
+      // it would look like one.
       {kTumourAndVessels,
-       {{80, {0.84, 0.37, 0.0}, 0},
-        {140, {0.84, 0.37, 0.0}, 0.16},
-        {185, {0.84, 0.37, 0.0}, 0.22},
-        {205, {0.0, 0.45, 0.70}, 0.22},
-        {240, {0.0, 0.45, 0.70}, 0.25},
+       {{80, {0.74, 0.62, 1.0}, 0},
+        {140, {0.74, 0.62, 1.0}, 0.16},
+        {185, {0.74, 0.62, 1.0}, 0.22},
+        {205, {0.0, 0.32, 0.85}, 0.22},
+        {240, {0.0, 0.32, 0.85}, 0.25},
         {290, {0.35, 0.95, 0.45}, 0.30},
         {340, {0.30, 1.0, 0.35}, 0.40},
         {500, {0.40, 1.0, 0.40}, 0.40}}},
