@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <optional>
 #include <utility>
 
 #include "device/birdseyed/camera_thread.hpp"
@@ -51,7 +52,6 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
   if (!config.gpio.lines.chip.empty())
     begin(a->gpio_post_, [a](const std::stop_token& s) { run_gpio(a->config_.gpio, a->state_, a->gpio_post_, s); });
   a->threads_.emplace_back([a](const std::stop_token& s) { a->make_messages(s); });
-  a->threads_.emplace_back([a](const std::stop_token& s) { a->report_health(s); });
   return appliance;
 }
 
@@ -74,20 +74,37 @@ Appliance::~Appliance() {
 
 void Appliance::make_messages(const std::stop_token& stop) {
   Core core(config_.core);
-  std::string status;
+  std::string status = core.status_text();
+  wire::Health health;
+  std::optional<Core::Counters> before;
+  DeviceTime measured;
   while (!stop.stop_requested()) {
     auto event = queue_.pop(device_now() + (core.waiting() ? kTickWaiting : kTickIdle), stop);
     if (!event) event = Tick{device_now()};
     if (recorder_) recorder_->take(*event);
     for (const wire::Packet& packet : core.take(*event)) server_.publish(packet);
+    bool changed = std::holds_alternative<InstrumentChanged>(*event);
     if (core.status_text() != status) {
       status = core.status_text();
+      changed = true;
       spdlog::info("status: {}", status.empty() ? "all is well" : status);
     }
-    core_alive_ns_ = device_now().ns;
+    const DeviceTime now = device_now();
+    const bool due = !before || now - measured >= kHealthEvery;
+    if (due) {
+      const Core::Counters counters = core.counters();
+      health = figures(before.value_or(counters), counters, before ? (now - measured).seconds() : 1);
+      before = counters;
+      measured = now;
+    }
+    // A change is told before any frame of the instrument that it is of: what is drawn may depend on which one that is.
+    if (due || changed) {
+      tell_instruments(core.board(), health);
+      server_.publish(wire::pack(health, now));
+    }
+    core_alive_ns_ = now.ns;
     state_ = core.board().state();
     const std::lock_guard lock(told_mutex_);
-    counters_ = core.counters();
     board_ = core.board();
   }
 }
@@ -103,7 +120,7 @@ wire::WallClock read_wall_clock() {
 
 }  // namespace
 
-wire::Health Appliance::health(const Core::Counters& before, const Core::Counters& counters, double seconds) {
+wire::Health Appliance::figures(const Core::Counters& before, const Core::Counters& counters, double seconds) {
   const auto sent = server_.take_counters();
   const auto& tracker = counters.tracker;
   wire::Health health;
@@ -133,32 +150,18 @@ wire::Health Appliance::health(const Core::Counters& before, const Core::Counter
   health.tracker_time_sigma_ms = counters.tracker_time_sigma_ms;
   health.clock = read_wall_clock();
   health.reference = config_.tracker.reference;
-  health.recording = recorder_ ? recorder_->text() : not_recording_;
-  const std::lock_guard lock(told_mutex_);
-  health.state = name_of(board_.state());
-  for (const Instrument instrument : {Instrument::tracker, Instrument::camera, Instrument::gpio}) {
-    const auto& entry = board_.of(instrument);
-    if (entry.state != InstrumentState::unused)
-      health.instruments.push_back(
-          {name_of(instrument), name_of(entry.state), entry.text, entry.times_lost, entry.identity});
-  }
   return health;
 }
 
-void Appliance::report_health(const std::stop_token& stop) {
-  Core::Counters before;
-  DeviceTime began = device_now();
-  while (!stop.stop_requested()) {
-    sleep_for(kHealthEvery, stop);
-    Core::Counters counters;
-    {
-      const std::lock_guard lock(told_mutex_);
-      counters = counters_;
-    }
-    const DeviceTime ended = device_now();
-    server_.publish(wire::pack(health(before, counters, (ended - began).seconds()), ended));
-    before = counters;
-    began = ended;
+void Appliance::tell_instruments(const InstrumentBoard& board, wire::Health& health) const {
+  health.recording = recorder_ ? recorder_->text() : not_recording_;
+  health.state = name_of(board.state());
+  health.instruments.clear();
+  for (const Instrument instrument : {Instrument::tracker, Instrument::camera, Instrument::gpio}) {
+    const auto& entry = board.of(instrument);
+    if (entry.state != InstrumentState::unused)
+      health.instruments.push_back(
+          {name_of(instrument), name_of(entry.state), entry.text, entry.times_lost, entry.identity});
   }
 }
 

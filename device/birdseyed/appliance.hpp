@@ -15,8 +15,8 @@
 namespace birdseye::device {
 
 /// The appliance at work: a thread for each instrument hands over what comes, one thread makes messages of it and
-/// publishes them, one reports health each second. When an instrument is not there, goes away or falls silent, the
-/// appliance says so on the wire and looks for it until it is back; the others go on.
+/// publishes them, and Health each second and with each change of an instrument. When an instrument is not there, goes
+/// away or falls silent, the appliance says so on the wire and looks for it until it is back; the others go on.
 class Appliance {
  public:
   /// server: outlives the appliance, so that clients stay connected when the configuration is read again.
@@ -34,8 +34,9 @@ class Appliance {
   Appliance(const Config& config, wire::Server& server);
   void start_recording();
   void make_messages(const std::stop_token& stop);
-  void report_health(const std::stop_token& stop);
-  [[nodiscard]] wire::Health health(const Core::Counters& before, const Core::Counters& now, double seconds);
+  /// All of a Health but what the instruments are and how they are.
+  [[nodiscard]] wire::Health figures(const Core::Counters& before, const Core::Counters& now, double seconds);
+  void tell_instruments(const InstrumentBoard& board, wire::Health& health) const;
 
   Config config_;
   wire::Server& server_;
@@ -45,9 +46,8 @@ class Appliance {
   InstrumentPost tracker_post_, camera_post_, gpio_post_;
   std::atomic<std::int64_t> core_alive_ns_;
   std::atomic<ApplianceState> state_ = ApplianceState::starting;
-  mutable std::mutex told_mutex_;  ///< guards what the core's thread tells the reporting thread
-  Core::Counters counters_;
-  InstrumentBoard board_;
+  mutable std::mutex told_mutex_;  ///< of what follows
+  InstrumentBoard board_;          ///< as the messages last told it
   std::vector<OwnedThread> threads_;
 };
 
