@@ -15,6 +15,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/condition.hpp"
+#include "drivers/system/durable.hpp"
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::device {
@@ -43,7 +44,7 @@ std::size_t size_of(const RawEvent& event) {
 
 class DiskFile : public RecordFile {
  public:
-  explicit DiskFile(UniqueFd fd) : fd_(std::move(fd)) {}
+  DiskFile(UniqueFd fd, const std::filesystem::path& path) : fd_(std::move(fd)), folder_(path.parent_path()) {}
 
   int write(std::span<const std::uint8_t> bytes) override {
     while (!bytes.empty()) {
@@ -54,10 +55,19 @@ class DiskFile : public RecordFile {
     }
     return 0;
   }
-  int sync() override { return ::fdatasync(fd_.get()) == 0 || errno == EINVAL ? 0 : errno; }  // EINVAL: it cannot
+  int sync() override {
+    if (::fdatasync(fd_.get()) != 0 && errno != EINVAL) return errno;  // EINVAL: it cannot
+    // Its name with it, once: what is on the disk without a name is lost all the same.
+    if (named_) return 0;
+    if (!sync_folder(folder_)) return EIO;
+    named_ = true;
+    return 0;
+  }
 
  private:
   UniqueFd fd_;
+  std::filesystem::path folder_;
+  bool named_ = false;
 };
 
 }  // namespace
@@ -72,7 +82,7 @@ Result<NewRecordFile> create_record_file(const RecordConfig& config) {
   int os_errno = EEXIST;
   for (int i = 2; os_errno == EEXIST && i <= kMostOfOneName; ++i) {
     UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0640));
-    if (fd) return NewRecordFile{std::make_unique<DiskFile>(std::move(fd)), path};
+    if (fd) return NewRecordFile{std::make_unique<DiskFile>(std::move(fd), path), path};
     os_errno = errno;
     if (os_errno == EEXIST) path = config.folder / fmt::format("{}-{}.berec", name, i);
   }

@@ -4,6 +4,8 @@
 
 #include <system_error>
 
+#include "drivers/system/durable.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -67,10 +69,9 @@ Result<void> Film::finish() {
   if (code != 0) {
     return Error{Errc::io, fmt::format("{}: ffmpeg did not finish it; see {}", path_.string(), log.string())};
   }
-  std::error_code error;
-  std::filesystem::rename(temporary_, path_, error);
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be replaced", path_.string())};
-  std::filesystem::remove(log, error);
+  if (auto replaced = replace_durably(temporary_, path_); !replaced) return replaced;
+  std::error_code ignored;
+  std::filesystem::remove(log, ignored);
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "drivers/system/clock.hpp"
+#include "drivers/system/durable.hpp"
 #include "host/files/sequence_header.hpp"
 #include "host/files/write_files.hpp"
 
@@ -29,9 +30,12 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const Recording
     return Error{Errc::in_use,
                  fmt::format("{}: holds a recording already; choose another --out", settings.folder.string())};
   }
-  fs::create_directories(settings.folder, error);
+  const bool made = fs::create_directories(settings.folder, error);
   if (error)
     return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", settings.folder.string())};
+  if (made) {
+    if (auto named = sync_folder(fs::canonical(settings.folder, error).parent_path()); !named) return named.error();
+  }
   auto events = OutputFile::create(settings.folder / kRecordingEvents);
   if (!events) return events.error();
   auto tracker = SequenceWriter::create(settings.folder, kRecordingTracker, 0, 0);
@@ -232,21 +236,28 @@ Result<void> RecordingWriter::end_video() {
     return finished;
   }
   if (sequence_.empty()) return {};
+  bool joined = false;
   if (!settings_.pair) {
+    const auto one = sequence_[0].join();
+    joined = one.has_value();
     // Two files are as good to read: not worth losing the recording for.
-    if (auto joined = sequence_[0].join(); !joined) notes_.push_back(joined.error().what);
+    if (!joined) notes_.push_back(one.error().what);
     figures_.videos.back().file = sequence_[0].path().filename().string();
   }
+  // The one is on the disk since it took its place.
+  Result<void> synced = joined ? Result<void>() : sequence_[0].sync();
   sequence_.clear();
-  return {};
+  return synced;
 }
 
 Result<void> RecordingWriter::finish(const std::string& why) {
   if (auto written = write_measurement(); !written) notes_.push_back(written.error().what);
   Result<void> ended = end_video();
   if (!ended) notes_.push_back(ended.error().what);
-  if (auto synced = events_.sync(); !synced) notes_.push_back(synced.error().what);
-  if (auto written = write_sheet(why, true); !written) return written;
+  for (auto synced : {events_.sync(), tracker_.sync()}) {
+    if (!synced) notes_.push_back(synced.error().what);
+  }
+  if (auto written = write_sheet(why, true); !written) return written;  // and with it the names in the folder
   return ended;
 }
 

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "drivers/system/durable.hpp"
 #include "host/files/sequence_header.hpp"
 
 namespace birdseye::host {
@@ -171,6 +172,13 @@ Result<void> SequenceWriter::add(const Fields& fields, std::span<const std::uint
   return header_.put(count_at_, count_text());
 }
 
+Result<void> SequenceWriter::sync() {
+  for (OutputFile& file : pixels_) {
+    if (auto synced = file.sync(); !synced) return synced;
+  }
+  return header_.sync();
+}
+
 Result<void> SequenceWriter::join() {
   if (pixels_.empty()) return {};
   fs::path whole = path_;
@@ -193,10 +201,8 @@ Result<void> SequenceWriter::join() {
   if (done) done = file->put(end_at_, end);
   file->cut(end_at_ + end.size());
   if (done) done = file->append(raw, end_at_ + end.size());
-  if (done) done = file->sync();
+  if (done) done = replace_durably(part, whole);
   if (!done) return stays(done.error().what);
-  fs::rename(part, whole, error);
-  if (error) return stays("the one cannot be put in its place");
   fs::remove(path_, error);
   fs::remove(raw, error);
   path_ = whole;

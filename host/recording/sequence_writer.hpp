@@ -58,6 +58,8 @@ class SequenceWriter {
   /// Joins header and pixels into one file, NAME.igs.mha, in place of the pair. Meanwhile the disk holds both: where
   /// there is no room the pair stays, and the error says so. Nothing can be added afterwards.
   Result<void> join();
+  /// Brings what was added onto the disk.
+  Result<void> sync();
   [[nodiscard]] std::size_t frames() const { return frames_; }
   /// The file to open.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }

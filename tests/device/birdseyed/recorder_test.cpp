@@ -17,6 +17,7 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/synced_files.hpp"
 
 namespace birdseye::device {
 namespace {
@@ -291,6 +292,7 @@ TEST(Appliance, RunsWithoutARecordingAndSaysSo) {
 
 TEST(Recorder, KeepsEverythingItIsGiven) {
   const birdseye::testing::Scratch scratch;
+  birdseye::testing::forget_synced();
   RecordConfig config;
   config.folder = scratch / "recordings";
   std::filesystem::path path;
@@ -301,6 +303,8 @@ TEST(Recorder, KeepsEverythingItIsGiven) {
     EXPECT_EQ((*recorder)->text(), path.string());
     for (int i = 0; i < 100; ++i) (*recorder)->take(bytes(static_cast<std::uint8_t>(i)));
   }
+  EXPECT_TRUE(birdseye::testing::is_synced(path));
+  EXPECT_TRUE(birdseye::testing::is_synced(config.folder)) << "a power cut leaves the bytes without a name";
   auto reader = RawEventReader::open(path);
   ASSERT_TRUE(reader) << reader.error().what;
   for (int i = 0; i < 100; ++i) {

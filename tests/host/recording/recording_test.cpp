@@ -9,12 +9,14 @@
 #include "host/recording/recording_writer.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/synced_files.hpp"
 
 namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
 using testing::contents_of;
+using testing::is_synced;
 using testing::read_json;
 using testing::Scratch;
 
@@ -122,6 +124,22 @@ TEST(Recording, PlaysTheSameEventsInTheSameOrderToTheBit) {
     EXPECT_TRUE(played.notes.empty());
     ASSERT_EQ(played.events.size(), events.size());
     for (std::size_t i = 0; i < events.size(); ++i) EXPECT_EQ(said(played.events[i]), said(events[i])) << i;
+  }
+}
+
+TEST(Recording, IsOnTheDiskOnceItHasEnded) {
+  for (const RecordingSettings& settings : {RecordingSettings{}, {.pair = true}, {.compressed = true}}) {
+    const Scratch scratch;
+    testing::forget_synced();
+    record(scratch / "made/r", session(6), settings);
+    EXPECT_TRUE(is_synced(scratch / "made")) << "or the folder is not there after a power cut";
+    EXPECT_TRUE(is_synced(scratch / "made/r"));
+    std::size_t files = 0;
+    for (const auto& entry : fs::directory_iterator(scratch / "made/r")) {
+      EXPECT_TRUE(is_synced(entry.path())) << entry.path();
+      ++files;
+    }
+    EXPECT_EQ(files, settings.pair ? 5U : 4U);  // sheet, events, tracker, video
   }
 }
 
