@@ -26,14 +26,14 @@ inline void add_ct_options(CLI::App& command, VolumeSource& source) {
   command
       .add_option_function<std::vector<double>>(
           "--spacing",
-          [&source](const std::vector<double>& mm) { source.spacing_mm = Eigen::Vector3d(mm[0], mm[1], mm[2]); },
+          [&source](const std::vector<double>& mm) { source.stated.spacing_mm = Eigen::Vector3d(mm[0], mm[1], mm[2]); },
           "how far apart the voxels are along i, j, k, mm; only for a file that does not say it, or says two")
       ->type_name("X,Y,Z")
       ->expected(3)
       ->delimiter(',')
       ->check(CLI::Range(0.02, 20.0));
   command
-      .add_option("--orientation", source.orientation,
+      .add_option("--orientation", source.stated.orientation,
                   "which way i, j, k grow: three of R or L, A or P, I or S, as LPS; only for a file that does not say "
                   "it, or says two")
       ->type_name("LETTERS")

@@ -100,11 +100,12 @@ struct DemoOptions {
 };
 
 /// The chosen CT as the simulator can read it, which knows no series. With the host's own checks: what would be stacked
-/// wrongly is refused here, with the reason.
-Result<fs::path> simple_ct(const VolumeSource& source, const fs::path& out) {
-  const auto ct = import_body(source);
+/// wrongly is refused here, with the reason. notes: gets what was noted of it.
+Result<fs::path> simple_ct(const VolumeSource& source, const fs::path& out, std::vector<std::string>& notes) {
+  auto ct = import_body(source);
   if (!ct) return ct.error();
   print_notes(ct->notes);
+  notes = std::move(ct->notes);
   const Volume& volume = ct->volume;
   ImageFile image;
   image.size = volume.size;
@@ -126,8 +127,9 @@ Result<ExitCode> demo(const DemoOptions& options) {
   std::error_code error;
   fs::create_directories(out, error);
   if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", out.string())};
+  std::vector<std::string> ct_notes;
   if (!options.ct.path.empty()) {
-    auto simple = simple_ct(options.ct, out);
+    auto simple = simple_ct(options.ct, out, ct_notes);
     if (!simple) return simple.error();
     settings.ct = *std::move(simple);
   }
@@ -156,6 +158,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   DemoSession session(**cart, *board, patient, *std::move(film), progress);
   session.figures.title =
       settings.ct.empty() ? "Birdseye: the simulated cart" : "Birdseye: the simulated cart over a CT of yours";
+  session.figures.notes = std::move(ct_notes);
   session.figures.deformation_mm = settings.deformation_mm;
   session.figures.position_noise_mm = settings.position_noise_mm;
   session.figures.angle_noise_deg = settings.angle_noise_deg;

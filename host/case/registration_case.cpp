@@ -134,12 +134,12 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
     const auto spacing = table.get<std::vector<double>>("spacing");
     if (!spacing) return spacing.error();
     if (spacing->size() != 3) return table.wrong("spacing", "is three numbers, mm");
-    source.spacing_mm = Eigen::Vector3d::Map(spacing->data());
+    source.stated.spacing_mm = Eigen::Vector3d::Map(spacing->data());
   }
   const auto orientation = table.get<std::string>("orientation", "");
   if (!orientation) return orientation.error();
-  source.orientation = *orientation;
-  if (!source.orientation.empty() && !axes_of_letters(source.orientation)) {
+  source.stated.orientation = *orientation;
+  if (!source.stated.orientation.empty() && !axes_of_letters(source.stated.orientation)) {
     return table.wrong("orientation",
                        "is one of R and L, one of A and P and one of I and S, in the order of i, j, k, as \"LPS\"");
   }

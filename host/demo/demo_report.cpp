@@ -108,6 +108,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"other_messages_dropped", f.drops.others},
       {"wall_s", f.wall_s},
   };
+  if (!f.notes.empty()) json["notes"] = f.notes;
   add_spread(json, "overlay_error_px", px);
   add_spread(json, "target_error_mm", mm);
   if (f.deforming) {
@@ -147,6 +148,7 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
   if (f.deforming) add_deforming(page, *f.deforming, f);
   page.heading("Figures");
   page.table(rows);
+  for (const std::string& note : f.notes) page.paragraph(note);
   page.heading("Error of the tumour's centre");
   if (f.errors.empty()) {
     page.paragraph("No frame carried an overlay.");

@@ -33,6 +33,7 @@ struct DeformingFigures {
 /// All that the demo measured and its report says.
 struct DemoFigures {
   std::string title;
+  std::vector<std::string> notes;             ///< of the reader of the CT
   std::vector<FrameError> errors;             ///< of the overlay as it was drawn at last
   double deformation_mm = 0;                  ///< how far the liver has moved since the CT, where it has moved most
   std::optional<DeformingFigures> deforming;  ///< where views were kept

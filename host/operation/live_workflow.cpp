@@ -297,6 +297,7 @@ void LiveWorkflow::keep() {
   if (!patient_.plan()) return;
   Operation operation;
   operation.ct_sha256 = patient_.plan()->ct_sha256;
+  operation.ct_stated = patient_.plan()->ct_stated;
   operation.labels_sha256 = patient_.plan()->labels_sha256;
   operation.record_sha256 = record_sha256_;
   const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();

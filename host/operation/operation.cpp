@@ -1,7 +1,9 @@
 #include "host/operation/operation.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -12,6 +14,7 @@
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/operation_parts.hpp"
+#include "host/volume/stated_geometry.hpp"
 
 namespace birdseye::host {
 
@@ -34,11 +37,26 @@ std::string camera_file(const ScopeSetup& scope) {
   return camera_text(scope.camera()) + (covariance ? camera_covariance_text(*covariance) : "");
 }
 
+nlohmann::json json_of_ct(const Operation& operation) {
+  nlohmann::json out{{"sha256", operation.ct_sha256}};
+  if (const auto& mm = operation.ct_stated.spacing_mm) out["stated_spacing_mm"] = {mm->x(), mm->y(), mm->z()};
+  if (const auto& letters = operation.ct_stated.orientation; !letters.empty()) out["stated_orientation"] = letters;
+  return out;
+}
+
+StatedGeometry stated_in(const nlohmann::json& ct) {
+  StatedGeometry out;
+  if (ct.contains("stated_spacing_mm"))
+    out.spacing_mm = Eigen::Vector3d(ct.at("stated_spacing_mm").get<std::array<double, 3>>().data());
+  out.orientation = ct.value("stated_orientation", "");
+  return out;
+}
+
 std::string sheet_text(const Operation& operation) {
   std::vector<SealedPart> parts{
       {"format", {{"name", kFormat}, {"version", kVersion}}},
       {"made", {{"made_utc", operation.made_utc}, {"software", "birdseye " BIRDSEYE_VERSION}}},
-      {"ct", {{"sha256", operation.ct_sha256}}}};
+      {"ct", json_of_ct(operation)}};
   if (!operation.labels_sha256.empty()) parts.push_back({"labels", {{"sha256", operation.labels_sha256}}});
   if (!operation.record_sha256.empty()) parts.push_back({"record", {{"sha256", operation.record_sha256}}});
   if (operation.calibrated) parts.emplace_back("calibrated", json_of(*operation.calibrated));
@@ -85,6 +103,7 @@ Result<Operation> operation_of(const nlohmann::json& sheet) {
   Operation out;
   sheet.at("made").at("made_utc").get_to(out.made_utc);
   out.ct_sha256 = sheet.at("ct").at("sha256").get<std::string>();
+  out.ct_stated = stated_in(sheet.at("ct"));
   out.labels_sha256 = sha256_in(sheet, "labels");
   out.record_sha256 = sha256_in(sheet, "record");
   if (sheet.contains("calibrated")) {
@@ -151,7 +170,15 @@ Result<Operation> read_operation(const fs::path& given) {
 }
 
 Result<void> check_patient(const Operation& operation, const std::string& ct_sha256, const std::string& labels_sha256) {
-  if (operation.ct_sha256 != ct_sha256) return Error{Errc::bad_value, "is of another CT; give that CT"};
+  if (operation.ct_sha256 != ct_sha256) {
+    const std::vector<std::string> stated = options_of(operation.ct_stated);
+    if (stated.empty()) return Error{Errc::bad_value, "is of another CT; give that CT"};
+    return Error{
+        Errc::bad_value,
+        fmt::format("is of another CT, or of this one with its voxels elsewhere; give that CT, and state of it "
+                    "what was stated then: {}",
+                    fmt::join(stated, " "))};
+  }
   if (!operation.labels_sha256.empty() && !labels_sha256.empty() && operation.labels_sha256 != labels_sha256)
     return Error{Errc::bad_value, "is of other labels; give those"};
   return {};

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "host/operation/findings.hpp"
+#include "host/volume/volume_source.hpp"
 
 namespace birdseye::host {
 
@@ -13,6 +14,7 @@ namespace birdseye::host {
 /// was, and so that other commands use what the window found.
 struct Operation {
   std::string ct_sha256;                          ///< which CT it was of: another's registration is refused
+  StatedGeometry ct_stated;                       ///< of where its voxels lie, by a person
   std::string labels_sha256;                      ///< and which labels; empty: there were none
   std::string made_utc;                           ///< 2026-11-22T09:30:00Z
   std::string record_sha256;                      ///< of the calibration record in force; empty: there was none
@@ -30,8 +32,9 @@ bool has_operation(const std::filesystem::path& folder);
 /// changed, and what 0.1.0 wrote, whose files nothing binds together.
 Result<Operation> read_operation(const std::filesystem::path& path);
 
-/// Refuses, with the remedy, a CT or labels other than the operation's. ct_sha256: host/overlay/ct_sha256.hpp;
-/// labels_sha256: host/files/files_sha256.hpp, or empty where no labels are given.
+/// Refuses, with the remedy, a CT or labels other than the operation's; the same voxels elsewhere are another CT.
+/// ct_sha256: host/overlay/ct_sha256.hpp; labels_sha256: host/files/files_sha256.hpp, or empty where no labels are
+/// given.
 Result<void> check_patient(const Operation& operation, const std::string& ct_sha256, const std::string& labels_sha256);
 
 }  // namespace birdseye::host

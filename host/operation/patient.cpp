@@ -109,6 +109,7 @@ Result<PatientPlan> read_patient(const PatientFiles& files, const std::stop_toke
   plan.identity = std::move(ct->patient);
   plan.notes = std::move(ct->notes);
   plan.ct_sha256 = ct_sha256(plan.ct);
+  plan.ct_stated = files.ct.stated;
   if (!files.labels.empty()) {
     if (auto read = read_labels(files, plan, stop); !read) return read.error();
     auto sum = files_sha256(files.labels);

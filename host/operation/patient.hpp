@@ -40,6 +40,7 @@ PatientFiles simulated_patient(const std::filesystem::path& folder);
 struct PatientPlan {
   Volume ct, shown;
   std::string ct_sha256;
+  StatedGeometry ct_stated;
   std::string labels_sha256;  ///< of their files; empty: there are none
   PatientIdentity identity;
   std::vector<std::string> notes;  ///< of the readers of the CT and of the labels, as what was passed over

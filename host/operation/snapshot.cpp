@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/identity_json.hpp"
+#include "host/volume/stated_geometry.hpp"
 
 namespace birdseye::host {
 
@@ -32,9 +35,7 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   };
   if (!snapshot.patient.ct.series.empty()) add("--series", snapshot.patient.ct.series);
   if (snapshot.patient.ct.untilt) out.emplace_back("--untilt");
-  if (const auto& mm = snapshot.patient.ct.spacing_mm)
-    add("--spacing", fmt::format("{},{},{}", number(mm->x()), number(mm->y()), number(mm->z())));
-  if (!snapshot.patient.ct.orientation.empty()) add("--orientation", snapshot.patient.ct.orientation);
+  std::ranges::move(options_of(snapshot.patient.ct.stated), std::back_inserter(out));
   if (!snapshot.patient.shown.empty()) {
     add("--labels", whole(snapshot.patient.labels));
     add("--keep", joined(snapshot.patient.shown, ","));

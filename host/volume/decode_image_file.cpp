@@ -136,11 +136,12 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
     }
     const GeometryGaps gaps = nifti ? nifti->gaps() : text_header_gaps(path);
     if (auto stated = check_stated(source, from, gaps); !stated) return stated.error();
-    const auto place = nifti && !source.orientation.empty() ? nifti->place_by(source.orientation) : std::nullopt;
-    if (nifti && !source.orientation.empty() && nifti->says_a_place() && !place) {
+    const auto place =
+        nifti && !source.stated.orientation.empty() ? nifti->place_by(source.stated.orientation) : std::nullopt;
+    if (nifti && !source.stated.orientation.empty() && nifti->says_a_place() && !place) {
       return refused(Errc::bad_value, path,
                      fmt::format("{}; {} is neither of these: give --orientation as one of the two", gaps.orientation,
-                                 source.orientation));
+                                 source.stated.orientation));
     }
     io->SetFileName(path.string());
     io->ReadImageInformation();

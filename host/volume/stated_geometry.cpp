@@ -155,32 +155,39 @@ Result<void> check_stated(const VolumeSource& source, GeometryFrom from, const G
                    fmt::format("{}; export it again by a program that writes it, as 3D Slicer{}", gap,
                                from == GeometryFrom::file ? "" : fmt::format(", or state it: {}", option)));
   };
-  if (auto known =
-          judge(gaps.spacing, source.spacing_mm.has_value(), "how far apart its voxels are", "--spacing x,y,z (mm)");
+  if (auto known = judge(gaps.spacing, source.stated.spacing_mm.has_value(), "how far apart its voxels are",
+                         "--spacing x,y,z (mm)");
       !known) {
     return known;
   }
-  return judge(gaps.orientation, !source.orientation.empty(), "which way its axes point",
+  return judge(gaps.orientation, !source.stated.orientation.empty(), "which way its axes point",
                "--orientation, as --orientation LPS");
 }
 
+std::vector<std::string> options_of(const StatedGeometry& stated) {
+  std::vector<std::string> out;
+  if (const auto& mm = stated.spacing_mm) out = {"--spacing", fmt::format("{},{},{}", mm->x(), mm->y(), mm->z())};
+  if (!stated.orientation.empty()) out.insert(out.end(), {"--orientation", stated.orientation});
+  return out;
+}
+
 void put_stated(const VolumeSource& source, const VoxelPlace* place, ImageFile& image) {
-  if (source.spacing_mm) {
-    image.spacing_mm = *source.spacing_mm;
+  if (source.stated.spacing_mm) {
+    image.spacing_mm = *source.stated.spacing_mm;
     image.notes.push_back(
         fmt::format("its spacing, {}, was stated by a person (--spacing): the file does not say it, or says two",
                     mm_of(image.spacing_mm)));
   }
-  if (source.orientation.empty()) return;
+  if (source.stated.orientation.empty()) return;
   if (place != nullptr) {
     image.axes = place->axes;
     image.origin_mm = place->origin_mm;
   } else {
-    image.axes = *axes_of_letters(source.orientation);
+    image.axes = *axes_of_letters(source.stated.orientation);
     image.origin_mm.setZero();
   }
   image.notes.push_back(fmt::format(
-      "its orientation, {}, was stated by a person (--orientation): {}", source.orientation,
+      "its orientation, {}, was stated by a person (--orientation): {}", source.stated.orientation,
       place != nullptr ? "the file says two"
                        : "the file does not say it, nor where the patient's origin is, which is taken to be "
                          "the first voxel"));

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "host/volume/volume_source.hpp"
@@ -34,6 +35,9 @@ enum class GeometryFrom { file, file_or_person };
 
 /// Refuses a gap that no person has closed, and a person's word on what the file says itself.
 Result<void> check_stated(const VolumeSource& source, GeometryFrom from, const GeometryGaps& gaps);
+
+/// The options that state it, and their values, as a command takes them.
+std::vector<std::string> options_of(const StatedGeometry& stated);
 
 /// Puts what a person stated, once check_stated has found it in order, and says so in the image's notes.
 /// place: that of the two which the file says; null where it says none, and the first voxel is the origin.

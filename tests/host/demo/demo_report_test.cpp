@@ -49,6 +49,17 @@ TEST(DemoReport, PutsWhatTheCtShowedRigidBesideTheOverlaysOwnErrors) {
     EXPECT_NE(page.find(said), std::string::npos) << said;
 }
 
+TEST(DemoReport, SaysWhatWasNotedOfTheCt) {
+  const Scratch scratch;
+  DemoFigures figures = deformed();
+  ASSERT_TRUE(write_demo_report(scratch.path(), figures));
+  EXPECT_FALSE(nlohmann::json::parse(text_in(scratch / "report.json")).contains("notes"));
+  figures.notes = {"its orientation, PIL, was stated by a person (--orientation)"};
+  ASSERT_TRUE(write_demo_report(scratch.path(), figures));
+  EXPECT_EQ(nlohmann::json::parse(text_in(scratch / "report.json"))["notes"], figures.notes);
+  EXPECT_NE(text_in(scratch / "report.html").find(figures.notes.front()), std::string::npos);
+}
+
 TEST(DemoReport, ShowsNoPairsWhereNothingWasFound) {
   const Scratch scratch;
   DemoFigures figures = deformed();

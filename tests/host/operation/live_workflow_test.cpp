@@ -203,9 +203,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
 }
 
 /// Four fiducials, and what was found of them is in out.
-void register_into(const std::filesystem::path& out, const Scratch& scratch, bool with_markers = false) {
-  LiveSettings kept = operation_settings(scratch);
-  if (with_markers) kept.patient.ct = ct_with_markers(scratch);
+void register_into(const std::filesystem::path& out, LiveSettings kept) {
   kept.out = out;
   LiveWorkflow workflow(kept);
   load(workflow);
@@ -214,6 +212,44 @@ void register_into(const std::filesystem::path& out, const Scratch& scratch, boo
   for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
   hand.rest_at({0, 0, 200}, 1);
   ASSERT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+}
+
+void register_into(const std::filesystem::path& out, const Scratch& scratch, bool with_markers = false) {
+  LiveSettings kept = operation_settings(scratch);
+  if (with_markers) kept.patient.ct = ct_with_markers(scratch);
+  register_into(out, kept);
+}
+
+TEST(LiveWorkflow, ACtWhoseGeometryIsStatedOtherwiseIsNotTakenUp) {
+  const Scratch scratch;
+  LiveSettings settings = operation_settings(scratch);
+  settings.patient.ct = scratch.file(
+      "ct.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 60 60 60\nendian: little\nencoding: raw\n\n" +
+                     std::string(std::size_t{2} * 60 * 60 * 60, '\0'));
+  settings.patient.ct.stated = {Eigen::Vector3d(2, 2, 2.5), "LPS"};
+  register_into(scratch.path(), settings);
+  const auto kept = read_operation(scratch.path());
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ(kept->ct_stated.spacing_mm, Eigen::Vector3d(2, 2, 2.5));
+  EXPECT_EQ(kept->ct_stated.orientation, "LPS");
+  settings.resume = scratch.path();
+  for (const StatedGeometry& other :
+       {StatedGeometry{Eigen::Vector3d(2, 2, 2), "LPS"}, StatedGeometry{Eigen::Vector3d(2, 2, 2.5), "PLS"}}) {
+    settings.patient.ct.stated = other;
+    LiveWorkflow workflow(settings);
+    load(workflow);
+    for (const char* said : {"is of another CT, or of this one with its voxels elsewhere", "give that CT",
+                             "stated then: --spacing 2,2,2.5 --orientation LPS"})
+      EXPECT_NE(workflow.view().fault.find(said), std::string::npos) << workflow.view().fault;
+    EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).done);
+  }
+  settings.patient.ct.stated = kept->ct_stated;
+  LiveWorkflow workflow(settings);
+  connect(workflow);
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+  EXPECT_EQ(workflow.view().patient->notes.size(), 2U) << "that a person stated both is said again";
 }
 
 TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {

@@ -121,8 +121,8 @@ TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
 VolumeSource stated(const fs::path& path, const std::optional<Eigen::Vector3d>& spacing_mm,
                     const std::string& orientation) {
   VolumeSource source(path);
-  source.spacing_mm = spacing_mm;
-  source.orientation = orientation;
+  source.stated.spacing_mm = spacing_mm;
+  source.stated.orientation = orientation;
   return source;
 }
 
