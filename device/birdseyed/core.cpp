@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "calibration/record/field_map_file.hpp"
+
 namespace birdseye::device {
 
 namespace {

@@ -22,7 +22,7 @@ std::string LiveWorkflow::lost_with_registration() const {
 /// Only where a press would do nothing: what it would do else, primary() does.
 std::string LiveWorkflow::why_primary_refused() const {
   if (frozen_ || asks_for_instruments() || asks_for_patient()) return {};
-  const std::string no_setup = picture_.why_no_setup();
+  std::string no_setup = picture_.why_no_setup();
   switch (step_) {
     case LiveStep::fiducials:
       if (fiducials_.note().done) return {};

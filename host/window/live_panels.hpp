@@ -44,22 +44,22 @@ struct PanelFacts {
   const AgeStrip* ages = nullptr;
   double frames_per_s = 0;
   std::uint64_t frames_skipped = 0;
-  OverlayLook look;
-  bool clip = false;
-  CuttingPlane plane;
   const HuHistogram* histogram = nullptr;
   TransferEditor* editor = nullptr;
-  bool recorded = false;       ///< the source is a recording
-  bool keys = false;           ///< all keys are shown
-  bool details = false;        ///< all figures are shown, not only that of the target
-  bool pseudonymised = false;  ///< the patient's name and ID are not shown: the picture is to be kept
-  std::string said;            ///< a remark of the window's own: where a snapshot went
-  Room room = Room::dark;
-  std::optional<SliceView> slices;  ///< empty: closed
-  bool large_slices = false;        ///< as large as the window's width lets them be
+  std::string said;                 ///< a remark of the window's own: where a snapshot went
   std::string preset;               ///< of the colours; empty: none
-  bool preset_changed = false;      ///< by hand since
+  std::optional<SliceView> slices;  ///< empty: closed
+  CuttingPlane plane;
+  OverlayLook look;
+  Room room = Room::dark;
   int inset_corner = 0;
+  bool clip = false;
+  bool recorded = false;        ///< the source is a recording
+  bool keys = false;            ///< all keys are shown
+  bool details = false;         ///< all figures are shown, not only that of the target
+  bool pseudonymised = false;   ///< the patient's name and ID are not shown: the picture is to be kept
+  bool large_slices = false;    ///< as large as the window's width lets them be
+  bool preset_changed = false;  ///< by hand since
   bool inset = true;
 };
 
