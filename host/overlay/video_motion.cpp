@@ -28,7 +28,7 @@ constexpr double kNearest_mm = 15, kFarthest_mm = 600;  // what a laparoscope se
 constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
-constexpr int kOddInRow = 2, kMostWanted = 32;
+constexpr int kOddInRow = 4, kMostWanted = 32;
 
 /// Where nothing is to be followed: outside the field, and in reflections, which go with the lamp.
 cv::Mat places_allowed(const cv::Mat& grey) {
