@@ -38,10 +38,11 @@ struct ReplayOptions {
   std::string transfer = "tumour-and-vessels", engine = "cpu", scope = "scope";
   double film_hz = 0;
   int every = 10;
+  bool motion_check = true;
 };
 
 Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup, const ReplayTrust& trust,
-              const std::map<std::string, std::string>& remedies) {
+              const std::map<std::string, std::string>& remedies, bool motion_check) {
   Verdict verdict;
   for (const auto& [why_not, remedy] : remedies) {
     const auto frames = done.reasons.find(why_not);
@@ -60,6 +61,8 @@ Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayS
                                          "the calibration of the camera that took them",
                                          done.other_size, done.frames));
   }
+  if (motion_check && done.overlaid > 0 && !done.video_told)
+    verdict.add(Grade::marginal, "the video does not show whether it moves as the poses say");
   for (const std::string& caution : setup.cautions) verdict.add(Grade::marginal, caution);
   for (const std::string& unproven : setup.hardware.unproven()) verdict.add(Grade::marginal, unproven);
   if (reader.frames_lost() > 0)
@@ -177,15 +180,16 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope, std::move(live)},
-                      setup->setup(), trust.figures, **engine, std::move(margins));
+  ReplayPlayer player(
+      {options.out, options.every, options.film_hz, options.look, options.scope, options.motion_check, std::move(live)},
+      *setup, trust.figures, **engine, std::move(margins));
   std::map<std::string, std::string> remedies;
   if (auto played = play(**reader, options, setup->hardware, player, remedies, progress); !played)
     return played.error();
   if (const std::string fault = (*engine)->fault(); !fault.empty())
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
-  const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies);
+  const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies, options.motion_check);
   const std::string json =
       text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), shown->notes, verdict));
   const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
@@ -246,6 +250,9 @@ void add_replay(CLI::App& app, CommandStatus& status) {
   add_look_options(command, options->look);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default tumour-and-vessels)");
   replaced.push_back(command.add_option("--deformation", options->deformation, "ITK displacement field, LPS mm"));
+  command.add_flag("!--no-motion-check", options->motion_check,
+                   "of a scene without any pattern, as a plain phantom: do not ask whether the video moves as the "
+                   "scope's poses say");
   CLI::Option* const operation =
       command.add_option("--operation", options->inputs.operation, kOperationHelp)->type_name("FOLDER|FILE");
   for (CLI::Option* const option : replaced) operation->excludes(option);

@@ -41,17 +41,30 @@ std::string ReplayPlayer::row_of(const wire::VideoFrame& frame, const OverlayGat
   return row + "\n";
 }
 
-ReplayPlayer::ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
+ReplayPlayer::ReplayPlayer(ReplayOutput output, const ReplaySetup& setup, const TrustFigures& figures, Engine& engine,
                            std::optional<Margins> margins)
-    : output_(std::move(output)), engine_(engine) {
-  painter_.set_setup(setup, figures);
+    : output_(std::move(output)), engine_(engine), scope_(setup.scope) {
+  painter_.set_setup(setup.setup(), figures);
   if (margins) painter_.set_margins(std::make_shared<const Margins>(*std::move(margins)));
 }
 
 void ReplayPlayer::take(const wire::Birds& birds) {
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name == output_.scope) painter_.take(birds.acquired, bird.tracker_from_sensor);
+    if (bird.name != output_.scope) continue;
+    painter_.take(birds.acquired, bird.tracker_from_sensor);
+    video_.take(birds.acquired, bird.tracker_from_sensor);
   }
+}
+
+/// As in the window, but that before the video has shown anything the overlay is drawn: nobody operates by a replay,
+/// and its verdict says so.
+void ReplayPlayer::watch(const wire::VideoFrame& frame) {
+  if (!video_.take(frame, scope_).any()) return;
+  done_.video_told = done_.video_told || video_.motion() != VideoAgreement::untold;
+  TrustFigures figures = painter_.figures();
+  video_.enter(figures);
+  if (!output_.motion_check || !done_.video_told) figures.video.reset();
+  painter_.set_setup(painter_.setup(), figures);
 }
 
 OverlayGate::Decision ReplayPlayer::decide(const wire::VideoFrame& frame, const std::string& other_hardware) {
@@ -77,6 +90,7 @@ Result<void> ReplayPlayer::take(const wire::VideoFrame& frame, const std::string
     done_.table += row_of(frame, none, std::nullopt);
     return {};
   }
+  watch(frame);
   const OverlayGate::Decision decision = decide(frame, other_hardware);
   const auto painted = painter_.paint(frame, decision, engine_, output_.look);
   const std::vector<std::uint8_t>& rgb = painted ? painted->rgb : *frame.rgb;

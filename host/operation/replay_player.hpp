@@ -10,7 +10,9 @@
 #include "device/wire/messages.hpp"
 #include "host/files/film.hpp"
 #include "host/operation/decision_log.hpp"
+#include "host/operation/replay_setup.hpp"
 #include "host/overlay/frame_painter.hpp"
+#include "host/overlay/video_watch.hpp"
 
 namespace birdseye::host {
 
@@ -21,6 +23,7 @@ struct ReplayOutput {
   double film_hz = 0;  ///< 0: no film
   OverlayLook look;
   std::string scope = "scope";  ///< its bird
+  bool motion_check = true;     ///< nothing is drawn over video that does not move as the poses say
   /// What the live window decided then, by the frames' numbers.
   std::map<std::uint64_t, LoggedDecision> live;
 };
@@ -30,6 +33,7 @@ struct Replayed {
   std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
   std::size_t other_hardware = 0;  ///< of which the setup does not hold with the instruments
   std::map<std::string, std::size_t> reasons;
+  bool video_told = false;     ///< whether the video has shown anything of whether it moves as the poses say
   std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
   std::string table =
       "sequence,acquired_ns,pose,strength,reason,expected_mm,circle_mm,live_strength,live_reason,camera_from_patient\n";
@@ -39,7 +43,7 @@ struct Replayed {
 class ReplayPlayer {
  public:
   /// margins: as the engine has the CT deformed; empty: there are none.
-  ReplayPlayer(ReplayOutput output, const Setup& setup, const TrustFigures& figures, Engine& engine,
+  ReplayPlayer(ReplayOutput output, const ReplaySetup& setup, const TrustFigures& figures, Engine& engine,
                std::optional<Margins> margins = std::nullopt);
 
   /// The poses of the scope tell how they scatter.
@@ -57,8 +61,11 @@ class ReplayPlayer {
   Engine& engine_;
   [[nodiscard]] std::string row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,
                                    const std::optional<FramePainter::Painted>& painted) const;
+  void watch(const wire::VideoFrame& frame);
   OverlayGate::Decision decide(const wire::VideoFrame& frame, const std::string& other_hardware);
 
+  ScopeSetup scope_;
+  VideoWatch video_;
   FramePainter painter_;
   bool held_back_ = false;
   std::optional<Film> film_;

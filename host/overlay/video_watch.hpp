@@ -1,0 +1,39 @@
+#pragma once
+
+#include "host/overlay/field_watch.hpp"
+#include "host/overlay/scope_setup.hpp"
+#include "host/overlay/trust.hpp"
+#include "host/overlay/video_motion.hpp"
+
+namespace birdseye::host {
+
+/// What the video itself says about the setup that the overlay is drawn by: whether it moves as the scope's poses, and
+/// whether its round field is as large as when the lens was calibrated.
+class VideoWatch {
+ public:
+  /// A pose of the scope's sensor, as they come.
+  void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+    motion_.take(acquired, tracker_from_sensor);
+  }
+  struct News {
+    bool motion = false, field = false;  ///< that it says something else now
+    [[nodiscard]] bool any() const { return motion || field; }
+  };
+  /// A frame, as they come, and the scope that took it.
+  News take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
+    return {motion_.take(frame, scope), field_.take(frame, scope)};
+  }
+
+  [[nodiscard]] VideoAgreement motion() const { return motion_.state(); }
+  [[nodiscard]] calibration::FieldSize field() const { return field_.state(); }
+  void enter(TrustFigures& figures) const {
+    figures.video = motion();
+    figures.field = field();
+  }
+
+ private:
+  VideoMotion motion_;
+  FieldWatch field_;
+};
+
+}  // namespace birdseye::host
