@@ -209,6 +209,7 @@ void add_demo(CLI::App& app, CommandStatus& status) {
           "how far the liver has moved since the CT, where it has moved most (default 10); 0: nothing is deformed")
       ->check(CLI::Range(0.0, 30.0));
   command.add_option("--deformation", cart.deformation, "of which kind")->check(CLI::IsMember(deformation_kinds()));
+  command.add_option("--faults", cart.faults, "a script of faults, to see what the overlay does")->type_name("FILE");
   command.add_option("--noise", options->noise, "typical (0.5 mm, 0.1 deg) or none")
       ->check(CLI::IsMember({"typical", "none"}));
   command.callback([options, &status] {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "host/files/write_files.hpp"
 #include "host/report/html_page.hpp"
@@ -79,6 +80,11 @@ void add_deforming(HtmlPage& page, const DeformingFigures& d, const DemoFigures&
 
 }  // namespace
 
+void DemoFigures::note_hidden(const std::string& reason) {
+  static const std::regex kNumber("[0-9]+([.][0-9]+)?");
+  ++hidden_because[std::regex_replace(reason, kNumber, "...")];
+}
+
 double percentile(std::vector<double> values, double p) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   std::sort(values.begin(), values.end());
@@ -103,12 +109,14 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
       {"angle_noise_deg", f.angle_noise_deg},
       {"frames", f.frames},
       {"frames_dropped", f.frames_dropped},
+      {"frames_unproven", f.frames_unproven},
       {"frames_without_overlay", f.frames_without_overlay},
       {"board_frames_left_out", f.board_frames_left_out},
       {"other_messages_dropped", f.drops.others},
       {"wall_s", f.wall_s},
   };
   if (!f.notes.empty()) json["notes"] = f.notes;
+  if (!f.hidden_because.empty()) json["hidden_because"] = f.hidden_because;
   add_spread(json, "overlay_error_px", px);
   add_spread(json, "target_error_mm", mm);
   if (f.deforming) {
@@ -134,20 +142,25 @@ Result<void> write_demo_report(const std::filesystem::path& folder, const DemoFi
   row("tracker noise, each axis", fmt::format("{} mm, {} deg", f.position_noise_mm, f.angle_noise_deg));
   row("frames / dropped / without overlay",
       fmt::format("{} / {} / {}", f.frames, f.frames_dropped, f.frames_without_overlay));
+  row("frames before the video had shown that it goes with the poses", fmt::format("{}", f.frames_unproven));
   row("frames of the board without poses / other messages dropped",
       fmt::format("{} / {}", f.board_frames_left_out, f.drops.others));
   row("wall time", fmt::format("{:.1f} s", f.wall_s));
 
   HtmlPage page(f.title);
   page.set_verdict(f.verdict);
-  page.picture_files({"overlay.png"},
-                     "The CT's vessels and tumour over the video. The cross is where the tumour's centre truly is, the "
-                     "circle where the overlay puts it.");
-  page.picture_files({"video.png"}, "The same frames as the camera saw them.");
+  if (!f.errors.empty()) {
+    page.picture_files({"overlay.png"},
+                       "The CT's vessels and tumour over the video. The cross is where the tumour's centre truly is, "
+                       "the circle where the overlay puts it.");
+    page.picture_files({"video.png"}, "The same frames as the camera saw them.");
+  }
   page.film_file("overlay.mp4", "All of it.");
   if (f.deforming) add_deforming(page, *f.deforming, f);
   page.heading("Figures");
   page.table(rows);
+  for (const auto& [why, frames] : f.hidden_because)
+    page.paragraph(fmt::format("Without an overlay, {} frame{}: {}.", frames, frames == 1 ? "" : "s", why));
   for (const std::string& note : f.notes) page.paragraph(note);
   page.heading("Error of the tumour's centre");
   if (f.errors.empty()) {

@@ -117,7 +117,8 @@ Result<void> DemoSession::end_calibrating_and_register() {
   }
   const auto fit = register_by_touches(*patient_->fiducials_in_patient_mm, touches_in_tracker_mm_, &patient_->ct);
   if (!fit) return fit.error().with_context("registration");
-  const ScopeSetup& scope = found->scope;
+  const ScopeSetup& scope = scope_.emplace(found->scope);
+  found_with_ = instruments_.now();
   figures.camera_rms_px = calibrated->stations.lens->rms_px;
   figures.held_out_px = calibrated->hand_eye.held_out_px;
   figures.fre_mm = fit->registered.fre_mm;
@@ -132,7 +133,8 @@ Result<void> DemoSession::end_calibrating_and_register() {
   const Eigen::Vector3d target_mm = target_in_patient_mm(*patient_);
   TrustFigures trust = trust_figures(scope.figures(), fit->registered, target_mm);
   trust.target_in_patient_mm = target_mm;
-  painter_.set_setup(setup, trust);
+  painter_.set_setup(std::nullopt, trust);
+  judge();
   progress_.keep(fmt::format("camera {:.2f} px from {} views, hand-eye held out {:.2f} px, registration {:.2f} mm",
                              figures.camera_rms_px, figures.board_views, figures.held_out_px, fit->registered.fre_mm));
   return {};
@@ -185,16 +187,18 @@ Result<void> DemoSession::end_deforming() {
     TrustFigures trust = painter_.figures();
     trust.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_), deformed());
     trust.motion_error = deformed()->target;
-    painter_.set_setup(setup, trust);
+    painter_.set_setup(std::nullopt, trust);
+    judge();
   }
   progress_.keep(said.words);
   for (const auto& one : waiting_) {
     if (interrupted()) return Error{Errc::disconnected, "interrupted; nothing is left running"};
-    const auto* const frame = std::get_if<wire::VideoFrame>(&one);
-    if (frame == nullptr) {
-      take_scope(std::get<wire::Birds>(one));
-    } else if (auto drawn = overlay(*frame); !drawn) {
-      return drawn;
+    if (const auto* const frame = std::get_if<wire::VideoFrame>(&one)) {
+      if (auto drawn = overlay(*frame); !drawn) return drawn;
+    } else if (const auto* const birds = std::get_if<wire::Birds>(&one)) {
+      take_scope(*birds);
+    } else {
+      take(std::get<wire::Health>(one));
     }
   }
   return {};
@@ -202,11 +206,33 @@ Result<void> DemoSession::end_deforming() {
 
 void DemoSession::take_scope(const wire::Birds& birds) {
   for (const wire::Bird& bird : birds.birds) {
-    if (bird.name == "scope") painter_.take(birds.acquired, bird.tracker_from_sensor);
+    if (bird.name != "scope") continue;
+    painter_.take(birds.acquired, bird.tracker_from_sensor);
+    video_.take(birds.acquired, bird.tracker_from_sensor);
   }
 }
 
+void DemoSession::take(const wire::Health& health) {
+  instruments_.take(health);
+  if (setup) judge();
+}
+
+/// Asks of the frame what the window asks of each: whether video and poses agree, and the round field with the lens.
+void DemoSession::watch(const wire::VideoFrame& frame) {
+  if (video_.take(frame, *scope_).any()) judge();
+}
+
+/// Has the overlay drawn by the setup only as long as what tells of it agrees.
+void DemoSession::judge() {
+  const InstrumentMatch match = instruments_.match(found_with_, DependsOn::tracker_and_camera);
+  TrustFigures trust = painter_.figures();
+  video_.enter(trust);
+  why_no_setup_ = match.why_not;
+  painter_.set_setup(match.holds ? setup : std::nullopt, trust);
+}
+
 Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
+  watch(frame);
   const OverlayGate::Decision decision = painter_.decide(frame);
   const auto painted = painter_.paint(frame, decision, *engine_, look_);
   if (painted) {
@@ -224,8 +250,11 @@ Result<void> DemoSession::overlay(const wire::VideoFrame& frame) {
     }
     overlaid.push_back({frame.info.sequence, frame.info.acquired, painted->camera_from_patient});
     if (overlaid.size() % kKeepEvery == 0) progress_(fmt::format("overlaid {} frames", overlaid.size()));
+  } else if (overlaid.empty() && video_.motion() == VideoAgreement::untold) {
+    ++figures.frames_unproven;
   } else {
     ++figures.frames_without_overlay;
+    figures.note_hidden(why_no_setup_.empty() ? decision.reason : why_no_setup_);
   }
   return film_.add(painted ? painted->rgb : *frame.rgb);
 }
@@ -247,6 +276,7 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
     if (auto done = end_calibrating_and_register(); !done) return done;
   }
   if (stage == "views") {
+    watch(frame);
     rests_.push(frame);
     return {};
   }
@@ -262,6 +292,7 @@ Result<void> DemoSession::take(const wire::VideoFrame& frame) {
 }
 
 Result<void> DemoSession::run(EventStream& stream) {
+  instruments_.set_link(true);
   constexpr Duration kPatience = Duration::from_ms(15'000);
   HostTime heard = host_now();
   for (;;) {
@@ -281,6 +312,8 @@ Result<void> DemoSession::run(EventStream& stream) {
     if (const auto* frame = std::get_if<wire::VideoFrame>(&**event)) {
       taken = take(*frame);
       heard = host_now();
+    } else if (const auto* health = std::get_if<wire::Health>(&**event)) {
+      began_to_deform_ ? void(waiting_.emplace_back(*health)) : take(*health);
     } else if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
       taken = take(*birds);
       // After the script's end the tracker goes on a little; the last frames may still be on their way.

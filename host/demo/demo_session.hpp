@@ -18,10 +18,12 @@
 #include "host/guide/live_stations.hpp"
 #include "host/link/event_stream.hpp"
 #include "host/operation/deformation_step.hpp"
+#include "host/operation/instruments.hpp"
 #include "host/operation/patient.hpp"
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/view_step.hpp"
 #include "host/overlay/frame_painter.hpp"
+#include "host/overlay/video_watch.hpp"
 #include "host/render/engine.hpp"
 #include "host/simulated/simulated_cart.hpp"
 
@@ -74,6 +76,7 @@ class DemoSession {
   [[nodiscard]] std::string stage_at(DeviceTime time) const;
   Result<void> take(const wire::Birds& birds);
   Result<void> take(const wire::VideoFrame& frame);
+  void take(const wire::Health& health);
   void take_stations();
   void begin_to_calibrate(const wire::VideoFrame& frame);
   Result<void> end_calibrating_and_register();
@@ -82,6 +85,8 @@ class DemoSession {
   void note_deformed();
   Result<void> end_deforming();
   void take_scope(const wire::Birds& birds);
+  void watch(const wire::VideoFrame& frame);
+  void judge();
   Result<void> overlay(const wire::VideoFrame& frame);
 
   SimulatedCart& cart_;
@@ -99,7 +104,13 @@ class DemoSession {
   DeformationStep deformation_;
   std::optional<HostTime> began_to_deform_;
   std::optional<double> deforming_took_s_;
-  std::vector<std::variant<wire::VideoFrame, wire::Birds>> waiting_;  ///< to be drawn once the deformation is known
+  /// To be drawn once the deformation is known, and what tells meanwhile whether it may be.
+  std::vector<std::variant<wire::VideoFrame, wire::Birds, wire::Health>> waiting_;
+  std::optional<ScopeSetup> scope_;
+  ConnectedInstruments instruments_;
+  Instruments found_with_;  ///< that the scope was calibrated and the patient registered with
+  VideoWatch video_;
+  std::string why_no_setup_;  ///< empty while the instruments are those that it was found with
   std::unique_ptr<Engine> engine_;
   FramePainter painter_;
   OverlayLook look_;

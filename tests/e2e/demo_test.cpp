@@ -37,14 +37,15 @@ TEST(Phantom, TheSameSeedGivesTheSameBytesAndAnotherDoesNot) {
   EXPECT_FALSE(a == contents(scratch / "c"));
 }
 
-nlohmann::json demo(const Scratch& scratch, const std::string& options) {
+nlohmann::json demo(const Scratch& scratch, const std::string& options, int code = 0) {
   const std::string out = (scratch / "demo").string();
   const auto result = run("birdseye", "demo --out " + out + " " + options);
-  EXPECT_EQ(result.code, 0) << result.output;
+  EXPECT_EQ(result.code, code) << result.output;
   std::ifstream in(scratch / "demo/report.json");
   nlohmann::json report = nlohmann::json::parse(in, nullptr, false);
   EXPECT_TRUE(report.is_object()) << result.output;
   for (const char* name : {"report.html", "overlay.png", "video.png", "overlay.mp4"}) {
+    if (code != 0) break;  // nothing was drawn
     EXPECT_GT(std::filesystem::file_size(scratch / "demo" / name), 2000U) << name;
   }
   return report;
@@ -75,6 +76,17 @@ TEST(Demo, IsLimitedByTheRecordsStepsWithoutNoiseAndWithoutDeformation) {
   EXPECT_LE(report.value("target_error_mm_p95", 1e9), 0.8);
   EXPECT_FALSE(report.contains("rigid_target_error_mm_p50"));
   EXPECT_FALSE(report.contains("views_kept"));
+}
+
+TEST(Demo, DrawsNothingOnceTheScopeIsTurnedInItsHolder) {
+  const Scratch scratch;
+  std::ofstream(scratch / "turned.toml") << "[[fault]]\nname = \"scope_turned\"\nat_s = 16\n";  // while it touches
+  nlohmann::json report =
+      demo(scratch, "--seed 2 --deformation-mm 0 --faults " + (scratch / "turned.toml").string(), 3);
+  EXPECT_EQ(report.value("verdict", ""), "fail");
+  EXPECT_TRUE(report["target_error_mm_p50"].is_null()) << "an overlay was drawn";
+  EXPECT_NE(report.value("reasons", nlohmann::json()).dump().find("do not agree"), std::string::npos)
+      << report.value("reasons", nlohmann::json());
 }
 
 }  // namespace
