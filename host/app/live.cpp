@@ -68,7 +68,9 @@ fs::path free_folder() {
 }
 
 Result<void> refuse_operation_in(const LiveSettings& live) {
-  if (live.out.empty() || !live.resume.empty() || !has_operation(live.out)) return {};
+  std::error_code ignored;
+  const bool goes_on = fs::equivalent(live.out, live.resume, ignored);
+  if (live.out.empty() || goes_on || !has_operation(live.out)) return {};
   return Error{Errc::in_use,
                fmt::format("{0}: holds an operation already; go on from it with --resume {0}, or choose another --out",
                            live.out.string())};
@@ -133,9 +135,9 @@ Result<void> prepare(LiveOptions& options) {
       return Error{Errc::bad_value, options.tip.string() + ": holds no single point; give what calibrate tip wrote"};
     options.live.tip_in_pointer_mm = points->front();
   }
+  if (options.live.out.empty()) options.live.out = options.live.resume;  // what is found from there on is kept too
   if (auto kept = refuse_operation_in(options.live); !kept) return kept;
   if (options.simulate) {
-    if (options.live.out.empty()) options.live.out = options.live.resume;
     if (options.live.out.empty()) options.live.out = free_folder();
     options.cart.folder = options.live.out;
     options.simulated = simulated_patient(options.live.out);

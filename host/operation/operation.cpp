@@ -154,7 +154,9 @@ Result<Operation> read_operation(const fs::path& given) {
   if (!sheet && is_of_010(text)) {
     return refused(
         "was kept by an earlier version, which did not bind its files together: whether they were changed "
-        "since, nobody can tell; start without --resume, and register anew");
+        "since, nobody can tell. Start without --resume, and register anew. To replay, render or export by it, give "
+        "its "
+        "camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and field.mha one by one");
   }
   if (!sheet) return refused(sheet.error().what + "; give a copy that is as the window wrote it, or register anew");
   try {

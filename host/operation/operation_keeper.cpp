@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 
 #include "drivers/system/clock.hpp"
@@ -24,8 +26,10 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
                         fmt::format("{}: {}, or go on without --resume", folder.string(), same.error().what)};
   }
   if (!operation) {
+    std::error_code ignored;
+    if (!std::filesystem::equivalent(out_, folder, ignored)) return operation.error();
     out_.clear();
-    return operation.error();
+    return Error{operation.error().code, words("note_nothing_kept", operation.error().what)};
   }
   return std::optional(*std::move(operation));
 }

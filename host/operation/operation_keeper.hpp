@@ -17,7 +17,7 @@ class OperationKeeper {
   OperationKeeper(std::filesystem::path out, std::filesystem::path resume);
 
   /// Of another CT or other labels nothing is taken up. Once: the second time, and where nothing was to be taken up, it
-  /// is empty. An error names the folder; nothing is written from then on, for what is there may yet be needed.
+  /// is empty. An error names the folder; nothing is written into it from then on, for what is there may yet be needed.
   Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256);
   /// Stamped now. Not before what is there has been taken up. Of several in a row the last is written at any rate.
   void keep(Operation operation);

@@ -173,6 +173,31 @@ TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
   }
 }
 
+/// What a keeper whose operation cannot be taken up writes of another.
+TEST(OperationKeeper, AfterARefusalKeepsWhatIsFoundInAnotherFolderOnly) {
+  const Scratch scratch;
+  const auto refused = scratch / "refused", fresh = scratch / "fresh";
+  for (const auto& folder : {refused, fresh}) std::filesystem::create_directory(folder);
+  ASSERT_TRUE(write_operation(refused, whole_operation()));
+  const std::string before = contents_of(refused / "operation.json");
+  Operation next = whole_operation();
+  next.ct_sha256 = "another";
+  const auto keep_in = [&](const std::filesystem::path& out) {
+    OperationKeeper keeper(out, refused);
+    const auto taken = keeper.take_up("another", "2");
+    EXPECT_FALSE(taken);
+    keeper.keep(next);
+    return taken ? std::string() : taken.error().what;  // the keeper's end waits until all is written
+  };
+  EXPECT_NE(keep_in(refused).find("is not kept"), std::string::npos);
+  EXPECT_EQ(contents_of(refused / "operation.json"), before);
+  EXPECT_EQ(keep_in(fresh).find("is not kept"), std::string::npos);
+  EXPECT_EQ(contents_of(refused / "operation.json"), before);
+  const auto kept = read_operation(fresh);
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ(kept->ct_sha256, "another");
+}
+
 TEST(Operation, AFileOf010OrOfALaterVersionIsRefusedInWords) {
   const Scratch scratch;
   (void)scratch.file("operation.json", R"({
