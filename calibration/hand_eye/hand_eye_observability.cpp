@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "calibration/base/counted.hpp"
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/linear_algebra.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "calibration/hand_eye/hand_eye_handedness.hpp"
 #include "calibration/hand_eye/hand_eye_start.hpp"
 
 namespace birdseye::calibration {
@@ -22,9 +24,8 @@ constexpr double kOpenTurnDeg = 5;
 constexpr double kWideTurnDeg = 10;
 /// The angles of the same turns by tracker and picture, which no hand-eye can reconcile if they differ.
 constexpr double kMismatchDeg = 4;
-/// A fit of the rotations so bad that another reading of the poses may be the right one, and how much better that is.
-constexpr double kBadFitDeg = 3;
-constexpr double kFarBetter = 3;
+/// How many times better poses have to fit the pictures that come before or after, to be called theirs.
+constexpr double kBetterShifted = 3;
 /// The board's scale is off if by so many sigmas and so much; by as much as kWorthlessScale nothing else can be told.
 constexpr double kHiddenMm =
     3;  // one sigma of the board's size at the board's distance; twice that is an overlay's worth
@@ -155,49 +156,12 @@ void judge_pairing(const StationsInOrder& in, HandEyeObservability& found) {
                   "see that each picture has the pose of its own moment, in the same order"};
   for (const int shift : {1, -1, 2, -2, 3, -3}) {
     const double mismatch = shifted_mismatch_deg(in_order, shift);
-    if (mismatch > kMismatchDeg || mismatch > found.angle_mismatch_deg / kFarBetter) continue;
+    if (mismatch > kMismatchDeg || mismatch > found.angle_mismatch_deg / kBetterShifted) continue;
     finding.next_step = fmt::format("the pictures fit the poses that come {} {}: look for one that is missing",
                                     std::abs(shift), shift > 0 ? "later" : "earlier");
     break;
   }
   found.findings.push_back(finding);
-}
-
-/// How far the rotations are from any hand-eye: median over stations.
-double rotation_misfit_deg(std::span<const SummedStation> stations) {
-  const Transform<Camera, Sensor> hand_eye(rotation_by_axes(stations), Eigen::Vector3d::Zero());
-  const Eigen::Matrix3d body_from_marker = body_from_marker_of(stations, hand_eye).rotation();
-  std::vector<double> out;
-  for (const SummedStation& s : stations) {
-    const Eigen::Matrix3d predicted =
-        body_from_marker * s.camera_from_marker.rotation().transpose() * hand_eye.rotation();
-    out.push_back(rotation_angle_between(predicted, body_from_sensor_rotation(s)) * kDegPerRad);
-  }
-  return median_of(out);
-}
-
-void judge_direction(const StationsInOrder& in, HandEyeObservability& found) {
-  const double as_given = rotation_misfit_deg(in.stations);
-  if (as_given < kBadFitDeg) return;
-  std::vector<SummedStation> inverted(in.stations.begin(), in.stations.end());
-  for (SummedStation& s : inverted) {
-    s.chain.tracker_from_sensor = {s.chain.tracker_from_sensor.rotation().transpose(), Eigen::Vector3d::Zero()};
-    s.chain.tracker_from_body = {s.chain.tracker_from_body.rotation().transpose(), Eigen::Vector3d::Zero()};
-  }
-  const double if_inverted = rotation_misfit_deg(inverted);
-  if (if_inverted > as_given / kFarBetter) return;
-  found.solvable = false;
-  found.findings.push_back(
-      {Grade::fail,
-       fmt::format("the poses seem to be inverted: they fit to {:.1f} degrees as given, to {:.1f} the other way round",
-                   as_given, if_inverted),
-       in.given_poses
-           ? "the poses are to be tracker_from_sensor and marker_from_camera, and one of the two is the other way: of "
-             "the camera's, if they are where the board is in the camera's frame, as OpenCV and ArUco find it, say "
-             "--eye-poses-are camera_from_marker; of the tracker's, say --poses-are sensor_from_tracker; or w is the "
-             "first of a quaternion's four numbers: name them in a header, qw,qx,qy,qz"
-           : "if the poses are sensor_from_tracker, say so: --poses-are sensor_from_tracker; if w is the first of the "
-             "quaternion's four numbers, name them in a header: qw,qx,qy,qz"});
 }
 
 std::string scale_in_words(double scale, double sigma, double square_mm) {
@@ -277,8 +241,12 @@ HandEyeObservability observe_hand_eye(const StationsInOrder& in, const std::opti
   judge_axes(found);
   judge_pairing(in, found);
   if (!found.solvable) return found;
-  judge_direction(in, found);
-  if (found.solvable) judge_scale(in, noise, found);
+  if (auto wrong = find_wrong_frames(in)) {
+    found.solvable = false;
+    found.findings.push_back(*std::move(wrong));
+    return found;
+  }
+  judge_scale(in, noise, found);
   return found;
 }
 

@@ -68,6 +68,16 @@ def a_mirror(folder):
                                            for pose in sensor])
 
 
+def of_a_left_handed_frame(pose):
+    """z the other way."""
+    return [[v * (-1) ** ((i == 2) + (k == 2)) for k, v in enumerate(row)] for i, row in enumerate(pose)]
+
+
+def positions_turned(pose):
+    """z of the position the other way, the rotation not."""
+    return [row if i != 2 else row[:3] + [-row[3]] for i, row in enumerate(pose)]
+
+
 def ros_lens(folder):
     stations(folder)
     (folder / "camera.yaml").write_text(
@@ -164,6 +174,12 @@ ROWS = [
     Row("calibrate hand-eye", "odd", "poses that are inverted", "fail; they seem to be inverted", HAND_EYE, 3,
         lambda folder: stations(folder, poses=lambda sensor: [motion.inverse(p) for p in sensor]), "fail", says=["inver"],
         writes=["hand_eye.json"]),
+    Row("calibrate hand-eye", "odd", "poses of a left-handed frame", "fail; they seem to be mirrored", HAND_EYE, 3,
+        lambda folder: stations(folder, poses=lambda sensor: [of_a_left_handed_frame(p) for p in sensor]), "fail",
+        says=["seem to be mirrored", "left-handed"], writes=["hand_eye.json"]),
+    Row("calibrate hand-eye", "odd", "positions with the wrong sign of z", "fail; the axis is named", HAND_EYE, 3,
+        lambda folder: stations(folder, poses=lambda sensor: [positions_turned(p) for p in sensor]), "fail",
+        says=["wrong sign of z"], writes=["hand_eye.json"]),
     Row("calibrate hand-eye", "odd", "only four stations", "not a pass: too few", HAND_EYE, 3,
         lambda folder: stations(folder, 4), "fail", says=["stations.*4|4.*stations"], writes=["hand_eye.json"]),
     Row("calibrate hand-eye", "wrong", "poses shifted by one against the pictures",

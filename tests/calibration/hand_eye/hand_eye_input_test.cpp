@@ -115,6 +115,33 @@ TEST(HandEyeInput, InvertedPoses) {
   expect_fail(bench.input, "seem to be inverted", "--poses-are sensor_from_tracker");
 }
 
+TEST(HandEyeInput, PosesOfALeftHandedFrame) {
+  const Eigen::Matrix3d mirror = Eigen::Vector3d(1, -1, 1).asDiagonal();
+  for (const bool poses_only : {false, true}) {
+    HandEyeScene scene = kGood;
+    scene.poses_only = poses_only;
+    HandEyeBench bench(scene);
+    for (HandEyeStation& s : bench.input.stations) {
+      s.tracker_from_sensor = {mirror * s.tracker_from_sensor.rotation() * mirror,
+                               Eigen::Vector3d(mirror * s.tracker_from_sensor.translation())};
+    }
+    expect_fail(bench.input, "seem to be mirrored", "write a right-handed frame");
+  }
+}
+
+TEST(HandEyeInput, PositionsWithAnotherSignThanTheirRotations) {
+  const auto turned = [](const Eigen::Vector3d& signs) {
+    HandEyeBench bench(kGood);
+    for (HandEyeStation& s : bench.input.stations) {
+      s.tracker_from_sensor = {s.tracker_from_sensor.rotation(),
+                               Eigen::Vector3d(signs.cwiseProduct(s.tracker_from_sensor.translation()))};
+    }
+    return bench.input;
+  };
+  expect_fail(turned({1, 1, -1}), "wrong sign of z:", "turn positions and rotations alike");
+  expect_fail(turned({-1, -1, 1}), "wrong sign of x, y:", "turn positions and rotations alike");
+}
+
 TEST(HandEyeInput, ABoardOfAnotherSize) {
   const auto scaled = [](double by) {
     HandEyeBench bench(kGood);
