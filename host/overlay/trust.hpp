@@ -31,9 +31,10 @@ struct ScopeFigures {
 
 /// Whether the video is seen to move as the scope's poses say.
 enum class VideoAgreement {
-  untold,   ///< the video has not shown enough yet
-  agrees,   ///< it does
-  differs,  ///< it does not: the scope is turned in its holder, or another; or something has moved
+  untold,    ///< the video has not shown enough yet
+  agrees,    ///< it does
+  in_doubt,  ///< it did, and the last picture does not: the next ones tell
+  differs,   ///< it does not: the scope is turned in its holder, or another; or something has moved
 };
 
 /// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
