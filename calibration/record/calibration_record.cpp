@@ -134,6 +134,7 @@ Json json_of(const HandEyeEntry& hand_eye) {
   json["held_out_px"] = hand_eye.held_out_px;
   json["held_out_mm"] = hand_eye.held_out_mm;
   if (hand_eye.rod) json["rod"] = json_of(*hand_eye.rod);
+  if (hand_eye.independent_stations) json["independent_stations"] = *hand_eye.independent_stations;
   return json;
 }
 HandEyeEntry hand_eye_of(const Json& json) {
@@ -150,6 +151,10 @@ HandEyeEntry hand_eye_of(const Json& json) {
   json.at("held_out_px").get_to(hand_eye.held_out_px);
   json.at("held_out_mm").get_to(hand_eye.held_out_mm);
   if (json.contains("rod")) hand_eye.rod = rod_of(json.at("rod"));
+  if (json.contains("independent_stations")) {
+    hand_eye.independent_stations = json.at("independent_stations").get<int>();
+    if (*hand_eye.independent_stations < 1) throw std::range_error("a hand-eye of no stations");
+  }
   return hand_eye;
 }
 

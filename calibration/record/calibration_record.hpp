@@ -48,6 +48,9 @@ struct HandEyeEntry {
   Eigen::Matrix<double, 6, 6> covariance;        ///< as the solver states it: rotation vector (rad), translation (mm)
   double rms_px = 0, held_out_px = 0, held_out_mm = 0;
   std::optional<RodEntry> rod;  ///< none: camera_from_sensor holds at the one angle at which it was made
+  /// That held_out_px and held_out_mm rest on, as HandEyeResult has them; empty: the record is of before they were
+  /// kept.
+  std::optional<int> independent_stations = std::nullopt;
 };
 
 struct TipEntry {

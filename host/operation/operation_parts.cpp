@@ -70,6 +70,7 @@ Json json_of(const CalibratedScope& found) {
   enter(json, "camera_rms_px", figures.camera_rms_px);
   enter(json, "held_out_px", figures.held_out_px);
   enter(json, "held_out_mm", figures.held_out_mm);
+  if (figures.hand_eye_stations) json["hand_eye_stations"] = *figures.hand_eye_stations;
   return json;
 }
 
@@ -117,6 +118,7 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
                        figure_of(json, "held_out_mm")};
   if (json.contains("hand_eye_covariance"))
     figures.hand_eye_covariance = matrix_of<Eigen::Matrix<double, 6, 6>>(json.at("hand_eye_covariance"));
+  if (json.contains("hand_eye_stations")) figures.hand_eye_stations = json.at("hand_eye_stations").get<int>();
   auto scope = ScopeSetup::of_values(camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye), figures);
   if (!scope) return scope.error();
   if (lens.contains("round_field")) scope = scope->with_round_field(calibration::field_of_json(lens.at("round_field")));

@@ -23,6 +23,8 @@ struct ScopeFigures {
   /// Of hand-eye, as errors e at a place p of the camera's frame: e = w x p + s, of w (rad) and s (mm), the shift at
   /// the camera itself. It says how hand-eye's error grows with the distance.
   std::optional<Eigen::Matrix<double, 6, 6>> hand_eye_covariance = std::nullopt;
+  /// That held_out_mm rests on: of few it may be small by chance. Empty: it is not known how many they were.
+  std::optional<int> hand_eye_stations = std::nullopt;
   std::optional<CameraMatrix> camera_covariance = std::nullopt;
   /// Of a rod that turns, or that had been turned to one angle when it was calibrated: whether somebody has said how it
   /// is turned now. Without that nobody knows where the camera sits, and nothing is drawn.
