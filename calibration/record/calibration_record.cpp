@@ -82,7 +82,7 @@ Json json_of(const LensEntry& lens) {
   json["rms_px"] = lens.rms_px;
   json["held_out_px"] = lens.held_out_px;
   if (lens.rod_angle_deg) json["rod_angle_deg"] = *lens.rod_angle_deg;
-  if (lens.round_field) json["round_field"] = json_of_field(*lens.round_field);
+  if (lens.round_field) json["round_field"] = json_of_round_field(*lens.round_field);
   return json;
 }
 LensEntry lens_of(const Json& json) {
@@ -97,7 +97,7 @@ LensEntry lens_of(const Json& json) {
   json.at("rms_px").get_to(lens.rms_px);
   json.at("held_out_px").get_to(lens.held_out_px);
   if (json.contains("rod_angle_deg")) lens.rod_angle_deg = json.at("rod_angle_deg").get<double>();
-  if (json.contains("round_field")) lens.round_field = field_of_json(json.at("round_field"));
+  if (json.contains("round_field")) lens.round_field = round_field_of_json(json.at("round_field"));
   return lens;
 }
 
