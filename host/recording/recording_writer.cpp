@@ -30,12 +30,7 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const Recording
     return Error{Errc::in_use,
                  fmt::format("{}: holds a recording already; choose another --out", settings.folder.string())};
   }
-  const bool made = fs::create_directories(settings.folder, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", settings.folder.string())};
-  if (made) {
-    if (auto named = sync_folder(fs::canonical(settings.folder, error).parent_path()); !named) return named.error();
-  }
+  if (auto made = make_folder_durably(settings.folder); !made) return made.error();
   auto events = OutputFile::create(settings.folder / kRecordingEvents);
   if (!events) return events.error();
   auto tracker = SequenceWriter::create(settings.folder, kRecordingTracker, 0, 0);
