@@ -174,7 +174,7 @@ FieldSize compare_round_field(const GreyView& picture, const RoundField& calibra
   const Small small = small_of(picture);
   const double radius = calibrated.radius_px / small.scale;
   const Eigen::Vector2d centre = (calibrated.centre_px.array() + 0.5) / small.scale - 0.5;
-  // Where the ring's part is that the sensor holds.
+  // The grey levels on a circle of so many radii about the field's centre, as far as it lies within the picture.
   const auto ring = [&](double share) {
     std::vector<double> out;
     for (int i = 0; i < kDirections; ++i) {

@@ -59,7 +59,7 @@ struct TrustFigures {
   std::optional<double> moved_mm = std::nullopt;
   /// Empty: nobody looks, as where there is no video that moves.
   std::optional<VideoAgreement> video = std::nullopt;
-  /// Of the video, against the lens's calibration.
+  /// How large the video's round field is, against the one of the lens's calibration.
   calibration::FieldSize field = calibration::FieldSize::cannot_tell;
 };
 

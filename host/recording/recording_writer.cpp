@@ -239,7 +239,7 @@ Result<void> RecordingWriter::end_video() {
     if (!joined) notes_.push_back(one.error().what);
     figures_.videos.back().file = sequence_[0].path().filename().string();
   }
-  // The one is on the disk since it took its place.
+  // Joining has brought the one file onto the disk.
   Result<void> synced = joined ? Result<void>() : sequence_[0].sync();
   sequence_.clear();
   return synced;
