@@ -96,6 +96,7 @@ HandEyeResult calibrate(const HandEyeInput& in) {
     out.solved = true;
     const CorrelatedStations blocks = fit_without_blocks(in, stations, freedom, *refined, *robust);
     widen_by_blocks(blocks, *refined, out);
+    out.independent_stations = static_cast<int>(blocks.in_time.without.size());
     fill_station_table(stations, freedom, *refined, *robust, blocks.in_time, out);
     add_lens_error(in, stations, freedom, *refined, *robust, out);
   } else {

@@ -110,6 +110,9 @@ struct HandEyeResult {
   double tracked_px = 0, held_out_px = 0, held_out_mm = 0;  ///< over the stations used, as above
   double held_out_median_px = 0;                            ///< over the stations, which one bad pose does not move
   double working_distance_mm = 0;                           ///< median, camera to board
+  /// On how many errors held out rest, each with hand-eye from the others: the stations used, or of a stream the blocks
+  /// of its neighbours. Empty: not solved.
+  std::optional<int> independent_stations;
 
   HandEyeObservability observability;
   std::vector<HandEyeStart> starts;

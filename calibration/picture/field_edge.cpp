@@ -112,10 +112,8 @@ std::vector<cv::Point> most_on_a_circle(const std::vector<cv::Point>& edge) {
   return most;
 }
 
-}  // namespace
-
-std::optional<RoundField> find_round_field(const GreyView& picture) {
-  const Small small = small_of(picture);
+/// In pixels of the picture that the small one was made of.
+std::optional<RoundField> round_field_in(const Small& small) {
   const auto levels = levels_of(small.grey);
   if (!levels) return std::nullopt;
   cv::Mat bright = small.grey > levels->between();
@@ -149,6 +147,12 @@ std::optional<RoundField> find_round_field(const GreyView& picture) {
   return circle;
 }
 
+}  // namespace
+
+std::optional<RoundField> find_round_field(const GreyView& picture) {
+  return round_field_in(small_of(picture));
+}
+
 std::optional<RoundField> agreed_round_field(std::span<const RoundField> found, std::size_t of_pictures) {
   if (found.empty() || 2 * found.size() < of_pictures) return std::nullopt;
   std::vector<double> x, y, radii;
@@ -170,7 +174,7 @@ FieldSize compare_round_field(const GreyView& picture, const RoundField& calibra
   const Small small = small_of(picture);
   const double radius = calibrated.radius_px / small.scale;
   const Eigen::Vector2d centre = (calibrated.centre_px.array() + 0.5) / small.scale - 0.5;
-  // Where the ring's part is that the sensor holds.
+  // The grey levels on a circle of so many radii about the field's centre, as far as it lies within the picture.
   const auto ring = [&](double share) {
     std::vector<double> out;
     for (int i = 0; i < kDirections; ++i) {
@@ -194,7 +198,7 @@ FieldSize compare_round_field(const GreyView& picture, const RoundField& calibra
   if (median_of(outside) > between) return FieldSize::larger;
   if (median_of(inside) > between) return FieldSize::same;
   // A rim that the lamp hardly reaches is dark too: then only an edge tells.
-  const auto found = find_round_field(picture);
+  const auto found = round_field_in(small);
   if (!found) return FieldSize::cannot_tell;
   return found->radius_px < kSmaller * calibrated.radius_px ? FieldSize::smaller : FieldSize::same;
 }

@@ -33,13 +33,16 @@ double chi_square_tail(double value, double dof) {
   return value > 0 ? Eigen::numext::igammac(0.5 * dof, 0.5 * value) : 1;
 }
 
+double upper95_over_estimate(double degrees_of_freedom) {
+  constexpr double kChance = 0.05;
+  return std::sqrt(degrees_of_freedom / chi_square_quantile(kChance, degrees_of_freedom));
+}
+
 LocalisationError localisation_error_of(double fre_rms_mm, std::size_t points) {
   const auto n = static_cast<double>(points);
   const double dof = 3 * n - 6;
-  const double squares_mm2 = n * fre_rms_mm * fre_rms_mm;
-  constexpr double kChance = 0.05;
-  return {std::sqrt(3 * squares_mm2 / dof), std::sqrt(3 * squares_mm2 / chi_square_quantile(kChance, dof)),
-          static_cast<int>(dof)};
+  const double rms_mm = fre_rms_mm * std::sqrt(3 * n / dof);
+  return {rms_mm, rms_mm * upper95_over_estimate(dof), static_cast<int>(dof)};
 }
 
 TargetError::TargetError(std::span<const Eigen::Vector3d> points_mm, double localisation_rms_mm) {

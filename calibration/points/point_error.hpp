@@ -20,8 +20,12 @@ struct LocalisationError {
 /// Nobody localises better than this: without it, rounding in made-up points would be told from rounding.
 inline constexpr double kFinestLocalisation_mm = 0.1;
 
-/// From the FRE of a rigid fit of so many points: FLE^2 = FRE^2 n / (n - 2) (R. Sibson, 1979), and its upper bound from
-/// the chi-square distribution of the residuals with 3 n - 6 degrees of freedom. points >= 3.
+/// How many times its estimate an error is at most, with a probability of 95 %, where the estimate rests on residuals
+/// of so many degrees of freedom: by their chi-square distribution.
+double upper95_over_estimate(double degrees_of_freedom);
+
+/// From the FRE of a rigid fit of so many points: FLE^2 = FRE^2 n / (n - 2) (R. Sibson, 1979), and its upper bound by
+/// 3 n - 6 degrees of freedom. points >= 3.
 LocalisationError localisation_error_of(double fre_rms_mm, std::size_t points);
 
 /// The error to expect at a target, root mean square, of a registration by points:

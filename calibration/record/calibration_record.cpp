@@ -82,7 +82,7 @@ Json json_of(const LensEntry& lens) {
   json["rms_px"] = lens.rms_px;
   json["held_out_px"] = lens.held_out_px;
   if (lens.rod_angle_deg) json["rod_angle_deg"] = *lens.rod_angle_deg;
-  if (lens.round_field) json["round_field"] = json_of_field(*lens.round_field);
+  if (lens.round_field) json["round_field"] = json_of_round_field(*lens.round_field);
   return json;
 }
 LensEntry lens_of(const Json& json) {
@@ -97,7 +97,7 @@ LensEntry lens_of(const Json& json) {
   json.at("rms_px").get_to(lens.rms_px);
   json.at("held_out_px").get_to(lens.held_out_px);
   if (json.contains("rod_angle_deg")) lens.rod_angle_deg = json.at("rod_angle_deg").get<double>();
-  if (json.contains("round_field")) lens.round_field = field_of_json(json.at("round_field"));
+  if (json.contains("round_field")) lens.round_field = round_field_of_json(json.at("round_field"));
   return lens;
 }
 
@@ -134,6 +134,7 @@ Json json_of(const HandEyeEntry& hand_eye) {
   json["held_out_px"] = hand_eye.held_out_px;
   json["held_out_mm"] = hand_eye.held_out_mm;
   if (hand_eye.rod) json["rod"] = json_of(*hand_eye.rod);
+  if (hand_eye.independent_stations) json["independent_stations"] = *hand_eye.independent_stations;
   return json;
 }
 HandEyeEntry hand_eye_of(const Json& json) {
@@ -150,6 +151,10 @@ HandEyeEntry hand_eye_of(const Json& json) {
   json.at("held_out_px").get_to(hand_eye.held_out_px);
   json.at("held_out_mm").get_to(hand_eye.held_out_mm);
   if (json.contains("rod")) hand_eye.rod = rod_of(json.at("rod"));
+  if (json.contains("independent_stations")) {
+    hand_eye.independent_stations = json.at("independent_stations").get<int>();
+    if (*hand_eye.independent_stations < 1) throw std::range_error("a hand-eye of no stations");
+  }
   return hand_eye;
 }
 
@@ -238,27 +243,6 @@ Result<CalibrationRecord> parse_record(const std::string& text) {
   } catch (const std::exception& problem) {
     return Error{Errc::bad_value, fmt::format("the calibration record makes no sense: {}", problem.what())};
   }
-}
-
-std::optional<IdentityDifference> first_difference(const Identity& recorded, const Identity& told) {
-  for (const auto& [name, value] : recorded) {
-    const auto found = told.find(name);
-    if (found == told.end()) return IdentityDifference{name, value, ""};
-    if (found->second != value) return IdentityDifference{name, value, found->second};
-  }
-  return std::nullopt;
-}
-
-std::string misfit(const std::string& what, const Identity& recorded, const Identity& told, const std::string& of) {
-  if (recorded.empty())
-    return fmt::format(
-        "{} does not say which {} it was made with; bind it to this one: birdseye calibrate record FILE --bind HOST",
-        of, what);
-  const auto other = first_difference(recorded, told);
-  if (!other) return {};
-  if (other->told.empty())
-    return fmt::format("{} is of {} {} {}; this one does not tell its", of, what, other->name, other->recorded);
-  return fmt::format("{} is of {} {} {}; this one's is {}", of, what, other->name, other->recorded, other->told);
 }
 
 }  // namespace birdseye::calibration

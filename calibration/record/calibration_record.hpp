@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <optional>
 #include <string>
 
@@ -10,11 +9,9 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/round_field.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/record/identity.hpp"
 
 namespace birdseye::calibration {
-
-/// What an instrument says it is, as "model", "sensor_serial" and so on. Empty: nothing is known of it.
-using Identity = std::map<std::string, std::string>;
 
 /// Where an entry of a record comes from.
 struct Provenance {
@@ -48,6 +45,9 @@ struct HandEyeEntry {
   Eigen::Matrix<double, 6, 6> covariance;        ///< as the solver states it: rotation vector (rad), translation (mm)
   double rms_px = 0, held_out_px = 0, held_out_mm = 0;
   std::optional<RodEntry> rod;  ///< none: camera_from_sensor holds at the one angle at which it was made
+  /// That held_out_px and held_out_mm rest on, as HandEyeResult has them; empty: the record is of before they were
+  /// kept.
+  std::optional<int> independent_stations = std::nullopt;
 };
 
 struct TipEntry {
@@ -85,17 +85,5 @@ std::string record_text(const CalibrationRecord& record);
 /// Refuses what is no calibration record, a later version, a checksum that does not fit, and numbers that make no
 /// sense.
 Result<CalibrationRecord> parse_record(const std::string& text);
-
-/// What of an instrument is not as it was recorded: the first that differs, or that is told no more (told: empty).
-struct IdentityDifference {
-  std::string name, recorded, told;
-};
-std::optional<IdentityDifference> first_difference(const Identity& recorded, const Identity& told);
-
-/// Why a record made with one instrument is not to be used with another, in words; empty where all that the record
-/// knows is as the instrument says. A record that knows nothing fits nothing, and what the instrument does not say
-/// cannot fit. what: "tracker", "camera". of: what was made with it.
-std::string misfit(const std::string& what, const Identity& recorded, const Identity& told,
-                   const std::string& of = "the record");
 
 }  // namespace birdseye::calibration

@@ -5,7 +5,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/base/verdict.hpp"
 #include "calibration/geometry/field_map.hpp"
-#include "calibration/record/calibration_record.hpp"
+#include "calibration/record/identity.hpp"
 
 namespace birdseye::calibration {
 

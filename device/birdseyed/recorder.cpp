@@ -76,8 +76,8 @@ Result<NewRecordFile> create_record_file(const RecordConfig& config) {
   std::string stamp = utc_now();
   std::erase_if(stamp, [](char c) { return c == '-' || c == ':'; });
   const std::string name = "birdseyed-" + stamp;
-  std::error_code ignored;
-  std::filesystem::create_directories(config.folder, ignored);
+  if (auto made = make_folder_durably(config.folder); !made)
+    return Error{Errc::unreadable, made.error().what + " ([record] folder)"};
   std::filesystem::path path = config.folder / (name + ".berec");
   int os_errno = EEXIST;
   for (int i = 2; os_errno == EEXIST && i <= kMostOfOneName; ++i) {

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <vector>
 
 #include "drivers/system/unique_fd.hpp"
 
@@ -30,6 +31,21 @@ Result<void> sync_file(const std::filesystem::path& path) {
 
 Result<void> sync_folder(const std::filesystem::path& folder) {
   return sync(folder.empty() ? "." : folder, O_DIRECTORY);
+}
+
+Result<void> make_folder_durably(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> parents;  // of all that are not there
+  auto at = folder.has_filename() ? folder : folder.parent_path();
+  for (; !at.empty() && !std::filesystem::exists(at, error); at = at.parent_path()) parents.push_back(at.parent_path());
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    return Error{Errc::unreadable,
+                 fmt::format("{}: the folder cannot be made ({}); choose another", folder.string(), error.message())};
+  for (const auto& parent : parents) {
+    if (auto synced = sync_folder(parent); !synced) return synced;
+  }
+  return {};
 }
 
 Result<void> replace_durably(const std::filesystem::path& written, const std::filesystem::path& place) {

@@ -219,8 +219,9 @@ RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecord
                                   lens->held_out_px, std::nullopt, recording.round_field});
             }
             const calibration::HandEyeResult& r = found.result;
-            record.hand_eye = calibration::HandEyeEntry{provenance,    r.camera_from_sensor, r.covariance, r.rms_px,
-                                                        r.held_out_px, r.held_out_mm,        std::nullopt};
+            record.hand_eye =
+                calibration::HandEyeEntry{provenance,    r.camera_from_sensor, r.covariance, r.rms_px,
+                                          r.held_out_px, r.held_out_mm,        std::nullopt, r.independent_stations};
             if (found.rod && found.rod->scope) {
               const RodScope& rod = *found.rod->scope;
               record.hand_eye->rod = calibration::RodEntry{found.rod->at_reference().angle_deg, rod.axis_in_sensor,

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/base/verdict.hpp"
+#include "drivers/system/durable.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/export_lens.hpp"
@@ -188,11 +189,7 @@ Result<ExitCode> run(const ExportOptions& options) {
   if (!registered) return registered.error();
   const auto map = map_of(options, *registered);
   if (!map) return map.error();
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", options.out.string())};
-
+  if (auto made = make_folder_durably(options.out); !made) return made.error();
   if (auto removed = remove_earlier_export(options.out); !removed) return removed.error();
 
   nlohmann::json files = nlohmann::json::object();

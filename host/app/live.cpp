@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/clock.hpp"
+#include "drivers/system/durable.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/foreign_options.hpp"
@@ -142,9 +143,7 @@ Result<void> prepare(LiveOptions& options) {
     options.cart.folder = options.live.out;
     options.simulated = simulated_patient(options.live.out);
     options.simulated.margins_mm = options.live.patient.margins_mm;
-    std::error_code error;
-    fs::create_directories(options.live.out, error);
-    if (error) return Error{Errc::unreadable, options.live.out.string() + ": cannot be made; choose another --out"};
+    if (auto made = make_folder_durably(options.live.out); !made) return made;
   } else if (std::error_code ignored; !fs::exists(options.live.patient.ct.path, ignored)) {
     return Error{Errc::not_found,
                  fmt::format("--ct {}: no such file or folder", options.live.patient.ct.path.string())};

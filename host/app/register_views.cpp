@@ -12,6 +12,7 @@
 
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/durable.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/case/error_picture.hpp"
@@ -267,9 +268,8 @@ Result<std::vector<FileText>> pictures_of(const RegistrationCase& c, const Trans
 
 /// Makes the folder, and removes the results of an earlier registration from it, which nobody must take for this one's.
 Result<void> make_empty_of_results(const fs::path& folder) {
+  if (auto made = make_folder_durably(folder); !made) return made;
   std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another folder", folder.string())};
   std::vector<fs::path> old;
   for (const char* name : {"field.mha", "result.json", "report.html", "expected_error.png", "trace.svg", "pose.txt"})
     old.push_back(folder / name);

@@ -9,6 +9,7 @@
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/durable.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -172,10 +173,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
     if (!decisions) return decisions.error().with_context("--live-log");
     for (LoggedDecision& decision : *decisions) live.insert_or_assign(decision.sequence, std::move(decision));
   }
-  std::error_code error;
-  fs::create_directories(options.out, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", options.out.string())};
+  if (auto made = make_folder_durably(options.out); !made) return made.error();
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;

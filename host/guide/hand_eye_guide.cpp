@@ -6,6 +6,7 @@
 #include "calibration/hand_eye/view_pose.hpp"
 #include "calibration/picture/field_edge.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/durable.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -34,9 +35,9 @@ Result<void> HandEyeGuide::check(const GuidePlan& plan) {
                              plan.pattern.spec)};
   }
   if (plan.keep.empty()) return {};
-  std::error_code error;
-  for (const char* folder : {"pictures", "poses"}) std::filesystem::create_directories(plan.keep / folder, error);
-  if (error) return Error{Errc::unreadable, plan.keep.string() + ": cannot be made: " + error.message()};
+  for (const char* folder : {"pictures", "poses"}) {
+    if (auto made = make_folder_durably(plan.keep / folder); !made) return made;
+  }
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "drivers/system/durable.hpp"
 #include "host/simulated/simulated_truth.hpp"
 
 namespace birdseye::host {
@@ -86,13 +87,11 @@ std::optional<LoggedDecision> decision_of(const std::vector<std::string>& cells)
 }  // namespace
 
 Result<DecisionLog> DecisionLog::open(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
+  if (auto made = make_folder_durably(folder); !made) return made.error();
   DecisionLog log;
   log.folder_ = folder;
   log.file_.open(folder / kFile, std::ios::trunc);
-  if (error || !log.file_)
-    return Error{Errc::unreadable, folder.string() + ": cannot be written; choose another --out"};
+  if (!log.file_) return Error{Errc::unreadable, folder.string() + ": cannot be written; choose another --out"};
   log.file_ << kHeader << '\n';
   return log;
 }

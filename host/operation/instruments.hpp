@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "calibration/record/calibration_record.hpp"
+#include "calibration/record/identity.hpp"
 #include "device/wire/messages.hpp"
 
 namespace birdseye::host {

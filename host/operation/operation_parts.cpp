@@ -64,12 +64,14 @@ Json json_of(const CalibratedScope& found) {
               {"fx_fy_cx_cy_k1_k2_p1_p2_k3", std::vector<double>(parameters.begin(), parameters.end())}}},
             {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
   if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
-  if (const auto& field = found.scope.round_field()) json["lens"]["round_field"] = calibration::json_of_field(*field);
+  if (const auto& field = found.scope.round_field())
+    json["lens"]["round_field"] = calibration::json_of_round_field(*field);
   const ScopeFigures& figures = found.scope.figures();
   if (figures.hand_eye_covariance) json["hand_eye_covariance"] = rows_of(*figures.hand_eye_covariance);
   enter(json, "camera_rms_px", figures.camera_rms_px);
   enter(json, "held_out_px", figures.held_out_px);
   enter(json, "held_out_mm", figures.held_out_mm);
+  if (figures.hand_eye_stations) json["hand_eye_stations"] = *figures.hand_eye_stations;
   return json;
 }
 
@@ -117,9 +119,11 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
                        figure_of(json, "held_out_mm")};
   if (json.contains("hand_eye_covariance"))
     figures.hand_eye_covariance = matrix_of<Eigen::Matrix<double, 6, 6>>(json.at("hand_eye_covariance"));
+  if (json.contains("hand_eye_stations")) figures.hand_eye_stations = json.at("hand_eye_stations").get<int>();
   auto scope = ScopeSetup::of_values(camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye), figures);
   if (!scope) return scope.error();
-  if (lens.contains("round_field")) scope = scope->with_round_field(calibration::field_of_json(lens.at("round_field")));
+  if (lens.contains("round_field"))
+    scope = scope->with_round_field(calibration::round_field_of_json(lens.at("round_field")));
   return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(),
                          json.at("made_from").get<std::string>() == "board", instruments_of(json)};
 }

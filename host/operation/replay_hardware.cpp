@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "calibration/record/calibration_record.hpp"
+#include "calibration/record/identity.hpp"
 
 namespace birdseye::host {
 

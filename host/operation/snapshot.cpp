@@ -8,6 +8,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/durable.hpp"
 #include "host/files/picture.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -67,9 +68,7 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
 }  // namespace
 
 Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return Error{Errc::io, folder.string() + ": cannot be made; choose another --out"};
+  if (auto made = make_folder_durably(folder); !made) return made;
   const wire::VideoFrame& frame = snapshot.frame;
   const ShownPicture& shown = snapshot.shown;
   std::vector<FileText> files{

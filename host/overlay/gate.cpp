@@ -28,7 +28,8 @@ std::string OverlayGate::doubt(const PoseAnswer& pose, const std::optional<Error
   if (figures_.field == calibration::FieldSize::larger) return words("why_zoomed_in");
   if (figures_.field == calibration::FieldSize::smaller) return words("why_zoomed_out");
   if (figures_.video == VideoAgreement::differs) return words("why_video_differs");
-  if (figures_.video == VideoAgreement::untold) return words("why_video_untold");
+  if (figures_.video == VideoAgreement::untold || figures_.video == VideoAgreement::in_doubt)
+    return words("why_video_untold");
   if (pose.kind == PoseKind::predicted && pose.age > settings_.most_predicted) {
     return words("why_predicted", pose.age.seconds() * 1e3);
   }

@@ -49,9 +49,13 @@ std::optional<ScopeSetup> ScopeSetup::of_record(const calibration::CalibrationRe
   if (!record.lens->covariance.isZero(0)) out.figures_.camera_covariance = record.lens->covariance;
   if (!record.hand_eye->covariance.isZero(0))
     out.figures_.hand_eye_covariance = about_camera(record.hand_eye->covariance, out.camera_from_sensor_);
+  out.figures_.hand_eye_stations = record.hand_eye->independent_stations;
   if (stated.camera_rms_px) out.figures_.camera_rms_px = stated.camera_rms_px;
   if (stated.held_out_px) out.figures_.held_out_px = stated.held_out_px;
-  if (stated.held_out_mm) out.figures_.held_out_mm = stated.held_out_mm;
+  if (stated.held_out_mm) {
+    out.figures_.held_out_mm = stated.held_out_mm;
+    out.figures_.hand_eye_stations = stated.hand_eye_stations;
+  }
   out.rod_ = rod_of(record);
   out.figures_.rod_angle_missing = out.rod_.has_value();
   return out;
@@ -84,6 +88,7 @@ ScopeSetup ScopeSetup::of_hand_eye(const CameraModel& camera, std::optional<doub
   out.camera_ = camera;
   out.camera_from_sensor_ = found.camera_from_sensor;
   out.figures_ = {camera_rms_px, if_measured(found.held_out_px), found.held_out_mm};
+  out.figures_.hand_eye_stations = found.independent_stations;
   out.figures_.camera_covariance = camera_covariance;
   if (!found.covariance.isZero(0))
     out.figures_.hand_eye_covariance = about_camera(found.covariance, out.camera_from_sensor_);

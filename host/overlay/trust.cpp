@@ -13,9 +13,12 @@ namespace {
 // half a frame of 25 Hz.
 constexpr Duration kUnknownLatency = Duration::from_ms(20);
 
-// Hand-eye's error is estimated of some twenty stations, two axes each: with a probability of 95 % it is no more than
-// so many times that, by chi-square with 40 degrees of freedom.
-constexpr double kOfFewStations = 1.23;
+/// Hand-eye's error is estimated, of two axes at each station: with a probability of 95 % it is no more than so many
+/// times that.
+double of_few_stations(const ScopeFigures& scope) {
+  constexpr double kOfTwenty = 1.23;  // as many as usual, where nobody says how many they were
+  return scope.hand_eye_stations ? calibration::upper95_over_estimate(2.0 * *scope.hand_eye_stations) : kOfTwenty;
+}
 
 /// Of a covariance of hand-eye, the error of a point straight ahead across the line of sight, each axis.
 double across_mm(const Eigen::Matrix<double, 6, 6>& covariance, double distance_mm) {
@@ -112,7 +115,7 @@ std::optional<ErrorBudget> error_budget(const CameraModel& camera, const FramePo
   ErrorBudget out;
   out.fiducials_mm = *figures.target_mm;
   const double hand_eye_mm = hand_eye_error_mm(camera, target_in_camera_mm, figures.scope);
-  out.hand_eye_mm = kOfFewStations * hand_eye_mm;
+  out.hand_eye_mm = of_few_stations(figures.scope) * hand_eye_mm;
   out.lens_mm = lens_error_mm(camera, target_in_camera_mm, figures.scope);
   // A pose's own sigma is an axis's, and counts what the hand may have done since; the jitter counts the angles.
   const double pose_mm = std::max(std::sqrt(3.0) * pose.position_sigma_mm, pose.jitter_mm.value_or(0));

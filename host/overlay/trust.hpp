@@ -23,6 +23,8 @@ struct ScopeFigures {
   /// Of hand-eye, as errors e at a place p of the camera's frame: e = w x p + s, of w (rad) and s (mm), the shift at
   /// the camera itself. It says how hand-eye's error grows with the distance.
   std::optional<Eigen::Matrix<double, 6, 6>> hand_eye_covariance = std::nullopt;
+  /// That held_out_mm rests on: of few it may be small by chance. Empty: it is not known how many they were.
+  std::optional<int> hand_eye_stations = std::nullopt;
   std::optional<CameraMatrix> camera_covariance = std::nullopt;
   /// Of a rod that turns, or that had been turned to one angle when it was calibrated: whether somebody has said how it
   /// is turned now. Without that nobody knows where the camera sits, and nothing is drawn.
@@ -31,9 +33,10 @@ struct ScopeFigures {
 
 /// Whether the video is seen to move as the scope's poses say.
 enum class VideoAgreement {
-  untold,   ///< the video has not shown enough yet
-  agrees,   ///< it does
-  differs,  ///< it does not: the scope is turned in its holder, or another; or something has moved
+  untold,    ///< the video has not shown enough yet
+  agrees,    ///< it does
+  in_doubt,  ///< it did, and the last picture does not: the next ones tell
+  differs,   ///< it does not: the scope is turned in its holder, or another; or something has moved
 };
 
 /// How far a deformation may have the target off: root mean square, and within which it is with a probability of 95 %.
@@ -56,7 +59,7 @@ struct TrustFigures {
   std::optional<double> moved_mm = std::nullopt;
   /// Empty: nobody looks, as where there is no video that moves.
   std::optional<VideoAgreement> video = std::nullopt;
-  /// Of the video, against the lens's calibration.
+  /// How large the video's round field is, against the one of the lens's calibration.
   calibration::FieldSize field = calibration::FieldSize::cannot_tell;
 };
 

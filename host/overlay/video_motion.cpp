@@ -273,8 +273,8 @@ bool VideoMotion::judge(const SeenFrom& now, const ScopeSetup& scope) {
   if (*off_px_ > allowed_px) {
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
     if (odd_ < kOddInRow) {
-      // The next picture tells. Until then nothing says that this one is right.
-      if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::untold;
+      // The next pictures tell. Until then nothing says that this one is right.
+      if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::in_doubt;
       return true;
     }
     if (state_ != VideoAgreement::differs) wanted_ = std::min(2 * wanted_, kMostWanted);

@@ -30,12 +30,7 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::create(const Recording
     return Error{Errc::in_use,
                  fmt::format("{}: holds a recording already; choose another --out", settings.folder.string())};
   }
-  const bool made = fs::create_directories(settings.folder, error);
-  if (error)
-    return Error{Errc::unreadable, fmt::format("{}: cannot be made; choose another --out", settings.folder.string())};
-  if (made) {
-    if (auto named = sync_folder(fs::canonical(settings.folder, error).parent_path()); !named) return named.error();
-  }
+  if (auto made = make_folder_durably(settings.folder); !made) return made.error();
   auto events = OutputFile::create(settings.folder / kRecordingEvents);
   if (!events) return events.error();
   auto tracker = SequenceWriter::create(settings.folder, kRecordingTracker, 0, 0);
@@ -244,7 +239,7 @@ Result<void> RecordingWriter::end_video() {
     if (!joined) notes_.push_back(one.error().what);
     figures_.videos.back().file = sequence_[0].path().filename().string();
   }
-  // The one is on the disk since it took its place.
+  // Joining has brought the one file onto the disk.
   Result<void> synced = joined ? Result<void>() : sequence_[0].sync();
   sequence_.clear();
   return synced;

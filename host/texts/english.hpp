@@ -331,12 +331,11 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_predicted", "the pose is predicted {:.0f} ms ahead"},
     {"why_scatter", "the tracker scatters by {:.1f} mm"},
     {"why_zoomed_in",
-     "the round field is larger than when the lens was calibrated: the lens is zoomed in, or another. Zoom it back, or "
-     "calibrate it"},
+     "the round field is larger than when the lens was calibrated: the lens is zoomed in, or another. Zoom the lens "
+     "back, or calibrate it"},
     {"why_zoomed_out",
-     "the round field is smaller than when the lens was calibrated: the lens is zoomed out, or another. Zoom it back, "
-     "or "
-     "calibrate it"},
+     "the round field is smaller than when the lens was calibrated: the lens is zoomed out, or another. Zoom the lens "
+     "back, or calibrate it"},
     {"why_video_differs",
      "video and poses do not agree: move the scope slowly; if that does not help, check a landmark or calibrate"},
     {"why_video_untold", "move the scope about: the video has not shown yet that it goes with the scope's poses"},

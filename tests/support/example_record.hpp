@@ -35,6 +35,7 @@ inline calibration::CalibrationRecord example_record(int width_px, int height_px
   hand_eye.rms_px = 1.5;
   hand_eye.held_out_px = 1.75;
   hand_eye.held_out_mm = 0.5;
+  hand_eye.independent_stations = 14;
   hand_eye.rod = RodEntry{30, Eigen::Vector3d(1, -2, 20).normalized(), {12, -3, 1.0 / 3}, 1};
   record.hand_eye = hand_eye;
   record.tip = TipEntry{provenance, {1, 2, 1.0 / 3}, Eigen::Matrix3d::Identity() / 9, 0.3};
@@ -51,6 +52,7 @@ inline calibration::CalibrationRecord straight_scope_record(int width_px = 768, 
   record.lens->covariance.setZero();
   record.hand_eye->rod.reset();
   record.hand_eye->covariance.setZero();
+  record.hand_eye->independent_stations.reset();
   return record;
 }
 

@@ -205,6 +205,7 @@ TEST(HandEyeCalibration, OfFewStationsTheOddOneIsNamed) {
   const auto result = calibrate_hand_eye(bench.input);
   ASSERT_TRUE(result && result->solved);
   EXPECT_THAT(result->outliers, ::testing::ElementsAre("station 3"));
+  EXPECT_EQ(result->independent_stations, 6);
 }
 
 TEST(HandEyeCalibration, AStationThatStandsOutIsTold) {

@@ -185,6 +185,8 @@ TEST(PoseStreams, WhatErrsTogetherIsNotCountedAsManyMeasurements) {
     EXPECT_LT((found->camera_from_sensor.translation() - one_by_one->camera_from_sensor.translation()).norm(), 1e-9);
     EXPECT_GT(found->sigma_at_board_mm(), 1.5 * one_by_one->sigma_at_board_mm()) << seed;
     EXPECT_GT(found->held_out_mm, one_by_one->held_out_mm) << seed;
+    EXPECT_EQ(found->independent_stations, 12) << "blocks of neighbours";
+    EXPECT_GT(one_by_one->independent_stations, 12);
     Vector6d error;
     error << rotation_log(
         Eigen::Matrix3d(stream.camera_from_sensor.rotation() * found->camera_from_sensor.rotation().transpose())),

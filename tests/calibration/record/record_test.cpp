@@ -23,6 +23,7 @@ TEST(CalibrationRecord, IsReadBackExactly) {
   EXPECT_EQ(read->lens->covariance, example().lens->covariance);
   EXPECT_EQ(read->lens->round_field, example().lens->round_field);
   EXPECT_EQ(read->hand_eye->camera_from_sensor.matrix(), example().hand_eye->camera_from_sensor.matrix());
+  EXPECT_EQ(read->hand_eye->independent_stations, 14);
   ASSERT_TRUE(read->hand_eye->rod);
   const RodEntry& rod = *read->hand_eye->rod;
   EXPECT_EQ(rod.reference_angle_deg, example().hand_eye->rod->reference_angle_deg);
@@ -113,6 +114,7 @@ TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {
   refused([](auto& r) { r.hand_eye->covariance(2, 2) = -1; }, "covariance");
   refused([](auto& r) { r.hand_eye->covariance(0, 1) = 5; }, "covariance");
   refused([](auto& r) { r.hand_eye->rod->axis_in_sensor *= 2; }, "unit length");
+  refused([](auto& r) { r.hand_eye->independent_stations = 0; }, "no stations");
   refused([](auto& r) { r.tip->provenance.grade = Grade::fail; }, "fail");
   refused([](auto& r) { r.lens->camera.k1 = std::numeric_limits<double>::quiet_NaN(); }, "null");
 }

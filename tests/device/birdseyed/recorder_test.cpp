@@ -294,7 +294,7 @@ TEST(Recorder, KeepsEverythingItIsGiven) {
   const birdseye::testing::Scratch scratch;
   birdseye::testing::forget_synced();
   RecordConfig config;
-  config.folder = scratch / "recordings";
+  config.folder = scratch / "new/recordings";
   std::filesystem::path path;
   {
     auto recorder = Recorder::start(config, {});
@@ -305,6 +305,8 @@ TEST(Recorder, KeepsEverythingItIsGiven) {
   }
   EXPECT_TRUE(birdseye::testing::is_synced(path));
   EXPECT_TRUE(birdseye::testing::is_synced(config.folder)) << "a power cut leaves the bytes without a name";
+  EXPECT_TRUE(birdseye::testing::is_synced(scratch / "new"));
+  EXPECT_TRUE(birdseye::testing::is_synced(scratch.path()));
   auto reader = RawEventReader::open(path);
   ASSERT_TRUE(reader) << reader.error().what;
   for (int i = 0; i < 100; ++i) {

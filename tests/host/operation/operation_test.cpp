@@ -33,6 +33,7 @@ Operation whole_operation() {
   found.camera_from_sensor = Transform<Camera, Sensor>(kTrackerFromPatient.rotation(), {1.0 / 3, -120, 250});
   found.held_out_px = 3;
   found.held_out_mm = 0.6;
+  found.independent_stations = 17;
   const CameraMatrix covariance = CameraMatrix::Identity() / 7;
   out.calibrated = {
       ScopeSetup::of_hand_eye({768, 576, 500.1, 500, 384, 288, -0.1, 0.2, 1e-4, -1e-5, 0.3}, 0.3, found, covariance)
@@ -65,6 +66,7 @@ TEST(Operation, IsReadBackToTheBit) {
   EXPECT_EQ(read->calibrated->scope.round_field(), kept.calibrated->scope.round_field());
   EXPECT_EQ(read->calibrated->scope.figures().held_out_px, 3);
   EXPECT_EQ(read->calibrated->scope.figures().held_out_mm, 0.6);
+  EXPECT_EQ(read->calibrated->scope.figures().hand_eye_stations, 17);
   EXPECT_TRUE(read->calibrated->by_board);
   EXPECT_EQ(read->calibrated->found_with.camera, kCamera);
   EXPECT_EQ(read->registered->tracker_from_patient.matrix(), kTrackerFromPatient.matrix());

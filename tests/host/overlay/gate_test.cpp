@@ -43,8 +43,10 @@ TEST(OverlayGate, DrawsNothingOverABadCalibration) {
 
 TEST(OverlayGate, WhatTheVideoDoesNotShowIsNotDrawn) {
   TrustFigures figures = kGood;
-  for (const auto& [video, strength] :
-       {std::pair{VideoAgreement::untold, 0.0}, {VideoAgreement::differs, 0.0}, {VideoAgreement::agrees, 1.0}}) {
+  for (const auto& [video, strength] : {std::pair{VideoAgreement::untold, 0.0},
+                                        {VideoAgreement::in_doubt, 0.0},
+                                        {VideoAgreement::differs, 0.0},
+                                        {VideoAgreement::agrees, 1.0}}) {
     figures.video = video;
     OverlayGate gate;
     gate.set_figures(figures);

@@ -24,7 +24,12 @@ TEST(ScopeSetup, OfARecordTellsTheHeldOutErrorAndNotTheFits) {
   EXPECT_EQ(scope->figures().camera_rms_px, 0.21);
   EXPECT_EQ(scope->figures().held_out_px, 1.75);
   EXPECT_EQ(scope->figures().held_out_mm, 0.5);
-  EXPECT_EQ(ScopeSetup::of_record(record, {0.4, 3, std::nullopt})->figures().held_out_px, 3);
+  EXPECT_EQ(scope->figures().hand_eye_stations, 14);
+  const auto in_part = ScopeSetup::of_record(record, {0.4, 3, std::nullopt});
+  EXPECT_EQ(in_part->figures().held_out_px, 3);
+  EXPECT_EQ(in_part->figures().hand_eye_stations, 14);
+  EXPECT_FALSE(ScopeSetup::of_record(record, {0.4, 3, 0.7})->figures().hand_eye_stations)
+      << "nobody says what the stated error rests on";
   EXPECT_EQ(scope->camera_covariance(), record.lens->covariance);
   record.lens->covariance.setZero();
   EXPECT_FALSE(ScopeSetup::of_record(record)->camera_covariance().has_value()) << "nobody has stated it";
@@ -87,10 +92,12 @@ TEST(ScopeSetup, CalibratedAtOneAngleOfTheRodHoldsAtThatOne) {
 TEST(ScopeSetup, AHandEyeWithoutPicturesHasNoFigureInPixels) {
   calibration::HandEyeResult found;
   found.held_out_mm = 0.7;
+  found.independent_stations = 12;
   const ScopeSetup scope = ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, found);
   EXPECT_FALSE(scope.figures().held_out_px.has_value());
   EXPECT_FALSE(scope.figures().camera_rms_px.has_value());
   EXPECT_EQ(scope.figures().held_out_mm, 0.7);
+  EXPECT_EQ(scope.figures().hand_eye_stations, 12);
 }
 
 TEST(ScopeSetup, OfFilesKnowsWhatIsStatedAndNamesWhatIsMissing) {

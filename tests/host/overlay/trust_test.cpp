@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "calibration/points/point_error.hpp"
@@ -75,6 +76,18 @@ TEST(ErrorBudget, HandEyeGrowsWithTheDistance) {
   covariance.bottomRightCorner<3, 3>().diagonal().setConstant(0.01);
   far.scope.hand_eye_covariance = covariance;
   EXPECT_NEAR(error_budget(kCamera, pose(), far)->hand_eye_mm, at_board_mm, 1e-12);
+}
+
+/// The 5 % quantiles of chi-square with two degrees of freedom a station, of printed tables.
+TEST(ErrorBudget, HandEyeOfFewStationsCountsForMore) {
+  const double estimate_mm = std::sqrt(1.5) * 0.5;
+  for (const auto& [stations, quantile] : {std::pair{3, 1.635}, {6, 5.226}, {20, 26.509}, {50, 77.929}}) {
+    TrustFigures known = figures();
+    known.scope.hand_eye_stations = stations;
+    EXPECT_NEAR(error_budget(kCamera, pose(), known)->hand_eye_mm, estimate_mm * std::sqrt(2 * stations / quantile),
+                3e-4)
+        << stations;
+  }
 }
 
 /// Held out at the board, a station's own pose is part of the error.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
@@ -117,6 +118,18 @@ TEST(VideoMotion, WhatMovesIsSeenAndHasToAgreeTwiceAsOftenAfter) {
   EXPECT_EQ(about.motion.state(), VideoAgreement::differs) << "half a second is not enough to believe it again";
   about.look(11.5, 20);
   EXPECT_EQ(about.motion.state(), VideoAgreement::agrees);
+}
+
+TEST(VideoMotion, IsInDoubtFromTheFirstPictureThatDoesNotAgree) {
+  LookingAbout about;
+  about.look(0, 10);
+  std::vector<VideoAgreement> states{about.motion.state()};
+  about.scene_moves = [](double t_s) { return Vector(Vector(4, 4, 0) * std::min(1.0, 3 * (t_s - 10))); };
+  for (int i = 0; i < 25; ++i) {
+    about.look(10 + 0.04 * i, 0.04);
+    if (about.motion.state() != states.back()) states.push_back(about.motion.state());
+  }
+  EXPECT_EQ(states, (std::vector{VideoAgreement::agrees, VideoAgreement::in_doubt, VideoAgreement::differs}));
 }
 
 /// A grabber hands its pictures on 20 ms late, and a scope moves fast.

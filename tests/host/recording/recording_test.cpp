@@ -132,6 +132,7 @@ TEST(Recording, IsOnTheDiskOnceItHasEnded) {
     const Scratch scratch;
     testing::forget_synced();
     record(scratch / "made/r", session(6), settings);
+    EXPECT_TRUE(is_synced(scratch.path())) << "both folders are new";
     EXPECT_TRUE(is_synced(scratch / "made")) << "or the folder is not there after a power cut";
     EXPECT_TRUE(is_synced(scratch / "made/r"));
     std::size_t files = 0;

@@ -1,0 +1,278 @@
+// The workflow of the live window without a window: fed with events as an appliance sends them. An operation that is
+// taken up from an earlier window's folder.
+#include <gtest/gtest.h>
+
+#include "calibration/hand_eye/hand_eye_calibration.hpp"
+#include "calibration/points/point_error.hpp"
+#include "drivers/system/wait.hpp"
+#include "host/operation/operation.hpp"
+#include "tests/host/operation/live_workflow_fixture.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::connect;
+using birdseye::testing::connect_and_calibrate;
+using birdseye::testing::ct_with_markers;
+using birdseye::testing::give_record;
+using birdseye::testing::Hand;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kTrackerFromPatient;
+using birdseye::testing::load;
+using birdseye::testing::looking_at;
+using birdseye::testing::operation_settings;
+using birdseye::testing::register_into;
+using birdseye::testing::registered_operation;
+using birdseye::testing::resumed;
+using birdseye::testing::Scratch;
+using birdseye::testing::square;
+
+TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
+  const Scratch scratch;
+  const LiveSettings again = resumed(scratch, scratch.path());
+  Operation kept = registered_operation(again);
+  // All of the small CT has moved by 4 mm towards the left: what is seen at p was at p + u(p).
+  DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  LiveWorkflow workflow(again);
+  connect(workflow);
+  load(workflow);
+  ASSERT_EQ(workflow.view().fault, "");
+  give_record(workflow);
+  workflow.primary(HostTime{0});
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  workflow.take(looking_at(workflow, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
+  workflow.draw();
+  const auto mark = workflow.view().target;
+  ASSERT_TRUE(mark.has_value());
+  const CameraModel& camera = workflow.picture().setup()->camera();
+  EXPECT_LT((mark->at_px - Eigen::Vector2d(camera.cx_px, camera.cy_px)).norm(), 0.1);
+  EXPECT_TRUE(mark->error.motion.has_value());
+  EXPECT_NEAR(workflow.view().target_moved_mm.value_or(-1), 4, 1e-3);
+  ASSERT_TRUE(workflow.view().expected.has_value());
+  EXPECT_EQ(workflow.view().expected->motion->rms_mm, 0.7);
+  const double fiducials_mm =
+      calibration::TargetError(kFiducials, calibration::localisation_error_of(0.3, 4).upper95_mm).rms_mm({30, 30, 20});
+  const double rigid_mm = std::sqrt((fiducials_mm * fiducials_mm + 1.5 * square(1.23 * 0.5)) * 5.99 / 3);
+  EXPECT_NEAR(mark->error.radius95_mm(), std::hypot(rigid_mm, 1.2), 1e-3);
+  Hand hand(workflow);
+  hand.rest_at({34, 30, 21}, 30);
+  const auto reading = workflow.view().check;
+  ASSERT_TRUE(reading.has_value());
+  EXPECT_EQ(reading->nearest, "tumour");
+  EXPECT_NEAR(reading->distance_mm, 1, 0.1);
+  // By another registration the deformation means nothing.
+  workflow.go_to(LiveStep::fiducials);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_TRUE(workflow.picture().setup().has_value()) << workflow.view().registration_fault;
+  EXPECT_FALSE(workflow.view().deformed != nullptr);
+  EXPECT_FALSE(workflow.view().note(LiveStep::deform).done);
+}
+
+TEST(LiveWorkflow, ACtWhoseGeometryIsStatedOtherwiseIsNotTakenUp) {
+  const Scratch scratch;
+  LiveSettings settings = operation_settings(scratch);
+  settings.patient.ct = scratch.file(
+      "ct.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 60 60 60\nendian: little\nencoding: raw\n\n" +
+                     std::string(std::size_t{2} * 60 * 60 * 60, '\0'));
+  settings.patient.ct.stated = {Eigen::Vector3d(2, 2, 2.5), "LPS"};
+  register_into(scratch.path(), settings);
+  const auto kept = read_operation(scratch.path());
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_EQ(kept->ct_stated.spacing_mm, Eigen::Vector3d(2, 2, 2.5));
+  EXPECT_EQ(kept->ct_stated.orientation, "LPS");
+  settings.resume = scratch.path();
+  for (const StatedGeometry& other :
+       {StatedGeometry{Eigen::Vector3d(2, 2, 2), "LPS"}, StatedGeometry{Eigen::Vector3d(2, 2, 2.5), "PLS"}}) {
+    settings.patient.ct.stated = other;
+    LiveWorkflow workflow(settings);
+    load(workflow);
+    for (const char* said : {"is of another CT, or of this one with its voxels elsewhere", "give that CT",
+                             "stated then: --spacing 2,2,2.5 --orientation LPS"})
+      EXPECT_NE(workflow.view().fault.find(said), std::string::npos) << workflow.view().fault;
+    EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).done);
+  }
+  settings.patient.ct.stated = kept->ct_stated;
+  LiveWorkflow workflow(settings);
+  connect(workflow);
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+  EXPECT_EQ(workflow.view().patient->notes.size(), 2U) << "that a person stated both is said again";
+}
+
+TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  connect(workflow);
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+  EXPECT_EQ(workflow.view().step, LiveStep::check);  // not the run: the patient may have been moved
+  EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).holds()) << "nobody has looked yet";
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "without the scope's record there is no overlay";
+  give_record(workflow);
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "nor before somebody has looked whether it still holds";
+  workflow.go_on();
+  EXPECT_FALSE(workflow.picture().setup().has_value()) << "to skip the look is not to have looked";
+  workflow.go_to(LiveStep::check);
+  workflow.primary(HostTime{0});
+  ASSERT_TRUE(workflow.picture().setup().has_value());
+  const auto& found = workflow.picture().setup()->tracker_from_patient();
+  EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
+}
+
+TEST(LiveWorkflow, WhatIsToBeTakenUpIsNotWrittenOverBefore) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch, true);
+  const std::string kept = birdseye::testing::contents_of(scratch / "operation.json");
+  LiveSettings settings = resumed(scratch, scratch.path());
+  settings.out = scratch.path();
+  settings.patient.ct = ct_with_markers(scratch);
+  settings.patient.fiducials.clear();  // looked for, which takes its time
+  LiveWorkflow workflow(settings);
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  hand.rest_at({0, 0, 40}, 80);  // by mistake
+  hand.rest_at({0, 0, 200}, 1);
+  load(workflow);
+  hand.rest_at({0, 0, 80}, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  ASSERT_EQ(workflow.view().touches.size(), 2U);
+  EXPECT_EQ(birdseye::testing::contents_of(scratch / "operation.json"), kept);
+  for (int i = 0; i < 1000 && !workflow.view().markers_seen; ++i) {
+    sleep_for(Duration::from_ms(10));
+    workflow.tick();
+  }
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done) << workflow.view().note(LiveStep::fiducials).line;
+  EXPECT_EQ(workflow.view().step, LiveStep::check);
+  EXPECT_TRUE(workflow.view().touches.empty());
+}
+
+TEST(LiveWorkflow, AnotherPatientsRegistrationIsNotTakenUp) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  LiveSettings wrong = resumed(scratch, scratch.path());
+  wrong.out = scratch.path();
+  birdseye::testing::ct_of_tissue(scratch, 25);  // in the first one's place
+  LiveWorkflow workflow(wrong);
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("is of another CT"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().note(LiveStep::fiducials).done);
+  // Nor is it lost by what is touched then.
+  const std::string kept = birdseye::testing::contents_of(scratch / "patient_from_tracker.txt");
+  connect_and_calibrate(workflow);
+  Hand hand(workflow);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+  EXPECT_EQ(birdseye::testing::contents_of(scratch / "patient_from_tracker.txt"), kept);
+}
+
+/// The scope's calibration in an operation that was kept, and the appliance's record, made before or after it.
+TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
+  const Scratch scratch;
+  for (const bool record_is_newer : {false, true}) {
+    const LiveSettings again = resumed(scratch, scratch.path());
+    Operation kept = registered_operation(again);
+    calibration::HandEyeResult found;
+    found.held_out_px = 1;
+    // The record's is 09:30.
+    kept.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found),
+                       record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z",
+                       true,
+                       {birdseye::testing::kTracker, birdseye::testing::kCamera, 0}};
+    ASSERT_TRUE(write_operation(scratch.path(), kept));
+    LiveWorkflow workflow(again);
+    connect(workflow);
+    load(workflow);
+    ASSERT_EQ(workflow.view().fault, "");
+    give_record(workflow);
+    workflow.primary(HostTime{0});
+    ASSERT_TRUE(workflow.picture().setup().has_value());
+    EXPECT_EQ(workflow.picture().setup()->camera().fx_px == 500, !record_is_newer);
+  }
+}
+
+TEST(LiveWorkflow, ATouchThatWasTakenBackIsNotTakenUp) {
+  const Scratch scratch;
+  {
+    LiveSettings kept = operation_settings(scratch);
+    kept.out = scratch.path();
+    LiveWorkflow workflow(kept);
+    load(workflow);
+    connect_and_calibrate(workflow);
+    Hand hand(workflow);
+    for (std::size_t i = 0; i < 3; ++i) hand.rest_at(kFiducials[i], 80);
+    hand.rest_at({0, 0, 200}, 1);
+    ASSERT_TRUE(workflow.view().fre_mm.has_value());
+    workflow.undo();
+  }
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  load(workflow);
+  EXPECT_EQ(workflow.view().fault, "");
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+}
+
+TEST(LiveWorkflow, ADamagedOperationIsNamed) {
+  const Scratch scratch;
+  register_into(scratch.path(), scratch);
+  const std::string whole = birdseye::testing::contents_of(scratch / "operation.json");
+  (void)scratch.file("operation.json", whole.substr(0, whole.size() / 3));
+  LiveWorkflow workflow(resumed(scratch, scratch.path()));
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("operation.json"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+}
+
+/// Found by a record that the appliance sent: whether it sends the same again decides.
+TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
+  const Scratch scratch;
+  const auto record = birdseye::testing::example_record(768, 576, {}, {});
+  auto other = record;
+  other.hand_eye->camera_from_sensor = Transform<Camera, Sensor>(Eigen::Matrix3d::Identity(), {0, 0, 250});
+  Operation kept = registered_operation(operation_settings(scratch));
+  kept.calibrated = {*ScopeSetup::of_record(record), record.hand_eye->provenance.made_utc, false};
+  DisplacementField field;
+  field.size = {2, 2, 2};
+  field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
+  field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
+  kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
+  for (const bool same : {true, false}) {
+    for (const bool record_comes_first : {true, false}) {
+      ASSERT_TRUE(write_operation(scratch.path(), kept));
+      LiveWorkflow workflow(resumed(scratch, scratch.path()));
+      connect(workflow);
+      if (record_comes_first) give_record(workflow, same ? record : other);
+      load(workflow);
+      ASSERT_EQ(workflow.view().fault, "");
+      if (!record_comes_first) give_record(workflow, same ? record : other);
+      EXPECT_TRUE(workflow.view().note(LiveStep::fiducials).done);
+      EXPECT_EQ(workflow.view().deformed != nullptr, same) << record_comes_first;
+    }
+  }
+}
+
+TEST(LiveWorkflow, AnOperationOfOtherLabelsIsNotTakenUp) {
+  const Scratch scratch;
+  Operation kept = registered_operation(operation_settings(scratch));
+  kept.labels_sha256 = "of labels that were shown";
+  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  LiveSettings settings = resumed(scratch, scratch.path());
+  settings.patient.labels = settings.patient.ct.path;  // on its grid
+  settings.patient.organ = {"200"};
+  LiveWorkflow workflow(settings);
+  load(workflow);
+  EXPECT_NE(workflow.view().fault.find("is of other labels"), std::string::npos) << workflow.view().fault;
+  EXPECT_FALSE(workflow.view().fre_mm.has_value());
+}
+
+}  // namespace
+}  // namespace birdseye::host
