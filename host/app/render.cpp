@@ -20,6 +20,7 @@
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
+#include "host/texts/texts.hpp"
 #include "host/window/show_scene.hpp"
 #include "host/window/window.hpp"
 
@@ -201,7 +202,7 @@ Result<void> write_still(const RenderOptions& options, const RenderScene& scene,
       {"render_ms", ms},
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
-      {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
+      {"reasons", {seen ? words("verdict_in_view") : words("verdict_not_in_view")}}};
   const std::string png =
       options.over.empty() ? transparent_png_of(image) : png_of(RgbView{painted.rgb, image.width_px, image.height_px});
   if (!options.movie.empty()) {

@@ -69,6 +69,11 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
      "Space: start a simulated patient. E: how to give what is missing. Q: close. L: light or dark room. F1: these "
      "keys."},
 
+    // The window itself, and what covers it where it stands still
+    {"window_title", "Birdseye - research, not for use on patients"},
+    {"stall_not_live", "NOT LIVE"},
+    {"stall_look", "the window stands still: look at the scope's own screen"},
+
     // The patient
     {"patient_name", "{}"},
     {"patient_id", "ID {}"},
@@ -180,6 +185,20 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"guide_so_far", "hand-eye so far: held-out {:.2f} mm, verdict {}"},
     {"guide_most_stations", "{} stations, the most that were asked for"},
     {"guide_passes", "the verdict is pass with {} stations"},
+    {"guide_by_hand", "ended by hand"},
+    {"guide_time_over", "{:g} s are over"},
+    {"guide_recording_ended", "the recording has ended"},
+    {"guide_stations", "{} stations; {}"},
+    {"guide_next", "{} stations; {}; next: {}"},
+    {"guide_next_unseen", "{} stations; {}; the pattern is not seen now; next: {}"},
+    {"guide_few_poses", "not taken: the tracker gave too few poses while the scope was still"},
+    {"guide_not_taken", "not taken: {}; all of the pattern has to be in the picture, sharp and evenly lit"},
+    {"guide_left_out", "{} frames were left out: no poses of \"{}\" came for them in time"},
+    {"guide_size_changed", "frames changed from {} x {} to {} x {}: calibrate at one size"},
+    {"guide_more_views", "the lens wants more views"},
+    {"guide_of_lens", "lens: {}"},
+    {"guide_no_lens_found", "no lens was found: {}"},
+    {"guide_no_lens_do", "hold the scope still at more stations, tilted another way at each"},
     {"guide_working_out", "{}; the last solution is being worked out"},
 
     // Fiducials
@@ -313,6 +332,16 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_folds", "what explains the views folds the organ: keep other views, or go on without"},
     {"note_undone", "undone: the CT is shown as it was taken"},
     {"note_matching", "matching"},
+    {"note_not_matched", "the views were not matched: {}"},
+    {"note_patches_none", "{}; of {} touched patches none is thought wrong"},
+    {"note_patches_one", "{}; of {} touched patches 1 is thought wrong"},
+    {"note_patches_some", "{}; of {} touched patches {} are thought wrong"},
+    {"view_name", "view {}"},
+    {"note_verdict_fail", "the verdict is fail"},
+    {"note_verdict_fail_why", "the verdict is fail; {}"},
+    {"note_by_board", "{}: {} stations, held-out {:.2f} mm"},
+    {"note_reading_ct", "reading the CT"},
+    {"note_no_transfer", "there is no transfer function to draw the CT by"},
     {"note_over_board", "hold the scope over the board"},
     {"note_record_of", "by the scope's record of {}"},
     {"note_kept_unknown", "what was kept does not say how far hand-eye is off: calibrate anew"},
@@ -351,6 +380,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_places_touched", "{} places touched"},
     {"note_tried_again", "{}; it is tried again every second"},
     {"note_connecting", "connecting to {}"},
+    {"simulated_cart", "the simulated cart"},
+    {"note_more", "and {} more"},
     {"note_connected", "connected to {}"},
     {"note_playing", "playing {}"},
 
@@ -383,6 +414,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"check_unknown_hand_eye", "how far hand-eye is off in mm is not known"},
     {"check_broke_off", "the check broke off: {}"},
     {"why_stopped", "the video has stopped, {:.1f} s ago"},
+    {"why_stopped_now", "the video has stopped"},
     {"why_old_picture", "the picture is {:.0f} ms old"},
     {"why_old_pose", "the newest pose is {:.0f} ms old"},
     {"why_stamp_ahead", "the frames' stamps lie {:.0f} ms ahead of the clock: how old they are is not known"},
@@ -392,6 +424,10 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_calibration_held", "the calibration is not used: {}"},
     {"why_registration_held", "the registration is not used: {}"},
     {"why_other_size", "the video is {} x {} and the camera was calibrated at {} x {}"},
+    {"why_unproven", "nothing tells whether {} is of the recording's {}"},
+    {"why_withdrawn", "the appliance withdrew its calibration record"},
+    {"why_withdrawn_for", "the appliance withdrew its calibration record: {}"},
+    {"why_other_record", "the recording has another calibration record than the operation was calibrated by"},
     {"doubt_fit", "the touches fit poorly"},
     {"why_no_pointer", "the pointer is not seen: hold its tip to a fiducial"},
     {"why_unregistered", "the patient is not registered yet"},
@@ -450,6 +486,17 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"banner_recording", "RECORDING, not live - {}"},
     {"target_error", "±{:.1f} mm"},
     {"target_error_unmoved", "if it has not moved since the CT: ±{:.1f} mm"},
+
+    // What is said of an operation, a picture or a file that was written
+    {"verdict_no_overlay", "no overlay was reached"},
+    {"verdict_no_frame", "no frame bore an overlay"},
+    {"verdict_frames_before",
+     "no frame bore an overlay after the CT was last deformed, undone or read; {} frames bore one before"},
+    {"verdict_tumour", "the tumour's centre is within {:.2f} mm in 95 % of {} frames"},
+    {"verdict_in_view", "the volume is in view"},
+    {"verdict_not_in_view", "nothing of the volume is seen: look at --transfer and --pose"},
+    {"verdict_files", "the files, read back by ITK, take places from where they should by"},
+    {"verdict_files_do", "report this with the files"},
 
     // The strip
     {"ages", "Exposure to screen, ms: p50 {:.0f}, p95 {:.0f}, max {:.0f}"},

@@ -308,7 +308,7 @@ TEST(ReplayCommand, FramesOfAnotherSizeBearNoOverlay) {
   const Replayed done = replay(scratch, "r", "--registration " + scratch.file("reg.txt", kIdentityPose));
   EXPECT_EQ(done.figures["frames_overlaid"], 0);
   EXPECT_EQ(done.figures["verdict"], "fail");
-  EXPECT_EQ(done.reasons[0], "the video is 64x48; the camera was calibrated at 128x48");
+  EXPECT_EQ(done.reasons[0], "the video is 64 x 48 and the camera was calibrated at 128 x 48");
   EXPECT_NE(done.output.find("8 of 8 frames are of another size"), std::string::npos) << done.output;
 }
 
