@@ -110,7 +110,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
   const auto& before = found_ ? found_ : held_back_ ? held_back_ : former_;
   if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
-  CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}};
+  CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
   take(std::move(adopted), words("note_record_of", made_utc));
   former_.reset();

@@ -341,6 +341,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->shown = shown;
     parts->shown.rgb = nullptr;
     if (operation_.frozen) parts->shown.reason = "frozen";
+    parts->taken_with = workflow_.taken_with();
     parts->setup = picture.setup();
     parts->camera_from_patient = picture.camera_from_patient();
     parts->look = picture.look();
