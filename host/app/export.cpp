@@ -19,6 +19,7 @@
 #include "host/operation/identity_json.hpp"
 #include "host/operation/operation.hpp"
 #include "host/overlay/ct_sha256.hpp"
+#include "host/texts/texts.hpp"
 #include "host/volume/image_file.hpp"
 #include "host/volume/import.hpp"
 
@@ -221,8 +222,7 @@ Result<ExitCode> run(const ExportOptions& options) {
     files["ct.nrrd"] = "the CT as it is seen: no transform is to be applied to it";
   }
   Verdict verdict;
-  verdict.judge("the files, read back by ITK, take places from where they should by", worst_mm, "mm", 1e-3, 1e-3,
-                "report this with the files");
+  verdict.judge(words("verdict_files"), worst_mm, "mm", 1e-3, 1e-3, words("verdict_files_do"));
   nlohmann::json json = {{"frame", options.frame},
                          {"files", files},
                          {"difference_mm_max", worst_mm},

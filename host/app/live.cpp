@@ -86,7 +86,7 @@ Result<void> prepare_window(LiveOptions& options) {
       window.height_px < 480) {
     return Error{Errc::bad_value, fmt::format("--size: \"{}\" is no size of at least 640x480", options.size)};
   }
-  window.title = "Birdseye - research, not for use on patients";
+  window.title = words("window_title");
   window.layout = layout_file();
   return {};
 }
@@ -181,7 +181,7 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
   const OperationView operation = app.operation();
   const auto& setup = app.setup();
   if (!setup || !operation.patient || operation.patient->landmarks.empty()) {
-    verdict.add(Grade::fail, "no overlay was reached");
+    verdict.add(Grade::fail, words("verdict_no_overlay"));
     return {};
   }
   const Eigen::Vector3d tumour_mm = operation.patient->landmarks.front().place_mm;
@@ -208,7 +208,7 @@ Result<void> judge(const LiveOptions& options, const LiveApp& app, nlohmann::jso
   verdict.add(p95_mm <= kTargetLimits.pass_mm       ? Grade::pass
               : p95_mm <= kTargetLimits.marginal_mm ? Grade::marginal
                                                     : Grade::fail,
-              fmt::format("the tumour's centre is within {:.2f} mm in 95 % of {} frames", p95_mm, errors.mm.size()));
+              words("verdict_tumour", p95_mm, errors.mm.size()));
   return {};
 }
 

@@ -16,10 +16,13 @@
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/operation.hpp"
+#include "host/operation/replay_hardware.hpp"
+#include "host/operation/snapshot.hpp"
 #include "host/overlay/margins.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/overlay/undistortion.hpp"
 #include "host/render/engine.hpp"
+#include "host/texts/texts.hpp"
 #include "host/window/show_scene.hpp"
 #include "host/window/window.hpp"
 
@@ -91,17 +94,35 @@ Result<Picture> behind_of(const CameraModel& camera, const std::filesystem::path
   return picture;
 }
 
-/// A picture does not tell which camera took it: whoever gives one to be drawn over answers for it, and is told for
-/// what.
-void tell_unproven(const RenderOptions& options, const Operation& operation) {
+/// What the operation was calibrated with, and the picture taken with: as replay asks it of a recording. What nothing
+/// tells, whoever gives the picture answers for, and is told for what.
+Result<void> check_taken_with(const RenderOptions& options, const Operation& operation) {
+  const CalibratedScope& calibrated = *operation.calibrated;
+  const auto told = read_taken_with(options.over);
+  if (!told) return told.error();
+  const std::string of = "the operation's calibration";
+  const ReplayHardware hardware({{of, calibrated.found_with, DependsOn::tracker_and_camera, ""}},
+                                {told->tracker, told->camera}, false);
+  const bool scope_told = !calibrated.scope_name.empty() && !told->scope.empty();
+  std::string why = hardware.why_not();
+  if (why.empty() && scope_told)
+    why = calibration::misfit("scope", {{"name", calibrated.scope_name}}, {{"name", told->scope}}, of);
+  if (!why.empty()) {
+    return Error{
+        Errc::bad_value,
+        fmt::format("--over {}: {}; give the operation that was done with what took this picture (--operation)",
+                    options.over.string(), why)};
+  }
+  if (hardware.unproven().empty() && scope_told) return {};
   std::string camera;
-  for (const auto& [name, value] : operation.calibrated->found_with.camera)
+  for (const auto& [name, value] : calibrated.found_with.camera)
     camera += fmt::format("{}{} {}", camera.empty() ? " (" : ", ", name, value);
   if (!camera.empty()) camera += ")";
   fmt::print(
       "nothing tells whether {} was taken with the operation's scope and camera{}, and with --pose: that is as you "
       "say\n",
       options.over.string(), camera);
+  return {};
 }
 
 /// Where lines are to be shown straight: the picture behind resampled, and a lens to draw with that bends none.
@@ -137,8 +158,9 @@ Result<RenderScene> scene_of(const RenderOptions& options) {
   auto behind = behind_of(scene.camera, options.over);
   if (!behind) return behind.error();
   scene.behind = *std::move(behind);
-  if (operation && operation->calibrated && options.camera.empty() && !options.over.empty())
-    tell_unproven(options, *operation);
+  if (operation && operation->calibrated && options.camera.empty() && !options.over.empty()) {
+    if (auto fits = check_taken_with(options, *operation); !fits) return fits.error();
+  }
   straighten(scene, options.display);
   scene.settings.step_mm = options.step_mm;
   if (!options.clip_plane.empty()) {
@@ -201,7 +223,7 @@ Result<void> write_still(const RenderOptions& options, const RenderScene& scene,
       {"render_ms", ms},
       {"coverage", coverage},
       {"verdict", seen ? "pass" : "marginal"},
-      {"reasons", {seen ? "the volume is in view" : "nothing of the volume is seen: look at --transfer and --pose"}}};
+      {"reasons", {seen ? words("verdict_in_view") : words("verdict_not_in_view")}}};
   const std::string png =
       options.over.empty() ? transparent_png_of(image) : png_of(RgbView{painted.rgb, image.width_px, image.height_px});
   if (!options.movie.empty()) {

@@ -24,6 +24,9 @@ struct Check {
   CheckState state = CheckState::not_known;
   std::string found;
   std::string remedy;  ///< empty where nothing is to be done
+  /// What the people in the operating room read instead: how it stands and what they do. Empty where no window shows
+  /// it.
+  std::string in_the_room = {};
 };
 
 bool any_bad(const std::vector<Check>& checks);

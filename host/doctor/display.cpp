@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "drivers/system/thread.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -25,12 +26,13 @@ bool draws_in_software(std::string renderer) {
 }
 
 Check check_size(const DisplayFacts& facts) {
-  Check check{kDisplay, "screen", CheckState::not_known, "its size is not told", ""};
+  Check check{kDisplay, "screen", CheckState::not_known, "its size is not told", "", words("first_screen_unknown")};
   if (facts.width_px < 1 || facts.height_px < 1) return check;
   const double scale = std::max(1.0, facts.scale);
   check.found = fmt::format("{}x{}, text at {:g} of the usual size", facts.width_px, facts.height_px, scale);
   const bool fits = facts.width_px >= kWidthPx * scale && facts.height_px >= kHeightPx * scale;
   check.state = fits ? CheckState::good : CheckState::could_be_better;
+  check.in_the_room = fits ? words("first_screen_good") : words("first_screen_small");
   if (!fits) {
     check.remedy = fmt::format(
         "the window takes {}x{} here: take a larger screen, or start live with --scale 1 and a "
@@ -70,10 +72,12 @@ std::vector<Check> display_checks(const DisplayFacts& facts) {
              "start this at the machine's own screen; over ssh set DISPLAY=:0, and on a machine without a screen use "
              "xvfb-run"}};
   }
-  std::vector<Check> checks{{kDisplay, "window", CheckState::good, fmt::format("OpenGL {}", facts.opengl), ""}};
-  Check drawn{kDisplay, "graphics", CheckState::good, facts.renderer, ""};
+  const std::string& good = words("first_screen_good");
+  std::vector<Check> checks{{kDisplay, "window", CheckState::good, fmt::format("OpenGL {}", facts.opengl), "", good}};
+  Check drawn{kDisplay, "graphics", CheckState::good, facts.renderer, "", good};
   if (draws_in_software(facts.renderer)) {
     drawn.state = CheckState::could_be_better;
+    drawn.in_the_room = words("first_screen_slow");
     drawn.found = fmt::format("the processor draws, by {}", facts.renderer);
     drawn.remedy = "if there is a graphics card, install its driver; without one it works, and --engine gl is slow";
   }

@@ -18,7 +18,7 @@ struct FirstRun {
 };
 
 /// What the window needs, one thing each and in the order in which a person would see to it: what was named, and where
-/// it was not, what of it this machine has.
+/// it was not, what of it this machine has. Names and what the people in the room read are the window's texts.
 std::vector<Question> first_run_questions(const Machine& machine, const FirstRun& given);
 
 /// The display's row: the worst of its checks, in sentences.

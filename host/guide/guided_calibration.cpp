@@ -3,6 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include "host/texts/texts.hpp"
+
 namespace birdseye::host {
 
 void find_lens(GuidedStations& stations, const calibration::CameraCalibrationSettings& settings) {
@@ -22,8 +24,7 @@ Result<GuidedCalibration> calibrate_guided(GuidedStations stations) {
   GuidedCalibration out;
   out.stations = std::move(stations);
   if (!out.stations.input.camera) {
-    out.verdict.add(Grade::fail, "no lens was found: " + out.stations.lens_fault,
-                    "hold the scope still at more stations, tilted another way at each");
+    out.verdict.add(Grade::fail, words("guide_no_lens_found", out.stations.lens_fault), words("guide_no_lens_do"));
     return out;
   }
   auto solved = calibration::calibrate_hand_eye(out.stations.input);
@@ -32,7 +33,7 @@ Result<GuidedCalibration> calibrate_guided(GuidedStations stations) {
   out.verdict = calibration::judge(out.hand_eye);
   if (const auto& lens = out.stations.lens) {
     const Verdict of_lens = calibration::judge_camera(*lens);
-    for (const std::string& reason : of_lens.reasons) out.verdict.add(of_lens.grade, "lens: " + reason);
+    for (const std::string& reason : of_lens.reasons) out.verdict.add(of_lens.grade, words("guide_of_lens", reason));
   }
   return out;
 }

@@ -70,8 +70,8 @@ Result<void> HandEyeGuide::take(const wire::Event& event) {
 
 Result<void> HandEyeGuide::take_frame(const wire::VideoFrame& frame) {
   if (session_.width_px != 0 && (frame.width_px != session_.width_px || frame.height_px != session_.height_px)) {
-    return Error{Errc::bad_value, fmt::format("frames changed from {} x {} to {} x {}: calibrate at one size",
-                                              session_.width_px, session_.height_px, frame.width_px, frame.height_px)};
+    return Error{Errc::bad_value,
+                 words("guide_size_changed", session_.width_px, session_.height_px, frame.width_px, frame.height_px)};
   }
   session_.width_px = frame.width_px;
   session_.height_px = frame.height_px;
@@ -148,7 +148,7 @@ void HandEyeGuide::solve() {
   Verdict verdict = calibration::judge(*result);
   if (session_.lens) {
     const Grade lens = calibration::judge_camera(*session_.lens).grade;
-    verdict.add(lens, lens == Grade::pass ? "" : "the lens wants more views");
+    verdict.add(lens, lens == Grade::pass ? "" : words("guide_more_views"));
   }
   state_.grade = verdict.grade;
   if (result->solved) state_.held_out_mm = result->held_out_mm;
@@ -170,7 +170,7 @@ void HandEyeGuide::look() {
   if (stations_.rests().deciding() || session_.width_px == 0) return;
   if (!session_.input.camera) {
     state_.next = words("guide_any_tilt");
-    tell_.now(fmt::format("{} stations; {}", session_.input.stations.size(), state_.next));
+    tell_.now(words("guide_stations", session_.input.stations.size(), state_.next));
     return;
   }
   std::vector<calibration::Station> stations;
@@ -183,8 +183,9 @@ void HandEyeGuide::look() {
   state_.next = words_of(
       calibration::next_best_pose(stations, *session_.input.camera, extent_mm_, seen ? pose_of(*seen) : std::nullopt));
   state_.coverage = calibration::coverage_of(stations, session_.width_px, session_.height_px);
-  tell_.now(fmt::format("{} stations; {}; {}next: {}", stations.size(), coverage_line(state_.coverage),
-                        seen ? "" : "the pattern is not seen now; ", state_.next));
+  const std::string covered = coverage_line(state_.coverage);
+  tell_.now(seen ? words("guide_next", stations.size(), covered, state_.next)
+                 : words("guide_next_unseen", stations.size(), covered, state_.next));
 }
 
 }  // namespace birdseye::host

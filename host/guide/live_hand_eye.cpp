@@ -9,6 +9,7 @@
 #include "drivers/system/interrupt.hpp"
 #include "host/link/appliance_link.hpp"
 #include "host/link/event_stream.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -75,7 +76,7 @@ Result<GuidedStations> lead(const LivePlan& plan, EventStream& stream, Progress&
     }
     if (const auto heard = silence.check(); !heard) return heard.error();
     if (interrupted()) guide.end("interrupted");
-    if (host_now() > ends) guide.end(fmt::format("{:g} s are over", plan.seconds));
+    if (host_now() > ends) guide.end(words("guide_time_over", plan.seconds));
   }
   // What comes while the solver works is of no use to it.
   if (const std::string words = stream.drops().words(); !words.empty()) progress.keep(words);
@@ -113,7 +114,7 @@ Result<GuidedStations> stations_of_recording(EventSource& recording, const Guide
     const auto event = recording.next(Deadline::after(kStationSilence));
     if (!event && event.error().code != Errc::disconnected) return event.error();
     if (!event) {
-      guide.end("the recording has ended");
+      guide.end(words("guide_recording_ended"));
     } else if (*event) {
       if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
         for (const wire::Bird& bird : birds->birds) ++poses[bird.name];

@@ -1,8 +1,8 @@
 #include "host/guide/live_rests.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
+
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -79,7 +79,7 @@ void LiveRests::finish_rest() {
   if (rest_->last - rest_->first < kLeast) return;
   const auto pose = still_.rest_between(rest_->first, rest_->last);
   if (!pose) {
-    remark_ = "not taken: the tracker gave too few poses while the scope was still";
+    remark_ = words("guide_few_poses");
     return;
   }
   taken_.push_back({frames[frames.size() / 2], pose->tracker_from_sensor});
@@ -98,7 +98,7 @@ std::string LiveRests::take_remark() {
 
 std::string LiveRests::left_out_words() const {
   if (left_out_ == 0) return {};
-  return fmt::format("{} frames were left out: no poses of \"{}\" came for them in time", left_out_, bird_);
+  return words("guide_left_out", left_out_, bird_);
 }
 
 }  // namespace birdseye::host

@@ -6,6 +6,7 @@
 
 #include "calibration/detect/detect.hpp"
 #include "host/files/picture.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -33,7 +34,7 @@ void LiveStations::look_at_rests() {
   while (auto rest = rests_.take()) {
     calibration::Detection found = find(pattern_, rest->frame, fmt::format("station {}", taken_ + 1));
     if (!found.view) {
-      remark_ = "not taken: " + found.rejected + "; all of the pattern has to be in the picture, sharp and evenly lit";
+      remark_ = words("guide_not_taken", found.rejected);
       continue;
     }
     ++taken_;

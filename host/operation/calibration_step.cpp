@@ -1,10 +1,9 @@
 #include "host/operation/calibration_step.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "drivers/system/clock.hpp"
+#include "host/guide/guide_words.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -34,7 +33,7 @@ void CalibrationStep::begin(const std::string& bird, const std::optional<calibra
 }
 
 void CalibrationStep::end() {
-  guide_.end("ended by hand");
+  guide_.end(words("guide_by_hand"));
 }
 
 void CalibrationStep::push(const wire::Event& event) {
@@ -100,8 +99,8 @@ bool CalibrationStep::finish(const Result<GuidedCalibration>& guided) {
     note_.line = scope.error().what;
     return false;
   }
-  take(*std::move(scope), fmt::format("{}: {} stations, held-out {:.2f} mm", name_of(guided->verdict.grade),
-                                      guided->stations.input.stations.size(), guided->hand_eye.held_out_mm));
+  take(*std::move(scope), words("note_by_board", words_of(guided->verdict.grade),
+                                guided->stations.input.stations.size(), guided->hand_eye.held_out_mm));
   return true;
 }
 
@@ -111,7 +110,7 @@ CalibrationStep::Adopted CalibrationStep::adopt(const calibration::CalibrationRe
   const std::string& made_utc = record.hand_eye->provenance.made_utc;
   const auto& before = found_ ? found_ : held_back_ ? held_back_ : former_;
   if (before && before->by_board && made_utc <= before->made_utc) return Adopted::no;
-  CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}};
+  CalibratedScope adopted{*std::move(scope), made_utc, false, {record.tracker, record.camera}, record.scope};
   const bool anew = before && !is_same(*before, adopted);
   take(std::move(adopted), words("note_record_of", made_utc));
   former_.reset();

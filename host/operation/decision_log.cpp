@@ -9,6 +9,7 @@
 
 #include "drivers/system/durable.hpp"
 #include "host/simulated/simulated_truth.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -174,9 +175,8 @@ Result<std::map<std::uint64_t, LoggedErrors>> logged_target_errors(
 std::string why_not_judged(const std::map<std::uint64_t, LoggedErrors>& errors_by_shape) {
   std::size_t frames = 0;
   for (const auto& [shape, errors] : errors_by_shape) frames += errors.mm.size();
-  if (frames == 0) return "no frame bore an overlay";
-  return fmt::format(
-      "no frame bore an overlay after the CT was last deformed, undone or read; {} frames bore one before", frames);
+  if (frames == 0) return words("verdict_no_frame");
+  return words("verdict_frames_before", frames);
 }
 
 }  // namespace birdseye::host

@@ -1,6 +1,5 @@
 #include "host/operation/deformation_step.hpp"
 
-#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -22,7 +21,7 @@ constexpr std::size_t kFewestViews = 2, kFewestBesideTouches = 1;
 
 Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::size_t number) {
   VideoView view;
-  view.name = fmt::format("view {}", number);
+  view.name = words("view_name", number);
   view.camera = camera;
   view.camera_from_patient = kept.camera_from_patient;
   const wire::VideoFrame& frame = kept.frame;
@@ -35,13 +34,14 @@ Result<VideoView> view_of(const KeptView& kept, const CameraModel& camera, std::
   return view;
 }
 
-/// How the touches fit, to come after what is said of the deformation; empty: there are none.
-std::string words_of(const std::vector<PlaceFit>& touches) {
-  if (touches.empty()) return {};
+/// What is said of the deformation, and after it how the touches fit, where there are any.
+std::string with_touches(const std::string& said, const std::vector<PlaceFit>& touches) {
+  if (touches.empty()) return said;
   const auto wrong =
       std::count_if(touches.begin(), touches.end(), [](const PlaceFit& fit) { return fit.thought_wrong(); });
-  const std::string how_many = wrong == 0 ? "none is" : wrong == 1 ? "1 is" : fmt::format("{} are", wrong);
-  return fmt::format("; of {} touched patches {} thought wrong", touches.size(), how_many);
+  if (wrong == 0) return words("note_patches_none", said, touches.size());
+  if (wrong == 1) return words("note_patches_one", said, touches.size());
+  return words("note_patches_some", said, touches.size(), wrong);
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ void DeformationStep::begin(std::span<const KeptView> kept, const CameraModel& c
         return Matched{*std::move(found), verdict, std::move(organ)};
       });
     } catch (const std::exception& problem) {  // of a library: it must not end the operation
-      return Error{Errc::io, fmt::format("the views were not matched: {}", problem.what())};
+      return Error{Errc::io, words("note_not_matched", problem.what())};
     }
   });
 }
@@ -126,12 +126,12 @@ bool DeformationStep::tick() {
     return false;
   }
   if (verdict.grade == Grade::fail) {
-    note_ = {false, verdict.reasons.front() + words_of(registration.touches)};
+    note_ = {false, with_touches(verdict.reasons.front(), registration.touches)};
     return false;
   }
   with_care_ = verdict.grade == Grade::marginal;
-  note_ = {true, with_care_ ? words("note_with_care", verdict.reasons.front()) : verdict.reasons.front()};
-  note_.line += words_of(registration.touches);
+  const std::string& reason = verdict.reasons.front();
+  note_ = {true, with_touches(with_care_ ? words("note_with_care", reason) : reason, registration.touches)};
   DeformedOrgan organ{std::move(registration.field), std::nullopt, std::nullopt, utc_now()};
   if (const auto& expected = registration.expected) {
     if (expected->seen) organ.seen_rms_mm = expected->seen->rms_mm;

@@ -23,8 +23,9 @@ std::string mirrored_words(const calibration::PointShape& shape) {
 
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc) {
   if (found.verdict.grade == Grade::fail) {
-    const std::string why = found.verdict.reasons.empty() ? "" : "; " + found.verdict.reasons.front();
-    return Error{Errc::degenerate, "the verdict is fail" + why};
+    const auto& why = found.verdict.reasons;
+    return Error{Errc::degenerate,
+                 why.empty() ? words("note_verdict_fail") : words("note_verdict_fail_why", why.front())};
   }
   const auto& lens = found.stations.lens;
   return CalibratedScope{

@@ -24,6 +24,7 @@ struct CalibratedScope {
   std::string made_utc;      ///< 2026-11-22T09:30:00Z
   bool by_board = false;     ///< here, by the board; else by a record
   Instruments found_with{};  ///< of one by a record, those that the record is of, which the appliance judges
+  std::string scope_name{};  ///< as its owner calls it; empty: nobody has told it, as over the board
 };
 /// By what was solved of stations over the board. Refuses, with the first reason, what the verdict fails.
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc);

@@ -15,6 +15,12 @@ struct Instruments {
   std::string reference{};  ///< the bird of that tracker that poses were relative to; empty: none
 };
 
+/// What a picture was taken with; empty where nobody has told it.
+struct PictureHardware {
+  calibration::Identity tracker, camera;
+  std::string scope;  ///< its name, as its owner calls it
+};
+
 /// Enters what the appliance tells of them; of what it does not tell, what was known stays.
 void take_identities(const wire::Health& health, Instruments& told);
 

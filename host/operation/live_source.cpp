@@ -1,7 +1,5 @@
 #include "host/operation/live_source.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "drivers/system/clock.hpp"
@@ -15,7 +13,6 @@ namespace birdseye::host {
 namespace {
 
 constexpr std::size_t kMostFramesWaiting = 12;  // half a second: older frames are of no use to a picture that is live
-constexpr const char* kSimulatedCart = "the simulated cart";
 constexpr Duration kConnectAgain = Duration::from_ms(1000);
 
 }  // namespace
@@ -47,12 +44,12 @@ std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings setti
     if (!client) return client.error();
     return Connection{*std::move(cart), *std::move(client)};
   };
-  return std::unique_ptr<LiveSource>(new LiveSource(kSimulatedCart, connect));
+  return std::unique_ptr<LiveSource>(new LiveSource(host::words("simulated_cart"), connect));
 }
 
 void LiveSource::take_link(Result<Connection> link) {
   if (!link) {
-    given_up_ = name_ == kSimulatedCart;  // what could not be started once is not tried for ever
+    given_up_ = name_ == host::words("simulated_cart");  // what could not be started once is not tried for ever
     words_ = given_up_ ? link.error().what : host::words("note_tried_again", link.error().what);
     again_ = host_now() + kConnectAgain;
     return;
@@ -122,7 +119,7 @@ std::string LiveSource::notes() const {
   if (recording_ == nullptr) return out;
   const std::vector<std::string>& notes = recording_->notes();
   for (std::size_t i = 0; i < std::min(notes.size(), kMost); ++i) out += "; " + notes[i];
-  if (notes.size() > kMost) out += fmt::format("; and {} more", notes.size() - kMost);
+  if (notes.size() > kMost) out += "; " + host::words("note_more", notes.size() - kMost);
   return out;
 }
 

@@ -106,6 +106,8 @@ void LiveWorkflow::take_relative(const wire::Event& event, HostTime now, const s
       std::optional<RelatedTime<HostTime>> stamped;
       if (clock) stamped = {clock->host_from_device(frame->info.acquired), clock->host.sigma};
       picture_.take(*frame, exposure_of(stamped, frame->info.acquired_sigma, now));
+      const auto& scope = calibration_.found();
+      taken_with_ = {instruments_.now().tracker, instruments_.now().camera, scope ? scope->scope_name : ""};
       watch_surface(now);
     }
   } else if (const auto* birds = std::get_if<wire::Birds>(&event)) {

@@ -98,6 +98,8 @@ class LiveWorkflow {
   /// What of it may be shown at this moment.
   ShownPicture shown_at(HostTime now) { return picture_.at(now); }
   [[nodiscard]] const LivePicture& picture() const { return picture_; }
+  /// What the frame that is shown was taken with.
+  [[nodiscard]] const PictureHardware& taken_with() const { return taken_with_; }
   [[nodiscard]] OperationView view() const;
   /// The CT as it is shown, from another place than the scope's. Empty: it cannot be drawn yet.
   [[nodiscard]] std::optional<ImageRgba> ct_seen_from(const CameraModel& camera,
@@ -143,6 +145,7 @@ class LiveWorkflow {
   bool simulated_ = false;              ///< nobody lies there
   std::optional<HostTime> video_came_;  ///< the newest frame
   ConnectedInstruments instruments_;
+  PictureHardware taken_with_;
   ReferenceSensor reference_;
   std::string why_doubted_;  ///< why somebody has to look whether the registration holds; empty: as usual
   std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force

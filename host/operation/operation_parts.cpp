@@ -63,6 +63,7 @@ Json json_of(const CalibratedScope& found) {
               {"height_px", camera.height_px},
               {"fx_fy_cx_cy_k1_k2_p1_p2_k3", std::vector<double>(parameters.begin(), parameters.end())}}},
             {"camera_from_sensor", rows_of(found.scope.camera_from_sensor().matrix())}};
+  if (!found.scope_name.empty()) json["scope"] = found.scope_name;
   if (const auto& covariance = found.scope.camera_covariance()) json["lens"]["covariance"] = rows_of(*covariance);
   if (const auto& field = found.scope.round_field())
     json["lens"]["round_field"] = calibration::json_of_round_field(*field);
@@ -125,7 +126,8 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
   if (lens.contains("round_field"))
     scope = scope->with_round_field(calibration::round_field_of_json(lens.at("round_field")));
   return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(),
-                         json.at("made_from").get<std::string>() == "board", instruments_of(json)};
+                         json.at("made_from").get<std::string>() == "board", instruments_of(json),
+                         json.value("scope", "")};
 }
 
 Result<RegisteredPatient> registered_of(const Json& json) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "host/render/engine_thread.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -19,7 +20,7 @@ PatientStep::PatientStep(const std::string& transfer, std::string engine) : engi
 Result<std::shared_ptr<Engine>> PatientStep::make(const std::string& name,
                                                   const std::shared_ptr<const PatientPlan>& plan,
                                                   const Transfer& transfer) {
-  if (!transfer) return Error{Errc::bad_value, "there is no transfer function to draw the CT by"};
+  if (!transfer) return Error{Errc::bad_value, words("note_no_transfer")};
   auto made = make_on_own_thread([&] { return make_engine(name, plan->shown, *transfer); });
   if (!made) return made.error();
   return std::shared_ptr<Engine>(made->release(), [plan](Engine* engine) { delete engine; });
@@ -29,7 +30,7 @@ void PatientStep::load(const PatientFiles& files) {
   files_ = files;
   transfer_is_newer_ = false;
   loading_.start([files, name = engine_name_, transfer = transfer_](const std::stop_token& stop, const auto& say) {
-    say("reading the CT");
+    say(words("note_reading_ct"));
     auto read = read_patient(files, stop);
     if (!read) return Result<Loaded>(read.error());
     auto plan = std::make_shared<const PatientPlan>(*std::move(read));

@@ -1,11 +1,10 @@
 #include "host/operation/replay_hardware.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
 #include "calibration/record/identity.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -25,8 +24,7 @@ void ReplayHardware::take(const wire::Event& event) {
   was_in_force_ = was_in_force_ || told->in_force;
   withdrawn_.clear();
   if (told->in_force || !was_in_force_) return;
-  withdrawn_ = fmt::format("the appliance withdrew its calibration record{}{}", told->why_not.empty() ? "" : ": ",
-                           told->why_not);
+  withdrawn_ = told->why_not.empty() ? words("why_withdrawn") : words("why_withdrawn_for", told->why_not);
   remedy_ = "give a record that holds for these frames (--calibration)";
 }
 
@@ -42,7 +40,7 @@ void ReplayHardware::judge() {
 void ReplayHardware::judge(const ReplayBinding& binding, const std::string& what, const calibration::Identity& found,
                            const calibration::Identity& told) {
   if (found.empty() || told.empty()) {
-    const std::string note = fmt::format("nothing tells whether {} is of the recording's {}", binding.of, what);
+    const std::string note = words("why_unproven", binding.of, what);
     if (std::find(unproven_.begin(), unproven_.end(), note) == unproven_.end()) unproven_.push_back(note);
     return;
   }

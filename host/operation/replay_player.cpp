@@ -10,6 +10,7 @@
 
 #include "host/files/picture.hpp"
 #include "host/files/write_files.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -84,8 +85,7 @@ Result<void> ReplayPlayer::take(const wire::VideoFrame& frame, const std::string
     ++done_.other_size;
     const CameraModel& camera = painter_.setup()->camera();
     const OverlayGate::Decision none =
-        refused_for(fmt::format("the video is {}x{}; the camera was calibrated at {}x{}", frame.width_px,
-                                frame.height_px, camera.width_px, camera.height_px));
+        refused_for(words("why_other_size", frame.width_px, frame.height_px, camera.width_px, camera.height_px));
     ++done_.reasons[none.reason];
     done_.table += row_of(frame, none, std::nullopt);
     return {};

@@ -12,6 +12,7 @@
 #include "host/operation/pointer_tip.hpp"
 #include "host/operation/reference_sensor.hpp"
 #include "host/recording/recording_reader.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -187,7 +188,7 @@ Result<ReplaySetup> setup_of_operation(const ReplayInputs& inputs, const Told& t
   if (!told.record.empty() && !operation->calibrated->by_board) {
     const auto record = calibration::parse_record(told.record);
     if (!record || calibration::sha256_of(calibration::record_text(*record)) != operation->record_sha256)
-      out.cautions.emplace_back("the recording has another calibration record than the operation was calibrated by");
+      out.cautions.emplace_back(words("why_other_record"));
   }
   out.operation = *std::move(operation);
   return out;

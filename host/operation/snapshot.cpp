@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -20,6 +21,10 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* kSheet = "snapshot.json";
+constexpr const char* kVideo = "video.png";
+constexpr const char* kPicture = "picture.png";
 
 std::string number(double value) {
   return fmt::format("{:.17g}", value);
@@ -49,7 +54,7 @@ std::vector<std::string> render_arguments(const fs::path& folder, const Snapshot
   add("--camera", whole(folder / "camera.yaml"));
   add("--pose", whole(folder / "camera_from_patient.txt"));
   add("--transfer", whole(folder / "transfer.json"));
-  add("--over", whole(folder / "video.png"));
+  add("--over", whole(folder / kVideo));
   if (snapshot.deformed) add("--deformation", whole(folder / "field.mha"));
   add("--step-mm", number(snapshot.look.render.step_mm));
   add("--opacity", number(snapshot.look.opacity * snapshot.shown.strength));
@@ -72,12 +77,16 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
   const wire::VideoFrame& frame = snapshot.frame;
   const ShownPicture& shown = snapshot.shown;
   std::vector<FileText> files{
-      {folder / "video.png", png_of(RgbView{*frame.rgb, frame.width_px, frame.height_px})},
-      {folder / "picture.png", png_of(RgbView{snapshot.picture, shown.width_px, shown.height_px})},
+      {folder / kVideo, png_of(RgbView{*frame.rgb, frame.width_px, frame.height_px})},
+      {folder / kPicture, png_of(RgbView{snapshot.picture, shown.width_px, shown.height_px})},
   };
   nlohmann::json sheet{{"sequence", frame.info.sequence}, {"acquired_ns", frame.info.acquired.ns},
                        {"age_ms", shown.age_ms},          {"overlaid", shown.overlaid},
                        {"strength", shown.strength},      {"reason", shown.reason}};
+  const PictureHardware& with = snapshot.taken_with;
+  if (!with.tracker.empty()) sheet["tracker"] = with.tracker;
+  if (!with.camera.empty()) sheet["camera"] = with.camera;
+  if (!with.scope.empty()) sheet["scope"] = with.scope;
   if (snapshot.fre_mm) sheet["fre_mm"] = *snapshot.fre_mm;
   if (snapshot.identity) sheet["patient"] = json_of(*snapshot.identity);
   if (shown.overlaid && snapshot.setup && snapshot.camera_from_patient && snapshot.transfer) {
@@ -89,8 +98,27 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
       if (auto written = write_field(folder / "field.mha", snapshot.deformed->field); !written) return written;
     }
   }
-  files.push_back({folder / "snapshot.json", text_of(sheet)});
+  files.push_back({folder / kSheet, text_of(sheet)});
   return write_files(files);
+}
+
+Result<PictureHardware> read_taken_with(const fs::path& picture) {
+  PictureHardware out;
+  if (picture.filename() != kVideo && picture.filename() != kPicture) return out;
+  const fs::path path = picture.parent_path() / kSheet;
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return out;
+  std::ifstream in(path);
+  try {
+    const nlohmann::json sheet = nlohmann::json::parse(in);
+    out.tracker = sheet.value("tracker", out.tracker);
+    out.camera = sheet.value("camera", out.camera);
+    out.scope = sheet.value("scope", out.scope);
+  } catch (const nlohmann::json::exception& wrong) {
+    return Error{Errc::bad_format, fmt::format("{}: makes no sense ({}); give the snapshot as the window wrote it",
+                                               path.string(), wrong.what())};
+  }
+  return out;
 }
 
 }  // namespace birdseye::host

@@ -17,8 +17,9 @@ namespace birdseye::host {
 /// All that a picture in the window was made of.
 struct Snapshot {
   wire::VideoFrame frame;
-  std::vector<std::uint8_t> picture;                              ///< RGB, as it was shown
-  ShownPicture shown;                                             ///< but for its pixels
+  std::vector<std::uint8_t> picture;  ///< RGB, as it was shown
+  ShownPicture shown;                 ///< but for its pixels
+  PictureHardware taken_with;
   std::optional<Setup> setup;                                     ///< empty: nothing was registered
   std::optional<Transform<Camera, Patient>> camera_from_patient;  ///< empty: nothing was drawn
   OverlayLook look;
@@ -33,5 +34,9 @@ struct Snapshot {
 /// In folder, which it makes: video.png as it came, picture.png as it was shown, and, where the CT was drawn, what it
 /// was drawn by, with snapshot.json holding the figures and the arguments by which `birdseye render` draws it again.
 Result<void> write_snapshot(const std::filesystem::path& folder, const Snapshot& snapshot);
+
+/// What the snapshot says that the picture was taken with. Nothing of a picture that is no snapshot's; refuses a sheet
+/// that cannot be read.
+Result<PictureHardware> read_taken_with(const std::filesystem::path& picture);
 
 }  // namespace birdseye::host

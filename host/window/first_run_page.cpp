@@ -29,23 +29,25 @@ constexpr const char* kHowKey = "e";
 struct Seen {
   Eigen::Vector3f colour;
   const char* sign;
+  const std::string& word;
 };
 Seen seen_as(CheckState state, const Theme& theme) {
   switch (state) {
     case CheckState::good:
-      return {theme.good, kGoodSign};
+      return {theme.good, kGoodSign, words("first_good")};
     case CheckState::could_be_better:
-      return {theme.warn, kWarnSign};
+      return {theme.warn, kWarnSign, words("first_could_be_better")};
     case CheckState::missing:
+      return {theme.bad, kBadSign, words("first_missing")};
     case CheckState::bad:
-      return {theme.bad, kBadSign};
+      return {theme.bad, kBadSign, words("first_bad")};
     case CheckState::not_known:
       break;
   }
-  return {theme.quiet, "?"};
+  return {theme.quiet, "?", words("first_not_known")};
 }
 
-/// State, name, and what was found; how: over what to do.
+/// State, name, and what the people in the room do; how: below it what whoever set the cart up reads.
 void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale, bool how) {
   if (!ImGui::BeginTable("checks", 3)) return;
   ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 125 * scale);
@@ -55,12 +57,12 @@ void draw_rows(const std::vector<Check>& checks, const Theme& theme, float scale
     ImGui::TableNextRow();
     ImGui::TableNextColumn();
     const Seen seen = seen_as(check.state, theme);
-    say(seen.colour, fmt::format("{} {}", seen.sign, name_of(check.state)));
+    say(seen.colour, fmt::format("{} {}", seen.sign, seen.word));
     ImGui::TableNextColumn();
     say(theme.text, check.name);
     ImGui::TableNextColumn();
-    say(theme.text, check.found);
-    if (how && !check.remedy.empty()) say(theme.quiet, check.remedy);
+    say(theme.text, check.in_the_room.empty() ? words("first_no_answer") : check.in_the_room);
+    if (how) say(theme.quiet, check.remedy.empty() ? check.found : fmt::format("{} {}", check.found, check.remedy));
     ImGui::Dummy(ImVec2(0, 12 * scale));
   }
   ImGui::EndTable();

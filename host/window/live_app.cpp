@@ -9,6 +9,7 @@
 #include "host/files/write_files.hpp"
 #include "host/operation/snapshot.hpp"
 #include "host/render/scene/transfer_function.hpp"
+#include "host/texts/texts.hpp"
 #include "host/window/stall_picture.hpp"
 
 namespace birdseye::host {
@@ -179,7 +180,7 @@ void LiveApp::draw() {
   to_draw_ = Duration{swapped.ns - began.ns};
   // Of video that has stopped the age grows: it is said once.
   if (publisher_ && shown.any)
-    publisher_->tell(shown.overlaid ? "" : shown.stale ? "the video has stopped" : shown.reason);
+    publisher_->tell(shown.overlaid ? "" : shown.stale ? words("why_stopped_now") : shown.reason);
   if (!shown.any) return grant(wishes);
   const double age_ms = Duration{swapped.ns - picture.exposed().ns}.seconds() * 1e3;
   if (shown.overlaid) figures_.oldest_overlay_ms = std::max(figures_.oldest_overlay_ms, age_ms);
@@ -340,6 +341,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->shown = shown;
     parts->shown.rgb = nullptr;
     if (operation_.frozen) parts->shown.reason = "frozen";
+    parts->taken_with = workflow_.taken_with();
     parts->setup = picture.setup();
     parts->camera_from_patient = picture.camera_from_patient();
     parts->look = picture.look();

@@ -6,13 +6,14 @@
 #include <array>
 
 #include "host/texts/texts.hpp"
+#include "host/window/line_breaks.hpp"
 #include "host/window/panel_context.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
-constexpr float kSidePx = 330, kStripPx = 62, kFiguresPx = 216;  // the strip, and with all figures in it
+constexpr float kSidePx = 330, kStripPx = 72, kFiguresPx = 216;  // the strip, and with all figures in it
 
 void draw_steps(PanelContext& context) {
   constexpr std::array<TextKey<0>, kLiveSteps> kNames{"step_connect", "step_calibrate", "step_fiducials", "step_views",
@@ -128,6 +129,11 @@ void draw_watch(const PanelContext& context) {
       fmt::format("{} {}", all ? kGoodSign : kWarnSign, words("watch", reference, organ)));
 }
 
+/// What may be left out, last: half a line at the window's edge is none.
+void say_if_room(const Theme& theme, const std::string& text) {
+  if (ImGui::GetContentRegionAvail().y >= ImGui::GetTextLineHeight()) say(theme.quiet, text);
+}
+
 void draw_strip(PanelContext& context) {
   const PanelLayout& at = context.at;
   const PanelFacts& facts = context.facts;
@@ -144,13 +150,12 @@ void draw_strip(PanelContext& context) {
   if (!operation.fault.empty()) say(theme.bad, fmt::format("{} {}", kBadSign, operation.fault));
   draw_watch(context);
   if (facts.details) draw_figures(context);
-  if (operation.surface_told && !facts.details) {
-    if (!operation.organ_moved) say(theme.quiet, words("surface_holds"));
-  } else if (!operation.surface_check.empty()) {
+  if (!operation.surface_check.empty() && (facts.details || !operation.surface_told))
     say(operation.organ_moved ? theme.warn : theme.quiet, operation.surface_check);
-  }
   if (!facts.said.empty()) say(theme.quiet, facts.said);
-  if (!facts.details) say(theme.quiet, words("details"));  // last: where there is no room, it is the one to go
+  const bool holds = operation.surface_told && !operation.organ_moved && !context.shown.stale;
+  if (holds && !facts.details) say_if_room(theme, words("surface_holds"));
+  if (!facts.details) say_if_room(theme, words("details"));
   ImGui::EndGroup();
   ImGui::End();
 }
@@ -193,7 +198,10 @@ std::string label_of(const std::string& text, const char* id) {
 void say(const Eigen::Vector3f& rgb, const std::string& text) {
   ImGui::PushStyleColor(ImGuiCol_Text, colour(rgb));
   ImGui::PushTextWrapPos(0);
-  ImGui::TextUnformatted(text.c_str());
+  const std::string lines = broken_at_spaces(text, ImGui::GetContentRegionAvail().x, [](const std::string& line) {
+    return ImGui::CalcTextSize(line.c_str()).x;
+  });
+  ImGui::TextUnformatted(lines.c_str());
   ImGui::PopTextWrapPos();
   ImGui::PopStyleColor();
 }

@@ -6,6 +6,7 @@
 
 #include "host/operation/decision_log.hpp"
 #include "host/operation/operation.hpp"
+#include "host/operation/snapshot.hpp"
 #include "host/overlay/ct_sha256.hpp"
 #include "host/recording/recording_writer.hpp"
 #include "host/volume/import.hpp"
@@ -310,7 +311,7 @@ TEST(ReplayCommand, FramesOfAnotherSizeBearNoOverlay) {
   const Replayed done = replay(scratch, "r", "--registration " + scratch.file("reg.txt", kIdentityPose));
   EXPECT_EQ(done.figures["frames_overlaid"], 0);
   EXPECT_EQ(done.figures["verdict"], "fail");
-  EXPECT_EQ(done.reasons[0], "the video is 64x48; the camera was calibrated at 128x48");
+  EXPECT_EQ(done.reasons[0], "the video is 64 x 48 and the camera was calibrated at 128 x 48");
   EXPECT_NE(done.output.find("8 of 8 frames are of another size"), std::string::npos) << done.output;
 }
 
@@ -382,6 +383,49 @@ TEST(ReplayCommand, ExportAndRenderTakeWhatAWindowKept) {
                           (scratch / "render.json").string() + " --out " + (scratch / "picture.png").string());
   ASSERT_EQ(rendered.code, 0) << rendered.output;
   EXPECT_EQ(read_json(scratch / "render.json")["width_px"], 64);
+}
+
+TEST(ReplayCommand, RenderAsksASnapshotWhatItWasTakenWith) {
+  const Scratch scratch;
+  const std::string ct = small_ct(scratch);
+  host::Operation kept;
+  kept.ct_sha256 = host::ct_sha256(*host::import_volume(ct));
+  kept.calibrated = {*host::ScopeSetup::of_record(testing::straight_scope_record(64, 48, kBird, kHead)),
+                     "2026-11-22T09:30:00Z",
+                     false,
+                     {kBird, kHead, 0},
+                     "no. 17"};
+  fs::create_directories(scratch / "kept");
+  ASSERT_TRUE(host::write_operation(scratch / "kept", kept));
+  host::Snapshot snapshot;
+  snapshot.frame.width_px = snapshot.shown.width_px = 64;
+  snapshot.frame.height_px = snapshot.shown.height_px = 48;
+  snapshot.picture.assign(3 * 64 * 48, 90);
+  snapshot.frame.rgb = std::make_shared<const std::vector<std::uint8_t>>(snapshot.picture);
+  const fs::path out = scratch / "out.png";
+  const std::string command = "render --volume " + ct + " --operation " + (scratch / "kept").string() + " --pose " +
+                              scratch.file("pose.txt", "1 0 0 0\n0 1 0 0\n0 0 1 80\n0 0 0 1\n") + " --over " +
+                              (scratch / "shot/video.png").string() + " --out " + out.string();
+  const auto taken_with = [&](const host::PictureHardware& told) {
+    snapshot.taken_with = told;
+    ASSERT_TRUE(host::write_snapshot(scratch / "shot", snapshot));
+  };
+  const std::string remedy = "give the operation that was done with what took this picture";
+  taken_with({kBird, kOtherHead, "no. 17"});
+  expect_refused("birdseye", command, {"video.png", "is of camera serial A1; this one's is B2", remedy}, out);
+  taken_with({kOtherBird, kHead, "no. 17"});
+  expect_refused("birdseye", command, {"is of tracker unit_serial 4711; this one's is 4712", remedy}, out);
+  taken_with({kBird, kHead, "no. 18"});
+  expect_refused("birdseye", command, {"is of scope name no. 17; this one's is no. 18", remedy}, out);
+  const std::string unproven = "nothing tells whether";
+  taken_with({kBird, kHead, "no. 17"});
+  const auto same = run("birdseye", command);
+  ASSERT_EQ(same.code, 0) << same.output;
+  EXPECT_EQ(same.output.find(unproven), std::string::npos) << same.output;
+  taken_with({kBird, {}, "no. 17"});
+  const auto untold = run("birdseye", command);
+  ASSERT_EQ(untold.code, 0) << untold.output;
+  EXPECT_NE(untold.output.find(unproven), std::string::npos) << untold.output;
 }
 
 }  // namespace

@@ -355,29 +355,29 @@ TEST(DoctorAppliance, WhatSaysNothingOfBirdseyedIsNone) {
 TEST(DoctorFirstRun, SaysWhatThisMachineHasForWhatWasNotNamed) {
   const Folder folder;
   const auto rows = [&](const FirstRun& given) { return ask_all(first_run_questions(folder.machine(), given)); };
-  for (const char* name : {"Appliance", "CT"}) EXPECT_EQ(named(rows({}), name).state, CheckState::missing);
-  EXPECT_THAT(named(rows({}), "Appliance").found, HasSubstr("no tracker and no camera"));
+  for (const char* name : {"Tracker and camera", "CT"}) EXPECT_EQ(named(rows({}), name).state, CheckState::missing);
+  EXPECT_THAT(named(rows({}), "Tracker and camera").found, HasSubstr("no tracker and no camera"));
   folder.serial_port("ttyUSB0");
   folder.file("/dev/video0", "");
-  EXPECT_THAT(named(rows({}), "Appliance").found, HasSubstr("/dev/ttyUSB0, /dev/video0"));
+  EXPECT_THAT(named(rows({}), "Tracker and camera").found, HasSubstr("/dev/ttyUSB0, /dev/video0"));
   folder.file("/proc/net/tcp", "   0: 0100007F:4A00 00000000:0000 0A 00000000:00000000\n");
-  EXPECT_THAT(named(rows({}), "Appliance").remedy, HasSubstr("--server 127.0.0.1:18944"));
+  EXPECT_THAT(named(rows({}), "Tracker and camera").remedy, HasSubstr("--server 127.0.0.1:18944"));
 }
 
 TEST(DoctorFirstRun, WhatWasNamedIsLookedAt) {
   const Folder folder;
   FirstRun given{"cart:18944", folder.machine().at("/proc/locks"), "liver.nii.gz", false, "chessboard:14x10:3mm"};
   auto rows = ask_all(first_run_questions(folder.machine(), given));
-  EXPECT_EQ(named(rows, "Appliance").state, CheckState::not_known);  // it is not called
+  EXPECT_EQ(named(rows, "Tracker and camera").state, CheckState::not_known);  // it is not called
   EXPECT_EQ(named(rows, "CT").state, CheckState::good);
-  EXPECT_EQ(named(rows, "Segmentation").state, CheckState::bad);
-  EXPECT_THAT(named(rows, "Segmentation").remedy, HasSubstr("--organ"));
-  EXPECT_EQ(named(rows, "Board").state, CheckState::good);
+  EXPECT_EQ(named(rows, "Organs in the CT").state, CheckState::bad);
+  EXPECT_THAT(named(rows, "Organs in the CT").remedy, HasSubstr("--organ"));
+  EXPECT_EQ(named(rows, "Calibration board").state, CheckState::good);
   given.ct = folder.machine().at("/no/such/ct");
   given.organ_named = true;
   rows = ask_all(first_run_questions(folder.machine(), given));
   EXPECT_EQ(named(rows, "CT").state, CheckState::bad);
-  EXPECT_EQ(named(rows, "Segmentation").state, CheckState::good);
+  EXPECT_EQ(named(rows, "Organs in the CT").state, CheckState::good);
 }
 
 TEST(DoctorFirstRun, TheDisplaysRowIsItsWorstCheckInSentences) {
@@ -386,6 +386,46 @@ TEST(DoctorFirstRun, TheDisplaysRowIsItsWorstCheckInSentences) {
   EXPECT_EQ(row.state, CheckState::could_be_better);
   EXPECT_EQ(row.found, "The processor draws, by llvmpipe.");
   EXPECT_EQ(display_row({}).state, CheckState::not_known);
+}
+
+/// What a theatre nurse cannot read: options, paths, and the programs' names.
+void expect_for_the_room(const std::vector<Check>& rows) {
+  for (const Check& row : rows) {
+    EXPECT_FALSE(row.in_the_room.empty()) << row.found;
+    for (const char* word : {"--", "/", "_", "birdseyed", "HOST", "DICOM", "llvmpipe"})
+      EXPECT_THAT(row.in_the_room, Not(HasSubstr(word)));
+  }
+}
+
+TEST(DoctorFirstRun, EachRowSaysToThePeopleInTheRoomWhatTheyDo) {
+  const Folder folder;
+  FirstRun given;
+  const auto rows = [&] { return ask_all(first_run_questions(folder.machine(), given)); };
+  expect_for_the_room(rows());
+  EXPECT_EQ(named(rows(), "Tracker and camera").in_the_room,
+            "Neither a tracker nor a camera is plugged in here. Switch both on, and check their cables.");
+  folder.serial_port("ttyUSB0");
+  expect_for_the_room(rows());
+  EXPECT_THAT(named(rows(), "Tracker and camera").in_the_room, HasSubstr("Nothing reads the tracker and the camera."));
+  folder.file("/proc/net/tcp", "   0: 0100007F:4A00 00000000:0000 0A 00000000:00000000\n");
+  expect_for_the_room(rows());
+  EXPECT_THAT(named(rows(), "Tracker and camera").in_the_room, HasSubstr("this window was started without it"));
+  given = {"cart:18944", folder.machine().at("/no/such/ct"), "liver.nii.gz", false, "chessboard:14x10:3mm"};
+  expect_for_the_room(rows());
+  EXPECT_THAT(named(rows(), "CT").in_the_room, HasSubstr("is not where it should be"));
+  EXPECT_THAT(named(rows(), "Organs in the CT").in_the_room, HasSubstr("which one the camera shows is not named"));
+  given.organ_named = true;
+  given.ct = folder.machine().at("/proc/net/tcp");
+  expect_for_the_room(rows());
+  EXPECT_EQ(named(rows(), "CT").in_the_room, "The patient's CT is there.");
+}
+
+TEST(DoctorFirstRun, TheScreensRowSaysToThePeopleInTheRoomWhatTheyDo) {
+  const auto row = [](const DisplayFacts& facts) { return display_row(display_checks(facts)); };
+  expect_for_the_room({row({true, "", "4.5", "a card", 1920, 1080, 1}),
+                       row({true, "", "4.5", "llvmpipe", 1920, 1080, 1}),
+                       row({true, "", "4.5", "a card", 1024, 600, 1}), row({true, "", "4.5", "a card", 0, 0, 1})});
+  EXPECT_THAT(row({true, "", "4.5", "a card", 1024, 600, 1}).in_the_room, HasSubstr("Take a larger screen"));
 }
 
 TEST(DoctorText, ALineStaysOneLineAndNumbersAreAllThere) {

@@ -40,7 +40,8 @@ Operation whole_operation() {
           .with_round_field(RoundField{{383.5, 1.0 / 3}, 280}),
       "2026-11-22T09:35:00Z",
       true,
-      {kTracker, kCamera, 0}};
+      {kTracker, kCamera, 0},
+      "no. 17"};
   out.registered = {kTrackerFromPatient, 0.3, kFiducials, {kTracker, {}, 0}, "2026-11-22T09:50:00Z"};
   DisplacementField field;
   field.size = {3, 2, 2};
@@ -69,6 +70,7 @@ TEST(Operation, IsReadBackToTheBit) {
   EXPECT_EQ(read->calibrated->scope.figures().hand_eye_stations, 17);
   EXPECT_TRUE(read->calibrated->by_board);
   EXPECT_EQ(read->calibrated->found_with.camera, kCamera);
+  EXPECT_EQ(read->calibrated->scope_name, "no. 17");
   EXPECT_EQ(read->registered->tracker_from_patient.matrix(), kTrackerFromPatient.matrix());
   EXPECT_EQ(read->registered->found_with.tracker, kTracker);
   EXPECT_EQ(read->registered->made_utc, "2026-11-22T09:50:00Z");
