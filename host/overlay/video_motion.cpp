@@ -231,7 +231,7 @@ void VideoMotion::follow(const Waiting& picture) {
   }
   // Where most are lost at once the picture is another, and what is left is chance.
   if (2 * kept < there.size()) {
-    if (state_ == VideoAgreement::agrees) forget_agreement();
+    if (state_ == VideoAgreement::agrees || state_ == VideoAgreement::in_doubt) forget_agreement();
     return key_.reset();
   }
   key_->places.resize(kept);

@@ -132,6 +132,18 @@ TEST(VideoMotion, IsInDoubtFromTheFirstPictureThatDoesNotAgree) {
   EXPECT_EQ(states, (std::vector{VideoAgreement::agrees, VideoAgreement::in_doubt, VideoAgreement::differs}));
 }
 
+TEST(VideoMotion, WhatWasInDoubtAsThePictureChangedHasToAgreeAnew) {
+  LookingAbout about;
+  about.look(0, 10);
+  about.scene_moves = [](double t_s) { return Vector(Vector(4, 4, 0) * std::min(1.0, 3 * (t_s - 10))); };
+  double t_s = 10;
+  for (; about.motion.state() == VideoAgreement::agrees && t_s < 11; t_s += 0.04) about.look(t_s, 0.04);
+  ASSERT_EQ(about.motion.state(), VideoAgreement::in_doubt);
+  about.scene_moves = [](double) { return Vector(300, 0, 0); };  // another picture: nothing is followed on
+  about.look(t_s, 0.3);
+  EXPECT_EQ(about.motion.state(), VideoAgreement::untold);
+}
+
 /// A grabber hands its pictures on 20 ms late, and a scope moves fast.
 TEST(VideoMotion, ALatencyThatNobodyMeasuredIsNoHandEyeThatIsOff) {
   for (const bool measured : {false, true}) {
