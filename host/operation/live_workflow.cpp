@@ -276,8 +276,8 @@ void LiveWorkflow::update_setup() {
   figures.target_in_patient_mm = as_shown_mm(target_in_patient_mm(*patient_.plan()), deformed);
   if (deformed != nullptr) figures.motion_error = deformed->target;
   figures.moved_mm = motion_.moved_mm();
-  if (settings_.video_must_agree) figures.video = video_.state();
-  figures.field = field_.state();
+  video_.enter(figures);
+  if (!settings_.video_must_agree) figures.video.reset();
   picture_.set_setup(turned.registered(registered->tracker_from_patient), figures);
 }
 

@@ -20,9 +20,8 @@
 #include "host/operation/reference_sensor.hpp"
 #include "host/operation/surface_watch.hpp"
 #include "host/operation/view_step.hpp"
-#include "host/overlay/field_watch.hpp"
 #include "host/overlay/live_picture.hpp"
-#include "host/overlay/video_motion.hpp"
+#include "host/overlay/video_watch.hpp"
 
 namespace birdseye::host {
 
@@ -169,8 +168,7 @@ class LiveWorkflow {
   WatchedSurface matched_;  ///< what the deformation is, or is being, found by
   SurfaceWatch watch_;
   OrganMotion motion_;
-  VideoMotion video_;
-  FieldWatch field_;
+  VideoWatch video_;
   std::optional<CheckedLandmark> checked_;  ///< of the registration and the deformation that are shown
   StepNote check_, run_;
   OperationKeeper keeper_;

@@ -69,10 +69,12 @@ void LiveWorkflow::watch_surface(HostTime now) {
 void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   // The board's squares look alike, one after the other.
   const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
-  if (scope && field_.take(frame, *scope)) update_setup();
-  if (!settings_.video_must_agree || !scope || !video_.take(frame, *scope)) return;
+  if (!scope) return;
+  const VideoWatch::News news = video_.take(frame, *scope);
+  if (news.field) update_setup();
+  if (!settings_.video_must_agree || !news.motion) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
-  if (video_.state() == VideoAgreement::differs && fiducials_.registered_or_held_back())
+  if (video_.motion() == VideoAgreement::differs && fiducials_.registered_or_held_back())
     return doubt_registration(words("why_video_differs"));
   update_setup();
 }
@@ -100,7 +102,7 @@ void LiveWorkflow::doubt_steps(OperationView& out) const {
   std::string why;  // what speaks against a step, and so against those that build on it
   if (calibration_.held_back()) {
     why = words("why_calibration_held", calibration_.note().line);
-  } else if (settings_.video_must_agree && video_.state() == VideoAgreement::differs) {
+  } else if (settings_.video_must_agree && video_.motion() == VideoAgreement::differs) {
     why = words("why_video_differs");
   }
   doubt(LiveStep::calibrate, why);
