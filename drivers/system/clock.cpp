@@ -4,11 +4,15 @@
 
 #include <ctime>
 
+#include "drivers/system/time_keeper.hpp"
+
 namespace birdseye {
 
 namespace {
 
 std::int64_t read_ns(clockid_t clock) {
+  if (TimeKeeper* const keeper = TimeKeeper::present())
+    return clock == CLOCK_REALTIME ? keeper->realtime_ns() : keeper->monotonic_ns();
   timespec time{};
   clock_gettime(clock, &time);
   return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;

@@ -37,6 +37,7 @@ class Deadline {
 
  private:
   friend void sleep_until(Deadline deadline);
+  friend class Condition;
   std::int64_t ns_;
 };
 

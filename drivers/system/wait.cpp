@@ -3,6 +3,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
+#include <mutex>
+#include <stdexcept>
+
+#include "drivers/system/condition.hpp"
+#include "drivers/system/time_keeper.hpp"
 
 namespace birdseye {
 
@@ -15,6 +20,7 @@ timespec timespec_of(Duration span) {
 }  // namespace
 
 void sleep_until(Deadline deadline) {
+  if (TimeKeeper* const keeper = TimeKeeper::present()) return keeper->sleep_until(deadline.ns_);
   const timespec until = timespec_of({std::max<std::int64_t>(0, deadline.ns_)});
   while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
   }
@@ -25,16 +31,16 @@ void sleep_for(Duration span) {
 }
 
 bool sleep_for(Duration span, const std::stop_token& stop) {
-  constexpr Duration kLook = Duration::from_ms(20);
-  const Deadline end = Deadline::after(span);
-  while (!end.passed()) {
-    if (stop.stop_requested()) return false;
-    sleep_until(std::min(end, Deadline::after(kLook)));
-  }
-  return true;
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  Condition never;
+  never.wait(lock, stop, Deadline::after(span), [] { return false; });
+  return !stop.stop_requested();
 }
 
 bool wait_ready(std::span<pollfd> entries, Deadline deadline) {
+  // What the kernel has ready has no part in a simulator's time: links and lines are its own there.
+  if (TimeKeeper::present() != nullptr) throw std::logic_error("a descriptor is waited for in a simulator's time");
   for (;;) {
     const timespec left = timespec_of(deadline.left());
     const int ready = ::ppoll(entries.data(), entries.size(), &left, nullptr);

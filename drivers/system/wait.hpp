@@ -11,7 +11,7 @@ namespace birdseye {
 
 void sleep_until(Deadline deadline);
 void sleep_for(Duration span);
-/// Or until stop is requested, which is looked for every few ms; false then.
+/// Or until stop is requested; false then.
 bool sleep_for(Duration span, const std::stop_token& stop);
 
 /// Waits until one of the entries is ready and fills in their revents. False: none was by the deadline. An entry whose
