@@ -47,8 +47,9 @@ Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::
       [a](bool locked, const drivers::ControlReport& report) {
         a->server_.publish(wire::pack(wire::CameraControls{locked, report.done, report.refused}, device_now()));
       }};
-  begin(a->camera_post_,
-        [a, lock](const std::stop_token& s) { run_camera(a->config_.camera, a->camera_post_, lock, s); });
+  begin(a->camera_post_, [a, lock](const std::stop_token& s) {
+    run_camera(a->config_.camera, a->config_.open_camera, a->camera_post_, lock, s);
+  });
   if (!config.gpio.lines.chip.empty())
     begin(a->gpio_post_, [a](const std::stop_token& s) { run_gpio(a->config_.gpio, a->state_, a->gpio_post_, s); });
   a->threads_.emplace_back([a](const std::stop_token& s) { a->make_messages(s); });

@@ -66,10 +66,10 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
 
 }  // namespace
 
-void run_camera(const drivers::CameraSettings& settings, InstrumentPost& post, const ControlsLock& lock,
-                const std::stop_token& stop) {
+void run_camera(const drivers::CameraSettings& settings, const CameraOpener& open, InstrumentPost& post,
+                const ControlsLock& lock, const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    auto camera = drivers::open_camera(settings);
+    auto camera = open(settings);
     if (!camera) {
       post.tell({.state = InstrumentState::absent, .text = camera.error().what});
     } else if (const Error lost = stream(**camera, settings, post, lock, stop); !stop.stop_requested()) {

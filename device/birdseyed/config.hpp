@@ -1,9 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <string>
 
 #include "calibration/base/result.hpp"
+#include "device/birdseyed/camera_thread.hpp"
 #include "device/birdseyed/core.hpp"
 #include "device/birdseyed/gpio_thread.hpp"
 #include "drivers/io/open_line.hpp"
@@ -14,6 +17,9 @@ namespace birdseye::device {
 
 struct TrackerConfig {
   drivers::LineSettings line;
+  /// By which the line is opened; a simulator gives its own.
+  std::function<Result<std::unique_ptr<drivers::ByteStream>>(const drivers::LineSettings&)> open_line =
+      drivers::open_line;
   drivers::minibird::MiniBirdSettings minibird;
   std::string reference;  ///< the bird that is fixed on patient or table, by its name; empty: there is none
 };
@@ -35,6 +41,7 @@ struct Config {
   std::string text;  ///< of the file
   TrackerConfig tracker;
   drivers::CameraSettings camera;
+  CameraOpener open_camera = drivers::open_camera;
   GpioConfig gpio;
   WireConfig wire;
   CoreSettings core;

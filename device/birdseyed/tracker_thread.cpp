@@ -58,7 +58,7 @@ std::map<std::string, std::string> identity_of(const drivers::minibird::MiniBird
 
 Result<std::unique_ptr<MiniBird>> open_tracker(const TrackerConfig& config, const std::stop_token& stop,
                                                const std::function<void()>& still) {
-  auto line = drivers::open_line(config.line);
+  auto line = config.open_line(config.line);
   if (!line) return std::move(line).error();
   return MiniBird::start(*std::move(line), config.minibird, stop, still);
 }

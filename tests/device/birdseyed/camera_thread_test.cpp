@@ -67,7 +67,7 @@ class ACamera : public ::testing::Test {
   ACamera() : program_((scratch_ / "camera").string()) {
     thread_ = std::jthread([this](const std::stop_token& stop) {
       run_camera({.source = "socket:" + (scratch_ / "camera").string(), .width_px = 4, .height_px = 2, .rate_hz = 100},
-                 post_, lock_, stop);
+                 drivers::open_camera, post_, lock_, stop);
     });
   }
   /// The text of the next change to that state, and whether a frame came before it.

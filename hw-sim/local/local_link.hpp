@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "calibration/time/clock.hpp"
+#include "device/wire/link.hpp"
+
+namespace birdseye::hw_sim {
+
+/// A network within this process, with one machine that is listened at.
+class LocalNetwork {
+ public:
+  struct Settings {
+    std::size_t holds = std::size_t{1} << 20;  ///< bytes on their way in one direction; beyond, the sender waits
+    Duration delay{};                          ///< of each byte
+  };
+  explicit LocalNetwork(const Settings& settings);
+
+  /// For the server, once.
+  [[nodiscard]] std::unique_ptr<wire::Listener> listener() const;
+  /// A client's end of a new connection.
+  [[nodiscard]] std::unique_ptr<wire::Link> connect() const;
+  /// Cuts all connections that stand, as a cable does that is pulled.
+  void cut() const;
+
+  struct State;
+
+ private:
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace birdseye::hw_sim
