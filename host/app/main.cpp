@@ -18,5 +18,6 @@ int main(int argc, char** argv) {
   add_render(app, status);
   add_replay(app, status);
   add_volume(app, status);
+  refuse_outputs_over_inputs(app);
   return birdseye::run_program<CLI::ParseError>(app, argc, argv, [&status] { return static_cast<int>(status.code); });
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
@@ -70,11 +71,11 @@ Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayS
     verdict.add(Grade::marginal, fmt::format("{} frames are cut short or missing", reader.frames_lost()));
   for (const std::string& note : reader.notes()) verdict.add(Grade::marginal, note);
   for (const std::string& figure : trust.vouched_for)
-    verdict.add(Grade::pass, fmt::format("{} is not known and taken for perfect", figure));
+    verdict.add(Grade::marginal, fmt::format("nothing states {}: how far the overlay may be off is not known", figure));
   return verdict;
 }
 
-nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const TrustFigures& figures,
+nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const ReplayTrust& trust,
                        const std::string& engine, const std::vector<std::string>& notes, const Verdict& verdict) {
   nlohmann::json json = {{"frames", done.frames},
                          {"frames_overlaid", done.overlaid},
@@ -84,13 +85,17 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Tru
                          {"reasons_of_frames", done.reasons},
                          {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
                          {"engine", engine},
-                         {"fre_mm", *figures.fre_mm},
                          {"touches", setup.touches},
                          {"notes", notes},
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
-  if (figures.scope.camera_rms_px) json["camera_rms_px"] = *figures.scope.camera_rms_px;
-  if (figures.scope.held_out_px) json["held_out_px"] = *figures.scope.held_out_px;
+  const TrustFigures& figures = trust.figures;
+  const auto enter = [&](const char* name, const std::optional<double>& figure) {
+    if (figure && std::ranges::count(trust.vouched_for, name) == 0) json[name] = *figure;
+  };
+  enter("fre_mm", figures.fre_mm);
+  enter("camera_rms_px", figures.scope.camera_rms_px);
+  enter("held_out_px", figures.scope.held_out_px);
   return json;
 }
 
@@ -178,9 +183,9 @@ Result<ExitCode> run(const ReplayOptions& options) {
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   Progress progress;
   const ReplayTrust trust = trust_of(*setup, *volume);
-  ReplayPlayer player(
-      {options.out, options.every, options.film_hz, options.look, options.scope, options.motion_check, std::move(live)},
-      *setup, trust.figures, **engine, std::move(margins));
+  ReplayPlayer player({options.out, options.every, options.film_hz, options.look, options.scope, options.motion_check,
+                       trust.vouched_for.empty(), std::move(live)},
+                      *setup, trust.figures, **engine, std::move(margins));
   std::map<std::string, std::string> remedies;
   if (auto played = play(**reader, options, setup->hardware, player, remedies, progress); !played)
     return played.error();
@@ -188,8 +193,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
     return Error{Errc::io, fmt::format("{}: {}; use --engine cpu", (*engine)->name(), fault)};
   if (auto finished = player.finish(); !finished) return finished.error();
   const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies, options.motion_check);
-  const std::string json =
-      text_of(json_of(player.done(), *setup, trust.figures, (*engine)->name(), shown->notes, verdict));
+  const std::string json = text_of(json_of(player.done(), *setup, trust, (*engine)->name(), shown->notes, verdict));
   const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},

@@ -32,7 +32,8 @@ std::string ReplayPlayer::row_of(const wire::VideoFrame& frame, const OverlayGat
   std::string row = fmt::format("{},{},{},{},{},", frame.info.sequence, frame.info.acquired.ns,
                                 to_string(frame.info.pose.kind), decision.strength, reason);
   const auto& expected = decision.expected;
-  row += expected ? fmt::format("{:.3f},{:.3f},", expected->rms_mm(), expected->radius95_mm()) : ",,";
+  row += expected && output_.error_known ? fmt::format("{:.3f},{:.3f},", expected->rms_mm(), expected->radius95_mm())
+                                         : ",,";
   const auto live = output_.live.find(frame.info.sequence);
   row += live == output_.live.end() ? ",," : fmt::format("{:.3f},{},", live->second.strength, live->second.reason);
   if (painted) {

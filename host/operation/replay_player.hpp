@@ -24,6 +24,7 @@ struct ReplayOutput {
   OverlayLook look;
   std::string scope = "scope";  ///< its bird
   bool motion_check = true;     ///< nothing is drawn over video that does not move as the poses say
+  bool error_known = true;      ///< else the table says nothing of the expected error
   /// What the live window decided then, by the frames' numbers.
   std::map<std::uint64_t, LoggedDecision> live;
 };

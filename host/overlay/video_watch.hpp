@@ -13,14 +13,18 @@ class VideoWatch {
  public:
   /// A pose of the scope's sensor, as they come.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+    single_poses_ = true;
     motion_.take(acquired, tracker_from_sensor);
   }
   struct News {
     bool motion = false, field = false;  ///< that it says something else now
     [[nodiscard]] bool any() const { return motion || field; }
   };
-  /// A frame, as they come, and the scope that took it.
+  /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, its own
+  /// tells.
   News take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
+    const auto& pose = frame.info.pose.tracker_from_sensor;
+    if (!single_poses_ && pose) motion_.take(frame.info.acquired, *pose);
     return {motion_.take(frame, scope), field_.take(frame, scope)};
   }
 
@@ -32,6 +36,7 @@ class VideoWatch {
   }
 
  private:
+  bool single_poses_ = false;
   VideoMotion motion_;
   FieldWatch field_;
 };

@@ -327,5 +327,19 @@ TEST(RigidCommands, RefuseBadInputInOneLine) {
   }
 }
 
+TEST(RigidCommands, AFileThatIsReadIsNotWrittenOver) {
+  const Scratch scratch;
+  const std::string ct = scratch.file("ct.txt", text_of(kMarkers)), read = text_of(touched(kMarkers));
+  const std::string tracker = scratch.file("tracker.txt", read);
+  for (const std::string& out : {"--out " + tracker, "--out " + (scratch / "r.txt").string() + " --json " + ct}) {
+    const auto refused = run("birdseye", "register fiducials --ct " + ct + " --tracker " + tracker + " " + out);
+    EXPECT_EQ(refused.code, 2) << refused.output;
+    EXPECT_NE(refused.output.find("would be written over"), std::string::npos) << refused.output;
+  }
+  EXPECT_EQ(testing::contents_of(tracker), read);
+  EXPECT_EQ(testing::contents_of(ct), text_of(kMarkers));
+  EXPECT_FALSE(fs::exists(scratch / "r.txt"));
+}
+
 }  // namespace
 }  // namespace birdseye

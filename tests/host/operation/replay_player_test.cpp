@@ -23,7 +23,8 @@ struct ReplayedLook {
   Transform<Camera, Sensor> told = kCameraFromSensor;
   bool motion_check = true;
   bool pattern = true;
-  std::string row{};  ///< of the last frame
+  bool single_poses = true;  ///< else there are the frames' own alone, as in a sequence of PLUS
+  std::string row{};         ///< of the last frame
 
   Replayed play() {
     const testing::Scratch scratch;
@@ -39,7 +40,7 @@ struct ReplayedLook {
     const Volume ct = testing::scene();
     const TransferFunction transfer = testing::soft();
     const auto engine = make_engine("cpu", ct, transfer);
-    ReplayPlayer player({scratch.path(), 1000, 0, {}, "scope", motion_check, {}}, setup, figures, **engine);
+    ReplayPlayer player({scratch.path(), 1000, 0, {}, "scope", motion_check, true, {}}, setup, figures, **engine);
     testing::TexturedScene scene(Vector(0, 0, 0));
     for (int i = 0; i < 1000; ++i) {
       const double t_s = i * 0.01;
@@ -50,7 +51,7 @@ struct ReplayedLook {
       const auto sensor = view.inverse() * kCameraFromSensor;
       const Transform<Tracker, Sensor> tracker_from_sensor(sensor.rotation(), sensor.translation());
       const DeviceTime at{10'000'000LL * i};
-      player.take(wire::Birds{at, {{"scope", tracker_from_sensor}}});
+      if (single_poses) player.take(wire::Birds{at, {{"scope", tracker_from_sensor}}});
       if (i % 4 != 0) continue;
       wire::VideoFrame frame;
       frame.info.sequence = static_cast<std::uint64_t>(i);
@@ -87,6 +88,17 @@ TEST(ReplayPlayer, DrawsNothingOnceTheVideoShowsAnotherHandEye) {
   EXPECT_NE(look.row.find("video and poses do not agree"), std::string::npos) << look.row;
   look.motion_check = false;
   EXPECT_EQ(look.play().overlaid, done.frames) << "asked not to look";
+}
+
+TEST(ReplayPlayer, WhereThereAreNoSinglePosesTheFramesOwnTell) {
+  ReplayedLook look;
+  look.single_poses = false;
+  const Replayed right = look.play();
+  EXPECT_EQ(right.overlaid, right.frames) << look.row;
+  EXPECT_TRUE(right.video_told);
+  look.told = Transform<Camera, Camera>(rotation_exp(Vector(0, 0, 30 * kRadPerDeg)), Vector::Zero()) * look.told;
+  EXPECT_LT(look.play().overlaid, 50U);
+  EXPECT_NE(look.row.find("video and poses do not agree"), std::string::npos) << look.row;
 }
 
 TEST(ReplayPlayer, SaysThatAPictureWithoutAPatternTellsNothing) {
