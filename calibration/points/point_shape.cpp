@@ -44,6 +44,41 @@ ScaledFit fit_scaled(Points to_mm, Points from_mm) {
   return out;
 }
 
+Eigen::Vector3d mean_of(Points points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
+/// Fits `to`, with lengths along one of its axes divided by a scale, by turn and shift of `from`: each in turn, which
+/// ends within a few rounds, for a turn is no stretch.
+ScaledFit fit_stretched(Points to_mm, Points from_mm, int axis) {
+  constexpr int kRounds = 30;
+  ScaledFit out;
+  const double to_mean_mm = mean_of(to_mm)[axis];
+  std::vector<Eigen::Vector3d> squeezed_mm(to_mm.begin(), to_mm.end());
+  double squeeze = 1;
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t i = 0; i < to_mm.size(); ++i) squeezed_mm[i][axis] = squeeze * to_mm[i][axis];
+    const auto rigid = detail::fit_rigid(squeezed_mm, from_mm);
+    if (!rigid) return out;
+    const double turned_mean_mm = (rigid->rotation * mean_of(from_mm))[axis];
+    double products_mm2 = 0, squares_mm2 = 0;
+    out.squares_mm2 = 0;
+    for (std::size_t i = 0; i < to_mm.size(); ++i) {
+      const Eigen::Vector3d turned_mm = rigid->rotation * from_mm[i];
+      const double along_mm = to_mm[i][axis] - to_mean_mm;
+      products_mm2 += along_mm * (turned_mm[axis] - turned_mean_mm);
+      squares_mm2 += along_mm * along_mm;
+      out.squares_mm2 += (squeezed_mm[i] - turned_mm - rigid->translation_mm).squaredNorm();
+    }
+    if (!(squares_mm2 > 0)) return out;
+    squeeze = products_mm2 / squares_mm2;
+  }
+  out.scale = 1 / squeeze;
+  return out;
+}
+
 }  // namespace
 
 PointShape compare_shapes(Points to_mm, Points from_mm, std::optional<double> localisation_rms_mm) {
@@ -70,7 +105,31 @@ PointShape compare_shapes(Points to_mm, Points from_mm, std::optional<double> lo
   out.scale = better.scale;
   out.scale_sigma = std::hypot(std::sqrt(variance_mm2 / better.from_squares_mm2), kSoundScale);
   const double off = (out.scale - 1) / out.scale_sigma;
-  out.scale_chance = localisation_rms_mm ? chi_square_tail(off * off, 1) : f_tail(off * off, 1, dof);
+  const auto chance_of = [&](double sigmas) {
+    return localisation_rms_mm ? chi_square_tail(sigmas * sigmas, 1) : f_tail(sigmas * sigmas, 1, dof);
+  };
+  out.scale_chance = chance_of(off);
+  const Points from_better = &better == &mirrored ? Points(mirrored_mm) : from_mm;
+  const auto rigid = detail::fit_rigid(to_mm, from_better);
+  if (!rigid) return out;
+  double rigid_mm2 = 0;
+  for (std::size_t i = 0; i < to_mm.size(); ++i)
+    rigid_mm2 += (to_mm[i] - rigid->rotation * from_better[i] - rigid->translation_mm).squaredNorm();
+  for (int axis = 0; axis < 3; ++axis) {
+    const ScaledFit stretched = fit_stretched(to_mm, from_better, axis);
+    const double gained_mm2 = rigid_mm2 - stretched.squares_mm2;
+    if (!(gained_mm2 > 0) || !(stretched.scale > 0)) continue;
+    const double axis_mm2 = localisation_rms_mm ? variance_mm2 : std::max(stretched.squares_mm2 / dof, finest_mm2);
+    const double stretch = std::abs(stretched.scale - 1);
+    // By how much the squares grow with the scale, the fit itself tells.
+    const double sigma = std::hypot(stretch * std::sqrt(axis_mm2 / gained_mm2), kSoundScale);
+    const double chance = std::min(1.0, 3 * chance_of(stretch / sigma));
+    if (chance >= out.axis_scale_chance) continue;
+    out.axis = axis;
+    out.axis_scale = stretched.scale;
+    out.axis_scale_sigma = sigma;
+    out.axis_scale_chance = chance;
+  }
   return out;
 }
 

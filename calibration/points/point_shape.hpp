@@ -24,6 +24,10 @@ struct PointShape {
   /// 0.2 % are what a sound CT and a sound tracker may differ by; and the probability that chance alone makes a scale
   /// that far from 1.
   double scale = 1, scale_sigma = 0, scale_chance = 1;
+  /// The same along one axis of `to` alone, as a CT has whose slices lie further apart than its file says: of the axis
+  /// (0 is x) that explains most. The chance counts that three axes were tried.
+  int axis = 0;
+  double axis_scale = 1, axis_scale_sigma = 0, axis_scale_chance = 1;
 };
 
 /// Fits `to` by `from` with turn, shift and scale, with and without a reflection (S. Umeyama, 1991). The sets are said

@@ -84,6 +84,10 @@ std::string list_of(const std::vector<std::size_t>& indices) {
   return text;
 }
 
+const char* axis_in_words(int axis) {
+  return axis == 0 ? "left to right" : axis == 1 ? "front to back" : "head to foot";
+}
+
 void judge_shape(Verdict& verdict, const FiducialsFound& out) {
   const FiducialJudgement& judged = out.judged;
   const calibration::PointShape& shape = judged.shape;
@@ -103,7 +107,13 @@ void judge_shape(Verdict& verdict, const FiducialsFound& out) {
                             shape.mirrored_fre_rms_mm, shape.fre_rms_mm),
                 "touch one more marker, off the plane of the others");
   }
-  if (judged.scale != Grade::pass) {
+  if (judged.scale != Grade::pass && judged.along_axis) {
+    verdict.add(judged.scale,
+                fmt::format("lengths from {} in the CT are {:.4g} times those that were touched (sigma {:.2g}); along "
+                            "the other axes they are not",
+                            axis_in_words(shape.axis), shape.axis_scale, shape.axis_scale_sigma),
+                "is the CT's spacing along this axis right, of a CT the distance of its slices? Import it again");
+  } else if (judged.scale != Grade::pass) {
     verdict.add(judged.scale,
                 fmt::format("lengths in the CT are {:.4g} times those that were touched (sigma {:.2g})", shape.scale,
                             shape.scale_sigma),
@@ -335,6 +345,9 @@ nlohmann::json fiducials_json(const FiducialInput& input, const FiducialsFound& 
   json["names"] = input.names;
   json["scale"] = out.judged.shape.scale;
   json["scale_sigma"] = out.judged.shape.scale_sigma;
+  json["axis_scale"] = out.judged.shape.axis_scale;
+  json["axis_scale_sigma"] = out.judged.shape.axis_scale_sigma;
+  json["axis"] = std::string(1, "xyz"[out.judged.shape.axis]);
   json["mirrored_fre_rms_mm"] = out.judged.shape.mirrored_fre_rms_mm;
   if (input.volume) {
     json["ct_outside"] = json["targets_outside"] = nlohmann::json::array();

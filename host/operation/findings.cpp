@@ -19,6 +19,16 @@ std::string mirrored_words(const calibration::PointShape& shape) {
   return words("fiducials_mirrored", shape.mirrored_fre_rms_mm, shape.fre_rms_mm);
 }
 
+std::string axis_words(int axis) {
+  return axis == 0 ? words("axis_x") : axis == 1 ? words("axis_y") : words("axis_z");
+}
+
+std::string scale_words(const FiducialJudgement& judged) {
+  const calibration::PointShape& shape = judged.shape;
+  return judged.along_axis ? words("fiducials_scale_axis", axis_words(shape.axis), shape.axis_scale)
+                           : words("fiducials_scale", shape.scale);
+}
+
 }  // namespace
 
 Result<CalibratedScope> calibrated_by_board(const GuidedCalibration& found, const std::string& made_utc) {
@@ -53,8 +63,8 @@ Result<TouchFit> register_by_touches(std::span<const Eigen::Vector3d> markers_in
   const auto odd = calibration::find_odd_points(fiducials, touched_in_tracker_mm);
   const auto judged = judge_fiducial_points(fiducials, touched_in_tracker_mm, std::nullopt, odd, nullptr);
   if (judged.mirrored) return Error{Errc::unsupported, mirrored_words(judged.shape)};
-  if (judged.scale == Grade::fail) return Error{Errc::unsupported, words("fiducials_scale", judged.shape.scale)};
-  if (judged.scale == Grade::marginal) out.doubt = words("fiducials_scale", judged.shape.scale);
+  if (judged.scale == Grade::fail) return Error{Errc::unsupported, scale_words(judged)};
+  if (judged.scale == Grade::marginal) out.doubt = scale_words(judged);
   if (judged.handedness_open) out.doubt = words("fiducials_flat");
   if (ct == nullptr) return out;
   if (auto inside = check_places(fiducials, *ct); !inside) return inside.error();

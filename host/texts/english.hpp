@@ -361,6 +361,12 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"fiducials_scale",
      "lengths in the CT are {:.4g} times those that were touched: is the spacing of the CT right, and the scale of the "
      "tracker?"},
+    {"fiducials_scale_axis",
+     "lengths from {} in the CT are {:.4g} times those that were touched, along the other axes they are not: is the "
+     "spacing of the CT right along that axis, as the distance of its slices?"},
+    {"axis_x", "left to right"},
+    {"axis_y", "front to back"},
+    {"axis_z", "head to foot"},
     {"fiducials_flat", "they are so flat that a mirror image fits as well: touch one more, off their plane"},
     {"fiducials_outside", "outside of the CT's body: fiducials at {} mm. {}"},
     {"fiducial_place", "({:.0f}, {:.0f}, {:.0f})"},

@@ -10,7 +10,9 @@ std::string broken_at_spaces(const std::string& text, float wide,
   std::string out, line;
   std::istringstream words(text);
   for (std::string word; std::getline(words, word, ' ');) {
-    const std::string longer = line.empty() ? word : line + ' ' + word;
+    std::string longer = line;
+    if (!longer.empty()) longer += ' ';
+    longer += word;
     if (!line.empty() && width_of(longer) > wide) {
       out += line + '\n';
       line = word;

@@ -26,8 +26,10 @@ FiducialJudgement judge_fiducial_points(std::span<const Eigen::Vector3d> ct_mm,
   out.handedness_open = shape.handedness == calibration::Handedness::cannot_tell && fits && ct_mm.size() > 3;
   // Points of another scale seem odd too: all of them fit with a scale as the sound ones would fit without.
   const bool one_is_off = !odd.named.empty() && odd.fre_without_rms_mm < shape.fre_rms_mm;
-  if (shape.scale_chance < kChanceOfScale && fits && !one_is_off)
-    out.scale = shape.scale_chance < kLeastChanceOfScale ? Grade::fail : Grade::marginal;
+  out.along_axis = shape.axis_scale_chance < shape.scale_chance;
+  const double chance = std::min(shape.scale_chance, shape.axis_scale_chance);
+  if (chance < kChanceOfScale && fits && !one_is_off)
+    out.scale = chance < kLeastChanceOfScale ? Grade::fail : Grade::marginal;
   if (ct == nullptr) return out;
   out.outside = points_outside(*ct, ct_mm);
   out.ras = look_like_ras(*ct, ct_mm);

@@ -23,6 +23,7 @@ struct FiducialJudgement {
   bool mirrored = false;             ///< a fail: one of the two sets is the other's mirror image
   bool handedness_open = false;      ///< marginal: they lie so nearly in a plane that this cannot be told
   Grade scale = Grade::pass;         ///< of lengths in the CT over those that were touched
+  bool along_axis = false;           ///< that scale is of one axis of the CT alone: shape.axis
   std::vector<std::size_t> outside;  ///< a fail: by index, those that are nowhere at the CT's patient
   bool ras = false;                  ///< all would be inside if their places were in RAS
   std::string ct_reach;              ///< where the CT lies, in words; empty without a CT

@@ -35,17 +35,19 @@ const Shapes kRound{{0, 0, 0}, {120, 10, 5}, {15, 140, -10}, {130, 150, 30}, {60
 const Shapes kFlat{{0, 0, 0}, {120, 10, 0.2}, {15, 140, -0.2}, {130, 150, 0.3}, {60, 70, 0}};
 
 TEST(PointShape, SoundSetsAreOfOneHandednessAndSize) {
-  int alarms = 0;
+  int alarms = 0, axis_alarms = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const Sets sets = sets_of(kRound, 0.7, seed, [](const Eigen::Vector3d& p) { return p; });
     const PointShape shape = compare_shapes(sets.to, sets.from);
     EXPECT_EQ(shape.handedness, Handedness::same);
     EXPECT_NEAR(shape.scale, 1, 0.03);
     alarms += shape.scale_chance < 0.01 ? 1 : 0;
+    axis_alarms += shape.axis_scale_chance < 0.01 ? 1 : 0;
     EXPECT_EQ(compare_shapes(sets.to, sets.from, 1.2).handedness, Handedness::same);
   }
   // 2 of 200 by chance, fewer by what sound instruments may differ by; 8 would be by chance in under 1 of 1000 runs.
   EXPECT_LT(alarms, 8);
+  EXPECT_LT(axis_alarms, 8);
 }
 
 TEST(PointShape, AMirrorImageIsTold) {

@@ -30,6 +30,11 @@ std::vector<Row> of_registration() {
             for (Vector& m : o.markers_mm) m *= 1.05;
             o.landmark_mm *= 1.05;
           }),
+      row("slices of the CT 5 % further apart than they were", Must::refuse, "lengths from head to foot",
+          [](Rehearsal& o) {
+            for (Vector& m : o.markers_mm) m.z() *= 1.05;
+            o.landmark_mm.z() *= 1.05;
+          }),
       row(
           "CT scaled by 1 %", Must::withhold, "",
           [](Rehearsal& o) {

@@ -76,5 +76,18 @@ TEST(FiducialJudgement, AScaleThatChanceDoesNotMakeFails) {
   EXPECT_EQ(judge_fiducial_points(kSound, scaled, std::nullopt, odd, nullptr).scale, Grade::fail);
 }
 
+TEST(FiducialJudgement, AScaleAlongOneAxisFailsAndTheAxisIsNamed) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Points ct_mm = kSound;
+    for (Eigen::Vector3d& place : ct_mm) place[axis] *= 1.04;
+    const FiducialJudgement out = judge_fiducial_points(ct_mm, touched(kSound, 1, 1), std::nullopt, {}, nullptr);
+    EXPECT_EQ(out.scale, Grade::fail) << axis;
+    EXPECT_TRUE(out.along_axis) << axis;
+    EXPECT_EQ(out.shape.axis, axis);
+    EXPECT_NEAR(out.shape.axis_scale, 1.04, 4 * out.shape.axis_scale_sigma);
+  }
+  EXPECT_FALSE(judged(kSound, 1.05, 1).along_axis) << "a scale of all axes is not one of one";
+}
+
 }  // namespace
 }  // namespace birdseye::host
