@@ -15,6 +15,8 @@ using Points = std::span<const Eigen::Vector3d>;
 
 constexpr double kClearOdds = 100;
 constexpr double kSoundScale = 0.002;
+// Along an axis with less spread (root mean square) one touch that is off looks like a stretch.
+constexpr double kLeastSpread_mm = 10;
 
 struct ScaledFit {
   double scale = 1, squares_mm2 = 0;
@@ -48,6 +50,14 @@ Eigen::Vector3d mean_of(Points points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : points) sum += point;
   return sum / static_cast<double>(points.size());
+}
+
+/// Root mean square, about the middle.
+double spread_mm(Points points, int axis) {
+  const double mean_mm = mean_of(points)[axis];
+  double squares_mm2 = 0;
+  for (const Eigen::Vector3d& point : points) squares_mm2 += (point[axis] - mean_mm) * (point[axis] - mean_mm);
+  return std::sqrt(squares_mm2 / static_cast<double>(points.size()));
 }
 
 /// Fits `to`, with lengths along one of its axes divided by a scale, by turn and shift of `from`: each in turn, which
@@ -116,6 +126,7 @@ PointShape compare_shapes(Points to_mm, Points from_mm, std::optional<double> lo
   for (std::size_t i = 0; i < to_mm.size(); ++i)
     rigid_mm2 += (to_mm[i] - rigid->rotation * from_better[i] - rigid->translation_mm).squaredNorm();
   for (int axis = 0; axis < 3; ++axis) {
+    if (spread_mm(to_mm, axis) < kLeastSpread_mm) continue;
     const ScaledFit stretched = fit_stretched(to_mm, from_better, axis);
     const double gained_mm2 = rigid_mm2 - stretched.squares_mm2;
     if (!(gained_mm2 > 0) || !(stretched.scale > 0)) continue;

@@ -25,7 +25,8 @@ struct PointShape {
   /// that far from 1.
   double scale = 1, scale_sigma = 0, scale_chance = 1;
   /// The same along one axis of `to` alone, as a CT has whose slices lie further apart than its file says: of the axis
-  /// (0 is x) that explains most. The chance counts that three axes were tried.
+  /// (0 is x) that explains most, of those along which the points spread by 10 mm. The chance counts that three axes
+  /// were tried.
   int axis = 0;
   double axis_scale = 1, axis_scale_sigma = 0, axis_scale_chance = 1;
 };
