@@ -23,17 +23,18 @@ struct ScaledFit {
   double from_squares_mm2 = 0;  ///< of the distances of `from` from its middle
 };
 
+Eigen::Vector3d mean_of(Points points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
 /// The rotation of the least-squares fit does not depend on the scale.
 ScaledFit fit_scaled(Points to_mm, Points from_mm) {
   ScaledFit out;
   const auto rigid = detail::fit_rigid(to_mm, from_mm);
   if (!rigid) return out;
-  const auto n = static_cast<double>(to_mm.size());
-  Eigen::Vector3d to_mean = Eigen::Vector3d::Zero(), from_mean = to_mean;
-  for (std::size_t i = 0; i < to_mm.size(); ++i) {
-    to_mean += to_mm[i] / n;
-    from_mean += from_mm[i] / n;
-  }
+  const Eigen::Vector3d to_mean = mean_of(to_mm), from_mean = mean_of(from_mm);
   double products_mm2 = 0;
   for (std::size_t i = 0; i < to_mm.size(); ++i) {
     const Eigen::Vector3d turned = rigid->rotation * (from_mm[i] - from_mean);
@@ -46,13 +47,7 @@ ScaledFit fit_scaled(Points to_mm, Points from_mm) {
   return out;
 }
 
-Eigen::Vector3d mean_of(Points points) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) sum += point;
-  return sum / static_cast<double>(points.size());
-}
-
-/// Root mean square, about the middle.
+/// Of the points along an axis, the root mean square distance from their middle.
 double spread_mm(Points points, int axis) {
   const double mean_mm = mean_of(points)[axis];
   double squares_mm2 = 0;
@@ -60,8 +55,8 @@ double spread_mm(Points points, int axis) {
   return std::sqrt(squares_mm2 / static_cast<double>(points.size()));
 }
 
-/// Fits `to`, with lengths along one of its axes divided by a scale, by turn and shift of `from`: each in turn, which
-/// ends within a few rounds, for a turn is no stretch.
+/// Fits `to`, with lengths along one of its axes divided by a scale, by turn and shift of `from`. Turn and shift are
+/// found for a scale, then the scale for them, and so on: as no turn is a stretch, a few rounds do.
 ScaledFit fit_stretched(Points to_mm, Points from_mm, int axis) {
   constexpr int kRounds = 30;
   ScaledFit out;

@@ -46,11 +46,12 @@ struct DemoFigures {
   double tracker_rate_hz = 0;
   int frames = 0;
   int frames_dropped = 0;
-  int frames_unproven = 0;                    ///< before the video had shown that it goes with the poses
-  int frames_without_overlay = 0;             ///< but for those
-  std::map<std::string, int> hidden_because;  ///< of those, how many for which reason; its figures left out
-  Drops drops;                                ///< frames among frames_dropped, and other messages
-  std::uint64_t board_frames_left_out = 0;    ///< for want of poses
+  int frames_unproven = 0;         ///< before the video had shown that it goes with the poses
+  int frames_without_overlay = 0;  ///< once the video had shown that
+  std::map<std::string, int>
+      hidden_because;  ///< how many of frames_without_overlay for which reason, without its figures
+  Drops drops;         ///< frames among frames_dropped, and other messages
+  std::uint64_t board_frames_left_out = 0;  ///< for want of poses
   double position_noise_mm = 0;
   double angle_noise_deg = 0;
   double wall_s = 0;

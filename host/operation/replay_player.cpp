@@ -58,8 +58,8 @@ void ReplayPlayer::take(const wire::Birds& birds) {
   }
 }
 
-/// As in the window, but that before the video has shown anything the overlay is drawn: nobody operates by a replay,
-/// and its verdict says so.
+/// The video is asked as in the window, with one difference: before the video has shown anything, the overlay is drawn.
+/// Nobody operates by a replay, and the replay's verdict says where the video never showed anything.
 void ReplayPlayer::watch(const wire::VideoFrame& frame) {
   if (!video_.take(frame, scope_).any()) return;
   done_.video_told = done_.video_told || video_.motion() != VideoAgreement::untold;

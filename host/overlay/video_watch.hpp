@@ -20,8 +20,8 @@ class VideoWatch {
     bool motion = false, field = false;  ///< that it says something else now
     [[nodiscard]] bool any() const { return motion || field; }
   };
-  /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, its own
-  /// tells.
+  /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, the poses
+  /// of the frames take their place.
   News take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
     const auto& pose = frame.info.pose.tracker_from_sensor;
     if (!single_poses_ && pose) motion_.take(frame.info.acquired, *pose);
