@@ -14,6 +14,7 @@
 #include "host/deform/deformed_volume.hpp"
 #include "host/deform/transform_file.hpp"
 #include "host/files/files_sha256.hpp"
+#include "host/files/registration_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/identity_json.hpp"
@@ -57,6 +58,7 @@ Result<Registered> read_registered(ExportOptions options) {
     if (fs::exists(options.views / "pose.txt", ignored)) options.model_pose = options.views / "pose.txt";
   }
   std::optional<Operation> operation;
+  std::optional<RegistrationFile> by_file;
   if (!options.operation.empty()) {
     auto kept = read_operation(options.operation);
     if (!kept) return kept.error();
@@ -65,9 +67,10 @@ Result<Registered> read_registered(ExportOptions options) {
     operation = *std::move(kept);
   }
   if (!options.registration.empty()) {
-    const auto matrix = read_pose(options.registration);
-    if (!matrix) return matrix.error();
-    read.patient_from_tracker = Transform<Patient, Tracker>::from_matrix(*matrix);
+    auto registration = read_registration(options.registration);
+    if (!registration) return registration.error();
+    read.patient_from_tracker = registration->patient_from_tracker;
+    by_file = *std::move(registration);
   }
   for (const fs::path* file : {&options.model_pose, &options.deformation}) {
     if (file->empty()) continue;
@@ -93,6 +96,13 @@ Result<Registered> read_registered(ExportOptions options) {
   if (operation && read.volume) {
     if (auto same = check_patient(*operation, ct_sha256(*read.volume), ""); !same)
       return same.error().with_context("--operation " + options.operation.string());
+  }
+  if (by_file && read.volume) {
+    if (auto same = check_ct(*by_file, ct_sha256(*read.volume)); !same)
+      return same.error().with_context(options.registration.string());
+    if (by_file->ct_sha256.empty())
+      fmt::print("note: {} does not say which CT it is of: that it is of this one, you answer for\n",
+                 options.registration.string());
   }
   if (read.field && read.volume) {
     if (auto covers = check_covers(*read.field, *read.volume); !covers)

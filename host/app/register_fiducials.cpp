@@ -13,8 +13,9 @@
 #include "host/case/fiducial_registration.hpp"
 #include "host/case/fiducial_report.hpp"
 #include "host/files/files_sha256.hpp"
-#include "host/files/text_files.hpp"
+#include "host/files/registration_file.hpp"
 #include "host/files/write_files.hpp"
+#include "host/overlay/ct_sha256.hpp"
 
 namespace birdseye::host {
 
@@ -58,7 +59,8 @@ Result<ExitCode> run(const RegisterFiducialsOptions& options) {
   if (!out) return out.error();
   const Verdict verdict = judge_fiducials(*out);
   const bool failed = verdict.grade == Grade::fail;
-  const std::string pose = pose_text(out->patient_from_tracker().matrix());
+  const std::string pose = registration_text(
+      {out->patient_from_tracker(), input->volume ? ct_sha256(*input->volume) : "", utc_now(), out->fit.fre_rms_mm});
   nlohmann::json json = fiducials_json(*input, *out, verdict);
   json["made_utc"] = utc_now();
   json["software"] = "birdseye " BIRDSEYE_VERSION;

@@ -17,7 +17,7 @@
 #include "host/app/ct_options.hpp"
 #include "host/app/overlay_options.hpp"
 #include "host/files/files_sha256.hpp"
-#include "host/files/text_files.hpp"
+#include "host/files/registration_file.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/reference_sensor.hpp"
 #include "host/operation/replay_player.hpp"
@@ -140,7 +140,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
   auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
   ShownChoice choice = options.shown;
-  choice.summed = setup->operation.has_value();
+  choice.summed = true;  // what is replayed by, and what is written, says which CT it is of
   const auto fiducials_inside = [&](const Volume& ct) -> Result<void> {
     if (!setup->by_touches || options.inputs.fiducials.empty()) return {};  // a window's were looked at there
     return check_places(setup->by_touches->fiducials_in_patient_mm, ct).with_context(options.inputs.fiducials.string());
@@ -151,6 +151,10 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (setup->operation) {
     if (auto same = check_patient(*setup->operation, shown->ct_sha256, shown->labels_sha256); !same)
       return same.error().with_context("--operation " + options.inputs.operation.string());
+  }
+  if (setup->by_file) {
+    if (auto same = check_ct(*setup->by_file, shown->ct_sha256); !same)
+      return same.error().with_context(options.inputs.patient_from_tracker.string());
   }
   const Volume* const volume = &shown->volume;
   const auto transfer = load_transfer_function(options.transfer);
@@ -194,7 +198,8 @@ Result<ExitCode> run(const ReplayOptions& options) {
   if (auto finished = player.finish(); !finished) return finished.error();
   const Verdict verdict = judge(player.done(), **reader, *setup, trust, remedies, options.motion_check);
   const std::string json = text_of(json_of(player.done(), *setup, trust, (*engine)->name(), shown->notes, verdict));
-  const std::string registration = pose_text(setup->setup().tracker_from_patient().inverse().matrix());
+  const std::string registration =
+      registration_text({setup->setup().tracker_from_patient().inverse(), shown->ct_sha256, "", setup->fre_mm});
   if (auto written = write_files({{options.out / "frames.csv", player.done().table},
                                   {options.out / "patient_from_tracker.txt", registration},
                                   {options.out / "replay.json", json},

@@ -10,6 +10,7 @@
 
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/registration_file.hpp"
 #include "host/files/sealed_text.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
@@ -77,7 +78,8 @@ Result<void> write_copies(const fs::path& folder, const Operation& operation) {
     fs::remove(folder / kHandEye, ignored);
   }
   if (const auto& found = operation.registered) {
-    copies.push_back({folder / kRegistration, pose_text(found->tracker_from_patient.inverse().matrix())});
+    copies.push_back({folder / kRegistration, registration_text({found->tracker_from_patient.inverse(),
+                                                                 operation.ct_sha256, "", found->fre_mm})});
   } else {
     fs::remove(folder / kRegistration, ignored);
   }

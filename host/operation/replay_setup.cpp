@@ -154,9 +154,11 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
   if (!inputs.fiducials.empty()) {
     if (auto done = register_anew(inputs, record, out); !done) return done;
   } else if (!inputs.patient_from_tracker.empty()) {
-    const auto read = read_transform<Patient, Tracker>(inputs.patient_from_tracker);
+    auto read = read_registration(inputs.patient_from_tracker);
     if (!read) return read.error();
-    out.tracker_from_patient = read->inverse();
+    out.tracker_from_patient = read->patient_from_tracker.inverse();
+    if (!out.fre_mm) out.fre_mm = read->fre_mm;
+    out.by_file = *std::move(read);
   } else {
     const auto read = read_transform<Tracker, Patient>(inputs.tracker_from_patient);
     if (!read) return read.error();

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host/files/registration_file.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/replay_hardware.hpp"
 #include "host/volume/volume.hpp"
@@ -38,8 +39,9 @@ struct ReplaySetup {
   std::size_t touches = 0;
   bool scope_from_files = false;  ///< lens and hand-eye, in place of a calibration record, which states its figures
   std::optional<Operation> operation{};
-  ReplayHardware hardware{};            ///< a person's own files hold with any: who gives them answers for them
-  std::vector<std::string> cautions{};  ///< in words, each a reason not to call the replay a pass
+  std::optional<RegistrationFile> by_file{};  ///< the registration, where a file brings it
+  ReplayHardware hardware{};                  ///< a person's own files hold with any: who gives them answers for them
+  std::vector<std::string> cautions{};        ///< in words, each a reason not to call the replay a pass
 
   [[nodiscard]] Setup setup() const { return scope.registered(tracker_from_patient * patient_from_model); }
 };

@@ -56,7 +56,7 @@ def matrix_text(a):
 
 
 def read_matrix(path):
-    return [[float(v) for v in line.split()] for line in Path(path).read_text().splitlines() if line.strip()][:4]
+    return [[float(v) for v in line.split()] for line in Path(path).read_text().splitlines() if line.strip() and line[0] != "#"][:4]
 
 
 def table_line(a, time_s=None):

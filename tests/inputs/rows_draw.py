@@ -1,4 +1,6 @@
 """birdseye render, replay, export and bench."""
+import hashlib
+
 import boards
 import draw
 import motion
@@ -65,6 +67,20 @@ def transfer(folder):
 def registration(folder):
     ct(folder)
     (folder / "patient_from_tracker.txt").write_text(motion.matrix_text(motion.inverse(rows_register.TRACKER_FROM_PATIENT)))
+
+
+def sealed_registration(folder):
+    """As register fiducials writes it, of a CT of which nothing is here."""
+    ct(folder)
+    text = ("# patient_from_tracker of birdseye, mm; do not edit: a sum binds it\n# {\"ct_sha256\":\"" + 64 * "a" + "\"}\n" +
+            motion.matrix_text(motion.inverse(rows_register.TRACKER_FROM_PATIENT)))
+    (folder / "patient_from_tracker.txt").write_text(text + "# sha256 " + hashlib.sha256(text.encode()).hexdigest() + "\n")
+
+
+def edited_registration(folder):
+    sealed_registration(folder)
+    path = folder / "patient_from_tracker.txt"
+    path.write_text(path.read_text().replace("\n0 0 0 1", "\n0 0 0 1.0"))
 
 
 def no_rotation(folder):
@@ -151,6 +167,10 @@ ROWS = [
         says=["--camera|calibration|session"]),
 
     Row("export", "good", "a registration and its CT", "CT and transforms for Slicer, pass", EXPORT, 0, registration, "pass", writes=["out/*"]),
+    Row("export", "wrong", "a registration of another CT", "refused: of another CT", EXPORT, 2, sealed_registration,
+        says=["patient_from_tracker.txt: is of another CT"]),
+    Row("export", "wrong", "a registration that was edited since", "refused: it was changed", EXPORT, 2, edited_registration,
+        says=["patient_from_tracker.txt: was changed"]),
     Row("export", "wrong", "a matrix that is no rotation", "refused: it is named", EXPORT, 2, no_rotation,
         says=["patient_from_tracker.txt", "rotation"]),
     Row("export", "wrong", "nothing to export", "refused: what to give", "birdseye export --out out", 2, says=["--registration|--volume"]),

@@ -4,6 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "host/files/registration_file.hpp"
 #include "host/operation/decision_log.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/snapshot.hpp"
@@ -155,11 +156,11 @@ TEST(ReplayCommand, RegistersAnewByTheTouchesInTheRecording) {
   const auto json = read_json(scratch / "o/replay.json");
   EXPECT_EQ(json["touches"], 4);
   EXPECT_LT(json["fre_mm"], 0.5);
-  std::istringstream pose(contents_of(scratch / "o/patient_from_tracker.txt"));
-  std::vector<double> numbers(16);
-  for (double& number : numbers) pose >> number;
-  EXPECT_NEAR(numbers[0], 1, 1e-2);
-  EXPECT_NEAR(numbers[3], 5, 0.5);
+  const auto kept = host::read_registration(scratch / "o/patient_from_tracker.txt");
+  ASSERT_TRUE(kept) << kept.error().what;
+  EXPECT_NEAR(kept->patient_from_tracker.matrix()(0, 0), 1, 1e-2);
+  EXPECT_NEAR(kept->patient_from_tracker.matrix()(0, 3), 5, 0.5);
+  EXPECT_EQ(kept->ct_sha256.size(), 64U);
 }
 
 TEST(ReplayCommand, WhatCannotBeReplayedIsRefused) {
@@ -337,7 +338,8 @@ TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
   EXPECT_EQ(done.figures["frames_overlaid"], 6) << done.output;
   EXPECT_EQ(done.reasons[6], "the operation's calibration is of tracker unit_serial 4711; this one's is 4712");
   EXPECT_EQ(done.figures["fre_mm"], 0.3);
-  // The copies beside it are nobody's word.
+  // The copies beside it are nobody's word; one taken for itself says of which CT it is.
+  const std::string copy = scratch.file("copy.txt", contents_of(scratch / "patient_from_tracker.txt"));
   const std::string pictures = done.figures["pictures_crc32"];
   (void)scratch.file("patient_from_tracker.txt", "1 0 0 20\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
   EXPECT_EQ(replay(scratch, "r", arguments).figures["pictures_crc32"], pictures);
@@ -354,6 +356,8 @@ TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
   refused("replay " + (scratch / "r").string() + by_operation + " --out " + (scratch / "none").string(),
           {"--operation", "is of another CT"});
   refused("export" + by_operation + " --out " + (scratch / "none").string(), {"--operation", "is of another CT"});
+  refused("export --volume " + ct + " --registration " + copy + " --out " + (scratch / "none").string(),
+          {"copy.txt: is of another CT"});
   refused("render" + by_operation + " --pose " + scratch.file("pose.txt", kIdentityPose) + " --out " +
               (scratch / "none").string() + ".png",
           {"--operation", "is of another CT"});
