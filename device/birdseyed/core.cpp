@@ -71,10 +71,16 @@ void Core::note(const InstrumentChanged& changed) {
   if (changed.instrument == Instrument::tracker) {
     if (running && settings_.field) field_fault_ = calibration::field_misfit(settings_.field_of, changed.identity);
     // What was half received will not be completed, and a unit that starts again has another beat.
-    if (assembler_) add(counted_, assembler_->counters());
+    if (assembler_) {
+      add(counted_, assembler_->counters());
+      noise_ = assembler_->noise();
+    }
     assembler_.reset();
     for (BirdState& bird : birds_) bird = {};
-    if (running && changed.layout) assembler_.emplace(*changed.layout);
+    if (running && changed.layout) {
+      assembler_.emplace(*changed.layout);
+      assembler_->expect(noise_);
+    }
   }
   if (changed.instrument == Instrument::camera && running) {
     frame_clock_.restart(changed.rate_hz, changed.exposure);

@@ -83,7 +83,8 @@ class Core {
   CoreSettings settings_;
   InstrumentBoard board_;
   std::optional<drivers::minibird::MeasurementAssembler> assembler_;
-  drivers::minibird::MiniBirdCounters counted_;  ///< by the assemblers before this one
+  drivers::minibird::MiniBirdCounters counted_;             ///< by the assemblers before this one
+  std::vector<drivers::minibird::BirdGuard::Noise> noise_;  ///< as the one before knew it
   std::uint64_t clock_events_ = 0, unmapped_ = 0;
   std::string field_fault_;  ///< why the map is not of this tracker's field
   std::vector<BirdState> birds_;

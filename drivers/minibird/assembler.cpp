@@ -24,6 +24,16 @@ MeasurementAssembler::MeasurementAssembler(const StreamLayout& layout)
   for (const BirdLayout& bird : layout_.birds) guards_.emplace_back(bird, layout_.plausibility);
 }
 
+std::vector<BirdGuard::Noise> MeasurementAssembler::noise() const {
+  std::vector<BirdGuard::Noise> out;
+  for (const BirdGuard& guard : guards_) out.push_back(guard.noise());
+  return out;
+}
+
+void MeasurementAssembler::expect(const std::vector<BirdGuard::Noise>& noise) {
+  for (std::size_t i = 0; i < std::min(noise.size(), guards_.size()); ++i) guards_[i].expect(noise[i]);
+}
+
 MiniBirdCounters MeasurementAssembler::counters() const {
   MiniBirdCounters counters = counters_;
   counters.phase_errors = parser_.phase_errors();

@@ -19,6 +19,10 @@ class MeasurementAssembler {
  public:
   explicit MeasurementAssembler(const StreamLayout& layout);
 
+  /// What the birds' noise was like, by address; and for a stream that begins, what it was before.
+  [[nodiscard]] std::vector<BirdGuard::Noise> noise() const;
+  void expect(const std::vector<BirdGuard::Noise>& noise);
+
   /// The measurements that these bytes complete, oldest first. A measurement of which records are missing is complete
   /// when a record of the next one has come.
   std::vector<Measurement> push(const Chunk& chunk);

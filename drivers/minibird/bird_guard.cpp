@@ -58,9 +58,16 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vecto
   ++repeats_;
   if (limits_.frozen_after <= 0) return std::nullopt;
   const double moved_mm = speed_mm_s_ * std::min(gap_between(repeated_since_, time), kTrackHolds).seconds();
-  const bool noise_is_gone = repeats_ >= limits_.frozen_after && restless_ > kRestless;
+  const int most =
+      noise_is_plain() ? std::min(limits_.frozen_after_plain_noise, limits_.frozen_after) : limits_.frozen_after;
+  const bool noise_is_gone = repeats_ >= most && noise_.restless > kRestless;
   if (!noise_is_gone && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
   return Objection{DoubtKind::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
+}
+
+/// Whether a record that repeats says of itself that the sensor does not.
+bool BirdGuard::noise_is_plain() const {
+  return limits_.frozen_after > 0 && noise_.restless > kRestless && noise_.back_counts >= limits_.frozen_noise_counts;
 }
 
 bool BirdGuard::within_reach(const Sample& from, const Sample& to) const {
@@ -136,7 +143,9 @@ void BirdGuard::follow(const Sample& sample) {
   if (!sample.time_certain) return;
   if (repeats_ > 0 || track_.size() < 2) return;
   const Eigen::Vector3d way_mm = track_.back().position_mm - track_[track_.size() - 2].position_mm;
-  restless_ += kNoiseMemory * ((way_mm.dot(last_way_mm_) < 0 ? 1 : 0) - restless_);
+  const bool back = way_mm.dot(last_way_mm_) < 0;
+  noise_.restless += kNoiseMemory * ((back ? 1 : 0) - noise_.restless);
+  if (back) noise_.back_counts += kNoiseMemory * (way_mm.norm() / layout_.mm_per_count - noise_.back_counts);
   last_way_mm_ = way_mm;
   const double seconds = (track_.back().time - track_.front().time).seconds();
   speed_mm_s_ =
@@ -155,7 +164,9 @@ BirdGuard::Objection BirdGuard::place(Sample sample) {
     return doubt_of_side(reported_mm, mirrored);
   }
   // Off the track. Either this is wrong, or the sensor is elsewhere: then the next readings agree with this one.
-  agreeing_ = candidate_ && within_reach(*candidate_, sample) ? agreeing_ + 1 : 0;
+  // The same record once more is no other reading, where noise would have changed it.
+  const bool another = repeats_ == 0 || !noise_is_plain();
+  agreeing_ = candidate_ && another && within_reach(*candidate_, sample) ? agreeing_ + 1 : 0;
   if (agreeing_ >= (lost_sight ? limits_.start_confirms : limits_.step_confirms)) {
     track_.clear();
     follow(sample);

@@ -18,6 +18,14 @@ class BirdGuard {
  public:
   BirdGuard(const BirdLayout& layout, const Plausibility& limits) : layout_(layout), limits_(limits) {}
 
+  /// What a bird's noise was like. It outlives the stream: a unit that starts again has the noise that it had.
+  struct Noise {
+    double restless = 0;     ///< how often, of late, a way led back: noise is there
+    double back_counts = 0;  ///< how far such a way was, on average
+  };
+  [[nodiscard]] const Noise& noise() const { return noise_; }
+  void expect(const Noise& noise) { noise_ = noise; }
+
   /// Judges one reading. Where its time is not certain, its place is judged but no speed is computed from it.
   BirdReading judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain = true);
 
@@ -40,6 +48,7 @@ class BirdGuard {
   [[nodiscard]] Objection doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const;
   /// Does the position, after the track, look like the negative of where the sensor is?
   [[nodiscard]] bool is_mirrored(const Sample& sample) const;
+  [[nodiscard]] bool noise_is_plain() const;
   [[nodiscard]] bool within_reach(const Sample& from, const Sample& to) const;
   bool on_track(const Sample& sample);
   [[nodiscard]] std::optional<Eigen::Vector3d> predicted_mm(DeviceTime time) const;
@@ -57,7 +66,7 @@ class BirdGuard {
   int repeats_ = 0;
   double speed_mm_s_ = 0;                                  ///< when the words last changed
   Eigen::Vector3d last_way_mm_ = Eigen::Vector3d::Zero();  ///< from the reading before
-  double restless_ = 0;                                    ///< how often, of late, a way led back: noise is there
+  Noise noise_;
 };
 
 }  // namespace birdseye::drivers::minibird

@@ -20,6 +20,10 @@ struct Plausibility {
   /// Noise keeps records from repeating exactly. Where there was noise, a reading is frozen after so many equal
   /// records. 0: never.
   int frozen_after = 100;
+  /// The same where the noise was plain, of frozen_noise_counts and more from one record to the next: then a record
+  /// hardly ever repeats.
+  int frozen_after_plain_noise = 8;
+  double frozen_noise_counts = 4;
   double frozen_moved_mm = 2;        ///< frozen at once, where the speed until then would have moved the sensor so far
   double hemisphere_border_mm = 15;  ///< so near the plane through the transmitter, p and -p are not told apart
   /// After a flip and a gap of at most this, the sensor is still taken to be where it was.

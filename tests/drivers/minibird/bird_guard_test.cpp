@@ -45,6 +45,9 @@ class Watch {
     return poses;
   }
 
+  [[nodiscard]] const BirdGuard::Noise& noise() const { return guard_.noise(); }
+  void expect(const BirdGuard::Noise& noise) { guard_.expect(noise); }
+
   double seconds = 0;
   bool time_certain = true;
 
@@ -153,14 +156,33 @@ TEST(BirdGuard, SaturationAndTheEndOfTheScaleAreNamed) {
 
 TEST(BirdGuard, ARecordThatRepeatsWhereThereWasNoiseIsFrozen) {
   Watch watch;
-  watch.see_often(60, kHere);
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
-  const BirdReading frozen = watch.see(kHere, Matrix3d::Identity(), 0);
+  for (int i = 0; i < 60; ++i) watch.see(kHere, Matrix3d::Identity(), 0.03);  // a count, now and then the same record
+  const Vector3d beside = kHere + Vector3d(0.4, 0, 0);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(watch.see(beside, Matrix3d::Identity(), 0).pose) << i;
+  const BirdReading frozen = watch.see(beside, Matrix3d::Identity(), 0);
   EXPECT_EQ(frozen.kind, DoubtKind::frozen);
   EXPECT_THAT(frozen.doubt, HasSubstr("101 times"));
-  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(beside, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   watch.see(kHere);
   EXPECT_EQ(watch.see_often(10, kHere), 10);
+}
+
+TEST(BirdGuard, WhereTheNoiseWasPlainItIsFrozenAfterAFewRecords) {
+  Watch watch;
+  watch.see_often(60, kHere);
+  for (int i = 0; i < 8; ++i) ASSERT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+  EXPECT_EQ(watch.see(kHere, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
+}
+
+/// The unit was powered off and on: the sensor's noise is what it was.
+TEST(BirdGuard, ANewStreamThatRepeatsItselfFromTheStartIsFrozenWhereTheOneBeforeHadNoise) {
+  Watch before, after;
+  before.see_often(60, kHere);
+  after.expect(before.noise());
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(after.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+  EXPECT_EQ(after.see(kHere, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
+  after.see(kHere);
+  EXPECT_EQ(after.see_often(10, kHere), 10);
 }
 
 TEST(BirdGuard, WhereThereNeverWasNoiseARepeatedRecordIsASensorAtRest) {
