@@ -13,10 +13,9 @@ namespace {
 double chi_square_quantile(double probability, double dof) {
   double low = 0;
   double high = dof + 20 * std::sqrt(2 * dof);
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
+  // Until no number lies between them.
+  for (double middle = 0.5 * high; low < middle && middle < high; middle = 0.5 * (low + high))
     (1 - chi_square_tail(middle, dof) < probability ? low : high) = middle;
-  }
   return high;
 }
 

@@ -122,10 +122,14 @@ bool ClockLine::is_clear_step(const Run& run) const {
 double ClockLine::look_for_late() {
   Run longest;
   double least = recent_.back().late_ns;
+  double of_least = doubt_of(least);
   for (std::size_t n = 1; n <= recent_.size(); ++n) {
-    least = std::min(least, recent_[recent_.size() - n].late_ns);
+    if (const double late = recent_[recent_.size() - n].late_ns; late < least) {
+      least = late;
+      of_least = doubt_of(least);
+    }
     if (least <= 0) break;
-    const double doubt = static_cast<double>(n) * doubt_of(least);
+    const double doubt = static_cast<double>(n) * of_least;
     if (doubt >= longest.doubt) {
       longest.doubt = doubt;
       longest.length = n;
