@@ -1,6 +1,7 @@
 # What the host and the simulator's pictures need, and the appliance does not.
 find_package(TBB REQUIRED)
 find_package(Boost 1.74 REQUIRED COMPONENTS context)
+find_package(SQLite3 REQUIRED)
 find_package(Ceres REQUIRED)
 find_package(NLopt REQUIRED)
 find_package(embree 3 REQUIRED)

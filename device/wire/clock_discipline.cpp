@@ -6,6 +6,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "drivers/system/time_keeper.hpp"
+
 namespace birdseye::wire {
 
 ClockDiscipline decode_discipline(const timex& reading, int state) {
@@ -22,6 +24,7 @@ ClockDiscipline decode_discipline(const timex& reading, int state) {
 }
 
 Result<ClockDiscipline> read_clock_discipline() {
+  if (TimeKeeper::present() != nullptr) return Error{Errc::unsupported, "a simulator keeps the time"};
   timex reading{};
   const int state = ::adjtimex(&reading);
   if (state < 0) {

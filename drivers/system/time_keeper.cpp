@@ -1,21 +1,20 @@
 #include "drivers/system/time_keeper.hpp"
 
-#include <atomic>
-
 namespace birdseye {
 
 namespace {
 
-std::atomic<TimeKeeper*> keeper_in_place = nullptr;
+// Of the one thread that a simulator's fibers are of: what runs beside it, as who watches standard input, is not its own.
+thread_local TimeKeeper* keeper_in_place = nullptr;
 
 }  // namespace
 
 TimeKeeper* TimeKeeper::present() {
-  return keeper_in_place.load(std::memory_order_acquire);
+  return keeper_in_place;
 }
 
 void TimeKeeper::put(TimeKeeper* keeper) {
-  keeper_in_place.store(keeper, std::memory_order_release);
+  keeper_in_place = keeper;
 }
 
 }  // namespace birdseye

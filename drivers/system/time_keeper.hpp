@@ -31,9 +31,9 @@ class TimeKeeper {
   };
   virtual std::shared_ptr<Thread> start(std::function<void()> work) = 0;
 
-  /// Null: time is the machine's.
+  /// For the calling thread of the machine. Null: its time is the machine's.
   static TimeKeeper* present();
-  /// keeper: outlives its being here. Null: none from now on.
+  /// The same. keeper: outlives its being here. Null: none from now on.
   static void put(TimeKeeper* keeper);
 };
 

@@ -23,12 +23,16 @@ LiveSource::LiveSource(std::string name, Connect::Work connect)
 }
 
 std::unique_ptr<LiveSource> LiveSource::of_appliance(const std::string& address, const wire::ForeignSettings& foreign) {
-  const auto connect = [address, foreign](const std::stop_token&, const Connect::Say&) -> Result<Connection> {
-    auto client = connect_appliance(address, foreign);
+  return of_client(address, [address, foreign] { return connect_appliance(address, foreign); });
+}
+
+std::unique_ptr<LiveSource> LiveSource::of_client(const std::string& name, const Client& connect_client) {
+  const auto connect = [connect_client](const std::stop_token&, const Connect::Say&) -> Result<Connection> {
+    auto client = connect_client();
     if (!client) return client.error();
     return Connection{nullptr, *std::move(client)};
   };
-  return std::unique_ptr<LiveSource>(new LiveSource(address, connect));
+  return std::unique_ptr<LiveSource>(new LiveSource(name, connect));
 }
 
 std::unique_ptr<LiveSource> LiveSource::of_simulator(SimulatedCartSettings settings) {

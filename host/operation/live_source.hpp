@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,6 +22,9 @@ class LiveSource {
  public:
   static std::unique_ptr<LiveSource> of_appliance(const std::string& address,
                                                   const wire::ForeignSettings& foreign = {});
+  /// The same, by what connects, on a thread of its own. name: of the other side, for people.
+  using Client = std::function<Result<std::unique_ptr<wire::Client>>()>;
+  static std::unique_ptr<LiveSource> of_client(const std::string& name, const Client& connect_client);
   /// Makes the patient in settings.folder first.
   static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
 

@@ -11,7 +11,7 @@ namespace birdseye::host {
 
 LiveWorkflow::LiveWorkflow(LiveSettings settings)
     : settings_(std::move(settings)),
-      patient_(settings_.transfer, settings_.engine),
+      patient_(settings_.transfer, settings_.engine, settings_.make_engine),
       keeper_(settings_.out, settings_.resume) {
   use_reference(settings_.reference);
   if (!settings_.patient.ct.path.empty()) load(settings_.patient);

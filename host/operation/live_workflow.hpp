@@ -28,6 +28,7 @@ namespace birdseye::host {
 struct LiveSettings {
   PatientFiles patient;
   std::string transfer = "tumour-and-vessels", engine = "cpu";
+  EngineMaker make_engine = engine_by_name;
   std::string scope = "scope", pointer = "pointer";  ///< birds, by their names
   std::string reference;  ///< the bird that is fixed on patient or table; empty: the one that the appliance names
   std::optional<calibration::Pattern> pattern;       ///< the board to calibrate with

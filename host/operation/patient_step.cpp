@@ -7,7 +7,13 @@
 
 namespace birdseye::host {
 
-PatientStep::PatientStep(const std::string& transfer, std::string engine) : engine_name_(std::move(engine)) {
+Result<std::unique_ptr<Engine>> engine_by_name(const std::string& name, const Volume& volume,
+                                               const TransferFunction& transfer) {
+  return make_on_own_thread([&] { return make_engine(name, volume, transfer); });
+}
+
+PatientStep::PatientStep(const std::string& transfer, std::string engine, EngineMaker make_engine)
+    : engine_name_(std::move(engine)), make_engine_(std::move(make_engine)) {
   auto loaded = load_transfer_function(transfer);
   if (loaded) {
     transfer_ = std::make_shared<const TransferFunction>(*std::move(loaded));
@@ -16,12 +22,12 @@ PatientStep::PatientStep(const std::string& transfer, std::string engine) : engi
   }
 }
 
-/// On a thread of its own: the window's OpenGL stays the window's. The engine draws from the plan, and keeps it.
-Result<std::shared_ptr<Engine>> PatientStep::make(const std::string& name,
+/// The engine draws from the plan, and keeps it.
+Result<std::shared_ptr<Engine>> PatientStep::make(const EngineMaker& maker, const std::string& name,
                                                   const std::shared_ptr<const PatientPlan>& plan,
                                                   const Transfer& transfer) {
   if (!transfer) return Error{Errc::bad_value, words("note_no_transfer")};
-  auto made = make_on_own_thread([&] { return make_engine(name, plan->shown, *transfer); });
+  auto made = maker(name, plan->shown, *transfer);
   if (!made) return made.error();
   return std::shared_ptr<Engine>(made->release(), [plan](Engine* engine) { delete engine; });
 }
@@ -29,12 +35,13 @@ Result<std::shared_ptr<Engine>> PatientStep::make(const std::string& name,
 void PatientStep::load(const PatientFiles& files) {
   files_ = files;
   transfer_is_newer_ = false;
-  loading_.start([files, name = engine_name_, transfer = transfer_](const std::stop_token& stop, const auto& say) {
+  loading_.start([files, maker = make_engine_, name = engine_name_, transfer = transfer_](const std::stop_token& stop,
+                                                                                          const auto& say) {
     say(words("note_reading_ct"));
     auto read = read_patient(files, stop);
     if (!read) return Result<Loaded>(read.error());
     auto plan = std::make_shared<const PatientPlan>(*std::move(read));
-    auto engine = make(name, plan, transfer);
+    auto engine = make(maker, name, plan, transfer);
     return Result<Loaded>(Loaded{std::move(plan), std::move(engine), transfer});
   });
 }
@@ -108,8 +115,9 @@ void PatientStep::set_transfer(const TransferFunction& transfer) {
 void PatientStep::recolour() {
   if (!transfer_is_newer_ || !plan_ || recolouring_.running()) return;
   transfer_is_newer_ = false;
-  recolouring_.start([plan = plan_, name = engine_name_, transfer = transfer_](const std::stop_token&, const auto&) {
-    auto engine = make(name, plan, transfer);
+  recolouring_.start([plan = plan_, maker = make_engine_, name = engine_name_, transfer = transfer_](
+                         const std::stop_token&, const auto&) {
+    auto engine = make(maker, name, plan, transfer);
     return Loaded{plan, std::move(engine), transfer};
   });
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,11 +14,18 @@
 
 namespace birdseye::host {
 
+/// By which the engine is made that draws a CT; a simulator that looks at no picture gives its own.
+using EngineMaker = std::function<Result<std::unique_ptr<Engine>>(const std::string& name, const Volume& volume,
+                                                                  const TransferFunction& transfer)>;
+/// It draws on a thread of its own: the window's OpenGL stays the window's.
+Result<std::unique_ptr<Engine>> engine_by_name(const std::string& name, const Volume& volume,
+                                               const TransferFunction& transfer);
+
 /// Reads the patient, finds the fiducials in the CT, and makes the engine that draws it: each on a thread of its own.
 class PatientStep {
  public:
   /// transfer: a preset or a file; engine: its name.
-  PatientStep(const std::string& transfer, std::string engine);
+  PatientStep(const std::string& transfer, std::string engine, EngineMaker make_engine = engine_by_name);
 
   /// Of one that is still being read nothing comes any more.
   void load(const PatientFiles& files);
@@ -63,13 +71,14 @@ class PatientStep {
     Result<std::shared_ptr<Engine>> engine;
     Transfer transfer;  ///< that the engine draws by
   };
-  static Result<std::shared_ptr<Engine>> make(const std::string& name, const std::shared_ptr<const PatientPlan>& plan,
-                                              const Transfer& transfer);
+  static Result<std::shared_ptr<Engine>> make(const EngineMaker& maker, const std::string& name,
+                                              const std::shared_ptr<const PatientPlan>& plan, const Transfer& transfer);
   bool use(const Loaded& loaded);
   void recolour();
 
   PatientFiles files_;
   std::string engine_name_, fault_, engine_fault_;
+  EngineMaker make_engine_;
   Transfer transfer_, drawn_by_;
   bool transfer_is_newer_ = false;  ///< than what engine_, or that of the CT that is being read, draws by
   std::shared_ptr<const PatientPlan> plan_;

@@ -5,7 +5,9 @@
 #include "drivers/system/interrupt.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/starter.hpp"
+#include "hw-sim/app/campaign_command.hpp"
 #include "hw-sim/app/instruments.hpp"
+#include "hw-sim/app/operation_command.hpp"
 #include "hw-sim/case/registration_case.hpp"
 #include "hw-sim/phantom/phantom.hpp"
 #include "hw-sim/world/cart.hpp"
@@ -36,6 +38,9 @@ int main(int argc, char** argv) {
     code = 2;
   };
 
+  bool broken = false;
+  hw_sim::add_operation_command(app, take, broken);
+  hw_sim::add_campaign_command(app, take, broken);
   hw_sim::PhantomSettings phantom;
   CLI::App& make = *app.add_subcommand("phantom", "write a patient: DICOM series, labels, surfaces, truth");
   make.add_option("--out", phantom.folder, "folder to write")->required();
@@ -153,5 +158,6 @@ int main(int argc, char** argv) {
     take(hw_sim::write_case(registration));
   });
 
-  return run_program<CLI::ParseError>(app, argc, argv, [&code] { return code; });
+  return run_program<CLI::ParseError>(
+      app, argc, argv, [&] { return code == 0 && broken ? static_cast<int>(ExitCode::verdict_fail) : code; });
 }

@@ -1,0 +1,124 @@
+#include "hw-sim/app/operation_command.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "host/files/write_files.hpp"
+#include "hw-sim/campaign/operation_results.hpp"
+#include "hw-sim/faults/fault_script.hpp"
+#include "hw-sim/operation/operation.hpp"
+#include "hw-sim/operation/shortest_script.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+struct OperationOptions {
+  SimulatedOperation operation;
+  std::filesystem::path script, log, faults;
+  bool line = false, shortest = false;
+};
+
+OperationResult result_of(const SimulatedOperation& operation, const OperationOutcome& out) {
+  OperationResult result;
+  result.seed = operation.seed;
+  result.minutes = operation.minutes;
+  result.laws_broken = out.broken.size();
+  for (const BrokenLaw& law : out.broken)
+    result.broken += fmt::format("{}{:.3f} s {}: {}", result.broken.empty() ? "" : "; ", law.at_s, law.law, law.what);
+  result.hash = fmt::format("{:016x}", out.hash);
+  const OperationLaws::Figures& laws = out.laws;
+  result.faults = laws.faults;
+  result.faults_alone = laws.faults_judged;
+  result.poses = laws.poses;
+  result.frames = laws.frames;
+  result.shown = laws.shown;
+  result.overlaid = laws.overlaid;
+  result.green = laws.green;
+  result.beyond = laws.beyond;
+  result.registrations = out.registrations;
+  result.checks = out.checks;
+  result.worst_pose = laws.worst_pose;
+  result.worst_age_ms = laws.worst_age_ms;
+  result.worst_circles = laws.worst_circles;
+  result.slowest_named_s = laws.slowest_named_s;
+  result.slowest_over_s = laws.slowest_over_s;
+  return result;
+}
+
+/// The first law that was broken, by as few faults as still break it.
+Result<void> print_shortest(const SimulatedOperation& operation, const OperationOutcome& out) {
+  constexpr double kAfter_s = 12;  // a law may be judged some seconds after what it judges
+  const std::string law = out.broken.front().law;
+  SimulatedOperation shorter = operation;
+  shorter.minutes = std::min(operation.minutes, (out.broken.front().at_s + kAfter_s) / 60);
+  std::optional<Error> failed;
+  const auto breaks = [&](const FaultScript& script) {
+    shorter.faults = script;
+    const auto tried = run_operation(shorter);
+    if (!tried) failed = tried.error();
+    return tried && std::ranges::any_of(tried->broken, [&](const BrokenLaw& one) { return one.law == law; });
+  };
+  FaultScript script = out.faults;
+  if (!breaks(script)) shorter.minutes = operation.minutes;
+  script = shortest_script(script, breaks);
+  if (failed) return *failed;
+  fmt::print("# {} is broken within {:.2f} minutes of seed {} by:\n{}", law, shorter.minutes, operation.seed,
+             text_of(script));
+  return {};
+}
+
+void print(const OperationOutcome& out, const OperationResult& result) {
+  const double share = result.shown > 0 ? static_cast<double>(result.green) / static_cast<double>(result.shown) : 0;
+  for (const BrokenLaw& law : out.broken) fmt::print("broken at {:.3f} s: {}: {}\n", law.at_s, law.law, law.what);
+  fmt::print("seed {}: {:g} minutes, {} faults ({} of them alone), {} poses, {} frames, {} registrations, {} checks\n",
+             result.seed, result.minutes, result.faults, result.faults_alone, result.poses, result.frames,
+             result.registrations, result.checks);
+  fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
+             100 * share, result.beyond, result.green, result.worst_circles, result.worst_age_ms);
+  fmt::print("worst pose {:.2f} of what it may be off; faults named within {:.2f} s, over within {:.2f} s\n",
+             result.worst_pose, result.slowest_named_s, result.slowest_over_s);
+  fmt::print("{} laws broken; hash {}\n", result.laws_broken, result.hash);
+}
+
+Result<void> run(const OperationOptions& options, bool& broken) {
+  SimulatedOperation operation = options.operation;
+  if (!options.script.empty()) {
+    auto script = read_fault_script(options.script, Instruments::both, operation.seed);
+    if (!script) return script.error();
+    operation.faults = *std::move(script);
+  }
+  spdlog::set_level(spdlog::level::off);  // the appliance's own log: what it says to the host is in ours
+  const auto out = run_operation(operation);
+  if (!out) return out.error();
+  if (auto written = host::write_files({{options.log, out->log}, {options.faults, text_of(out->faults)}}); !written)
+    return written;
+  const OperationResult result = result_of(operation, *out);
+  options.line ? fmt::print("{}\n", line_of(result)) : print(*out, result);
+  broken = result.laws_broken > 0;
+  return broken && options.shortest ? print_shortest(operation, *out) : Result<void>();
+}
+
+}  // namespace
+
+void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
+  const auto options = std::make_shared<OperationOptions>();
+  CLI::App& command = *app.add_subcommand(
+      "operation", "one operation in virtual time, with faults at random: whether anything breaks a law");
+  command.add_option("--seed", options->operation.seed, "everything random follows from it");
+  command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
+  command.add_option("--script", options->script, "these faults (TOML) in place of random ones");
+  command.add_option("--log", options->log, "write what happened to this file");
+  command.add_option("--faults", options->faults, "write the faults that befell to this file, as --script takes them");
+  command.add_flag("--shortest", options->shortest,
+                   "where a law is broken, look for the fewest faults that break it, and print them as a script");
+  command.add_flag("--line", options->line, "print what came of it as one line of JSON");
+  command.callback([options, take, &broken] { take(run(*options, broken)); });
+}
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,271 @@
+#include "hw-sim/operation/operation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <utility>
+
+#include "device/birdseyed/appliance.hpp"
+#include "device/wire/server.hpp"
+#include "drivers/system/clock.hpp"
+#include "drivers/system/local_programs.hpp"
+#include "drivers/system/wait.hpp"
+#include "host/operation/live_source.hpp"
+#include "hw-sim/base/hashed.hpp"
+#include "hw-sim/local/local_camera.hpp"
+#include "hw-sim/local/local_line.hpp"
+#include "hw-sim/local/local_link.hpp"
+#include "hw-sim/minibird/tracker_loop.hpp"
+#include "hw-sim/operation/operation_patient.hpp"
+#include "hw-sim/operation/surgeon.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+constexpr int kWidth_px = 96, kHeight_px = 72;
+constexpr double kVideo_hz = 25;
+constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
+constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
+constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
+constexpr const char* kReference = "reference";
+
+/// Draws nothing: what is decided of each frame is all that is looked at.
+class NoEngine final : public host::Engine {
+ public:
+  void deform(const host::DisplacementField& /*field*/) override {}
+  void undeform() override {}
+  host::ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& /*camera_from_patient*/,
+                         const host::RenderSettings& /*settings*/) override {
+    const std::size_t pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
+    return {camera.width_px, camera.height_px, std::vector<std::uint8_t>(4 * pixels)};
+  }
+  [[nodiscard]] std::string name() const override { return "none"; }
+};
+
+/// The window's workflow with the patient read: files are read in the machine's time, before the operation's begins.
+Result<std::unique_ptr<host::LiveWorkflow>> workflow_of(const host::PatientFiles& patient,
+                                                        const OperationTruth& truth) {
+  host::LiveSettings settings;
+  settings.patient = patient;
+  settings.make_engine = [](const auto&, const auto&, const auto&) -> Result<std::unique_ptr<host::Engine>> {
+    return std::unique_ptr<host::Engine>(std::make_unique<NoEngine>());
+  };
+  settings.tip_in_pointer_mm = truth.tip_in_pointer_mm();
+  settings.fiducials = truth.fiducials_mm().size();
+  settings.video_must_agree = false;  // it is grey all over
+  auto workflow = std::make_unique<host::LiveWorkflow>(settings);
+  const Deadline deadline = Deadline::after(Duration::from_ms(30'000));
+  while (!workflow->view().markers_seen || workflow->view().engine_name.empty()) {
+    if (const std::string fault = workflow->view().fault; !fault.empty()) return Error{Errc::bad_value, fault};
+    if (deadline.passed()) return Error{Errc::timeout, "the simulated patient's CT is not read within 30 s"};
+    sleep_for(Duration::from_ms(2));
+    workflow->tick();
+  }
+  return workflow;
+}
+
+/// A log with the operation's time before each line, and a hash of more than it tells.
+class Journal {
+ public:
+  explicit Journal(std::int64_t zero_ns) : zero_ns_(zero_ns) {}
+  void say(HostTime now, const std::string& what) { text_ += fmt::format("{:10.3f} {}\n", at_s(now), what); }
+  /// What is no more as it was when it was last said; why: told with it, whatever it was before.
+  void follow(HostTime now, std::string& last, const std::string& what, const std::string& why = {}) {
+    if (what != last) say(now, why.empty() ? what : fmt::format("{}: {}", what, why));
+    last = what;
+  }
+  void enter(std::uint64_t value) { hash_ = splitmix64(hash_ ^ value); }
+  void enter(double value) { enter(std::bit_cast<std::uint64_t>(value)); }
+  void enter(const wire::Event& event, HostTime now) {
+    enter(static_cast<std::uint64_t>(now.ns));
+    enter(static_cast<std::uint64_t>(event.index()));
+    if (const auto* const birds = std::get_if<wire::Birds>(&event)) {
+      enter(static_cast<std::uint64_t>(birds->acquired.ns));
+      for (const wire::Bird& bird : birds->birds)
+        for (const double value : bird.tracker_from_sensor.translation()) enter(value);
+    }
+    if (const auto* const frame = std::get_if<wire::VideoFrame>(&event)) {
+      enter(frame->info.sequence);
+      enter(static_cast<std::uint64_t>(frame->info.acquired.ns));
+      enter(static_cast<std::uint64_t>(frame->info.pose.kind));
+      if (const auto& pose = frame->info.pose.tracker_from_sensor)
+        for (const double value : pose->translation()) enter(value);
+    }
+  }
+  [[nodiscard]] double at_s(HostTime now) const { return static_cast<double>(now.ns - zero_ns_) * 1e-9; }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  [[nodiscard]] std::uint64_t hash() const { return hash_; }
+
+ private:
+  std::int64_t zero_ns_;
+  std::string text_;
+  std::uint64_t hash_ = 0;
+};
+
+/// What befalls, at its time.
+class Announcer {
+ public:
+  explicit Announcer(const FaultScript& script) {
+    for (const auto& [target, faults] :
+         {std::pair{FaultTarget::tracker, &script.tracker}, std::pair{FaultTarget::camera, &script.camera},
+          std::pair{FaultTarget::world, &script.world}}) {
+      for (const Fault& fault : *faults) {
+        const std::string name = fmt::format("{} {}", target_name(target), fault_name(fault.kind));
+        lines_.emplace_back(fault.at_s, "begins: " + name);
+        if (fault.for_s) lines_.emplace_back(fault.at_s + *fault.for_s, "ends: " + name);
+      }
+    }
+    std::stable_sort(lines_.begin(), lines_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  }
+  void tell(Journal& journal, HostTime now) {
+    for (; next_ < lines_.size() && lines_[next_].first <= journal.at_s(now); ++next_)
+      journal.say(now, lines_[next_].second);
+  }
+
+ private:
+  std::vector<std::pair<double, std::string>> lines_;
+  std::size_t next_ = 0;
+};
+
+device::Config config_of(const OperationTruth& truth, const LocalLine& line, const LocalCamera& camera) {
+  device::Config config;
+  config.tracker.line.device = "/sim/tracker";
+  config.tracker.open_line = [&line](const auto&) { return line.open(); };
+  config.tracker.minibird.birds = static_cast<int>(truth.birds());
+  config.core.bird_names = {"scope", "pointer"};
+  if (truth.birds() > 2) {
+    config.core.bird_names.emplace_back(kReference);
+    config.tracker.reference = kReference;
+  }
+  config.core.calibration = calibration::record_text(truth.record());
+  config.core.pose.smoothing = Duration::from_ms(40);
+  config.core.pose_wait = Duration::from_ms(60);
+  config.camera.width_px = kWidth_px;
+  config.camera.height_px = kHeight_px;
+  config.camera.rate_hz = kVideo_hz;
+  config.open_camera = [&camera](const auto&) { return camera.open(); };
+  return config;
+}
+
+TrackerScript tracker_of(const OperationTruth& truth, std::uint64_t seed, const FaultScript& faults,
+                         std::int64_t zero_ns) {
+  TrackerSettings settings;
+  settings.unit.birds = static_cast<int>(truth.birds());
+  settings.noise = OperationTruth::kNoise;
+  settings.seed = seed;
+  settings.faults = faults.tracker;
+  settings.faults_from_streaming = false;
+  const BirdMotion motion = [&truth, zero_ns](std::size_t bird, std::int64_t at_ns) -> BirdPose {
+    const auto pose = truth.tracker_from_sensor(bird, static_cast<double>(at_ns - zero_ns) * 1e-9);
+    return {pose.rotation(), pose.translation()};
+  };
+  return {settings, motion, device_now().ns};
+}
+
+/// Events to the workflow until the screen is drawn the next time, as the window takes them.
+void take_events(host::LiveSource& source, host::LiveWorkflow& workflow, OperationLaws& laws, Journal& journal) {
+  const HostTime deadline = host_now() + kScreen;
+  bool frame = false;
+  while (const auto event = source.next(frame ? host_now() : deadline)) {
+    const HostTime now = host_now();
+    frame = frame || std::holds_alternative<wire::VideoFrame>(*event);
+    journal.enter(*event, now);
+    laws.take(*event, now);
+    workflow.take(*event, now, source.host_from_device());
+  }
+}
+
+bool is_whole(const host::ShownPicture& shown) {
+  return shown.overlaid && shown.strength >= 1 && shown.reason.empty();
+}
+
+const char* words_of(const host::ShownPicture& shown) {
+  if (!shown.any) return "nothing is on the screen";
+  if (is_whole(shown)) return "the overlay is whole";
+  return shown.overlaid ? "the overlay fades" : "there is no overlay";
+}
+
+/// In virtual time.
+void operate(const SimulatedOperation& operation, OperationTruth& truth, host::LiveWorkflow& workflow,
+             OperationOutcome& out) {
+  const std::int64_t zero_ns = device_now().ns;
+  const LocalLine line("sim:tracker");
+  TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
+  unit.align(zero_ns + 1);  // before the first measurement
+  LocalCamera::Settings camera_settings;
+  camera_settings.width_px = kWidth_px;
+  camera_settings.height_px = kHeight_px;
+  camera_settings.timing.rate_hz = kVideo_hz;
+  camera_settings.timing.seed = operation.seed;
+  camera_settings.timing.faults = out.faults.camera;
+  const LocalCamera camera(camera_settings, zero_ns);
+  const LocalNetwork network({.delay = Duration::from_ms(1)});
+  const auto server = wire::Server::over(network.listener());
+  const auto appliance = device::Appliance::start(config_of(truth, line, camera), *server);
+  if (!appliance) return out.broken.push_back({0, "start", appliance.error().what});
+  const auto source =
+      host::LiveSource::of_client("the appliance", [&network]() -> Result<std::unique_ptr<wire::Client>> {
+        return wire::Client::over(network.connect(), "the appliance");
+      });
+  OperationLaws laws(
+      truth, out.faults, [&camera](std::uint64_t sequence) { return camera.exposed_ns(sequence); }, zero_ns);
+  Surgeon surgeon(workflow, truth, operation.seed);
+  Journal journal(zero_ns);
+  Announcer announcer(out.faults);
+  std::string said, step, screen;
+  double acts_at_s = 0;
+  const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
+  while (host_now() < end) {
+    take_events(*source, workflow, laws, journal);
+    workflow.set_link(source->connected(), source->words(), source->may_retry());
+    workflow.tick();
+    workflow.draw();
+    const HostTime now = host_now();
+    const host::ShownPicture shown = workflow.shown_at(now);
+    laws.take(shown, workflow.picture(), now);
+    journal.enter(shown.strength);
+    announcer.tell(journal, now);
+    journal.follow(now, screen, words_of(shown), shown.reason);
+    if (journal.at_s(now) < acts_at_s) continue;
+    acts_at_s = journal.at_s(now) + kActs_s;
+    surgeon.act(journal.at_s(now), now, is_whole(shown));
+    const host::OperationView view = workflow.view();
+    journal.follow(now, step, fmt::format("step {}", host::name_of(view.step)));
+    journal.follow(now, said, "the appliance: " + view.link.appliance_says);
+  }
+  laws.finish(operation.minutes * 60);
+  out.broken = laws.broken();
+  out.laws = laws.figures();
+  out.registrations = surgeon.registrations();
+  out.checks = surgeon.checks();
+  out.log = journal.text();
+  out.hash = journal.hash();
+}
+
+}  // namespace
+
+Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
+  OperationOutcome out;
+  const bool reference = hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5;
+  const double ends_s = operation.minutes * 60;
+  out.faults = operation.faults ? *operation.faults
+                                : draw_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s, reference);
+  OperationTruth truth(operation.seed, kWidth_px, kHeight_px, Happenings(out.faults.world), reference);
+  const auto folder = RendezvousFolder::make();
+  if (!folder) return folder.error();
+  const auto patient = write_patient((*folder)->path(), truth);
+  if (!patient) return patient.error();
+  const auto workflow = workflow_of(*patient, truth);
+  if (!workflow) return workflow.error();
+  const auto ran = run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, **workflow, out); });
+  if (!ran) return ran.error();
+  out.time = *ran;
+  for (const BrokenLaw& law : out.broken)
+    out.log += fmt::format("{:10.3f} broken: {}: {}\n", law.at_s, law.law, law.what);
+  return out;
+}
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "hw-sim/faults/fault_script.hpp"
+#include "hw-sim/operation/operation_laws.hpp"
+#include "hw-sim/time/virtual_time.hpp"
+
+namespace birdseye::hw_sim {
+
+struct SimulatedOperation {
+  std::uint64_t seed = 1;  ///< all that is random follows from it
+  double minutes = 10;
+  std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
+};
+
+/// What came of it.
+struct OperationOutcome {
+  std::vector<BrokenLaw> broken;
+  OperationLaws::Figures laws;
+  VirtualTimeFigures time;
+  std::size_t registrations = 0, checks = 0;
+  FaultScript faults;      ///< that befell
+  std::string log;         ///< what happened, a line each
+  std::uint64_t hash = 0;  ///< of every event that reached the host, and of all that was on the screen
+};
+
+/// One operation from power-on to the last frame, in virtual time and without pictures: the tracker, the camera, the
+/// appliance, the wire, and the window's workflow up to what it decides of each frame, as the programs have them; and a
+/// surgeon. The same operation gives the same outcome.
+Result<OperationOutcome> run_operation(const SimulatedOperation& operation);
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,166 @@
+#include "hw-sim/operation/operation_faults.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "hw-sim/base/hashed.hpp"
+#include "hw-sim/faults/fault_table.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+/// A kind of fault as an operation meets it: for how long, and with which parameters in place of the usual ones.
+struct DrawnFault {
+  FaultKind kind;
+  FaultTarget of;
+  double least_s, most_s;
+  const char* parameter = "";
+  double least = 0, most = 0;
+};
+
+constexpr FaultTarget kTracker = FaultTarget::tracker, kCamera = FaultTarget::camera, kWorld = FaultTarget::world;
+
+constexpr DrawnFault kDrawn[] = {
+    {FaultKind::drop_byte, kTracker, 1, 5, "chance", 0.2, 0.5},
+    {FaultKind::duplicate_byte, kTracker, 1, 5, "chance", 0.2, 0.5},
+    {FaultKind::corrupt_byte, kTracker, 1, 5, "chance", 0.2, 0.5},
+    {FaultKind::wrong_phase_bit, kTracker, 1, 5, "chance", 0.2, 1},
+    {FaultKind::line_noise, kTracker, 1, 5, "chance", 0.2, 0.5},
+    {FaultKind::lost_record, kTracker, 1, 5, "chance", 0.2, 0.5},
+    {FaultKind::zero_matrix, kTracker, 1, 5},
+    {FaultKind::saturated, kTracker, 1, 5},
+    {FaultKind::frozen_pose, kTracker, 1, 5},
+    {FaultKind::hemisphere_flip, kTracker, 1, 5},
+    {FaultKind::metal_distortion, kTracker, 1, 5, "peak_mm", 2, 20},
+    {FaultKind::stuck_stream, kTracker, 1, 10},
+    {FaultKind::unplug, kTracker, 1, 20},
+    {FaultKind::power_cycle, kTracker, 1, 10, "boot_s", 0.5, 2},
+    {FaultKind::clock_step, kTracker, 3, 10, "ms", 15, 40},
+    {FaultKind::drift_step, kTracker, 3, 10, "ppm", 1500, 3000},
+    {FaultKind::drop_frames, kCamera, 2, 5, "chance", 0.2, 0.5},
+    {FaultKind::sequence_gap, kCamera, 2, 5, "chance", 0.2, 0.5},
+    {FaultKind::late_frames, kCamera, 2, 5, "ms", 20, 200},
+    {FaultKind::duplicate_frames, kCamera, 2, 5, "chance", 0.2, 0.5},
+    {FaultKind::size_change, kCamera, 2, 5},
+    {FaultKind::silence, kCamera, 2, 15},
+    {FaultKind::clock_step, kCamera, 3, 10, "ms", 15, 40},
+    {FaultKind::garbage, kCamera, 2, 5, "chance", 0.1, 0.3},
+    {FaultKind::torn_frame, kCamera, 2, 5, "chance", 0.1, 0.3},
+    {FaultKind::unplug, kCamera, 1, 20},
+    // These need a reference bird to be seen.
+    {FaultKind::transmitter_bumped, kWorld, 5, 60, "mm", 2, 40},
+    {FaultKind::patient_moved, kWorld, 5, 60, "mm", 2, 20},
+};
+
+Fault usual(FaultKind kind) {
+  Fault fault;
+  fault.kind = kind;
+  for (const ParameterSpec& parameter : fault_spec(fault_name(kind))->parameters)
+    fault.values.emplace(parameter.name, parameter.usual);
+  return fault;
+}
+
+FaultSigns of_camera(const Fault& fault) {
+  switch (fault.kind) {
+    case FaultKind::drop_frames:
+    case FaultKind::sequence_gap:
+      return {.counters = {"frames_dropped"}};
+    case FaultKind::duplicate_frames:
+      return {.counters = {"frames_repeated"}};
+    case FaultKind::size_change:
+      return {.half_size = true};
+    case FaultKind::silence:
+      return {.words = {"sends no"}};
+    case FaultKind::late_frames:
+      return {};  // each frame says when it arrived
+    case FaultKind::clock_step:
+      return {.counters = {"clock_events"}, .extra_s = std::abs(fault.value("ms")) * 1e-3};
+    case FaultKind::garbage:
+    case FaultKind::torn_frame:
+      return {.words = {"is not a frame"}};
+    default:
+      return {.words = {"the camera has gone", "no camera listens"}};
+  }
+}
+
+}  // namespace
+
+FaultSigns signs_of(const Fault& fault, FaultTarget target) {
+  if (target == FaultTarget::camera) return of_camera(fault);
+  constexpr double kUnseenByte_mm = 30;   // a predicted pose makes three times of what a moving hand may have done
+  constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
+  switch (fault.kind) {
+    case FaultKind::line_noise:
+    case FaultKind::corrupt_byte:
+      return {.counters = {"doubted", "phase_errors"}, .extra_mm = kUnseenByte_mm};
+    case FaultKind::lost_record:
+      return {.counters = {"clock_events", "measurements_lost"}};
+    case FaultKind::zero_matrix:
+    case FaultKind::saturated:
+      return {.words = {"saturated"}};
+    case FaultKind::frozen_pose:
+      return {.words = {"frozen"}};
+    case FaultKind::hemisphere_flip:
+      return {.words = {"hemisphere"}};
+    case FaultKind::metal_distortion:
+      return {.lies = true};
+    case FaultKind::clock_step:
+      return {.counters = {"clock_events"}, .extra_s = std::abs(fault.value("ms")) * 1e-3};
+    case FaultKind::drift_step:
+      return {.counters = {"clock_events"}};
+    case FaultKind::stuck_stream:
+      return {.words = {"silent"}, .own_s = kFlockStarts_s};
+    case FaultKind::unplug:
+      return {.words = {"is not there", "the line is gone"}, .own_s = kFlockStarts_s};
+    case FaultKind::power_cycle:
+      return {.words = {"silent"}, .own_s = fault.value("boot_s") + kFlockStarts_s};
+    default:
+      return {.counters = {"phase_errors"}};
+  }
+}
+
+FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference) {
+  constexpr double kBetween_s = 20;  // on average, from one beginning to the next
+  FaultScript script;
+  std::uint64_t key = 0;
+  const auto uniform = [&](double least, double most) {
+    return least + (most - least) * hashed_uniform(hashed_word(seed, 3), key++);
+  };
+  double at_s = from_s;
+  for (;;) {
+    at_s += -kBetween_s * std::log(1 - uniform(0, 1));
+    const DrawnFault& drawn = kDrawn[static_cast<std::size_t>(uniform(0, std::size(kDrawn)))];
+    const double lasts_s = uniform(drawn.least_s, drawn.most_s), value = uniform(drawn.least, drawn.most);
+    if (at_s + lasts_s > until_s) return script;
+    if (drawn.of == kWorld && !reference) continue;
+    Fault fault = usual(drawn.kind);
+    fault.at_s = std::round(at_s * 1e3) / 1e3;
+    fault.for_s = std::round(lasts_s * 1e3) / 1e3;
+    if (*drawn.parameter != 0) fault.values.insert_or_assign(drawn.parameter, std::round(value * 1e3) / 1e3);
+    (drawn.of == kTracker  ? script.tracker
+     : drawn.of == kCamera ? script.camera
+                           : script.world)
+        .push_back(std::move(fault));
+  }
+}
+
+std::string text_of(const FaultScript& script) {
+  std::string text;
+  for (const auto& [target, faults] :
+       {std::pair{kTracker, &script.tracker}, std::pair{kCamera, &script.camera}, std::pair{kWorld, &script.world}}) {
+    for (const Fault& fault : *faults) {
+      text += fmt::format("[[fault]]\nname = \"{}\"\n", fault_name(fault.kind));
+      if (target != kWorld) text += fmt::format("of = \"{}\"\n", target_name(target));
+      text += fmt::format("at_s = {}\n", fault.at_s);
+      if (fault.for_s) text += fmt::format("for_s = {}\n", *fault.for_s);
+      for (const auto& [name, value] : fault.values) text += fmt::format("{} = {}\n", name, value);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hw-sim/faults/fault.hpp"
+#include "hw-sim/faults/fault_script.hpp"
+
+namespace birdseye::hw_sim {
+
+/// What a fault of an instrument may do to what the appliance says, and by what the appliance tells of it
+/// (docs/manual/faults.md).
+struct FaultSigns {
+  std::vector<std::string> counters{};  ///< of Health: one of them grows
+  std::vector<std::string> words{};     ///< one of them is in a STATUS, a Doubt, or an instrument's state in Health
+  bool half_size = false;               ///< frames of another size come
+  bool lies = false;                    ///< poses are off, and nobody can see it
+  double extra_mm = 0;                  ///< poses may be off by so much more
+  double extra_s = 0;                   ///< and by as much as things move in this time
+  double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
+};
+
+/// Of a fault of the tracker or the camera. Nothing to be seen: both lists are empty.
+FaultSigns signs_of(const Fault& fault, FaultTarget target);
+
+/// Faults of every kind that the instruments know, alone and together, at random times from from_s on until until_s;
+/// with a reference bird also the transmitter is bumped and the patient moved. All of it follows from the seed.
+FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference);
+
+/// As read_fault_script reads it (TOML).
+std::string text_of(const FaultScript& script);
+
+}  // namespace birdseye::hw_sim

@@ -1,0 +1,223 @@
+#include "hw-sim/operation/operation_laws.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "device/wire/json.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+constexpr double kSigmas = 6;
+constexpr double kQuantum_mm = 0.06;    // half a count in 914 mm, per axis, and rounding
+constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDATA promises
+constexpr double kMostAge_ms = 150;
+constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
+constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
+constexpr double kAlone_s = 5;            // from another fault's end to this one's begin, and after it
+constexpr double kLinger_s = 0.5;         // after a fault's end poses may still be made of samples that it touched
+constexpr std::size_t kMostBroken = 100;  // that are told
+
+double speed_mm_s(const OperationTruth& truth, std::size_t bird, double at_s) {
+  constexpr double kStep_s = 0.01;
+  double most = 0;
+  for (int step = -2; step < 2; ++step) {
+    const auto from = truth.tracker_from_sensor(bird, at_s + step * kStep_s).translation();
+    const auto to = truth.tracker_from_sensor(bird, at_s + (step + 1) * kStep_s).translation();
+    most = std::max(most, (to - from).norm() / kStep_s);
+  }
+  return most;
+}
+
+std::size_t bird_of(const std::string& name) {
+  return name == "scope" ? 0 : name == "pointer" ? 1 : 2;
+}
+
+}  // namespace
+
+OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns,
+                             std::int64_t zero_ns)
+    : truth_(truth), exposed_ns_(std::move(exposed_ns)), zero_ns_(zero_ns) {
+  for (const auto& [target, script] :
+       {std::pair{FaultTarget::tracker, &faults.tracker}, std::pair{FaultTarget::camera, &faults.camera},
+        std::pair{FaultTarget::world, &faults.world}}) {
+    for (const Fault& fault : *script) {
+      const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
+      const double ends_s = fault.at_s + fault.for_s.value_or(0) + signs.own_s;
+      spans_.push_back({fault, target, signs, fault.at_s, ends_s, true, {}, {}, {}});
+    }
+  }
+  for (Span& span : spans_) {
+    for (const Span& other : spans_) {
+      if (&other == &span) continue;
+      if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
+    }
+  }
+  figures_.faults = spans_.size();
+}
+
+void OperationLaws::break_law(double at_s, const char* law, std::string what) {
+  if (broken_.size() < kMostBroken) broken_.push_back({at_s, law, std::move(what)});
+}
+
+/// own_mm: 6 sigma of what the pose says of its place; time_s: 6 sigma of its time.
+void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s,
+                               double now_s, double own_mm, double time_s) {
+  double extra_mm = 0, extra_s = 0;
+  for (const Span& span : spans_) {
+    if (true_s < span.begins_s - kLinger_s || true_s > span.ends_s + kLinger_s) continue;
+    if (span.signs.lies) return;
+    // A hand does not move like a transmitter that is pushed: what is made of samples about the push is off.
+    if (span.of == FaultTarget::world) {
+      const double over_s = span.fault.value("over_s");
+      for (const double change_s : {span.begins_s, span.begins_s + *span.fault.for_s})
+        if (true_s > change_s - kLinger_s && true_s < change_s + over_s + kLinger_s) return;
+    }
+    extra_mm += span.signs.extra_mm;
+    extra_s += span.signs.extra_s;
+  }
+  const double noise_mm = kSigmas * OperationTruth::kNoise.position_mm * std::sqrt(3.0) + kQuantum_mm;
+  const double off_mm = (told.translation() - truth_.tracker_from_sensor(bird, true_s).translation()).norm();
+  if (off_mm < noise_mm / 2) return;  // good, however slowly it moves
+  const double may_mm = noise_mm + own_mm + extra_mm + speed_mm_s(truth_, bird, true_s) * (time_s + extra_s);
+  figures_.worst_pose = std::max(figures_.worst_pose, off_mm / may_mm);
+  if (off_mm > may_mm)
+    break_law(now_s, "pose", fmt::format("{} is {:.1f} mm off where it may be {:.1f}", of, off_mm, may_mm));
+}
+
+void OperationLaws::take(const wire::Birds& birds, double now_s) {
+  for (const wire::Bird& bird : birds.birds) {
+    ++figures_.poses;
+    judge_pose(bird.name.c_str(), bird_of(bird.name), bird.tracker_from_sensor, at_s(birds.acquired.ns), now_s, 0,
+               kTimeLimit_s);
+    if (bird.name != "scope") continue;
+    for (Span& span : spans_) {
+      if (now_s > span.ends_s && !span.poses_again_s) span.poses_again_s = now_s;
+    }
+  }
+}
+
+void OperationLaws::take(const wire::VideoFrame& frame, double now_s) {
+  ++figures_.frames;
+  for (Span& span : spans_) {
+    if (span.signs.half_size && now_s >= span.begins_s && !span.named_s && frame.width_px != truth_.lens().width_px)
+      span.named_s = now_s;
+  }
+  const PoseAnswer& pose = frame.info.pose;
+  if (!pose.tracker_from_sensor) return;
+  ++figures_.frames_posed;
+  for (Span& span : spans_) {
+    if (now_s > span.ends_s && !span.frames_again_s) span.frames_again_s = now_s;
+  }
+  // By the time that is stamped: that the stamp is right is the camera's to say.
+  judge_pose("a frame's pose", 0, *pose.tracker_from_sensor, at_s(frame.info.acquired.ns), now_s,
+             kSigmas * pose.position_sigma_mm * std::sqrt(3.0),
+             kSigmas * std::hypot(frame.info.acquired_sigma.seconds(), pose.time_sigma.seconds()));
+}
+
+void OperationLaws::name(double now_s, const std::string& words) {
+  for (Span& span : spans_) {
+    if (now_s < span.begins_s || span.named_s) continue;
+    for (const std::string& sign : span.signs.words)
+      if (words.find(sign) != std::string::npos) span.named_s = now_s;
+  }
+}
+
+void OperationLaws::take(const wire::Health& health, double now_s) {
+  for (const wire::InstrumentHealth& instrument : health.instruments)
+    if (instrument.state != "running") name(now_s, instrument.text);
+  const nlohmann::json now(health);
+  for (Span& span : spans_) {
+    if (now_s < span.begins_s || span.named_s || span.signs.counters.empty() || !before_) continue;
+    const nlohmann::json before(*before_);
+    for (const std::string& counter : span.signs.counters)
+      if (now.at(counter).get<double>() > before.at(counter).get<double>()) span.named_s = now_s;
+  }
+  before_ = health;
+}
+
+void OperationLaws::take(const wire::Event& event, HostTime now) {
+  const double now_s = at_s(now.ns);
+  if (const auto* const birds = std::get_if<wire::Birds>(&event)) take(*birds, now_s);
+  if (const auto* const frame = std::get_if<wire::VideoFrame>(&event)) take(*frame, now_s);
+  if (const auto* const health = std::get_if<wire::Health>(&event)) take(*health, now_s);
+  if (const auto* const status = std::get_if<wire::Status>(&event); status != nullptr && !status->ok)
+    name(now_s, status->text);
+  if (const auto* const doubt = std::get_if<wire::Doubt>(&event)) name(now_s, doubt->why);
+  if (std::holds_alternative<wire::ClockChange>(event)) {
+    for (Span& span : spans_) {
+      if (now_s >= span.begins_s && !span.named_s && std::ranges::count(span.signs.counters, "clock_events") > 0)
+        span.named_s = now_s;
+    }
+  }
+}
+
+void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {
+  const double now_s = at_s(now.ns);
+  ++figures_.shown;
+  if (!shown.overlaid || shown.strength <= 0 || !picture.frame()) return;
+  ++figures_.overlaid;
+  const auto exposed_ns = exposed_ns_(picture.frame()->info.sequence);
+  if (!exposed_ns) return break_law(now_s, "age", "an overlay is on a frame that the camera never gave");
+  const double exposed_s = at_s(*exposed_ns);
+  double lies_s = 0;
+  bool lies = false;
+  for (const Span& span : spans_) {
+    if (exposed_s < span.begins_s - kLinger_s || exposed_s > span.ends_s + kLinger_s) continue;
+    lies_s += span.signs.extra_s;
+    lies = lies || span.signs.lies || span.signs.extra_mm > 0 || span.signs.extra_s > 0;
+  }
+  const double age_ms = 1e3 * (now_s - exposed_s - lies_s);
+  figures_.worst_age_ms = std::max(figures_.worst_age_ms, age_ms);
+  if (age_ms > kMostAge_ms)
+    break_law(now_s, "age", fmt::format("an overlay's frame was exposed {:.0f} ms ago", age_ms));
+  const auto drawn_from = picture.camera_from_patient();
+  const auto& budget = picture.decision().expected;
+  if (shown.strength < 1 || !shown.reason.empty() || !drawn_from || !budget) return;
+  ++figures_.green;
+  if (lies) return;
+  const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();
+  const auto true_px = project(truth_.lens(), true_mm);
+  const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));
+  if (!true_px || !drawn_px) return;
+  const double off_mm = (*true_px - *drawn_px).norm() / truth_.lens().fx_px * true_mm.z();
+  const double circles = off_mm / budget->radius95_mm();
+  figures_.worst_circles = std::max(figures_.worst_circles, circles);
+  if (circles > kPromisedCircles) ++figures_.beyond;
+  if (circles > kMostCircles) {
+    break_law(now_s, "circle",
+              fmt::format("a whole overlay is {:.1f} mm off, its circle {:.1f} mm", off_mm, budget->radius95_mm()));
+  }
+}
+
+void OperationLaws::judge(const Span& span, double until_s) {
+  const std::string name =
+      fmt::format("{} {} at {:.3f} s", target_name(span.of), fault_name(span.fault.kind), span.begins_s);
+  const FaultSigns& signs = span.signs;
+  ++figures_.faults_judged;
+  if (!signs.counters.empty() || !signs.words.empty() || signs.half_size) {
+    const double took_s = span.named_s.value_or(until_s) - span.begins_s;
+    figures_.slowest_named_s = std::max(figures_.slowest_named_s, took_s);
+    if (took_s > kNamedWithin_s)
+      break_law(span.begins_s, "named", fmt::format("{} was {}", name, span.named_s ? "named late" : "never named"));
+  }
+  for (const auto& [what, again_s] : {std::pair{"poses", span.poses_again_s}, {"frames", span.frames_again_s}}) {
+    const double took_s = again_s.value_or(until_s) - span.ends_s;
+    figures_.slowest_over_s = std::max(figures_.slowest_over_s, took_s);
+    if (took_s > kOverWithin_s)
+      break_law(span.ends_s, "over", fmt::format("{}: {} are there {:.1f} s after its end", name, what, took_s));
+  }
+}
+
+void OperationLaws::finish(double until_s) {
+  for (const Span& span : spans_) {
+    if (span.alone && span.of != FaultTarget::world && span.ends_s + kAlone_s < until_s) judge(span, until_s);
+  }
+}
+
+}  // namespace birdseye::hw_sim

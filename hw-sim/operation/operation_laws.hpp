@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/time/clock.hpp"
+#include "device/wire/messages.hpp"
+#include "host/operation/live_workflow.hpp"
+#include "hw-sim/faults/fault_script.hpp"
+#include "hw-sim/operation/operation_faults.hpp"
+#include "hw-sim/operation/operation_truth.hpp"
+
+namespace birdseye::hw_sim {
+
+/// A law that did not hold.
+struct BrokenLaw {
+  double at_s = 0;   ///< of the operation
+  std::string law;   ///< its name
+  std::string what;  ///< in words, with figures
+};
+
+/// What must hold of an operation at any moment, whatever befalls it.
+///
+/// pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
+/// age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
+/// circle: no overlay is shown as whole that is off by more than three circles.
+/// named: a fault that befalls alone is named within 2 s, where anybody can see it.
+/// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
+class OperationLaws {
+ public:
+  /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
+  using ExposedNs = std::function<std::optional<std::int64_t>(std::uint64_t sequence)>;
+  OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns, std::int64_t zero_ns);
+
+  /// An event as it reached the host.
+  void take(const wire::Event& event, HostTime now);
+  /// What is on the screen.
+  void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
+  /// At the end: until_s is when the operation ended.
+  void finish(double until_s);
+
+  struct Figures {
+    std::uint64_t poses = 0, frames = 0, frames_posed = 0, shown = 0, overlaid = 0, green = 0, beyond = 0;
+    double worst_pose = 0;     ///< of a pose, in parts of what it may be off
+    double worst_age_ms = 0;   ///< of an overlay
+    double worst_circles = 0;  ///< of a green overlay
+    std::uint64_t faults = 0, faults_judged = 0;
+    double slowest_named_s = 0, slowest_over_s = 0;
+  };
+  [[nodiscard]] const Figures& figures() const { return figures_; }
+  [[nodiscard]] const std::vector<BrokenLaw>& broken() const { return broken_; }
+
+ private:
+  struct Span {
+    Fault fault;
+    FaultTarget of;
+    FaultSigns signs;
+    double begins_s = 0, ends_s = 0;
+    bool alone = true;
+    std::optional<double> named_s, poses_again_s, frames_again_s;
+  };
+  [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
+  void break_law(double at_s, const char* law, std::string what);
+  void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
+                  double own_mm, double time_s);
+  void take(const wire::Birds& birds, double now_s);
+  void take(const wire::VideoFrame& frame, double now_s);
+  void take(const wire::Health& health, double now_s);
+  void name(double now_s, const std::string& words);
+  void judge(const Span& span, double until_s);
+
+  const OperationTruth& truth_;
+  ExposedNs exposed_ns_;
+  std::int64_t zero_ns_;
+  std::vector<Span> spans_;
+  std::optional<wire::Health> before_;
+  Figures figures_;
+  std::vector<BrokenLaw> broken_;
+};
+
+}  // namespace birdseye::hw_sim

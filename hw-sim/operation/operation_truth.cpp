@@ -1,0 +1,127 @@
+#include "hw-sim/operation/operation_truth.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "calibration/base/units.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
+#include "calibration/geometry/rotations.hpp"
+#include "hw-sim/base/hashed.hpp"
+#include "hw-sim/camera/laparoscope.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kLook_mm = 100;  // from the camera to the target
+
+/// Numbers that follow from a seed, one after the other.
+class Numbers {
+ public:
+  explicit Numbers(std::uint64_t seed) : seed_(seed) {}
+  Vector3d within(double most) {
+    const auto one = [&] { return most * (2 * hashed_uniform(seed_, key_++) - 1); };
+    const double x = one(), y = one(), z = one();
+    return {x, y, z};
+  }
+  Vector3d normal(double sigma) {
+    const auto one = [&] { return sigma * hashed_normal(seed_, key_++); };
+    const double x = one(), y = one(), z = one();
+    return {x, y, z};
+  }
+
+ private:
+  std::uint64_t seed_, key_ = 0;
+};
+
+}  // namespace
+
+OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, Happenings happenings, bool reference)
+    : happenings_(std::move(happenings)), reference_(reference), lens_(laparoscope_lens(width_px, height_px)) {
+  Numbers drawn(hashed_word(seed, 1));
+  // The scope comes from below along the patient's z axis; so all sensors stay before the transmitter, and in range.
+  at_rest_ = {rotation_exp(drawn.within(0.25)), Vector3d(Vector3d(480, 0, 120) + drawn.within(30))};
+  // Six markers on the skin round about the organ, in a CT of 100 x 110 x 90 mm that begins at (-20, -20, -20).
+  fiducials_mm_ = {{0, 0, 0}, {60, 5, -5}, {65, 75, 0}, {-5, 70, 20}, {30, 20, 55}, {35, 70, 50}};
+  for (Vector3d& place : fiducials_mm_) place += drawn.within(4);
+  target_mm_ = Vector3d(30, 35, 20) + drawn.within(8);
+  hand_.rest_at({0, 0, 200}, 0);
+  calibrate(hashed_word(seed, 2));
+}
+
+/// The scope is calibrated as an engineer does it with 20 stations over a board 100 mm away: hand-eye is off by
+/// rotations and translations about the camera, of these sigmas. The record has what was found, and how good it is.
+void OperationTruth::calibrate(std::uint64_t seed) {
+  constexpr double kTurned_rad = 0.002, kShifted_mm = 0.2, kLens = 0.0004;  // kLens: of the focal length
+  constexpr int kStations = 20;
+  Numbers drawn(seed);
+  const Transform<Camera, Sensor> found(rotation_exp(Vector3d(0.2, -0.1, 1.5)), {6, -14, -300});
+  const Vector3d turned = drawn.normal(kTurned_rad), shifted = drawn.normal(kShifted_mm);
+  camera_from_sensor_ = {rotation_exp(turned) * found.rotation(),
+                         Vector3d(rotation_exp(turned) * found.translation() + shifted)};
+  // The solver's own terms: exp(w) R and t + d, with d = w x t and the shift.
+  Eigen::Matrix<double, 6, 6> by = Eigen::Matrix<double, 6, 6>::Identity();
+  by.bottomLeftCorner<3, 3>() = -cross_matrix(found.translation());
+  Eigen::Matrix<double, 6, 1> sigma;
+  sigma << Vector3d::Constant(kTurned_rad), Vector3d::Constant(kShifted_mm);
+
+  CameraModel found_lens = lens_;
+  const double lens_px = kLens * lens_.fx_px;
+  const Vector3d focal = drawn.normal(lens_px), middle = drawn.normal(lens_px);
+  found_lens.fx_px += focal.x();
+  found_lens.fy_px += focal.y();
+  found_lens.cx_px += middle.x();
+  found_lens.cy_px += middle.y();
+  CameraMatrix lens_covariance = CameraMatrix::Zero();
+  lens_covariance.topLeftCorner<4, 4>().diagonal().setConstant(lens_px * lens_px);
+
+  // Held out, at the board: hand-eye's own error, and that of a pose at the end of the scope; of two axes.
+  const double own_mm = std::hypot(kTurned_rad * kLook_mm, kShifted_mm);
+  const double arm_mm = found.translation().norm() + kLook_mm;
+  const double pose_mm = std::hypot(kNoise.position_mm, kNoise.angle_deg * kRadPerDeg * arm_mm);
+  const double held_out_mm = std::sqrt(2.0) * std::hypot(own_mm, pose_mm);
+
+  record_.scope = "simulated";
+  record_.tracker = {{"model", "6DFOB"}};
+  record_.camera = {{"model", "simulated"}};
+  const calibration::Provenance provenance{"2026-11-26T09:30:00Z", "birdseye-sim", "the truth", Grade::pass};
+  record_.lens = calibration::LensEntry{provenance, found_lens, "radial3_tangential2", lens_covariance,
+                                        lens_px,    lens_px,    std::nullopt,          std::nullopt};
+  record_.hand_eye = calibration::HandEyeEntry{provenance,
+                                               found,
+                                               by * sigma.cwiseAbs2().asDiagonal() * by.transpose(),
+                                               held_out_mm * lens_.fx_px / kLook_mm,
+                                               held_out_mm * lens_.fx_px / kLook_mm,
+                                               held_out_mm,
+                                               std::nullopt,
+                                               kStations};
+  record_.latency = calibration::LatencyEntry{provenance, 0, -1, 1, 0};
+}
+
+Transform<Tracker, Patient> OperationTruth::tracker_from_patient(double at_s) const {
+  const Vector3d table_mm(30, 140, 20);  // the patient lies on it
+  return happenings_.transmitter(at_s) * at_rest_ * happenings_.table(at_s, table_mm) *
+         happenings_.patient(at_s, table_mm);
+}
+
+/// The scope turns about the target as about a port; it goes with the patient, in whose wall it is.
+Transform<Camera, Patient> OperationTruth::camera_from_patient(double at_s) const {
+  const Eigen::Matrix3d turn =
+      rotation_exp(Vector3d(0.25 * std::sin(0.7 * at_s), 0.3 * std::sin(0.5 * at_s + 1), 0.2 * std::sin(0.3 * at_s)));
+  const Vector3d aside(8 * std::sin(0.45 * at_s), 6 * std::cos(0.6 * at_s), kLook_mm + 10 * std::sin(0.35 * at_s));
+  return {turn, Vector3d(aside - turn * target_mm_)};
+}
+
+Transform<Tracker, Sensor> OperationTruth::tracker_from_sensor(std::size_t bird, double at_s) const {
+  const Transform<Tracker, Patient> on = tracker_from_patient(at_s);
+  if (bird == 0) return on * camera_from_patient(at_s).inverse() * camera_from_sensor_;
+  if (bird == 2) return on * patient_from_reference_ * happenings_.reference(at_s);
+  const HandPath::Place place = hand_.at(at_s);
+  const Transform<Patient, Sensor> pointer(place.turn,
+                                           Vector3d(place.tip_in_patient_mm - place.turn * tip_in_pointer_mm_));
+  return on * pointer;
+}
+
+}  // namespace birdseye::hw_sim

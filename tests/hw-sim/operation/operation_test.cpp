@@ -1,0 +1,154 @@
+// Whole operations in virtual time, and whether what judges them can tell.
+#include "hw-sim/operation/operation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "hw-sim/faults/fault_table.hpp"
+#include "hw-sim/operation/operation_faults.hpp"
+#include "hw-sim/operation/shortest_script.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::hw_sim {
+namespace {
+
+OperationOutcome operate(const SimulatedOperation& operation) {
+  auto out = run_operation(operation);
+  EXPECT_TRUE(out) << out.error().what;
+  return out ? *std::move(out) : OperationOutcome{};
+}
+
+std::string told(const OperationOutcome& out) {
+  std::string text;
+  for (const BrokenLaw& law : out.broken) text += law.law + ": " + law.what + "\n";
+  return text + out.log;
+}
+
+TEST(Operation, WithoutAFaultTheOverlayIsWholeOnceThePatientIsRegistered) {
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = FaultScript{}});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_GE(out.checks, 1U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.8 * static_cast<double>(out.laws.shown)) << out.log;
+  EXPECT_EQ(out.laws.beyond, 0U);
+  EXPECT_GT(out.laws.poses, 2 * 100 * 110U);
+  EXPECT_GT(out.laws.frames, 25 * 115U);
+}
+
+TEST(Operation, FaultsAtRandomBreakNoLaw) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const OperationOutcome out = operate({.seed = seed, .minutes = 4});
+    EXPECT_TRUE(out.broken.empty()) << "seed " << seed << "\n" << told(out);
+    EXPECT_GT(out.laws.faults, 3U);
+    EXPECT_GT(out.laws.green, 0U) << out.log;
+  }
+}
+
+/// 4 and 17: a bird that was frozen from its first record on, after a power cycle and after readings that were doubted,
+/// had a pose for a second.
+TEST(Operation, SeedsThatOnceBrokeALawHold) {
+  for (const std::uint64_t seed : {4U, 17U}) {
+    const OperationOutcome out = operate({.seed = seed, .minutes = 5});
+    EXPECT_TRUE(out.broken.empty()) << "seed " << seed << "\n" << told(out);
+  }
+}
+
+TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
+  const OperationOutcome first = operate({.seed = 5, .minutes = 1.5}), again = operate({.seed = 5, .minutes = 1.5});
+  EXPECT_EQ(first.log, again.log);
+  EXPECT_EQ(first.hash, again.hash);
+  EXPECT_EQ(first.time.order_hash, again.time.order_hash);
+  EXPECT_NE(operate({.seed = 6, .minutes = 1.5}).hash, first.hash);
+}
+
+TEST(Operation, ItsFaultsAreReadBackFromTheScriptThatItWrites) {
+  const birdseye::testing::Scratch scratch;
+  const FaultScript drawn = draw_faults(7, 20, 3600, true);
+  const auto read = read_fault_script(scratch.file("faults.toml", text_of(drawn)), Instruments::both, 1);
+  ASSERT_TRUE(read) << read.error().what;
+  EXPECT_EQ(text_of(*read), text_of(drawn));
+  EXPECT_GT(drawn.tracker.size(), 50U);
+  EXPECT_GT(drawn.camera.size(), 30U);
+  EXPECT_GT(drawn.world.size(), 3U);
+}
+
+TEST(ShortestScript, HasWhatBreaksAndNothingElse) {
+  const FaultScript all = draw_faults(7, 0, 1200, true);
+  int tried = 0;
+  const auto has = [](const std::vector<Fault>& faults, FaultKind kind) {
+    return std::ranges::any_of(faults, [kind](const Fault& fault) { return fault.kind == kind; });
+  };
+  const FaultKind first = all.tracker.at(2).kind, second = all.camera.at(1).kind;
+  const FaultScript few = shortest_script(all, [&](const FaultScript& script) {
+    ++tried;
+    return has(script.tracker, first) && has(script.camera, second);
+  });
+  EXPECT_EQ(few.tracker.size(), 1U);
+  EXPECT_EQ(few.camera.size(), 1U);
+  EXPECT_TRUE(few.world.empty());
+  EXPECT_LT(tried, 300);
+}
+
+/// What laws say of a patient without a fault, by hand.
+class Laws : public ::testing::Test {
+ protected:
+  Laws()
+      : laws_(
+            truth_, faults_, [](std::uint64_t) { return 1'000'000'000; }, 0) {}
+
+  wire::Birds scope(double at_s, const Eigen::Vector3d& off_mm) {
+    const auto pose = truth_.tracker_from_sensor(0, at_s);
+    wire::Birds birds;
+    birds.acquired = DeviceTime{static_cast<std::int64_t>(at_s * 1e9)};
+    birds.birds.push_back({"scope", {pose.rotation(), Eigen::Vector3d(pose.translation() + off_mm)}});
+    return birds;
+  }
+
+  FaultScript faults_;
+  OperationTruth truth_{1, 96, 72, Happenings(), false};
+  OperationLaws laws_;
+};
+
+TEST_F(Laws, APoseThatIsOffByMoreThanItMayBeIsFound) {
+  laws_.take(scope(1, {1, 0, 0}), HostTime{1'020'000'000});
+  EXPECT_TRUE(laws_.broken().empty());
+  laws_.take(scope(2, {20, 0, 0}), HostTime{2'020'000'000});
+  ASSERT_EQ(laws_.broken().size(), 1U);
+  EXPECT_EQ(laws_.broken().front().law, "pose");
+}
+
+TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
+  FaultScript faults;
+  Fault frozen;
+  frozen.kind = FaultKind::frozen_pose;
+  frozen.at_s = 10;
+  frozen.for_s = 2;
+  faults.tracker.push_back(frozen);
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  OperationLaws laws(
+      truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
+  laws.finish(60);
+  std::vector<std::string> broken;
+  for (const BrokenLaw& law : laws.broken()) broken.push_back(law.law);
+  EXPECT_EQ(broken, (std::vector<std::string>{"named", "over", "over"}));
+}
+
+TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
+  std::vector<std::string> drawn;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const FaultScript script = draw_faults(seed, 0, 3600, true);
+    for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
+    for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
+  }
+  for (const FaultSpec& spec : fault_table()) {
+    const std::string name(fault_name(spec.kind));
+    EXPECT_TRUE(!spec.of_tracker || std::ranges::count(drawn, "tracker " + name) > 0) << name;
+    EXPECT_TRUE(!spec.of_camera || std::ranges::count(drawn, "camera " + name) > 0) << name;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::hw_sim
