@@ -102,7 +102,8 @@ class SlopePosterior {
     double low = std::min(base_slope_, prior_.slope), high = std::max(base_slope_, prior_.slope);
     for (int i = 0; i < 60 && high - low > 1e-3; ++i) {
       const double a = low + 0.382 * (high - low), b = low + 0.618 * (high - low);
-      (log_density(a) < log_density(b) ? low : high) = log_density(a) < log_density(b) ? a : b;
+      const bool beyond_a = log_density(a) < log_density(b);
+      (beyond_a ? low : high) = beyond_a ? a : b;
     }
     return 0.5 * (low + high);
   }
