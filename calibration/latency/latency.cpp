@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "calibration/base/units.hpp"
+#include "calibration/latency/common_part.hpp"
 #include "calibration/latency/latency_limits.hpp"
 #include "calibration/latency/latency_models.hpp"
 #include "calibration/latency/latency_scan.hpp"
@@ -46,9 +47,10 @@ bool is_covered(const MotionSpline& a, const ImageMotion& b, double offset_s) {
   return a.covers(b.from_s - offset_s, kMarginS) && a.covers(b.to_s - offset_s, kMarginS);
 }
 
-/// Moves both to a time of which 0 is the middle of what they have in common.
+/// Cuts both to what they have in common and what an offset may bring to it, and moves them to a time of which 0 is the
+/// middle of it.
 template <typename SamplesB>
-Result<void> overlap(MotionSamples& a, SamplesB& b, Latency& latency) {
+Result<void> overlap(MotionSamples& a, SamplesB& b, double most_offset_s, Latency& latency) {
   const double begin_s = std::max(first_time(a), first_time(b)), end_s = std::min(last_time(a), last_time(b));
   if (!(end_s > begin_s)) {
     return Error{Errc::bad_value,
@@ -56,8 +58,21 @@ Result<void> overlap(MotionSamples& a, SamplesB& b, Latency& latency) {
                              "record both at once, with stamps of one clock",
                              first_time(a), last_time(a), first_time(b), last_time(b))};
   }
-  latency.overlap_s = end_s - begin_s;
-  latency.at_s = 0.5 * (begin_s + end_s);
+  const auto both = common_stretches(stretches_of(a), stretches_of(b));
+  latency.overlap_s = seconds_of(both);
+  latency.a.recorded_s = last_time(a) - first_time(a);
+  latency.b.recorded_s = last_time(b) - first_time(b);
+  latency.a.longest_gap_s = longest_gap_s(a, begin_s, end_s);
+  latency.b.longest_gap_s = longest_gap_s(b, begin_s, end_s);
+  keep_near(both, most_offset_s + kRateWindowS + kMarginS, a);
+  keep_near(both, most_offset_s + kRateWindowS + kMarginS, b);
+  if (std::min(a.size(), b.size()) < kFewestRows) {
+    return Error{Errc::bad_value,
+                 fmt::format("the streams have {:.1f} s in common, of at least {:g}, with {} rows of a and {} of b "
+                             "there, of at least {}; record both at once, for 20 s without holes",
+                             latency.overlap_s, kShortestS, a.size(), b.size(), kFewestRows)};
+  }
+  latency.at_s = 0.5 * (both.front().first + both.back().second);
   shift_times(a, -latency.at_s);
   shift_times(b, -latency.at_s);
   return {};
@@ -135,7 +150,7 @@ Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const T
   if (!of_a) return std::move(of_a).error();
   auto of_b = clean(std::span<const TimedMotionPose>(as_poses(b)), "b", latency.b);
   if (!of_b) return std::move(of_b).error();
-  if (auto common = overlap(*of_a, *of_b, latency); !common) return common.error();
+  if (auto common = overlap(*of_a, *of_b, settings.most_offset_s, latency); !common) return common.error();
   measure(*of_a, latency.a);
   measure(*of_b, latency.b);
 
@@ -167,7 +182,7 @@ Result<Latency> find_latency(std::span<const TimedMotionPose> a, std::span<const
   if (!of_a) return std::move(of_a).error();
   auto of_b = clean(b, "b", latency.b);
   if (!of_b) return std::move(of_b).error();
-  if (auto common = overlap(*of_a, *of_b, latency); !common) return common.error();
+  if (auto common = overlap(*of_a, *of_b, settings.most_offset_s, latency); !common) return common.error();
   measure(*of_a, latency.a);
   measure(*of_b, latency.b);
 

@@ -36,12 +36,14 @@ struct LatencySettings {
   bool find_drift = true;    ///< false: the two clocks are known to run at one rate
 };
 
-/// What a stream holds, for judging it. Speeds are taken over 0.3 s, so that noise counts for little.
+/// What a stream holds where the other is near, for judging it. Speeds are taken over 0.3 s, so that noise counts for
+/// little.
 struct StreamMotion {
-  std::size_t samples = 0;  ///< that were used
-  double seconds = 0;       ///< from the first to the last
-  double rate_hz = 0;       ///< by the median of the intervals
-  double longest_gap_s = 0;
+  std::size_t samples = 0;       ///< that were used
+  double seconds = 0;            ///< from the first to the last
+  double recorded_s = 0;         ///< of all samples, from the first to the last
+  double rate_hz = 0;            ///< by the median of the intervals
+  double longest_gap_s = 0;      ///< from where both have begun to where one ends
   double turn_speed_deg_s = 0;   ///< root mean square; 0 where the stream tells no angles
   double shift_speed_mm_s = 0;   ///< root mean square; 0 where the stream tells no places
   double image_speed_px_s = 0;   ///< root mean square; 0 where the stream is not of pictures
@@ -72,14 +74,15 @@ struct Latency {
   double rival_lag_s = 0;                                  ///< the second best peak; 0 where there is none
   double rival_correlation = 0;
   double rival_sigmas = 0;  ///< by how many standard errors the best lag explains the streams better than the rival
-  double overlap_s = 0;
+  double overlap_s = 0;     ///< where both streams tell something, without holes
   StreamMotion a, b;
   LatencyCurves curves;
 };
 
 /// Two streams of rotations of bodies that are rigidly joined (a bird and a camera), against bases that are both at
-/// rest; neither of the two joints need be known. Errors: streams of less than 20 usable rows, times that run
-/// backwards, no overlap.
+/// rest; neither of the two joints need be known. What lies further from the common part than the offset is sought is
+/// left out of everything. Errors: streams of less than 20 usable rows, in all or there, times that run backwards, no
+/// overlap.
 Result<Latency> find_latency(std::span<const TimedRotation> a, std::span<const TimedRotation> b,
                              const LatencySettings& settings = {});
 

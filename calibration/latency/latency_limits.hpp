@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "calibration/latency/latency.hpp"
 
 namespace birdseye::calibration {
@@ -7,7 +9,8 @@ namespace birdseye::calibration {
 // In motion slower than this, the tracker's noise (half a degree looks like 1.7 deg/s over 0.3 s) and the tremor of a
 // hand are no longer small beside the motion.
 inline constexpr double kLeastTurnDegS = 5, kLeastShiftMmS = 20, kLeastImagePxS = 15;
-inline constexpr double kShortestS = 8;  ///< fewer parts than this many seconds give no interval to rely on
+inline constexpr std::size_t kFewestRows = 20;  ///< of a stream
+inline constexpr double kShortestS = 8;         ///< fewer parts than this many seconds give no interval to rely on
 inline constexpr double kGoodS = 15;
 // Below this, chance reaches as high a correlation at some lag within a second to either side.
 inline constexpr double kLeastCorrelation = 0.5, kGoodCorrelation = 0.8;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kLagStepS = 0.01;
 constexpr Eigen::Index kMostRows = 6000;  // of b: more make no peak clearer
-constexpr double kLeastShare = 0.5;       // of b's rows that must meet rows of a for a lag to count
+constexpr double kLeastShare = 0.5;       // of the rows that meet at the lag where most do, for another lag to count
+constexpr Eigen::Index kFewestMeeting = 10;
 // Between two peaks the correlation must dip by so much for them to be two.
 constexpr double kDip = 0.02;
 
@@ -50,15 +51,14 @@ std::optional<Meeting> meet(const RateGrid& a, const RateSignal& b, double lag_s
   const Eigen::Index every = std::max<Eigen::Index>(1, b.rates.rows() / kMostRows);
   std::vector<Eigen::VectorXd> of_a;
   std::vector<Eigen::Index> rows;
-  Eigen::Index asked = 0;
-  for (Eigen::Index i = 0; i < b.rates.rows(); i += every, ++asked) {
+  for (Eigen::Index i = 0; i < b.rates.rows(); i += every) {
     if (auto found = look_up(a, b.times_s[static_cast<std::size_t>(i)] - lag_s)) {
       of_a.push_back(*std::move(found));
       rows.push_back(i);
     }
   }
   const auto count = static_cast<Eigen::Index>(rows.size());
-  if (static_cast<double>(count) < kLeastShare * static_cast<double>(asked) || count < 10) return std::nullopt;
+  if (count < kFewestMeeting) return std::nullopt;
   Meeting meeting{Eigen::MatrixXd(count, a.rates.cols()), Eigen::MatrixXd(count, b.rates.cols())};
   for (Eigen::Index i = 0; i < count; ++i) {
     meeting.a.row(i) = of_a[static_cast<std::size_t>(i)];
@@ -122,6 +122,7 @@ LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double mo
   clip(clipped_a.rates);
   clip(clipped_b.rates);
   LagScan scan;
+  std::vector<Eigen::Index> met;
   const int steps = static_cast<int>(std::lround(most_lag_s / kLagStepS));
   for (int n = -steps; n <= steps; ++n) {
     const double lag_s = n * kLagStepS;
@@ -131,6 +132,11 @@ LagScan scan_lags(const RateGrid& a, const RateSignal& b, RateMap map, double mo
                                                 : linear_correlation(*meeting);
     scan.lags_s.push_back(lag_s);
     scan.correlation.push_back(c);
+    met.push_back(meeting ? meeting->a.rows() : 0);
+  }
+  const auto most_met = static_cast<double>(*std::max_element(met.begin(), met.end()));
+  for (std::size_t i = 0; i < met.size(); ++i) {
+    if (static_cast<double>(met[i]) < kLeastShare * most_met) scan.correlation[i] = 0;
   }
   const auto top = std::max_element(scan.correlation.begin(), scan.correlation.end());
   const auto best = static_cast<std::size_t>(top - scan.correlation.begin());

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "calibration/latency/latency.hpp"
@@ -35,6 +36,15 @@ void judge_gap(const StreamMotion& motion, const std::string& name, Verdict& ver
               fmt::format("see why the {} falls silent (Health tells), and record again", name));
 }
 
+/// What was left out, so that nobody takes the figures for those of the whole recording.
+void tell_part(const Latency& latency, const std::string& a_name, const std::string& b_name, Verdict& verdict) {
+  constexpr double kToldS = 3;
+  if (std::max(latency.a.recorded_s, latency.b.recorded_s) - latency.overlap_s < kToldS) return;
+  verdict.add(Grade::pass, fmt::format("only the {:.1f} s that both have were used, of {:.1f} s of the {} and {:.1f} s "
+                                       "of the {}",
+                                       latency.overlap_s, latency.a.recorded_s, a_name, latency.b.recorded_s, b_name));
+}
+
 /// What makes an offset no answer. True if there is such a thing.
 bool judge_peak(const Latency& latency, Verdict& verdict) {
   if (latency.overlap_s < kShortestS) {
@@ -68,6 +78,7 @@ bool judge_peak(const Latency& latency, Verdict& verdict) {
 
 Verdict latency_verdict(const Latency& latency, const std::string& a_name, const std::string& b_name) {
   Verdict verdict;
+  tell_part(latency, a_name, b_name, verdict);
   judge_motion(latency.a, a_name, verdict);
   judge_motion(latency.b, b_name, verdict);
   if (judge_peak(latency, verdict)) return verdict;

@@ -9,12 +9,12 @@
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/latency/latency_limits.hpp"
 
 namespace birdseye::calibration {
 
 namespace {
 
-constexpr std::size_t kFewestRows = 20;
 constexpr double kMostOutOfOrder = 0.01;  // of the rows: a late packet or two, not another clock
 constexpr double kJumpBackS = 1;
 constexpr double kSpeedWindowS = 0.15;  // half of it
@@ -81,7 +81,6 @@ void measure_times(std::vector<double> times_s, StreamMotion& motion) {
   motion.seconds = times_s.back() - times_s.front();
   std::vector<double> intervals;
   for (std::size_t i = 1; i < times_s.size(); ++i) intervals.push_back(times_s[i] - times_s[i - 1]);
-  motion.longest_gap_s = *std::max_element(intervals.begin(), intervals.end());
   motion.rate_hz = 1 / median_of(std::move(intervals));
 }
 

@@ -19,7 +19,7 @@ Result<MotionSamples> clean(std::span<const TimedMotionPose> rows, const std::st
 Result<std::vector<ImageMotion>> clean(std::span<const ImageMotion> rows, const std::string& name,
                                        StreamMotion& motion);
 
-/// Fills in everything of motion but what clean() does.
+/// Fills in of motion what is of these samples by themselves: how many, how often, how fast.
 void measure(const MotionSamples& samples, StreamMotion& motion);
 void measure(const std::vector<ImageMotion>& samples, StreamMotion& motion);
 

@@ -21,6 +21,7 @@ constexpr double kMostPoints = 600;  // of a curve
 nlohmann::json json_of(const StreamMotion& motion) {
   return {{"samples", motion.samples},
           {"seconds", motion.seconds},
+          {"recorded_s", motion.recorded_s},
           {"rate_hz", motion.rate_hz},
           {"longest_gap_s", motion.longest_gap_s},
           {"turn_speed_deg_s", motion.turn_speed_deg_s},

@@ -178,6 +178,71 @@ TEST(Latency, AnEvenSwingIsAmbiguousAndSaidToBe) {
   }
 }
 
+/// Moves from 45 to 75 s only.
+Eigen::Quaterniond now_and_then(const Hand& hand, double t) {
+  return hand.rotation(std::clamp(t, 45.0, 75.0));
+}
+
+TEST(Latency, OfStreamsThatLastUnlikeLongThePartThatBothHaveIsUsed) {
+  const Hand hand(12);
+  const auto expect_found = [](const Result<Latency>& found, const std::string& words) {
+    ASSERT_TRUE(found) << found.error().what;
+    EXPECT_TRUE(found->determined);
+    EXPECT_NEAR(found->offset_ms, 83, 1.5);
+    const Verdict verdict = latency_verdict(*found, "tracker", "video");
+    EXPECT_NE(verdict.grade, Grade::fail) << reasons_of(verdict);
+    EXPECT_NE(reasons_of(verdict).find(words), std::string::npos) << reasons_of(verdict);
+  };
+  StreamSettings tracker = tracker_of(12), camera = camera_of(12, 25);
+  tracker.begin_s = 50;
+  camera.seconds = 120;
+  const std::string words =
+      "only the 20.0 s that both have were used, of 20.0 s of the tracker and 120.0 s of the video";
+  expect_found(find_latency(record(hand, tracker), record(hand, camera)), words);
+  expect_found(find_latency(simulated::record_poses(hand, tracker, 1.8), simulated::film(hand, camera, 0.2)), words);
+  // The stillness of what is not used counts for nothing.
+  const auto moves = [&hand](double t) { return now_and_then(hand, t); };
+  std::swap(tracker.begin_s, camera.begin_s);
+  std::swap(tracker.seconds, camera.seconds);
+  expect_found(find_latency(record(moves, tracker), record(moves, camera)), "of 120.0 s of the tracker and 20.0 s");
+  // A tracker that fell silent for most of the time.
+  tracker = tracker_of(12);
+  tracker.seconds = 6;
+  Rotations a = record(hand, tracker);
+  tracker.begin_s = 110;
+  const Rotations later = record(hand, tracker);
+  a.insert(a.end(), later.begin(), later.end());
+  camera.begin_s = 0;
+  camera.seconds = 120;
+  expect_found(find_latency(a, record(hand, camera)), "the tracker has a hole of 104.0 s");
+  const auto found = find_latency(a, record(hand, camera));
+  ASSERT_TRUE(found);
+  EXPECT_LT(found->b.longest_gap_s, 0.1);  // what of the video is left out is no hole of it
+  expect_found(found, "only the 11.9 s that both have");
+}
+
+TEST(Latency, ACommonPartOfTooLittleFailsByWhatItLacks) {
+  const Hand hand(12);
+  StreamSettings tracker = tracker_of(12), camera = camera_of(12, 25);
+  camera.seconds = 120;
+  tracker.begin_s = 50;
+  tracker.seconds = 6;
+  expect_fail(record(hand, tracker), record(hand, camera), {"6.0 s in common, of at least 8"});
+  // All of the motion is before the tracker was heard.
+  const auto moves = [&hand](double t) { return now_and_then(hand, t); };
+  tracker.begin_s = 90;
+  tracker.seconds = 20;
+  expect_fail(record(moves, tracker), record(moves, camera), {"the tracker hardly moves", "the video hardly moves"});
+  tracker.begin_s = 119.4;
+  const auto found = find_latency(record(hand, tracker), record(hand, camera));
+  ASSERT_TRUE(found) << found.error().what;  // a second of each may belong together
+  EXPECT_EQ(latency_verdict(*found, "tracker", "video").grade, Grade::fail);
+  camera.rate_hz = 2;
+  const auto few = find_latency(record(hand, tracker), record(hand, camera));
+  ASSERT_FALSE(few);
+  EXPECT_NE(few.error().what.find("of at least 8"), std::string::npos) << few.error().what;
+}
+
 TEST(Latency, OddRowsAreToldAndDoNoHarm) {
   const Hand hand(8);
   Rotations a = record(hand, tracker_of(8)), b = record(hand, camera_of(8, 25));
