@@ -45,7 +45,14 @@ class CaseTable {
       if constexpr (std::is_same_v<T, double>) {
         if (table_.at(key).is_integer()) return static_cast<double>(table_.at(key).as_integer());
       }
-      return toml::find<T>(table_, key);
+      if constexpr (std::is_same_v<T, std::vector<double>>) {
+        T numbers;
+        for (const toml::value& number : table_.at(key).as_array())
+          numbers.push_back(number.is_integer() ? static_cast<double>(number.as_integer()) : number.as_floating());
+        return numbers;
+      } else {
+        return toml::find<T>(table_, key);
+      }
     } catch (const std::exception&) {
       return wrong(key, "is of another type");
     }
@@ -130,6 +137,7 @@ Result<void> read_volume(const CaseTable& table, RegistrationCase& out) {
   const auto untilt = table.get<bool>("untilt", false);
   if (!untilt) return untilt.error();
   source.untilt = *untilt;
+  source.stated.in_case = true;
   if (table.has("spacing")) {
     const auto spacing = table.get<std::vector<double>>("spacing");
     if (!spacing) return spacing.error();

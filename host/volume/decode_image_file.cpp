@@ -18,6 +18,7 @@
 #include "host/volume/decode.hpp"
 #include "host/volume/nifti_file.hpp"
 #include "host/volume/stated_geometry.hpp"
+#include "host/volume/unread_form.hpp"
 #include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
@@ -83,6 +84,18 @@ bool read_voxels(itk::ImageIOBase& io, std::span<char> filled) {
   return std::equal(filled.begin(), filled.end(), second.begin());
 }
 
+/// Reads the header. Why it cannot be read, where that is known; throws where it is not.
+std::string read_information(itk::ImageIOBase& io, const std::optional<NiftiFile>& nifti) {
+  try {
+    io.ReadImageInformation();
+    return {};
+  } catch (const std::exception&) {
+    std::string why = nifti ? nifti->unread_place() : std::string();
+    if (why.empty()) throw;
+    return why;
+  }
+}
+
 /// Where one value a voxel is what is due. cut: why to refuse a file that does not give all voxels.
 Result<void> read_hu(const fs::path& path, itk::ImageIOBase& io, const Error& cut, std::vector<std::int16_t>& hu) {
   const auto bytes = static_cast<std::size_t>(io.GetImageSizeInBytes());
@@ -120,10 +133,10 @@ Result<void> read_values(const fs::path& path, itk::ImageIOBase& io, const Error
 Result<ImageFile> decode_image_file(const VolumeSource& source, int components, GeometryFrom from) {
   const fs::path& path = source.path;
   const itk::ImageIOBase::Pointer io = image_io(path, false);
-  if (io == nullptr) {
+  if (const std::string why = unread_form(path); !why.empty()) return refused(Errc::unsupported, path, why);
+  if (io == nullptr)
     return refused(Errc::bad_format, path, "is no image that can be read; give DICOM, NIfTI, NRRD, MHA or MHD");
-  }
-  const std::string why_cut = "is cut short or damaged; export it again";
+  const Error cut = refused(Errc::bad_format, path, "is cut short or damaged; export it again");
   try {
     const bool is_nifti = std::string(io->GetNameOfClass()) == "NiftiImageIO";
     const auto nifti = is_nifti ? NiftiFile::open(path) : std::nullopt;
@@ -132,7 +145,10 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
                      "has numbers in its header that are not finite or no place of a patient; export it again");
     }
     if (is_nifti && !nifti) {
-      return refused(Errc::unsupported, path, "is NIfTI of another version than 1; save it as NIfTI-1");
+      return refused(Errc::unsupported, path, "is no NIfTI-1 file by its header; save it as NIfTI-1");
+    }
+    if (nifti) {
+      if (const std::string fault = nifti->type_fault(); !fault.empty()) return refused(Errc::unsupported, path, fault);
     }
     const GeometryGaps gaps = nifti ? nifti->gaps() : text_header_gaps(path);
     if (auto stated = check_stated(source, from, gaps); !stated) return stated.error();
@@ -144,7 +160,8 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
                                  source.stated.orientation));
     }
     io->SetFileName(path.string());
-    io->ReadImageInformation();
+    if (const std::string why = read_information(*io, nifti); !why.empty())
+      return refused(Errc::unsupported, path, why);
     for (unsigned axis = 3; axis < io->GetNumberOfDimensions(); ++axis) {
       if (io->GetDimensions(axis) > 1)
         return refused(Errc::unsupported, path, "has more than three dimensions; give one volume of it");
@@ -173,8 +190,15 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
       const std::string fault = nifti->fault(nifti->bytes_of(count));
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);
     }
+    if (!gaps.place.empty() && source.stated.orientation.empty()) {
+      // Of a field, and of nothing else, all numbers depend on it: a CT and its labels are compared voxel by voxel.
+      if (components != 1) return refused(Errc::bad_format, path, fmt::format("{}; export it again", gaps.place));
+      image.notes.push_back(
+          fmt::format("{}, which is taken to be the patient's origin: points of other programs, in mm, may be of "
+                      "another; take them from this file",
+                      gaps.place));
+    }
     put_stated(source, place ? &*place : nullptr, image);
-    const Error cut = refused(Errc::bad_format, path, why_cut);
     auto read = components == 1 ? read_hu(path, *io, cut, image.hu) : read_values(path, *io, cut, image.values);
     if (!read) return read.error();
     if (image.hu.size() + image.values.size() != count) return cut;
@@ -182,7 +206,7 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
   } catch (const std::bad_alloc&) {
     return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
   } catch (const std::exception&) {
-    return refused(Errc::unreadable, path, why_cut);
+    return cut;
   }
 }
 

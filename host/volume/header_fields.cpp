@@ -22,7 +22,9 @@ HeaderFields header_fields(std::istream& file, char sign, const std::string& las
     const auto at = line.find(sign);
     if (at == std::string::npos) continue;
     const std::string name = lower_case(std::string(without_blanks(std::string_view(line).substr(0, at))));
-    fields[name] = without_blanks(std::string_view(line).substr(at + 1));
+    const std::string value(without_blanks(std::string_view(line).substr(at + 1)));
+    const auto [known, is_new] = fields.emplace(name, value);
+    if (!is_new && known->second != value) fields[name + std::string(kAgain)] = value;
     if (name == last) break;
   }
   return fields;

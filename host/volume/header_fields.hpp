@@ -12,8 +12,11 @@ using HeaderFields = std::map<std::string, std::string>;
 
 std::string_view without_blanks(std::string_view text);
 
+/// Behind the name of a field that a header has said before with another value.
+inline constexpr std::string_view kAgain = " again";
+
 /// The lines "name<sign>value" at the begin of a file, up to a blank line or the field `last`. Of NRRD's pairs
-/// "name:=value" the value begins with '='.
+/// "name:=value" the value begins with '='. The last of several different values of a name stands under "name again".
 HeaderFields header_fields(std::istream& file, char sign, const std::string& last);
 
 }  // namespace birdseye::host

@@ -35,6 +35,13 @@ fs::path image_of(fs::path header) {
   return header;
 }
 
+constexpr std::int16_t kLastCode = 5;
+
+/// Talairach's, the MNI152's, or another template's.
+bool is_atlas(std::int16_t code) {
+  return code >= 3 && code <= kLastCode;
+}
+
 std::string letters_of(const VoxelPlace& place) {
   Eigen::Affine3d axes = Eigen::Affine3d::Identity();
   axes.linear() = place.axes;
@@ -71,16 +78,81 @@ bool NiftiFile::header_is_sound() const {
   return true;
 }
 
+std::string NiftiFile::type_fault() const {
+  struct Type {
+    std::int16_t code, bits;
+    const char* unread;  ///< what its numbers are, where they are not read
+  };
+  static constexpr std::array<Type, 16> kTypes{{{2, 8, nullptr},
+                                                {4, 16, nullptr},
+                                                {8, 32, nullptr},
+                                                {16, 32, nullptr},
+                                                {64, 64, nullptr},
+                                                {256, 8, nullptr},
+                                                {512, 16, nullptr},
+                                                {768, 32, nullptr},
+                                                {1024, 64, nullptr},
+                                                {1280, 64, nullptr},
+                                                {1, 1, "single bits"},
+                                                {32, 64, "complex numbers"},
+                                                {1792, 128, "complex numbers"},
+                                                {1536, 128, "floats of 128 bits"},
+                                                {128, 24, "colours"},
+                                                {2304, 32, "colours"}}};
+  const auto code = number<std::int16_t>(70), bits = number<std::int16_t>(72);
+  const auto* const type =
+      std::find_if(kTypes.begin(), kTypes.end(), [code](const Type& known) { return known.code == code; });
+  if (type == kTypes.end())
+    return fmt::format("has voxels of the datatype {}, which is not read; save it as 16-bit integers", code);
+  if (type->unread != nullptr)
+    return fmt::format("has voxels of {} (datatype {}); give the CT, as 16-bit integers", type->unread, code);
+  if (bits != type->bits) {
+    return fmt::format("says two sizes of its voxels: {} bits by its datatype ({}), {} by its bitpix; export it again",
+                       type->bits, code, bits);
+  }
+  return {};
+}
+
 bool NiftiFile::is_nifti() const {
   return std::memcmp(header_.data() + 344, "n+1", 3) == 0 || std::memcmp(header_.data() + 344, "ni1", 3) == 0;
 }
 
 bool NiftiFile::says_a_place() const {
-  return is_nifti() && (number<std::int16_t>(252) > 0 || number<std::int16_t>(254) > 0);
+  return is_nifti() && (quaternion_code() > 0 || matrix_code() > 0);
+}
+
+std::string NiftiFile::code_fault() const {
+  const std::int16_t by_quaternion = quaternion_code(), by_matrix = matrix_code();
+  for (const auto& [form, code, other] :
+       {std::tuple{"qform", by_quaternion, by_matrix}, {"sform", by_matrix, by_quaternion}}) {
+    if (code < 0 || code > kLastCode) {
+      return fmt::format(
+          "has the {0} code {1}, which NIfTI does not know (0 to {2}); export it again, or set the code: to 1 where "
+          "its {0} is the scanner's, to 0 where it is not to count (as by fslorient -set{0}code 1)",
+          form, code, kLastCode);
+    }
+    if (!is_atlas(code)) continue;
+    const char* atlas = code == 3 ? "Talairach's atlas" : code == 4 ? "the MNI152 atlas" : "an atlas";
+    // Of these the voxels may still lie as they were scanned.
+    if (other > 0 && !is_atlas(other)) {
+      return fmt::format(
+          "says two places: its {0} is in the space of {1}, and only its {2} is of the scanner; give the CT as it was "
+          "scanned, or, where its voxels never were resampled to the atlas, take the {0} away (as by fslorient "
+          "-set{0}code 0)",
+          form, atlas, form[0] == 'q' ? "sform" : "qform");
+    }
+    return fmt::format(
+        "lies in the space of {1} ({0} code {2}), to which a body is turned and scaled: it is not this patient's; give "
+        "the CT as it was scanned, or, where the code is wrong, set it to 1 (as by fslorient -set{0}code 1)",
+        form, atlas, code);
+  }
+  return {};
 }
 
 GeometryGaps NiftiFile::gaps() const {
   GeometryGaps gaps;
+  if (is_nifti()) gaps.beyond = code_fault();
+  if (!gaps.beyond.empty()) return gaps;
   const Eigen::Vector3d apart = spacing();
   if (!(apart.minCoeff() > 0)) gaps.spacing = "does not say how far apart its voxels are (a pixdim is not above 0)";
   if (!says_a_place()) {
@@ -88,7 +160,7 @@ GeometryGaps NiftiFile::gaps() const {
                                    is_nifti() ? "neither its qform nor its sform is set" : "it is an Analyze file");
     return gaps;
   }
-  if (number<std::int16_t>(254) <= 0) return gaps;
+  if (matrix_code() <= 0) return gaps;
   const Map matrix = matrix_map();
   const Eigen::Vector3d lengths = matrix.leftCols<3>().colwise().norm();
   const Eigen::Matrix3d axes = matrix.leftCols<3>() * lengths.cwiseInverse().asDiagonal();
@@ -99,13 +171,12 @@ GeometryGaps NiftiFile::gaps() const {
   const double allowed = 0.5 * lengths.minCoeff();
   Map by_spacing = matrix;
   by_spacing.leftCols<3>() = axes * apart.asDiagonal();
-  if (gaps.spacing.empty() && corners_apart(matrix, by_spacing) > allowed) {
-    gaps.spacing = fmt::format(
-        "says two spacings of its voxels: {:.4g} x {:.4g} x {:.4g} by its pixdim, {:.4g} x {:.4g} x {:.4g} by its "
-        "sform",
-        apart.x(), apart.y(), apart.z(), lengths.x(), lengths.y(), lengths.z());
+  if (gaps.spacing.empty() && corners_apart(matrix, by_spacing) > allowed) gaps.spacing = two_spacings();
+  if (quaternion_code() <= 0) {
+    // Of a matrix alone the reader takes no other spacing than its own.
+    if (const std::string two = unread_place(); !gaps.spacing.empty() && !two.empty()) gaps.beyond = two;
+    return gaps;
   }
-  if (number<std::int16_t>(252) <= 0) return gaps;
   Map turned = quaternion_map();
   // Of the two spacings another line tells.
   if (!gaps.spacing.empty()) turned.leftCols<3>() = turned.leftCols<3>().colwise().normalized() * lengths.asDiagonal();
@@ -122,7 +193,26 @@ GeometryGaps NiftiFile::gaps() const {
   return gaps;
 }
 
+std::string NiftiFile::two_spacings() const {
+  const Eigen::Vector3d apart = spacing(), lengths = matrix_map().leftCols<3>().colwise().norm();
+  return fmt::format(
+      "says two spacings of its voxels: {:.5g} x {:.5g} x {:.5g} by its pixdim, {:.5g} x {:.5g} x {:.5g} by its sform",
+      apart.x(), apart.y(), apart.z(), lengths.x(), lengths.y(), lengths.z());
+}
+
+std::string NiftiFile::unread_place() const {
+  constexpr double kRounding_mm = 1e-6;
+  const Eigen::Vector3d apart = spacing(), lengths = matrix_map().leftCols<3>().colwise().norm();
+  if (!is_nifti() || matrix_code() <= 0 || quaternion_code() > 0 || !(apart.minCoeff() > 0) ||
+      (apart - lengths).cwiseAbs().maxCoeff() < kRounding_mm) {
+    return {};
+  }
+  return two_spacings() + "; open and save it again by a program that writes them alike, as 3D Slicer";
+}
+
 std::optional<VoxelPlace> NiftiFile::place_by(const std::string& letters) const {
+  // A matrix that no code says to be set may hold anything, such as the place of what the file was made from.
+  if (!is_nifti() || quaternion_code() <= 0 || matrix_code() <= 0) return std::nullopt;
   const VoxelPlace first = in_patient(quaternion_map()), second = in_patient(matrix_map());
   const bool by_first = letters_of(first) == letters, by_second = letters_of(second) == letters;
   if (by_first == by_second) return std::nullopt;
@@ -136,7 +226,8 @@ std::size_t NiftiFile::bytes_of(std::size_t count) const {
 std::string NiftiFile::fault(std::size_t image_bytes) const {
   if (!offset_is_sound_) return "is damaged in its header; export it again";
   const gzFile file = gzopen(voxels_.c_str(), "rb");
-  if (file == nullptr) return "lacks the file of its voxels; copy both";
+  if (file == nullptr)
+    return fmt::format("lacks the file of its voxels, {}; copy both into one folder", voxels_.filename().string());
   const auto type = number<std::int16_t>(70);
   const std::size_t step = type == 16 ? 4 : type == 64 ? 8 : 0;
   std::vector<char> chunk(1U << 18U);

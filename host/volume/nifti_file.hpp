@@ -25,13 +25,20 @@ class NiftiFile {
   /// ever over 1e38 mm.
   [[nodiscard]] bool header_is_sound() const;
 
+  /// Why its numbers are none that a CT or a field has, with the remedy; empty where they may be.
+  [[nodiscard]] std::string type_fault() const;
+
   /// What the header lacks, or says twice differently, of where the voxels lie.
   [[nodiscard]] GeometryGaps gaps() const;
+
+  /// Why the reader may not read where the voxels lie, though the file may say it, with the remedy: it has an sform
+  /// alone, whose lengths are not quite those of pixdim. Empty where they are.
+  [[nodiscard]] std::string unread_place() const;
 
   [[nodiscard]] bool says_a_place() const;
 
   /// Of a header that says two orientations, the place of the voxels by the one that a person says is right. Empty
-  /// where not exactly one of the two has these letters.
+  /// where it does not say two, or not exactly one of the two has these letters.
   [[nodiscard]] std::optional<VoxelPlace> place_by(const std::string& letters) const;
 
   /// Of so many numbers, by bitpix.
@@ -45,6 +52,12 @@ class NiftiFile {
 
   /// Not Analyze, which has texts where NIfTI says a place.
   [[nodiscard]] bool is_nifti() const;
+  /// Codes of places, 0 where the header says none: of the scanner, aligned to it, or of an atlas.
+  [[nodiscard]] std::int16_t quaternion_code() const { return number<std::int16_t>(252); }
+  [[nodiscard]] std::int16_t matrix_code() const { return number<std::int16_t>(254); }
+  /// Why these are no codes of a patient's CT, with the remedy; empty where they are.
+  [[nodiscard]] std::string code_fault() const;
+  [[nodiscard]] std::string two_spacings() const;
   [[nodiscard]] double unit_mm() const;
   /// Of a place in the header's own frame and unit.
   [[nodiscard]] VoxelPlace in_patient(const Eigen::Matrix<double, 3, 4>& map) const;

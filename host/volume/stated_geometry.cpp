@@ -38,6 +38,45 @@ bool are_spacings(const std::vector<double>& numbers) {
          std::all_of(numbers.begin(), numbers.begin() + 3, [](double mm) { return std::isfinite(mm) && mm > 0; });
 }
 
+bool are_place(const std::vector<double>& numbers) {
+  return numbers.size() >= 3 &&
+         std::all_of(numbers.begin(), numbers.end(), [](double mm) { return std::isfinite(mm); });
+}
+
+/// The first of these fields that is said a second time with another value; empty where none is.
+std::string said_again(const HeaderFields& fields, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    const std::string key = lower_case(name);
+    const auto again = fields.find(key + std::string(kAgain));
+    if (again == fields.end()) continue;
+    return fmt::format("says \"{}\" twice: {} and {}; keep the line that is right, or export it again", name,
+                       fields.at(key).substr(0, 80), again->second.substr(0, 80));
+  }
+  return {};
+}
+
+/// Two of these names of one thing that differ by more than `most`; empty where no two do.
+std::string two_differ(const HeaderFields& fields, std::initializer_list<const char*> names, double most) {
+  const char* first = nullptr;
+  for (const char* name : names) {
+    const auto found = fields.find(lower_case(name));
+    if (found == fields.end()) continue;
+    if (first == nullptr) {
+      first = name;
+      continue;
+    }
+    const std::string& text = fields.at(lower_case(first));
+    const auto a = numbers_in(text), b = numbers_in(found->second);
+    const bool alike = std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                                  [most](double p, double q) { return std::abs(p - q) <= most; });
+    if (!alike) {
+      return fmt::format("twice, differently: {} {}, {} {}; keep the line that is right, or export it again", first,
+                         text.substr(0, 80), name, found->second.substr(0, 80));
+    }
+  }
+  return {};
+}
+
 GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
   static constexpr std::array<std::string_view, 6> kSpaces = {
       "right-anterior-superior", "ras", "left-anterior-superior", "las", "left-posterior-superior", "lps"};
@@ -46,6 +85,9 @@ GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
     return found == fields.end() ? std::string() : found->second;
   };
   GeometryGaps gaps;
+  gaps.beyond = said_again(fields, {"dimension", "sizes", "space", "space dimension", "space directions",
+                                    "space origin", "space units", "spacings", "units"});
+  if (!gaps.beyond.empty()) return gaps;
   const std::string space = value("space"), directions = value("space directions");
   if (directions.empty()) {
     if (!are_spacings(numbers_in(value("spacings")))) {
@@ -62,6 +104,8 @@ GeometryGaps gaps_of_nrrd(const HeaderFields& fields) {
         "does not say which way its axes point (it is in the space \"{}\", which says nothing of the patient)",
         space.substr(0, 80));
   }
+  if (!are_place(numbers_in(value("space origin"))))
+    gaps.place = "does not say where its first voxel lies (it has no \"space origin\")";
   // The reader passes units over.
   const std::string units = lower_case(value("space units") + " " + value("units"));
   std::string spaced = units;
@@ -94,6 +138,9 @@ GeometryGaps gaps_of_meta_image(const HeaderFields& fields) {
     return std::string();
   };
   GeometryGaps gaps;
+  gaps.beyond = said_again(fields, {"NDims", "DimSize", "ElementSpacing", "ElementSize", "Offset", "Position", "Origin",
+                                    "TransformMatrix", "Rotation", "Orientation", "AnatomicalOrientation"});
+  if (!gaps.beyond.empty()) return gaps;
   const std::string dimensions = value({"ndims"});
   if (dimensions.size() != 1 || dimensions < "1" || dimensions > "9") {
     gaps.beyond = "does not say how many dimensions it has (NDims); export it again";
@@ -109,6 +156,13 @@ GeometryGaps gaps_of_meta_image(const HeaderFields& fields) {
     gaps.spacing = fmt::format("says two spacings of its voxels: ElementSpacing {}, ElementSize {}",
                                value({"elementspacing"}), value({"elementsize"}));
   }
+  if (const std::string two = two_differ(fields, {"Offset", "Position", "Origin"}, 1e-3); !two.empty()) {
+    gaps.beyond = fmt::format("says where its first voxel lies {}", two);
+  } else if (!are_place(numbers_in(value({"offset", "position", "origin"})))) {
+    gaps.place = "does not say where its first voxel lies (it has no Offset)";
+  }
+  if (const std::string two = two_differ(fields, {"TransformMatrix", "Rotation", "Orientation"}, 1e-4); !two.empty())
+    gaps.beyond = fmt::format("says which way its axes point {}", two);
   const auto turn = numbers_in(value({"transformmatrix", "rotation", "orientation"}));
   if (turn.empty()) {
     gaps.orientation = "does not say which way its axes point (it has no TransformMatrix)";
@@ -155,13 +209,16 @@ Result<void> check_stated(const VolumeSource& source, GeometryFrom from, const G
                    fmt::format("{}; export it again by a program that writes it, as 3D Slicer{}", gap,
                                from == GeometryFrom::file ? "" : fmt::format(", or state it: {}", option)));
   };
-  if (auto known = judge(gaps.spacing, source.stated.spacing_mm.has_value(), "how far apart its voxels are",
-                         "--spacing x,y,z (mm)");
+  const bool in_case = source.stated.in_case;
+  const bool spaced = source.stated.spacing_mm.has_value(), turned = !source.stated.orientation.empty();
+  if (auto known = judge(gaps.spacing, spaced, "how far apart its voxels are",
+                         in_case ? "spacing = [x, y, z] (mm) in [volume] of the case" : "--spacing x,y,z (mm)");
       !known) {
     return known;
   }
-  return judge(gaps.orientation, !source.stated.orientation.empty(), "which way its axes point",
-               "--orientation, as --orientation LPS");
+  return judge(gaps.orientation, turned, "which way its axes point",
+               in_case ? "orientation = \"LPS\", or what it is, in [volume] of the case"
+                       : "--orientation, as --orientation LPS");
 }
 
 std::vector<std::string> options_of(const StatedGeometry& stated) {
@@ -175,8 +232,8 @@ void put_stated(const VolumeSource& source, const VoxelPlace* place, ImageFile& 
   if (source.stated.spacing_mm) {
     image.spacing_mm = *source.stated.spacing_mm;
     image.notes.push_back(
-        fmt::format("its spacing, {}, was stated by a person (--spacing): the file does not say it, or says two",
-                    mm_of(image.spacing_mm)));
+        fmt::format("its spacing, {}, was stated by a person ({}): the file does not say it, or says two",
+                    mm_of(image.spacing_mm), source.stated.in_case ? "in the case" : "--spacing"));
   }
   if (source.stated.orientation.empty()) return;
   if (place != nullptr) {
@@ -187,7 +244,8 @@ void put_stated(const VolumeSource& source, const VoxelPlace* place, ImageFile& 
     image.origin_mm.setZero();
   }
   image.notes.push_back(fmt::format(
-      "its orientation, {}, was stated by a person (--orientation): {}", source.stated.orientation,
+      "its orientation, {}, was stated by a person ({}): {}", source.stated.orientation,
+      source.stated.in_case ? "in the case" : "--orientation",
       place != nullptr ? "the file says two"
                        : "the file does not say it, nor where the patient's origin is, which is taken to be "
                          "the first voxel"));

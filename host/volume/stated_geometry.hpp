@@ -24,6 +24,7 @@ struct GeometryGaps {
   std::string spacing;      ///< a person may say it
   std::string orientation;  ///< a person may say it
   std::string beyond;       ///< with its remedy: what no person's word makes good
+  std::string place;        ///< where the first voxel lies: of a CT by itself it does not matter
 };
 
 /// Of a NRRD's or MetaImage's header; none of any other file. Their readers fill in what is missing, unseen: voxels of

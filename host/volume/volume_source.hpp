@@ -12,6 +12,7 @@ namespace birdseye::host {
 struct StatedGeometry {
   std::optional<Eigen::Vector3d> spacing_mm;
   std::string orientation;  ///< as orientation_letters gives it; empty: not stated
+  bool in_case = false;     ///< by a case's file, which has keys where commands have options
 };
 
 /// Where a CT is, and which of several it is.

@@ -60,6 +60,42 @@ TEST(StatedGeometry, ATextHeaderSaysWhereTheVoxelsLieOrWhatItLacks) {
   }
 }
 
+TEST(StatedGeometry, ATextHeaderThatSaysOneThingTwiceDifferentlyIsNamed) {
+  const Scratch scratch;
+  const std::string directions = "space: LPS\nspace directions: (1,0,0) (0,1,0) (0,0,2)\n";
+  const std::string meta = kMeta + "TransformMatrix = 1 0 0 0 1 0 0 0 1\nElementSpacing = 1 1 2\n";
+  const std::string local = "ElementDataFile = LOCAL\n";
+  struct Header {
+    std::string name, text, place, beyond;  // what is said of each; empty: nothing
+  };
+  for (const Header& h : std::vector<Header>{
+           {"a.nrrd", kNrrd + directions + "space origin: (1,2,3)\n\n", "", ""},
+           {"b.nrrd", kNrrd + directions + "\n", "no \"space origin\"", ""},
+           {"c.nrrd", kNrrd + directions + "space origin: (nan,nan,nan)\n\n", "no \"space origin\"", ""},
+           {"d.nrrd", kNrrd + directions + "space origin: (1,2,3)\nspace origin: (1,2,4)\n\n", "", "\"space origin\""},
+           {"e.nrrd", kNrrd + directions + "space origin: (1,2,3)\nspace origin: (1,2,3)\n\n", "", ""},
+           {"f.nrrd",
+            "NRRD0004\n# see http://a\n# see http://b\n" + kNrrd.substr(9) + directions + "k:=1\nk:=2\n" +
+                "space origin: (1,2,3)\n\n",
+            "", ""},
+           {"g.mha", meta + "Offset = 1 2 3\n" + local, "", ""},
+           {"h.mha", meta + "Position = 1 2 3\n" + local, "", ""},
+           {"i.mha", meta + local, "no Offset", ""},
+           {"j.mha", meta + "Offset = 1 2 3\nOrigin = 1.0 2.0 3\n" + local, "", ""},
+           {"k.mha", meta + "Offset = 1 2 3\nOrigin = 1 2 4\n" + local, "", "Offset 1 2 3, Origin 1 2 4"},
+           {"l.mha", meta + "Position = 1 2 3\nOrigin = 1 2\n" + local, "", "Position 1 2 3, Origin 1 2"},
+           {"m.mha", meta + "Offset = 1 2 3\nRotation = 1 0 0 0 1 0 0 0 1\n" + local, "", ""},
+           {"n.mha", meta + "Offset = 1 2 3\nOrientation = -1 0 0 0 -1 0 0 0 1\n" + local, "",
+            "TransformMatrix 1 0 0 0 1 0 0 0 1, Orientation -1 0 0"},
+           {"o.mha", meta + "Offset = 1 2 3\nElementSpacing = 1 1 3\n" + local, "", "\"ElementSpacing\" twice"}}) {
+    const GeometryGaps gaps = text_header_gaps(scratch.file(h.name, h.text));
+    for (const auto& [told, says] : {std::pair{gaps.place, h.place}, {gaps.beyond, h.beyond}}) {
+      EXPECT_EQ(told.empty(), says.empty()) << h.name << ": " << told;
+      EXPECT_NE(told.find(says), std::string::npos) << h.name << ": " << told;
+    }
+  }
+}
+
 using Size = std::array<int, 3>;
 
 /// A NIfTI-1 file of water: the codes of its two geometries, by how much they lie apart along x, and which way the
@@ -112,6 +148,13 @@ TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
            {"wide.nii", nifti(0, 1, 0.0F, 3), "two spacings"},
            {"unspaced.nii", with_number(nifti(1, 0, 0.0F), 88, 0), "a pixdim is not above 0"},
            {"sheared.nii", with_number(nifti(0, 1, 0.0F), 284, 0.5F), "sheared"},
+           {"rounded_alone.nii", with_number(nifti(0, 1, 0.0F), 88, 1.002F), "1.002 by its pixdim, 1 x 1 x 1 by its"},
+           {"mni.nii", nifti(0, 4, 0.0F), "the MNI152 atlas (sform code 4)"},
+           {"talairach.nii", nifti(3, 3, 0.0F), "Talairach's atlas (qform code 3)"},
+           {"template.nii", nifti(0, 5, 0.0F), "of an atlas (sform code 5)"},
+           {"both.nii", nifti(1, 4, 12.0F), "its sform is in the space of the MNI152 atlas"},
+           {"unknown.nii", nifti(1, 9, 0.0F), "the sform code 9"},
+           {"negative.nii", nifti(-1, 1, 0.0F), "the qform code -1"},
            {"far.nii", nifti(1, 1, 3.4e38F), "header"}}) {
     expect_refused(import_volume(fs::path(scratch.file(name, text))), name, why);
   }
@@ -165,6 +208,16 @@ TEST(StatedGeometry, WhatAFileDoesNotSayAPersonMayStateAndNothingElse) {
   EXPECT_EQ(read->volume.patient_from_voxel.translation(), Eigen::Vector3d::Zero());
   ASSERT_EQ(read->notes.size(), 1U);
   EXPECT_NE(read->notes.front().find("its orientation, PIL, was stated by a person"), std::string::npos);
+  // What lies in a matrix that no code says to be set is no place, and what letters it has does not matter.
+  const fs::path unset = scratch.file("unset.nii", nifti(0, 0, 59.0F, -1, size));
+  for (const char* letters : {"LAS", "RAS"}) {
+    read = import_with_notes(stated(unset, std::nullopt, letters));
+    ASSERT_TRUE(read) << read.error().what;
+    EXPECT_EQ(orientation_letters(read->volume.patient_from_voxel), letters);
+    EXPECT_EQ(read->volume.patient_from_voxel.translation(), Eigen::Vector3d::Zero());
+    ASSERT_EQ(read->notes.size(), 1U);
+    EXPECT_NE(read->notes.front().find("the file does not say it, nor where"), std::string::npos);
+  }
   // Of two that the file says, the one that is stated, with its place: RAS grows from the right, LAS from the left.
   for (const auto& [letters, first_x_mm] : {std::pair{"RAS", -10.0}, {"LAS", -69.0}}) {
     read = import_with_notes(stated(conflict, std::nullopt, letters));
@@ -191,6 +244,30 @@ TEST(StatedGeometry, WhatAFileDoesNotSayAPersonMayStateAndNothingElse) {
   expect_refused(import_volume(stated(nospacing, std::nullopt, "LPS")), "nospc.mha", "ElementSpacing");
 }
 
+TEST(StatedGeometry, AFileThatDoesNotSayWhereItsFirstVoxelLiesIsReadWithANote) {
+  const Scratch scratch;
+  const std::string meta = kMeta + "BinaryData = True\nBinaryDataByteOrderMSB = False\nElementSpacing = 1 1 2\n" +
+                           "TransformMatrix = 1 0 0 0 1 0 0 0 1\n";
+  const std::string local = "ElementDataFile = LOCAL\n" + voxels({4, 3, 2});
+  const auto placed = import_with_notes(scratch.file("placed.mha", meta + "Position = 1 2 3\n" + local));
+  ASSERT_TRUE(placed) << placed.error().what;
+  EXPECT_EQ(placed->volume.patient_from_voxel.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(placed->notes.empty());
+  const auto unplaced = import_with_notes(scratch.file("unplaced.mha", meta + local));
+  ASSERT_TRUE(unplaced) << unplaced.error().what;
+  ASSERT_EQ(unplaced->notes.size(), 1U);
+  EXPECT_NE(unplaced->notes.front().find("does not say where its first voxel lies"), std::string::npos);
+  // A displacement field is nothing without its place.
+  const std::string field = "NRRD0004\ntype: float\ndimension: 4\nspace: LPS\nsizes: 3 4 3 2\nendian: little\n" +
+                            std::string("encoding: raw\nkinds: vector domain domain domain\n") +
+                            "space directions: none (1,0,0) (0,1,0) (0,0,2)\n";
+  const std::string numbers(4 * 3 * 24, '\0');
+  EXPECT_TRUE(read_image(scratch.file("field.nrrd", field + "space origin: (1,2,3)\n\n" + numbers), 3));
+  const auto refused = read_image(scratch.file("nowhere.nrrd", field + "\n" + numbers), 3);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("no \"space origin\""), std::string::npos) << refused.error().what;
+}
+
 TEST(StatedGeometry, LettersNameEachOfThe48AxesOnce) {
   int named = 0;
   const std::string all = "RLAPIS";
@@ -211,8 +288,8 @@ TEST(StatedGeometry, LettersNameEachOfThe48AxesOnce) {
   for (const char* none : {"", "LP", "LPSS", "lps", "LRS", "LPX"}) EXPECT_FALSE(axes_of_letters(none)) << none;
 }
 
-/// A MetaImage of so many voxels a side, so far apart, with so many HU in each.
-std::string cube(int side, double apart_mm, std::int16_t hu) {
+/// A MetaImage of so many voxels a side, so far apart, with so many HU in each but the first, which has `first`.
+std::string cube(int side, double apart_mm, std::int16_t hu, std::int16_t first) {
   std::string text = "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n";
   text += fmt::format(
       "DimSize = {0} {0} {0}\nElementType = MET_SHORT\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\n"
@@ -221,13 +298,14 @@ std::string cube(int side, double apart_mm, std::int16_t hu) {
   const std::size_t at = text.size();
   text.resize(at + 2 * grid_count({side, side, side}));
   for (std::size_t i = at; i < text.size(); i += sizeof hu) std::memcpy(text.data() + i, &hu, sizeof hu);
+  std::memcpy(text.data() + at, &first, sizeof first);
   return text;
 }
 
 TEST(StatedGeometry, VoxelsAndBodiesThatNoCtHasAreRefused) {
   const Scratch scratch;
-  const auto file = [&](const char* name, int side, double apart_mm, std::int16_t hu = 0) {
-    return fs::path(scratch.file(name, cube(side, apart_mm, hu)));
+  const auto file = [&](const char* name, int side, double apart_mm, std::int16_t hu = 0, std::int16_t first = 1) {
+    return fs::path(scratch.file(name, cube(side, apart_mm, hu, first)));
   };
   EXPECT_TRUE(import_volume(file("least.mha", 4, 0.02)));
   EXPECT_TRUE(import_volume(file("widest.mha", 4, 20)));
@@ -245,7 +323,7 @@ TEST(StatedGeometry, VoxelsAndBodiesThatNoCtHasAreRefused) {
   EXPECT_TRUE(import_volume(file("tiny.mha", 60, 0.3)));
   expect_refused(body(scratch.path() / "tiny.mha"), "tiny.mha", "a body of 18 mm");
   expect_refused(body(file("giant.mha", 151, 20)), "giant.mha", "a body of 3020 mm");
-  expect_refused(body(file("air.mha", 60, 1, -1000)), "air.mha", "nothing but air");
+  expect_refused(body(file("air.mha", 60, 1, -1000, -1000)), "air.mha", "nothing but air");
 }
 
 }  // namespace

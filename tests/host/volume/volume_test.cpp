@@ -145,7 +145,7 @@ TEST(Import, RefusesWithAReason) {
                                            "nowhere1.raw\nnowhere2.raw\n";
   }
   expect_refused(scratch / "garbled.mha", "damaged");
-  expect_refused(scratch / "list.mhd", "damaged");
+  expect_refused(scratch / "list.mhd", "\"nowhere1.raw\" is not there");
   write_mha(scratch / "nan.mha", "MET_FLOAT", voxels.data(), voxels.size() * 4);
   expect_refused(scratch / "nan.mha", "not finite");
   voxels[7] = 1e6F;

@@ -1,0 +1,107 @@
+#include "host/volume/unread_form.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "host/volume/import.hpp"
+#include "tests/support/scratch.hpp"
+
+namespace birdseye::host {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Scratch;
+
+const std::string kVoxels(2 * 4 * 3 * 2, '\1');
+
+std::string nrrd(const std::string& type = "short", const std::string& encoding = "raw",
+                 const std::string& more = "endian: little\n") {
+  return "NRRD0004\ntype: " + type + "\ndimension: 3\nspace: LPS\nsizes: 4 3 2\nencoding: " + encoding +
+         "\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace origin: (1,2,3)\n" + more;
+}
+
+std::string meta_image(const std::string& type = "MET_SHORT", const std::string& more = "",
+                       const std::string& data = "LOCAL") {
+  return "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n" + more +
+         "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 1 2 3\nElementSpacing = 1 1 2\nDimSize = 4 3 2\nElementType "
+         "= " +
+         type + "\nElementDataFile = " + data + "\n";
+}
+
+/// A NIfTI-1 file, of a pair its header.
+std::string nifti(std::int16_t datatype, std::int16_t bits, const char* magic = "n+1") {
+  std::string file(352, '\0');
+  const auto put = [&file](std::size_t at, auto value) { std::memcpy(file.data() + at, &value, sizeof value); };
+  put(0, std::int32_t{348});
+  for (std::size_t k = 0; k < 4; ++k) put(40 + 2 * k, static_cast<std::int16_t>(std::vector<int>{3, 4, 3, 2}[k]));
+  put(70, datatype);
+  put(72, bits);
+  for (std::size_t at = 76; at < 92; at += 4) put(at, 1.0F);
+  put(108, magic[1] == '+' ? 352.0F : 0.0F);
+  file[123] = 2;
+  put(252, std::int16_t{1});
+  std::memcpy(file.data() + 344, magic, 4);
+  return file;
+}
+
+TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
+  const Scratch scratch;
+  std::ofstream(scratch / "there.raw") << kVoxels;
+  struct Case {
+    std::string name, text, why;  // why it is refused; empty: it is read
+  };
+  const std::string compressed = "CompressedData = True\n";
+  for (const Case& c : std::vector<Case>{
+           {"good.nrrd", nrrd() + "\n" + kVoxels, ""},
+           {"beside.nhdr", nrrd() + "data file: there.raw\n\n", ""},
+           {"bytes.nrrd", nrrd("uchar", "raw", "") + "\n" + kVoxels, ""},
+           {"bzip2.nrrd", nrrd("short", "bzip2") + "\n" + kVoxels, "the encoding \"bzip2\", which is not read"},
+           {"block.nrrd", nrrd("block", "raw", "block size: 2\n") + "\n" + kVoxels, "the type \"block\""},
+           {"endless.nrrd", nrrd("short", "raw", "") + "\n" + kVoxels, "no \"endian\""},
+           {"both.nrrd", nrrd() + "spacings: 1 1 2\n\n" + kVoxels, "both \"spacings\" and \"space directions\""},
+           {"beside.nrrd",
+            "NRRD0004\ntype: short\ndimension: 3\nspace: LPS\nsizes: 4 3 2\nendian: little\nencoding: raw\n"
+            "spacings: 1 1 2\n\n" +
+                kVoxels,
+            "\"spacings\" beside its \"space\""},
+           {"four.nrrd",
+            "NRRD0004\ntype: short\ndimension: 4\nsizes: 4 3 2 1\nendian: little\nencoding: raw\n\n" + kVoxels,
+            "more than three dimensions"},
+           {"lone.nhdr", nrrd() + "data file: gone.raw\n\n", "\"gone.raw\" is not there"},
+           {"list.nhdr", nrrd() + "data file: LIST\nthere.raw\ngone.raw\n", "\"gone.raw\" is not there"},
+           {"cut.nrrd", nrrd() + "\nshort", "cut short or damaged"},
+           {"good.mha", meta_image() + kVoxels, ""},
+           {"beside.mhd", meta_image("MET_SHORT", "", "there.raw"), ""},
+           {"text.mha", meta_image("MET_STRING") + kVoxels, "the type MET_STRING"},
+           {"half.mha", meta_image("MET_HALF") + kVoxels, "the type MET_HALF"},
+           {"lone.mhd", meta_image("MET_SHORT", "", "gone.raw"), "\"gone.raw\" is not there"},
+           {"list.mhd", meta_image("MET_SHORT", "", "LIST") + "there.raw\ngone.raw\n", "\"gone.raw\" is not there"},
+           {"unsized.mha", meta_image("MET_SHORT", compressed) + kVoxels, "(CompressedDataSize); save it"},
+           {"missized.mha", meta_image("MET_SHORT", compressed + "CompressedDataSize = 9\n") + kVoxels,
+            "take 9 bytes (CompressedDataSize), and 48 follow"},
+           {"cut.mha", meta_image() + "short", "cut short or damaged"},
+           {"good.nii", nifti(4, 16) + kVoxels, ""},
+           {"colours.nii", nifti(128, 24) + kVoxels + kVoxels, "colours (datatype 128)"},
+           {"complex.nii", nifti(32, 64) + kVoxels + kVoxels + kVoxels + kVoxels, "complex numbers (datatype 32)"},
+           {"bits.nii", nifti(1, 1) + kVoxels, "single bits (datatype 1)"},
+           {"wide.nii", nifti(1536, 128) + kVoxels, "floats of 128 bits"},
+           {"unknown.nii", nifti(77, 16) + kVoxels, "the datatype 77"},
+           {"two.nii", nifti(4, 32) + kVoxels, "16 bits by its datatype (4), 32 by its bitpix"},
+           {"second.nii", std::string("\x1c\x02\0\0n+2\0", 8) + std::string(600, '\0'), "another version than 1"},
+           {"lone.hdr", nifti(4, 16, "ni1"), "the file of its voxels, lone.img"},
+           {"voxels.img", kVoxels, "give the one that ends in .hdr"}}) {
+    const auto read = import_volume(fs::path(scratch.file(c.name, c.text)));
+    EXPECT_EQ(read.has_value(), c.why.empty()) << c.name << (read ? "" : ": " + read.error().what);
+    if (read) continue;
+    EXPECT_NE(read.error().what.find(c.name + ": "), std::string::npos) << read.error().what;
+    EXPECT_NE(read.error().what.find(c.why), std::string::npos) << read.error().what;
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::host
