@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -184,8 +185,12 @@ Result<void> volume_info(const InfoOptions& options) {
     if (!look) return look.error();
     if (!*look) return write_file(options.json, text_of(json));
   }
-  const auto imported = import_with_notes(options.source);
+  auto imported = import_with_notes(options.source);
   if (!imported) return imported.error();
+  const auto& hu = imported->volume.hu;
+  if (std::adjacent_find(hu.begin(), hu.end(), std::not_equal_to<>()) == hu.end())
+    imported->notes.push_back(
+        fmt::format("all voxels are {}: there is nothing in it to draw or to register", hu.front()));
   print_grid(imported->volume, json);
   const bool labels = !imported->label_names.empty() ||
                       (!holds_dicom(options.source.path) && look_like_labels(values_in(imported->volume)));

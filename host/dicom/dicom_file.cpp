@@ -87,18 +87,22 @@ std::string read_place_and_scale(const FrameElements& elements, DicomSlice& slic
   slice.column = (slice.column - slice.column.dot(slice.row) * slice.row).normalized();
   const auto thickness = elements.numbers(DCM_SliceThickness);
   if (!thickness.empty() && thickness[0] > 0) slice.thickness_mm = thickness[0];
+  const auto between = elements.numbers(DCM_SpacingBetweenSlices);
+  if (!between.empty() && std::isfinite(between[0])) slice.between_mm = std::abs(between[0]);
   for (const auto& [tag, value] :
        {std::pair{DCM_RescaleIntercept, &slice.intercept}, std::pair{DCM_RescaleSlope, &slice.slope}}) {
     const auto numbers = elements.numbers(tag);
     if (elements.has(tag) && numbers.size() != 1)
       return "has no sound Rescale Intercept and Slope (0028,1052); export it again";
     if (numbers.size() == 1) *value = numbers[0];
+    slice.scaled = slice.scaled && numbers.size() == 1;
   }
   if (!(slice.slope > 0)) return "has no sound Rescale Intercept and Slope (0028,1052); export it again";
   return {};
 }
 
 void read_keys(DcmDataset& dataset, const FrameElements& elements, DicomSlice& slice) {
+  slice.unit = words_of(dataset, elements.text(DCM_RescaleType));
   for (std::size_t k = 0; k < kSliceKeys; ++k) {
     std::string text = elements.text(enhanced_tag(static_cast<SliceKey>(k)));
     if (text.empty()) text = elements.text(key_tags()[k].tag);

@@ -44,8 +44,11 @@ struct DicomSlice {
   Eigen::Vector3d row, column;  ///< which way the pixels of a row and those of a column follow one another, unit length
   Eigen::Vector2d spacing_mm;   ///< of pixels along a row, and along a column
   double thickness_mm = 0;      ///< 0 where the file has none
+  double between_mm = 0;        ///< Spacing Between Slices, which positions may contradict; 0 where the file has none
   double slope = 1, intercept = 0;           ///< HU = slope * stored + intercept
+  std::string unit;                          ///< Rescale Type, as HU; empty where the file has none
   std::array<std::string, kSliceKeys> keys;  ///< empty where the file has none
+  bool scaled = true;                        ///< whether the file says both slope and intercept
 
   [[nodiscard]] const std::string& key(SliceKey k) const { return keys[static_cast<std::size_t>(k)]; }
 };

@@ -10,6 +10,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "host/dicom/phase_words.hpp"
 #include "host/dicom/slice_volumes.hpp"
@@ -72,6 +73,21 @@ void describe(const DicomSlice& slice, SeriesInfo& info) {
   }
 }
 
+/// What is wrong with slices of several frames of reference; empty where they are of one, or do not say.
+std::string several_frames(const std::vector<DicomSlice>& slices, const std::vector<DicomFile>& all) {
+  std::set<std::string> frames;
+  for (const DicomSlice& slice : slices) {
+    if (const std::string& uid = all[slice.file].frame_of_reference_uid; !uid.empty()) frames.insert(uid);
+  }
+  if (frames.size() < 2) return {};
+  return fmt::format(
+      "its slices are of {} frames of reference (0020,0052), as {} and {}, and how these lie to each other no file "
+      "says: "
+      "the patient may have moved between them; give a folder with the slices of one, or, where an "
+      "anonymiser wrote them, export it again",
+      frames.size(), *frames.begin(), *std::next(frames.begin()));
+}
+
 Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVolume volume, bool untilt) {
   Series series;
   const DicomSlice first = volume.slices.front();
@@ -80,6 +96,10 @@ Series of_volume(const Files& files, const std::vector<DicomFile>& all, SliceVol
   describe(first, series.info);
   series.stack = stack_slices(std::move(volume.slices),
                               [&all](const DicomSlice& slice) { return slice_name(all[slice.file], slice); });
+  if (std::string several = several_frames(series.stack.slices, all); !several.empty()) {
+    series.stack.problem = std::move(several);
+    series.stack.usual_step_mm = 0;  // which no resampling mends
+  }
   const auto count = static_cast<int>(series.stack.slices.size());
   series.info.size = {first.columns, first.rows, count};
   series.info.spacing_mm = {first.spacing_mm.x(), first.spacing_mm.y(), series.stack.step_mm};

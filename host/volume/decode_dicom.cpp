@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "host/dicom/series_choice.hpp"
 #include "host/volume/decode.hpp"
 #include "host/volume/decode_slices.hpp"
@@ -10,6 +13,32 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// What its slices say of themselves that does not fit, or does not tell Hounsfield units.
+void note_doubts(const Series& series, std::vector<std::string>& notes) {
+  const auto& slices = series.stack.slices;
+  const DicomSlice& first = slices.front();
+  if (!first.scaled) {
+    notes.emplace_back(
+        "does not say how its values are Hounsfield units (it lacks Rescale Intercept or Slope, (0028,1052)): they are "
+        "read as they are stored; compare air (-1000 HU) and water (0 HU) before you trust them");
+  }
+  const auto other_unit = std::find_if(
+      slices.begin(), slices.end(), [](const DicomSlice& slice) { return !slice.unit.empty() && slice.unit != "HU"; });
+  if (other_unit != slices.end()) {
+    notes.push_back(fmt::format("says that its values are no Hounsfield units: Rescale Type (0028,1054) is {}",
+                                other_unit->unit.substr(0, 16)));
+  }
+  if (slices.size() < 2 || first.between_mm == 0) return;
+  const double step_mm = series.stack.step_mm, apart_mm = (slices[1].position_mm - first.position_mm).norm();
+  const auto is_said = [&](double mm) { return std::abs(first.between_mm - mm) <= 0.02 * mm + 0.01; };
+  if (is_said(step_mm) || is_said(apart_mm)) return;
+  notes.push_back(
+      fmt::format("says two distances of its slices: {:.4g} mm by Spacing Between Slices (0018,0088), {:.4g} mm by "
+                  "their positions, "
+                  "which count",
+                  first.between_mm, step_mm));
+}
 
 /// What the reader of a volume should know that is not in it.
 std::vector<std::string> notes_of(const DicomScan& scan, std::size_t chosen) {
@@ -24,12 +53,13 @@ std::vector<std::string> notes_of(const DicomScan& scan, std::size_t chosen) {
     notes.push_back(fmt::format("passed over {} cop{} of slices: {}{}", copies.size(), copies.size() == 1 ? "y" : "ies",
                                 copies.front().filename().string(), copies.size() == 1 ? "" : " and others"));
   }
+  note_doubts(scan.series[chosen], notes);
   for (const Error& unreadable : scan.tree.unreadable) notes.push_back(fmt::format("passed over {}", unreadable.what));
   return notes;
 }
 
 /// Whether a chosen series is a volume.
-Result<void> check_volume(const fs::path& path, const Series& series, bool untilt) {
+Result<void> check_volume(const fs::path& path, const DicomScan& scan, const Series& series, bool untilt) {
   if (!series.bad.empty()) return refused(Errc::bad_format, series.bad, series.fault);
   if (series.stack.slices.empty()) {
     return refused(Errc::unsupported, path,
@@ -38,6 +68,12 @@ Result<void> check_volume(const fs::path& path, const Series& series, bool until
   if (const std::string why = why_no_volume(series.stack, untilt); !why.empty())
     return refused(Errc::unsupported, path, why);
   const DicomSlice& first = series.stack.slices.front();
+  for (const DicomSlice& slice : series.stack.slices) {
+    if (slice.scaled == first.scaled) continue;
+    return refused(Errc::bad_format, scan.tree.files[(slice.scaled ? first : slice).file].path,
+                   "lacks Rescale Intercept or Slope (0028,1052), which other slices of its series have; export the "
+                   "series again");
+  }
   constexpr std::size_t kMostVoxels = std::size_t{1} << 32U;
   if (static_cast<std::size_t>(first.columns) * static_cast<std::size_t>(first.rows) * series.stack.slices.size() >
       kMostVoxels) {
@@ -91,7 +127,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   const auto chosen = choose_series(infos, source.series);
   if (!chosen) return chosen.error().with_context(source.path.string());
   const Series& series = scan->series[*chosen];
-  if (auto sound = check_volume(source.path, series, source.untilt); !sound) return sound.error();
+  if (auto sound = check_volume(source.path, *scan, series, source.untilt); !sound) return sound.error();
   const auto& slices = series.stack.slices;
   const bool compressed = scan->tree.files[slices.front().file].compressed;
   const PatientIdentity& patient = scan->tree.files[slices.front().file].patient;

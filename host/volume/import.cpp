@@ -13,11 +13,12 @@ namespace birdseye::host {
 
 namespace {
 
+constexpr std::int16_t kLeastBody_hu = -700;  // a lung's tissue is denser
+
 /// The longest side of the box that holds all that is no air; 0 where there is nothing but air.
 double body_reach_mm(const Volume& ct) {
-  constexpr std::int16_t kAir_hu = -700;  // a lung's tissue is denser
   Eigen::Array3i low(ct.size[0], ct.size[1], ct.size[2]), high(-1, -1, -1);
-  const auto is_body = [](std::int16_t hu) { return hu >= kAir_hu; };
+  const auto is_body = [](std::int16_t hu) { return hu >= kLeastBody_hu; };
   const auto columns = static_cast<std::ptrdiff_t>(ct.size[0]);
   auto row = ct.hu.begin();
   for (int k = 0; k < ct.size[2]; ++k) {
@@ -59,6 +60,11 @@ Result<ImportedVolume> import_body(const VolumeSource& source, const std::stop_t
   constexpr double kLeast_mm = 20, kMost_mm = 3000;
   const Volume& ct = imported->volume;
   if (ct.size[2] < 2) return refused(Errc::bad_value, source.path, "is one slice; give the whole series");
+  const auto [low, high] = std::minmax_element(ct.hu.begin(), ct.hu.end());
+  if (*low == *high && *low >= kLeastBody_hu) {
+    return refused(Errc::bad_value, source.path,
+                   fmt::format("holds nothing: all of its voxels are {} HU; export it again; is it the CT?", *low));
+  }
   const double reach_mm = body_reach_mm(ct);
   if (reach_mm == 0) return refused(Errc::bad_value, source.path, "holds nothing but air; is it the CT?");
   if (reach_mm < kLeast_mm || reach_mm > kMost_mm) {

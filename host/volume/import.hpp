@@ -29,8 +29,9 @@ struct ImportedVolume {
   std::vector<NamedLabel> label_names;  ///< where the file says that its values are labels
 };
 Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::stop_token& stop = {});
-/// Of a CT that is to be registered or drawn. Refuses too what is no body by its size: one slice, nothing but air, or
-/// tissue that reaches over less than 20 mm or more than 3 m, as where the file's lengths are in another unit.
+/// Of a CT that is to be registered or drawn. Refuses too what is no body by its size: one slice, nothing but air, one
+/// value throughout, or tissue that reaches over less than 20 mm or more than 3 m, as where the file's lengths are in
+/// another unit.
 Result<ImportedVolume> import_body(const VolumeSource& source, const std::stop_token& stop = {});
 
 }  // namespace birdseye::host

@@ -153,6 +153,60 @@ def nifti_of_floats_with_nan(folder):
     volumes.write_nifti(folder / "ct.nii", values, kind=16)
 
 
+def mha(**more):
+    return lambda folder: volumes.write_mha(folder / "ct.mha", **more)
+
+
+def pair(folder):
+    volumes.write_nifti(folder / "whole.nii")
+    whole = (folder / "whole.nii").read_bytes()
+    (folder / "ct.hdr").write_bytes(whole[:108] + struct.pack("<f", 0.0) + whole[112:344] + b"ni1\0")
+    (folder / "ct.img").write_bytes(whole[352:])
+
+
+def detached(voxels=True):
+    def make(folder):
+        volumes.write_nrrd(folder / "whole.nrrd")
+        head, content = (folder / "whole.nrrd").read_bytes().split(b"\n\n", 1)
+        (folder / "ct.nhdr").write_bytes(head + b"\ndata file: ct.raw\n\n")
+        if voxels:
+            (folder / "ct.raw").write_bytes(content.lstrip(b"\n"))
+    return make
+
+
+def own_scale(elements, k):
+    stored = volumes.array.array("H", elements[0x7fe00010][1])
+    elements[0x7fe00010] = ("OW", volumes.array.array("H", [value + k for value in stored]).tobytes())
+    elements[0x00281052] = ("DS", f"{-1024 - k}")
+
+
+def slices_with(change):
+    """A series of which change(elements, k) changes the elements of slice k."""
+    def make(folder):
+        for k in range(volumes.SLICES):
+            elements = dicom.ct_slice(volumes.slice_bytes(k), volumes.COLUMNS, volumes.ROWS, volumes.place(0, 0, k), instance=k + 1)
+            change(elements, k)
+            dicom.write(folder / "ct" / f"s1_{k:03d}.dcm", elements)
+    return make
+
+
+def without_scale(elements, _):
+    del elements[0x00281052], elements[0x00281053]
+
+
+def without_scale_of_one(elements, k):
+    if k == 11:
+        without_scale(elements, k)
+
+
+def two_frames(elements, k):
+    elements[0x00200052] = ("UI", "2.25.77" if k < 20 else "2.25.78")
+
+
+def said_apart(elements, _):
+    elements[0x00180088] = ("DS", "5")
+
+
 def deep_folder(folder):
     volumes.write_series(folder / "ct" / "PAT0" / "STU0" / "SER0")
     (folder / "ct" / "PAT0" / "again").symlink_to(folder / "ct")
@@ -202,6 +256,16 @@ ROWS = [
         writes=ONE, check=is_the_ct),
     Row("volume info", "good", "MetaImage", "as the series", info_of("ct.mha"), 0, lambda folder: volumes.write_mha(folder / "ct.mha"),
         writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "MetaImage that names its place Origin", "as the series, without a note", info_of("ct.mha"), 0, mha(place="Origin"),
+        says=["first voxel  \\(-60.000, -50.000, 100.000\\)"], says_not=["^note"], writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "MetaImage with an Offset and the same Position", "as the series", info_of("ct.mha"), 0,
+        mha(lines="Position = -60 -50 100\n"), says_not=["^note"], writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "a NIfTI file of aligned coordinates (code 2), as nibabel writes it", "as the series", info_of("ct.nii"), 0,
+        nifti("ct.nii", form=(0, 2)), writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "a pair of NIfTI files, header and voxels", "as the series", info_of("ct.hdr"), 0, pair, writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "a NRRD header beside its voxels", "as the series", info_of("ct.nhdr"), 0, detached(), writes=ONE, check=is_the_ct),
+    Row("volume info", "good", "DICOM whose slices each have their own Rescale Intercept", "as the series: each slice by its own", INFO, 0,
+        slices_with(own_scale), says=["HU           -1000 to 1200, mean -475.8"], writes=ONE, check=is_the_ct),
     Row("volume info", "good", "two phases in a folder, one chosen by --series portal", "that one", INFO + " --series portal", 0, two_phases,
         says=["Leber portalvenoes"], writes=ONE),
     Row("volume info", "good", "two phases in a folder, none chosen", "both are listed, and how to choose", INFO, 0, two_phases,
@@ -243,6 +307,35 @@ ROWS = [
         nifti("ct.nii", form=(0, 0)), says=["ct.nii"]),
     Row("volume info", "odd", "the same, --orientation RAS", "read; the note says that a person stated it",
         info_of("ct.nii") + " --orientation RAS", 0, nifti("ct.nii", form=(0, 0)), says=["RAS, was stated by a person"], writes=ONE),
+    Row("volume info", "odd", "the same, --orientation LPS, which is what its unset sform holds", "read; the unset sform counts for nothing",
+        info_of("ct.nii") + " --orientation LPS", 0, nifti("ct.nii", form=(0, 0)), says=["LPS, was stated by a person", "does not say it, nor",
+                                                                                        "first voxel  \\(0.000, 0.000, 0.000\\)"], writes=ONE),
+    Row("volume info", "wrong", "a NIfTI file in the space of the MNI152 atlas", "refused: no patient's; the CT as it was scanned",
+        info_of("ct.nii"), 2, nifti("ct.nii", form=(0, 4)), says=["MNI152", "as it was scanned", "-setsformcode 1"]),
+    Row("volume info", "wrong", "a NIfTI file whose sform has a code that there is not", "refused: the code", info_of("ct.nii"), 2,
+        nifti("ct.nii", form=(1, 9)), says=["sform code 9", "-setsformcode 1"]),
+    Row("volume info", "odd", "a MetaImage that does not say where its first voxel lies", "read; what that means for points", info_of("ct.mha"), 0,
+        mha(place=""), says=["note .*no Offset", "points of other programs"], writes=ONE),
+    Row("volume info", "wrong", "a MetaImage with an Offset and another Position", "refused: both", info_of("ct.mha"), 2,
+        mha(lines="Position = 0 0 0\n"), says=["Offset -60.0 -50.0 100.0, Position 0 0 0"]),
+    Row("volume info", "wrong", "a MetaImage with a TransformMatrix and another Orientation", "refused: both", info_of("ct.mha"), 2,
+        mha(lines="Orientation = -1 0 0 0 -1 0 0 0 1\n"), says=["TransformMatrix 1 0 0", "Orientation -1 0 0"]),
+    Row("volume info", "wrong", "a NRRD header whose file of voxels is not there", "refused: that file", info_of("ct.nhdr"), 2,
+        detached(voxels=False), says=["\"ct.raw\" is not there"], says_not=["damaged"]),
+    Row("volume info", "odd", "a NRRD in an encoding that is not read", "refused: the encoding", info_of("ct.nrrd"), 2,
+        lambda folder: volumes.write_nrrd(folder / "ct.nrrd", encoding="bzip2"), says=["\"bzip2\", which is not read"], says_not=["damaged"]),
+    Row("volume info", "wrong", "a NIfTI file of colours", "refused: the datatype", info_of("ct.nii"), 2, nifti("ct.nii", kind=128),
+        says=["colours \\(datatype 128\\)"], says_not=["damaged"]),
+    Row("volume info", "odd", "DICOM whose Spacing Between Slices is not that of the positions", "read by the positions; both are said", INFO, 0,
+        slices_with(said_apart), says=["5 mm by Spacing Between Slices", "2 mm by their positions"], writes=ONE, check=is_the_ct),
+    Row("volume info", "wrong", "DICOM slices of two frames of reference", "refused: both are named", INFO, 2, slices_with(two_frames),
+        says=["2 frames of reference", "2.25.77", "2.25.78"]),
+    Row("volume info", "odd", "DICOM without Rescale Intercept and Slope", "read; the values may be no Hounsfield units", INFO, 0,
+        slices_with(without_scale), says=["lacks Rescale Intercept"], writes=ONE),
+    Row("volume info", "wrong", "DICOM of which one slice has no Rescale Intercept", "refused: the file", INFO, 2,
+        slices_with(without_scale_of_one), says=["s1_011.dcm", "Rescale Intercept"]),
+    Row("volume info", "odd", "a CT of one value throughout", "read; there is nothing in it", info_of("ct.mha"), 0,
+        mha(values=volumes.array.array("h", [40] * (volumes.COLUMNS * volumes.ROWS * volumes.SLICES))), says=["all voxels are 40"], writes=ONE),
     Row("volume info", "wrong", "--orientation for a file that says its own", "refused: leave it out", info_of("ct.nii.gz") + " --orientation LPS", 2,
         nifti(), says=["leave --orientation"]),
     Row("volume info", "wrong", "a voxel that is not a number", "refused", info_of("ct.nii"), 2, nifti_of_floats_with_nan,

@@ -70,13 +70,13 @@ def write_series(folder, which=range(SLICES), series=1, description="abdomen", p
 
 
 def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0, shift_mm=(0.0, 0.0, 0.0)):
-    """NIfTI-1 of the CT; form are the codes of qform and sform, kind 4 is int16 and 16 float."""
+    """NIfTI-1 of the CT; form are the codes of qform and sform, kind 4 is int16, 16 float, 128 colours."""
     values = hounsfield() if values is None else values
     content = values.tobytes()
     head = bytearray(352)
     struct.pack_into("<i", head, 0, 348)
     struct.pack_into("<8h", head, 40, 3, COLUMNS, ROWS, SLICES, 1, 1, 1, 1)
-    struct.pack_into("<hh", head, 70, kind, {4: 16, 16: 32}[kind])
+    struct.pack_into("<hh", head, 70, kind, {4: 16, 16: 32, 128: 24}[kind])
     struct.pack_into("<8f", head, 76, 1.0, SPACING_MM * scale, SPACING_MM * scale, SPACING_MM * scale, 0, 0, 0, 0)
     struct.pack_into("<fff", head, 108, 352.0 + len(extra), 1.0, 0.0)
     struct.pack_into("<b", head, 123, 2)
@@ -93,18 +93,20 @@ def write_nifti(path, values=None, form=(1, 1), kind=4, extra=b"", scale=1.0, sh
     Path(path).write_bytes(gzip.compress(everything, 1) if str(path).endswith(".gz") else everything)
 
 
-def write_nrrd(path, space="left-posterior-superior", lines="", values=None):
+def write_nrrd(path, space="left-posterior-superior", lines="", values=None, encoding="raw"):
     x, y, z = ORIGIN_MM
     head = ("NRRD0004\ntype: short\ndimension: 3\n" + (f"space: {space}\n" if space else "") +
             f"sizes: {COLUMNS} {ROWS} {SLICES}\n" +
             (f"space directions: (2,0,0) (0,2,0) (0,0,2)\nspace origin: ({x},{y},{z})\n" if space else "spacings: 2 2 2\n") +
-            f"kinds: domain domain domain\nendian: little\nencoding: raw\n{lines}\n")
+            f"kinds: domain domain domain\nendian: little\nencoding: {encoding}\n{lines}\n")
     Path(path).write_bytes(head.encode() + (hounsfield() if values is None else values).tobytes())
 
 
-def write_mha(path, values=None, cut=0, direction="1 0 0 0 1 0 0 0 1"):
+def write_mha(path, values=None, cut=0, direction="1 0 0 0 1 0 0 0 1", place="Offset", lines=""):
+    """MetaImage of the CT; place is the name under which its first voxel stands, if any, lines are further ones of its header."""
+    offset = f"{place} = {ORIGIN_MM[0]} {ORIGIN_MM[1]} {ORIGIN_MM[2]}\n" if place else ""
     head = (f"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
-            f"TransformMatrix = {direction}\nOffset = {ORIGIN_MM[0]} {ORIGIN_MM[1]} {ORIGIN_MM[2]}\nElementSpacing = 2 2 2\n"
+            f"TransformMatrix = {direction}\n{offset}ElementSpacing = 2 2 2\n{lines}"
             f"DimSize = {COLUMNS} {ROWS} {SLICES}\nElementType = MET_SHORT\nElementDataFile = LOCAL\n")
     content = (hounsfield() if values is None else values).tobytes()
     Path(path).write_bytes(head.encode() + content[:len(content) - cut])

@@ -324,6 +324,7 @@ TEST(StatedGeometry, VoxelsAndBodiesThatNoCtHasAreRefused) {
   expect_refused(body(scratch.path() / "tiny.mha"), "tiny.mha", "a body of 18 mm");
   expect_refused(body(file("giant.mha", 151, 20)), "giant.mha", "a body of 3020 mm");
   expect_refused(body(file("air.mha", 60, 1, -1000, -1000)), "air.mha", "nothing but air");
+  expect_refused(body(file("empty.mha", 60, 1, 40, 40)), "empty.mha", "all of its voxels are 40 HU");
 }
 
 }  // namespace
