@@ -89,7 +89,8 @@ def in_metres():
     return table([[[v / 1000 if j == 3 and i < 3 else v for j, v in enumerate(row)] for i, row in enumerate(pose)] for pose in pivot()])
 
 
-def latency_streams(folder, moves=True, periodic=False, late_s=0.083):
+def latency_streams(folder, moves=True, periodic=False, late_s=0.083, body_s=(0, 20), eye_s=(0, 20)):
+    """Poses of the tracker and of the eye, from when to when each."""
     chance = random.Random(5)
 
     def turned(t):
@@ -101,11 +102,11 @@ def latency_streams(folder, moves=True, periodic=False, late_s=0.083):
                               motion.turn((1, 0, 0), 15 * math.sin(2.1 * t + 2) + 8 * math.sin(5.9 * t)))
 
     body, eye = [], []
-    for k in range(20 * 60):
+    for k in range(body_s[0] * 60, body_s[1] * 60):
         t = k / 60
         noise = motion.turn((1, 0.3, 0.2), chance.gauss(0, 0.05))
         body.append(motion.table_line(motion.product(motion.shift(300, 0, 0), turned(t), noise, boards.CAMERA_FROM_SENSOR), 50 + t))
-    for k in range(20 * 30):
+    for k in range(eye_s[0] * 30, eye_s[1] * 30):
         t = k / 30
         eye.append(motion.table_line(motion.product(motion.shift(0, 0, 80), turned(t), motion.turn((0, 1, 0), chance.gauss(0, 0.05))),
                                      50 + t + late_s))
@@ -221,6 +222,12 @@ ROWS = [
 
     Row("calibrate latency", "good", "two streams of poses, the eye 83 ms late", "pass; 83 ms", LATENCY, 0, latency_streams, "pass",
         says=["83"], writes=["latency.toml", "latency.json"], check=latency_is(83)),
+    Row("calibrate latency", "good", "20 s of the tracker's poses within 60 s of the eye's", "pass; 83 ms, by the 20 s that both have", LATENCY, 0,
+        lambda folder: latency_streams(folder, body_s=(30, 50), eye_s=(0, 60)), "pass", says=["only the 20.0 s that both have were used", "60.0 s of"],
+        writes=["latency.toml", "latency.json"], check=latency_is(83)),
+    Row("calibrate latency", "wrong", "5 s of the tracker's poses within 60 s of the eye's", "fail: how long the part in common has to be", LATENCY, 3,
+        lambda folder: latency_streams(folder, body_s=(30, 35), eye_s=(0, 60)), "fail", says=["5.0 s in common, of at least 8"],
+        writes=["latency.json"]),
     Row("calibrate latency", "odd", "an even swing", "fail: the motion repeats itself", LATENCY, 3,
         lambda folder: latency_streams(folder, periodic=True), "fail", says=["repeats"], writes=["latency.json"]),
     Row("calibrate latency", "wrong", "nothing moves", "fail: the tracker hardly moves", LATENCY, 3,
