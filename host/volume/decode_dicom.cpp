@@ -20,24 +20,23 @@ void note_doubts(const Series& series, std::vector<std::string>& notes) {
   const DicomSlice& first = slices.front();
   if (!first.scaled) {
     notes.emplace_back(
-        "does not say how its values are Hounsfield units (it lacks Rescale Intercept or Slope, (0028,1052)): they are "
-        "read as they are stored; compare air (-1000 HU) and water (0 HU) before you trust them");
+        "its files do not say how its values are Hounsfield units (they lack Rescale Intercept or Slope, (0028,1052)): "
+        "these are read as they are stored; compare air (-1000 HU) and water (0 HU) before you trust them");
   }
   const auto other_unit = std::find_if(
       slices.begin(), slices.end(), [](const DicomSlice& slice) { return !slice.unit.empty() && slice.unit != "HU"; });
   if (other_unit != slices.end()) {
-    notes.push_back(fmt::format("says that its values are no Hounsfield units: Rescale Type (0028,1054) is {}",
+    notes.push_back(fmt::format("its files say that its values are no Hounsfield units: Rescale Type (0028,1054) is {}",
                                 other_unit->unit.substr(0, 16)));
   }
   if (slices.size() < 2 || first.between_mm == 0) return;
   const double step_mm = series.stack.step_mm, apart_mm = (slices[1].position_mm - first.position_mm).norm();
   const auto is_said = [&](double mm) { return std::abs(first.between_mm - mm) <= 0.02 * mm + 0.01; };
   if (is_said(step_mm) || is_said(apart_mm)) return;
-  notes.push_back(
-      fmt::format("says two distances of its slices: {:.4g} mm by Spacing Between Slices (0018,0088), {:.4g} mm by "
-                  "their positions, "
-                  "which count",
-                  first.between_mm, step_mm));
+  notes.push_back(fmt::format(
+      "its files say two distances of its slices: {:.4g} mm by Spacing Between Slices (0018,0088), {:.4g} mm by "
+      "their positions, which count",
+      first.between_mm, step_mm));
 }
 
 /// What the reader of a volume should know that is not in it.

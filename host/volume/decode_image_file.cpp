@@ -193,10 +193,10 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
     if (!gaps.place.empty() && source.stated.orientation.empty()) {
       // Of a field, and of nothing else, all numbers depend on it: a CT and its labels are compared voxel by voxel.
       if (components != 1) return refused(Errc::bad_format, path, fmt::format("{}; export it again", gaps.place));
-      image.notes.push_back(
-          fmt::format("{}, which is taken to be the patient's origin: points of other programs, in mm, may be of "
-                      "another; take them from this file",
-                      gaps.place));
+      image.notes.push_back(fmt::format(
+          "its file {}, which is taken to be the patient's origin: points of other programs, in mm, may be of "
+          "another; take them from this file",
+          gaps.place));
     }
     put_stated(source, place ? &*place : nullptr, image);
     auto read = components == 1 ? read_hu(path, *io, cut, image.hu) : read_values(path, *io, cut, image.values);

@@ -331,7 +331,7 @@ ROWS = [
     Row("volume info", "wrong", "DICOM slices of two frames of reference", "refused: both are named", INFO, 2, slices_with(two_frames),
         says=["2 frames of reference", "2.25.77", "2.25.78"]),
     Row("volume info", "odd", "DICOM without Rescale Intercept and Slope", "read; the values may be no Hounsfield units", INFO, 0,
-        slices_with(without_scale), says=["lacks Rescale Intercept"], writes=ONE),
+        slices_with(without_scale), says=["lack Rescale Intercept"], writes=ONE),
     Row("volume info", "wrong", "DICOM of which one slice has no Rescale Intercept", "refused: the file", INFO, 2,
         slices_with(without_scale_of_one), says=["s1_011.dcm", "Rescale Intercept"]),
     Row("volume info", "odd", "a CT of one value throughout", "read; there is nothing in it", info_of("ct.mha"), 0,

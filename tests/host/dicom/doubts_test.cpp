@@ -87,7 +87,7 @@ TEST(DicomDoubts, ValuesThatMayBeNoHounsfieldUnitsAreSaidToBe) {
   for (const DcmTagKey& tag : {DCM_RescaleIntercept, DCM_RescaleSlope}) {
     const fs::path folder = scratch / DcmTag(tag).getTagName();
     write_four(folder, [&](DcmDataset& dataset, int) { EXPECT_TRUE(dataset.findAndDeleteElement(tag).good()); });
-    EXPECT_NE(notes_of(folder).find("lacks Rescale Intercept or Slope"), std::string::npos) << folder;
+    EXPECT_NE(notes_of(folder).find("lack Rescale Intercept or Slope"), std::string::npos) << folder;
   }
   write_ct_series(scratch / "hu", {}, 4, [](DcmDataset& dataset) { put(dataset, DCM_RescaleType, "HU"); });
   EXPECT_EQ(notes_of(scratch / "hu"), "");
