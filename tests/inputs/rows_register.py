@@ -133,6 +133,14 @@ def in_ct(folder, wrong):
 PELVIS = "$DATA/fiducial_registration_pelvis_phantom"
 
 
+def unspaced_case(stated=""):
+    def make(folder):
+        case(folder, **{'path = "ct.nii.gz"\n': 'path = "ct.mha"\n' + stated})
+        volumes.write_mha(folder / "whole.mha")
+        (folder / "ct.mha").write_bytes((folder / "whole.mha").read_bytes().replace(b"ElementSpacing = 2 2 2\n", b""))
+    return make
+
+
 def case(folder, **changes):
     """A case of a CT and one picture, to be refused."""
     volumes.write_nifti(folder / "ct.nii.gz")
@@ -243,6 +251,10 @@ ROWS = [
         simulated(4, EXCHANGED_VIEWS, "--deformation push --amplitude-mm 12 --push-width-mm 40 "), 0, verdict="marginal",
         says=["view[02]\\.png does not agree with the other views"], writes=["case/*", "out/*"], slow=True),
     Row("register views", "wrong", "a CT that is not there", "refused: the path is named", VIEWS, 2, case_without("ct.nii.gz"), says=["ct.nii.gz"]),
+    Row("register views", "wrong", "a CT that does not say how far apart its voxels are", "refused: the key of the case that states it", VIEWS, 2,
+        unspaced_case(), says=["no ElementSpacing", "spacing = \\[x, y, z\\] \\(mm\\) in \\[volume\\]"], says_not=["--spacing"]),
+    Row("register views", "odd", "the same, with spacing = [2, 2, 2] in the case", "the CT is taken (and of a board alone nothing is found)", VIEWS, 3,
+        unspaced_case("spacing = [2, 2, 2]\n"), "fail", says=["no place of the surface"], writes=["out/result.json"], slow=True),
     Row("register views", "wrong", "a pose that is not there", "refused: the path is named", VIEWS, 2, case_without("view1.txt"),
         says=["view1.txt"]),
     Row("register views", "wrong", "a key that there is not", "refused: the key is named", VIEWS, 2,
