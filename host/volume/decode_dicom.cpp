@@ -23,8 +23,10 @@ void note_doubts(const Series& series, std::vector<std::string>& notes) {
         "its files do not say how its values are Hounsfield units (they lack Rescale Intercept or Slope, (0028,1052)): "
         "these are read as they are stored; compare air (-1000 HU) and water (0 HU) before you trust them");
   }
-  const auto other_unit = std::find_if(
-      slices.begin(), slices.end(), [](const DicomSlice& slice) { return !slice.unit.empty() && slice.unit != "HU"; });
+  // US is "unspecified", which GDCM and what stands on it writes into all that it writes.
+  const auto other_unit = std::find_if(slices.begin(), slices.end(), [](const DicomSlice& slice) {
+    return !slice.unit.empty() && slice.unit != "HU" && slice.unit != "US";
+  });
   if (other_unit != slices.end()) {
     notes.push_back(fmt::format("its files say that its values are no Hounsfield units: Rescale Type (0028,1054) is {}",
                                 other_unit->unit.substr(0, 16)));

@@ -92,7 +92,9 @@ TEST(DicomDoubts, ValuesThatMayBeNoHounsfieldUnitsAreSaidToBe) {
   write_ct_series(scratch / "hu", {}, 4, [](DcmDataset& dataset) { put(dataset, DCM_RescaleType, "HU"); });
   EXPECT_EQ(notes_of(scratch / "hu"), "");
   write_ct_series(scratch / "us", {}, 4, [](DcmDataset& dataset) { put(dataset, DCM_RescaleType, "US"); });
-  EXPECT_NE(notes_of(scratch / "us").find("Rescale Type (0028,1054) is US"), std::string::npos);
+  EXPECT_EQ(notes_of(scratch / "us"), "");
+  write_ct_series(scratch / "od", {}, 4, [](DcmDataset& dataset) { put(dataset, DCM_RescaleType, "OD"); });
+  EXPECT_NE(notes_of(scratch / "od").find("Rescale Type (0028,1054) is OD"), std::string::npos);
   // Beside slices that have it, what a slice without it holds is not known.
   write_four(scratch / "some", [](DcmDataset& dataset, int k) {
     if (k == 2) {
