@@ -115,7 +115,8 @@ ClockLine::Tick ClockLine::push(DeviceTime arrived, std::int64_t lost, bool perh
 }
 
 ClockLine::Tick ClockLine::push_numbered(DeviceTime arrived, std::int64_t number) {
-  if (index_ < 0 || number - first_number_ <= index_) {
+  const bool elsewhere = number - first_number_ <= index_ || number - first_number_ - index_ > kMostMissing;
+  if (index_ < 0 || elsewhere) {
     if (index_ >= 0) {
       report({ClockEvent::Kind::restart, arrived, 0, 0});
       ++restarts_;

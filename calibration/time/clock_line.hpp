@@ -56,8 +56,9 @@ class ClockLine {
   /// Takes the next arrival; `lost` measurements before it are known to be missing. `perhaps_more`: there are signs
   /// that more than those are missing; lateness by whole periods is then believed sooner.
   Tick push(DeviceTime arrived, std::int64_t lost = 0, bool perhaps_more = false);
-  /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow is a
-  /// restart.
+  /// An arrival with the sender's own count, which leaves no doubt about losses. A count that does not grow, or grows
+  /// by more than kMostMissing at once, is a restart.
+  static constexpr std::int64_t kMostMissing = 1'000'000;
   Tick push_numbered(DeviceTime arrived, std::int64_t index);
 
   /// By how much the true period is longer than the nominal one.

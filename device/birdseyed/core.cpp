@@ -163,7 +163,10 @@ void Core::note(const FrameCame& came) {
     ++frames_repeated_;
     return;
   }
-  if (next_sequence_ && frame.sequence > *next_sequence_) frames_lost_ += frame.sequence - *next_sequence_;
+  // A camera that counts from elsewhere has lost nothing; its clock begins anew too.
+  if (next_sequence_ && frame.sequence > *next_sequence_ &&
+      frame.sequence - *next_sequence_ < std::uint64_t{ClockLine::kMostMissing})
+    frames_lost_ += frame.sequence - *next_sequence_;
   next_sequence_ = frame.sequence + 1;
   ++frames_seen_;
   calibration_.note_frame(frame.width_px, frame.height_px);

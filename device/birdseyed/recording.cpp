@@ -9,6 +9,7 @@
 #include "device/birdseyed/byte_codec.hpp"
 #include "device/birdseyed/layout_json.hpp"
 #include "device/wire/igtl_bytes.hpp"
+#include "device/wire/json.hpp"
 
 namespace birdseye::device {
 
@@ -37,11 +38,11 @@ Bytes payload_of(const InstrumentChanged& changed) {
   out.put(changed.state);
   out.put_text(changed.text);
   out.put(changed.at.ns);
-  out.put_text(changed.layout ? nlohmann::json(*changed.layout).dump() : "");
+  out.put_text(changed.layout ? wire::text_of(*changed.layout) : "");
   out.put(changed.rate_hz);
   out.put<std::uint8_t>(changed.exposure ? 1 : 0);
   out.put(changed.exposure.value_or(Duration{}).ns);
-  out.put_text(nlohmann::json(changed.identity).dump());
+  out.put_text(wire::text_of(changed.identity));
   return out.take();
 }
 
@@ -239,6 +240,7 @@ std::string fault_of(const drivers::Frame& frame) {
   const bool sized = frame.width_px > 0 && frame.height_px > 0 &&
                      std::int64_t{frame.width_px} * frame.height_px <= drivers::kMostPixels;
   const auto pixels = std::uint64_t{3} * static_cast<unsigned>(frame.width_px) * static_cast<unsigned>(frame.height_px);
+  if (frame.sequence > drivers::kMostSequence) return fmt::format("a frame of number {}", frame.sequence);
   if (sized && frame.rgb->size() == pixels) return "";
   return fmt::format("a frame of {} x {} pixels in {} bytes", frame.width_px, frame.height_px, frame.rgb->size());
 }
@@ -256,7 +258,7 @@ Bytes recording_magic() {
 }
 
 Bytes block_of(const CoreSettings& settings) {
-  const std::string text = nlohmann::json(settings).dump();
+  const std::string text = wire::text_of(settings);
   return block(kSettings, {text.begin(), text.end()});
 }
 

@@ -53,6 +53,10 @@ void each_of_health(AnyHealth& health, const Each& each) {
 
 }  // namespace
 
+std::string text_of(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 void to_json(json& out, const FrameInfo& info) {
   json pose{{"kind", to_string(info.pose.kind)},
             {"reason", info.pose.reason},

@@ -1,11 +1,16 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
 #include "device/wire/packet.hpp"
 
 /// The JSON inside the wire's STRINGs. Reading throws nlohmann::json::exception where a value is not what it should be.
 namespace birdseye::wire {
+
+/// On one line. What an instrument says of itself may be cut inside a character, or be in another encoding: such bytes
+/// become U+FFFD.
+std::string text_of(const nlohmann::json& json);
 
 void to_json(nlohmann::json& json, const FrameInfo& info);
 void from_json(const nlohmann::json& json, FrameInfo& info);

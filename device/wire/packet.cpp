@@ -34,7 +34,7 @@ void append_string(std::vector<std::uint8_t>& out, const char* device, const nlo
   const auto message = igtl::StringMessage::New();
   message->SetDeviceName(device);
   stamp(*message, time);
-  message->SetString(json.dump().c_str());
+  message->SetString(text_of(json).c_str());
   append(out, *message);
 }
 

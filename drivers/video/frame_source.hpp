@@ -30,6 +30,9 @@ struct Frame {
 /// of the wire.
 inline constexpr std::int64_t kMostPixels = std::int64_t{4096} * 4096;
 
+/// The most that a frame's number can be: a camera of a thousand frames a second counts so far in 140,000 years.
+inline constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 52U;
+
 struct CameraSettings {
   std::string source;  ///< v4l2:/dev/video0 or socket:/path
   int width_px = 0, height_px = 0;

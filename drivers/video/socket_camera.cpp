@@ -96,7 +96,8 @@ Result<void> SocketCamera::read_header() {
   const bool sized = width > 0 && height > 0 && width <= kLargestSide && height <= kLargestSide &&
                      std::int64_t{width} * height <= kMostPixels;
   const bool timed = acquired_ns >= 0 && acquired_ns <= kLatest_ns && sigma_ns >= 0 && sigma_ns <= kWorstSigma_ns;
-  bool sensible = std::memcmp(header_.data(), "BEFRAME1", 8) == 0 && format && sized && timed;
+  const bool counted = get<std::uint64_t>(header_, 24) <= kMostSequence;
+  bool sensible = std::memcmp(header_.data(), "BEFRAME1", 8) == 0 && format && sized && timed && counted;
   if (sensible) {
     layout_ = packed_layout(*format, static_cast<int>(width), static_cast<int>(height));
     const std::uint64_t raw = std::uint64_t{3} * width * height;

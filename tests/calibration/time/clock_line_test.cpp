@@ -291,6 +291,20 @@ TEST(ClockLine, ANumberLeavesNoDoubt) {
   EXPECT_EQ(line.take_events().at(0).kind, ClockEvent::Kind::restart);
 }
 
+TEST(ClockLine, ANumberFromFarAwayIsAnotherCount) {
+  SimulatedArrivals arrivals = instrument(8, Jitter::exponential, 144, 50);
+  ClockLine line = line_for(arrivals);
+  constexpr std::int64_t kFar = std::int64_t{1} << 52;
+  for (int n = 0; n < 1000; ++n) {
+    const double arrived_s = arrivals.arrival_of(arrivals.measure());
+    line.push_numbered(at(arrived_s), n < 500 ? n : kFar + n);
+  }
+  const auto events = line.take_events();
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].kind, ClockEvent::Kind::restart);
+  EXPECT_LT(std::abs(line.drift_ppm()), 500);
+}
+
 TEST(ClockLine, LossesThatAreToldAreNoEvent) {
   SimulatedArrivals arrivals = instrument(9, Jitter::uniform, 103.3, -50);
   ClockLine line = line_for(arrivals);

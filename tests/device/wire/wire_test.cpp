@@ -102,6 +102,16 @@ TEST(Wire, BirdsStatusAndHealth) {
   EXPECT_EQ(std::get<Health>(**ends.client->next(Deadline::after(Duration::from_ms(5000)))).phase_errors, 2U);
 }
 
+/// A card's name, cut inside a character as a driver cuts it.
+TEST(Wire, WhatAnInstrumentSaysInAnotherEncodingIsSentAllTheSame) {
+  const Ends ends = connected();
+  Health health;
+  health.instruments = {{"camera", "running", "Endoskop f\xFCr \xC3", 0, {{"card", "Endoskop f\xFCr \xC3"}}}};
+  ends.server->publish(pack(health, {1}));
+  const auto told = std::get<Health>(**ends.client->next(Deadline::after(Duration::from_ms(5000))));
+  EXPECT_EQ(told.instruments.at(0).identity.at("card"), "Endoskop f\uFFFDr \uFFFD");
+}
+
 TEST(Wire, ATransformIsNamedByItsBirdWithinWhatTheProtocolHasRoomFor) {
   EXPECT_EQ(transform_device("scope"), "ScopeToTracker");
   EXPECT_EQ(transform_device("bird2"), "Bird2ToTracker");

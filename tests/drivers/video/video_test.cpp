@@ -144,6 +144,7 @@ TEST(SocketCamera, RefusesWhatIsNoFrame) {
   refuses(8, std::uint32_t{0x8000'0004});
   refuses(12, std::uint32_t{8193});
   refuses(16, 'X');
+  refuses(24, std::uint64_t{0x7fff'ffff'ffff'ffff});
   refuses(32, std::int64_t{-1});
   refuses(32, std::int64_t{0x7fff'ffff'ffff'ffff});
   refuses(40, std::int64_t{-5});
