@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "host/registration/rigid/points_in_ct.hpp"
 #include "host/volume/marker_near.hpp"
 
 namespace birdseye::host {
@@ -57,8 +58,10 @@ std::optional<MarkersSeen> look_for_markers(const Volume& ct, Places places_mm) 
   seen.places = places_mm.size();
   for (const Eigen::Vector3d& place_mm : places_mm) seen.as_given += shows_marker(ct, place_mm) ? 1 : 0;
   if (4 * seen.as_given > seen.places) return seen;
-  for (const Eigen::Vector3d& place_mm : places_mm)
-    seen.turned += shows_marker(ct, {-place_mm.x(), -place_mm.y(), place_mm.z()}) ? 1 : 0;
+  std::vector<Eigen::Vector3d> turned_mm;
+  for (const Eigen::Vector3d& place_mm : places_mm) turned_mm.emplace_back(-place_mm.x(), -place_mm.y(), place_mm.z());
+  for (const Eigen::Vector3d& place_mm : turned_mm) seen.turned += shows_marker(ct, place_mm) ? 1 : 0;
+  seen.turned_inside = points_outside(ct, turned_mm).empty();
   return seen;
 }
 

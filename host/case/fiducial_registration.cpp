@@ -144,9 +144,12 @@ void judge_places(Verdict& verdict, const FiducialsFound& out) {
                   "the file is in RAS: give LPS (x and y with the other sign), or 3D Slicer's own .mrk.json or .fcsv, "
                   "which say their frame");
     } else if (seen.none()) {
-      verdict.add(Grade::pass,
-                  "the CT shows no marker of a usual kind at any place of the CT's file: look whether they lie where "
-                  "the file says");
+      verdict.add(seen.turned_inside ? Grade::marginal : Grade::pass,
+                  fmt::format("the CT shows no marker of a usual kind at any place of the CT's file{}",
+                              seen.turned_inside ? ", and the patient is there with the other sign of x and y too: "
+                                                   "nothing tells whether the file is in LPS, or in RAS"
+                                                 : ""),
+                  "look in --report whether each point lies where its marker is");
     }
   }
   if (!out.targets_outside.empty()) {

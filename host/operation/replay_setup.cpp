@@ -158,6 +158,7 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
     if (!read) return read.error();
     out.tracker_from_patient = read->patient_from_tracker.inverse();
     if (!out.fre_mm) out.fre_mm = read->fre_mm;
+    if (read->ct_sha256.empty()) out.cautions.emplace_back(words("why_registration_of_no_ct"));
     out.by_file = *std::move(read);
   } else {
     const auto read = read_transform<Tracker, Patient>(inputs.tracker_from_patient);

@@ -433,6 +433,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_unproven", "nothing tells whether {} is of the recording's {}"},
     {"why_withdrawn", "the appliance withdrew its calibration record"},
     {"why_withdrawn_for", "the appliance withdrew its calibration record: {}"},
+    {"why_registration_of_no_ct",
+     "the registration does not say of which CT it is; register fiducials with --volume writes it down"},
     {"why_other_record", "the recording has another calibration record than the operation was calibrated by"},
     {"doubt_fit", "the touches fit poorly"},
     {"why_no_pointer", "the pointer is not seen: hold its tip to a fiducial"},

@@ -130,6 +130,14 @@ def in_ct(folder, wrong):
     (folder / "ct.txt").write_text(points_text([wrong(place) for place in places]))
 
 
+def landmarks_in_ct(folder, wrong):
+    """Places amid the small CT that no marker shows; the patient's middle is that of the frame, so that he is at the turned places too."""
+    volumes.write_nifti(folder / "ct.nii.gz")
+    places = [(-30.0, -10.0, 120.0), (25.0, -12.0, 125.0), (-22.0, 20.0, 150.0), (28.0, 15.0, 160.0), (4.0, -20.0, 140.0), (0.0, 25.0, 130.0)]
+    (folder / "touched.txt").write_text(points_text([motion.apply(TRACKER_FROM_PATIENT, place) for place in places]))
+    (folder / "ct.txt").write_text(points_text([wrong(place) for place in places]))
+
+
 PELVIS = "$DATA/fiducial_registration_pelvis_phantom"
 
 
@@ -213,6 +221,8 @@ ROWS = [
     Row("register fiducials", "wrong", "the CT's points 1000 mm above the CT", "fail: where the CT lies", IN_CT, 3,
         lambda folder: in_ct(folder, lambda p: (p[0], p[1], p[2] + 1000)), "fail", says=["outside of the CT", "The CT has x from"],
         writes=["r.json"]),
+    Row("register fiducials", "wrong", "landmarks of the CT in RAS, where the patient is too", "marginal: nothing tells LPS from RAS; look", IN_CT, 0,
+        lambda folder: landmarks_in_ct(folder, lambda p: (-p[0], -p[1], p[2])), "marginal", says=["in LPS, or in RAS", "--report"], writes=BOTH),
     Row("register fiducials", "good", "points of the CT, with the CT at hand", "pass", IN_CT, 0, lambda folder: in_ct(folder, lambda p: p),
         "pass", writes=BOTH),
     Row("register fiducials", "wrong", "the CT's points by a spacing that is 5 % too large", "fail: the spacing", FIDUCIALS, 3,
