@@ -2,9 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "device/wire/json.hpp"
+
 namespace birdseye::device {
+
+namespace {
+
+constexpr std::size_t kMostMessageBytes = 65'000;  // of OpenIGTLink's STRING, whose length has 16 bits
+
+}  // namespace
 
 CalibrationGuard::CalibrationGuard(const std::string& record) : text_(record) {
   changed_ = true;  // also that there is none: who had one before must not go on with it
@@ -13,10 +22,15 @@ CalibrationGuard::CalibrationGuard(const std::string& record) : text_(record) {
     return;
   }
   auto parsed = calibration::parse_record(record);
-  if (parsed) {
-    record_ = *std::move(parsed);
-  } else {
+  // In the message that carries it, quotes and other characters take more room than in the file.
+  const std::size_t bytes = wire::text_of(wire::Calibration{true, "", record}).size();
+  if (!parsed) {
     fault_ = "calibration: " + parsed.error().what;
+  } else if (bytes > kMostMessageBytes) {
+    fault_ = fmt::format("calibration: the record takes {} bytes of a message that holds {}; shorten its names", bytes,
+                         kMostMessageBytes);
+  } else {
+    record_ = *std::move(parsed);
   }
   judge();
 }

@@ -43,6 +43,21 @@ TEST(CalibrationGuard, IsInForceOnceAllThatItWasMadeWithIsThere) {
   EXPECT_FALSE(guard.take_change());
 }
 
+TEST(CalibrationGuard, ARecordThatNoMessageHoldsIsNotInForceAndTheReasonIsSaid) {
+  calibration::CalibrationRecord large = testing::example_record(4, 2, kTracker, kCamera);
+  large.scope = std::string(20'000, '"');  // of which JSON in JSON makes four characters each
+  CalibrationGuard guard(record_text(large));
+  guard.note(runs(Instrument::tracker, kTracker));
+  guard.note(runs(Instrument::camera, kCamera));
+  guard.note_frame(4, 2);
+  const auto told = guard.take_change();
+  ASSERT_TRUE(told);
+  EXPECT_FALSE(told->in_force);
+  EXPECT_TRUE(told->record.empty());
+  EXPECT_NE(told->why_not.find("a message that holds 65000"), std::string::npos) << told->why_not.substr(0, 200);
+  EXPECT_LT(told->why_not.size(), 300U);
+}
+
 TEST(CalibrationGuard, AnotherSensorCameraOrSizeOfFrameTakesItOutOfForce) {
   const auto after = [](auto&& change) {
     CalibrationGuard guard(record());
