@@ -1,12 +1,12 @@
 #include "hw-sim/campaign/campaign.hpp"
 
 #include <fmt/format.h>
+#include <tbb/info.h>
 
 #include <algorithm>
 #include <deque>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "drivers/system/child_process.hpp"
@@ -103,8 +103,8 @@ Result<OperationResult> run_campaign(const CampaignSettings& settings,
   Work work(std::move(missing), **results, said);
   {
     std::vector<OwnedThread> threads;
-    const unsigned jobs = settings.jobs > 0 ? settings.jobs : std::max(1U, std::thread::hardware_concurrency());
-    for (unsigned i = 0; i < jobs; ++i) {
+    const int jobs = settings.jobs > 0 ? settings.jobs : tbb::info::default_concurrency();
+    for (int i = 0; i < jobs; ++i) {
       threads.emplace_back([&](const std::stop_token&) {
         while (const auto seed = work.next()) work.take(run_one(settings, *seed));
       });

@@ -14,7 +14,7 @@ struct CampaignSettings {
   std::uint64_t first_seed = 1, last_seed = 1;
   double minutes = 10;           ///< of each operation
   std::filesystem::path folder;  ///< gets operations.sqlite
-  unsigned jobs = 0;             ///< operations at a time; 0: as many as there are cores
+  int jobs = 0;                  ///< operations at a time; 0: as many as there are cores
   std::string program;           ///< of this name; it knows `operation --line`
 };
 
