@@ -79,7 +79,7 @@ TEST(LiveWorkflow, ACtWhoseGeometryIsStatedOtherwiseIsNotTakenUp) {
   LiveSettings settings = operation_settings(scratch);
   settings.patient.ct = scratch.file(
       "ct.nrrd", "NRRD0004\ntype: short\ndimension: 3\nsizes: 60 60 60\nendian: little\nencoding: raw\n\n" +
-                     std::string(std::size_t{2} * 60 * 60 * 60, '\0'));
+                     std::string("A") + std::string(std::size_t{2} * 60 * 60 * 60 - 1, '\0'));
   settings.patient.ct.stated = {Eigen::Vector3d(2, 2, 2.5), "LPS"};
   register_into(scratch.path(), settings);
   const auto kept = read_operation(scratch.path());
