@@ -104,6 +104,7 @@ Result<OperationResult> run_campaign(const CampaignSettings& settings,
   {
     std::vector<OwnedThread> threads;
     const int jobs = settings.jobs > 0 ? settings.jobs : tbb::info::default_concurrency();
+    threads.reserve(static_cast<std::size_t>(jobs));
     for (int i = 0; i < jobs; ++i) {
       threads.emplace_back([&](const std::stop_token&) {
         while (const auto seed = work.next()) work.take(run_one(settings, *seed));

@@ -28,7 +28,7 @@ TEST(OperationResults, AreReadBackAddedUpAndKeptOncePerSeed) {
   {
     const auto results = OperationResults::open(scratch / "o.sqlite", 2.5);
     ASSERT_TRUE(results) << results.error().what;
-    for (const std::uint64_t seed : {3, 1, 2, 9}) ASSERT_TRUE((*results)->enter(result_of_seed(seed)));
+    for (const std::uint64_t seed : {3U, 1U, 2U, 9U}) ASSERT_TRUE((*results)->enter(result_of_seed(seed)));
     OperationResult broken = result_of_seed(2);
     broken.laws_broken = 1;
     broken.broken = "12.000 s pose: scope is 20.0 mm off";
