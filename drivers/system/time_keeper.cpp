@@ -4,7 +4,8 @@ namespace birdseye {
 
 namespace {
 
-// Of the one thread that a simulator's fibers are of: what runs beside it, as who watches standard input, is not its own.
+// Of the one thread that a simulator's fibers are of: what runs beside it, as who watches standard input, is not its
+// own.
 thread_local TimeKeeper* keeper_in_place = nullptr;
 
 }  // namespace

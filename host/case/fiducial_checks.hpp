@@ -26,7 +26,7 @@ Result<void> refuse_one_file_twice(const std::filesystem::path& ct, const std::f
 struct MarkersSeen {
   std::size_t places = 0;
   std::size_t as_given = 0, turned = 0;  ///< turned: with the other sign of x and y, as RAS has them
-  bool turned_inside = false;  ///< the CT's patient is at all places, turned
+  bool turned_inside = false;            ///< the CT's patient is at all places, turned
   [[nodiscard]] bool only_turned() const { return 4 * turned >= 3 * places && 4 * as_given <= places; }
   [[nodiscard]] bool none() const { return as_given == 0 && !only_turned(); }
 };
