@@ -144,7 +144,7 @@ void DemoSession::keep_views() {
   while (const auto rest = rests_.take()) {
     // Of a rest the pose is known better than of a frame: the tracker's noise is averaged away.
     if (!setup || began_to_deform_) continue;
-    views_.keep(rest->frame, setup->camera_from_patient(rest->tracker_from_sensor));
+    views_.keep(rest->frame, setup->camera_from_patient(rest->tracker_from_sensor), setup);
     progress_(views_.note().line);
   }
 }

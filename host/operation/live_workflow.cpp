@@ -384,7 +384,7 @@ void LiveWorkflow::primary(HostTime now) {
       }
       break;
     case LiveStep::views:
-      return views_.keep(picture_.frame(), picture_.seen_from());
+      return views_.keep(picture_.frame(), picture_.seen_from(), setup);
     case LiveStep::deform:
       if (deformation_.running()) return;  // cancel_matching() is for a key of its own
       if (setup && patient_.plan() && patient_.transfer()) {

@@ -29,7 +29,8 @@ std::string LiveWorkflow::why_primary_refused() const {
       if (simulated_) return words("touch_simulated");
       return pointer_.held() ? std::string() : words("why_no_pointer");
     case LiveStep::views:
-      return views_.note().done ? std::string() : views_.why_refused(picture_.seen_from());
+      return views_.note().done ? std::string()
+                                : views_.why_refused(picture_.frame(), picture_.seen_from(), picture_.setup());
     case LiveStep::deform:
       if (deformation_.running()) return words("match_runs");
       if (deformation_.note().done && !motion_.moved_mm()) return {};

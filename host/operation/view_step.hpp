@@ -27,15 +27,18 @@ class ViewStep {
   ViewStep();
 
   /// The newest frame, with where its overlay was drawn from; empty where none was. A view from where a kept one was
-  /// taken is refused: it tells no depth.
+  /// taken is refused: it tells no depth. So is one of a scope that moves fast: where its camera was is less sure.
   void keep(const std::optional<wire::VideoFrame>& frame,
-            const std::optional<Transform<Camera, Patient>>& camera_from_patient);
+            const std::optional<Transform<Camera, Patient>>& camera_from_patient, const std::optional<Setup>& setup);
   /// Why keep() would refuse it, in words; empty: it would not.
-  [[nodiscard]] std::string why_refused(const std::optional<Transform<Camera, Patient>>& camera_from_patient) const;
+  [[nodiscard]] std::string why_refused(const std::optional<wire::VideoFrame>& frame,
+                                        const std::optional<Transform<Camera, Patient>>& camera_from_patient,
+                                        const std::optional<Setup>& setup) const;
   /// A measurement of the scope's bird.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   /// Gives each kept view the pose on which the measurements before and after its frame agree, as soon as they have
-  /// come: a single measurement's noise is averaged away.
+  /// come: a single measurement's noise is averaged away. Lets a view go that was taken as the scope began to move
+  /// fast.
   void average(const Setup& setup);
   void undo();
   /// All of them; why in words.
@@ -47,6 +50,8 @@ class ViewStep {
   [[nodiscard]] ViewAdvice advice(const Transform<Camera, Patient>& now, const Eigen::Vector3d& middle_mm) const;
 
  private:
+  [[nodiscard]] bool moved_fast(DeviceTime from, DeviceTime to, const Setup& setup) const;
+
   PoseHistory scope_;
   std::vector<KeptView> views_;
   std::size_t averaged_ = 0;  ///< of views_, from the first on

@@ -326,6 +326,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_not_watched", "the surface is not checked: the views it was found by are not kept"},
     {"why_most_views", "{} views are the most; undo the last one, or go on"},
     {"why_no_overlay", "there is no overlay on this frame, so that where its camera was is not sure"},
+    {"why_moving", "the scope moves: hold it still"},
     {"why_same_place", "view {} was kept from here: move the scope by {:.0f} mm or more"},
     {"note_views_kept", "{} views kept"},
     {"note_few_views", "{} views are too few: keep {} or more, from different sides"},

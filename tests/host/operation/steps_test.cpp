@@ -279,12 +279,15 @@ Transform<Camera, Patient> beside(unsigned n) {
   return {Eigen::Matrix3d::Identity(), kCameraFromPatient.translation() - Eigen::Vector3d(6.0 * n, 0, 0)};
 }
 
+const Setup kSetup = ScopeSetup::of_hand_eye({64, 48, 60, 60, 32, 24}, std::nullopt, {})
+                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {300, 0, 0}));
+
 TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
   ViewStep step;
-  step.keep(noise(1), std::nullopt);
+  step.keep(noise(1), std::nullopt, kSetup);
   EXPECT_TRUE(step.views().empty());
   EXPECT_EQ(step.note().line.substr(0, 9), "not kept:");
-  for (unsigned i = 0; i < 5; ++i) step.keep(noise(i), beside(i));
+  for (unsigned i = 0; i < 5; ++i) step.keep(noise(i), beside(i), kSetup);
   EXPECT_TRUE(step.note().done);
   step.undo();
   EXPECT_FALSE(step.note().done);
@@ -296,35 +299,33 @@ TEST(ViewStep, KeepsOnlyFramesWithAnOverlay) {
 
 TEST(ViewStep, OneMoreThanTheMostIsRefusedAndToldSo) {
   ViewStep step;
-  for (unsigned i = 0; i < 12; ++i) step.keep(noise(i), beside(i));
+  for (unsigned i = 0; i < 12; ++i) step.keep(noise(i), beside(i), kSetup);
   EXPECT_EQ(step.note().line, "12 views kept");
-  step.keep(noise(12), beside(12));
+  step.keep(noise(12), beside(12), kSetup);
   EXPECT_EQ(step.views().size(), 12U);
   EXPECT_EQ(step.note().line, "not kept: 12 views are the most; undo the last one, or go on");
   EXPECT_TRUE(step.note().done);
   step.undo();
-  step.keep(noise(12), beside(12));
+  step.keep(noise(12), beside(12), kSetup);
   EXPECT_EQ(step.note().line, "12 views kept");
 }
 
 TEST(ViewStep, AViewFromWhereOneWasKeptIsRefused) {
   ViewStep step;
-  step.keep(noise(1), beside(0));
-  step.keep(noise(2), beside(1));
+  step.keep(noise(1), beside(0), kSetup);
+  step.keep(noise(2), beside(1), kSetup);
   const Transform<Camera, Patient> near(Eigen::Matrix3d::Identity(),
                                         beside(1).translation() + Eigen::Vector3d(0, 2, -3));
-  step.keep(noise(3), near);
+  step.keep(noise(3), near, kSetup);
   EXPECT_EQ(step.views().size(), 2U);
   EXPECT_EQ(step.note().line, "not kept: view 2 was kept from here: move the scope by 5 mm or more");
   // From there it sees another part of the organ.
   const Transform<Camera, Camera> turned(rotation_exp(Eigen::Vector3d(0, 0.6, 0)), Eigen::Vector3d::Zero());
-  step.keep(noise(4), turned * near);
+  step.keep(noise(4), turned * near, kSetup);
   EXPECT_EQ(step.note().line, "3 views kept");
 }
 
 TEST(ViewStep, AveragesTheTrackersNoiseAboutAKeptFrame) {
-  const auto setup = ScopeSetup::of_hand_eye({64, 48, 60, 60, 32, 24}, std::nullopt, {})
-                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {300, 0, 0}));
   std::mt19937 random(1);
   std::normal_distribution<double> noise_mm(0, 0.5);
   // 100 measurements a second while the scope moves by 30 mm/s; the frame is of the middle.
@@ -345,26 +346,63 @@ TEST(ViewStep, AveragesTheTrackersNoiseAboutAKeptFrame) {
       if (i != 100) continue;
       wire::VideoFrame frame = *noise(1);
       frame.info.acquired = time(i);
-      step.keep(frame, setup.camera_from_patient(pose));
+      step.keep(frame, kSetup.camera_from_patient(pose), kSetup);
       before_mm2 += (pose.translation() - truth(i).translation()).squaredNorm();
     }
     const auto given = step.views().front().camera_from_patient;
-    step.average(setup);
+    step.average(kSetup);
     EXPECT_EQ(step.views().front().camera_from_patient.matrix(), given.matrix()) << "what comes after it is missing";
     for (int i = 104; i <= 120; ++i) step.take(time(i), measured(i));
-    step.average(setup);
+    step.average(kSetup);
     const Eigen::Vector3d is = step.views().front().camera_from_patient.translation();
-    after_mm2 += (is - setup.camera_from_patient(truth(100)).translation()).squaredNorm();
+    after_mm2 += (is - kSetup.camera_from_patient(truth(100)).translation()).squaredNorm();
     EXPECT_NE(is, given.translation());
   }
   // Thirteen measurements, of which a line takes its value in the middle: a share of 1 / sqrt(13).
   EXPECT_NEAR(std::sqrt(after_mm2 / before_mm2), 0.28, 0.08);
 }
 
+TEST(ViewStep, OfAScopeThatMovesFastIsRefused) {
+  const auto time = [](int i) { return DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}); };
+  const auto note_of = [&](double mm_per_s, double deg_per_s) {
+    ViewStep step;
+    Transform<Tracker, Sensor> pose;
+    for (int i = 0; i <= 100; ++i) {
+      const double since_s = 0.01 * i;
+      pose = Transform<Tracker, Sensor>(rotation_exp(Eigen::Vector3d(0, 0, deg_per_s * kRadPerDeg * since_s)),
+                                        Eigen::Vector3d(mm_per_s * since_s, 0, 0));
+      step.take(time(i), pose);
+    }
+    wire::VideoFrame frame = *noise(1);
+    frame.info.acquired = time(90);
+    step.keep(frame, kSetup.camera_from_patient(pose), kSetup);
+    return step.note().line;
+  };
+  EXPECT_EQ(note_of(0, 0), "1 views kept");
+  EXPECT_EQ(note_of(35, 25), "1 views kept");
+  EXPECT_EQ(note_of(45, 0), "not kept: the scope moves: hold it still");
+  EXPECT_EQ(note_of(0, 35), "not kept: the scope moves: hold it still");
+}
+
+TEST(ViewStep, TakenAsTheScopeBeganToMoveIsLetGo) {
+  const auto time = [](int i) { return DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}); };
+  const auto pose = [](int i) {
+    return Transform<Tracker, Sensor>(Eigen::Matrix3d::Identity(), {1.0 * std::max(0, i - 100), 0, 0});
+  };
+  ViewStep step;
+  for (int i = 0; i <= 100; ++i) step.take(time(i), pose(i));
+  wire::VideoFrame frame = *noise(1);
+  frame.info.acquired = time(100);
+  step.keep(frame, kSetup.camera_from_patient(pose(100)), kSetup);
+  EXPECT_EQ(step.note().line, "1 views kept");
+  for (int i = 101; i <= 110; ++i) step.take(time(i), pose(i));
+  step.average(kSetup);
+  EXPECT_TRUE(step.views().empty());
+  EXPECT_EQ(step.note().line, "not kept: the scope moves: hold it still");
+}
+
 /// As of an appliance that was started anew: a measurement of before has no say in a frame of now.
 TEST(ViewStep, AClockThatWentBackAveragesNothingOfBefore) {
-  const auto setup = ScopeSetup::of_hand_eye({64, 48, 60, 60, 32, 24}, std::nullopt, {})
-                         .registered(Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {300, 0, 0}));
   const Transform<Tracker, Sensor> before(Eigen::Matrix3d::Identity(), {200, 0, 0});
   const Transform<Tracker, Sensor> now(Eigen::Matrix3d::Identity(), {260, 0, 0});
   ViewStep step;
@@ -372,10 +410,10 @@ TEST(ViewStep, AClockThatWentBackAveragesNothingOfBefore) {
   wire::VideoFrame frame = *noise(1);
   frame.info.acquired = DeviceTime{} + Duration::from_ms(500);
   for (int i = 40; i < 60; ++i) step.take(DeviceTime{} + Duration::from_ms(10 * std::int64_t{i}), now);
-  step.keep(frame, setup.camera_from_patient(now));
-  step.average(setup);
+  step.keep(frame, kSetup.camera_from_patient(now), kSetup);
+  step.average(kSetup);
   const Eigen::Vector3d off_mm =
-      step.views().front().camera_from_patient.translation() - setup.camera_from_patient(now).translation();
+      step.views().front().camera_from_patient.translation() - kSetup.camera_from_patient(now).translation();
   EXPECT_LT(off_mm.norm(), 1e-9);
 }
 
@@ -399,7 +437,7 @@ TEST(DeformationStep, NeedsNothingOfItsCallerWhileItRuns) {
   DeformationStep step;
   {
     ViewStep views;
-    for (unsigned i = 0; i < 2; ++i) views.keep(noise(i), beside(i));
+    for (unsigned i = 0; i < 2; ++i) views.keep(noise(i), beside(i), kSetup);
     const auto plan = ball();
     watched = plan;
     step.begin(views.views(), {64, 48, 60, 60, 32, 24}, plan, transfer);
@@ -432,7 +470,7 @@ TEST(DeformationStep, IsFoundByTouchesBesideASingleView) {
   const auto transfer = std::make_shared<const TransferFunction>(*load_transfer_function("abdomen"));
   const CameraModel camera{64, 48, 60, 60, 32, 24};
   ViewStep views;
-  views.keep(noise(1), kCameraFromPatient);
+  views.keep(noise(1), kCameraFromPatient, kSetup);
   DeformationStep step;
   step.begin(views.views(), camera, ball(), transfer);
   EXPECT_FALSE(step.running());
