@@ -115,7 +115,8 @@ Verdict judge_pivot(const Pivot& pivot) {
         fmt::format("the tip slid by {:.1f} mm in divot {} while poses were recorded (its place in the last third "
                     "of the time against the first)",
                     pivot.slid_mm, pivot.slid_divot + 1),
-        "use a deeper divot that cannot move, and check that the sensor is firm on the pointer");
+        "use a deeper divot that cannot move, and check that the sensor is firm on the pointer; where the tip was put "
+        "into another divot, say which poses belong to which (--phases)");
   }
   return verdict;
 }

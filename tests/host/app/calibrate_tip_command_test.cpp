@@ -1,5 +1,6 @@
 // `calibrate tip`, from the outside.
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,6 +20,7 @@ namespace fs = std::filesystem;
 using calibration::PivotPose;
 using calibration::SimulatedPointer;
 using testing::contents_of;
+using ::testing::HasSubstr;
 using testing::read_json;
 using testing::run;
 using testing::Scratch;
@@ -237,19 +239,55 @@ TEST(CalibrateTip, QuaternionsWithWFirstAreTold) {
       0);
 }
 
-TEST(CalibrateTip, CentimetresAreDoubtedUntilTheyAreSaid) {
+TEST(CalibrateTip, RotationsThatDoNotGoWithThePositionsAreTold) {
+  const Scratch scratch;
+  const auto told = [&](const auto& change) {
+    auto poses = SimulatedPointer{.position_noise_mm = 0.2}.poses(60);
+    for (PivotPose& pose : poses) pose.tracker_from_sensor = change(pose.tracker_from_sensor);
+    const auto result = run("birdseye", command(scratch, scratch.file("p.csv", csv_of(poses))));
+    EXPECT_EQ(result.code, 3) << result.output;
+    EXPECT_FALSE(fs::exists(scratch / "tip.txt"));
+    return result.output;
+  };
+  using Pose = Transform<Tracker, Sensor>;
+  EXPECT_THAT(told([](const Pose& p) { return Pose(Eigen::Matrix3d(p.rotation().transpose()), p.translation()); }),
+              HasSubstr("the rotations seem to go the other way than the positions"));
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto mirrored = [axis](const Pose& p) {
+      Eigen::Vector3d position_mm = p.translation();
+      position_mm[axis] = -position_mm[axis];
+      return Pose(p.rotation(), position_mm);
+    };
+    EXPECT_THAT(told(mirrored), HasSubstr(fmt::format("with {} mirrored", "xyz"[axis])));
+  }
+}
+
+TEST(CalibrateTip, PosesThatWereLeftOutAreInTheVerdict) {
+  const Scratch scratch;
+  const auto poses = SimulatedPointer{.position_noise_mm = 0.2}.poses(60);
+  const auto verdict_with = [&](int left_out) {
+    std::string text = csv_of(poses);
+    for (int i = 0; i < left_out; ++i) text += "100,nan,nan,nan,0,0,0,1\n";
+    return run("birdseye", command(scratch, scratch.file("p.csv", text))).output;
+  };
+  EXPECT_THAT(verdict_with(20), HasSubstr("verdict: pass"));
+  EXPECT_THAT(verdict_with(20), HasSubstr("20 of 80 poses could not be read or used"));
+  EXPECT_THAT(verdict_with(61), HasSubstr("verdict: marginal"));
+}
+
+TEST(CalibrateTip, CentimetresFailUntilTheyAreSaid) {
   const Scratch scratch;
   SimulatedPointer pointer{.position_noise_mm = 0.2};
   const std::string cm = command(scratch, scratch.file("p.csv", csv_of(pointer.poses(60), 0.1)));
   const auto doubted = run("birdseye", cm);
-  EXPECT_EQ(doubted.code, 0) << doubted.output;
-  EXPECT_NE(doubted.output.find("verdict: marginal"), std::string::npos) << doubted.output;
-  EXPECT_NE(doubted.output.find("--unit cm or --unit in"), std::string::npos) << doubted.output;
+  EXPECT_EQ(doubted.code, 3) << doubted.output;
+  EXPECT_FALSE(fs::exists(scratch / "tip.txt"));
+  EXPECT_NE(doubted.output.find("--unit cm, --unit in"), std::string::npos) << doubted.output;
   // So are those of an optical tracker, a metre away, until somebody says that they are mm.
   pointer.tip_mm = {4, 3, -400};
   pointer.pivot_mm = {120, -40, -1100};
   const std::string far = command(scratch, scratch.file("far.csv", csv_of(pointer.poses(60), 0.1)));
-  EXPECT_NE(run("birdseye", far).output.find("--unit cm or --unit in"), std::string::npos) << far;
+  EXPECT_NE(run("birdseye", far).output.find("--unit cm, --unit in"), std::string::npos) << far;
   EXPECT_NE(run("birdseye", far + " --unit mm").output.find("verdict: pass"), std::string::npos) << far;
   pointer = SimulatedPointer{.position_noise_mm = 0.2};
   const auto told = run("birdseye", cm + " --unit cm");
