@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "host/dicom/refused.hpp"
 
@@ -39,14 +41,14 @@ std::optional<VoxelWay> way_into(const Volume& ct, const ImageFile& labels) {
   return way;
 }
 
-/// On the CT's grid; empty where no voxel of the CT has a label and some outside of it have.
-std::optional<Volume> laid_into(const Volume& ct, const ImageFile& labels, const VoxelWay& way) {
+/// The labels on the CT's grid, and which share of their voxels lies outside of the CT.
+std::pair<Volume, double> laid_into(const Volume& ct, const ImageFile& labels, const VoxelWay& way) {
   Volume out;
   out.size = ct.size;
   out.spacing_mm = ct.spacing_mm;
   out.patient_from_voxel = ct.patient_from_voxel;
   out.hu.assign(grid_count(ct.size), 0);
-  bool inside = false, outside = false;
+  std::size_t inside = 0, outside = 0;
   const std::int16_t* label = labels.hu.data();
   for (int k = 0; k < labels.size[2]; ++k) {
     for (int j = 0; j < labels.size[1]; ++j) {
@@ -54,13 +56,13 @@ std::optional<Volume> laid_into(const Volume& ct, const ImageFile& labels, const
         if (*label == 0) continue;
         const Eigen::Vector3i at = way.first + way.steps * Eigen::Vector3i(i, j, k);
         const bool in = (at.array() >= 0).all() && at.x() < ct.size[0] && at.y() < ct.size[1] && at.z() < ct.size[2];
-        (in ? inside : outside) = true;
+        ++(in ? inside : outside);
         if (in) out.hu[out.index(at.x(), at.y(), at.z())] = *label;
       }
     }
   }
-  if (outside && !inside) return std::nullopt;
-  return out;
+  const auto all = static_cast<double>(std::max<std::size_t>(1, inside + outside));
+  return {std::move(out), static_cast<double>(outside) / all};
 }
 
 /// Labels that say whose they are must be the CT's: two patients' CTs of one size may lie on one grid.
@@ -83,15 +85,20 @@ Result<void> check_same_patient(const PatientFrame& ct, const ImageFile& labels,
 
 }  // namespace
 
-Result<Volume> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path) {
+Result<LabelsOnGrid> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path) {
+  constexpr double kMostOutside = 0.5;
   if (auto same = check_same_patient(ct.frame, labels, path); !same) return same.error();
   const auto way = way_into(ct, labels);
   if (!way) {
     return refused(Errc::bad_value, path, "is not on the grid of the CT; resample the labels to it");
   }
-  auto volume = laid_into(ct, labels, *way);
-  if (!volume) return refused(Errc::bad_value, path, "lies outside of the CT; is it of this CT?");
-  return *std::move(volume);
+  auto [volume, outside] = laid_into(ct, labels, *way);
+  if (outside == 0) return LabelsOnGrid{std::move(volume), {}};
+  const std::string share =
+      fmt::format("{:.1f} % of its voxels that have a label lie outside of the CT", 100 * outside);
+  if (outside > kMostOutside) return refused(Errc::bad_value, path, share + "; is it of this CT?");
+  return LabelsOnGrid{std::move(volume), fmt::format("{}: {}, and are left out: what it labels ends where the CT ends",
+                                                     path.string(), share)};
 }
 
 }  // namespace birdseye::host

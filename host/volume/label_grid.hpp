@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "calibration/base/result.hpp"
 #include "host/volume/image_file.hpp"
@@ -8,9 +9,14 @@
 
 namespace birdseye::host {
 
-/// Labels as their file has them, on the grid of the CT: 0 where they do not reach. path: for errors, which are
-/// Errc::bad_value: their voxels are not the CT's, or lie outside of it; or both say whose they are, and labels are of
+struct LabelsOnGrid {
+  Volume volume;     ///< 0 where they do not reach
+  std::string note;  ///< of what lies outside of the CT, if some does, with the file's name
+};
+
+/// Labels as their file has them, on the grid of the CT. path: for errors, which are Errc::bad_value: their voxels are
+/// not the CT's, or most of those with a label lie outside of it; or both say whose they are, and labels are of
 /// another patient or another frame of reference.
-Result<Volume> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path);
+Result<LabelsOnGrid> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path);
 
 }  // namespace birdseye::host

@@ -41,10 +41,11 @@ Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const
   if (is_mask_folder(path)) return import_masks(path, ct, wanted, stop);
   auto image = read_labels_file(path, stop);
   if (!image) return image.error();
-  auto volume = labels_on_grid(ct, *image, path);
-  if (!volume) return volume.error();
-  LabelVolume labels{*std::move(volume), std::move(image->label_names), {}};
-  labels.notes.reserve(image->notes.size() + 1);
+  auto laid = labels_on_grid(ct, *image, path);
+  if (!laid) return laid.error();
+  LabelVolume labels{std::move(laid->volume), std::move(image->label_names), {}};
+  labels.notes.reserve(image->notes.size() + 2);
+  if (!laid->note.empty()) labels.notes.push_back(std::move(laid->note));
   for (const std::string& note : image->notes) labels.notes.push_back(fmt::format("{}: {}", path.string(), note));
   if (!image->frame_of_reference_uid.empty() && ct.frame.uid.empty()) {
     labels.notes.push_back(fmt::format(

@@ -89,9 +89,10 @@ Result<LabelVolume> import_masks(const fs::path& folder, const Volume& ct, std::
     const fs::path& path = masks.at(label.name);
     const auto image = read_labels_file(path, stop);
     if (!image) return image.error();
-    const auto mask = labels_on_grid(ct, *image, path);
+    auto mask = labels_on_grid(ct, *image, path);
     if (!mask) return mask.error();
-    if (!add_mask(*mask, label.number, values, out.volume)) {
+    if (!mask->note.empty()) out.notes.push_back(std::move(mask->note));
+    if (!add_mask(mask->volume, label.number, values, out.volume)) {
       return Error{Errc::unsupported,
                    fmt::format("{}: too many masks share voxels; name fewer of them", folder.string())};
     }
