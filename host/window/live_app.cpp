@@ -159,14 +159,15 @@ void LiveApp::draw() {
   const HostTime began = host_now();
   // Judged as of when it will be seen: drawing the window takes its time too.
   ShownPicture shown = workflow_.shown_at(began + to_draw_);
-  const bool news = shown.changes != drawn_changes_ || !shot_.empty();
+  const bool news = shown.changes != drawn_changes_ || shot_due(began);
   if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
   drawn_ = began;
   operation_ = workflow_.view();
-  facts_.pseudonymised = !shot_.empty() && !identify_;
+  const bool shoots = shot_due(began);
+  facts_.pseudonymised = shoots && !identify_;
   const PanelWishes wishes = draw_window(shown);
   figures_.picture_says = shown.reason;
-  if (!shot_.empty()) snapshot(shot_, shown);
+  if (shoots) snapshot(shot_, shown);
   if (shown.overlaid && !workflow_.shown_at(host_now()).overlaid) {
     // It took longer than it was thought to: what has grown stale on the way is not shown.
     shown = workflow_.shown_at(host_now());
@@ -281,7 +282,7 @@ void LiveApp::grant(const PanelWishes& asked) {
     facts_.preset = wishes.preset;
     facts_.preset_changed = false;
   }
-  if (wishes.snapshot && shot_.empty()) shot_ = next_snapshot();
+  if (wishes.snapshot && shot_.empty()) ask_for_shot(next_snapshot());
 }
 
 void LiveApp::grant_look(const PanelWishes& wishes) {
@@ -324,8 +325,22 @@ Result<bool> LiveApp::follow_script() {
     if (!facts_.slices) return Error{Errc::bad_value, "the script points at the slices, which are closed: key v first"};
     place_ = act->place_mm;
   }
-  if (!act->shot.empty()) shot_ = act->shot;
+  if (!act->shot.empty()) ask_for_shot(act->shot);
   return act->end;
+}
+
+void LiveApp::ask_for_shot(std::filesystem::path path) {
+  shot_ = std::move(path);
+  shot_asked_ = host_now();
+}
+
+/// With the next frame: the one on the screen is too old to be drawn again where the machine is slow. Where none comes,
+/// of what there is.
+bool LiveApp::shot_due(HostTime now) const {
+  constexpr Duration kPatience = Duration::from_ms(500);
+  if (shot_.empty()) return false;
+  const auto& frame = workflow_.picture().frame();
+  return (frame && frame->info.sequence != drawn_sequence_) || now - shot_asked_ > kPatience;
 }
 
 /// The window as it is, and in a folder of the same name the picture with all that it was made of. Written on a thread

@@ -67,6 +67,8 @@ class LiveApp {
   void note_patient();
   void snapshot(const std::filesystem::path& path, const ShownPicture& shown);
   std::filesystem::path next_snapshot();
+  void ask_for_shot(std::filesystem::path path);
+  [[nodiscard]] bool shot_due(HostTime now) const;
 
   std::unique_ptr<LiveWindow> window_;
   std::unique_ptr<LiveSource> source_;
@@ -88,7 +90,7 @@ class LiveApp {
   Background<Picture> slicing_;
   std::vector<SliceMark> marks_;
   bool slices_changed_ = false;
-  HostTime inset_drawn_, drawn_;
+  HostTime inset_drawn_, drawn_, shot_asked_;
   Duration to_draw_;  ///< what the window last took, until it was shown
   std::filesystem::path shot_;
   std::uint64_t drawn_changes_ = 0;

@@ -16,6 +16,17 @@ std::optional<LiveStep> step_of(const std::string& name) {
   return std::nullopt;
 }
 
+constexpr const char* kOverlay = "overlay";
+
+/// Whether what a line waits for has come.
+bool came(const OperationView& operation, const std::string& awaited) {
+  return awaited == kOverlay ? operation.target.has_value() : operation.note(*step_of(awaited)).done;
+}
+
+std::string why_not(const OperationView& operation, const std::string& awaited) {
+  return awaited == kOverlay ? "no frame bore an overlay" : operation.note(*step_of(awaited)).line;
+}
+
 }  // namespace
 
 Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
@@ -38,12 +49,13 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
     if (line.verb == "look")
       sound = static_cast<bool>(words >> line.place_mm.x() >> line.place_mm.y() >> line.place_mm.z());
     if (line.verb == "end") sound = true;
-    sound = sound && line.seconds >= 0 && line.every_s >= 0 && (line.step.empty() || step_of(line.step));
+    sound = sound && line.seconds >= 0 && line.every_s >= 0 &&
+            (line.step.empty() || line.step == kOverlay || step_of(line.step));
     if (!sound) {
-      return Error{Errc::bad_format,
-                   fmt::format("{}:{}: is no \"wait STEP SECONDS\", \"press NAME SECONDS STEP SECONDS\", \"sleep "
-                               "SECONDS\", \"key NAME\", \"look X Y Z\", \"shot FILE\" or \"end\"",
-                               path.string(), number)};
+      return Error{Errc::bad_format, fmt::format("{}:{}: is no \"wait STEP SECONDS\" (or \"wait overlay SECONDS\"), "
+                                                 "\"press NAME SECONDS STEP SECONDS\", \"sleep "
+                                                 "SECONDS\", \"key NAME\", \"look X Y Z\", \"shot FILE\" or \"end\"",
+                                                 path.string(), number)};
     }
     script.lines_.push_back(std::move(line));
   }
@@ -56,17 +68,17 @@ Result<LiveScript::Act> LiveScript::next(const OperationView& operation, HostTim
   const Line& line = lines_.front();
   const double waited_s = Duration{now.ns - since_->ns}.seconds();
   if (!line.step.empty()) {
-    const StepNote& note = operation.note(*step_of(line.step));
-    if (!note.done && waited_s >= line.seconds) {
+    const bool done = came(operation, line.step);
+    if (!done && waited_s >= line.seconds) {
       return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.step,
-                                              line.seconds, note.line)};
+                                              line.seconds, why_not(operation, line.step))};
     }
     const bool due = line.verb == "press" && (!pressed_ || Duration{now.ns - pressed_->ns}.seconds() >= line.every_s);
-    if (!note.done && due) {
+    if (!done && due) {
       pressed_ = now;
       return Act{line.what, {}, {}, false};
     }
-    if (!note.done) return Act{};
+    if (!done) return Act{};
   }
   if (line.verb == "sleep" && waited_s < line.seconds) return Act{};
   Act act;

@@ -14,6 +14,7 @@ namespace birdseye::host {
 
 /// Keys pressed and pictures taken without a hand: a line each of
 ///   wait STEP SECONDS                 until that step is done; fails after so long
+///   wait overlay SECONDS              until a frame bears an overlay with the target in view; fails after so long
 ///   press NAME SECONDS STEP SECONDS   that key every so often until that step is done; fails after so long
 ///   sleep SECONDS
 ///   key NAME                          as draw_panels' keys: space, enter, backspace, a letter

@@ -29,7 +29,7 @@ TEST(Live, ReachesARegisteredOverlayByAScriptAlone) {
   // On a machine that is too slow at one moment there is rightly no overlay then: no view is kept, no snapshot bears
   // one.
   std::string several;
-  for (int i = 0; i < 6; ++i) several += "key s\nsleep 0.7\n";
+  for (int i = 0; i < 6; ++i) several += "wait overlay 60\nkey s\nsleep 0.7\n";
   const std::string script =
       scratch.file("script.txt", "wait connect 90\nwait calibrate 120\nshot " + out + "/calibrated.png\n" +
                                      "wait fiducials 60\nshot " + out + "/registered.png\n" +

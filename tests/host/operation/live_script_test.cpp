@@ -45,6 +45,23 @@ TEST(LiveScript, PressesAKeyUntilAStepIsDone) {
   EXPECT_TRUE(script->next(workflow.view(), HostTime{1601 * kMs})->end);
 }
 
+TEST(LiveScript, WaitsForAnOverlay) {
+  const Scratch scratch;
+  auto script = LiveScript::read(scratch.file("s.txt", "wait overlay 2\nkey s\n"));
+  ASSERT_TRUE(script) << script.error().what;
+  OperationView operation;
+  EXPECT_EQ(script->next(operation, HostTime{0})->key, "");
+  auto other = *script;
+  const auto late = other.next(operation, HostTime{2000 * kMs});
+  ASSERT_FALSE(late);
+  EXPECT_NE(late.error().what.find("s.txt:1: overlay was not done within 2 s: no frame bore an overlay"),
+            std::string::npos)
+      << late.error().what;
+  operation.target.emplace();
+  EXPECT_EQ(script->next(operation, HostTime{1000 * kMs})->key, "");
+  EXPECT_EQ(script->next(operation, HostTime{1001 * kMs})->key, "s");
+}
+
 TEST(LiveScript, NamesALineThatIsNone) {
   const Scratch scratch;
   for (const char* text :
