@@ -17,9 +17,15 @@ constexpr double kParabola = 2.5;
 constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line through readings foretells the next
 constexpr double kNoiseMemory = 1.0 / 64;                 // of the mean square, per reading
 constexpr double kNoiseSigmas = 3.5;
-constexpr double kMostNoiseMm = 5;  // beyond that it is not noise
-constexpr double kRestless = 0.2;   // of ways lead back where there is noise; without, hardly any
-constexpr double kMuchNearer = 3;   // the mirrored position, than the one reported
+constexpr double kMostNoiseMm = 5;            // beyond that it is not noise
+constexpr double kRestless = 0.2;             // of ways lead back where there is noise; without, hardly any
+constexpr double kDamageMemory = 1.0 / 32;    // of how often readings make no sense, per reading
+constexpr double kMostDamaged = 0.08;         // three of the last readings: a jerk and a bump make two
+constexpr std::size_t kRecent = 16;           // records, among which one that repeats is looked for
+constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading
+constexpr double kSeldom = 0.02;              // two just now are less; three then are chance once in 10^6
+constexpr int kFrozenWhereSeldom = 3;
+constexpr double kMuchNearer = 3;  // the mirrored position, than the one reported
 
 Duration gap_between(DeviceTime earlier, DeviceTime later) {
   return std::max(later - earlier, Duration{0});
@@ -49,6 +55,16 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
 
 std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vector<std::int16_t>& words,
                                                                 DeviceTime time) {
+  // A damaged record between those of a frozen bird is no sign of life.
+  const auto same = static_cast<int>(std::count(recent_words_.begin(), recent_words_.end(), words));
+  recent_words_.push_back(words);
+  if (recent_words_.size() > kRecent) recent_words_.pop_front();
+  const bool where_seldom = noise_.repeats < kSeldom && same >= kFrozenWhereSeldom;
+  if (limits_.frozen_after > 0 && (where_seldom || (noise_is_plain() && same >= limits_.frozen_after_plain_noise))) {
+    if (words == last_words_) ++repeats_;
+    return Objection{DoubtKind::frozen, fmt::format("frozen: the same record {} times", same + 1)};
+  }
+  noise_.repeats += kRepeatsMemory * ((same > 0 ? 1 : 0) - noise_.repeats);
   if (words != last_words_) {
     last_words_ = words;
     repeats_ = 0;
@@ -58,9 +74,7 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vecto
   ++repeats_;
   if (limits_.frozen_after <= 0) return std::nullopt;
   const double moved_mm = speed_mm_s_ * std::min(gap_between(repeated_since_, time), kTrackHolds).seconds();
-  const int most =
-      noise_is_plain() ? std::min(limits_.frozen_after_plain_noise, limits_.frozen_after) : limits_.frozen_after;
-  const bool noise_is_gone = repeats_ >= most && noise_.restless > kRestless;
+  const bool noise_is_gone = repeats_ >= limits_.frozen_after && noise_.restless > kRestless;
   if (!noise_is_gone && moved_mm < limits_.frozen_moved_mm) return std::nullopt;
   return Objection{DoubtKind::frozen, fmt::format("frozen: the same record {} times", repeats_ + 1)};
 }
@@ -94,18 +108,28 @@ std::optional<Eigen::Vector3d> BirdGuard::predicted_mm(DeviceTime time) const {
   return Eigen::Vector3d(mean_mm - mean_s * (moment / square_s2));
 }
 
-bool BirdGuard::on_track(const Sample& sample) {
-  if (!within_reach(track_.back(), sample)) return false;
+/// in_reach: where a sensor might be, after readings that were withheld, and a damaged reading too.
+BirdGuard::Placed BirdGuard::placed(const Sample& sample) {
+  if (!within_reach(track_.back(), sample)) return Placed::off;
+  const Duration gap = gap_between(track_.back().time, sample.time);
+  bool after_doubt = candidate_ || !made_sense_;
   const auto predicted = predicted_mm(sample.time);
-  if (!predicted || !sample.time_certain) return true;
-  const double seconds = (gap_between(track_.back().time, sample.time) + sample.sigma).seconds();
+  if (!predicted || !sample.time_certain) return after_doubt ? Placed::in_reach : Placed::on_track;
+  Duration usual = gap;
+  for (std::size_t i = 1; i < track_.size(); ++i)
+    usual = std::min(usual, gap_between(track_[i - 1].time, track_[i].time));
+  after_doubt = after_doubt || gap.ns > usual.ns + usual.ns / 2;
+  const double seconds = (gap + sample.sigma).seconds(), usual_s = (usual + sample.sigma).seconds();
   const double noise_mm = std::min(std::sqrt(noise_mm2_), kMostNoiseMm);
-  const double most_mm =
-      limits_.slack_mm + kParabola * limits_.most_acceleration_mm_s2 * seconds * seconds + kNoiseSigmas * noise_mm;
+  const auto most_mm = [&](double s) {
+    return limits_.slack_mm + kParabola * limits_.most_acceleration_mm_s2 * s * s + kNoiseSigmas * noise_mm;
+  };
+  const double all_mm = most_mm(seconds);
   const double off_mm = (sample.position_mm - *predicted).norm();
-  const double counted_mm = std::min(off_mm, most_mm);  // a damaged reading is not noise, or not all of it
+  const double counted_mm = std::min(off_mm, all_mm);  // a damaged reading is not noise, or not all of it
   noise_mm2_ += kNoiseMemory * (counted_mm * counted_mm - noise_mm2_);
-  return off_mm <= most_mm;
+  if (off_mm > all_mm) return Placed::off;
+  return after_doubt && off_mm > most_mm(usual_s) ? Placed::in_reach : Placed::on_track;
 }
 
 bool BirdGuard::is_mirrored(const Sample& sample) const {
@@ -134,6 +158,7 @@ BirdGuard::Objection BirdGuard::doubt_of_side(const Eigen::Vector3d& reported_mm
 void BirdGuard::follow(const Sample& sample) {
   candidate_.reset();
   agreeing_ = 0;
+  was_frozen_ = false;
   if (!track_.empty() && track_.front().time_certain != sample.time_certain) {
     if (!sample.time_certain) return;
     track_.clear();
@@ -158,8 +183,9 @@ BirdGuard::Objection BirdGuard::place(Sample sample) {
   if (mirrored) sample.position_mm = -reported_mm;
   // Wrong by itself, and no place to follow: what is told as it should be would look like a flip from there.
   if (Objection side = doubt_of_side(reported_mm, mirrored); side.kind == DoubtKind::outside_hemisphere) return side;
-  const bool lost_sight = track_.empty() || gap_between(track_.back().time, sample.time) > limits_.gap;
-  if (!lost_sight && on_track(sample)) {
+  const bool lost_sight = track_.empty() || was_frozen_ || gap_between(track_.back().time, sample.time) > limits_.gap;
+  const Placed place = lost_sight ? Placed::off : placed(sample);
+  if (place == Placed::on_track) {
     follow(sample);
     return doubt_of_side(reported_mm, mirrored);
   }
@@ -167,7 +193,9 @@ BirdGuard::Objection BirdGuard::place(Sample sample) {
   // The same record once more is no other reading, where noise would have changed it.
   const bool another = repeats_ == 0 || !noise_is_plain();
   agreeing_ = candidate_ && another && within_reach(*candidate_, sample) ? agreeing_ + 1 : 0;
-  if (agreeing_ >= (lost_sight ? limits_.start_confirms : limits_.step_confirms)) {
+  // Of a bird that was frozen more is asked: damaged records differ too.
+  const bool few = !was_frozen_ && (lost_sight || place == Placed::in_reach);
+  if (agreeing_ >= (few ? limits_.start_confirms : limits_.step_confirms)) {
     track_.clear();
     follow(sample);
     return doubt_of_side(reported_mm, mirrored);
@@ -182,6 +210,19 @@ BirdGuard::Objection BirdGuard::place(Sample sample) {
 }
 
 BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain) {
+  BirdReading reading = judge_itself(record, acquired, sigma, time_certain);
+  const bool makes_sense = reading.kind != DoubtKind::senseless && reading.kind != DoubtKind::step;
+  // A sensor that was moved at once is off its track for some readings in a row, and counts once.
+  damaged_ += kDamageMemory * ((!makes_sense && made_sense_ ? 1 : 0) - damaged_);
+  made_sense_ = makes_sense;
+  if (reading.kind != DoubtKind::none || damaged_ < kMostDamaged) return reading;
+  reading.kind = DoubtKind::line_noise;
+  reading.doubt = fmt::format("line noise: of the last readings {:.0f} % make no sense", 100 * damaged_);
+  reading.pose.reset();
+  return reading;
+}
+
+BirdReading BirdGuard::judge_itself(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain) {
   BirdReading reading;
   reading.button = record.button;
   const auto withhold = [&reading](const Objection& objection) {
@@ -192,7 +233,11 @@ BirdReading BirdGuard::judge(const Record& record, DeviceTime acquired, Duration
   if (const auto doubt = doubt_of_words(record.words)) return withhold(*doubt);
   auto pose = decode_pose(layout_.format, record.words, layout_.mm_per_count);
   if (!pose) return withhold({DoubtKind::senseless, pose.error().what});
-  if (const auto doubt = doubt_of_repeats(record.words, acquired)) return withhold(*doubt);
+  if (const auto doubt = doubt_of_repeats(record.words, acquired)) {
+    was_frozen_ = true;
+    candidate_.reset();
+    return withhold(*doubt);
+  }
   Sample sample;
   sample.time = acquired;
   sample.sigma = sigma;

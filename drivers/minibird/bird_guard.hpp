@@ -13,7 +13,8 @@ namespace birdseye::drivers::minibird {
 
 /// Decides whether one bird's records make sense, each by itself and after those before it. The guard follows the
 /// sensor through readings that it withholds too, so that a position that has flipped to its negative stays known as
-/// flipped.
+/// flipped. Where readings make no sense again and again, those that do are withheld too: a byte that was damaged may
+/// have changed them by less than shows.
 class BirdGuard {
  public:
   BirdGuard(const BirdLayout& layout, const Plausibility& limits) : layout_(layout), limits_(limits) {}
@@ -22,6 +23,7 @@ class BirdGuard {
   struct Noise {
     double restless = 0;     ///< how often, of late, a way led back: noise is there
     double back_counts = 0;  ///< how far such a way was, on average
+    double repeats = 1;      ///< how often, of late, a record was one of those before
   };
   [[nodiscard]] const Noise& noise() const { return noise_; }
   void expect(const Noise& noise) { noise_ = noise; }
@@ -45,12 +47,14 @@ class BirdGuard {
   [[nodiscard]] std::optional<Objection> doubt_of_words(const std::vector<std::int16_t>& words) const;
   std::optional<Objection> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
   Objection place(Sample sample);
+  BirdReading judge_itself(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain);
   [[nodiscard]] Objection doubt_of_side(const Eigen::Vector3d& reported_mm, bool mirrored) const;
   /// Does the position, after the track, look like the negative of where the sensor is?
   [[nodiscard]] bool is_mirrored(const Sample& sample) const;
   [[nodiscard]] bool noise_is_plain() const;
   [[nodiscard]] bool within_reach(const Sample& from, const Sample& to) const;
-  bool on_track(const Sample& sample);
+  enum class Placed { on_track, in_reach, off };
+  Placed placed(const Sample& sample);
   [[nodiscard]] std::optional<Eigen::Vector3d> predicted_mm(DeviceTime time) const;
   void follow(const Sample& sample);
 
@@ -62,11 +66,15 @@ class BirdGuard {
   std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
   int agreeing_ = 0;
   std::vector<std::int16_t> last_words_;
+  std::deque<std::vector<std::int16_t>> recent_words_;  ///< of the records before, newest last
+  bool was_frozen_ = false;                             ///< until a reading is good again
   DeviceTime repeated_since_;
   int repeats_ = 0;
   double speed_mm_s_ = 0;                                  ///< when the words last changed
   Eigen::Vector3d last_way_mm_ = Eigen::Vector3d::Zero();  ///< from the reading before
   Noise noise_;
+  double damaged_ = 0;      ///< how often, of late, a reading made no sense after one that did
+  bool made_sense_ = true;  ///< the reading before
 };
 
 }  // namespace birdseye::drivers::minibird

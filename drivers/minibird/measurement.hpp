@@ -25,9 +25,10 @@ enum class DoubtKind : std::uint8_t {
   hemisphere_border,   ///< so near the plane that it may flip
   outside_hemisphere,  ///< where a unit with our settings never reports
   unconfirmed,         ///< the first after a start or a gap
+  line_noise,          ///< readings about it make no sense again and again: this one may be wrong unseen
   unmapped,            ///< outside the field map; found by whoever applies the map, never by the driver
 };
-inline constexpr std::size_t kDoubtKinds = 12;
+inline constexpr std::size_t kDoubtKinds = 13;
 std::string_view name_of(DoubtKind doubt);  ///< "hemisphere flip" and so on, for counters
 
 /// One bird at one measurement: a pose, or why there is none.

@@ -16,8 +16,9 @@ std::size_t cycle_bytes(const StreamLayout& layout) {
 
 std::string_view name_of(DoubtKind doubt) {
   static constexpr std::array<std::string_view, kDoubtKinds> kNames = {
-      "none", "lost record",     "senseless",         "saturated",          "beyond scale", "frozen",
-      "step", "hemisphere flip", "hemisphere border", "outside hemisphere", "unconfirmed",  "unmapped field",
+      "none",        "lost record", "senseless",       "saturated",         "beyond scale",
+      "frozen",      "step",        "hemisphere flip", "hemisphere border", "outside hemisphere",
+      "unconfirmed", "line noise",  "unmapped field",
   };
   return kNames[static_cast<std::size_t>(doubt)];
 }

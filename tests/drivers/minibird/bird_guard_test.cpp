@@ -111,6 +111,54 @@ TEST(BirdGuard, ASingleWildReadingIsDoubtedAndTheStreamGoesOn) {
   EXPECT_EQ(watch.see_often(100, kHere), 100);
 }
 
+TEST(BirdGuard, DamagedRecordsBetweenThoseOfAFrozenBirdAreNoSignOfLife) {
+  Watch watch;
+  watch.see_often(1000, kHere);
+  watch.see(kHere, Matrix3d::Identity(), 0);
+  for (int i = 0; i < 4; ++i) watch.see(kHere, Matrix3d::Identity(), 0);
+  std::mt19937 random(3);
+  int poses = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const bool damaged = random() % 3 == 0;
+    const Vector3d told = kHere + Vector3d(damaged ? 0.1 * static_cast<double>(1 + random() % 30) : 0, 0, 0);
+    poses += watch.see(told, Matrix3d::Identity(), 0).pose ? 1 : 0;
+  }
+  EXPECT_LE(poses, 100) << "of some 660 that differ from the frozen one";
+  EXPECT_LT(watch.see_often(60, kHere), 60);
+  EXPECT_EQ(watch.see_often(100, kHere), 100);
+}
+
+TEST(BirdGuard, AfterLostRecordsAReadingFarOffTheTrackIsConfirmedByTheNext) {
+  Watch watch;
+  watch.see_often(100, kHere);
+  watch.seconds += 2 * kPeriodS;  // two records are lost
+  EXPECT_FALSE(watch.see(kHere + Vector3d(35, 0, 0)).pose) << "a hand might have moved so far, a damaged byte may too";
+  EXPECT_TRUE(watch.see(kHere).pose);
+  watch.see_often(100, kHere);
+  watch.seconds += 2 * kPeriodS;
+  EXPECT_FALSE(watch.see(kHere + Vector3d(35, 0, 0)).pose);
+  EXPECT_TRUE(watch.see(kHere + Vector3d(40, 0, 0)).pose);
+}
+
+TEST(BirdGuard, BetweenReadingsThatMakeNoSenseNoneIsBelieved) {
+  Watch watch;
+  watch.see_often(100, kHere);
+  int between = 0;
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_FALSE(watch.see(kHere + Vector3d(0, 60, 0)).pose);
+    between += watch.see_often(2, kHere);
+  }
+  EXPECT_LE(between, 6) << "once three of them have come none is believed";
+  EXPECT_EQ(watch.see(kHere).kind, DoubtKind::line_noise);
+  EXPECT_LT(watch.see_often(60, kHere), 60);
+  EXPECT_EQ(watch.see_often(100, kHere), 100) << "the line is sound again";
+  // One now and then is none of a line that is damaged.
+  for (int i = 0; i < 50; ++i) {
+    watch.see(kHere + Vector3d(0, 60, 0));
+    EXPECT_EQ(watch.see_often(30, kHere), 30);
+  }
+}
+
 TEST(BirdGuard, AStepThatStaysIsBelievedAfterAWhile) {
   Watch watch;
   watch.see_often(20, kHere);
@@ -164,6 +212,7 @@ TEST(BirdGuard, ARecordThatRepeatsWhereThereWasNoiseIsFrozen) {
   EXPECT_THAT(frozen.doubt, HasSubstr("101 times"));
   for (int i = 0; i < 200; ++i) EXPECT_EQ(watch.see(beside, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   watch.see(kHere);
+  watch.see_often(5, kHere);  // of a bird that was frozen more is asked
   EXPECT_EQ(watch.see_often(10, kHere), 10);
 }
 
@@ -182,6 +231,7 @@ TEST(BirdGuard, ANewStreamThatRepeatsItselfFromTheStartIsFrozenWhereTheOneBefore
   for (int i = 0; i < 100; ++i) EXPECT_FALSE(after.see(kHere, Matrix3d::Identity(), 0).pose) << i;
   EXPECT_EQ(after.see(kHere, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   after.see(kHere);
+  after.see_often(5, kHere);  // of a bird that was frozen more is asked
   EXPECT_EQ(after.see_often(10, kHere), 10);
 }
 
@@ -202,6 +252,7 @@ TEST(BirdGuard, WhatMovedIsFrozenAtOnce) {
   ASSERT_TRUE(watch.see(last, Matrix3d::Identity(), 0).pose);
   for (int i = 0; i < 80; ++i) EXPECT_EQ(watch.see(last, Matrix3d::Identity(), 0).kind, DoubtKind::frozen);
   watch.see(kHere);
+  watch.see_often(5, kHere);  // of a bird that was frozen more is asked
   EXPECT_EQ(watch.see_often(10, kHere), 10);
 }
 
