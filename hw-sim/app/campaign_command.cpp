@@ -40,7 +40,7 @@ void print(const CampaignSettings& settings, const OperationResult& sum) {
     return all > 0 ? 100.0 * static_cast<double>(some) / static_cast<double>(all) : 0;
   };
   fmt::print("{}", sum.broken);
-  fmt::print("seeds {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n", settings.first_seed,
+  fmt::print("of seeds {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n", settings.first_seed,
              settings.last_seed, sum.minutes, sum.faults, sum.faults_alone, sum.poses, sum.frames);
   fmt::print(
       "overlay whole on {:.1f} % of pictures, {:.4f} % of those beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
@@ -78,6 +78,8 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->check(CLI::Range(0.5, 600.0));
   command.add_option("--jobs", options->settings.jobs, "operations at a time (default: as many as there are cores)")
       ->check(CLI::Range(1, 1024));
+  command.add_option("--at-most", options->settings.at_most_s, "seconds after which no operation begins")
+      ->check(CLI::Range(1.0, 1e6));
   command.callback([options, take, &broken] { take(run(*options, broken)); });
 }
 

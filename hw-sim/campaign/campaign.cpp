@@ -50,12 +50,13 @@ Result<OperationResult> run_one(const CampaignSettings& settings, std::uint64_t 
 /// What several threads work off.
 class Work {
  public:
-  Work(std::deque<std::uint64_t> seeds, OperationResults& results, const std::function<void(const std::string&)>& said)
-      : seeds_(std::move(seeds)), all_(seeds_.size()), results_(results), said_(said) {}
+  Work(std::deque<std::uint64_t> seeds, std::optional<Deadline> until, OperationResults& results,
+       const std::function<void(const std::string&)>& said)
+      : seeds_(std::move(seeds)), all_(seeds_.size()), until_(until), results_(results), said_(said) {}
 
   std::optional<std::uint64_t> next() {
     const std::lock_guard lock(mutex_);
-    if (seeds_.empty() || fault_) return std::nullopt;
+    if (seeds_.empty() || fault_ || (until_ && until_->passed())) return std::nullopt;
     const std::uint64_t seed = seeds_.front();
     seeds_.pop_front();
     return seed;
@@ -77,6 +78,7 @@ class Work {
   std::mutex mutex_;  // of what follows
   std::deque<std::uint64_t> seeds_;
   std::size_t all_, done_ = 0, broken_ = 0;
+  std::optional<Deadline> until_;
   OperationResults& results_;
   const std::function<void(const std::string&)>& said_;
   std::optional<Error> fault_;
@@ -100,7 +102,9 @@ Result<OperationResult> run_campaign(const CampaignSettings& settings,
   for (std::uint64_t seed = settings.first_seed; seed <= settings.last_seed; ++seed) {
     if (!known->contains(seed)) missing.push_back(seed);
   }
-  Work work(std::move(missing), **results, said);
+  std::optional<Deadline> until;
+  if (settings.at_most_s) until = Deadline::after(Duration::from_seconds(*settings.at_most_s));
+  Work work(std::move(missing), until, **results, said);
   {
     std::vector<OwnedThread> threads;
     const int jobs = settings.jobs > 0 ? settings.jobs : tbb::info::default_concurrency();

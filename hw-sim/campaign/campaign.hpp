@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "calibration/base/result.hpp"
@@ -15,6 +16,7 @@ struct CampaignSettings {
   double minutes = 10;           ///< of each operation
   std::filesystem::path folder;  ///< gets operations.sqlite
   int jobs = 0;                  ///< operations at a time; 0: as many as there are cores
+  std::optional<double> at_most_s;  ///< no operation begins after so long; empty: all seeds are run
   std::string program;           ///< of this name; it knows `operation --line`
 };
 

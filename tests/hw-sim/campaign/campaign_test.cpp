@@ -82,6 +82,20 @@ TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
   EXPECT_EQ(sum->laws_broken, 0U) << sum->broken;
 }
 
+TEST(Campaign, BeginsNoOperationOnceItsTimeIsOver) {
+  const Scratch scratch;
+  CampaignSettings settings;
+  settings.last_seed = 1000;
+  settings.minutes = 0.5;
+  settings.jobs = 1;
+  settings.at_most_s = 1e-9;
+  settings.folder = scratch / "campaign";
+  settings.program = beside_us("birdseye-sim");
+  const auto sum = run_campaign(settings, [](const std::string&) {});
+  ASSERT_TRUE(sum) << sum.error().what;
+  EXPECT_EQ(sum->minutes, 0);
+}
+
 TEST(Campaign, AnOperationThatGivesNoResultBreaksALaw) {
   const Scratch scratch;
   CampaignSettings settings;
