@@ -4,13 +4,25 @@ Reads TRANSFORM and IMAGE, as birdseyed, PLUS and 3D Slicer send them. Standard 
 import socket, struct, sys
 
 host, port, count = (sys.argv[1:] + ["127.0.0.1", "18944", "20"][len(sys.argv) - 1:])[:3]
-stream = socket.create_connection((host, int(port)), 5).makefile("rb")
-left = int(count)
-while left > 0 and len(header := stream.read(58)) == 58:
+left = int(count) if port.isdigit() and count.isdigit() else sys.exit("poses.py: PORT and COUNT are numbers")
+try:
+    stream = socket.create_connection((host, int(port)), 5).makefile("rb")
+except (OSError, OverflowError) as error:
+    sys.exit("poses.py: nobody answers at %s:%s (%s): is the server running there?" % (host, port, error))
+
+
+def read(size):
+    try:
+        got = stream.read(size)
+    except OSError as error:  # it was reset, or said nothing for 5 s
+        sys.exit("poses.py: the server at %s:%s sends no more (%s)" % (host, port, error))
+    return got if len(got) == size else sys.exit("poses.py: the server at %s:%s has gone" % (host, port))
+
+
+while left > 0:
     # Version, type, device, seconds and 2^-32 seconds of the time stamp, size of the body, its checksum; big endian.
-    version, kind, device, seconds, fraction, size, _ = struct.unpack(">H12s20sIIQQ", header)
-    if len(body := stream.read(size)) < size:
-        break
+    version, kind, device, seconds, fraction, size, _ = struct.unpack(">H12s20sIIQQ", read(58))
+    body = read(size)
     if version >= 2:  # an extended header, which begins with its own size, lies before the content
         body = body[struct.unpack(">H", body[:2])[0]:]
     kind, name = kind.rstrip(b"\0").decode(), device.rstrip(b"\0").decode()
@@ -25,4 +37,3 @@ while left > 0 and len(header := stream.read(58)) == 58:
     elif kind == "STATUS":  # 1: OK; else the text says what is wrong
         code = struct.unpack(">H", body[:2])[0]
         print("%-20s %s" % (name, "OK" if code == 1 else body[30:].rstrip(b"\0").decode()), flush=True)
-sys.exit(left > 0 and "the server has gone")

@@ -2,23 +2,38 @@
 """Prints poses from a miniBIRD: track.py (tcp:HOST:PORT | /dev/ttyX) COUNT. A whole tracker program in a page."""
 import os, socket, sys
 
-if sys.argv[1].startswith("tcp:"):
-    host, port = sys.argv[1][4:].rsplit(":", 1)
-    line = socket.create_connection((host, int(port)), 2).makefile("rwb", buffering=0)
-else:
-    line = open(os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY), "r+b", buffering=0)
+if len(sys.argv) != 3 or not sys.argv[2].isdigit():
+    sys.exit("usage: track.py (tcp:HOST:PORT | /dev/ttyX) COUNT")
+where = sys.argv[1]
+try:
+    if where.startswith("tcp:"):
+        host, port = where[4:].rsplit(":", 1)
+        line = socket.create_connection((host, int(port)), 2).makefile("rwb", buffering=0)
+    else:
+        line = open(os.open(where, os.O_RDWR | os.O_NOCTTY), "r+b", buffering=0)
+except (OSError, OverflowError, ValueError) as error:
+    sys.exit("track.py: no tracker at %s (%s)" % (where, error))
 
-line.write(b"O\x0f")  # EXAMINE the model: ten characters
+
+def call(what, argument):
+    try:
+        done = what(argument)
+    except OSError as error:  # it was reset, or said nothing for 2 s
+        sys.exit("track.py: the tracker at %s answers no more (%s)" % (where, error))
+    return done or sys.exit("track.py: the tracker at %s has gone" % where)
+
+
+call(line.write, b"O\x0f")  # EXAMINE the model: ten characters
 model = b""
 while len(model) < 10:
-    model += line.read(10 - len(model))
+    model += call(line.read, 10 - len(model))
 print(model.decode().strip())
 
-line.write(b"YF@")  # position and angles; run; stream
+call(line.write, b"YF@")  # position and angles; run; stream
 for _ in range(int(sys.argv[2])):
     record = b""
     while len(record) < 12:
-        byte = line.read(1)
+        byte = call(line.read, 1)
         if byte[0] & 0x80:  # bit 7 marks a record's first byte
             record = byte
         elif record:
@@ -28,4 +43,4 @@ for _ in range(int(sys.argv[2])):
     position = [w * 914.4 / 32768 for w in words[:3]]
     angles = [w * 180 / 32768 for w in words[3:]]
     print("%8.1f %8.1f %8.1f mm %8.1f %8.1f %8.1f deg" % (*position, *angles))
-line.write(b"B")  # stop
+call(line.write, b"B")  # stop

@@ -3,11 +3,26 @@
 import json, socket, struct, sys
 
 host, port = (sys.argv[1:] + ["127.0.0.1", "18944"][len(sys.argv) - 1:])[:2]
-stream = socket.create_connection((host, int(port)), 5).makefile("rb")
+try:
+    stream = socket.create_connection((host, int(port)), 5).makefile("rb")
+except (OSError, OverflowError, ValueError) as error:
+    sys.exit("watch.py: nobody answers at %s:%s (%s): is birdseyed running there?" % (host, port, error))
+
+
+def read(size):
+    try:
+        got = stream.read(size)
+    except KeyboardInterrupt:
+        sys.exit(0)
+    except OSError as error:  # it was reset, or said nothing for 5 s
+        sys.exit("watch.py: birdseyed at %s:%s sends no more (%s)" % (host, port, error))
+    return got if len(got) == size else sys.exit("watch.py: birdseyed at %s:%s has gone" % (host, port))
+
+
 bird, frame = "no pose", {"sequence": "-", "pose": {"kind": "none yet", "reason": ""}}
-while header := stream.read(58):
-    _, kind, device, _, size, _ = struct.unpack(">H12s20sQQQ", header)
-    body = stream.read(size)
+while True:
+    _, kind, device, _, size, _ = struct.unpack(">H12s20sQQQ", read(58))
+    body = read(size)
     kind, device = kind.rstrip(b"\0"), device.rstrip(b"\0")
     if kind == b"STATUS":  # code, sub-code, name of the error, text
         print("STATUS", struct.unpack(">H", body[:2])[0], body[30:].rstrip(b"\0").decode())
