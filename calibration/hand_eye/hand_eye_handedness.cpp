@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <iterator>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calibration/base/median.hpp"
 #include "calibration/base/units.hpp"
+#include "calibration/geometry/quaternion_order.hpp"
 #include "calibration/geometry/rotations.hpp"
 #include "calibration/hand_eye/hand_eye_start.hpp"
 
@@ -53,6 +57,30 @@ Pose inverted(const Pose& pose) {
   return {pose.rotation().transpose(), Eigen::Vector3d::Zero()};
 }
 
+/// The poses the other way round, whole.
+template <typename Pose>
+Pose turned_round(const Pose& pose) {
+  const auto back = pose.inverse();
+  return {back.rotation(), back.translation()};
+}
+
+/// How the quaternions of a file may have to be read, and whether the file holds the inverse of what is held here.
+struct QuaternionReading {
+  QuaternionOrder order = QuaternionOrder::as_read;
+  bool inverse = false;
+  template <typename Pose>
+  [[nodiscard]] Pose of(Pose pose) const {
+    if (order == QuaternionOrder::as_read) return pose;
+    if (inverse) pose = turned_round(pose);
+    pose = Pose(reordered(pose.rotation(), order), pose.translation());
+    return inverse ? turned_round(pose) : pose;
+  }
+};
+constexpr std::array kQuaternionReadings{QuaternionReading{}, QuaternionReading{QuaternionOrder::w_first, false},
+                                         QuaternionReading{QuaternionOrder::w_last, false},
+                                         QuaternionReading{QuaternionOrder::w_first, true},
+                                         QuaternionReading{QuaternionOrder::w_last, true}};
+
 template <typename Change>
 Stations with_poses(const StationsInOrder& in, const Change& change) {
   Stations out(in.stations.begin(), in.stations.end());
@@ -61,6 +89,54 @@ Stations with_poses(const StationsInOrder& in, const Change& change) {
     s.chain.tracker_from_body = change(s.chain.tracker_from_body);
   }
   return out;
+}
+
+Stations with_eyes_turned_round(const StationsInOrder& in) {
+  Stations out(in.stations.begin(), in.stations.end());
+  for (SummedStation& s : out) s.camera_from_marker = turned_round(s.camera_from_marker);
+  return out;
+}
+
+/// The poses of the tracker, of the camera, or of both, by other readings of their quaternions.
+Stations with_readings(const StationsInOrder& in, const QuaternionReading& tracked, const QuaternionReading& eye) {
+  Stations out = with_poses(in, [&tracked](const auto& pose) { return tracked.of(pose); });
+  for (SummedStation& s : out) s.camera_from_marker = eye.of(s.camera_from_marker);
+  return out;
+}
+
+Finding seem_disordered(QuaternionOrder tracked, QuaternionOrder eye, double fit_deg, double fit_mm) {
+  const bool of_tracker = tracked != QuaternionOrder::as_read, of_eye = eye != QuaternionOrder::as_read;
+  const bool first = (of_tracker ? tracked : eye) == QuaternionOrder::w_first;
+  const char* const whose = !of_eye ? "the tracker's poses" : of_tracker ? "both files of poses" : "the camera's poses";
+  return {Grade::fail,
+          fmt::format("the quaternions of {} seem to have w {}: read so, the poses fit to {:.1f} degrees and {:.1f} "
+                      "mm, and not as they were read",
+                      whose, first ? "first" : "last", fit_deg, fit_mm),
+          fmt::format("name the columns in a header as they stand: t,x,y,z,{}",
+                      first ? "qw,qx,qy,qz" : "qx,qy,qz,qw (q0,q1,q2,q3 are read as w,x,y,z)")};
+}
+
+/// A quaternion with w in the wrong place turns as the inverse does, in frames of its own, and two such files as right
+/// ones: only the positions, which stay where they are, tell. least_mm: to which other readings fit them.
+std::optional<Finding> find_disorder(const StationsInOrder& in, double least_mm) {
+  double best_mm = least_mm / kFarBetter, best_deg = 0;
+  QuaternionOrder tracked = QuaternionOrder::as_read, eye = QuaternionOrder::as_read;
+  for (const QuaternionReading& of_tracker : kQuaternionReadings) {
+    for (const QuaternionReading& of_eye : kQuaternionReadings) {
+      if (!in.given_poses && of_eye.order != QuaternionOrder::as_read) continue;
+      const Stations stations = with_readings(in, of_tracker, of_eye);
+      const double misfit_deg = rotation_misfit_deg(stations);
+      if (misfit_deg > kBadFit_deg) continue;
+      const double misfit_mm = position_misfit_mm(stations);
+      if (misfit_mm >= best_mm) continue;
+      best_mm = misfit_mm;
+      best_deg = misfit_deg;
+      tracked = of_tracker.order;
+      eye = of_eye.order;
+    }
+  }
+  if (tracked == QuaternionOrder::as_read && eye == QuaternionOrder::as_read) return std::nullopt;
+  return seem_disordered(tracked, eye, best_deg, best_mm);
 }
 
 Finding seem_inverted(double as_given_deg, double inverted_deg, bool given_poses) {
@@ -77,27 +153,51 @@ Finding seem_inverted(double as_given_deg, double inverted_deg, bool given_poses
                 "the quaternion's four numbers, name them in a header: qw,qx,qy,qz"};
 }
 
-/// Of positions whose axes have the wrong signs while the rotations are right. A mirror turns rotations as a half turn
-/// about its normal does, which is a frame as good as another: of a left-handed frame what shows is that all three
-/// signs are wrong.
-std::optional<Finding> find_wrong_signs(const StationsInOrder& in) {
-  constexpr int kAll = 7;
+/// Which of a position's axes stand for x, y and z, and with which signs.
+struct AxesReading {
+  std::array<int, 3> axes{0, 1, 2};
+  std::array<int, 3> signs{1, 1, 1};
+  [[nodiscard]] Eigen::Vector3d of(const Eigen::Vector3d& v) const {
+    return {signs[0] * v[axes[0]], signs[1] * v[axes[1]], signs[2] * v[axes[2]]};
+  }
+  [[nodiscard]] bool exchanged() const { return axes != std::array{0, 1, 2}; }
+  [[nodiscard]] bool mirrored() const { return !exchanged() && signs == std::array{-1, -1, -1}; }
+  /// "-x, z, y"; of axes in their places those alone that have the wrong sign.
+  [[nodiscard]] std::string words() const {
+    std::string out;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!exchanged() && signs.at(i) > 0) continue;
+      fmt::format_to(std::back_inserter(out), "{}{}{}", out.empty() ? "" : ", ",
+                     exchanged() && signs.at(i) < 0 ? "-" : "", "xyz"[axes.at(i)]);
+    }
+    return out;
+  }
+};
+
+/// Of positions whose axes have the wrong signs, or are exchanged, while the rotations are right. A mirror turns
+/// rotations as a half turn about its normal does, which is a frame as good as another: of a left-handed frame what
+/// shows is that all three signs are wrong.
+std::optional<Finding> find_wrong_axes(const StationsInOrder& in) {
   const double as_given_mm = position_misfit_mm(in.stations);
   if (as_given_mm < kBadFit_mm) return std::nullopt;
   double best_mm = as_given_mm / kFarBetter;
-  int best = 0;
-  for (int axes = 1; axes <= kAll; ++axes) {
-    const Eigen::Vector3d signs((axes & 1) != 0 ? -1 : 1, (axes & 2) != 0 ? -1 : 1, (axes & 4) != 0 ? -1 : 1);
-    const double misfit_mm = position_misfit_mm(with_poses(in, [&signs](auto pose) {
-      using Pose = decltype(pose);
-      return Pose(pose.rotation(), Eigen::Vector3d(signs.cwiseProduct(pose.translation())));
-    }));
-    if (misfit_mm >= best_mm) continue;
-    best_mm = misfit_mm;
-    best = axes;
-  }
-  if (best == 0) return std::nullopt;
-  if (best == kAll) {
+  std::optional<AxesReading> best;
+  AxesReading reading;
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      for (std::size_t i = 0; i < 3; ++i) reading.signs.at(i) = (signs >> i & 1U) != 0 ? -1 : 1;
+      const double misfit_mm = position_misfit_mm(with_poses(in, [&reading](auto pose) {
+        using Pose = decltype(pose);
+        return Pose(pose.rotation(), reading.of(pose.translation()));
+      }));
+      if (misfit_mm >= best_mm) continue;
+      best_mm = misfit_mm;
+      best = reading;
+    }
+  } while (std::ranges::next_permutation(reading.axes).found);
+  if (auto found = find_disorder(in, best ? best_mm : as_given_mm)) return found;
+  if (!best) return std::nullopt;
+  if (best->mirrored()) {
     return Finding{
         Grade::fail,
         fmt::format("the poses seem to be mirrored: they fit to {:.1f} mm as given, to {:.1f} as a left-handed frame "
@@ -106,14 +206,18 @@ std::optional<Finding> find_wrong_signs(const StationsInOrder& in) {
         "have the program that writes them write a right-handed frame; or turn the sign of z in positions, and of qx "
         "and qy in quaternions (of the third row and the third column in matrices)"};
   }
-  std::string names;
-  for (int axis = 0; axis < 3; ++axis) {
-    if ((best & (1 << axis)) != 0) names += fmt::format("{}{}", names.empty() ? "" : ", ", "xyz"[axis]);
+  if (best->exchanged()) {
+    return Finding{Grade::fail,
+                   fmt::format("the axes of the tracker's positions seem to be exchanged: they fit to {:.1f} mm as "
+                               "given, to {:.1f} where x, y, z are read from {}",
+                               as_given_mm, best_mm, best->words()),
+                   "name the columns in a header as they stand, or have the program that writes the poses turn "
+                   "positions and rotations alike"};
   }
   return Finding{Grade::fail,
                  fmt::format("the tracker's positions seem to have the wrong sign of {}: they fit to {:.1f} mm as "
                              "given, to {:.1f} with the other sign",
-                             names, as_given_mm, best_mm),
+                             best->words(), as_given_mm, best_mm),
                  "have the program that writes the poses turn positions and rotations alike"};
 }
 
@@ -121,9 +225,12 @@ std::optional<Finding> find_wrong_signs(const StationsInOrder& in) {
 
 std::optional<Finding> find_wrong_frames(const StationsInOrder& in) {
   const double as_given_deg = rotation_misfit_deg(in.stations);
-  if (as_given_deg < kBadFit_deg) return find_wrong_signs(in);
+  if (as_given_deg < kBadFit_deg) return find_wrong_axes(in);
   const double inverted_deg = rotation_misfit_deg(with_poses(in, [](const auto& pose) { return inverted(pose); }));
   if (inverted_deg > as_given_deg / kFarBetter) return std::nullopt;
+  double inverted_mm = position_misfit_mm(with_poses(in, [](const auto& pose) { return turned_round(pose); }));
+  if (in.given_poses) inverted_mm = std::min(inverted_mm, position_misfit_mm(with_eyes_turned_round(in)));
+  if (auto found = find_disorder(in, inverted_mm)) return found;
   return seem_inverted(as_given_deg, inverted_deg, in.given_poses);
 }
 

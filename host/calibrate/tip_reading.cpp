@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calibration/base/median.hpp"
+#include "calibration/geometry/quaternion_order.hpp"
 
 namespace birdseye::host {
 
@@ -17,10 +18,9 @@ using Pose = Transform<Tracker, Sensor>;
 /// A fit so bad that another reading of the file may be the right one, and how much better that must fit.
 constexpr double kBadFit_mm = 2.5, kFarBetter = 3;
 
-/// The pose if w stood first among the file's four numbers, which were read with w last.
-Pose with_w_first(const Pose& pose) {
-  const Eigen::Quaterniond read = pose.quaternion();
-  return {Eigen::Quaterniond(read.x(), read.y(), read.z(), read.w()), pose.translation()};
+template <QuaternionOrder order>
+Pose with_quaternion(const Pose& pose) {
+  return {reordered(pose.rotation(), order), pose.translation()};
 }
 
 Pose with_rotation_inverted(const Pose& pose) {
@@ -45,8 +45,10 @@ struct OtherReading {
 constexpr const char* kOneHand = "export both in the same right-handed axes";
 
 constexpr std::array kOtherReadings{
-    OtherReading{"the quaternions seem to have w first", with_w_first, "with w first",
+    OtherReading{"the quaternions seem to have w first", with_quaternion<QuaternionOrder::w_first>, "with w first",
                  "name the columns in a header: qw,qx,qy,qz"},
+    OtherReading{"the quaternions seem to have w last", with_quaternion<QuaternionOrder::w_last>, "with w last",
+                 "name the columns in a header: qx,qy,qz,qw"},
     OtherReading{"the rotations seem to go the other way than the positions", with_rotation_inverted,
                  "with each rotation inverted",
                  "export the rotation that takes the sensor's axes to the tracker's, beside the sensor's position"},

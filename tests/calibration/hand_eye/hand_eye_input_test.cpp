@@ -142,6 +142,73 @@ TEST(HandEyeInput, PositionsWithAnotherSignThanTheirRotations) {
   expect_fail(turned({-1, -1, 1}), "wrong sign of x, y:", "turn positions and rotations alike");
 }
 
+TEST(HandEyeInput, PositionsWhoseAxesAreExchanged) {
+  const auto read_as = [](const Eigen::Vector3i& axes, const Eigen::Vector3d& signs) {
+    HandEyeBench bench(kGood);
+    for (HandEyeStation& s : bench.input.stations) {
+      const Eigen::Vector3d t = s.tracker_from_sensor.translation();
+      s.tracker_from_sensor = {
+          s.tracker_from_sensor.rotation(),
+          Eigen::Vector3d(signs.cwiseProduct(Eigen::Vector3d(t[axes[0]], t[axes[1]], t[axes[2]])))};
+    }
+    return bench.input;
+  };
+  expect_fail(read_as({0, 2, 1}, {1, 1, 1}), "where x, y, z are read from x, z, y", "as they stand");
+  expect_fail(read_as({2, 0, 1}, {1, 1, 1}), "where x, y, z are read from y, z, x", "as they stand");
+  expect_fail(read_as({0, 2, 1}, {1, 1, -1}), "where x, y, z are read from x, -z, y", "turn positions and rotations");
+}
+
+/// As it comes where the four numbers of a quaternion with w first are read with w last.
+template <typename Pose>
+Pose read_w_last(const Pose& pose) {
+  const Eigen::Quaterniond q = pose.quaternion();
+  return {Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()), pose.translation()};
+}
+
+/// And the other way round.
+template <typename Pose>
+Pose read_w_first(const Pose& pose) {
+  const Eigen::Quaterniond q = pose.quaternion();
+  return {Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()), pose.translation()};
+}
+
+template <typename Pose>
+Pose round(const Pose& pose) {
+  const auto back = pose.inverse();
+  return {back.rotation(), back.translation()};
+}
+
+TEST(HandEyeInput, QuaternionsOfTheTrackerWithWElsewhere) {
+  for (const bool poses_only : {false, true}) {
+    HandEyeScene scene = kGood;
+    scene.poses_only = poses_only;
+    const auto disordered = [&scene](const auto& change) {
+      HandEyeBench bench(scene);
+      for (HandEyeStation& s : bench.input.stations) s.tracker_from_sensor = change(s.tracker_from_sensor);
+      return bench.input;
+    };
+    const std::string first = "the quaternions of the tracker's poses seem to have w first";
+    const std::string last = "the quaternions of the tracker's poses seem to have w last";
+    expect_fail(disordered([](const auto& pose) { return read_w_last(pose); }), first, "t,x,y,z,qw,qx,qy,qz");
+    expect_fail(disordered([](const auto& pose) { return read_w_first(pose); }), last, "t,x,y,z,qx,qy,qz,qw");
+    // Of a file of sensor_from_tracker, which was said.
+    expect_fail(disordered([](const auto& pose) { return round(read_w_last(round(pose))); }), first, "qw,qx,qy,qz");
+  }
+}
+
+TEST(HandEyeInput, QuaternionsOfTheCameraOrOfBothWithWElsewhere) {
+  HandEyeScene scene = kGood;
+  scene.poses_only = true;
+  HandEyeBench eye(scene), both(scene);
+  for (HandEyeStation& s : eye.input.stations) s.camera_from_marker = round(read_w_last(round(*s.camera_from_marker)));
+  expect_fail(eye.input, "the quaternions of the camera's poses seem to have w first", "qw,qx,qy,qz");
+  for (HandEyeStation& s : both.input.stations) {
+    s.camera_from_marker = round(read_w_last(round(*s.camera_from_marker)));
+    s.tracker_from_sensor = read_w_last(s.tracker_from_sensor);
+  }
+  expect_fail(both.input, "the quaternions of both files of poses seem to have w first", "qw,qx,qy,qz");
+}
+
 TEST(HandEyeInput, ABoardOfAnotherSize) {
   const auto scaled = [](double by) {
     HandEyeBench bench(kGood);
