@@ -164,9 +164,37 @@ void judge_pairing(const StationsInOrder& in, HandEyeObservability& found) {
   found.findings.push_back(finding);
 }
 
-std::string scale_in_words(double scale, double sigma, double square_mm) {
-  constexpr double kNear = 0.1;
-  const auto near = [&](double value) { return std::abs(scale / value - 1) < kNear; };
+constexpr double kNearUnit = 0.1;
+
+/// Of two files of poses: which of them seems to be in another unit; empty where neither.
+std::string units_in_words(double scale) {
+  struct Unit {
+    double per_mm;
+    const char *name, *option;
+  };
+  for (const Unit& unit : {Unit{1e3, "metres", "m"}, Unit{10, "cm", "cm"}, Unit{25.4, "inches", "in"}}) {
+    if (std::abs(scale / unit.per_mm - 1) < kNearUnit) {
+      return fmt::format(
+          "the camera's poses seem {:g} times too small against the tracker's: in {}, taken for mm? Give "
+          "--eye-unit {}",
+          unit.per_mm, unit.name, unit.option);
+    }
+    if (std::abs(scale * unit.per_mm - 1) < kNearUnit) {
+      return fmt::format(
+          "the tracker's poses seem {:g} times too small against the camera's: in {}, where the "
+          "camera's are in mm? Give --unit {} --eye-unit mm",
+          unit.per_mm, unit.name, unit.option);
+    }
+  }
+  return {};
+}
+
+std::string scale_in_words(double scale, double sigma, const StationsInOrder& in) {
+  const double square_mm = in.square_mm;
+  const auto near = [&](double value) { return std::abs(scale / value - 1) < kNearUnit; };
+  if (in.given_poses) {
+    if (std::string words = units_in_words(scale); !words.empty()) return words;
+  }
   if (near(1e-3))
     return "the board seems 1000 times smaller than stated: poses in metres, taken for millimetres? Give --unit m";
   if (near(1e3)) return "the board seems 1000 times larger than stated: its squares in metres, taken for millimetres?";
@@ -193,7 +221,7 @@ void judge_what_scale_hides(const StationsInOrder& in, double scale, double sigm
                                           2 * std::min(1.0, sigma) * middle_mm),
                               remedy});
   } else if (std::abs(scale - 1) > std::max(2 * sigma, kScaleOff)) {
-    found.findings.push_back({Grade::marginal, scale_in_words(scale, sigma, in.square_mm), remedy});
+    found.findings.push_back({Grade::marginal, scale_in_words(scale, sigma, in), remedy});
   }
 }
 
@@ -220,8 +248,9 @@ void judge_scale(const StationsInOrder& in, const std::optional<TrackerNoise>& s
   if (std::abs(scale - 1) < std::max(kScaleSigmas * sigma, kScaleOff))
     return judge_what_scale_hides(in, scale, sigma, found);
   if (std::abs(scale - 1) > kWorthlessScale) found.solvable = false;
-  found.findings.push_back({Grade::fail, scale_in_words(scale, sigma, in.square_mm),
-                            "measure the board's squares, and check the units of board and poses"});
+  found.findings.push_back({Grade::fail, scale_in_words(scale, sigma, in),
+                            in.given_poses ? "check the units of both files of poses"
+                                           : "measure the board's squares, and check the units of board and poses"});
 }
 
 }  // namespace

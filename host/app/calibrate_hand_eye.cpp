@@ -32,8 +32,8 @@ struct CalibrateHandEyeOptions {
   std::filesystem::path recording;
   LivePlan plan;
   PoseOptions poses_are;
-  std::string eye_direction;  ///< empty where it is not said: marker_from_camera
-  std::string eye_time_unit;  ///< empty where it is not said: as of all files
+  std::string eye_direction;            ///< empty where it is not said: marker_from_camera
+  std::string eye_unit, eye_time_unit;  ///< empty where it is not said: as of all files
   std::vector<double> at;
   std::string pixel_aspect = "1";
   double position_sigma_mm = 0, angle_sigma_deg = 0;
@@ -83,7 +83,8 @@ Result<void> check_use(const CLI::App& command, const CalibrateHandEyeOptions& o
   }
   if (files.points.empty() && !files.size.empty()) return Error{Errc::bad_value, "--size goes with --points"};
   if (files.eye_poses.empty())
-    return refuse_given(command, {"--eye-transform", "--eye-time-unit", "--eye-poses-are"}, "goes with --eye-poses");
+    return refuse_given(command, {"--eye-transform", "--eye-unit", "--eye-time-unit", "--eye-poses-are"},
+                        "goes with --eye-poses");
   return refuse_given(command, {"--board"}, "goes with pictures, and --eye-poses takes their place");
 }
 
@@ -122,6 +123,7 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   HandEyeFiles& files = options.files;
   for (PoseReading* tracked : {&files.of_sensor, &files.of_board}) {
     tracked->mm_per_unit = how->mm_per_unit;
+    tracked->unit_said = how->unit_said;
     tracked->s_per_unit = how->s_per_unit;
     tracked->column_major = how->column_major;
     tracked->inverted = how->inverted;
@@ -130,7 +132,8 @@ Result<void> read_how(CalibrateHandEyeOptions& options) {
   }
   files.of_board.option_prefix = "board-";
   files.of_eye.option_prefix = "eye-";
-  files.of_eye.mm_per_unit = how->mm_per_unit;
+  files.of_eye.mm_per_unit = mm_per(options.eye_unit).value_or(how->mm_per_unit);
+  files.of_eye.unit_said = how->unit_said || !options.eye_unit.empty();
   files.of_eye.s_per_unit = options.eye_time_unit.empty() ? how->s_per_unit : seconds_per(options.eye_time_unit);
   files.of_eye.column_major = how->column_major;
   files.of_eye.inverted = options.eye_direction == "camera_from_marker";
@@ -328,6 +331,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->add_option("--eye-poses", files.eye_poses,
                    "instead of pictures, poses of the camera in the board's frame; by time if both have times")
       ->type_name("PATH");
+  add_eye_unit(*command, options->eye_unit);
   add_eye_time_unit(*command, options->eye_time_unit);
   command
       ->add_option("--eye-poses-are", options->eye_direction,

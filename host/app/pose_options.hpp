@@ -31,6 +31,9 @@ void add_unit_options(CLI::App& command, PoseOptions& options);
 /// Adds `--eye-time-unit`. unit must outlive the command's parsing.
 void add_eye_time_unit(CLI::App& command, std::string& unit);
 
+/// Adds `--eye-unit`, likewise.
+void add_eye_unit(CLI::App& command, std::string& unit);
+
 /// Adds these and `--field` and `--max-error`. options must outlive the command's parsing.
 void add_pose_options(CLI::App& command, PoseOptions& options);
 

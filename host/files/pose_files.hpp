@@ -46,6 +46,7 @@ struct PoseReading {
   /// sound. In TimedPose the reference then takes the tracker's place.
   std::string reference = {};
   double mm_per_unit = 1;  ///< 1000 for files in metres
+  bool unit_said = false;  ///< somebody said it
   /// Corrects each pose as birdseyed does; what it does not map is rejected.
   std::optional<calibration::FieldMap> field = {};
   /// Poses of which the file, or the fit of a body, tells a larger error are rejected.

@@ -226,6 +226,24 @@ TEST(HandEyeInput, ABoardOfAnotherSize) {
   EXPECT_NEAR(result->observability.board_scale, 1.1, 0.02);
 }
 
+TEST(HandEyeInput, TwoFilesOfPosesInDifferentUnits) {
+  const auto scaled = [](double eye_by) {
+    HandEyeScene scene = kGood;
+    scene.poses_only = true;
+    HandEyeBench bench(scene);
+    for (HandEyeStation& s : bench.input.stations) {
+      const auto& pose = *s.camera_from_marker;
+      s.camera_from_marker = {pose.rotation(), Eigen::Vector3d(eye_by * pose.translation())};
+    }
+    return bench.input;
+  };
+  expect_fail(scaled(1e-3), "the camera's poses seem 1000 times too small", "both files");
+  expect_fail(scaled(1e-3), "--eye-unit m", "both files");
+  expect_fail(scaled(1 / 25.4), "in inches, taken for mm? Give --eye-unit in", "both files");
+  expect_fail(scaled(1e3), "the tracker's poses seem 1000 times too small", "both files");
+  expect_fail(scaled(10), "in cm, where the camera's are in mm? Give --unit cm --eye-unit mm", "both files");
+}
+
 TEST(HandEyeInput, NumbersThatAreNone) {
   HandEyeBench bench(kGood);
   auto& stations = bench.input.stations;

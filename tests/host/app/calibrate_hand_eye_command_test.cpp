@@ -346,6 +346,11 @@ TEST(CalibrateHandEyeCommand, RefusesUsageThatMakesNoSense) {
   const auto no_board = run("birdseye", "calibrate hand-eye --poses . --images .");
   EXPECT_EQ(no_board.code, 2);
   EXPECT_THAT(no_board.output, HasSubstr("--board is missing"));
+  expect_refused(
+      "birdseye", "calibrate hand-eye --poses . --eye-poses . --eye-unit metres",
+      {"--eye-unit: \"metres\" is no unit that is read of the lengths in --eye-poses", "say mm, cm, m or in"});
+  expect_refused("birdseye", "calibrate hand-eye --poses . --images . --board chessboard:9x6:5mm --eye-unit m",
+                 {"--eye-unit goes with --eye-poses"});
 }
 
 TEST(CalibrateHandEyeCommand, WhatWouldBeOfNoEffectIsRefusedByName) {
