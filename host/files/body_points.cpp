@@ -10,6 +10,7 @@
 
 #include "calibration/points/point_fit.hpp"
 #include "host/files/column_names.hpp"
+#include "host/files/motive_header.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/files/rigid_body.hpp"
 #include "host/files/text_rows.hpp"
@@ -186,6 +187,12 @@ class BodyTable {
   Result<void> take(TextRow row) {
     if (row.remark) return {};
     drop_empty_ends(row.fields, columns_ ? columns_->count : 1);
+    if (!columns_ && begins_motive_export(row.fields)) {
+      return Error{Errc::bad_value,
+                   fmt::format("{}: is an export of OptiTrack Motive, which has the body's poses: leave "
+                               "--{}body out, and name the rigid body by --{}tool",
+                               path_.string(), how_.option_prefix, how_.option_prefix)};
+    }
     if (!columns_) {
       const bool words = !row.fields[0].empty() && read_number(row.fields[0]).problem.ends_with("is no number");
       auto columns = words ? columns_by_name(row.fields, body_) : columns_by_count(row.fields.size(), body_);

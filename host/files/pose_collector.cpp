@@ -75,9 +75,11 @@ ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit) {
   if (!(off <= 2 * kRotationTolerance)) {
     out.problem = "no rotation";
   } else if (r.determinant() < 0) {
-    out.problem = "no rotation but a mirror";
+    out.problem =
+        "no rotation but a mirror (determinant -1), as of a left-handed frame or with two axes exchanged: have the "
+        "program that writes it write a right-handed frame";
   } else if ((matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-9) {
-    out.problem = "its last row is not 0 0 0 1";
+    out.problem = kNoLastRow;
   }
   out.tracker_from_sensor = Transform<Tracker, Sensor>(r, position_mm);
   return out;

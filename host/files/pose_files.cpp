@@ -86,6 +86,26 @@ Result<PoseSet> read_folder(const fs::path& folder, const std::string& pattern, 
                fmt::format("{}: has no files {}; one 4x4 matrix in each is expected", folder.string(), pattern)};
 }
 
+/// Refuses what programs save in a form of their own, by its first bytes.
+Result<void> refuse_binary(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string first(8, '\0');
+  in.read(first.data(), static_cast<std::streamsize>(first.size()));
+  if (first.starts_with("\x93NUMPY")) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: is an array that NumPy saved, which is not read: write it as text, a matrix a row: "
+                             "numpy.savetxt(\"poses.txt\", poses.reshape(-1, 16))",
+                             path.string())};
+  }
+  if (first.starts_with("MATLAB") || first.starts_with("\x89HDF")) {
+    return Error{Errc::unsupported,
+                 fmt::format("{}: is a file of MATLAB or HDF5, which is not read: write the poses as text, 16 numbers "
+                             "of a matrix a row",
+                             path.string())};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::optional<double> time_by_name(const fs::path& file) {
@@ -110,6 +130,9 @@ Result<PoseSet> read_pose_set(const fs::path& path, const PoseReading& how) {
   const bool many = folder || is_pattern(name);
   if (!many && !fs::is_regular_file(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such file or folder", path.string())};
+  if (!many) {
+    if (const auto text = refuse_binary(path); !text) return text.error();
+  }
   if (!how.body.empty() && many)
     return Error{Errc::bad_value, fmt::format("{}: --body needs a table of the body's tracked points", path.string())};
   if (!how.body.empty() && !how.transform.empty()) {

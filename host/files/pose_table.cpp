@@ -6,12 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "calibration/base/lower_case.hpp"
 #include "calibration/base/median.hpp"
 #include "host/files/column_names.hpp"
+#include "host/files/motive_header.hpp"
 #include "host/files/pose_collector.hpp"
+#include "host/files/pose_columns.hpp"
 #include "host/files/text_rows.hpp"
 #include "host/files/tool_column.hpp"
 
@@ -21,9 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Fields = std::vector<std::string>;
-
-constexpr std::array<std::string_view, kPoseColumns> kPoseNames{"t", "x", "y", "z", "qx", "qy", "qz", "qw"};
-constexpr auto kTime = static_cast<std::size_t>(PoseColumn::time);
 
 /// The unit of a time whose header names none, s. What is too large for seconds since 1970 is counted in smaller units.
 double seconds_per_unit_of(double time) {
@@ -36,110 +34,6 @@ double seconds_per_unit_of(double time) {
 /// Times so far apart are not in seconds: no tracker measures, and nobody takes stations, so seldom.
 constexpr double kLongestStepS = 600;
 constexpr std::size_t kFewestSteps = 20;
-
-/// Where in a row each of PoseColumn is, and what its numbers are.
-struct PoseColumns {
-  std::array<std::optional<std::size_t>, kPoseColumns> at;
-  std::size_t count = 0;         ///< of all columns of a row
-  std::optional<double> mm_per;  ///< as the header tells
-  std::optional<double> s_per;
-  std::optional<std::size_t> picture;  ///< the name of the one that was taken there
-  bool matrix = false;                 ///< rows are 4x4 or 3x4 matrices, after a time, and nothing else
-  [[nodiscard]] bool timed() const { return at[kTime].has_value(); }
-};
-
-/// Columns of a table without a header, by their count.
-PoseColumns columns_by_count(std::size_t count) {
-  PoseColumns out;
-  out.matrix = count == 12 || count == 13 || count == 16 || count == 17;
-  out.count = out.matrix || count == 7 ? count : kPoseColumns;
-  if (count == 13 || count == 17) out.at[kTime] = 0;
-  const std::size_t first = out.count == 7 ? 1 : 0;
-  for (std::size_t c = first; c < kPoseColumns && !out.matrix; ++c) out.at[c] = c - first;
-  return out;
-}
-
-/// Whether a column may hold the names of pictures.
-bool names_pictures(const ColumnName& name) {
-  constexpr std::array<std::string_view, 9> kNames{"picture",   "image",     "file",        "filename", "picturename",
-                                                   "imagename", "imagefile", "picturefile", "name"};
-  const std::string joined = fmt::format("{}", fmt::join(name.words, ""));
-  return std::ranges::find(kNames, joined) != kNames.end();
-}
-
-/// The columns that are angles of a turn, or a vector of one, of a header that names a position and no whole
-/// quaternion.
-Fields angles_in(const Fields& header, const PoseColumns& columns) {
-  static const std::set<std::string> kAngles{
-      "yaw", "pitch", "roll", "azimuth", "elevation", "heading", "rx",    "ry",   "rz",     "alpha", "beta", "gamma",
-      "phi", "theta", "psi",  "rotx",    "roty",      "rotz",    "euler", "rvec", "rotvec", "az",    "el",   "angle"};
-  Fields angles;
-  if (columns.at[kPoseColumns - 1] || !columns.at[1] || !columns.at[2] || !columns.at[3]) return angles;
-  for (std::size_t i = 0; i < header.size(); ++i) {
-    const ColumnName name = column_name(header[i]);
-    const bool named = std::ranges::any_of(name.words, [](const auto& word) { return kAngles.contains(word); });
-    // rotation_x with no w beside it is no part of a quaternion.
-    const bool part = std::find(columns.at.begin() + 4, columns.at.end(), i) != columns.at.end() &&
-                      std::ranges::any_of(name.words, [](const auto& word) { return word.starts_with("rot"); });
-    if (named || part) angles.push_back(header[i]);
-  }
-  return angles;
-}
-
-/// What each column of a header is. A name that is exactly ours goes before others that mean the same.
-Result<PoseColumns> columns_by_name(const Fields& header) {
-  PoseColumns out;
-  out.count = header.size();
-  std::array<bool, kPoseColumns> exact{};
-  std::vector<std::string> units;  // of lengths
-  for (std::size_t i = 0; i < header.size(); ++i) {
-    const ColumnName name = column_name(header[i]);
-    const auto column = pose_column(name);
-    if (!column && !out.picture && names_pictures(name)) out.picture = i;
-    if (!column) continue;
-    const auto c = static_cast<std::size_t>(*column);
-    const bool ours = header[i] == kPoseNames[c];
-    if (out.at[c] && c != kTime && ours == exact[c]) {
-      return Error{Errc::bad_format,
-                   fmt::format("its header has both {} and {} for {}: leave the columns of one pose "
-                               "in, under the names {}",
-                               header[*out.at[c]], header[i], kPoseNames[c], fmt::join(kPoseNames, ","))};
-    }
-    if (out.at[c] && !ours) continue;
-    out.at[c] = i;
-    exact[c] = ours;
-    if (c == kTime) out.s_per = seconds_per(name.unit);
-    if (c > kTime && c < 4 && !name.unit.empty()) units.push_back(name.unit);
-  }
-  for (const std::string& unit : units) {
-    if (!mm_per(unit)) {
-      return Error{
-          Errc::bad_format,
-          fmt::format("its header has lengths in '{}', which is no unit that is read: give mm, cm, m or inches", unit)};
-    }
-    if (unit != units.front() || units.size() < 3) {
-      return Error{Errc::bad_format,
-                   fmt::format("its header has lengths in {} alone or mixed: give x, y and z the same "
-                               "unit, or none",
-                               fmt::join(units, ", "))};
-    }
-    out.mm_per = mm_per(unit);
-  }
-  if (const auto angles = angles_in(header, out); !angles.empty()) {
-    return Error{
-        Errc::unsupported,
-        fmt::format("its header has angles ({}): programs turn by them in different orders and units, and they "
-                    "are not read; export quaternions (qx,qy,qz,qw), or 4x4 matrices",
-                    fmt::join(angles, ", "))};
-  }
-  std::vector<std::string_view> lacking;
-  for (std::size_t c = 1; c < kPoseColumns; ++c) {
-    if (!out.at[c]) lacking.push_back(kPoseNames[c]);
-  }
-  if (lacking.empty()) return out;
-  return Error{Errc::bad_format, fmt::format("its header lacks {}; the columns are {}", fmt::join(lacking, ", "),
-                                             fmt::join(kPoseNames, ","))};
-}
 
 bool is_words(const Fields& row) {
   return !row.empty() && !row[0].empty() && read_number(row[0]).problem.ends_with("is no number");
@@ -180,11 +74,31 @@ class PoseTable {
     if (!columns_) {
       if (auto started = start(columns_by_count(row.fields.size())); !started) return started;
     }
-    take_pose(row);
+    if (columns_->stacked && row.fields.size() == 4)
+      take_matrix_row(row);
+    else
+      take_pose(row);
+    return {};
+  }
+
+  /// first: the first row of an export of OptiTrack's Motive; rows is read on to the end of its header.
+  Result<void> take_motive_header(const Fields& first, TextRows& rows) {
+    const auto header = read_motive_header(first, rows, how_);
+    if (!header) return Error{header.error().code, fmt::format("{}: {}", path_.string(), header.error().what)};
+    if (auto started = start(header->columns); !started) return started;
+    of_motive_ = true;
+    collector_->note(
+        fmt::format("it is an export of OptiTrack Motive: the poses of its rigid body {} are read", header->body));
     return {};
   }
 
   Result<PoseSet> finish(bool decimal_commas) {
+    if (!stack_.empty()) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}: holds {} rows of four numbers, which are no 4x4 matrices one below another: each "
+                               "has four rows, the last 0 0 0 1; or write each matrix in one row, of 16 numbers",
+                               path_.string(), 4 * count_ + stack_.size() / 4)};
+    }
     if (!collector_) return Error{Errc::bad_format, fmt::format("{}: holds no poses", path_.string())};
     if (decimal_commas) collector_->note("its numbers have decimal commas, and are read so");
     if (repeated_headers_ > 0)
@@ -201,6 +115,7 @@ class PoseTable {
     if (!columns_->timed() && !columns_->picture)
       collector_->note("it has no times: its poses count by their order, row by row");
     auto set = std::move(*collector_).finish(path_);
+    if (set && of_motive_) set->direction_known = true;
     if (set && columns_->picture) set->picture_column = header_[*columns_->picture];
     return set;
   }
@@ -233,6 +148,18 @@ class PoseTable {
     return {};
   }
 
+  /// A row of four numbers of a matrix that has four such rows.
+  void take_matrix_row(const TextRow& row) {
+    stack_.insert(stack_.end(), row.fields.begin(), row.fields.end());
+    if (stack_.size() < 16) return;
+    const auto place = static_cast<double>(count_++);
+    ReadPose pose = corrected(matrix_of_row(stack_, how_.mm_per_unit), how_);
+    if (pose.problem == kNoLastRow)
+      pose.problem += ": matrices one below another have four rows each, 0 0 0 1 below three";
+    collector_->add(fmt::format("the matrix up to line {}", row.line), place, place, pose);
+    stack_.clear();
+  }
+
   void take_pose(const TextRow& row) {
     const std::string name = fmt::format("line {}", row.line);
     const Fields& fields = row.fields;
@@ -243,13 +170,13 @@ class PoseTable {
       return collector_->reject(
           name, absent ? problem
                        : fmt::format("{} numbers where a row has {}{}", fields.size(), columns_->count,
-                                     header_.empty()
-                                         ? "; without a header all rows have 7 or 8, or 12, 13, 16 or 17 of a matrix"
+                                     header_.empty() && !of_motive_
+                                         ? "; without a header all rows have 7 or 8, or 4, 12, 13, 16 or 17 of a matrix"
                                          : ""));
     }
     double time_s = place;
     if (columns_->timed()) {
-      const ReadNumber time = read_number(fields[*columns_->at[kTime]]);
+      const ReadNumber time = read_number(fields[*columns_->at[kTimeColumn]]);
       if (!time.problem.empty()) return collector_->reject(name, time.problem);
       if (!columns_->s_per && !how_.s_per_unit) s_per_ = std::min(s_per_, seconds_per_unit_of(time.value));
       time_s = s_per_ * time.value;
@@ -284,7 +211,12 @@ class PoseTable {
       if (!number.problem.empty()) return {{}, number.problem};
       v[c] = number.value;
     }
-    return checked_pose(Eigen::Quaterniond(v[7], v[4], v[5], v[6]), Eigen::Vector3d(v[1], v[2], v[3]), mm_per_unit);
+    ReadPose out =
+        checked_pose(Eigen::Quaterniond(v[7], v[4], v[5], v[6]), Eigen::Vector3d(v[1], v[2], v[3]), mm_per_unit);
+    if (!columns_->error) return out;
+    const ReadNumber error = read_number(fields[*columns_->error]);
+    if (error.problem.empty()) out.error_mm = mm_per_unit * error.value;
+    return out;
   }
 
   [[nodiscard]] ReadPose matrix_of_row(const Fields& numbers, double mm_per_unit) const {
@@ -302,9 +234,11 @@ class PoseTable {
   std::optional<PoseColumns> columns_;
   std::optional<PoseCollector> collector_;
   std::optional<Chosen> chosen_;
+  Fields stack_;  ///< numbers of a matrix of which all four rows are not read yet
   double s_per_ = 1;
   std::vector<double> times_s_;
   std::size_t count_ = 0, repeated_headers_ = 0, of_others_ = 0;
+  bool of_motive_ = false;
 };
 
 /// The column that says whose the rows are, where the table has a header with one.
@@ -358,12 +292,19 @@ Result<std::optional<Chosen>> choose_tool(const fs::path& path, const PoseReadin
 }  // namespace
 
 Result<PoseSet> read_pose_table(const fs::path& path, const PoseReading& how) {
-  auto chosen = choose_tool(path, how);
-  if (!chosen) return chosen.error();
   auto rows = TextRows::open(path);
   if (!rows) return rows.error();
+  auto row = rows->next();
+  const bool motive = row && begins_motive_export(row->fields);
+  Result<std::optional<Chosen>> chosen = std::optional<Chosen>();
+  if (!motive) chosen = choose_tool(path, how);
+  if (!chosen) return chosen.error();
   PoseTable table(path, how, *std::move(chosen));
-  while (auto row = rows->next()) {
+  if (motive) {
+    if (const auto taken = table.take_motive_header(row->fields, *rows); !taken) return taken.error();
+    row = rows->next();
+  }
+  for (; row; row = rows->next()) {
     if (const auto taken = table.take(*std::move(row)); !taken) return taken.error();
   }
   return table.finish(rows->decimal_commas());

@@ -61,6 +61,16 @@ Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& m, const std::string&
       (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() <= 1e-9) {
     return m;
   }
+  if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() < 0) {
+    return Error{Errc::bad_value, where +
+                                      ": is a mirror (determinant -1), as of a left-handed frame or with two axes "
+                                      "exchanged: have the program that writes it write a right-handed frame"};
+  }
+  if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && m.topRightCorner<3, 1>().isZero(0) && m(3, 3) == 1) {
+    return Error{Errc::bad_value, where +
+                                      ": is written column by column, as OpenGL and MATLAB do: write it row by row, "
+                                      "last row 0 0 0 1"};
+  }
   return Error{Errc::bad_value,
                where + ": is no rigid transform; give rotation and translation in mm, last row 0 0 0 1"};
 }

@@ -130,8 +130,8 @@ def write_recordings(folder):
     for k, pose in enumerate(pivot):
         tools += [f"Pointer,{100 + k / 40:.4f}," + ",".join(f"{v:.6f}" for v in numbers(pose)), scope_lines[-k]]
     (folder / "tools.csv").write_text("\n".join(tools) + "\n")
-    take = ["Format Version,1.23,Take Name,pivot,Length Units,Meters", "", ",Type,Rigid Body,Rigid Body", ",Name,Pointer,Pointer", ",ID,1,1",
-            ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error", "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,"]
+    take = ["Format Version,1.23,Take Name,pivot,Rotation Type,Quaternion,Length Units,Meters", "", ",Type" + ",Rigid Body" * 8,
+            ",Name" + ",Pointer" * 8, ",ID" + ",1" * 8, ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error", "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,"]
     for k, pose in enumerate(pivot):
         x, y, z, *turn = numbers(pose)
         take.append(",".join([str(k), f"{k / 40:.4f}"] + [f"{v:.6f}" for v in (*turn, x / 1000, y / 1000, z / 1000, 0.0002)]))
