@@ -212,6 +212,8 @@ class BodyTable {
     if (!collector_) return Error{Errc::bad_format, fmt::format("{}: holds no points", path_.string())};
     if (const std::string why = why_misfit(); !why.empty())
       return Error{Errc::bad_value, fmt::format("{}, {}: {}", how_.body.string(), path_.string(), why)};
+    if (const auto sound = check_size(body_, how_.mm_per_unit, how_.unit_said); !sound)
+      return sound.error().with_context(how_.body.string());
     if (decimal_commas) collector_->note("its numbers have decimal commas, and are read so");
     if (unmapped_ > 0) {
       collector_->note(fmt::format("{} of {} points lie where the field was not mapped, and count as not seen",

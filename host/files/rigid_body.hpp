@@ -20,6 +20,10 @@ struct RigidBody {
 /// point that is not finite, names for some points only, and one name twice.
 Result<RigidBody> read_rigid_body(const std::filesystem::path& path, double mm_per_unit);
 
+/// Refuses a body of a size that none has, and names the units in which it would have one. unit_said: mm_per_unit was
+/// said by somebody, who may have a very small body.
+Result<void> check_size(const RigidBody& body, double mm_per_unit, bool unit_said);
+
 /// Where the body's points were seen; none for those that were not.
 using SeenPoints = std::vector<std::optional<Eigen::Vector3d>>;
 

@@ -7,6 +7,8 @@ from rows_points import TIP_BOTH, TIP_RUN, pivot, tip_close, tip_file
 
 STREAM, BOTH = rows_hand_eye.STREAM, rows_hand_eye.BOTH
 MIRROR = [[0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]  # x and y exchanged
+BODY = ((0.0, 0.0, 0.0), (50.0, 0.0, 5.0), (0.0, 80.0, 0.0), (-30.0, 20.0, 25.0))
+BODY_RUN = "birdseye calibrate tip --poses points.csv --body body.csv --out tip.txt --json tip.json"
 MOTIVE_RUN = "birdseye calibrate tip --poses take.csv --out tip.txt --json tip.json"
 
 
@@ -75,6 +77,15 @@ def motive(names=("Pointer",), unit="Meters", turns="Quaternion", space="Global"
     return make
 
 
+def body(body_unit=1.0, points_unit=1.0, text=None):
+    """A body's points and where they were tracked, each in a unit of so many mm."""
+    def make(folder):
+        (folder / "body.csv").write_text(text or "".join(",".join(f"{v / body_unit:.9g}" for v in p) + "\n" for p in BODY))
+        (folder / "points.csv").write_text("".join(
+            ",".join(f"{v / points_unit:.9g}" for p in BODY for v in motion.apply(pose, p)) + "\n" for pose in pivot()))
+    return make
+
+
 ROWS = [
     Row("calibrate tip", "good", "4x4 matrices one below another, as numpy.savetxt writes them", "pass; the tip to 0.5 mm", TIP_RUN, 0,
         tip_file(stacked), "pass", writes=TIP_BOTH, check=tip_close(0.5)),
@@ -117,4 +128,22 @@ ROWS = [
         says=["--tool NAME", "Pointer, Scope"]),
     Row("calibrate tip", "wrong", "an export of Motive with angles", "refused: Rotation Type Quaternion", MOTIVE_RUN, 2, motive(turns="XYZ"),
         says=["Motive", "Rotation Type Quaternion"]),
+    Row("calibrate tip", "good", "where a body's points were tracked, and the body", "pass; the tip to 0.5 mm", BODY_RUN, 0, body(), "pass",
+        writes=TIP_BOTH, check=tip_close(0.5)),
+    Row("calibrate tip", "odd", "the same in metres, and nobody says so", "refused: the body is too small, --unit m", BODY_RUN, 2, body(1000.0, 1000.0),
+        says=["body.csv", "--unit m"]),
+    Row("calibrate tip", "odd", "the same in inches, and nobody says so", "refused: the body is too small, --unit in", BODY_RUN, 2, body(25.4, 25.4),
+        says=["body.csv", "inches", "--unit in"]),
+    Row("calibrate tip", "good", "the same in inches, said by --unit in", "pass; the tip to 0.5 mm", BODY_RUN + " --unit in", 0, body(25.4, 25.4), "pass",
+        writes=TIP_BOTH, check=tip_close(0.5)),
+    Row("calibrate tip", "odd", "a body in mm, its tracked points in inches", "refused: one unit for both", BODY_RUN, 2, body(1.0, 25.4),
+        says=["1/25", "inches", "one unit"]),
+    Row("calibrate tip", "odd", "a body in cm, its tracked points in mm", "refused: one unit for both", BODY_RUN, 2, body(10.0, 1.0),
+        says=["10 times", "cm", "one unit"]),
+    Row("calibrate tip", "wrong", "a body as 4x4 matrices", "refused: x y z a line", BODY_RUN, 2, body(text="1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"),
+        says=["body.csv", "x,y,z"]),
+    Row("calibrate tip", "wrong", "a body as a JSON file", "refused: x y z a line", BODY_RUN, 2, body(text='{"points": [[0, 0, 0], [50, 0, 5]]}\n'),
+        says=["body.csv", "x,y,z"]),
+    Row("calibrate tip", "wrong", "a body whose points stand in one line", "refused: x y z a line", BODY_RUN, 2,
+        body(text="0,0,0,50,0,5,0,80,0,-30,20,25\n"), says=["body.csv", "12 numbers", "x,y,z"]),
 ]

@@ -137,17 +137,69 @@ TEST(BodyPoints, ABodyInAnotherOrderMirroredOrInAnotherUnitIsNamed) {
       << other.error().what;
 }
 
+/// Rows of a body, each number divided.
+std::string divided(const std::string& rows, double by) {
+  std::string out;
+  for (std::size_t at = 0; at < rows.size();) {
+    const std::size_t end = rows.find_first_of(",\n", at);
+    out += fmt::format("{}{}", std::stod(rows.substr(at, end - at)) / by, rows[end]);
+    at = end + 1;
+  }
+  return out;
+}
+
+std::string divided_body(double by) {
+  Points out;
+  for (const Eigen::Vector3d& p : kBody) out.push_back(p / by);
+  return body_text(out);
+}
+
+TEST(BodyPoints, ABodyInAnotherUnitThanItsRecordingIsNamedWithBothUnits) {
+  TrackedBody tracked;
+  tracked.noise_mm = 0;
+  const std::string rows = tracked.rows(10);
+  for (const auto& [body_by, rows_by, words] :
+       {std::tuple{1000., 1., "1000 times as far apart as the body's: give both in one unit (metres and mm?)"},
+        {1., 25.4, "1/25.4 as far apart as the body's: give both in one unit (inches and mm?)"},
+        {10., 1., "10 times as far apart as the body's: give both in one unit (cm and mm?)"},
+        {1.3, 1., "1.3 times as far apart as the body's: measure the body's points anew"}}) {
+    const auto set = read_tracked(divided_body(body_by), divided(rows, rows_by));
+    ASSERT_FALSE(set) << words;
+    EXPECT_NE(set.error().what.find(words), std::string::npos) << set.error().what;
+  }
+}
+
+TEST(BodyPoints, ABodyThatIsTooSmallOrTooLargeIsRefusedWithTheUnitsItMayHave) {
+  TrackedBody tracked;
+  const std::string rows = tracked.rows(10);
+  for (const auto& [by, how, words] :
+       {std::tuple{1000., PoseReading{}, "are in metres, say so: --unit m"},
+        {25.4, PoseReading{}, "are in cm or inches, say so: --unit cm or --unit in"},
+        {1., PoseReading{.mm_per_unit = 1000, .unit_said = true}, "are in mm or cm, say so: --unit mm or --unit cm"}}) {
+    const auto set = read_tracked(divided_body(by), divided(rows, by), how);
+    ASSERT_FALSE(set) << words;
+    EXPECT_NE(set.error().what.find("body.csv: its points are at most"), std::string::npos) << set.error().what;
+    EXPECT_NE(set.error().what.find(words), std::string::npos) << set.error().what;
+  }
+  const PoseReading small{.unit_said = true};
+  EXPECT_TRUE(read_tracked(divided_body(25.4), divided(rows, 25.4), small)) << "somebody said that it is so small";
+}
+
 TEST(BodyPoints, RefusalsNameTheFileAndTheRemedy) {
   TrackedBody tracked;
   const std::string rows = tracked.rows(3);
   for (const auto& [body, recording, words] :
        {std::tuple{std::string("1,2,3\n4,5,6\n"), rows, "body.csv: has 2 points"},
-        {std::string("1,2,3\n4,5\n"), rows, "body.csv: line 2: is no point"},
+        {std::string("1,2,3\n4,5\n"), rows, "body.csv: line 2: is no point but 2 numbers or words; give x,y,z a line"},
+        {std::string("0,0,0,50,0,5,0,80,0\n"), rows,
+         "body.csv: line 1: is no point but 9 numbers or words; give x,y,z"},
+        {std::string("{\"points\": [[0, 0, 0], [50, 0, 5]]}\n"), rows, "body.csv: has 0 points"},
         {std::string("a,1,2,3\na,4,5,6\nb,7,8,10\n"), rows, "two of its points are called a"},
         {std::string("a,1,2,3\n4,5,6\nb,7,8,10\n"), rows, "some of its points have names"},
         {body_text(kBody), std::string("1,2,3,4\n"), "4 columns where 4 points of the body have 12, or 13"},
         {body_text(kBody), std::string("x1,y1,z1,x2,y2,z2\n"), "columns of 2 numbered points where the body has 4"},
         {body_text(kBody), std::string("x1,y1,z1,x2,y2,z2,x3,y3,z3,x4,y4\n"), "lacks a coordinate of point 4"},
+        {body_text(kBody), std::string("Format Version,1.23,Take Name,a\n"), "is an export of OptiTrack Motive"},
         {body_text(kBody), std::string(), "holds no points"}}) {
     const auto set = read_tracked(body, recording);
     ASSERT_FALSE(set) << words;
