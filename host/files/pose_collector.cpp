@@ -73,7 +73,7 @@ ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit) {
   if (!out.problem.empty()) return out;
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(off <= 2 * kRotationTolerance)) {
-    out.problem = "no rotation";
+    out.problem = kNoRotation;
   } else if (r.determinant() < 0) {
     out.problem =
         "no rotation but a mirror (determinant -1), as of a left-handed frame or with two axes exchanged: have the "

@@ -27,7 +27,8 @@ struct ReadPose {
   bool unmapped = false;                ///< the problem is that it lies where the field was not mapped
   std::optional<double> error_mm = {};  ///< as TimedPose has it
 };
-/// The problem of a matrix whose last row is another.
+/// The problem of a matrix whose upper left block, or whose last row, is another.
+inline constexpr std::string_view kNoRotation = "no rotation";
 inline constexpr std::string_view kNoLastRow = "its last row is not 0 0 0 1";
 /// matrix: 4x4, lengths in units of mm_per_unit.
 ReadPose checked_pose(const Eigen::Matrix4d& matrix, double mm_per_unit);

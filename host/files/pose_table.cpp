@@ -154,8 +154,9 @@ class PoseTable {
     if (stack_.size() < 16) return;
     const auto place = static_cast<double>(count_++);
     ReadPose pose = corrected(matrix_of_row(stack_, how_.mm_per_unit), how_);
-    if (pose.problem == kNoLastRow)
-      pose.problem += ": matrices one below another have four rows each, 0 0 0 1 below three";
+    if (pose.problem == kNoLastRow || pose.problem == kNoRotation)
+      pose.problem +=
+          " (rows of four numbers are read as matrices one below another, of four rows each, 0 0 0 1 below three)";
     collector_->add(fmt::format("the matrix up to line {}", row.line), place, place, pose);
     stack_.clear();
   }

@@ -62,7 +62,9 @@ TEST(ForeignPoses, AMatrixBelowAnotherThatIsNoneKeepsItsPlace) {
 
 TEST(ForeignPoses, MatricesOneBelowAnotherThatAreCutOffOrHaveThreeRowsAreRefused) {
   expect_foreign_refused(std::string(kTurnedRows) + "1 0 0 4\n0 1 0 5\n0 0 1 6\n", "holds 7 rows of four numbers");
-  expect_foreign_refused("0 -1 0 1\n1 0 0 2\n0 0 1 3\n1 0 0 4\n", "matrices one below another have four rows each");
+  expect_foreign_refused("0 -1 0 1\n1 0 0 2\n0 0 1 3\n1 0 0 4\n", "0 0 0 1 below three");
+  expect_foreign_refused("0.1 0.2 0.3 0.9\n0.2 0.3 0.4 0.8\n0.1 0.2 0.3 0.9\n0.2 0.3 0.4 0.8\n",
+                         "no rotation (rows of four numbers are read as matrices one below another");
   expect_foreign_refused("0 1 0 0\n-1 0 0 0\n0 0 1 0\n1 2 3 1\n", "it is written column by column: say --column-major");
 }
 
