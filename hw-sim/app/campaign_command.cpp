@@ -40,8 +40,8 @@ void print(const CampaignSettings& settings, const OperationResult& sum) {
     return all > 0 ? 100.0 * static_cast<double>(some) / static_cast<double>(all) : 0;
   };
   fmt::print("{}", sum.broken);
-  fmt::print("of seeds {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n", settings.first_seed,
-             settings.last_seed, sum.minutes, sum.faults, sum.faults_alone, sum.poses, sum.frames);
+  fmt::print("of seeds {} to {}: {:.0f} minutes, {} faults ({} of them alone), {} poses, {} frames\n",
+             settings.first_seed, settings.last_seed, sum.minutes, sum.faults, sum.faults_alone, sum.poses, sum.frames);
   fmt::print(
       "overlay whole on {:.1f} % of pictures, {:.4f} % of those beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
       share(sum.green, sum.shown), share(sum.beyond, sum.green), sum.worst_circles, sum.worst_age_ms);

@@ -13,11 +13,11 @@ namespace birdseye::hw_sim {
 
 struct CampaignSettings {
   std::uint64_t first_seed = 1, last_seed = 1;
-  double minutes = 10;           ///< of each operation
-  std::filesystem::path folder;  ///< gets operations.sqlite
-  int jobs = 0;                  ///< operations at a time; 0: as many as there are cores
+  double minutes = 10;              ///< of each operation
+  std::filesystem::path folder;     ///< gets operations.sqlite
+  int jobs = 0;                     ///< operations at a time; 0: as many as there are cores
   std::optional<double> at_most_s;  ///< no operation begins after so long; empty: all seeds are run
-  std::string program;           ///< of this name; it knows `operation --line`
+  std::string program;              ///< of this name; it knows `operation --line`
 };
 
 /// Runs the operation of each seed that the folder has no result of, each in a process of its own, handed out by need.

@@ -14,10 +14,10 @@
 namespace birdseye::host {
 namespace {
 
+using birdseye::testing::Scratch;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using birdseye::testing::Scratch;
 
 const hw_sim::Grid kGrid{{6, 5, 4}, {10, -20, 30}, {0.5, 0.75, 2}};
 
@@ -38,9 +38,10 @@ TEST(LabelGrid, WhatLiesOutsideOfTheCtIsTold) {
   const auto whole = shifted_by(0), cut = shifted_by(1), elsewhere = shifted_by(kGrid.size[2] - 1);
   ASSERT_TRUE(whole && cut);
   EXPECT_THAT(whole->notes, Not(Contains(HasSubstr("outside"))));
-  EXPECT_THAT(cut->notes, Contains(HasSubstr(fmt::format(
-                              "shifted.nii.gz: {:.1f} % of its voxels that have a label lie outside of the CT",
-                              100.0 / kGrid.size[2]))));
+  EXPECT_THAT(
+      cut->notes,
+      Contains(HasSubstr(fmt::format("shifted.nii.gz: {:.1f} % of its voxels that have a label lie outside of the CT",
+                                     100.0 / kGrid.size[2]))));
   ASSERT_FALSE(elsewhere);
   EXPECT_THAT(elsewhere.error().what, HasSubstr("lie outside of the CT; is it of this CT?"));
 }
