@@ -14,4 +14,12 @@ enum class QuaternionOrder {
 /// The rotation that was meant, of one that was read from a quaternion.
 Eigen::Matrix3d reordered(const Eigen::Matrix3d& rotation, QuaternionOrder order);
 
+/// The inverse of a pose under the pose's own name: what a file holds whose poses were inverted as they were read, and
+/// back. Frames do not cancel here.
+template <typename Pose>
+Pose turned_round(const Pose& pose) {
+  const auto back = pose.inverse();
+  return {back.rotation(), back.translation()};
+}
+
 }  // namespace birdseye

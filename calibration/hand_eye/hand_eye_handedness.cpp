@@ -57,13 +57,6 @@ Pose inverted(const Pose& pose) {
   return {pose.rotation().transpose(), Eigen::Vector3d::Zero()};
 }
 
-/// The poses the other way round, whole.
-template <typename Pose>
-Pose turned_round(const Pose& pose) {
-  const auto back = pose.inverse();
-  return {back.rotation(), back.translation()};
-}
-
 /// How the quaternions of a file may have to be read, and whether the file holds the inverse of what is held here.
 struct QuaternionReading {
   QuaternionOrder order = QuaternionOrder::as_read;

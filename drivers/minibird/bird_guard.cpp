@@ -108,7 +108,8 @@ std::optional<Eigen::Vector3d> BirdGuard::predicted_mm(DeviceTime time) const {
   return Eigen::Vector3d(mean_mm - mean_s * (moment / square_s2));
 }
 
-/// in_reach: where a sensor might be, after readings that were withheld, and a damaged reading too.
+/// in_reach: further off the track than a sensor gets in one period. After readings that were lost or withheld the
+/// sensor may have come there all the same; or the reading is damaged.
 BirdGuard::Placed BirdGuard::placed(const Sample& sample) {
   if (!within_reach(track_.back(), sample)) return Placed::off;
   const Duration gap = gap_between(track_.back().time, sample.time);

@@ -23,7 +23,8 @@ void add_verdict(Verdict& to, const Verdict& more) {
   for (const std::string& step : more.next_steps) to.add(Grade::pass, {}, step);
 }
 
-/// Poses that were left out say nothing against the tip, but of what was recorded it stands on a part.
+/// Poses that were left out say nothing against the tip. But the reader is to know on how much of the recording the tip
+/// stands.
 void judge_left_out(const PoseSet& set, Verdict& verdict) {
   constexpr double kMost_percent = 50;
   if (set.rejected.empty()) return;

@@ -65,13 +65,7 @@ double residual_mm(const TipInput& input, const OtherReading& other) {
   auto poses = input.poses;
   for (calibration::PivotPose& one : poses) {
     Pose& pose = one.tracker_from_sensor;
-    const auto turned_round = [&] {
-      const auto back = pose.inverse();
-      return Pose(back.rotation(), back.translation());
-    };
-    if (input.inverted) pose = turned_round();  // as the file has it
-    pose = other.read(pose);
-    if (input.inverted) pose = turned_round();
+    pose = input.inverted ? turned_round(other.read(turned_round(pose))) : other.read(pose);
   }
   const auto pivot = calibration::solve_pivot(poses);
   return pivot ? median_of(pivot->residuals_mm) : std::numeric_limits<double>::infinity();

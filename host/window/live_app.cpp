@@ -159,11 +159,11 @@ void LiveApp::draw() {
   const HostTime began = host_now();
   // Judged as of when it will be seen: drawing the window takes its time too.
   ShownPicture shown = workflow_.shown_at(began + to_draw_);
-  const bool news = shown.changes != drawn_changes_ || shot_due(began);
+  const bool shoots = shot_due(began);
+  const bool news = shown.changes != drawn_changes_ || shoots;
   if (!news && Duration{began.ns - drawn_.ns} < kRedraw) return;
   drawn_ = began;
   operation_ = workflow_.view();
-  const bool shoots = shot_due(began);
   facts_.pseudonymised = shoots && !identify_;
   const PanelWishes wishes = draw_window(shown);
   figures_.picture_says = shown.reason;
@@ -334,8 +334,8 @@ void LiveApp::ask_for_shot(std::filesystem::path path) {
   shot_asked_ = host_now();
 }
 
-/// With the next frame: the one on the screen is too old to be drawn again where the machine is slow. Where none comes,
-/// of what there is.
+/// A snapshot waits for the next frame: on a slow machine the frame on the screen has grown too old for an overlay.
+/// Where no frame comes, the snapshot is of the window as it is.
 bool LiveApp::shot_due(HostTime now) const {
   constexpr Duration kPatience = Duration::from_ms(500);
   if (shot_.empty()) return false;

@@ -110,7 +110,7 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target) {
     case FaultKind::clock_step:
       return {.counters = {"clock_events"}, .extra_s = std::abs(fault.value("ms")) * 1e-3};
     case FaultKind::drift_step:
-      return {};  // the line under the arrivals follows it, so that no time is off: named is what it cannot follow
+      return {};  // the clock's line may follow the new rate unsaid; how far off poses are then is for the law of poses
     case FaultKind::stuck_stream:
       return {.words = {"silent"}, .own_s = kFlockStarts_s};
     case FaultKind::unplug:

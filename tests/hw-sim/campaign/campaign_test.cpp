@@ -61,14 +61,19 @@ TEST(OperationResults, ALineIsReadBackAndAnythingElseRefused) {
   for (const char* const line : {"", "{}", "no JSON", "{\"seed\": \"seven\"}"}) EXPECT_FALSE(result_of(line)) << line;
 }
 
-TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
-  const Scratch scratch;
+/// Operations of half a minute of the seeds from 1 on.
+CampaignSettings short_ones(const Scratch& scratch, std::uint64_t last_seed) {
   CampaignSettings settings;
-  settings.first_seed = 1;
-  settings.last_seed = 3;
+  settings.last_seed = last_seed;
   settings.minutes = 0.5;
   settings.folder = scratch / "campaign";
   settings.program = beside_us("birdseye-sim");
+  return settings;
+}
+
+TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
+  const Scratch scratch;
+  const CampaignSettings settings = short_ones(scratch, 3);
   {
     std::filesystem::create_directories(settings.folder);
     const auto known = OperationResults::open(settings.folder / "operations.sqlite", settings.minutes);
@@ -84,13 +89,8 @@ TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
 
 TEST(Campaign, BeginsNoOperationOnceItsTimeIsOver) {
   const Scratch scratch;
-  CampaignSettings settings;
-  settings.last_seed = 1000;
-  settings.minutes = 0.5;
-  settings.jobs = 1;
+  CampaignSettings settings = short_ones(scratch, 1000);
   settings.at_most_s = 1e-9;
-  settings.folder = scratch / "campaign";
-  settings.program = beside_us("birdseye-sim");
   const auto sum = run_campaign(settings, [](const std::string&) {});
   ASSERT_TRUE(sum) << sum.error().what;
   EXPECT_EQ(sum->minutes, 0);
@@ -98,8 +98,7 @@ TEST(Campaign, BeginsNoOperationOnceItsTimeIsOver) {
 
 TEST(Campaign, AnOperationThatGivesNoResultBreaksALaw) {
   const Scratch scratch;
-  CampaignSettings settings;
-  settings.folder = scratch / "campaign";
+  CampaignSettings settings = short_ones(scratch, 1);
   settings.program = "/bin/true";
   const auto sum = run_campaign(settings, [](const std::string&) {});
   ASSERT_TRUE(sum) << sum.error().what;
