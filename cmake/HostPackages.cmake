@@ -12,6 +12,7 @@ find_package(ZLIB REQUIRED)
 pkg_check_modules(epoxy REQUIRED IMPORTED_TARGET epoxy)
 find_package(glfw3 3.3 REQUIRED)
 pkg_check_modules(xcb REQUIRED IMPORTED_TARGET xcb)
+pkg_check_modules(seccomp REQUIRED IMPORTED_TARGET libseccomp)
 pkg_check_modules(imgui REQUIRED IMPORTED_TARGET imgui)
 find_package(ITK 5.2 REQUIRED COMPONENTS
   ITKCommon ITKIOImageBase ITKIOGDCM ITKIONIFTI ITKIONRRD ITKIOMeta

@@ -46,6 +46,10 @@ bool& is_copy() {
     ::dup2(nowhere, STDOUT_FILENO);
     ::dup2(nowhere, STDERR_FILENO);
   }
+  // Links to an appliance and files that are being written are the parent's alone.
+  const auto own = static_cast<unsigned>(fd);
+  if (own > STDERR_FILENO + 1) ::close_range(STDERR_FILENO + 1, own - 1, 0);
+  ::close_range(own + 1, ~0U, 0);
   // What work throws must not unwind into the copied stack: the objects on it are not ours to end.
   try {
     work([fd](const void* data, std::size_t size) {
@@ -92,6 +96,7 @@ Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& w
 }
 
 ProcessCopy::~ProcessCopy() {
+  fd_ = UniqueFd();  // a copy that waits for room in its pipe ends by that, also where it may not be killed
   kill();
 }
 

@@ -9,8 +9,9 @@
 #include <sstream>
 
 #include "device/wire/clock_discipline.hpp"
+#include "host/confine/confinement.hpp"
+#include "host/confine/isolated.hpp"
 #include "host/render/cpu/kernels.hpp"
-#include "host/volume/isolated.hpp"
 
 namespace birdseye::host {
 
@@ -93,16 +94,31 @@ std::vector<Check> check_clock() {
 }
 
 std::vector<Check> check_decoder() {
+  Check check{kComputer, "decoder of CTs", CheckState::bad, "", ""};
+  struct {
+    int word = 0;
+    Confinement confined;
+  } came;
   static constexpr int kSent = 20'261'125;
-  int received = 0;
-  const auto ran =
-      run_isolated([](const Send& send) { send(&kSent, sizeof kSent); },
-                   [&](const Receive& receive) { (void)receive(&received, sizeof received); }, Duration::from_ms(4000));
-  if (ran && received == kSent)
-    return {{kComputer, "decoder of CTs", CheckState::good, "its process starts and ends", ""}};
-  return {{kComputer, "decoder of CTs", CheckState::bad,
-           fmt::format("its process {}", ran ? "says something else than it was told" : ran.error().what),
-           "close other programs: a process more must fit into memory and into this user's limit (ulimit -u)"}};
+  const auto ran = run_isolated(
+      [](const Send& send) {
+        const decltype(came) sent{kSent, confine_to("/dev/null")};
+        send(&sent, sizeof sent);
+      },
+      [&](const Receive& receive) { (void)receive(&came, sizeof came); }, Duration::from_ms(4000));
+  if (!ran || came.word != kSent) {
+    check.found = fmt::format("its process {}", ran ? "says something else than it was told" : ran.error().what);
+    check.remedy = "close other programs: a process more must fit into memory and into this user's limit (ulimit -u)";
+    return {check};
+  }
+  const auto [system_calls, files] = came.confined;
+  check.state = system_calls && files ? CheckState::good : CheckState::could_be_better;
+  check.found = fmt::format("its process starts and ends; a damaged file can {} there, and {}",
+                            system_calls ? "start nothing and write nothing" : "do what this user can",
+                            files ? "read nothing else" : "read what this user can");
+  if (check.state != CheckState::good)
+    check.remedy = "run a kernel with seccomp filters and Landlock (Debian's has both), or read files you trust only";
+  return {check};
 }
 
 }  // namespace

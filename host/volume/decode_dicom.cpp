@@ -128,6 +128,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   const auto chosen = choose_series(infos, source.series);
   if (!chosen) return chosen.error().with_context(source.path.string());
   const Series& series = scan->series[*chosen];
+  announce(source.path);  // from here on it is no single file that takes its time
   if (auto sound = check_volume(source.path, *scan, series, source.untilt); !sound) return sound.error();
   const auto& slices = series.stack.slices;
   const bool compressed = scan->tree.files[slices.front().file].compressed;
@@ -142,6 +143,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   }
   auto hu = decode_slices(scan->tree.files, slices, compressed ? copies : 1, announce);
   if (!hu) return hu.error();
+  announce(source.path);
   ImageFile image;
   image.size = series.info.size;
   image.spacing_mm = series.info.spacing_mm;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "drivers/system/process_copy.hpp"
+#include "host/confine/confinement.hpp"
 #include "host/dicom/dicom_pixels.hpp"
 #include "host/dicom/refused.hpp"
 
@@ -34,6 +35,7 @@ void send_share(const ProcessCopy::Send& send, const std::vector<DicomFile>& fil
   for (std::size_t i = first; i < slices.size(); i += stride) {
     hu.clear();
     SliceHead head;
+    allow_time_for(files[slices[i].file].path);
     if (const auto read = pixels.append_hu(files[slices[i].file].path, slices[i], hu); !read) {
       head = {static_cast<std::int32_t>(read.error().code), static_cast<std::uint32_t>(read.error().what.size())};
       send(&head, sizeof head);

@@ -1,14 +1,13 @@
 #include "host/volume/decoder_process.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <new>
 #include <optional>
 #include <string>
 
+#include "host/confine/confinement.hpp"
 #include "host/dicom/refused.hpp"
 
 namespace birdseye::host {
@@ -42,19 +41,6 @@ std::optional<Error> receive_text(const Receive& receive) {
   return told;
 }
 
-/// A file may claim any size, and a deflated one grow to it: half of the machine's memory is more than any CT needs.
-void bound_memory() {
-  rlim_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  const long all_pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGESIZE);
-  if (pages == 0 || all_pages <= 0 || page_bytes <= 0) return;
-  const rlim_t most = (pages + static_cast<rlim_t>(all_pages) / 2) * static_cast<rlim_t>(page_bytes);
-  rlimit limit{};
-  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur <= most) return;
-  limit.rlim_cur = most;
-  ::setrlimit(RLIMIT_AS, &limit);
-}
-
 Error not_decoded(const fs::path& reading, const Result<void>& ran) {
   if (!ran && ran.error().code == Errc::timeout) {
     return refused(Errc::timeout, reading,
@@ -71,13 +57,16 @@ Error not_decoded(const fs::path& reading, const Result<void>& ran) {
 Result<void> run_decoder(const fs::path& path, const std::function<Result<SendDecoded>(const Announce&)>& decode,
                          const std::function<bool(const Receive&)>& take, const std::stop_token& stop) {
   const auto work = [&](const Send& send) {
-    bound_memory();
-    const auto decoded =
-        decode([&send](const fs::path& file) { send_text(send, MessageKind::reading, 0, file.string()); });
+    confine_to(path);
+    const auto decoded = decode([&send](const fs::path& file) {
+      send_text(send, MessageKind::reading, 0, file.string());
+      allow_time_for(file);
+    });
     if (!decoded) {
       send_text(send, MessageKind::error, static_cast<std::int32_t>(decoded.error().code), decoded.error().what);
       return;
     }
+    allow_time_for(path);
     const MessageKind kind = MessageKind::decoded;
     send(&kind, sizeof kind);
     (*decoded)(send);

@@ -5,17 +5,18 @@
 #include <stop_token>
 
 #include "calibration/base/result.hpp"
+#include "host/confine/isolated.hpp"
 #include "host/dicom/dicom_tree.hpp"
-#include "host/volume/isolated.hpp"
 
 namespace birdseye::host {
 
 /// Sends what was decoded.
 using SendDecoded = std::function<void(const Send&)>;
 
-/// Runs decode in a process of its own (docs/decisions/0012-isolated-import.md), with a bound on its memory and for no
-/// longer than five minutes, and meanwhile take in this one. decode: gives what sends its outcome, or why there is
-/// none. take: whether all that was sent came. Errors name the path, or the file that decode announced last.
+/// Runs decode in a process of its own (docs/decisions/0012-isolated-import.md) that is confined to the path
+/// (confine_to), and that lasts no longer than five minutes, and meanwhile take in this one. decode: gives what sends
+/// its outcome, or why there is none. take: whether all that was sent came. Errors name the path, or the file that
+/// decode announced last.
 Result<void> run_decoder(const std::filesystem::path& path,
                          const std::function<Result<SendDecoded>(const Announce&)>& decode,
                          const std::function<bool(const Receive&)>& take, const std::stop_token& stop = {});

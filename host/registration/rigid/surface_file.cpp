@@ -9,8 +9,9 @@
 #include <cstring>
 #include <fstream>
 
+#include "host/confine/confinement.hpp"
+#include "host/confine/isolated.hpp"
 #include "host/registration/rigid/surface.hpp"
-#include "host/volume/isolated.hpp"
 
 namespace birdseye::host {
 
@@ -105,6 +106,7 @@ Result<Surface> read_surface(const fs::path& path) {
   Surface surface;
   const auto ran = run_isolated(
       [&path](const Send& send) {
+        confine_to(path);
         const Surface decoded = path.extension() == ".vtk" ? decode_vtk(path) : decode_others(path);
         const auto put = [&send](const auto& values) {
           const std::uint64_t count = values.size();

@@ -1,4 +1,4 @@
-#include "host/volume/isolated.hpp"
+#include "host/confine/isolated.hpp"
 
 namespace birdseye::host {
 
