@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "device/wire/latency_log.hpp"
@@ -25,6 +26,10 @@ class ClientLink {
   explicit ClientLink(std::unique_ptr<Link> link);
 
   [[nodiscard]] Link& link() const { return *link_; }
+  [[nodiscard]] const std::string& host() const { return host_; }
+  /// Whether the client has asked no more than a client needs. Until it may ask again, receive() is not to be called,
+  /// and what the client sends waits with the operating systems.
+  [[nodiscard]] bool may_ask() const { return device_now() >= may_ask_again_; }
   [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
   /// Queues a packet if the client wants its kind. Returns how many older packets were dropped for it.
   std::size_t offer(const Packet& packet);
@@ -55,6 +60,7 @@ class ClientLink {
   void finish(Latencies& latencies);
 
   std::unique_ptr<Link> link_;
+  std::string host_;
   RequestReader reader_;
   Subscription subscription_;
   bool locks_camera_ = false;
@@ -64,6 +70,8 @@ class ClientLink {
   std::optional<Packet> sending_;  ///< begun
   std::size_t sent_ = 0;           ///< bytes of sending_
   DeviceTime progress_, asking_since_;
+  DeviceTime asked_until_;  ///< by when all that was asked would have been, at the rate that is granted
+  DeviceTime may_ask_again_;
 };
 
 }  // namespace birdseye::wire

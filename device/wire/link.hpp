@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "calibration/base/result.hpp"
 #include "drivers/system/clock.hpp"
@@ -22,11 +23,14 @@ class Link {
   virtual bool wait_readable(Deadline deadline) = 0;
   /// Until write_some() would not give 0. False: not by the deadline.
   virtual bool wait_writable(Deadline deadline) = 0;
+  /// The machine at the other end, by its address; empty: this one, without an address.
+  [[nodiscard]] virtual std::string host() const = 0;
 };
 
 /// A link that a listener watches, and what became of it.
 struct LinkWatch {
   Link* link = nullptr;   ///< which this listener has accepted
+  bool to_read = true;    ///< what comes is read
   bool to_write = false;  ///< there is something to write to it
   bool readable = false;  ///< told by wait(): bytes have come, or the other side has gone
   bool broken = false;    ///< told by wait(): nothing can be read or written any more
@@ -36,9 +40,9 @@ struct LinkWatch {
 class Listener {
  public:
   virtual ~Listener() = default;
-  /// Waits until something can be read from or written to one of the links, somebody wants to be accepted, or wake()
-  /// is called; no longer than until the deadline. Whether somebody wants to be accepted.
-  virtual bool wait(std::span<LinkWatch> links, Deadline deadline) = 0;
+  /// Waits until something can be read from or written to one of the links, somebody wants to be accepted (where
+  /// to_accept), or wake() is called; no longer than until the deadline. Whether somebody wants to be accepted.
+  virtual bool wait(std::span<LinkWatch> links, bool to_accept, Deadline deadline) = 0;
   /// Null: whoever wanted to be has gone.
   virtual std::unique_ptr<Link> accept() = 0;
   /// Ends the wait(), or the next one. From any thread.

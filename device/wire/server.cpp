@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <utility>
 
 #include "device/wire/tcp_link.hpp"
@@ -14,7 +15,9 @@ namespace {
 
 constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
-constexpr Duration kLook = Duration::from_ms(200);  // for clients that are stuck
+constexpr Duration kLook = Duration::from_ms(200);        // for clients that are stuck
+constexpr Duration kAcceptsAgain = Duration::from_ms(1);  // so that connections without end leave the thread time
+constexpr Duration kAsksAgain = Duration::from_ms(10);
 
 }  // namespace
 
@@ -60,9 +63,10 @@ Server::Counters Server::take_counters() {
 }
 
 void Server::accept_one() {
+  accepts_again_ = device_now() + kAcceptsAgain;
   auto link = listener_->accept();
   if (!link) return;
-  if (clients_.size() >= kMostClients) {
+  if (!make_room(link->host())) {
     ++clients_shed_;  // before the client can know
     return;
   }
@@ -71,6 +75,19 @@ void Server::accept_one() {
   if (last_calibration_) offer(clients_.back(), *last_calibration_);
   if (last_volume_) offer(clients_.back(), *last_volume_);
   ++clients_count_;
+}
+
+bool Server::make_room(const std::string& host) {
+  if (clients_.size() < kMostClients) return true;
+  std::map<std::string, std::size_t> held;
+  for (const ClientLink& client : clients_) ++held[client.host()];
+  const auto most = std::ranges::max_element(held, {}, [](const auto& of_host) { return of_host.second; });
+  if (most->second < held[host] + 2) return false;
+  // The newest: those before it were there first.
+  const auto newest = std::ranges::find(clients_.rbegin(), clients_.rend(), most->first, &ClientLink::host);
+  put_out(std::prev(newest.base()));
+  ++clients_shed_;
+  return true;
 }
 
 bool Server::distribute() {
@@ -164,8 +181,16 @@ void Server::run(const std::stop_token& stop) {
   std::vector<LinkWatch> watches;
   while (!stop.stop_requested()) {
     watches.clear();
-    for (const ClientLink& client : clients_) watches.push_back({&client.link(), client.wants_to_write()});
-    const bool somebody = listener_->wait(watches, Deadline::after(kLook));
+    bool all_may_ask = true;
+    for (const ClientLink& client : clients_) {
+      const bool may_ask = client.may_ask();
+      all_may_ask = all_may_ask && may_ask;
+      watches.push_back({.link = &client.link(), .to_read = may_ask, .to_write = client.wants_to_write()});
+    }
+    const DeviceTime now = device_now();
+    const bool accepts = now >= accepts_again_;
+    const Duration look = accepts ? (all_may_ask ? kLook : kAsksAgain) : kAcceptsAgain;
+    const bool somebody = listener_->wait(watches, accepts, Deadline::after(look));
     const bool frames = distribute();
     auto watch = watches.begin();
     for (auto client = clients_.begin(); client != clients_.end(); ++watch) {

@@ -19,7 +19,8 @@ bool is_address(const std::string& text);
 
 /// Sends packets to every client that is connected, and answers what they ask (docs/manual/wire.md). A client that does
 /// not keep up loses the oldest packets that wait for it (never parts of one), not the others; one that takes nothing
-/// for ten seconds, or does not speak the protocol, is disconnected.
+/// for ten seconds, or does not speak the protocol, is disconnected; one that asks without end is answered at a bounded
+/// rate.
 class Server {
  public:
   /// port: 0 takes any that is free. For a port in use the error names the port and the setting.
@@ -48,6 +49,9 @@ class Server {
   explicit Server(std::unique_ptr<Listener> listener);
   void run(const std::stop_token& stop);
   void accept_one();
+  /// Whether there is room for one more of this host. Where all places are taken, the host that holds most gives one up
+  /// to a host that then holds no more than it.
+  bool make_room(const std::string& host);
   /// Gives published packets to the clients; returns whether there were frames among them.
   bool distribute();
   void offer(ClientLink& client, const Packet& packet) { messages_shed_ += client.offer(packet); }
@@ -70,6 +74,7 @@ class Server {
   std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
   // A new client gets these at once.
   std::optional<Packet> last_status_, last_calibration_, last_volume_;
+  DeviceTime accepts_again_;
   OwnedThread thread_;
 };
 

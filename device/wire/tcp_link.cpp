@@ -55,6 +55,14 @@ class TcpLink final : public Link {
   }
   bool wait_readable(Deadline deadline) override { return wait_ready(fd_.get(), POLLIN, deadline) != 0; }
   bool wait_writable(Deadline deadline) override { return wait_ready(fd_.get(), POLLOUT, deadline) != 0; }
+  [[nodiscard]] std::string host() const override {
+    sockaddr_in address{};
+    socklen_t size = sizeof address;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    if (::getpeername(fd_.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0 || address.sin_family != AF_INET)
+      return {};
+    return ::inet_ntop(AF_INET, &address.sin_addr, text.data(), text.size()) == nullptr ? "" : text.data();
+  }
 
  private:
   static Error gone() { return {Errc::disconnected, "the other side has gone"}; }
@@ -67,10 +75,10 @@ class TcpListener final : public Listener {
   TcpListener(UniqueFd fd, UniqueFd wake_fd, int port)
       : fd_(std::move(fd)), wake_fd_(std::move(wake_fd)), port_(port) {}
 
-  bool wait(std::span<LinkWatch> links, Deadline deadline) override {
-    entries_.assign({{fd_.get(), POLLIN, 0}, {wake_fd_.get(), POLLIN, 0}});
+  bool wait(std::span<LinkWatch> links, bool to_accept, Deadline deadline) override {
+    entries_.assign({{fd_.get(), static_cast<short>(to_accept ? POLLIN : 0), 0}, {wake_fd_.get(), POLLIN, 0}});
     for (const LinkWatch& watch : links) {
-      const auto events = static_cast<short>(watch.to_write ? POLLIN | POLLOUT : POLLIN);
+      const auto events = static_cast<short>((watch.to_read ? POLLIN : 0) | (watch.to_write ? POLLOUT : 0));
       entries_.push_back({static_cast<const TcpLink*>(watch.link)->fd(), events, 0});
     }
     wait_ready(entries_, deadline);
@@ -80,8 +88,9 @@ class TcpListener final : public Listener {
     }
     for (std::size_t i = 0; i < links.size(); ++i) {
       const short told = entries_[i + 2].revents;
-      links[i].readable = (told & (POLLIN | POLLHUP)) != 0;
-      links[i].broken = (told & (POLLERR | POLLNVAL)) != 0;
+      links[i].readable = links[i].to_read && (told & (POLLIN | POLLHUP)) != 0;
+      const int gone = links[i].to_read ? 0 : POLLHUP;  // else read_some() tells, after the last that came
+      links[i].broken = (told & (POLLERR | POLLNVAL | gone)) != 0;
     }
     return (entries_[0].revents & POLLIN) != 0;
   }

@@ -106,6 +106,7 @@ class LocalLink final : public wire::Link {
     std::unique_lock lock(network_->mutex);
     return network_->changed.wait(lock, deadline, [this] { return writable(); });
   }
+  [[nodiscard]] std::string host() const override { return {}; }
   // With the network's mutex held.
   [[nodiscard]] const OneWay& in() const { return *in_; }
   [[nodiscard]] bool writable() const { return out_->held < network_->settings.holds || out_->ended; }
@@ -119,14 +120,15 @@ class LocalListener final : public wire::Listener {
  public:
   explicit LocalListener(std::shared_ptr<LocalNetwork::State> network) : network_(std::move(network)) {}
 
-  bool wait(std::span<wire::LinkWatch> links, Deadline deadline) override {
+  bool wait(std::span<wire::LinkWatch> links, bool to_accept, Deadline deadline) override {
     std::unique_lock lock(network_->mutex);
+    const auto somebody = [&] { return to_accept && !network_->calling.empty(); };
     const auto ready = [&] {
       const DeviceTime now = device_now();
-      bool any = network_->woken || !network_->calling.empty();
+      bool any = network_->woken || somebody();
       for (wire::LinkWatch& watch : links) {
         const auto& link = *static_cast<const LocalLink*>(watch.link);
-        watch.readable = link.in().readable(now);
+        watch.readable = watch.to_read && link.in().readable(now);
         any = any || watch.readable || (watch.to_write && link.writable());
       }
       return any;
@@ -134,13 +136,13 @@ class LocalListener final : public wire::Listener {
     while (!ready() && !deadline.passed()) {
       Deadline until = deadline;
       for (const wire::LinkWatch& watch : links) {
-        if (const auto due = static_cast<const LocalLink*>(watch.link)->in().next())
+        if (const auto due = static_cast<const LocalLink*>(watch.link)->in().next(); due && watch.to_read)
           until = std::min<Deadline>(until, *due);
       }
       network_->changed.wait(lock, until, ready);
     }
     network_->woken = false;
-    return !network_->calling.empty();
+    return somebody();
   }
   std::unique_ptr<wire::Link> accept() override {
     const std::lock_guard lock(network_->mutex);

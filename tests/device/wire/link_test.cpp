@@ -72,9 +72,10 @@ TEST(Link, ACutConnectionIsDisconnectedAtBothEndsAndAnotherCanBeMade) {
 TEST(Link, OfTcpCarriesWhatItHasTakenAndSaysWhenTheOtherSideHasGone) {
   const auto listener = *listen_tcp("127.0.0.1", 0);
   std::span<LinkWatch> nobody;
-  EXPECT_FALSE(listener->wait(nobody, Deadline::after(kShort)));
+  EXPECT_FALSE(listener->wait(nobody, true, Deadline::after(kShort)));
   auto here = *connect_tcp("127.0.0.1", listener->port(), Deadline::after(kLong));
-  ASSERT_TRUE(listener->wait(nobody, Deadline::after(kLong)));
+  EXPECT_FALSE(listener->wait(nobody, false, Deadline::after(kShort))) << "nobody is to be accepted yet";
+  ASSERT_TRUE(listener->wait(nobody, true, Deadline::after(kLong)));
   auto there = listener->accept();
   ASSERT_TRUE(there);
 
@@ -88,9 +89,9 @@ TEST(Link, OfTcpCarriesWhatItHasTakenAndSaysWhenTheOtherSideHasGone) {
   got.resize(*here->read_some(got));
   EXPECT_EQ(got, (std::vector<std::uint8_t>{1, 2, 3, 4, 5}));
 
-  LinkWatch watch{there.get(), true};
+  LinkWatch watch{.link = there.get(), .to_write = true};
   listener->wake();
-  listener->wait(std::span(&watch, 1), Deadline::after(kLong));
+  listener->wait(std::span(&watch, 1), true, Deadline::after(kLong));
   EXPECT_FALSE(watch.readable || watch.broken);
   here.reset();
   ASSERT_TRUE(there->wait_readable(Deadline::after(kLong)));
