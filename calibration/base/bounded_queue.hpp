@@ -18,11 +18,13 @@ enum class WhenFull {
 struct QueueLane {
   std::size_t capacity = 0;
   WhenFull when_full = WhenFull::drop_oldest;
+  std::size_t bytes = SIZE_MAX;  ///< that its values may have together
 };
 
 /// What waits, first in, first out. It waits in lanes, each with its own bound, so that much of one kind never pushes
 /// out what there is of another; it is taken in the order in which it came, whatever its lane. Nothing is lost
-/// uncounted. For one thread; drivers/system/blocking_queue.hpp is for several.
+/// uncounted. A lane's bound is in values, and in bytes where values differ in size. For one thread;
+/// drivers/system/blocking_queue.hpp is for several.
 template <typename T, std::size_t kLanes>
 class BoundedQueue {
  public:
@@ -30,25 +32,30 @@ class BoundedQueue {
 
   explicit BoundedQueue(const Lanes& lanes) : lanes_(lanes) {}
 
-  /// False: the lane was full, and one was lost, as its rule says.
-  bool push(std::size_t lane, T value) {
-    const bool room = waiting_[lane].size() < lanes_[lane].capacity;
-    if (!room) ++dropped_[lane];
-    if (!room && lanes_[lane].when_full == WhenFull::refuse) return false;
-    waiting_[lane].push_back({turns_++, std::move(value)});
-    if (!room) waiting_[lane].pop_front();
+  /// bytes: of the value. False: the lane was full, and one was lost, or as many as leave room, as its rule says.
+  bool push(std::size_t lane, T value, std::size_t bytes = 0) {
+    const bool room = has_room(lane, waiting_[lane].size() + 1, bytes);
+    if (!room && lanes_[lane].when_full == WhenFull::refuse) {
+      ++dropped_[lane];
+      return false;
+    }
+    waiting_[lane].push_back({turns_++, bytes, std::move(value)});
+    held_[lane] += bytes;
+    while (!has_room(lane, waiting_[lane].size(), 0)) {
+      (void)take(lane);
+      ++dropped_[lane];
+    }
     return room;
   }
   /// The oldest of all; nothing where none waits.
   std::optional<T> pop() {
-    std::deque<Waiting>* oldest = nullptr;
-    for (auto& lane : waiting_) {
-      if (!lane.empty() && (oldest == nullptr || lane.front().turn < oldest->front().turn)) oldest = &lane;
+    std::optional<std::size_t> oldest;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto& of_lane = waiting_[lane];
+      if (!of_lane.empty() && (!oldest || of_lane.front().turn < waiting_[*oldest].front().turn)) oldest = lane;
     }
-    if (oldest == nullptr) return std::nullopt;
-    std::optional<T> value = std::move(oldest->front().value);
-    oldest->pop_front();
-    return value;
+    if (!oldest) return std::nullopt;
+    return take(*oldest);
   }
   [[nodiscard]] bool empty() const {
     for (const auto& lane : waiting_) {
@@ -62,11 +69,25 @@ class BoundedQueue {
  private:
   struct Waiting {
     std::uint64_t turn;
+    std::size_t bytes;
     T value;
   };
 
+  [[nodiscard]] bool has_room(std::size_t lane, std::size_t values, std::size_t more_bytes) const {
+    const QueueLane& bound = lanes_[lane];
+    return values <= bound.capacity && held_[lane] <= bound.bytes && more_bytes <= bound.bytes - held_[lane];
+  }
+  T take(std::size_t lane) {
+    Waiting& first = waiting_[lane].front();
+    T value = std::move(first.value);
+    held_[lane] -= first.bytes;
+    waiting_[lane].pop_front();
+    return value;
+  }
+
   Lanes lanes_;
   std::array<std::deque<Waiting>, kLanes> waiting_;
+  std::array<std::size_t, kLanes> held_{};  ///< bytes
   std::array<std::uint64_t, kLanes> dropped_{};
   std::uint64_t turns_ = 0;
 };

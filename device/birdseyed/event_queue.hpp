@@ -15,8 +15,8 @@ namespace birdseye::device {
 /// minutes. What becomes of instruments comes seldom, and has a bound of its own. What is dropped is counted.
 class EventQueue {
  public:
-  static constexpr std::size_t kMostFrames = 8;  // 50 MB of 1080p
-  static constexpr std::size_t kMostEvents = 16384;
+  static constexpr std::size_t kMostFrames = 8, kMostFrameBytes = 96U << 20U;  // 50 MB of 1080p
+  static constexpr std::size_t kMostEvents = 16384, kMostEventBytes = 16U << 20U;
 
   void push(RawEvent event);
   /// The oldest event; empty at the deadline, or once stop is requested.
@@ -27,8 +27,9 @@ class EventQueue {
  private:
   enum Lane : std::size_t { kFrames, kOthers, kChanges, kLanes };
 
-  BlockingQueue<RawEvent, kLanes> events_{
-      {{{kMostFrames, WhenFull::drop_oldest}, {kMostEvents, WhenFull::refuse}, {kMostEvents, WhenFull::drop_oldest}}}};
+  BlockingQueue<RawEvent, kLanes> events_{{{{kMostFrames, WhenFull::drop_oldest, kMostFrameBytes},
+                                            {kMostEvents, WhenFull::refuse, kMostEventBytes},
+                                            {kMostEvents, WhenFull::drop_oldest, kMostEventBytes}}}};
   std::atomic<bool> tracker_bytes_dropped_ = false;
 };
 

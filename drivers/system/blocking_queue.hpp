@@ -21,11 +21,11 @@ class BlockingQueue {
   explicit BlockingQueue(const Lanes& lanes) : queue_(lanes) {}
 
   /// As BoundedQueue::push().
-  bool push(std::size_t lane, T value) {
+  bool push(std::size_t lane, T value, std::size_t bytes = 0) {
     bool room = false;
     {
       const std::lock_guard lock(mutex_);
-      room = queue_.push(lane, std::move(value));
+      room = queue_.push(lane, std::move(value), bytes);
     }
     changed_.notify_one();
     return room;

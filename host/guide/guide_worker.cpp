@@ -6,6 +6,7 @@
 
 #include "drivers/system/blocking_queue.hpp"
 #include "host/link/drops.hpp"
+#include "host/link/event_bytes.hpp"
 #include "host/texts/texts.hpp"
 
 namespace birdseye::host {
@@ -13,14 +14,15 @@ namespace birdseye::host {
 namespace {
 
 constexpr std::size_t kMostLines = 40, kMostFrames = 50, kMostPoses = 2000;
+constexpr std::size_t kMostFrameBytes = 320U << 20U, kMostPoseBytes = 16U << 20U;  // of 1080p, fifty frames
 
 }  // namespace
 
 class GuideWorker::Session {
  public:
   void push(const wire::Event& event) {
-    if (std::holds_alternative<wire::VideoFrame>(event)) events_.push(kFrames, event);
-    if (std::holds_alternative<wire::Birds>(event)) events_.push(kPoses, event);
+    if (std::holds_alternative<wire::VideoFrame>(event)) events_.push(kFrames, event, bytes_of(event));
+    if (std::holds_alternative<wire::Birds>(event)) events_.push(kPoses, event, bytes_of(event));
   }
   void end(const std::string& why) {
     {
@@ -80,7 +82,8 @@ class GuideWorker::Session {
     if (lines_.size() > kMostLines) lines_.pop_front();
   }
 
-  BlockingQueue<wire::Event, kLanes> events_{{{{kMostFrames, WhenFull::drop_oldest}, {kMostPoses, WhenFull::refuse}}}};
+  BlockingQueue<wire::Event, kLanes> events_{
+      {{{kMostFrames, WhenFull::drop_oldest, kMostFrameBytes}, {kMostPoses, WhenFull::refuse, kMostPoseBytes}}}};
   mutable std::mutex mutex_;  // of what follows
   std::string end_;
   GuideState state_;

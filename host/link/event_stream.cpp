@@ -3,17 +3,19 @@
 #include <utility>
 
 #include "device/wire/clock_discipline.hpp"
+#include "host/link/event_bytes.hpp"
 
 namespace birdseye::host {
 
 namespace {
 constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
-}
+}  // namespace
 
 EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
     : client_(std::move(client)),
-      events_(
-          {{{most_frames, WhenFull::drop_oldest}, {kMostOthers, WhenFull::refuse}, {kMostOthers, WhenFull::refuse}}}) {
+      events_({{{most_frames, WhenFull::drop_oldest, kMostFrameBytes},
+                {kMostOthers, WhenFull::refuse, kMostOtherBytes},
+                {kMostOthers, WhenFull::refuse, kMostOtherBytes}}}) {
   thread_ = OwnedThread([this](const std::stop_token& stop) { read(stop); });
 }
 
@@ -38,7 +40,8 @@ void EventStream::read(const std::stop_token& stop) {
     }
     if (*event) {
       const Lane lane = lane_of(**event);
-      events_.push(lane, **std::move(event));
+      const std::size_t bytes = bytes_of(**event);
+      events_.push(lane, **std::move(event), bytes);
     }
   }
 }

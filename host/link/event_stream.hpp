@@ -48,7 +48,8 @@ class EventStream : public EventSource {
   [[nodiscard]] std::optional<ClockGap> gap_at(const wire::Event& event) const;
 
   /// Other events than frames are small and come a hundred times a second: this bound holds a minute of them.
-  static constexpr std::size_t kMostOthers = 8192;
+  static constexpr std::size_t kMostOthers = 8192, kMostOtherBytes = 64U << 20U;
+  static constexpr std::size_t kMostFrameBytes = 768U << 20U;  ///< two seconds of 1080p at 60 Hz
 
   std::unique_ptr<wire::Client> client_;
   BlockingQueue<wire::Event, kLanes> events_;

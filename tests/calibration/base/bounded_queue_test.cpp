@@ -49,6 +49,23 @@ TEST(BoundedQueue, WithoutRoomLosesAllAndCountsAll) {
   EXPECT_EQ(queue.dropped(0) + queue.dropped(1), 2U);
 }
 
+TEST(BoundedQueue, ALargeValuePushesOutAsManyAsItTakesAndIsRefusedWhereItFitsNowhere) {
+  BoundedQueue<int, 2> queue({{{10, WhenFull::drop_oldest, 100}, {10, WhenFull::refuse, 100}}});
+  for (const int value : {1, 2, 3}) {
+    EXPECT_TRUE(queue.push(0, value, 30));
+    EXPECT_TRUE(queue.push(1, -value, 30));
+  }
+  EXPECT_FALSE(queue.push(0, 4, 70));
+  EXPECT_FALSE(queue.push(1, -4, 70));
+  EXPECT_TRUE(queue.push(1, -5, 10));
+  EXPECT_EQ(queue.dropped(0), 2U);
+  EXPECT_THAT(drain(queue), ElementsAre(-1, -2, 3, -3, 4, -5));
+  EXPECT_FALSE(queue.push(0, 6, 101));
+  EXPECT_FALSE(queue.push(1, -6, SIZE_MAX));
+  EXPECT_TRUE(queue.empty());
+  EXPECT_TRUE(queue.push(0, 7, 100)) << "what was taken or dropped holds nothing";
+}
+
 TEST(BoundedQueue, WhatIsPushedIsTakenWaitsOrIsCounted) {
   std::mt19937 random(7);
   BoundedQueue<int, 2> queue({{{5, WhenFull::drop_oldest}, {3, WhenFull::refuse}}});
