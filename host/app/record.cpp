@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "calibration/base/verdict.hpp"
@@ -46,10 +47,11 @@ struct Ending {
 /// Until there is a reason to end.
 Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions& options, Progress& progress) {
   HostTime heard = host_now();
+  std::optional<HostTime> began;  // by this machine's clock, whatever the server's stamps say
   int told_s = -1;
   while (!interrupted()) {
     const RecordingFigures& figures = writer.figures();
-    if (options.seconds > 0 && figures.seconds() >= options.seconds)
+    if (options.seconds > 0 && began && (host_now() - *began).seconds() >= options.seconds)
       return {fmt::format("{:g} s are over", options.seconds), true};
     auto event = stream.next(Deadline::after(Duration::from_ms(200)));
     if (!event) return {event.error().what};
@@ -60,7 +62,10 @@ Ending record(EventStream& stream, RecordingWriter& writer, const RecordOptions&
       continue;
     }
     const bool frame = std::holds_alternative<wire::VideoFrame>(**event);
-    if (frame || std::holds_alternative<wire::Birds>(**event)) heard = host_now();
+    if (frame || std::holds_alternative<wire::Birds>(**event)) {
+      heard = host_now();
+      if (!began) began = heard;
+    }
     std::error_code unknown;
     if (frame && fs::space(options.out, unknown).available < kSpareBytes && !unknown)
       return {fmt::format("{}: the disk is full; free some, or choose another --out", options.out.string())};

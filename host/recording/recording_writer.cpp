@@ -21,6 +21,7 @@ namespace fs = std::filesystem;
 constexpr double kUsualRateHz = 25;
 /// More than any tracker has: names are what somebody sends.
 constexpr std::size_t kMostBirds = 64;
+constexpr std::size_t kMostVideos = 20;  // a file each
 
 }  // namespace
 
@@ -149,6 +150,11 @@ std::string RecordingWriter::next_video() const {
 }
 
 Result<void> RecordingWriter::begin_video(const wire::VideoFrame& frame, double rate_hz) {
+  if (figures_.videos.size() >= kMostVideos) {
+    return Error{
+        Errc::unsupported,
+        fmt::format("the frames have had {} sizes, one after another: set the camera to one", kMostVideos + 1)};
+  }
   RecordedVideo video;
   video.name = next_video();
   video.width_px = frame.width_px;

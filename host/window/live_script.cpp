@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
 #include <sstream>
 
@@ -17,6 +19,13 @@ std::optional<LiveStep> step_of(const std::string& name) {
 }
 
 constexpr const char* kOverlay = "overlay";
+
+/// Whether LiveWindow::keys() may say it.
+bool is_key(const std::string& name) {
+  constexpr std::array kNamed{"space", "enter", "backspace", "escape", "pageup", "pagedown", "+", "-", "?"};
+  if (std::ranges::find(kNamed, name) != kNamed.end()) return true;
+  return name.size() == 1 && ((name[0] >= 'a' && name[0] <= 'z') || (name[0] >= '0' && name[0] <= '9'));
+}
 
 /// Whether what a line waits for has come.
 bool came(const OperationView& operation, const std::string& awaited) {
@@ -49,8 +58,15 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
     if (line.verb == "look")
       sound = static_cast<bool>(words >> line.place_mm.x() >> line.place_mm.y() >> line.place_mm.z());
     if (line.verb == "end") sound = true;
-    sound = sound && line.seconds >= 0 && line.every_s >= 0 &&
+    std::string more;
+    sound = sound && !(words >> more) && line.seconds >= 0 && line.every_s >= 0 &&
             (line.step.empty() || line.step == kOverlay || step_of(line.step));
+    if (sound && (line.verb == "key" || line.verb == "press") && !is_key(line.what)) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}:{}: there is no key {}: give space, enter, backspace, escape, pageup, pagedown, a "
+                               "letter, a digit, +, - or ?",
+                               path.string(), number, line.what)};
+    }
     if (!sound) {
       return Error{Errc::bad_format, fmt::format("{}:{}: is no \"wait STEP SECONDS\" (or \"wait overlay SECONDS\"), "
                                                  "\"press NAME SECONDS STEP SECONDS\", \"sleep "

@@ -17,7 +17,7 @@ namespace birdseye::host {
 ///   wait overlay SECONDS              until a frame bears an overlay with the target in view; fails after so long
 ///   press NAME SECONDS STEP SECONDS   that key every so often until that step is done; fails after so long
 ///   sleep SECONDS
-///   key NAME                          as draw_panels' keys: space, enter, backspace, a letter
+///   key NAME                          as LiveWindow's keys: space, enter, backspace, a letter
 ///   look X Y Z                        the slices' cross-hair at that place of the CT, patient frame, mm
 ///   shot FILE                         the window as a PNG
 ///   end

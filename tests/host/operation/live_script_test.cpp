@@ -65,7 +65,8 @@ TEST(LiveScript, WaitsForAnOverlay) {
 TEST(LiveScript, NamesALineThatIsNone) {
   const Scratch scratch;
   for (const char* text :
-       {"wait connect\n", "wait nothing 3\n", "jump 3\n", "key\n", "sleep -1\n", "press space 1 views\n"}) {
+       {"wait connect\n", "wait nothing 3\n", "jump 3\n", "key\n", "sleep -1\n", "press space 1 views\n", "key spcae\n",
+        "press nothing 1 views 3\n", "key space space\n", "end 3\n"}) {
     const auto script = LiveScript::read(scratch.file("s.txt", std::string("end\n") + text));
     ASSERT_FALSE(script) << text;
     EXPECT_NE(script.error().what.find("s.txt:2: "), std::string::npos) << script.error().what;

@@ -229,6 +229,21 @@ TEST(Recording, AnotherSizeBeginsAnotherFile) {
   EXPECT_EQ(said(played.events.back()), said(events.back()));
 }
 
+TEST(Recording, EndsWhereFramesHaveAnotherSizeAgainAndAgain) {
+  for (const bool compressed : {false, true}) {
+    const Scratch scratch;
+    const RecordingSettings settings{.folder = scratch / "r", .source = "test", .compressed = compressed};
+    auto writer = RecordingWriter::create(settings);
+    ASSERT_TRUE(writer) << writer.error().what;
+    int n = 0;
+    Result<void> added;
+    for (; n < 100 && added; ++n) added = (*writer)->add(frame(n, n % 2 == 0 ? 16 : 32, 12));
+    ASSERT_FALSE(added);
+    EXPECT_NE(added.error().what.find("21 sizes, one after another"), std::string::npos) << added.error().what;
+    EXPECT_EQ((*writer)->figures().videos.size(), 20U);
+  }
+}
+
 TEST(Recording, OneThatWasCutPlaysWhatIsWhole) {
   const Scratch scratch;
   {
