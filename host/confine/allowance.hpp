@@ -15,16 +15,17 @@ struct Allowance {
 };
 
 /// Of files of so many bytes in all: memory for three times what Deflate can make of them at most, and processor time
-/// for the slowest decoder, JPEG 2000's.
+/// to unpack that, and for the slowest decoder, JPEG 2000's.
 Allowance allowance_of(std::uintmax_t bytes);
 
 /// What a decoder that is given a path may read.
 struct Readable {
   std::vector<std::filesystem::path> paths;  ///< folders with all that is in them, and files
-  std::uintmax_t bytes = 0;                  ///< of all files of a folder; else of the one file
+  std::uintmax_t bytes = 0;                  ///< of all files that count as the input
 };
 
-/// Of a folder: itself and what its links lead to. Of a file: its own folder, since headers name files beside them.
+/// Of a folder: itself and what its links lead to. Of a file: its own folder, since headers name files beside them; of
+/// a header (.mhd, .nhdr, .hdr, .img) what the folder's links lead to besides, and the folder's files count.
 Readable readable_for(const std::filesystem::path& input);
 
 }  // namespace birdseye::host

@@ -21,11 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Lowers this process's own limit to `most`; one that is lower already stays.
+/// Lowers this process's own limit to `most` for good; one that is lower already stays.
 void lower_limit(__rlimit_resource of, rlim_t most) {
   rlimit limit{};
   if (::getrlimit(of, &limit) != 0 || limit.rlim_cur <= most) return;
-  limit.rlim_cur = most;
+  limit.rlim_cur = limit.rlim_max = most;
   ::setrlimit(of, &limit);
 }
 

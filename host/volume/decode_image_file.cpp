@@ -204,7 +204,9 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
     if (image.hu.size() + image.values.size() != count) return cut;
     return image;
   } catch (const std::bad_alloc&) {
-    return refused(Errc::io, path, "needs more memory than there is; close other programs, or resample it");
+    return refused(
+        Errc::io, path,
+        "needs more memory than there is, or than a file of its size can need; close other programs, or resample it");
   } catch (const std::exception&) {
     return cut;
   }

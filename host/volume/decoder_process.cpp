@@ -48,7 +48,7 @@ Error not_decoded(const fs::path& reading, const Result<void>& ran) {
                                ran.error().what, kLongestSilence.seconds()));
   }
   return refused(Errc::bad_format, reading,
-                 fmt::format("is cut short, damaged, or too large to decode{}; copy it again",
+                 fmt::format("is cut short, damaged, or too large to decode{}; copy it again, or save it uncompressed",
                              ran ? "" : fmt::format(" (its decoder {})", ran.error().what)));
 }
 

@@ -53,6 +53,13 @@ Result<Volume> slab_behind(const Surface& surface, const SlabSettings& settings)
                                               "smaller --spacing-mm",
                                               across_mm)};
   }
+  constexpr double kMostBody_mm = 3000;
+  if (const double across_mm = (surface_box.high - surface_box.low).maxCoeff(); !(across_mm <= kMostBody_mm)) {
+    return Error{Errc::bad_value,
+                 fmt::format("the surface is {:.3g} mm across, and no body is over {:g} mm; give it in "
+                             "mm, without points that lie apart",
+                             across_mm, kMostBody_mm)};
+  }
   std::size_t met = 0;
   for (const auto& t : surface.triangles) {
     const Eigen::Vector3d centre =
