@@ -23,6 +23,9 @@ Result<GLFWwindow*> open_glfw_window(const std::string& title, int width_px, int
   glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, GLFW_TRUE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_STENCIL_BITS, 0);
+  // By these a desktop knows the window as that of packaging/birdseye.desktop, and shows its icon.
+  glfwWindowHintString(GLFW_X11_CLASS_NAME, "birdseye");
+  glfwWindowHintString(GLFW_X11_INSTANCE_NAME, "birdseye");
   // GLX before EGL: a driver in software shares its picture with the X server by GLX, and sends it through a socket by
   // EGL.
   GLFWwindow* window = nullptr;

@@ -1,22 +1,24 @@
 #!/bin/sh
-# package_test.sh SOURCE_DIR BUILD_DIR [EMULATOR...]: the Debian package holds what it should and its parts are sound.
+# package_test.sh SOURCE_DIR BUILD_DIR [EMULATOR...]: the appliance's Debian package holds what it should and its parts are
+# sound. All packages are made here, for the other tests of packages too, and packed quickly rather than small.
 set -eu
 source=$1 build=$2
 shift 2
 
 fail() { echo "package_test: $*" >&2; exit 1; }
 
-(cd "$build" && rm -rf package && cpack -B package >cpack.log 2>&1) || { cat "$build/cpack.log" >&2; fail "cpack failed"; }
+(cd "$build" && rm -rf package && cpack -B package -D CPACK_DEBIAN_COMPRESSION_TYPE=gzip >cpack.log 2>&1) || { cat "$build/cpack.log" >&2; fail "cpack failed"; }
 set -- "$@" "$build/bin/birdseyed"  # from here on "$@" runs the program
 deb=$(ls "$build"/package/birdseyed_*.deb)
 
 contents=$(dpkg-deb -c "$deb")
 for path in ./usr/bin/birdseyed ./etc/birdseye/birdseyed.toml ./usr/lib/systemd/system/birdseyed.service \
-  ./usr/lib/sysusers.d/birdseyed.conf ./usr/lib/udev/rules.d/60-birdseye.rules ./usr/share/doc/birdseyed/copyright; do
+  ./usr/lib/sysusers.d/birdseyed.conf ./usr/lib/udev/rules.d/60-birdseye.rules ./usr/share/doc/birdseyed/copyright ./usr/share/doc/birdseyed/changelog.gz \
+  ./usr/share/man/man8/birdseyed.8.gz ./usr/share/bash-completion/completions/birdseyed; do
   echo "$contents" | grep -q "root/root .* $path\$" || fail "no $path in it, or not root's: $contents"
 done
 echo "$contents" | grep -q '^-rwxr-xr-x .*/usr/bin/birdseyed$' || fail "birdseyed is not to be run by everybody"
-[ "$(echo "$contents" | grep -v /usr/share/doc/ | grep -c -v '/$')" -le 8 ] || fail "more in it than the appliance: $contents"
+[ "$(echo "$contents" | grep -v /usr/share/doc/ | grep -c -v '/$')" -le 10 ] || fail "more in it than the appliance: $contents"
 
 # Every link of the manual that comes with it leads somewhere, and so does the unit's.
 files=$build/package/files
