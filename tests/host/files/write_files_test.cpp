@@ -7,6 +7,7 @@
 #include "calibration/record/sha256.hpp"
 #include "host/files/files_sha256.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/synced_files.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -27,6 +28,15 @@ TEST(WriteFiles, WhatAnInterruptedWriteLeftIsWrittenOver) {
   ASSERT_TRUE(write_file(path, "new"));
   EXPECT_EQ(birdseye::testing::contents_of(path), "new");
   EXPECT_FALSE(std::filesystem::exists(part));
+}
+
+TEST(WriteFiles, IsOnTheDiskByItsName) {
+  const birdseye::testing::Scratch scratch;
+  const std::string path = scratch.file("result.json", "former");
+  birdseye::testing::forget_synced();
+  ASSERT_TRUE(write_file(path, "new"));
+  EXPECT_TRUE(birdseye::testing::is_synced(path)) << "a power cut leaves the name without the text";
+  EXPECT_TRUE(birdseye::testing::is_synced(scratch.path())) << "or the former text by that name";
 }
 
 TEST(WriteFiles, WhereOneCannotBeWrittenNoneIsReplaced) {
