@@ -74,6 +74,21 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   EXPECT_FALSE(workflow.view().note(LiveStep::deform).done);
 }
 
+TEST(LiveWorkflow, WhatIsKeptDoesNotNameThePatient) {
+  const Scratch scratch;
+  const LiveSettings settings = operation_settings(scratch);
+  const std::string id = read_patient(settings.patient)->identity.id;
+  ASSERT_EQ(id, "SIM1");
+  std::filesystem::create_directory(scratch / "kept");
+  register_into(scratch / "kept", settings);
+  ASSERT_TRUE(read_operation(scratch / "kept")->registered);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(scratch / "kept")) {
+    if (entry.is_regular_file()) {
+      EXPECT_EQ(birdseye::testing::contents_of(entry.path()).find(id), std::string::npos) << entry.path();
+    }
+  }
+}
+
 TEST(LiveWorkflow, ACtWhoseGeometryIsStatedOtherwiseIsNotTakenUp) {
   const Scratch scratch;
   LiveSettings settings = operation_settings(scratch);

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <igtlClientSocket.h>
 
 #include <thread>
 
@@ -162,6 +163,19 @@ TEST(Publisher, AClientThatDoesNotReadHoldsUpNobody) {
   EXPECT_EQ(slow.volume->size, plan()->ct.size);
   EXPECT_LE(slow.counts["TRANSFORM"], 300);
   EXPECT_GT(slow.counts["TRANSFORM"], 0);
+}
+
+/// 127.0.0.2 is this machine too: there answers who listens on all addresses, and nobody who listens on 127.0.0.1.
+TEST(Publisher, ListensToThisMachineAloneUnlessToldOtherwise) {
+  const auto answers = [](const Publisher& publisher) {
+    const auto socket = igtl::ClientSocket::New();
+    const bool connected = socket->ConnectToServer("127.0.0.2", publisher.port()) == 0;
+    socket->CloseSocket();
+    return connected;
+  };
+  const auto alone = *Publisher::listen("0"), told = *Publisher::listen("0.0.0.0:0");
+  EXPECT_FALSE(answers(*alone));
+  EXPECT_TRUE(answers(*told));
 }
 
 TEST(Publisher, SaysWhyItCannotListen) {
