@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -16,10 +18,36 @@ constexpr int kSilentPeriods = 8;                            // frames that do n
 constexpr Duration kSilentAtLeast = Duration::from_ms(300);  // a busy machine is no silent camera
 constexpr int kRestarts = 2;  // of a stream that is silent, before the camera is closed and opened again
 
-Duration silence_of(const drivers::FrameSource& camera, const drivers::CameraSettings& settings) {
-  const double rate_hz = camera.rate_hz() > 0 ? camera.rate_hz() : settings.rate_hz;
-  return std::max(Duration::from_seconds(kSilentPeriods / rate_hz), kSilentAtLeast);
+double rate_of(const drivers::FrameSource& camera, const drivers::CameraSettings& settings) {
+  return camera.rate_hz() > 0 ? camera.rate_hz() : settings.rate_hz;
 }
+
+Duration silence_of(const drivers::FrameSource& camera, const drivers::CameraSettings& settings) {
+  return std::max(Duration::from_seconds(kSilentPeriods / rate_of(camera, settings)), kSilentAtLeast);
+}
+
+/// Reads up to four times as many frames as were agreed, and some at once after a halt. A program that feeds a socket
+/// may send thousands a second, and then waits: their copies would leave the tracker no time.
+class Pace {
+ public:
+  explicit Pace(double rate_hz) : gap_(Duration::from_seconds(1 / (kTimes * rate_hz))) {}
+
+  void wait(const std::stop_token& stop) {
+    const DeviceTime now = device_now();
+    if (next_ > now) sleep_for(next_ - now, stop);
+  }
+  void frame_came() {
+    const Duration at_once{kAtOnce * gap_.ns};
+    next_ = std::max(next_, device_now() - at_once) + gap_;
+  }
+
+ private:
+  static constexpr double kTimes = 4;
+  static constexpr std::int64_t kAtOnce = 8;
+
+  Duration gap_;
+  DeviceTime next_;
+};
 
 /// Until the camera is lost; why.
 Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settings, InstrumentPost& post,
@@ -33,6 +61,7 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
                .identity = camera.identity()});
   };
   const Duration silence = silence_of(camera, settings);
+  Pace pace(rate_of(camera, settings));
   DeviceTime heard = device_now();
   std::optional<std::uint64_t> newest;
   int restarts = 0;
@@ -44,10 +73,12 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
       lock.tell(locked, locked ? camera.lock_controls() : camera.unlock_controls());
       if (known) running();  // its exposure is known now, or no longer
     }
+    pace.wait(stop);
     auto frame = camera.next(device_now() + kPatience);
     if (!frame) return frame.error();
     const bool came = frame->has_value();
     if (came) {
+      pace.frame_came();
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       // One frame over and over is no stream.
       if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = device_now();

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstring>
+#include <optional>
 #include <thread>
 
 #include "device/birdseyed/event_queue.hpp"
@@ -33,11 +34,14 @@ class Program {
         pollfd entry{listener_.get(), POLLIN, 0};
         if (::poll(&entry, 1, 20) <= 0) continue;
         const UniqueFd client(::accept(listener_.get(), nullptr, nullptr));
-        while (!stop.stop_requested() && send(client.get())) sleep_for(Duration::from_ms(10));
+        while (!stop.stop_requested() && send(client.get())) {
+          if (!floods) sleep_for(Duration::from_ms(10));
+        }
       }
     });
   }
   std::atomic<bool> sticks = false;  ///< the same frame over and over
+  std::atomic<bool> floods = false;  ///< as fast as the socket takes them
 
  private:
   bool send(int client) {
@@ -109,6 +113,24 @@ TEST_F(ACamera, ThatRepeatsAFrameIsSilent) {
   EXPECT_NE(text.find("sends no new frames"), std::string::npos) << text;
   program_.sticks = false;
   next(InstrumentState::running);
+}
+
+TEST_F(ACamera, ThatSendsAsFastAsItCanIsReadAtFourTimesItsRate) {
+  program_.floods = true;
+  next(InstrumentState::running);
+  constexpr int kFrames = 100, kAtOnce = 9;
+  std::optional<DeviceTime> first, last;
+  for (int came = 0; came < kFrames;) {
+    const auto event = queue_.pop(device_now() + Duration::from_ms(20'000), {});
+    ASSERT_TRUE(event);
+    const auto* const frame = std::get_if<FrameCame>(&*event);
+    if (frame == nullptr) continue;
+    ++came;
+    if (!first) first = frame->frame.arrived;
+    last = frame->frame.arrived;
+  }
+  // What the queue dropped came in between, and only makes it longer.
+  EXPECT_GE((*last - *first).seconds(), (kFrames - 1 - kAtOnce) / 400.0);
 }
 
 TEST_F(ACamera, IsHeldOnceAndLetGoOnceAsIsWanted) {
