@@ -5,7 +5,7 @@ PAGE = "docs/manual/trace.md"
 
 INTRODUCTION = """# Requirements, and the tests that hold them
 
-What must not happen, what holds it back, and which tests hold that. Each row is a file in [docs/requirements](../requirements); `./run trace`
+What must not happen, what holds it back, and which tests hold that. Each row is a file in `docs/requirements`; `./run trace`
 writes this page from them. `./run test` fails where a requirement has neither a control nor a place among the open ones, where a control has
 no test, where a test that is cited is not there or does not run, and where this page is out of date.
 
@@ -17,7 +17,7 @@ How to read it:
   life), catastrophic (death). Developers chose it, no clinician has. How probable a harm is stands nowhere here: nobody has measured it. Whoever
   puts this into a medical device judges both in a risk file of their own, for which these rows are a beginning.
 - **Control** is what the product does about it; after *it leaves* stands what that does not see.
-- **Held by**: a name as `Suite.Name` is a GoogleTest, linked to its file. *lies*, *faults* and *inputs* are rows of [lies](lies.md),
+- **Held by**: a name as `Suite.Name` is a GoogleTest. *lies*, *faults* and *inputs* are rows of [lies](lies.md),
   [faults](faults.md) and [inputs](inputs.md), each written and held by a test. `./run test` runs them, but for those with a star:
   `./run faults` and `./run vm-test` run these.
 
@@ -42,10 +42,10 @@ def plain(text):
 
 def cited(name, evidence):
     star = "\\*" if name in evidence.apart else ""
-    place = os.path.relpath(evidence.places[name], os.path.dirname(PAGE))
     kind, colon, row = name.partition(": ")
     if not colon:
-        return f"[{name}]({place}){star}"
+        return f"`{name}`{star}"  # no link: the manual is installed without the tests
+    place = os.path.relpath(evidence.places[name], os.path.dirname(PAGE))
     return f"[{kind}]({place}): {plain(row)}{star}"
 
 
