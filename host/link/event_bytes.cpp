@@ -35,7 +35,7 @@ std::size_t texts_of(const wire::Health& health) {
 std::size_t texts_of(const wire::CameraControls& controls) {
   std::size_t bytes = 0;
   for (const auto* lines : {&controls.done, &controls.refused}) {
-    for (const std::string& line : *lines) bytes += sizeof line + line.size();
+    for (const std::string& line : *lines) bytes += sizeof(std::string) + line.size();
   }
   return bytes;
 }
