@@ -215,6 +215,7 @@ TEST(Client, HoldsTheCamerasControlsForAsLongAsItIsThere) {
   };
   auto one = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
   auto other = *Client::connect("127.0.0.1", server->port(), Deadline::after(Duration::from_ms(5000)));
+  while (server->clients() < 2) sleep_for(Duration::from_ms(2));
   EXPECT_FALSE(server->camera_locked());
   ASSERT_TRUE(one->lock_camera(true, Deadline::after(Duration::from_ms(1000))));
   ASSERT_TRUE(other->lock_camera(true, Deadline::after(Duration::from_ms(1000))));
