@@ -82,6 +82,21 @@ TEST(ExportCommand, ALandmarkLandsWhereTheRegistrationHasIt) {
   EXPECT_LT(((*in_patient)[0] - rest_mm).norm(), 1e-3);
 }
 
+TEST(ExportCommand, NamesThePatientOnlyWhereThatIsAskedFor) {
+  const Scratch scratch;
+  const std::string id = "SIM1";  // as small_ct's files have it
+  const std::string command = "export --registration " + scratch.file("fiducials.txt", kPatientFromTracker) +
+                              " --volume " + small_ct(scratch) + " --out ";
+  const auto result = run("birdseye", command + (scratch / "out").string());
+  ASSERT_EQ(result.code, 0) << result.output;
+  EXPECT_EQ(result.output.find(id), std::string::npos) << result.output;
+  ASSERT_TRUE(fs::exists(scratch / "out/ct.nrrd"));
+  for (const auto& entry : fs::recursive_directory_iterator(scratch / "out"))
+    EXPECT_EQ(testing::contents_of(entry.path()).find(id), std::string::npos) << entry.path();
+  ASSERT_EQ(run("birdseye", command + (scratch / "named").string() + " --identify").code, 0);
+  EXPECT_NE(testing::contents_of(scratch / "named/export.json").find(id), std::string::npos);
+}
+
 TEST(ExportCommand, WhatCannotBeExportedIsRefused) {
   const Scratch scratch;
   const std::string out = " --out " + (scratch / "out").string();

@@ -256,6 +256,31 @@ TEST_F(LiveWindowPictures, ALightRoomWithSlicesAndAPatientNobodyHasConfirmed) {
   expect_looks("light-slices-1280x720", workflow, HostTime{});
 }
 
+TEST_F(LiveWindowPictures, ASnapshotLooksTheSameWhoeverThePatientIs) {
+  ASSERT_NO_FATAL_FAILURE(open(1280, 720, 1));
+  const Scratch scratch;
+  LiveWorkflow workflow(operation_settings(scratch));
+  birdseye::testing::read_ct(workflow);
+  connect_and_calibrate(workflow);
+  const auto of_patient = [&](const PatientIdentity& identity, bool snapshot) {
+    OperationView view = workflow.view();
+    const auto plan = std::make_shared<PatientPlan>(*view.patient);
+    plan->identity = identity;
+    view.patient = plan;
+    facts_.pseudonymised = snapshot;
+    for (int i = 0; i < 3; ++i) {
+      window_->begin_frame();
+      draw_panels(*window_, view, workflow.shown_at(HostTime{}), facts_);
+      window_->end_frame();
+      if (i < 2) window_->swap();
+    }
+    return window_->shot().rgb;
+  };
+  const PatientIdentity one{"Doe, Jane", "4711", "1961-02-03", "2026-11-20"}, other{};
+  ASSERT_NE(of_patient(one, false), of_patient(other, false));
+  EXPECT_EQ(of_patient(one, true), of_patient(other, true));
+}
+
 TEST_F(LiveWindowPictures, TheOverlayRunsAndOnADenseScreenTheVideoHasStopped) {
   const Scratch scratch;
   LiveWorkflow workflow(operation_settings(scratch));
