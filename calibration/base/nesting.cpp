@@ -61,8 +61,8 @@ int most_in_any_line(std::string_view text, Notation notation) {
 }  // namespace
 
 bool nests_too_deeply(std::string_view text, Notation notation) {
-  return open_at_once(text, notation == Notation::yaml_or_xml) > kDeepest ||
-         most_in_any_line(text, notation) > kDeepest;
+  if (open_at_once(text, notation == Notation::yaml_or_xml) > kDeepest) return true;
+  return notation != Notation::json && most_in_any_line(text, notation) > kDeepest;
 }
 
 }  // namespace birdseye

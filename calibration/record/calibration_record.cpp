@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibration/base/nesting.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/round_field_json.hpp"
 
@@ -224,7 +225,7 @@ std::string record_text(const CalibrationRecord& record) {
 }
 
 Result<CalibrationRecord> parse_record(const std::string& text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = nests_too_deeply(text, Notation::json) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kRecordFormat)
     return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
   if (json.value("version", Json()) != CalibrationRecord::kVersion) {

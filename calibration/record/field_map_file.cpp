@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "calibration/base/nesting.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/field_map_json.hpp"
 
@@ -66,6 +67,7 @@ std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
 }
 
 Result<FieldMapFile> parse_field_map(const std::string& text) {
+  if (nests_too_deeply(text, Notation::json)) return no_map("it nests lists deeper than any");
   try {
     nlohmann::json json = nlohmann::json::parse(text);
     if (!json.is_object() || json.value("format", "") != kFieldMapFormat)

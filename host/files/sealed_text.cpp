@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "calibration/base/nesting.hpp"
 #include "calibration/record/sha256.hpp"
 
 namespace birdseye::host {
@@ -83,6 +84,7 @@ Result<nlohmann::json> unseal(const std::string& text) {
   const std::size_t end = text.rfind(fmt::format("\n\"{}\": ", kWhole));
   if (end == std::string::npos || text.substr(end + 1) != end_of(text.substr(0, end + 1)))
     return Error{Errc::bad_format, damage(text)};
+  if (nests_too_deeply(text, Notation::json)) return Error{Errc::bad_format, "nests lists deeper than any"};
   nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return Error{Errc::bad_format, "is no object of JSON"};
   json.erase(std::string(kSums));

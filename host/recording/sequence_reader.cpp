@@ -145,10 +145,11 @@ Result<void> SequenceReader::find_pixels() {
   if (width_px_ == 0) return {};
   const std::string named(value_of(header_.fields, "ElementDataFile"));
   const fs::path file = named == "LOCAL" ? path_ : path_.parent_path() / named;
+  std::error_code ignored;
   pixels_ = std::make_unique<Pixels>();
   pixels_->begin = named == "LOCAL" ? header_.data_offset : 0;
   pixels_->in.open(file, std::ios::binary);
-  if (named.empty() || fs::path(named).has_parent_path() || !pixels_->in)
+  if (named.empty() || fs::path(named).has_parent_path() || !pixels_->in || !fs::is_regular_file(file, ignored))
     return refused(Errc::not_found, path_, fmt::format("the file of its pixels, \"{}\", is not beside it", named));
   pixels_->compressed = value_of(header_.fields, "CompressedData") == "True";
   if (pixels_->compressed && ::inflateInit(&pixels_->zip) != Z_OK)
@@ -156,7 +157,6 @@ Result<void> SequenceReader::find_pixels() {
   const auto frame_bytes = static_cast<std::uint64_t>(channels_) * static_cast<std::uint64_t>(width_px_) *
                            static_cast<std::uint64_t>(height_px_);
   pixels_->rewind();
-  std::error_code ignored;
   const std::uint64_t size = fs::file_size(file, ignored);
   const std::uint64_t there = pixels_->compressed     ? pixels_->count(told_ * frame_bytes)
                               : size > pixels_->begin ? size - pixels_->begin

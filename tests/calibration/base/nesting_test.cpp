@@ -21,9 +21,13 @@ TEST(Nesting, DeepOnesAreFound) {
   for (const auto& text : {"x: " + times(70, "["), times(70, "<a>"), "x:\n  " + times(70, "- ") + "1"}) {
     EXPECT_TRUE(nests_too_deeply(text, Notation::yaml_or_xml)) << text;
   }
+  for (const auto& text : {times(70, "["), times(70, "{\"a\":") + "1"})
+    EXPECT_TRUE(nests_too_deeply(text, Notation::json)) << text;
 }
 
 TEST(Nesting, WhatUsersWriteIsNot) {
+  for (const auto& text : {"[" + times(200, "[1.5, {}], ") + "2]", "{\"serial\": \"" + times(80, "1.") + "\"}"})
+    EXPECT_FALSE(nests_too_deeply(text, Notation::json)) << text;
   for (const auto& text : {std::string("[tracker]\ndevice = \"/dev/serial/by-id/usb-FTDI_1.2.3\"\n"),
                            "# " + times(80, ".") + "\n[a.b.c]\n", "x = [" + times(200, "0.5, ") + "1]\n",
                            times(200, "[[fault]]\nname = \"drop_byte\"\n")}) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "calibration/record/field_map_file.hpp"
 #include "calibration/record/sha256.hpp"
 #include "tests/support/example_record.hpp"
 
@@ -100,6 +101,20 @@ TEST(CalibrationRecord, ACutOrForeignFileIsNoRecord) {
   const auto read = parse_record(later);
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().what.find("version 2"), std::string::npos);
+}
+
+/// A parser of JSON goes on for as long as there are brackets; who copies or writes what it read calls itself for each.
+TEST(CalibrationRecord, OneThatNestsWithoutEndIsNoRecordNorFieldMap) {
+  constexpr std::size_t kDeep = 100'000;
+  const std::string nested = std::string(kDeep, '[') + std::string(kDeep, ']');
+  for (const std::string key : {"version", "lens"}) {
+    const auto record = parse_record(R"({"format": "birdseye calibration record", ")" + key + "\": " + nested + "}");
+    ASSERT_FALSE(record);
+    EXPECT_NE(record.error().what.find("is no calibration record"), std::string::npos) << record.error().what;
+  }
+  const auto map = parse_field_map(R"({"format": "birdseye field map", "version": 1, "map": )" + nested + "}");
+  ASSERT_FALSE(map);
+  EXPECT_NE(map.error().what.find("nests"), std::string::npos) << map.error().what;
 }
 
 TEST(CalibrationRecord, NumbersThatMakeNoSenseAreRefusedWhateverTheirChecksum) {

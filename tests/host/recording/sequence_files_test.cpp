@@ -206,6 +206,7 @@ TEST(SequenceFiles, WhatCannotBeReadIsNamed) {
   expect("MFA", "FMA", "orientation is FMA");
   expect("= LOCAL", "= gone.raw", "gone.raw");
   expect("= LOCAL", "= /etc/passwd", "/etc/passwd");
+  expect("= LOCAL", "= .", "is not beside it");
   EXPECT_FALSE(SequenceReader::open(scratch / "none.igs.mha"));
   EXPECT_FALSE(SequenceWriter::create(scratch / "no folder", "video", 2, 2));
 }
