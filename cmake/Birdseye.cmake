@@ -8,15 +8,17 @@ set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
 add_library(birdseye_options INTERFACE)
 target_compile_options(birdseye_options INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Werror
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
-# Damage by a hostile file or message ends the program rather than taking it over. FORTIFY wants an optimising compiler.
-target_compile_options(birdseye_options INTERFACE
-  -fPIE -fstack-protector-strong -fstack-clash-protection
-  "$<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>")
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>
+  $<$<AND:$<CXX_COMPILER_ID:Clang>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-shadow>)  # of another file's name in the batch
+# Damage by a hostile file or message ends the program rather than taking it over.
+target_compile_options(birdseye_options INTERFACE -fPIE -fstack-protector-strong -fstack-clash-protection)
 target_include_directories(birdseye_options INTERFACE ${CMAKE_SOURCE_DIR})
 if(BIRDSEYE_SANITIZE)
   target_compile_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(birdseye_options INTERFACE -fsanitize=${BIRDSEYE_SANITIZE})
+else()
+  # It wants an optimising compiler, and would hide from a sanitizer what it checks itself.
+  target_compile_options(birdseye_options INTERFACE "$<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE;-D_FORTIFY_SOURCE=3>")
 endif()
 
 # The library's headers are those of its folder. NOT_ALONE names those that ask for more than the library has: whoever
@@ -61,4 +63,17 @@ function(birdseye_test name)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT} ${alone}
       ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}")
+endfunction()
+
+# A program that gives bytes to one parser: main is libFuzzer's, which clang alone has. Built by its name or with all of its
+# kind, as `fuzz`, and never otherwise (preset fuzz, ./run fuzz).
+function(birdseye_fuzz name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PRIVATE" ${ARGN})
+  add_executable(${name} EXCLUDE_FROM_ALL ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options)
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  if(NOT TARGET fuzz)
+    add_custom_target(fuzz)
+  endif()
+  add_dependencies(fuzz ${name})
 endfunction()

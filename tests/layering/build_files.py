@@ -8,8 +8,8 @@ from source_files import CODE, TOPS
 
 LEXEME = re.compile(r'#\[(=*)\[.*?\]\1\]|#[^\n]*|\[(=*)\[(.*?)\]\2\]|"((?:\\.|[^"\\])*)"|([()])|((?:\\.|[^\s()#"\\])+)', re.S)
 PLAIN = re.compile(r"[A-Za-z0-9_][\w.+-]*(?:::[\w.+-]+)?")
-MAKERS = {"birdseye_library": "library", "birdseye_executable": "program", "birdseye_test": "test", "add_library": "library",
-          "add_executable": "program"}
+MAKERS = {"birdseye_library": "library", "birdseye_executable": "program", "birdseye_test": "test",
+          "birdseye_fuzz": "program", "add_library": "library", "add_executable": "program"}
 # These make no link and no include. `set` may be too, of a name in small letters: CMake's own are in capitals.
 HARMLESS = {"if", "elseif", "else", "endif", "foreach", "endforeach", "return", "message", "find_package", "add_test",
             "add_dependencies", "set_tests_properties", "target_compile_definitions"}
