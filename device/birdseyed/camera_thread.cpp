@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "calibration/time/rate_limit.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 
@@ -26,28 +27,13 @@ Duration silence_of(const drivers::FrameSource& camera, const drivers::CameraSet
   return std::max(Duration::from_seconds(kSilentPeriods / rate_of(camera, settings)), kSilentAtLeast);
 }
 
-/// Reads up to four times as many frames as were agreed, and some at once after a halt. A program that feeds a socket
-/// may send thousands a second, and then waits: their copies would leave the tracker no time.
-class Pace {
- public:
-  explicit Pace(double rate_hz) : gap_(Duration::from_seconds(1 / (kTimes * rate_hz))) {}
-
-  void wait(const std::stop_token& stop) {
-    const DeviceTime now = device_now();
-    if (next_ > now) sleep_for(next_ - now, stop);
-  }
-  void frame_came() {
-    const Duration at_once{kAtOnce * gap_.ns};
-    next_ = std::max(next_, device_now() - at_once) + gap_;
-  }
-
- private:
-  static constexpr double kTimes = 4;
-  static constexpr std::int64_t kAtOnce = 8;
-
-  Duration gap_;
-  DeviceTime next_;
-};
+/// Up to four times as many frames as were agreed are read, and some at once after a halt. A program that feeds a
+/// socket may send thousands a second, and then waits: their copies would leave the tracker no time.
+RateLimit pace_of(const drivers::FrameSource& camera, const drivers::CameraSettings& settings) {
+  constexpr double kTimes = 4;
+  constexpr std::int64_t kAtOnce = 8;
+  return {Duration::from_seconds(1 / (kTimes * rate_of(camera, settings))), kAtOnce};
+}
 
 /// Until the camera is lost; why.
 Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settings, InstrumentPost& post,
@@ -61,7 +47,7 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
                .identity = camera.identity()});
   };
   const Duration silence = silence_of(camera, settings);
-  Pace pace(rate_of(camera, settings));
+  RateLimit pace = pace_of(camera, settings);
   DeviceTime heard = device_now();
   std::optional<std::uint64_t> newest;
   int restarts = 0;
@@ -73,12 +59,12 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
       lock.tell(locked, locked ? camera.lock_controls() : camera.unlock_controls());
       if (known) running();  // its exposure is known now, or no longer
     }
-    pace.wait(stop);
+    if (const Duration early = pace.free_at() - device_now(); early > Duration{}) sleep_for(early, stop);
     auto frame = camera.next(device_now() + kPatience);
     if (!frame) return frame.error();
     const bool came = frame->has_value();
     if (came) {
-      pace.frame_came();
+      pace.passed(device_now());
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       // One frame over and over is no stream.
       if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = device_now();

@@ -13,12 +13,13 @@ constexpr std::size_t kSliceBytes = 256U << 10U;
 constexpr Duration kStuck = Duration::from_ms(10'000);
 constexpr Duration kHalfAsked = Duration::from_ms(5'000);
 // A client asks for the time some times a second, and for more as it begins.
-constexpr Duration kPerRequest = Duration::from_ms(10), kAtOnce = Duration::from_ms(2'000);
+constexpr Duration kPerRequest = Duration::from_ms(10);
+constexpr std::int64_t kRequestsAtOnce = 200;
 
 }  // namespace
 
 ClientLink::ClientLink(std::unique_ptr<Link> link)
-    : link_(std::move(link)), host_(link_->host()), progress_(device_now()) {}
+    : link_(std::move(link)), host_(link_->host()), progress_(device_now()), requests_(kPerRequest, kRequestsAtOnce) {}
 
 void ClientLink::take(const Subscription& subscription) {
   subscription_ = subscription;
@@ -88,11 +89,7 @@ Result<std::vector<Request>> ClientLink::receive() {
   auto requests = reader_.push(std::span(chunk).first(*got));
   const DeviceTime now = device_now();
   if (fresh || (requests && !requests->empty())) asking_since_ = now;
-  if (requests) {
-    const auto count = static_cast<std::int64_t>(requests->size());
-    asked_until_ = std::max(asked_until_, now) + Duration{count * kPerRequest.ns};
-    may_ask_again_ = asked_until_ - kAtOnce;
-  }
+  if (requests) requests_.passed(now, static_cast<std::int64_t>(requests->size()));
   return requests;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/time/rate_limit.hpp"
 #include "device/wire/latency_log.hpp"
 #include "device/wire/link.hpp"
 #include "device/wire/packet_queue.hpp"
@@ -29,7 +30,7 @@ class ClientLink {
   [[nodiscard]] const std::string& host() const { return host_; }
   /// Whether the client has asked no more than a client needs. Until it may ask again, receive() is not to be called,
   /// and what the client sends waits with the operating systems.
-  [[nodiscard]] bool may_ask() const { return device_now() >= may_ask_again_; }
+  [[nodiscard]] bool may_ask() const { return device_now() >= requests_.free_at(); }
   [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
   /// Queues a packet if the client wants its kind. Returns how many older packets were dropped for it.
   std::size_t offer(const Packet& packet);
@@ -70,8 +71,7 @@ class ClientLink {
   std::optional<Packet> sending_;  ///< begun
   std::size_t sent_ = 0;           ///< bytes of sending_
   DeviceTime progress_, asking_since_;
-  DeviceTime asked_until_;  ///< by when all that was asked would have been, at the rate that is granted
-  DeviceTime may_ask_again_;
+  RateLimit requests_;
 };
 
 }  // namespace birdseye::wire

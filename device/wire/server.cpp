@@ -15,9 +15,8 @@ namespace {
 
 constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
-constexpr Duration kLook = Duration::from_ms(200);        // for clients that are stuck
-constexpr Duration kAcceptsAgain = Duration::from_ms(1);  // so that connections without end leave the thread time
-constexpr Duration kAsksAgain = Duration::from_ms(10);
+constexpr Duration kLook = Duration::from_ms(200);  // for clients that are stuck
+constexpr Duration kLookAgain = Duration::from_ms(1), kAsksAgain = Duration::from_ms(10);
 
 }  // namespace
 
@@ -63,7 +62,7 @@ Server::Counters Server::take_counters() {
 }
 
 void Server::accept_one() {
-  accepts_again_ = device_now() + kAcceptsAgain;
+  accepts_.passed(device_now());
   auto link = listener_->accept();
   if (!link) return;
   if (!make_room(link->host())) {
@@ -188,8 +187,8 @@ void Server::run(const std::stop_token& stop) {
       watches.push_back({.link = &client.link(), .to_read = may_ask, .to_write = client.wants_to_write()});
     }
     const DeviceTime now = device_now();
-    const bool accepts = now >= accepts_again_;
-    const Duration look = accepts ? (all_may_ask ? kLook : kAsksAgain) : kAcceptsAgain;
+    const bool accepts = now >= accepts_.free_at();
+    const Duration look = accepts ? (all_may_ask ? kLook : kAsksAgain) : kLookAgain;
     const bool somebody = listener_->wait(watches, accepts, Deadline::after(look));
     const bool frames = distribute();
     auto watch = watches.begin();

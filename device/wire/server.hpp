@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "calibration/time/rate_limit.hpp"
 #include "device/wire/client_link.hpp"
 #include "device/wire/link.hpp"
 #include "drivers/system/thread.hpp"
@@ -74,7 +75,7 @@ class Server {
   std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
   // A new client gets these at once.
   std::optional<Packet> last_status_, last_calibration_, last_volume_;
-  DeviceTime accepts_again_;
+  RateLimit accepts_{Duration{200'000}, 64};  ///< so that connections without end leave the thread time
   OwnedThread thread_;
 };
 

@@ -21,6 +21,7 @@ namespace birdseye::wire {
 
 namespace {
 
+constexpr int kMostCalling = 128;  // whoever finds no room here tries again a second later
 constexpr int kMostUnsentBytes = 256 << 10;
 constexpr Duration kConnectAgain = Duration::from_ms(50);
 constexpr std::size_t kMostParts = 4;
@@ -166,7 +167,8 @@ Result<std::unique_ptr<Listener>> listen_tcp(const std::string& bind_address, in
   const int on = 1;
   if (fd) ::setsockopt(fd.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
   socklen_t size = sizeof address;
-  if (!fd || ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 || ::listen(fd.get(), 8) != 0 ||
+  if (!fd || ::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0 ||
+      ::listen(fd.get(), kMostCalling) != 0 ||
       ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&address), &size) != 0) {
     if (errno == EADDRINUSE) {
       return Error{Errc::in_use, fmt::format("[wire] port {} on {} is in use; stop the other program or choose another",
