@@ -76,6 +76,10 @@ class ScopeSetup {
   [[nodiscard]] ScopeSetup turned_to(double rod_angle_deg) const;
   /// The same scope, of whose lens the edge of the picture's round field is known.
   [[nodiscard]] ScopeSetup with_round_field(const std::optional<RoundField>& field) const;
+  /// Whether places lie in its pictures, by a pose of its sensor, where they lie in the other's.
+  [[nodiscard]] bool sees_as(const ScopeSetup& other) const {
+    return camera_ == other.camera_ && camera_from_sensor_.matrix() == other.camera_from_sensor_.matrix();
+  }
   /// Whether the scope's rod can be at other angles than now.
   [[nodiscard]] bool has_rod() const { return rod_.has_value(); }
   /// At which the rod was when the scope was calibrated; 0 without a rod.

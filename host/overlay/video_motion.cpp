@@ -3,15 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 #include <utility>
 #include <vector>
 
-#include "calibration/base/median.hpp"
-#include "calibration/geometry/rotations.hpp"
-#include "calibration/picture/field_mask.hpp"
-#include "calibration/picture/picture_mat.hpp"
+#include "host/overlay/followed_places.hpp"
 
 namespace birdseye::host {
 
@@ -21,70 +16,17 @@ using Relative = Transform<Camera, Camera>;
 
 constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms(3000);
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
-constexpr int kWorkingWidthPx = 320;                  // more tells no more of the motion, and takes longer
-constexpr std::size_t kPlaces = 80, kFewest = 15;
-constexpr double kThereAndBackPx = 0.7, kFollowedPx = 1.5;
-constexpr double kNearest_mm = 15, kFarthest_mm = 600;  // what a laparoscope sees lies between
+constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
 constexpr int kOddInRow = 4, kMostWanted = 32;
-
-/// Where nothing is to be followed: outside the field, and in reflections, which go with the lamp.
-cv::Mat places_allowed(const cv::Mat& grey) {
-  cv::Mat mask = field_mask(grey.size());
-  cv::Mat glare = grey > 240;
-  cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
-  mask.setTo(0, glare);
-  return mask;
-}
-
-/// From a place to a line's part between two others.
-double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-  const Eigen::Vector2d along = to - from;
-  const double squared = along.squaredNorm();
-  const double share = squared > 0 ? std::clamp((place - from).dot(along) / squared, 0.0, 1.0) : 0.0;
-  return (place - from - share * along).norm();
-}
-
-/// A place in two pictures, as directions of unit Z.
-struct Followed {
-  Eigen::Vector3d then, now;
-};
-
-/// The median distance from the lines, of unit focal length. Empty where most places would be behind the camera.
-std::optional<double> median_off(const std::vector<Followed>& places, const Relative& now_from_then) {
-  std::vector<double> off;
-  off.reserve(places.size());
-  for (const Followed& place : places) {
-    // From the nearest depth on at which the place is before the camera in both pictures.
-    const double ahead = (now_from_then.rotation() * place.then).z();
-    if (!(ahead > 0)) continue;
-    const double nearest_mm = std::max(kNearest_mm, (kNearest_mm - now_from_then.translation().z()) / ahead);
-    if (nearest_mm >= kFarthest_mm) continue;
-    const Eigen::Vector3d nearest = now_from_then * Eigen::Vector3d(nearest_mm * place.then);
-    const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(kFarthest_mm * place.then);
-    off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
-  }
-  if (2 * off.size() <= places.size()) return std::nullopt;
-  return median_of(std::move(off));
-}
-
-/// As a hand-eye that is turned about an axis of the camera would have it.
-Relative turned(const Relative& motion, Eigen::Index axis, double by_rad) {
-  const Relative turn(rotation_exp(Eigen::Vector3d(by_rad * Eigen::Vector3d::Unit(axis))), Eigen::Vector3d::Zero());
-  return turn * motion * turn.inverse();
-}
 
 PoseHistory averaged_poses() {
   PoseHistory::Settings settings;
   settings.capacity = 512;
   settings.smoothing = kAverage;
   return PoseHistory(settings);
-}
-
-bool same(const ScopeSetup& a, const ScopeSetup& b) {
-  return a.camera() == b.camera() && a.camera_from_sensor().matrix() == b.camera_from_sensor().matrix();
 }
 
 }  // namespace
@@ -114,7 +56,15 @@ void VideoMotion::forget_agreement() {
   state_ = VideoAgreement::untold;
 }
 
+bool VideoMotion::doubt(DeviceTime since) {
+  doubted_since_ = since;
+  if (state_ != VideoAgreement::agrees) return false;
+  state_ = VideoAgreement::in_doubt;
+  return true;
+}
+
 void VideoMotion::reset() {
+  doubted_since_.reset();
   waiting_.reset();
   key_.reset();
   looked_at_.reset();
@@ -136,7 +86,7 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
 
 bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
   bool changed = false;
-  if (of_ && !same(*of_, scope)) {
+  if (of_ && !of_->sees_as(scope)) {
     changed = state_ != VideoAgreement::untold;
     reset();
   }
@@ -157,14 +107,10 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
   looked_at_ = at;
   auto next = std::make_unique<Waiting>();
   next->at = at;
-  const cv::Mat rgb = mat_of(RgbView{*frame.rgb, frame.width_px, frame.height_px});
   next->times_apart_s = times_apart_s(
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
       frame.info.latency.has_value());
-  const double scale = std::max(1.0, static_cast<double>(frame.width_px) / kWorkingWidthPx);
-  cv::Mat small;
-  cv::resize(rgb, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
-  cv::cvtColor(small, next->grey, cv::COLOR_RGB2GRAY);
+  next->grey = grey_to_follow(frame);
   waiting_ = std::move(next);
   return changed;
 }
@@ -182,7 +128,7 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& pictu
   const Transform<Tracker, Camera> back = at[1]->inverse();
   for (const Eigen::Vector3d& place_mm : {Eigen::Vector3d(0, 0, 100), Eigen::Vector3d(40, 0, 100)}) {
     const Eigen::Vector3d before = *at[0] * (back * place_mm), after = *at[2] * (back * place_mm);
-    if (!(before.z() > kNearest_mm && after.z() > kNearest_mm)) return std::nullopt;
+    if (!(before.z() > kNearestSeen_mm && after.z() > kNearestSeen_mm)) return std::nullopt;
     const Eigen::Vector2d from = before.hnormalized(), to = after.hnormalized(), middle = place_mm.hnormalized();
     const double bend = ((from + to) / 2 - middle).norm();
     const double rate_s = (to - from).norm() / (2 * kAverage.seconds());
@@ -199,15 +145,15 @@ bool VideoMotion::look(const Waiting& picture, const ScopeSetup& scope) {
     key_.reset();
     return false;
   }
-  if (key_) follow(picture);
   const VideoAgreement before = state_;
-  const bool told = key_ && key_->places.size() >= kFewest && judge(*from, scope);
+  if (key_) follow(picture);
+  const bool told = key_ && key_->places.size() >= kFewest && judge(picture.at, *from, scope);
   if (key_ && key_->places.size() >= kFewest && picture.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
     return state_ != before;
   key_ = std::make_unique<Key>();
   key_->at = picture.at;
   key_->from = *from;
-  cv::goodFeaturesToTrack(picture.grey, key_->places, kPlaces, 0.01, 8, places_allowed(picture.grey));
+  key_->places = places_to_follow(picture.grey);
   key_->now = key_->places;
   key_->newest = picture.grey;
   return state_ != before;
@@ -216,18 +162,12 @@ bool VideoMotion::look(const Waiting& picture, const ScopeSetup& scope) {
 /// To the next picture; what is not found there, or leads back to another place, is let go.
 void VideoMotion::follow(const Waiting& picture) {
   if (key_->places.empty() || key_->newest.size() != picture.grey.size()) return key_.reset();
-  const cv::Size window(15, 15);
-  constexpr int kLevels = 3;
-  std::vector<cv::Point2f> there, back;
-  std::vector<std::uint8_t> found, found_back;
-  std::vector<float> unused;
-  cv::calcOpticalFlowPyrLK(key_->newest, picture.grey, key_->now, there, found, unused, window, kLevels);
-  cv::calcOpticalFlowPyrLK(picture.grey, key_->newest, there, back, found_back, unused, window, kLevels);
+  const auto there = follow_places(key_->newest, picture.grey, key_->now);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < there.size(); ++i) {
-    if (found[i] == 0 || found_back[i] == 0 || cv::norm(back[i] - key_->now[i]) > kThereAndBackPx) continue;
+    if (!there[i]) continue;
     key_->places[kept] = key_->places[i];
-    key_->now[kept++] = there[i];
+    key_->now[kept++] = *there[i];
   }
   // Where most are lost at once the picture is another, and what is left is chance.
   if (2 * kept < there.size()) {
@@ -240,31 +180,28 @@ void VideoMotion::follow(const Waiting& picture) {
 }
 
 /// True: the picture does not agree.
-bool VideoMotion::judge(const SeenFrom& now, const ScopeSetup& scope) {
+bool VideoMotion::judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return false;  // nothing says how far off a picture may be
   const CameraModel& camera = scope.camera();
-  const double scale = static_cast<double>(camera.width_px) / key_->newest.cols;
-  const auto ray = [&](const cv::Point2f& small) {
-    return unproject(camera, Eigen::Vector2d((small.x + 0.5) * scale - 0.5, (small.y + 0.5) * scale - 0.5));
-  };
-  std::vector<Followed> places;
+  const int columns = key_->newest.cols;
+  std::vector<FollowedPlace> places;
   places.reserve(key_->places.size());
   for (std::size_t i = 0; i < key_->places.size(); ++i) {
-    const auto then = ray(key_->places[i]), later = ray(key_->now[i]);
+    const auto then = ray_of(camera, columns, key_->places[i]), later = ray_of(camera, columns, key_->now[i]);
     if (then && later) places.push_back({*then, *later});
   }
   if (places.size() < kFewest) return false;
   const Relative motion = now.camera_from_tracker * key_->from.camera_from_tracker.inverse();
-  const auto off = median_off(places, motion);
+  const auto off = median_off_line(places, motion);
   if (!off) return false;
   off_px_ = *off * camera.fx_px;
   std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const auto right = median_off(places, turned(motion, axis, kTurned_rad));
-    const auto left = median_off(places, turned(motion, axis, -kTurned_rad));
-    if (right && left) otherwise_px[static_cast<std::size_t>(axis)] = std::min(*right, *left) * camera.fx_px;
+    const auto off_if_turned = median_off_if_turned(places, motion, axis, kTurned_rad);
+    otherwise_px[static_cast<std::size_t>(axis)] = off_if_turned.value_or(0) * camera.fx_px;
   }
+  const double scale = static_cast<double>(camera.width_px) / columns;
   // The errors of hand-eye and of two poses, of two axes, with a probability of 99.9 %, for many pictures are asked;
   // how well a place is found; how sure the two poses are; and what of the motion itself is not as it is modelled.
   const double still_px =
@@ -287,6 +224,7 @@ bool VideoMotion::judge(const SeenFrom& now, const ScopeSetup& scope) {
     if (!(otherwise_px[axis] > std::max(still_px, kPlainly * *off_px_))) continue;
     if (!std::exchange(key_->told[axis], true)) ++told_[axis];
   }
+  if (doubted_since_ && at < *doubted_since_) return false;
   if (std::ranges::all_of(told_, [this](int times) { return times >= wanted_; })) state_ = VideoAgreement::agrees;
   return false;
 }

@@ -29,6 +29,10 @@ class VideoMotion {
   /// looked at, each once the poses after it have come. True: state() is another now.
   bool take(const wire::VideoFrame& frame, const ScopeSetup& scope);
 
+  /// Something else speaks against a frame of that time: what agreed is in doubt until a picture that was taken then or
+  /// later agrees. True: state() is another now.
+  bool doubt(DeviceTime since);
+
   [[nodiscard]] VideoAgreement state() const { return state_; }
   /// Of the last picture that could tell, the median of how far the places lie off their lines; empty before one could.
   [[nodiscard]] const std::optional<double>& off_px() const { return off_px_; }
@@ -47,11 +51,11 @@ class VideoMotion {
   [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& picture, const ScopeSetup& scope) const;
   bool look(const Waiting& picture, const ScopeSetup& scope);
   void follow(const Waiting& picture);
-  bool judge(const SeenFrom& now, const ScopeSetup& scope);
+  bool judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& scope);
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
   PoseHistory poses_;
-  std::optional<DeviceTime> looked_at_;
+  std::optional<DeviceTime> looked_at_, doubted_since_;
   std::unique_ptr<Waiting> waiting_;  ///< the newest picture that is looked at, until the poses after it have come
   std::unique_ptr<Key> key_;          ///< the picture in which the places that are followed were chosen
   std::array<int, 3> told_{};         ///< how often it agreed, by axis of the camera

@@ -2,6 +2,7 @@
 
 #include "host/overlay/field_watch.hpp"
 #include "host/overlay/scope_setup.hpp"
+#include "host/overlay/sudden_motion.hpp"
 #include "host/overlay/trust.hpp"
 #include "host/overlay/video_motion.hpp"
 
@@ -15,17 +16,23 @@ class VideoWatch {
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
     single_poses_ = true;
     motion_.take(acquired, tracker_from_sensor);
+    sudden_.take(acquired, tracker_from_sensor);
   }
   struct News {
     bool motion = false, field = false;  ///< that it says something else now
     [[nodiscard]] bool any() const { return motion || field; }
   };
   /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, the poses
-  /// of the frames take their place.
-  News take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
-    const auto& pose = frame.info.pose.tracker_from_sensor;
-    if (!single_poses_ && pose) motion_.take(frame.info.acquired, *pose);
-    return {motion_.take(frame, scope), field_.take(frame, scope)};
+  /// of the frames take their place. target_mm: how far from the camera the target is drawn; empty: it is not.
+  News take(const wire::VideoFrame& frame, const ScopeSetup& scope, std::optional<double> target_mm) {
+    if (const auto& pose = frame.info.pose.tracker_from_sensor; !single_poses_ && pose) {
+      motion_.take(frame.info.acquired, *pose);
+      sudden_.take(frame.info.acquired, *pose);
+    }
+    const VideoAgreement before = motion_.state();
+    motion_.take(frame, scope);
+    if (sudden_.take(frame, scope, target_mm)) motion_.doubt(frame.info.acquired);
+    return {motion_.state() != before, field_.take(frame, scope)};
   }
 
   [[nodiscard]] VideoAgreement motion() const { return motion_.state(); }
@@ -38,6 +45,7 @@ class VideoWatch {
  private:
   bool single_poses_ = false;
   VideoMotion motion_;
+  SuddenMotion sudden_;
   FieldWatch field_;
 };
 

@@ -160,9 +160,13 @@ bool Rehearsal::begin() {
   give_record();
   if (!workflow_->view().note(host::LiveStep::calibrate).done) return false;
   workflow_->go_to(host::LiveStep::fiducials);
+  look_about();
+  return true;
+}
+
+void Rehearsal::look_about() {
   constexpr double kLookAbout_s = 8, kHaste = 3;
   look_on(kLookAbout_s, kHaste, nullptr);
-  return true;
 }
 
 /// What the driver makes of a bird's record; empty: it withholds it.

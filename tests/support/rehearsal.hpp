@@ -89,6 +89,8 @@ class Rehearsal {
   Watched watch(double seconds);
 
   [[nodiscard]] host::LiveWorkflow& workflow() { return *workflow_; }
+  /// The scope is moved quickly over the scene, as before anything is drawn: the video tells of its motion.
+  void look_about();
   /// The scope has looked elsewhere, long enough for what was followed to be lost.
   void forget_video();
   /// Half of the organ is cut away.

@@ -98,6 +98,7 @@ std::vector<Row> while_running() {
           [](Rehearsal& o) {
             move_patient(o);
             o.forget_video();
+            o.look_about();
           },
           kOnlyReference),
       row("patient moved, the reference not", Must::end, "reference", move_patient, "", with_reference),
@@ -120,7 +121,11 @@ std::vector<Row> while_running() {
           },
           "the check of the deformed surface, once views are kept; a breath hold"),
       row(
-          "half of the organ is resected", Must::unseen, "", [](Rehearsal& o) { o.resect(); },
+          "half of the organ is resected", Must::unseen, "",
+          [](Rehearsal& o) {
+            o.resect();
+            o.look_about();  // what the video shows is another scene, and has to move as the poses say anew
+          },
           "the person who cuts; the check of the deformed surface, where it holds views against the video"),
       row("the organ is shifted by 25 mm, as by a retractor", Must::end, kVideo,
           [](Rehearsal& o) { o.organ_motion = [](double at_s) { return Vector(25 * std::min(1.0, at_s), 0, 0); }; }),

@@ -1,0 +1,103 @@
+#include "host/overlay/followed_places.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "calibration/base/median.hpp"
+#include "calibration/geometry/rotations.hpp"
+#include "calibration/picture/field_mask.hpp"
+#include "calibration/picture/picture_mat.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Relative = Transform<Camera, Camera>;
+
+constexpr int kWidthPx = 320;
+constexpr int kPlaces = 80;
+constexpr double kThereAndBackPx = 0.7;
+
+/// From a place to a line's part between two others.
+double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const Eigen::Vector2d along = to - from;
+  const double squared = along.squaredNorm();
+  const double share = squared > 0 ? std::clamp((place - from).dot(along) / squared, 0.0, 1.0) : 0.0;
+  return (place - from - share * along).norm();
+}
+
+}  // namespace
+
+cv::Mat grey_to_follow(const wire::VideoFrame& frame) {
+  const cv::Mat rgb = mat_of(RgbView{*frame.rgb, frame.width_px, frame.height_px});
+  const double scale = std::max(1.0, static_cast<double>(frame.width_px) / kWidthPx);
+  cv::Mat small, grey;
+  cv::resize(rgb, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
+  cv::cvtColor(small, grey, cv::COLOR_RGB2GRAY);
+  return grey;
+}
+
+std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
+  cv::Mat mask = field_mask(grey.size());
+  cv::Mat glare = grey > 240;
+  cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
+  mask.setTo(0, glare);
+  std::vector<cv::Point2f> places;
+  cv::goodFeaturesToTrack(grey, places, kPlaces, 0.01, 8, mask);
+  return places;
+}
+
+std::vector<std::optional<cv::Point2f>> follow_places(const cv::Mat& from, const cv::Mat& to,
+                                                      const std::vector<cv::Point2f>& places) {
+  std::vector<std::optional<cv::Point2f>> out(places.size());
+  if (places.empty() || from.size() != to.size()) return out;
+  const cv::Size window(15, 15);
+  constexpr int kLevels = 3;
+  std::vector<cv::Point2f> there, back;
+  std::vector<std::uint8_t> found, found_back;
+  std::vector<float> unused;
+  cv::calcOpticalFlowPyrLK(from, to, places, there, found, unused, window, kLevels);
+  cv::calcOpticalFlowPyrLK(to, from, there, back, found_back, unused, window, kLevels);
+  for (std::size_t i = 0; i < places.size(); ++i)
+    if (found[i] != 0 && found_back[i] != 0 && cv::norm(back[i] - places[i]) <= kThereAndBackPx) out[i] = there[i];
+  return out;
+}
+
+std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_columns, const cv::Point2f& place) {
+  const double scale = static_cast<double>(camera.width_px) / small_columns;
+  return unproject(camera, Eigen::Vector2d((place.x + 0.5) * scale - 0.5, (place.y + 0.5) * scale - 0.5));
+}
+
+std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                      double farthest_mm) {
+  std::vector<double> off;
+  off.reserve(places.size());
+  for (const FollowedPlace& place : places) {
+    // From the nearest depth on at which the place is before the camera in both pictures.
+    const double ahead = (now_from_then.rotation() * place.then).z();
+    if (!(ahead > 0)) continue;
+    const double nearest_mm = std::max(kNearestSeen_mm, (kNearestSeen_mm - now_from_then.translation().z()) / ahead);
+    if (nearest_mm >= farthest_mm) continue;
+    const Eigen::Vector3d nearest = now_from_then * Eigen::Vector3d(nearest_mm * place.then);
+    const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(farthest_mm * place.then);
+    off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
+  }
+  if (2 * off.size() <= places.size()) return std::nullopt;
+  return median_of(std::move(off));
+}
+
+std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                           Eigen::Index axis, double by_rad) {
+  std::optional<double> least;
+  for (const double side_rad : {by_rad, -by_rad}) {
+    const Relative turn(rotation_exp(Eigen::Vector3d(side_rad * Eigen::Vector3d::Unit(axis))), Eigen::Vector3d::Zero());
+    const auto off = median_off_line(places, turn * now_from_then * turn.inverse());
+    if (!off) return std::nullopt;
+    least = std::min(least.value_or(*off), *off);
+  }
+  return least;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/transform.hpp"
+#include "device/wire/messages.hpp"
+
+/// Places of the tissue that are followed from one picture to the next, and where the poses say that they lie.
+namespace birdseye::host {
+
+inline constexpr double kFollowedPx = 1.5;  ///< of the small picture: how far a place that is followed may be off
+/// From the camera: what a laparoscope sees lies between.
+inline constexpr double kNearestSeen_mm = 15, kFarthestSeen_mm = 600;
+
+/// A frame in grey and small: more tells no more of the motion, and takes longer.
+cv::Mat grey_to_follow(const wire::VideoFrame& frame);
+
+/// Places of such a picture that can be followed: within the round field, and away from reflections, which go with the
+/// lamp.
+std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey);
+
+/// Where places of one picture lie in another. Empty: it is not found there, or leads back to another place.
+std::vector<std::optional<cv::Point2f>> follow_places(const cv::Mat& from, const cv::Mat& to,
+                                                      const std::vector<cv::Point2f>& places);
+
+/// A place of the small picture of so many columns as a direction of unit Z; empty: no ray of the camera ends there.
+std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_columns, const cv::Point2f& place);
+
+/// A place in two pictures, as directions of unit Z.
+struct FollowedPlace {
+  Eigen::Vector3d then, now;
+};
+
+/// Where a place may lie in the later picture, at whatever depth, the poses tell: on a line (the epipolar line), of
+/// which the part from 15 mm to farthest_mm counts. The median of how far the places are off it, of unit focal length.
+/// Empty where most places would be behind the camera.
+std::optional<double> median_off_line(const std::vector<FollowedPlace>& places,
+                                      const Transform<Camera, Camera>& now_from_then,
+                                      double farthest_mm = kFarthestSeen_mm);
+
+/// How far they would be off, the least of both ways, were hand-eye turned about an axis of the camera.
+std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& places,
+                                           const Transform<Camera, Camera>& now_from_then, Eigen::Index axis,
+                                           double by_rad);
+
+}  // namespace birdseye::host
