@@ -28,6 +28,7 @@ void add_bench_device(CLI::App& bench, CommandStatus& status);  ///< under `benc
 void add_bench_similarity(CLI::App& bench, CommandStatus& status);
 void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_calibrate(CLI::App& app, CommandStatus& status);
+void add_convert(CLI::App& app, CommandStatus& status);
 void add_demo(CLI::App& app, CommandStatus& status);
 void add_doctor(CLI::App& app, CommandStatus& status);
 void add_export(CLI::App& app, CommandStatus& status);

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   CommandStatus status;
   add_bench(app, status);
   add_calibrate(app, status);
+  add_convert(app, status);
   add_demo(app, status);
   add_doctor(app, status);
   add_export(app, status);

@@ -14,6 +14,7 @@
 #include "host/files/sealed_text.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
+#include "host/operation/operation_010.hpp"
 #include "host/operation/operation_parts.hpp"
 #include "host/volume/stated_geometry.hpp"
 
@@ -91,12 +92,6 @@ Result<void> write_copies(const fs::path& folder, const Operation& operation) {
   return write_files(copies);
 }
 
-/// What was kept before there was a format.
-bool is_of_010(const std::string& text) {
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  return json.is_object() && json.contains("ct_checksum");
-}
-
 std::string sha256_in(const nlohmann::json& sheet, const char* part) {
   return sheet.contains(part) ? sheet.at(part).at("sha256").get<std::string>() : "";
 }
@@ -155,10 +150,9 @@ Result<Operation> read_operation(const fs::path& given) {
   const auto sheet = unseal(text);
   if (!sheet && is_of_010(text)) {
     return refused(
-        "was kept by an earlier version, which did not bind its files together: whether they were changed "
-        "since, nobody can tell. Start without --resume, and register anew. To replay, render or export by it, give "
-        "its "
-        "camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and field.mha one by one");
+        "was kept by version 0.1.0, which did not bind its files together: whether they were changed since, nobody can "
+        "tell. Where you answer for them, `birdseye convert FOLDER --ct CT --out NEW` makes an operation of them; else "
+        "register anew");
   }
   if (!sheet) return refused(sheet.error().what + "; give a copy that is as the window wrote it, or register anew");
   try {

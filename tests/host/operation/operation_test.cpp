@@ -212,7 +212,7 @@ TEST(Operation, AFileOf010OrOfALaterVersionIsRefusedInWords) {
 })");
   const auto old = read_operation(scratch.path());
   ASSERT_FALSE(old);
-  EXPECT_NE(old.error().what.find("earlier version"), std::string::npos) << old.error().what;
+  EXPECT_NE(old.error().what.find("version 0.1.0"), std::string::npos) << old.error().what;
   EXPECT_NE(old.error().what.find("register anew"), std::string::npos) << old.error().what;
   const auto later = read_operation(
       scratch.file("later.json", sealed_text({{"format", {{"name", "birdseye operation"}, {"version", 3}}}})));
