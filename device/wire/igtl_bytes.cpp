@@ -1,8 +1,8 @@
 #include "device/wire/igtl_bytes.hpp"
 
-#include <isa-l/crc64.h>
-
 #include <algorithm>
+
+#include "calibration/base/crc64.hpp"
 
 namespace birdseye::wire {
 
@@ -21,7 +21,7 @@ std::string name_of(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 std::uint64_t checksum(std::span<const std::uint8_t> bytes, std::uint64_t crc) {
-  return ~crc64_ecma_norm(~crc, bytes.data(), bytes.size());  // it inverts on the way in and out; the protocol does not
+  return ~crc64_ecma(bytes, ~crc);  // it inverts on the way in and out; the protocol does not
 }
 
 std::uint64_t stamp_from(DeviceTime time) {
