@@ -40,6 +40,9 @@ cv::Mat grey_to_follow(const wire::VideoFrame& frame) {
 }
 
 std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
+  double least = 0, most = 0;
+  cv::minMaxLoc(grey, &least, &most);
+  if (least == most) return {};  // no signal, or grey all over: to look for them takes longest where there are none
   cv::Mat mask = field_mask(grey.size());
   cv::Mat glare = grey > 240;
   cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
