@@ -7,12 +7,8 @@
 #include <boost/context/protected_fixedsize_stack.hpp>
 #include <cstddef>
 #include <limits>
-#include <map>
-#include <optional>
 #include <random>
-#include <set>
 #include <stdexcept>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -28,8 +24,6 @@ constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 struct Fiber {
   std::uint64_t id = 0;
   context::fiber here;  ///< where it goes on, while it does not run
-  std::int64_t due_ns = kNever;
-  const void* waits_for = nullptr;
   bool done = false;
 };
 
@@ -57,11 +51,18 @@ class VirtualTime final : public TimeKeeper {
   }
 
  private:
-  using Waiting = std::pair<std::int64_t, std::uint64_t>;  ///< when it is due, and which fiber
+  struct Waiting {
+    std::int64_t due_ns = kNever;
+    const void* thing = nullptr;  ///< that it waits to be told of
+    std::shared_ptr<Fiber> fiber;
+    [[nodiscard]] bool before(const Waiting& other) const {
+      return due_ns != other.due_ns ? due_ns < other.due_ns : fiber->id < other.fiber->id;
+    }
+  };
 
   std::shared_ptr<Fiber> make(std::function<void()> work);
   void wait(const void* thing, std::int64_t until_ns);
-  void wake(const std::shared_ptr<Fiber>& fiber);
+  void wake(std::vector<Waiting>::iterator one);
   bool advance();
 
   VirtualTimeSettings settings_;
@@ -72,8 +73,9 @@ class VirtualTime final : public TimeKeeper {
   context::fiber scheduler_;  ///< where it goes on, while a fiber runs
   std::shared_ptr<Fiber> running_;
   std::vector<std::shared_ptr<Fiber>> ready_;
-  std::map<Waiting, std::shared_ptr<Fiber>> due_;  ///< all that wait, those that wait for ever last
-  std::unordered_map<const void*, std::vector<std::shared_ptr<Fiber>>> told_;  ///< those that wait for a thing, in turn
+  /// In the order in which they began to wait. It is searched at each switch: a program has a dozen threads, and trees
+  /// and tables take longer.
+  std::vector<Waiting> waiting_;
 };
 
 class VirtualThread final : public TimeKeeper::Thread {
@@ -107,39 +109,39 @@ std::shared_ptr<TimeKeeper::Thread> VirtualTime::start(std::function<void()> wor
 }
 
 void VirtualTime::wait(const void* thing, std::int64_t until_ns) {
-  const std::shared_ptr<Fiber> one = running_;
   reads_ = 0;
-  one->due_ns = until_ns;
-  one->waits_for = thing;
-  due_.emplace(Waiting(until_ns, one->id), one);
-  if (thing != nullptr) told_[thing].push_back(one);
+  waiting_.push_back({until_ns, thing, std::move(running_)});
   scheduler_ = std::move(scheduler_).resume();
 }
 
-void VirtualTime::wake(const std::shared_ptr<Fiber>& fiber) {
-  due_.erase(Waiting(fiber->due_ns, fiber->id));
-  if (fiber->waits_for != nullptr) {
-    const auto waiting = told_.find(fiber->waits_for);
-    std::erase(waiting->second, fiber);
-    if (waiting->second.empty()) told_.erase(waiting);
-    fiber->waits_for = nullptr;
-  }
-  ready_.push_back(fiber);
+void VirtualTime::wake(std::vector<Waiting>::iterator one) {
+  ready_.push_back(std::move(one->fiber));
+  waiting_.erase(one);
 }
 
 void VirtualTime::tell(const void* thing, bool all) {
-  const auto waiting = told_.find(thing);
-  if (waiting == told_.end()) return;
-  const std::vector<std::shared_ptr<Fiber>> those =
-      all ? waiting->second : std::vector<std::shared_ptr<Fiber>>{waiting->second.front()};
-  for (const auto& fiber : those) wake(fiber);
+  for (auto one = waiting_.begin(); one != waiting_.end();) {
+    if (one->thing != thing) {
+      ++one;
+      continue;
+    }
+    const auto next = one - waiting_.begin();
+    wake(one);
+    if (!all) return;
+    one = waiting_.begin() + next;
+  }
 }
 
 /// To the next time that somebody waits for. False: nobody does.
 bool VirtualTime::advance() {
-  if (due_.empty() || due_.begin()->first.first == kNever) return false;
-  now_ns_ = std::max(now_ns_, due_.begin()->first.first);
-  while (!due_.empty() && due_.begin()->first.first <= now_ns_) wake(std::shared_ptr<Fiber>(due_.begin()->second));
+  const auto before = [](const Waiting& a, const Waiting& b) { return a.before(b); };
+  auto first = std::ranges::min_element(waiting_, before);
+  if (first == waiting_.end() || first->due_ns == kNever) return false;
+  now_ns_ = std::max(now_ns_, first->due_ns);
+  while (first != waiting_.end() && first->due_ns <= now_ns_) {
+    wake(first);
+    first = std::ranges::min_element(waiting_, before);
+  }
   return true;
 }
 
@@ -148,21 +150,21 @@ Result<VirtualTimeFigures> VirtualTime::run(std::function<void()> work) {
   while (!ready_.empty() || advance()) {
     // A library's distribution differs from one to the next; the generator is the standard's.
     const std::size_t chosen = ready_.size() > 1 ? random_() % ready_.size() : 0;
-    running_ = ready_[chosen];
+    running_ = std::move(ready_[chosen]);
     ready_.erase(ready_.begin() + static_cast<std::ptrdiff_t>(chosen));
     reads_ = 0;
     ++figures_.switches;
     constexpr std::uint64_t kPrime = 1'099'511'628'211U;  // FNV-1a
     figures_.order_hash = (figures_.order_hash ^ running_->id ^ static_cast<std::uint64_t>(now_ns_)) * kPrime;
-    running_->here = std::move(running_->here).resume();
+    Fiber& one = *running_;  // it is among those that wait once it comes back, or has ended and is still running_
+    one.here = std::move(one.here).resume();
   }
   running_.reset();
   figures_.elapsed_ns = now_ns_ - settings_.begins_monotonic_ns;
-  if (due_.empty()) return figures_;
-  std::size_t left = due_.size();
+  if (waiting_.empty()) return figures_;
   // To unwind their stacks would run destructors that wait for each other.
-  for (auto& [when, fiber] : due_) new context::fiber(std::move(fiber->here));
-  return Error{Errc::timeout, fmt::format("{} threads wait for each other, at {:.3f} s", left,
+  for (const Waiting& one : waiting_) new context::fiber(std::move(one.fiber->here));
+  return Error{Errc::timeout, fmt::format("{} threads wait for each other, at {:.3f} s", waiting_.size(),
                                           static_cast<double>(figures_.elapsed_ns) * 1e-9)};
 }
 
