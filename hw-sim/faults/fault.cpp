@@ -51,9 +51,12 @@ std::optional<std::int64_t> FaultTimeline::ends_ns(const Fault& fault) const {
 void FaultTimeline::advance(std::int64_t now_ns) {
   if (!zero_ns_) return;
   const std::size_t first = events_.size();
-  for (Entry& entry : entries_) {
-    if (entry.state == State::waiting && begins_ns(entry.fault) <= now_ns) {
+  for (std::size_t i = ended_; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    if (entry.state == State::waiting) {
+      if (begins_ns(entry.fault) > now_ns) break;  // nor do those after it
       entry.state = State::active;
+      begun_ = i + 1;
       events_.push_back({entry.fault.kind, target_, true, begins_ns(entry.fault)});
     }
     const auto ends = ends_ns(entry.fault);
@@ -62,19 +65,22 @@ void FaultTimeline::advance(std::int64_t now_ns) {
       events_.push_back({entry.fault.kind, target_, false, *ends});
     }
   }
+  while (ended_ < begun_ && entries_[ended_].state == State::over) ++ended_;
   std::stable_sort(events_.begin() + static_cast<std::ptrdiff_t>(first), events_.end(),
                    [](const FaultEvent& a, const FaultEvent& b) { return a.at_ns < b.at_ns; });
 }
 
 const Fault* FaultTimeline::active(FaultKind kind) const {
-  for (const Entry& entry : entries_) {
+  for (std::size_t i = ended_; i < begun_; ++i) {
+    const Entry& entry = entries_[i];
     if (entry.state == State::active && entry.fault.kind == kind) return &entry.fault;
   }
   return nullptr;
 }
 
 void FaultTimeline::done(FaultKind kind, std::int64_t now_ns) {
-  for (Entry& entry : entries_) {
+  for (std::size_t i = ended_; i < begun_; ++i) {
+    Entry& entry = entries_[i];
     if (entry.state != State::active || entry.fault.kind != kind || entry.fault.for_s) continue;
     entry.state = State::over;
     events_.push_back({kind, target_, false, now_ns});
@@ -85,10 +91,10 @@ void FaultTimeline::done(FaultKind kind, std::int64_t now_ns) {
 std::optional<std::int64_t> FaultTimeline::next_change_ns() const {
   std::optional<std::int64_t> next;
   if (!zero_ns_) return next;
-  for (const Entry& entry : entries_) {
-    if (entry.state == State::over) continue;
-    const auto change = entry.state == State::waiting ? std::optional(begins_ns(entry.fault)) : ends_ns(entry.fault);
-    if (change && (!next || *change < *next)) next = change;
+  if (begun_ < entries_.size()) next = begins_ns(entries_[begun_].fault);
+  for (std::size_t i = ended_; i < begun_; ++i) {
+    const auto ends = entries_[i].state == State::active ? ends_ns(entries_[i].fault) : std::nullopt;
+    if (ends && (!next || *ends < *next)) next = ends;
   }
   return next;
 }

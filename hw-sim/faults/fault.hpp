@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -98,7 +99,9 @@ class FaultTimeline {
   [[nodiscard]] std::int64_t begins_ns(const Fault& fault) const;
   [[nodiscard]] std::optional<std::int64_t> ends_ns(const Fault& fault) const;
 
-  std::vector<Entry> entries_;
+  std::vector<Entry> entries_;  ///< as they begin
+  // Those before ended_ are over, those from begun_ on wait: an hour has hundreds, and many ask at each measurement.
+  std::size_t ended_ = 0, begun_ = 0;
   FaultTarget target_ = FaultTarget::tracker;
   std::optional<std::int64_t> zero_ns_;
   std::vector<FaultEvent> events_;

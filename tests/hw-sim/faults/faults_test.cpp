@@ -1,5 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+
 #include "hw-sim/faults/fault_script.hpp"
 #include "hw-sim/faults/fault_table.hpp"
 #include "tests/support/scratch.hpp"
@@ -149,6 +155,46 @@ TEST(FaultTimeline, BeginsEndsAndTellsOfIt) {
   EXPECT_FALSE(events[2].begin);
   EXPECT_EQ(events[3].kind, FaultKind::saturated);
   EXPECT_EQ(events[3].at_ns, 6'500'000'000);
+}
+
+/// Held against all of the script at each step: short faults among long ones, several of a kind, some at one time.
+TEST(FaultTimeline, HoldsWhatTheScriptSaysHoweverManyThereAre) {
+  std::mt19937_64 random(7);
+  const auto up_to = [&random](std::uint64_t count) { return static_cast<std::int64_t>(random() % count); };
+  constexpr std::array kKinds{FaultKind::saturated, FaultKind::unplug, FaultKind::silence};
+  std::vector<Fault> script(200);
+  for (Fault& fault : script) {
+    fault.kind = kKinds.at(static_cast<std::size_t>(up_to(kKinds.size())));
+    fault.at_s = static_cast<double>(up_to(600));
+    fault.for_s = static_cast<double>(1 + (up_to(10) == 0 ? up_to(100) : up_to(4)));
+  }
+  FaultTimeline timeline(script, FaultTarget::tracker);
+  timeline.begin(0);
+  std::ranges::stable_sort(script, {}, &Fault::at_s);
+  std::size_t told = 0;
+  for (std::int64_t now_s = 0; now_s < 800; now_s += up_to(4)) {
+    timeline.advance(now_s * 1'000'000'000);
+    told += timeline.take_events().size();
+    const auto now = static_cast<double>(now_s);
+    std::size_t changes = 0;
+    std::optional<double> next_s;
+    for (const Fault& fault : script) {
+      for (const double change_s : {fault.at_s, fault.at_s + *fault.for_s}) {
+        if (change_s <= now) ++changes;
+        if (change_s > now) next_s = std::min(next_s.value_or(change_s), change_s);
+      }
+    }
+    EXPECT_EQ(told, changes) << now_s;
+    EXPECT_EQ(timeline.next_change_ns().value_or(-1), next_s ? std::llround(*next_s * 1e9) : -1) << now_s;
+    for (const FaultKind kind : kKinds) {
+      const auto holds = std::ranges::find_if(script, [&](const Fault& fault) {
+        return fault.kind == kind && fault.at_s <= now && now < fault.at_s + *fault.for_s;
+      });
+      const Fault* const active = timeline.active(kind);
+      const auto ends_s = [](const Fault& fault) { return fault.at_s + *fault.for_s; };
+      EXPECT_EQ(active != nullptr ? ends_s(*active) : -1, holds != script.end() ? ends_s(*holds) : -1) << now_s;
+    }
+  }
 }
 
 }  // namespace
