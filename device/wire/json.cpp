@@ -1,6 +1,8 @@
 #include "device/wire/json.hpp"
 
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 namespace birdseye::wire {
 
@@ -58,26 +60,28 @@ std::string text_of(const json& value) {
 }
 
 void to_json(json& out, const FrameInfo& info) {
-  json pose{{"kind", to_string(info.pose.kind)},
-            {"reason", info.pose.reason},
-            {"sigma_mm", info.pose.position_sigma_mm},
-            {"time_sigma_ns", info.pose.time_sigma.ns},
-            {"speed_mm_s", info.pose.speed_mm_s},
-            {"age_ns", info.pose.age.ns},
-            {"tracker_from_scope", nullptr}};
-  if (info.pose.tracker_from_sensor) {
-    const Eigen::Matrix4d m = info.pose.tracker_from_sensor->matrix();
-    json rows = json::array();
-    for (int i = 0; i < 16; ++i) rows.push_back(m(i / 4, i % 4));
-    pose["tracker_from_scope"] = rows;
-  }
-  out = {{"sequence", info.sequence},
-         {"acquired_ns", info.acquired.ns},
-         {"acquired_sigma_ns", info.acquired_sigma.ns},
-         {"arrived_ns", info.arrived.ns},
-         {"frames_dropped", info.frames_dropped},
-         {"pose", pose}};
+  // Member by member: of a list of them each would be copied, and there is one with every frame.
+  out = json::object();
+  out["sequence"] = info.sequence;
+  out["acquired_ns"] = info.acquired.ns;
+  out["acquired_sigma_ns"] = info.acquired_sigma.ns;
+  out["arrived_ns"] = info.arrived.ns;
+  out["frames_dropped"] = info.frames_dropped;
   if (info.latency) out["latency_ns"] = info.latency->ns;
+  json& pose = out["pose"];
+  pose["kind"] = to_string(info.pose.kind);
+  pose["reason"] = info.pose.reason;
+  pose["sigma_mm"] = info.pose.position_sigma_mm;
+  pose["time_sigma_ns"] = info.pose.time_sigma.ns;
+  pose["speed_mm_s"] = info.pose.speed_mm_s;
+  pose["age_ns"] = info.pose.age.ns;
+  json& rows = pose["tracker_from_scope"];
+  if (!info.pose.tracker_from_sensor) return;
+  const Eigen::Matrix4d m = info.pose.tracker_from_sensor->matrix();
+  std::vector<json> numbers;
+  numbers.reserve(16);
+  for (int i = 0; i < 16; ++i) numbers.emplace_back(m(i / 4, i % 4));
+  rows = std::move(numbers);
 }
 
 void from_json(const json& in, FrameInfo& info) {

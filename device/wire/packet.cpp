@@ -1,7 +1,6 @@
 #include "device/wire/packet.hpp"
 
 #include <igtlStatusMessage.h>
-#include <igtlStringMessage.h>
 #include <igtl_header.h>
 #include <igtl_image.h>
 #include <igtl_tdata.h>
@@ -30,20 +29,6 @@ void append(std::vector<std::uint8_t>& out, igtl::MessageBase& message) {
   out.insert(out.end(), bytes, bytes + message.GetPackSize());
 }
 
-void append_string(std::vector<std::uint8_t>& out, const char* device, const nlohmann::json& json, DeviceTime time) {
-  const auto message = igtl::StringMessage::New();
-  message->SetDeviceName(device);
-  stamp(*message, time);
-  message->SetString(text_of(json).c_str());
-  append(out, *message);
-}
-
-Packet string_packet(const char* device, const nlohmann::json& json, DeviceTime time) {
-  auto out = std::make_shared<std::vector<std::uint8_t>>();
-  append_string(*out, device, json, time);
-  return {Packet::Kind::other, std::move(out), nullptr, {}};
-}
-
 void append_header(std::vector<std::uint8_t>& out, const char* type, const char* device, DeviceTime time,
                    std::uint64_t body_bytes, std::uint64_t crc, std::uint16_t version = 1) {
   igtl_header header{};
@@ -56,6 +41,25 @@ void append_header(std::vector<std::uint8_t>& out, const char* type, const char*
   igtl_header_convert_byte_order(&header);
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(&header);
   out.insert(out.end(), bytes, bytes + sizeof header);
+}
+
+/// By hand: the library takes a checksum a byte at a time.
+void append_string(std::vector<std::uint8_t>& out, const char* device, const nlohmann::json& json, DeviceTime time) {
+  constexpr std::uint8_t kAscii = 3;  // as IANA numbers encodings
+  const std::string text = text_of(json);
+  const auto size = static_cast<std::uint16_t>(text.size());
+  const std::array<std::uint8_t, 4> lead{0, kAscii, static_cast<std::uint8_t>(size >> 8U),
+                                         static_cast<std::uint8_t>(size & 0xFFU)};
+  const std::span body(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
+  append_header(out, "STRING", device, time, lead.size() + body.size(), checksum(body, checksum(lead)));
+  out.insert(out.end(), lead.begin(), lead.end());
+  out.insert(out.end(), body.begin(), body.end());
+}
+
+Packet string_packet(const char* device, const nlohmann::json& json, DeviceTime time) {
+  auto out = std::make_shared<std::vector<std::uint8_t>>();
+  append_string(*out, device, json, time);
+  return {Packet::Kind::other, std::move(out), nullptr, {}};
 }
 
 /// An IMAGE's header and that of its body, for pixels that are sent from where they are: the library would copy them

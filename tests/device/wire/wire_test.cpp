@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <igtlStringMessage.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -110,6 +111,21 @@ TEST(Wire, WhatAnInstrumentSaysInAnotherEncodingIsSentAllTheSame) {
   ends.server->publish(pack(health, {1}));
   const auto told = std::get<Health>(**ends.client->next(Deadline::after(Duration::from_ms(5000))));
   EXPECT_EQ(told.instruments.at(0).identity.at("card"), "Endoskop f\uFFFDr \uFFFD");
+}
+
+/// What is packed by hand, against the library that others unpack it with.
+TEST(Wire, AStringIsToTheByteAsTheLibraryPacksIt) {
+  for (const std::size_t size : {0U, 1U, 300U, 20000U}) {
+    const Doubt doubt{{1'234'567'890'123}, "scope", std::string(size, 'x') + "\u00e9"};
+    const auto message = igtl::StringMessage::New();
+    message->SetDeviceName(kDoubtDevice);
+    const std::uint64_t stamp = stamp_from(doubt.acquired);
+    message->SetTimeStamp(static_cast<unsigned>(stamp >> 32U), static_cast<unsigned>(stamp & 0xFFFFFFFFU));
+    message->SetString(text_of(doubt).c_str());
+    message->Pack();
+    const auto* bytes = static_cast<const std::uint8_t*>(message->GetPackPointer());
+    EXPECT_EQ(pack(doubt).bytes(), std::vector<std::uint8_t>(bytes, bytes + message->GetPackSize())) << size;
+  }
 }
 
 TEST(Wire, ATransformIsNamedByItsBirdWithinWhatTheProtocolHasRoomFor) {
