@@ -41,6 +41,9 @@ function(birdseye_executable name)
   target_link_options(${name} PRIVATE -pie -Wl,-z,relro -Wl,-z,now)
 endfunction()
 
+# The key of the machine on which tests run: never that of whoever runs them.
+set(BIRDSEYE_TEST_IDENTITY ${CMAKE_BINARY_DIR}/test-identity)
+
 # One executable of GoogleTests; LABEL is unit, hw, gl or e2e. Those of e2e run the cart in real time, each alone.
 function(birdseye_test name)
   cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
@@ -62,7 +65,8 @@ function(birdseye_test name)
   endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
     PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT} ${alone}
-      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}")
+      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}"
+      ENVIRONMENT_MODIFICATION "BIRDSEYE_IDENTITY=set:${BIRDSEYE_TEST_IDENTITY}")
 endfunction()
 
 # A program that gives bytes to one parser: main is libFuzzer's, which clang alone has. Built by its name or with all of its

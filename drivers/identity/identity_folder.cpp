@@ -1,0 +1,31 @@
+#include "drivers/identity/identity_folder.hpp"
+
+#include <cstdlib>
+#include <string>
+
+namespace birdseye {
+
+namespace {
+
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value != nullptr ? value : "";
+}
+
+}  // namespace
+
+Result<std::filesystem::path> identity_folder() {
+  namespace fs = std::filesystem;
+  if (const std::string given = environment("BIRDSEYE_IDENTITY"); !given.empty()) return fs::path(given);
+  // Several folders come with colons between them.
+  std::string state = environment("STATE_DIRECTORY");
+  if (!state.empty()) return fs::path(state.substr(0, state.find(':'))) / "identity";
+  if (const std::string config = environment("XDG_CONFIG_HOME"); !config.empty())
+    return fs::path(config) / "birdseye" / "identity";
+  if (const std::string home = environment("HOME"); !home.empty())
+    return fs::path(home) / ".config" / "birdseye" / "identity";
+  return Error{Errc::not_found,
+               "there is no folder for this machine's key: HOME is not set; set BIRDSEYE_IDENTITY to a folder"};
+}
+
+}  // namespace birdseye

@@ -1,0 +1,101 @@
+#include "drivers/identity/known_keys.hpp"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "drivers/system/durable.hpp"
+
+namespace birdseye {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+bool is_word(std::string_view name) {
+  return !name.empty() && name.size() <= 255 && name.front() != '#' &&
+         std::none_of(name.begin(), name.end(),
+                      [](char c) { return static_cast<unsigned char>(c) <= ' ' || c == 127; });
+}
+
+}  // namespace
+
+std::string KnownKeys::objection(const Machine& machine) const {
+  if (!is_word(machine.name))
+    return fmt::format("\"{}\" is no name of a machine: give one word without spaces", machine.name);
+  for (const Machine& known : machines_) {
+    if (known.name == machine.name && known.key != machine.key)
+      return fmt::format("another key has the name {} already: give another name", machine.name);
+  }
+  return {};
+}
+
+Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Machine>& own) {
+  KnownKeys out(folder / "known");
+  std::error_code ignored;
+  if (own) out.machines_.push_back(*own);
+  if (!fs::exists(out.file_, ignored)) return out;
+  struct stat status {};
+  if (::stat(out.file_.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    return Error{Errc::bad_value, fmt::format("{}: others than its owner may say in it which machines are known: chmod "
+                                              "644 {}, and look whether each line is yours",
+                                              out.file_.string(), out.file_.string())};
+  }
+  std::ifstream in(out.file_);
+  std::string line;
+  int number = 1;
+  for (; std::getline(in, line); ++number) {
+    if (line.empty() || line.front() == '#') continue;
+    std::istringstream words(line);
+    Machine machine;
+    std::string hex, more;
+    words >> machine.name >> hex;
+    const auto key = PublicKey::of_hex(hex);
+    if (key) machine.key = *key;
+    std::string why = key ? out.objection(machine) : "is no machine's name and key";
+    if (words >> more) why = "is more than a machine's name and key";
+    if (!why.empty())
+      return Error{Errc::bad_format,
+                   fmt::format("{}: line {}: {}; mend or remove the line", out.file_.string(), number, why)};
+    out.machines_.push_back(std::move(machine));
+  }
+  if (in.eof()) return out;
+  return Error{Errc::unreadable, fmt::format("{}: cannot be read; check its permissions", out.file_.string())};
+}
+
+std::optional<std::string> KnownKeys::name_of(const PublicKey& key) const {
+  const auto found = std::find_if(machines_.begin(), machines_.end(), [&](const Machine& m) { return m.key == key; });
+  if (found == machines_.end()) return std::nullopt;
+  return found->name;
+}
+
+Result<void> KnownKeys::add(const std::string& name, const PublicKey& key) {
+  if (name_of(key)) return {};
+  const Machine machine{name, key};
+  if (const std::string why = objection(machine); !why.empty()) return Error{Errc::bad_value, why};
+  if (auto made = make_folder_durably(file_.parent_path()); !made) return made;
+  std::string text;
+  if (std::ifstream in(file_); in) text.assign(std::istreambuf_iterator<char>(in), {});
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  text += fmt::format("{} {}\n", name, key.hex());
+  const fs::path part = file_.string() + ".part";
+  std::ofstream out(part, std::ios::binary | std::ios::trunc);
+  out << text;
+  out.close();
+  std::error_code failed;
+  fs::permissions(part, fs::perms::owner_read | fs::perms::owner_write, failed);  // whatever new files are given
+  if (!out || failed)
+    return Error{Errc::unreadable,
+                 fmt::format("{}: cannot be written; check the folder and its permissions", file_.string())};
+  if (auto placed = replace_durably(part, file_); !placed) return placed;
+  machines_.push_back(machine);
+  return {};
+}
+
+}  // namespace birdseye

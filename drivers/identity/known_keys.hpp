@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "drivers/identity/public_key.hpp"
+
+namespace birdseye {
+
+/// The machines whose keys this one knows, by names that its people gave them: the text file `known` beside its own
+/// key, a line a machine, with its name and its key in hexadecimal digits. Its own key is known without a line.
+class KnownKeys {
+ public:
+  struct Machine {
+    std::string name;
+    PublicKey key;
+  };
+
+  /// Of the folder, where there may be no such file. own: this machine's key, or nothing where it has none yet. Refuses
+  /// a line that is damaged, by its number, and a file that others may change.
+  static Result<KnownKeys> read(const std::filesystem::path& folder, const std::optional<Machine>& own);
+
+  /// The name of the machine with this key; nothing where it is unknown.
+  [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const;
+  /// Also into the file, and onto the disk. A key that is known stays with its name. Refuses a name that is no single
+  /// word, and one that another key has.
+  Result<void> add(const std::string& name, const PublicKey& key);
+  [[nodiscard]] const std::vector<Machine>& machines() const { return machines_; }
+
+ private:
+  explicit KnownKeys(std::filesystem::path file) : file_(std::move(file)) {}
+
+  /// Why the machine cannot be entered; empty where it can.
+  [[nodiscard]] std::string objection(const Machine& machine) const;
+
+  std::filesystem::path file_;
+  std::vector<Machine> machines_;  ///< this one first, where it has a key
+};
+
+}  // namespace birdseye

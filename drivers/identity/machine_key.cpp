@@ -1,0 +1,158 @@
+#include "drivers/identity/machine_key.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/bio.h>
+#include <openssl/err.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <new>
+#include <system_error>
+
+#include "drivers/system/durable.hpp"
+#include "drivers/system/unique_fd.hpp"
+
+namespace birdseye {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using Bio = std::unique_ptr<BIO, decltype(&BIO_free)>;
+
+constexpr std::size_t kMostBytes = 4096;  // of a key's file: one of Ed25519 has 119
+
+std::shared_ptr<EVP_PKEY> owned(EVP_PKEY* key) {
+  return {key, &EVP_PKEY_free};
+}
+
+Error cannot(const fs::path& path, const char* what) {
+  return {Errc::unreadable,
+          fmt::format("{}: {} ({}); check the folder and its permissions, or set BIRDSEYE_IDENTITY to another folder",
+                      path.string(), what, std::strerror(errno))};
+}
+
+/// The folder, made where there is none, and its owner's alone.
+Result<void> own_folder(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::exists(folder, ignored)) {
+    if (auto made = make_folder_durably(folder); !made) return made;
+    if (::chmod(folder.c_str(), S_IRWXU) != 0) return cannot(folder, "cannot be made its owner's alone");
+  }
+  struct stat status {};
+  if (::stat(folder.c_str(), &status) != 0) return cannot(folder, "cannot be read");
+  if ((status.st_mode & (S_IWGRP | S_IWOTH)) == 0) return {};
+  return Error{Errc::bad_value, fmt::format("{}: others than its owner may change the keys in it: chmod 700 {}",
+                                            folder.string(), folder.string())};
+}
+
+bool write_all(int fd, std::span<const char> bytes) {
+  while (!bytes.empty()) {
+    const auto written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno != EINTR) return false;
+    if (written > 0) bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return true;
+}
+
+/// Makes a key and puts it in its place, unless another program was first: then that one's stays.
+Result<void> make_key(const fs::path& file) {
+  const auto key = owned(EVP_PKEY_Q_keygen(nullptr, nullptr, "ED25519"));
+  const Bio text(BIO_new(BIO_s_secmem()), &BIO_free);
+  if (!key || !text || PEM_write_bio_PKCS8PrivateKey(text.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) != 1)
+    throw std::bad_alloc();
+  char* begin = nullptr;
+  const auto size = static_cast<std::size_t>(BIO_get_mem_data(text.get(), &begin));
+  std::string part = file.string() + "-XXXXXX";
+  {
+    const UniqueFd fd(::mkstemp(part.data()));  // for its owner alone
+    if (!fd) return cannot(file, "cannot be made");
+    if (!write_all(fd.get(), {begin, size})) {
+      auto error = cannot(file, "cannot be written");
+      ::unlink(part.c_str());
+      return error;
+    }
+  }
+  auto placed = sync_file(part);
+  if (placed && ::link(part.c_str(), file.c_str()) != 0 && errno != EEXIST) placed = cannot(file, "cannot be made");
+  ::unlink(part.c_str());
+  return placed ? sync_folder(file.parent_path()) : placed;
+}
+
+/// A key with a password is none that a service could use: nobody is asked.
+int no_password(char* /*to*/, int /*size*/, int /*writing*/, void* /*user*/) {
+  return -1;
+}
+
+Result<std::shared_ptr<EVP_PKEY>> read_key(const fs::path& file) {
+  const UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (!fd || ::fstat(fd.get(), &status) != 0) return cannot(file, "cannot be read");
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    return Error{
+        Errc::bad_value,
+        fmt::format("{}: others than its owner may read this machine's key: chmod 600 {}; if somebody may have "
+                    "read it, remove it, and another is made",
+                    file.string(), file.string())};
+  }
+  std::array<char, kMostBytes> bytes{};
+  const auto size = ::read(fd.get(), bytes.data(), bytes.size());
+  if (size < 0) return cannot(file, "cannot be read");
+  const Bio text(BIO_new_mem_buf(bytes.data(), static_cast<int>(size)), &BIO_free);
+  auto key = owned(text ? PEM_read_bio_PrivateKey(text.get(), nullptr, &no_password, nullptr) : nullptr);
+  OPENSSL_cleanse(bytes.data(), bytes.size());
+  ERR_clear_error();
+  if (key && EVP_PKEY_get_id(key.get()) == EVP_PKEY_ED25519) return key;
+  return Error{Errc::bad_format,
+               fmt::format("{}: is no key of Ed25519 without a password, in PEM; remove it, and another is made: what "
+                           "the former one signed is then of an unknown machine",
+                           file.string())};
+}
+
+}  // namespace
+
+Result<MachineKey> MachineKey::open(const fs::path& folder) {
+  if (auto own = own_folder(folder); !own) return own.error();
+  const fs::path file = folder / "key.pem";
+  std::error_code ignored;
+  if (!fs::exists(fs::symlink_status(file, ignored))) {
+    if (auto made = make_key(file); !made) return made.error();
+  }
+  auto key = read_key(file);
+  if (!key) return key.error();
+  PublicKey public_key;
+  std::size_t size = public_key.bytes.size();
+  if (EVP_PKEY_get_raw_public_key(key->get(), public_key.bytes.data(), &size) != 1) throw std::bad_alloc();
+  return MachineKey(*std::move(key), public_key, file);
+}
+
+Signature MachineKey::sign(std::span<const std::uint8_t> bytes) const {
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
+  Signature signature{};
+  std::size_t size = signature.size();
+  if (!context || EVP_DigestSignInit(context.get(), nullptr, nullptr, nullptr, key_.get()) != 1 ||
+      EVP_DigestSign(context.get(), signature.data(), &size, bytes.data(), bytes.size()) != 1)
+    throw std::bad_alloc();
+  return signature;
+}
+
+std::string machine_name() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return "unnamed";
+  std::string out(name.data());
+  // It stands in lines of text, as a word.
+  std::replace_if(
+      out.begin(), out.end(), [](char c) { return c <= ' ' || c >= 127; }, '_');
+  return out.empty() ? "unnamed" : out;
+}
+
+}  // namespace birdseye

@@ -1,0 +1,102 @@
+#include "drivers/identity/known_keys.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/scratch.hpp"
+#include "tests/support/synced_files.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::Scratch;
+
+PublicKey key_of(std::uint8_t first) {
+  PublicKey key;
+  key.bytes[0] = first;
+  return key;
+}
+
+const KnownKeys::Machine kOwn{"theatre-3", key_of(1)};
+
+std::string error_of(const Scratch& folder) {
+  const auto known = KnownKeys::read(folder.path(), kOwn);
+  return known ? "" : known.error().what;
+}
+
+TEST(KnownKeys, KnowsItsOwnAndNoOtherWithoutAFile) {
+  const Scratch folder;
+  const auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known) << known.error().what;
+  EXPECT_EQ(known->name_of(key_of(1)), "theatre-3");
+  EXPECT_FALSE(known->name_of(key_of(2)));
+  const auto of_nobody = KnownKeys::read(folder.path(), {});
+  ASSERT_TRUE(of_nobody);
+  EXPECT_FALSE(of_nobody->name_of(key_of(1)));
+  EXPECT_FALSE(of_nobody->name_of(PublicKey{}));
+}
+
+TEST(KnownKeys, ReadsWhatWasAddedAndLeavesRemarks) {
+  const Scratch folder;
+  (void)folder.file("known", "# carts\n\ncart-1 " + key_of(2).hex());
+  fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
+  auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known) << known.error().what;
+  testing::forget_synced();
+  ASSERT_TRUE(known->add("cart-2", key_of(3)));
+  EXPECT_TRUE(testing::is_synced(folder / "known"));
+  EXPECT_TRUE(testing::is_synced(folder.path()));
+  EXPECT_EQ(testing::contents_of(folder / "known"),
+            "# carts\n\ncart-1 " + key_of(2).hex() + "\ncart-2 " + key_of(3).hex() + "\n");
+  const auto again = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(again) << again.error().what;
+  for (const auto& names : {*known, *again}) {
+    EXPECT_EQ(names.name_of(key_of(1)), "theatre-3");
+    EXPECT_EQ(names.name_of(key_of(2)), "cart-1");
+    EXPECT_EQ(names.name_of(key_of(3)), "cart-2");
+    EXPECT_EQ(names.machines().size(), 3);
+  }
+}
+
+TEST(KnownKeys, AddsNoKeyTwiceNoNameOfAnotherKeyAndNoNameThatIsNoWord) {
+  const Scratch folder;
+  auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known);
+  ASSERT_TRUE(known->add("cart-1", key_of(2)));
+  ASSERT_TRUE(known->add("another", key_of(2)));
+  EXPECT_EQ(known->name_of(key_of(2)), "cart-1");
+  for (const char* name : {"cart-1", "theatre-3"}) {
+    const auto added = known->add(name, key_of(4));
+    ASSERT_FALSE(added);
+    EXPECT_NE(added.error().what.find("another key has the name"), std::string::npos) << added.error().what;
+  }
+  for (const char* name : {"", "two words", "line\nbreak", "#remark"})
+    EXPECT_FALSE(known->add(name, key_of(4))) << name;
+  EXPECT_EQ(testing::contents_of(folder / "known"), "cart-1 " + key_of(2).hex() + "\n");
+}
+
+TEST(KnownKeys, RefusesADamagedLineByItsNumber) {
+  const std::string hex = key_of(2).hex();
+  for (const std::string& line : {std::string("cart-1"), "cart-1 " + hex.substr(1), "cart-1 x" + hex.substr(1),
+                                  "cart-1 " + hex + " more", "theatre-3 " + hex}) {
+    const Scratch folder;
+    (void)folder.file("known", "# carts\n" + line + "\ncart-2 " + key_of(3).hex() + "\n");
+    fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
+    EXPECT_NE(error_of(folder).find("known: line 2: "), std::string::npos) << line << ": " << error_of(folder);
+  }
+}
+
+TEST(KnownKeys, RefusesAFileThatOthersMayChange) {
+  const Scratch folder;
+  (void)folder.file("known", "cart-1 " + key_of(2).hex() + "\n");
+  for (const fs::perms more : {fs::perms::group_write, fs::perms::others_write}) {
+    fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write | more);
+    EXPECT_NE(error_of(folder).find("known: others than its owner may say"), std::string::npos) << error_of(folder);
+  }
+  fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_read);
+  EXPECT_EQ(error_of(folder), "");
+}
+
+}  // namespace
+}  // namespace birdseye
