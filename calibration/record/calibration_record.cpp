@@ -10,6 +10,7 @@
 #include "calibration/base/nesting.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/round_field_json.hpp"
+#include "calibration/record/sha256.hpp"
 
 namespace birdseye::calibration {
 
@@ -17,7 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kRecordFormat = "birdseye calibration record";
+constexpr const char* kChecksum = "checksum";
+constexpr const char* kSigned = "signed";
 
 template <typename Matrix>
 Json rows_of(const Matrix& matrix) {
@@ -203,6 +205,21 @@ CalibrationRecord record_of(const Json& json) {
   return record;
 }
 
+Json json_of(const CalibrationRecord& record) {
+  Json json{{"format", kRecordFormat}, {"version", CalibrationRecord::kVersion}, {"scope", record.scope}};
+  json["hardware"] = {{"tracker", record.tracker}, {"camera", record.camera}};
+  if (record.lens) json["lens"] = json_of(*record.lens);
+  if (record.hand_eye) json["hand_eye"] = json_of(*record.hand_eye);
+  if (record.tip) json["tip"] = json_of(*record.tip);
+  if (record.latency) json["latency"] = json_of(*record.latency);
+  return json;
+}
+
+std::string with_checksum(Json json) {
+  json[kChecksum] = checksum_of(json.dump());
+  return json.dump(2) + "\n";
+}
+
 }  // namespace
 
 bool CalibrationRecord::set_lens(LensEntry entry) {
@@ -214,17 +231,26 @@ bool CalibrationRecord::set_lens(LensEntry entry) {
 }
 
 std::string record_text(const CalibrationRecord& record) {
-  Json json{{"format", kRecordFormat}, {"version", CalibrationRecord::kVersion}, {"scope", record.scope}};
-  json["hardware"] = {{"tracker", record.tracker}, {"camera", record.camera}};
-  if (record.lens) json["lens"] = json_of(*record.lens);
-  if (record.hand_eye) json["hand_eye"] = json_of(*record.hand_eye);
-  if (record.tip) json["tip"] = json_of(*record.tip);
-  if (record.latency) json["latency"] = json_of(*record.latency);
-  json["checksum"] = checksum_of(json.dump());
-  return json.dump(2) + "\n";
+  return with_checksum(json_of(record));
+}
+
+std::string record_text(const CalibrationRecord& record, const FileSignature& signature) {
+  Json json = json_of(record);
+  json[kSigned] = json_of_signature(signature);
+  return with_checksum(std::move(json));
+}
+
+std::string signed_sha256(const CalibrationRecord& record) {
+  return sha256_of(json_of(record).dump());
 }
 
 Result<CalibrationRecord> parse_record(const std::string& text) {
+  auto read = parse_signed_record(text);
+  if (!read) return read.error();
+  return std::move(read->record);
+}
+
+Result<SignedRecord> parse_signed_record(const std::string& text) {
   const Json json = nests_too_deeply(text, Notation::json) ? Json() : Json::parse(text, nullptr, false);
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kRecordFormat)
     return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
@@ -233,14 +259,18 @@ Result<CalibrationRecord> parse_record(const std::string& text) {
                                                json.value("version", Json()).dump(), CalibrationRecord::kVersion)};
   }
   Json told = json;
-  told.erase("checksum");
-  const Json checksum = json.value("checksum", Json());
+  told.erase(kChecksum);
+  const Json checksum = json.value(kChecksum, Json());
   if (!checksum.is_string() || !has_checksum(told.dump(), checksum.get<std::string>())) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
   }
   try {
-    return record_of(json);
+    SignedRecord out{record_of(json), "", std::nullopt, checksum.get<std::string>().starts_with("crc64")};
+    if (told.contains(kSigned)) out.signature = signature_of_json(told.at(kSigned));
+    told.erase(kSigned);
+    out.sha256 = sha256_of(told.dump());
+    return out;
   } catch (const std::exception& problem) {
     return Error{Errc::bad_value, fmt::format("the calibration record makes no sense: {}", problem.what())};
   }

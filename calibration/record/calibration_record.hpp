@@ -9,6 +9,7 @@
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/round_field.hpp"
 #include "calibration/geometry/transform.hpp"
+#include "calibration/record/file_signature.hpp"
 #include "calibration/record/identity.hpp"
 
 namespace birdseye::calibration {
@@ -81,9 +82,25 @@ struct CalibrationRecord {
   bool set_lens(LensEntry entry);
 };
 
+/// Signed by nobody.
 std::string record_text(const CalibrationRecord& record);
 /// Refuses what is no calibration record, a later version, a checksum that does not fit, and numbers that make no
-/// sense.
+/// sense. Who signed it is not asked.
 Result<CalibrationRecord> parse_record(const std::string& text);
+
+inline constexpr const char* kRecordFormat = "birdseye calibration record";
+/// What a record's signature is over: all of its text but white space, the signature itself and the checksum.
+std::string signed_sha256(const CalibrationRecord& record);
+std::string record_text(const CalibrationRecord& record, const FileSignature& signature);
+
+/// A record, and who says that they wrote it.
+struct SignedRecord {
+  CalibrationRecord record;
+  std::string sha256;                      ///< signed_sha256(), of the text
+  std::optional<FileSignature> signature;  ///< empty: it is signed by nobody
+  bool of_010 = false;                     ///< as 0.1.0 wrote it, which signed nothing
+};
+/// As parse_record().
+Result<SignedRecord> parse_signed_record(const std::string& text);
 
 }  // namespace birdseye::calibration

@@ -69,6 +69,12 @@ Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Ma
   return Error{Errc::unreadable, fmt::format("{}: cannot be read; check its permissions", out.file_.string())};
 }
 
+KnownKeys KnownKeys::of_own(const Machine& own) {
+  KnownKeys out{fs::path()};
+  out.machines_.push_back(own);
+  return out;
+}
+
 std::optional<std::string> KnownKeys::name_of(const PublicKey& key) const {
   const auto found = std::find_if(machines_.begin(), machines_.end(), [&](const Machine& m) { return m.key == key; });
   if (found == machines_.end()) return std::nullopt;
@@ -77,6 +83,7 @@ std::optional<std::string> KnownKeys::name_of(const PublicKey& key) const {
 
 Result<void> KnownKeys::add(const std::string& name, const PublicKey& key) {
   if (name_of(key)) return {};
+  if (file_.empty()) return Error{Errc::unsupported, "there is no file of known keys"};
   const Machine machine{name, key};
   if (const std::string why = objection(machine); !why.empty()) return Error{Errc::bad_value, why};
   if (auto made = make_folder_durably(file_.parent_path()); !made) return made;

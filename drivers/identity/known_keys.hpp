@@ -22,6 +22,8 @@ class KnownKeys {
   /// Of the folder, where there may be no such file. own: this machine's key, or nothing where it has none yet. Refuses
   /// a line that is damaged, by its number, and a file that others may change.
   static Result<KnownKeys> read(const std::filesystem::path& folder, const std::optional<Machine>& own);
+  /// This machine alone, and no file: none can be added.
+  static KnownKeys of_own(const Machine& own);
 
   /// The name of the machine with this key; nothing where it is unknown.
   [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const;

@@ -64,11 +64,24 @@ bool write_all(int fd, std::span<const char> bytes) {
   return true;
 }
 
+std::shared_ptr<EVP_PKEY> new_key() {
+  auto key = owned(EVP_PKEY_Q_keygen(nullptr, nullptr, "ED25519"));
+  if (!key) throw std::bad_alloc();
+  return key;
+}
+
+PublicKey public_half_of(EVP_PKEY* key) {
+  PublicKey out;
+  std::size_t size = out.bytes.size();
+  if (EVP_PKEY_get_raw_public_key(key, out.bytes.data(), &size) != 1) throw std::bad_alloc();
+  return out;
+}
+
 /// Makes a key and puts it in its place, unless another program was first: then that one's stays.
 Result<void> make_key(const fs::path& file) {
-  const auto key = owned(EVP_PKEY_Q_keygen(nullptr, nullptr, "ED25519"));
+  const auto key = new_key();
   const Bio text(BIO_new(BIO_s_secmem()), &BIO_free);
-  if (!key || !text || PEM_write_bio_PKCS8PrivateKey(text.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) != 1)
+  if (!text || PEM_write_bio_PKCS8PrivateKey(text.get(), key.get(), nullptr, nullptr, 0, nullptr, nullptr) != 1)
     throw std::bad_alloc();
   char* begin = nullptr;
   const auto size = static_cast<std::size_t>(BIO_get_mem_data(text.get(), &begin));
@@ -129,10 +142,14 @@ Result<MachineKey> MachineKey::open(const fs::path& folder) {
   }
   auto key = read_key(file);
   if (!key) return key.error();
-  PublicKey public_key;
-  std::size_t size = public_key.bytes.size();
-  if (EVP_PKEY_get_raw_public_key(key->get(), public_key.bytes.data(), &size) != 1) throw std::bad_alloc();
+  const PublicKey public_key = public_half_of(key->get());
   return MachineKey(*std::move(key), public_key, file);
+}
+
+MachineKey MachineKey::for_once() {
+  auto key = new_key();
+  const PublicKey public_key = public_half_of(key.get());
+  return {std::move(key), public_key, {}};
 }
 
 Signature MachineKey::sign(std::span<const std::uint8_t> bytes) const {
@@ -147,12 +164,15 @@ Signature MachineKey::sign(std::span<const std::uint8_t> bytes) const {
 
 std::string machine_name() {
   std::array<char, 256> name{};
-  if (::gethostname(name.data(), name.size() - 1) != 0) return "unnamed";
-  std::string out(name.data());
-  // It stands in lines of text, as a word.
+  if (::gethostname(name.data(), name.size() - 1) != 0) return machine_word("");
+  return machine_word(name.data());
+}
+
+std::string machine_word(std::string name) {
   std::replace_if(
-      out.begin(), out.end(), [](char c) { return c <= ' ' || c >= 127; }, '_');
-  return out.empty() ? "unnamed" : out;
+      name.begin(), name.end(), [](char c) { return c <= ' ' || c >= 127; }, '_');
+  constexpr std::size_t kMost = 64;
+  return name.empty() ? "unnamed" : name.substr(0, kMost);
 }
 
 }  // namespace birdseye

@@ -20,6 +20,8 @@ class MachineKey {
   /// Of the folder, and made there where there is none: of two programs that make it at once both get the same. Refused
   /// where anybody else may read the key or change the folder.
   static Result<MachineKey> open(const std::filesystem::path& folder);
+  /// One that is kept nowhere, and has no file.
+  static MachineKey for_once();
 
   [[nodiscard]] const PublicKey& public_key() const { return public_key_; }
   [[nodiscard]] Signature sign(std::span<const std::uint8_t> bytes) const;
@@ -38,5 +40,7 @@ class MachineKey {
 
 /// What this machine is called.
 std::string machine_name();
+/// Somebody's name for a machine as a word, to stand in a line of text.
+std::string machine_word(std::string name);
 
 }  // namespace birdseye

@@ -1,0 +1,25 @@
+#include "calibration/record/file_signature.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace birdseye::calibration {
+
+std::string signed_words(std::string_view kind, std::string_view sha256, const FileSignature& signature) {
+  // As JSON, so that no machine's name can stand for another line.
+  return nlohmann::json{"birdseye signature 1", kind, sha256, signature.machine, signature.key, signature.utc}.dump(
+      -1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+nlohmann::json json_of_signature(const FileSignature& signature) {
+  return {{"machine", signature.machine},
+          {"key", signature.key},
+          {"utc", signature.utc},
+          {"signature", signature.signature}};
+}
+
+FileSignature signature_of_json(const nlohmann::json& json) {
+  return {json.at("machine").get<std::string>(), json.at("key").get<std::string>(), json.at("utc").get<std::string>(),
+          json.at("signature").get<std::string>()};
+}
+
+}  // namespace birdseye::calibration
