@@ -15,7 +15,7 @@ constexpr std::size_t kMostMessageBytes = 65'000;  // of OpenIGTLink's STRING, w
 
 }  // namespace
 
-CalibrationGuard::CalibrationGuard(const std::string& record) : text_(record) {
+CalibrationGuard::CalibrationGuard(const std::string& record, const std::string& refused) : text_(record) {
   changed_ = true;  // also that there is none: who had one before must not go on with it
   if (record.empty()) {
     awaited_ = "no calibration record is configured; see [calibration] record";
@@ -26,6 +26,8 @@ CalibrationGuard::CalibrationGuard(const std::string& record) : text_(record) {
   const std::size_t bytes = wire::text_of(wire::Calibration{true, "", record}).size();
   if (!parsed) {
     fault_ = "calibration: " + parsed.error().what;
+  } else if (!refused.empty()) {
+    fault_ = "calibration: " + refused;
   } else if (bytes > kMostMessageBytes) {
     fault_ = fmt::format("calibration: the record takes {} bytes of a message that holds {}; shorten its names", bytes,
                          kMostMessageBytes);

@@ -7,9 +7,12 @@
 #include <optional>
 #include <set>
 
+#include "calibration/record/calibration_record.hpp"
 #include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/config_section.hpp"
 #include "device/wire/server.hpp"
+#include "drivers/identity/identity_folder.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "drivers/io/serial_port.hpp"
 
 namespace birdseye::device {
@@ -230,21 +233,42 @@ void read_field_map(const std::string& path, ConfigSection& section, Config& con
   config.core.field_of = std::move(parsed->notes.tracker);
 }
 
-void read_calibration_record(const std::string& path, ConfigSection& section, Config& config) {
+/// Why birdseyed does not use the record; empty where it may. An error: it is not as it was signed. Whoever is not
+/// known stops no appliance: poses and video need no record.
+Result<std::string> refusal_of(const calibration::SignedRecord& record, const std::string& path) {
+  const auto folder = identity_folder();
+  const auto machine = folder ? ThisMachine::open(*folder) : Result<ThisMachine>(folder.error());
+  if (!machine) return fmt::format("{}: whose it is cannot be told: {}", path, machine.error().what);
+  const auto author = machine->author_of(calibration::kRecordFormat, record.sha256, record.signature);
+  if (!author) return author.error();
+  if (author->standing == Author::Standing::known) return std::string();
+  const std::string is = fmt::format("{}: the record is {}; [calibration] accept_unsigned = true uses it all the same",
+                                     path, author->words());
+  if (author->standing == Author::Standing::nobody) return is;
+  return fmt::format("{}; to know that machine, add the line \"NAME {}\" to {}", is, author->key.hex(),
+                     (*folder / "known").string());
+}
+
+void read_calibration_record(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
   const auto text = text_of_file(path, kMostRecordBytes);
   if (!text) return section.fail("record", path + ": cannot be read; see whether it is there, its owner and mode");
   if (text->size() > kMostRecordBytes) return section.fail("record", path + ": is no calibration record");
-  if (const auto record = calibration::parse_record(*text); !record)
-    return section.fail("record", record.error().with_context(path).what);
+  const auto record = calibration::parse_signed_record(*text);
+  if (!record) return section.fail("record", record.error().with_context(path).what);
+  auto refusal = refusal_of(*record, path);
+  if (!refusal) return section.fail("record", refusal.error().with_context(path).what);
   config.core.calibration = *text;
+  if (!accept_unsigned) config.core.calibration_refused = *std::move(refusal);
 }
 
 void read_calibration(ConfigSection& section, Config& config) {
   std::string field, record;
   section.text("field", field);
   section.text("record", record);
+  bool accept_unsigned = false;
+  section.flag("accept_unsigned", accept_unsigned);
   if (!field.empty()) read_field_map(field, section, config);
-  if (!record.empty()) read_calibration_record(record, section, config);
+  if (!record.empty()) read_calibration_record(record, accept_unsigned, section, config);
 }
 
 constexpr std::pair<const char*, void (*)(ConfigSection&, Config&)> kSections[] = {{"tracker", read_tracker},

@@ -37,7 +37,7 @@ Core::Core(CoreSettings settings)
       birds_(settings_.bird_names.size()),
       scope_(settings_.pose),
       frame_clock_(settings_.frame_clock),
-      calibration_(settings_.calibration) {}
+      calibration_(settings_.calibration, settings_.calibration_refused) {}
 
 Core::Counters Core::counters() const {
   Counters counters;

@@ -25,6 +25,7 @@ struct CoreSettings {
   Duration pose_wait{0};
   FrameClock::Settings frame_clock;
   std::string calibration;                     ///< a calibration record's text; empty: none
+  std::string calibration_refused;             ///< why it is not used: nobody known signed it; empty: it may be
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
   calibration::Identity field_of;  ///< the tracker whose field that is; of another every pose is doubted. Empty: any
 };

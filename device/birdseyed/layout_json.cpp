@@ -71,6 +71,7 @@ void to_json(nlohmann::json& json, const CoreSettings& settings) {
           {"frame_clock", settings.frame_clock},
           {"calibration", settings.calibration}};
   if (settings.field) json["field"] = settings.field->data();
+  if (!settings.calibration_refused.empty()) json["calibration_refused"] = settings.calibration_refused;
   if (!settings.field_of.empty()) json["field_of"] = settings.field_of;
 }
 void from_json(const nlohmann::json& json, CoreSettings& settings) {
@@ -80,6 +81,7 @@ void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("pose_wait").get_to(settings.pose_wait);
   json.at("frame_clock").get_to(settings.frame_clock);
   json.at("calibration").get_to(settings.calibration);
+  settings.calibration_refused = json.value("calibration_refused", "");
   if (json.contains("field_of")) json.at("field_of").get_to(settings.field_of);
   if (!json.contains("field")) return;
   auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());

@@ -112,6 +112,7 @@ int main(int argc, char** argv) {
     if (check_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());
+      if (!config->core.calibration_refused.empty()) print_error("birdseyed", config->core.calibration_refused);
       fmt::print("{}: sound\n", config_path.string());
       return 0;
     }

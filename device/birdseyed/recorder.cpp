@@ -13,6 +13,8 @@
 #include <system_error>
 #include <utility>
 
+#include "calibration/record/sha256.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/condition.hpp"
 #include "drivers/system/durable.hpp"
@@ -109,6 +111,8 @@ class Recorder::Writer {
   Result<std::filesystem::path> begin();
   void write_events();
   bool write(const RawEvent& event);
+  int put(const Bytes& bytes);
+  void sign();
   void sync();
   void end(const std::string& why);
 
@@ -119,6 +123,9 @@ class Recorder::Writer {
 
   // The thread's alone.
   std::unique_ptr<RecordFile> file_;
+  calibration::Sha256 sum_;  ///< of all that the file has taken
+  bool whole_ = true;        ///< it has taken all, up to the stop or the limit of its size
+  std::optional<ThisMachine> machine_;
   std::size_t written_bytes_ = 0, unsynced_bytes_ = 0;
   DeviceTime synced_;
 
@@ -137,8 +144,13 @@ Result<std::filesystem::path> Recorder::Writer::begin() {
   auto created = create_(config_);
   if (!created) return created.error();
   file_ = std::move(created->file);
-  int failed = file_->write(recording_magic());
-  if (failed == 0) failed = file_->write(block_of(settings_));
+  int failed = put(recording_magic());
+  if (failed == 0) failed = put(block_of(settings_));
+  if (auto machine = ThisMachine::open()) {
+    machine_ = *std::move(machine);
+  } else {  // better one that nobody signs than none
+    log_->warn("recording: {}: not signed: {}", created->path.string(), machine.error().what);
+  }
   if (failed == 0) return created->path;
   std::error_code ignored;
   std::filesystem::remove(created->path, ignored);
@@ -180,10 +192,14 @@ void Recorder::Writer::write_events() {
       held_bytes_ -= std::exchange(in_hand_bytes, 0);
       const auto ending = [this] { return give_up_ || !ended_.empty(); };
       work_.wait(lock, Deadline::after(kLookEvery), [&] { return !waiting_.empty() || ending(); });
-      if (waiting_.empty() && ending()) break;
+      if (waiting_.empty() && ending()) {
+        whole_ = whole_ && ended_.empty();
+        break;
+      }
       if (give_up_ && device_now() > *give_up_) {
         lock.unlock();
         end("cut short, the disk was too slow for what waited");
+        whole_ = false;
         break;
       }
       if (!waiting_.empty()) {
@@ -195,12 +211,13 @@ void Recorder::Writer::write_events() {
     if (event && !write(*std::exchange(event, std::nullopt))) break;
     if (unsynced_bytes_ > kSyncBytes || device_now() - synced_ > kSyncEvery) sync();
   }
+  sign();
   sync();
 }
 
 bool Recorder::Writer::write(const RawEvent& event) {
   const Bytes block = block_of(event);
-  if (const int failed = file_->write(block); failed != 0) {
+  if (const int failed = put(block); failed != 0) {
     end(fmt::format("ended, the disk takes no more ({})", words(failed)));
     return false;
   }
@@ -211,12 +228,30 @@ bool Recorder::Writer::write(const RawEvent& event) {
   return false;
 }
 
+int Recorder::Writer::put(const Bytes& bytes) {
+  const int failed = file_->write(bytes);
+  whole_ = whole_ && failed == 0;
+  sum_.add(bytes);
+  return failed;
+}
+
+/// What ended for a disk's sake nobody signs.
+void Recorder::Writer::sign() {
+  if (!whole_ || !machine_) return;
+  const Bytes block = block_of(machine_->sign(calibration::kApplianceRecordingFormat, sum_.hex()));
+  if (const int failed = file_->write(block); failed != 0)
+    log_->warn("recording: {}: not signed, the disk takes no more ({})", name_, words(failed));
+  unsynced_bytes_ += block.size();
+}
+
 void Recorder::Writer::sync() {
   if (unsynced_bytes_ == 0) return;
   unsynced_bytes_ = 0;
   // What the kernel could not write it may have thrown away, and it says so once.
-  if (const int failed = file_->sync(); failed != 0)
+  if (const int failed = file_->sync(); failed != 0) {
+    whole_ = false;
     end(fmt::format("ended, the disk has lost some of it ({})", words(failed)));
+  }
   synced_ = device_now();
 }
 

@@ -15,7 +15,7 @@ namespace birdseye::device {
 
 namespace {
 
-enum Kind : std::uint32_t { kSettings = 1, kChanged, kTrackerBytes, kFrame, kEdges, kTick };
+enum Kind : std::uint32_t { kSettings = 1, kChanged, kTrackerBytes, kFrame, kEdges, kTick, kSignature };
 constexpr std::size_t kBlockHead = 12;  // kind, size
 constexpr std::uint64_t kLargestPayload = 64U << 20U;
 
@@ -267,6 +267,11 @@ Bytes block_of(const RawEvent& event) {
   return block(kind, std::visit([](const auto& what) { return payload_of(what); }, event));
 }
 
+Bytes block_of(const calibration::FileSignature& signature) {
+  const std::string text = json_of_signature(signature).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return block(kSignature, {text.begin(), text.end()});
+}
+
 Result<RawEventReader> RawEventReader::open(const std::filesystem::path& path) {
   const std::string name = path.string();
   std::ifstream in(path, std::ios::binary);
@@ -321,7 +326,7 @@ Result<std::optional<RawEventReader::Block>> RawEventReader::next_block() {
 Result<std::optional<RawEvent>> RawEventReader::next() {
   auto block = next_block();
   if (!block) return block.error();
-  if (!*block) return std::optional<RawEvent>();
+  if (!*block || (*block)->kind == kSignature) return std::optional<RawEvent>();
   try {
     if (auto event = event_of((*block)->kind, (*block)->payload)) {
       const std::string fault = fault_of(*event, settings_.bird_names.size());

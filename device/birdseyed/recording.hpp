@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "calibration/record/file_signature.hpp"
 #include "device/birdseyed/core.hpp"
 
 /// An appliance recording, a file of raw events (docs/manual/appliance-recording.md): eight bytes of magic, then blocks
@@ -21,6 +22,8 @@ Bytes recording_magic();
 /// The core's settings: the first block of a file.
 Bytes block_of(const CoreSettings& settings);
 Bytes block_of(const RawEvent& event);
+/// Over the SHA-256 of all bytes before it: the last block, where the recording was ended in order.
+Bytes block_of(const calibration::FileSignature& signature);
 
 /// Reads a file front to back.
 class RawEventReader {

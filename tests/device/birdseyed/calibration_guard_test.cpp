@@ -43,6 +43,19 @@ TEST(CalibrationGuard, IsInForceOnceAllThatItWasMadeWithIsThere) {
   EXPECT_FALSE(guard.take_change());
 }
 
+TEST(CalibrationGuard, ARecordThatIsRefusedIsNotInForceWhateverIsHere) {
+  CalibrationGuard guard(record(), "record.json: the record is not signed");
+  guard.note(runs(Instrument::tracker, kTracker));
+  guard.note(runs(Instrument::camera, kCamera));
+  guard.note_frame(4, 2);
+  const auto told = guard.take_change();
+  ASSERT_TRUE(told);
+  EXPECT_FALSE(told->in_force);
+  EXPECT_TRUE(told->record.empty());
+  EXPECT_EQ(told->why_not, "calibration: record.json: the record is not signed");
+  EXPECT_EQ(guard.latency(), nullptr);
+}
+
 TEST(CalibrationGuard, ARecordThatNoMessageHoldsIsNotInForceAndTheReasonIsSaid) {
   calibration::CalibrationRecord large = testing::example_record(4, 2, kTracker, kCamera);
   large.scope = std::string(20'000, '"');  // of which JSON in JSON makes four characters each

@@ -5,7 +5,9 @@
 
 #include <fstream>
 
+#include "drivers/identity/this_machine.hpp"
 #include "tests/support/example_record.hpp"
+#include "tests/support/scratch.hpp"
 
 namespace birdseye::device {
 namespace {
@@ -54,6 +56,31 @@ TEST(Config, TakesOnlyAWholeCalibrationRecord) {
   ASSERT_TRUE(sound) << sound.error().what;
   EXPECT_EQ(sound->core.calibration, text);
   std::filesystem::remove(path);
+}
+
+TEST(Config, ARecordOfNobodyKnownIsNotUsedUnlessAskedTo) {
+  const testing::Scratch scratch;
+  const auto record = testing::example_record(768, 576, {{"model", "a"}}, {{"model", "b"}});
+  const auto signed_by = [&record](const ThisMachine& machine) {
+    return record_text(record, machine.sign(calibration::kRecordFormat, signed_sha256(record)));
+  };
+  const auto refusal = [&](const std::string& text, const std::string& more = "") {
+    const std::string path = scratch.file("record.json", text);
+    const auto config = read(kSound + std::string("[calibration]\nrecord = \"") + path + "\"\n" + more);
+    return config ? config->core.calibration_refused : config.error().what;
+  };
+  const auto own = ThisMachine::open();
+  ASSERT_TRUE(own) << own.error().what;
+  const ThisMachine other = ThisMachine::for_once();
+  EXPECT_EQ(refusal(signed_by(*own)), "");
+  EXPECT_NE(refusal(record_text(record)).find("not signed"), std::string::npos);
+  EXPECT_NE(refusal(record_text(record)).find("accept_unsigned = true"), std::string::npos);
+  EXPECT_NE(refusal(signed_by(other)).find("add the line \"NAME " + other.key().public_key().hex()), std::string::npos);
+  for (const std::string& text : {record_text(record), signed_by(other)})
+    EXPECT_EQ(refusal(text, "accept_unsigned = true\n"), "");
+  auto copied = own->sign(calibration::kRecordFormat, std::string(64, '0'));
+  EXPECT_NE(refusal(record_text(record, copied), "accept_unsigned = true\n").find("was changed since"),
+            std::string::npos);
 }
 
 TEST(Config, AFieldMapThatIsNotThereHidesNoMistakeInTheRecord) {
