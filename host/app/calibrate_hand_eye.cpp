@@ -148,9 +148,9 @@ Result<void> check_record(const CalibrateHandEyeOptions& options) {
   if (path.empty() || (!there && options.files.camera.empty())) return {};
   std::optional<CameraModel> recorded;
   if (there) {
-    const auto record = read_record(path);
-    if (!record) return record.error();
-    if (record->lens) recorded = record->lens->camera;
+    const auto read = read_signed_record(path);
+    if (!read) return read.error();
+    if (read->record.lens) recorded = read->record.lens->camera;
   }
   if (options.files.camera.empty()) return {};
   const auto camera = read_camera(options.files.camera);

@@ -19,6 +19,7 @@ using calibration::Provenance;
 struct CalibrateRecordOptions {
   std::filesystem::path record;
   std::string scope, bind;
+  bool accept_unsigned = false;
 };
 
 /// To what tracker and camera say they are, once both run.
@@ -69,16 +70,27 @@ void show(const CalibrationRecord& record) {
   }
 }
 
-Result<void> run(const CalibrateRecordOptions& options) {
-  auto record = read_record(options.record);
+/// As it is, whoever wrote it.
+Result<void> show_as_it_is(const CalibrateRecordOptions& options) {
+  const auto record = read_record(options.record);
   if (!record) return record.error();
+  show(*record);
+  return {};
+}
+
+/// Who changes a record signs all of it.
+Result<void> run(const CalibrateRecordOptions& options) {
+  if (options.bind.empty() && options.scope.empty() && !options.accept_unsigned) return show_as_it_is(options);
+  const auto authors = Authors::of_this_machine(options.accept_unsigned);
+  if (!authors) return authors.error();
+  auto read = read_record(options.record, *authors);
+  if (!read) return read.error();
+  CalibrationRecord* const record = &read->record;
   if (!options.bind.empty()) {
     if (auto bound = bind_to(options.bind, *record); !bound) return bound;
   }
   if (!options.scope.empty()) record->scope = options.scope;
-  if (!options.bind.empty() || !options.scope.empty()) {
-    if (auto written = write_file(options.record, record_text(*record)); !written) return written;
-  }
+  if (auto written = write_file(options.record, record_text(*record, *authors->machine)); !written) return written;
   show(*record);
   return {};
 }
@@ -92,6 +104,8 @@ void add_calibrate_record(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--scope", options->scope, "the scope's name or serial number, to be written into it");
   command->add_option("--bind", options->bind, "an appliance whose tracker and camera it holds for")
       ->type_name("HOST:PORT");
+  command->add_flag("--accept-unsigned", options->accept_unsigned,
+                    "sign also a record that is not signed, or signed by a machine that is not known here");
   command->callback([options, &status] { status.take(run(*options)); });
 }
 

@@ -38,6 +38,7 @@ void add_register(CLI::App& app, CommandStatus& status);
 void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `register`
 void add_render(CLI::App& app, CommandStatus& status);
 void add_replay(CLI::App& app, CommandStatus& status);
+void add_verify(CLI::App& app, CommandStatus& status);
 void add_volume(CLI::App& app, CommandStatus& status);
 void add_volume_info(CLI::App& volume, CommandStatus& status);          ///< under `volume`
 void add_volume_from_surface(CLI::App& volume, CommandStatus& status);  ///< under `volume`

@@ -18,6 +18,7 @@
 #include "host/operation/landmark_check.hpp"
 #include "host/operation/operation.hpp"
 #include "host/operation/patient.hpp"
+#include "host/recording/recording_signature.hpp"
 #include "host/texts/texts.hpp"
 #include "host/window/first_run_page.hpp"
 #include "host/window/live_app.hpp"
@@ -31,7 +32,7 @@ namespace fs = std::filesystem;
 struct LiveOptions {
   std::string server, board;
   wire::ForeignSettings foreign;
-  bool simulate = false;
+  bool simulate = false, accept_unsigned = false;
   SimulatedCartSettings cart;
   LiveSettings live;
   PatientFiles simulated;  ///< once it is made
@@ -228,6 +229,9 @@ Result<ExitCode> run(LiveOptions& options) {
   }
   auto window = offer_simulated_cart(options, script);
   if (!window) return window.error();
+  auto authors = Authors::of_this_machine(options.accept_unsigned);
+  if (!authors) return authors.error();
+  options.live.authors = *std::move(authors);
   const HostTime asked = host_now();
   if (auto prepared = prepare(options); !prepared) return prepared.error();
   std::optional<DecisionLog> log;
@@ -246,6 +250,9 @@ Result<ExitCode> run(LiveOptions& options) {
   if (!window) return window.error();
   std::unique_ptr<LiveSource> source;
   if (!options.recording.empty()) {
+    auto doubt = admit_recording(options.recording, options.live.authors);
+    if (!doubt) return doubt.error();
+    options.live.recording_doubt = *std::move(doubt);
     auto opened = LiveSource::of_recording(options.recording, options.speed);
     if (!opened) return opened.error();
     source = *std::move(opened);
@@ -375,6 +382,8 @@ void add_live(CLI::App& app, CommandStatus& status) {
   command
       ->add_option("--publish", options->publish, "give 3D Slicer the registered CT over OpenIGTLink (default: do not)")
       ->type_name("[ADDRESS:]PORT");
+  command->add_flag("--accept-unsigned", options->accept_unsigned,
+                    "use also what is not signed, or signed by a machine that is not known here; the picture says so");
   command->add_option("--json", options->json, "figures and verdict")->type_name("FILE");
   command->callback([options, &status] {
     const auto done = run(*options);

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   add_register(app, status);
   add_render(app, status);
   add_replay(app, status);
+  add_verify(app, status);
   add_volume(app, status);
   refuse_outputs_over_inputs(app);
   return birdseye::run_program<CLI::ParseError>(app, argc, argv, [&status] { return static_cast<int>(status.code); });

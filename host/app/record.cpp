@@ -106,6 +106,8 @@ Result<ExitCode> run(const RecordOptions& options) {
   note_interrupts();
   ::signal(SIGPIPE, SIG_IGN);  // of an encoder that ended
   ::signal(SIGXFSZ, SIG_IGN);  // a limit on files' sizes is told as a full disk is
+  auto machine = ThisMachine::open();
+  if (!machine) return machine.error();
   wire::ForeignSettings foreign = options.foreign;
   foreign.scope_bird.clear();  // what is recorded is found again by the names that the server gave
   auto client = connect_appliance(options.server, foreign);
@@ -114,7 +116,8 @@ Result<ExitCode> run(const RecordOptions& options) {
                                          .source = options.server,
                                          .scope = foreign.scope_device.empty() ? "scope" : foreign.scope_device,
                                          .compressed = options.video == "compressed",
-                                         .pair = options.pair});
+                                         .pair = options.pair,
+                                         .machine = std::make_shared<const ThisMachine>(*std::move(machine))});
   if (!writer) return writer.error();
   Progress progress;
   Ending ending;

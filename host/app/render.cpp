@@ -42,7 +42,7 @@ struct RenderOptions {
   double clip = 0.5;
   double step_mm = 0.7, seconds = 4;
   std::vector<double> clip_plane;
-  bool window = false;
+  bool window = false, accept_unsigned = false;
   int frames = 0;
 };
 
@@ -135,11 +135,24 @@ void straighten(RenderScene& scene, const std::string& display) {
   scene.camera = straight;
 }
 
+/// One to draw over a picture by; a view of the CT alone is a report, whoever wrote the operation.
+Result<Operation> operation_of(const RenderOptions& options) {
+  if (options.over.empty()) return read_operation(options.operation);
+  const auto authors = Authors::of_this_machine(options.accept_unsigned);
+  if (!authors) return authors.error();
+  auto operation = read_operation(options.operation, *authors);
+  if (operation && !operation->doubt.empty()) {
+    fmt::print(stderr, "birdseye: --operation {}: {}\n", options.operation.string(),
+               words("why_unsigned", words("unsigned_operation"), operation->doubt));
+  }
+  return operation;
+}
+
 Result<RenderScene> scene_of(const RenderOptions& options) {
   RenderScene scene;
   std::optional<Operation> operation;
   if (!options.operation.empty()) {
-    auto kept = read_operation(options.operation);
+    auto kept = operation_of(options);
     if (!kept) return kept.error();
     operation = *std::move(kept);
   }
@@ -289,6 +302,10 @@ void add_render(CLI::App& app, CommandStatus& status) {
   CLI::Option* const over =
       command.add_option("--over", options->over, "picture of that lens to draw over, as a frame of its video");
   for (CLI::Option* const option : add_look_options(command, options->look)) option->needs(over);
+  command
+      .add_flag("--accept-unsigned", options->accept_unsigned,
+                "use also an operation that is not signed, or signed by a machine that is not known here")
+      ->needs(over);
   command.add_option("--out", options->out, "PNG to write; RGBA, or RGB with --over")->check(png_name);
   command.add_option("--transfer", options->transfer, "preset or JSON file (default abdomen)");
   command.add_option("--size", options->size, "WIDTHxHEIGHT of the view without a camera");

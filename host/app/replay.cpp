@@ -25,6 +25,8 @@
 #include "host/overlay/margins.hpp"
 #include "host/overlay/render_scene.hpp"
 #include "host/recording/recording_reader.hpp"
+#include "host/recording/recording_signature.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -40,7 +42,7 @@ struct ReplayOptions {
   std::string transfer = "tumour-and-vessels", engine = "cpu", scope = "scope";
   double film_hz = 0;
   int every = 10;
-  bool motion_check = true;
+  bool motion_check = true, accept_unsigned = false;
 };
 
 Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup, const ReplayTrust& trust,
@@ -129,8 +131,13 @@ Result<void> play(RecordingReader& reader, const ReplayOptions& options, ReplayH
   }
 }
 
-Result<ExitCode> run(const ReplayOptions& options) {
+Result<ExitCode> run(ReplayOptions& options) {
   if (options.out.empty()) return Error{Errc::bad_value, "--out: is empty; name a folder"};
+  auto authors = Authors::of_this_machine(options.accept_unsigned);
+  if (!authors) return authors.error();
+  options.inputs.authors = *std::move(authors);
+  const auto doubt = admit_recording(options.inputs.recording, options.inputs.authors);
+  if (!doubt) return doubt.error();
   auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
   if (!reader) return reader.error();
   for (const fs::path* file : {&options.inputs.patient_from_model, &options.deformation}) {
@@ -139,6 +146,7 @@ Result<ExitCode> run(const ReplayOptions& options) {
   }
   auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
+  if (!doubt->empty()) setup->cautions.push_back(words("why_unsigned", words("unsigned_recording"), *doubt));
   ShownChoice choice = options.shown;
   choice.summed = true;  // what is replayed by, and what is written, says which CT it is of
   const auto fiducials_inside = [&](const Volume& ct) -> Result<void> {
@@ -277,6 +285,8 @@ void add_replay(CLI::App& app, CommandStatus& status) {
       .add_option("--live-log", options->live_log,
                   "what live --out wrote: frames.csv then says of each frame what the window decided, too")
       ->type_name("FOLDER|FILE");
+  command.add_flag("--accept-unsigned", options->accept_unsigned,
+                   "use also what is not signed, or signed by a machine that is not known here; the verdict says so");
   command.add_option("--json", options->json, "write the figures to this file too");
   command.callback([options, &status] {
     const auto done = run(*options);

@@ -23,8 +23,24 @@ std::string folder_is_there(const std::string& file) {
 std::string record_is_sound(const std::string& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return "";
-  const auto record = read_record(file);
+  const auto record = read_signed_record(file);
   return record ? "" : record.error().what;
+}
+
+/// Likewise: who enters something signs all of the record.
+void refuse_unknown_author(const ResultPaths& paths) {
+  std::error_code ignored;
+  if (paths.record.empty() || !std::filesystem::exists(paths.record, ignored)) return;
+  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
+  if (!authors) throw CLI::ValidationError("--record", authors.error().what);
+  if (const auto read = read_record(paths.record, *authors); !read)
+    throw CLI::ValidationError("--record", read.error().what);
+}
+
+Result<std::string> record_of(const ResultPaths& paths, const RecordEntry& entry, Grade grade) {
+  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
+  if (!authors) return authors.error();
+  return record_with(paths.record, entry, grade, *authors);
 }
 
 }  // namespace
@@ -32,11 +48,19 @@ std::string record_is_sound(const std::string& file) {
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record) {
   command.add_option("--out", paths.out, out_help)->type_name("FILE")->check(folder_is_there);
   command.add_option("--json", paths.json, "figures, verdict and reasons")->type_name("FILE")->check(folder_is_there);
-  if (record)
-    command.add_option("--record", paths.record, "the scope's calibration record, which gets this as an entry")
-        ->type_name("FILE")
-        ->check(folder_is_there)
-        ->check(record_is_sound);
+  if (record) {
+    CLI::Option* const into =
+        command.add_option("--record", paths.record, "the scope's calibration record, which gets this as an entry")
+            ->type_name("FILE")
+            ->check(folder_is_there)
+            ->check(record_is_sound);
+    command
+        .add_flag("--accept-unsigned", paths.accept_unsigned,
+                  "enter it also into a record that is not signed, or signed by a machine that is not known here, and "
+                  "sign that")
+        ->needs(into);
+    command.parse_complete_callback([&paths] { refuse_unknown_author(paths); });
+  }
   command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
       ->type_name("FILE")
       ->check(folder_is_there);
@@ -59,7 +83,7 @@ void finish_calibration(const ResultPaths& paths, const std::string& out_text, n
   if (verdict.grade != Grade::fail) {
     files.push_back({paths.out, out_text});
     if (!paths.record.empty()) {
-      const auto record = record_with(paths.record, entry, verdict.grade);
+      const auto record = record_of(paths, entry, verdict.grade);
       if (!record) {  // what was found is not lost for it
         (void)write_files({{paths.json, text_of(json)}, {paths.report, page.html()}, {paths.out, out_text}});
         return status.refuse(record.error());

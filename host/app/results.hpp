@@ -15,9 +15,11 @@ namespace birdseye::host {
 /// The files that a calibration writes its results to; an empty path is not written.
 struct ResultPaths {
   std::filesystem::path out, json, report, record;
+  bool accept_unsigned = false;  ///< go on from a record that no known machine signed
 };
 
-/// Adds `--out`, `--json`, `--report` and, where the calibration record has an entry for the result, `--record`.
+/// Adds `--out`, `--json`, `--report` and, where the calibration record has an entry for the result, `--record`
+/// and `--accept-unsigned`.
 /// out_help: what --out holds.
 void add_result_options(CLI::App& command, ResultPaths& paths, const std::string& out_help, bool record = true);
 

@@ -32,22 +32,40 @@ std::vector<Check> check_ct(const VolumeSource& ct) {
   return checks;
 }
 
+Check check_author(const calibration::SignedRecord& read) {
+  Check check{kInputs, "record's signature", CheckState::good, "", ""};
+  const auto authors = Authors::of_this_machine(true);
+  const auto author = authors ? authors->machine->author_of(calibration::kRecordFormat, read.sha256, read.signature)
+                              : Result<Author>(authors.error());
+  if (!author) {
+    check.state = CheckState::bad;
+    check.found = author.error().what;
+    return check;
+  }
+  check.found = author->words();
+  if (author->standing == Author::Standing::known) return check;
+  check.state = CheckState::could_be_better;
+  check.remedy = "live and replay use it only with --accept-unsigned: docs/manual/signatures.md";
+  return check;
+}
+
 std::vector<Check> check_record(const std::filesystem::path& path) {
   Check check{kInputs, "calibration record", CheckState::good, "", ""};
-  const auto record = read_record(path);
-  if (!record) {
+  const auto read = read_signed_record(path);
+  if (!read) {
     check.state = CheckState::bad;
-    check.found = record.error().what;
+    check.found = read.error().what;
     check.remedy = "take a copy that is whole, or calibrate: docs/manual/calibration.md";
     return {check};
   }
+  const calibration::CalibrationRecord* const record = &read->record;
   check.found = fmt::format("{}: is sound, of {}: {}", path.string(),
                             record->scope.empty() ? "a scope without a name" : record->scope, record_words(*record));
   if (!record->lens || !record->hand_eye) {
     check.state = CheckState::could_be_better;
     check.remedy = "an overlay takes lens and hand-eye: calibrate what is not there";
   }
-  return {check};
+  return {check, check_author(*read)};
 }
 
 }  // namespace

@@ -256,7 +256,7 @@ Result<void> has_no_k3(const CameraModel& camera) {
 Result<CameraModel> read_camera(const fs::path& path) {
   const CameraPath which = camera_path(path);
   if (const auto there = check_file(which.file); !there) return there.error();
-  if (read_record(which.file)) {
+  if (read_signed_record(which.file)) {
     return Error{Errc::bad_format,
                  fmt::format("{}: is a calibration record; `birdseye export lens --record {} --as opencv --out "
                              "camera.yaml` writes its lens",

@@ -9,28 +9,63 @@
 
 namespace birdseye::host {
 
-Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& path) {
+Result<calibration::SignedRecord> read_signed_record(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file)
     return Error{Errc::unreadable,
                  path.string() + ": cannot be read; give a record that birdseye calibrate has written (--record)"};
   std::ostringstream text;
   text << file.rdbuf();
-  auto record = calibration::parse_record(text.str());
+  auto record = calibration::parse_signed_record(text.str());
   if (!record) return record.error().with_context(path.string());
   return record;
 }
 
-Result<std::string> record_with(const std::filesystem::path& path, const RecordEntry& entry, Grade grade) {
+namespace {
+
+Result<AdmittedRecord> admit(calibration::SignedRecord read, const Authors& authors) {
+  auto doubt = authors.admit(calibration::kRecordFormat, read.sha256, read.signature);
+  if (!doubt) return Error{doubt.error().code, "the calibration record " + doubt.error().what};
+  return AdmittedRecord{std::move(read.record), *std::move(doubt)};
+}
+
+}  // namespace
+
+Result<calibration::CalibrationRecord> read_record(const std::filesystem::path& path) {
+  auto read = read_signed_record(path);
+  if (!read) return read.error();
+  if (auto noted = note_author(path.string(), calibration::kRecordFormat, read->sha256, read->signature); !noted)
+    return noted.error();
+  return std::move(read->record);
+}
+
+Result<AdmittedRecord> read_record(const std::filesystem::path& path, const Authors& authors) {
+  auto read = read_signed_record(path);
+  if (!read) return read.error();
+  return admit(*std::move(read), authors).with_context(path.string());
+}
+
+Result<AdmittedRecord> admit_record(const std::string& text, const Authors& authors) {
+  auto read = calibration::parse_signed_record(text);
+  if (!read) return read.error();
+  return admit(*std::move(read), authors);
+}
+
+std::string record_text(const calibration::CalibrationRecord& record, const ThisMachine& machine) {
+  return record_text(record, machine.sign(calibration::kRecordFormat, signed_sha256(record)));
+}
+
+Result<std::string> record_with(const std::filesystem::path& path, const RecordEntry& entry, Grade grade,
+                                const Authors& authors) {
   calibration::CalibrationRecord record;
   std::error_code ignored;
   if (std::filesystem::exists(path, ignored)) {
-    auto read = read_record(path);
+    auto read = read_record(path, authors);
     if (!read) return read.error();
-    record = *std::move(read);
+    record = std::move(read->record);
   }
   entry.enter(record, {utc_now(), "birdseye " BIRDSEYE_VERSION, entry.made_from, grade});
-  return record_text(record);
+  return record_text(record, *authors.machine);
 }
 
 void enter_lens(calibration::CalibrationRecord& record, calibration::LensEntry entry) {

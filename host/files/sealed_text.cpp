@@ -16,7 +16,7 @@ namespace {
 
 using calibration::sha256_of;
 
-constexpr std::string_view kBegin = "{\n", kSums = "sha256", kWhole = "whole";
+constexpr std::string_view kBegin = "{\n", kSums = "sha256", kWhole = "whole", kSigned = "signed";
 
 std::string line_of(std::string_view name, const nlohmann::json& value) {
   // Names may come from files in other encodings: what is found is not lost for one of them.
@@ -45,6 +45,33 @@ std::string end_of(const std::string& before) {
   return line_of(kWhole, sha256_of(before)) + "\n}\n";
 }
 
+std::string before(const std::string& text, std::string_view line) {
+  return text.substr(0, static_cast<std::size_t>(line.data() - text.data()));
+}
+
+std::string without_comma(const std::string& lines) {
+  return lines.ends_with(",\n") ? lines.substr(0, lines.size() - 2) : lines;
+}
+
+/// Lines of parts, and the sum of each.
+class TextWithSums {
+ public:
+  void add(std::string_view name, const std::string& line) {
+    sums_[std::string(name)] = sha256_of(line);
+    text_ += line;
+    text_ += ",\n";
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  [[nodiscard]] std::string sealed() const {
+    const std::string text = text_ + line_of(kSums, sums_) + ",\n";
+    return text + end_of(text);
+  }
+
+ private:
+  std::string text_{kBegin};
+  nlohmann::json sums_ = nlohmann::json::object();
+};
+
 /// What of a text that does not fit its sums is damaged, in words.
 std::string damage(const std::string& text) {
   if (!text.starts_with("{\n\"")) return "is empty, or its beginning was changed or damaged";
@@ -69,15 +96,30 @@ std::string damage(const std::string& text) {
 }  // namespace
 
 std::string sealed_text(const std::vector<SealedPart>& parts) {
-  std::string text(kBegin);
-  nlohmann::json sums = nlohmann::json::object();
-  for (const auto& [name, value] : parts) {
-    const std::string line = line_of(name, value);
-    sums[name] = sha256_of(line);
-    text += line + ",\n";
+  TextWithSums out;
+  for (const auto& [name, value] : parts) out.add(name, line_of(name, value));
+  return out.sealed();
+}
+
+std::string sealed_text(const std::vector<SealedPart>& parts, std::string_view kind, const ThisMachine& machine) {
+  TextWithSums out;
+  for (const auto& [name, value] : parts) out.add(name, line_of(name, value));
+  const auto signature = machine.sign(kind, sha256_of(out.text()));
+  out.add(kSigned, line_of(kSigned, json_of_signature(signature)));
+  return out.sealed();
+}
+
+SealedBy sealed_by(const std::string& text) {
+  const auto line = find_line(text, kSigned);
+  if (!line) return {};
+  const nlohmann::json json = nlohmann::json::parse("{" + std::string(*line) + "}", nullptr, false);
+  SealedBy out{sha256_of(before(text, *line)), std::nullopt};
+  try {
+    out.signature = calibration::signature_of_json(json.at(std::string(kSigned)));
+  } catch (const nlohmann::json::exception&) {
+    out.signature = calibration::FileSignature();  // which holds for nothing
   }
-  text += line_of(kSums, sums) + ",\n";
-  return text + end_of(text);
+  return out;
 }
 
 Result<nlohmann::json> unseal(const std::string& text) {
@@ -85,7 +127,10 @@ Result<nlohmann::json> unseal(const std::string& text) {
   if (end == std::string::npos || text.substr(end + 1) != end_of(text.substr(0, end + 1)))
     return Error{Errc::bad_format, damage(text)};
   if (nests_too_deeply(text, Notation::json)) return Error{Errc::bad_format, "nests lists deeper than any"};
-  nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  // What stands behind a signature it does not hold for: it is not read.
+  const auto line = find_line(text, kSigned);
+  const std::string read = line ? without_comma(before(text, *line)) + "\n}\n" : text;
+  nlohmann::json json = nlohmann::json::parse(read, nullptr, false);
   if (!json.is_object()) return Error{Errc::bad_format, "is no object of JSON"};
   json.erase(std::string(kSums));
   json.erase(std::string(kWhole));

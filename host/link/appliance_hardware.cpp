@@ -68,12 +68,12 @@ Result<void> check_bound_record(const std::filesystem::path& record, const std::
                                 const std::vector<std::string>& names) {
   std::error_code ignored;
   if (record.empty() || !std::filesystem::exists(record, ignored)) return {};
-  const auto read = read_record(record);
+  const auto read = read_signed_record(record);
   if (!read) return read.error();
-  if (read->tracker.empty() && read->camera.empty()) return {};
+  if (read->record.tracker.empty() && read->record.camera.empty()) return {};
   const auto told = ask_hardware(address, names);
   if (!told) return told.error();
-  if (auto fits = check_hardware(*read, *told); !fits) return fits.error().with_context(record.string());
+  if (auto fits = check_hardware(read->record, *told); !fits) return fits.error().with_context(record.string());
   return {};
 }
 

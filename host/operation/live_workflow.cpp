@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/record/sha256.hpp"
 #include "host/operation/landmark_check.hpp"
 #include "host/texts/texts.hpp"
 
@@ -12,7 +11,7 @@ namespace birdseye::host {
 LiveWorkflow::LiveWorkflow(LiveSettings settings)
     : settings_(std::move(settings)),
       patient_(settings_.transfer, settings_.engine, settings_.make_engine),
-      keeper_(settings_.out, settings_.resume) {
+      keeper_(settings_.out, settings_.resume, settings_.authors) {
   use_reference(settings_.reference);
   if (!settings_.patient.ct.path.empty()) load(settings_.patient);
 }
@@ -153,29 +152,6 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   keep();
 }
 
-void LiveWorkflow::take(const wire::Calibration& calibration) {
-  record_tip_in_pointer_mm_.reset();
-  tip_rms_mm_.reset();
-  if (!calibration.in_force) {
-    if (calibration_.withdraw_record(calibration.why_not)) follow_held_back();
-    return;
-  }
-  const auto record = calibration::parse_record(calibration.record);
-  if (!record) {
-    if (calibration_.withdraw_record(record.error().what)) follow_held_back();
-    return;
-  }
-  record_sha256_ = calibration::sha256_of(calibration::record_text(*record));
-  if (record->tip) {
-    record_tip_in_pointer_mm_ = record->tip->tip_in_sensor_mm;
-    if (!settings_.tip_in_pointer_mm) tip_rms_mm_ = record->tip->rms_mm;
-  }
-  const auto adopted = calibration_.adopt(*record);
-  if (adopted == CalibrationStep::Adopted::no) return;
-  if (adopted == CalibrationStep::Adopted::anew) forget_views(words("note_calibrated_anew"));
-  follow_held_back();
-}
-
 /// What is found holds with the instruments that are connected now, or is held back.
 void LiveWorkflow::judge_instruments() {
   const bool scope = calibration_.judge(instruments_), patient = fiducials_.judge(instruments_);
@@ -293,48 +269,6 @@ void LiveWorkflow::turn_rod(double by_deg) {
   auto& angle_deg = settings_.rod_angle_deg;
   angle_deg = angle_deg ? std::remainder(*angle_deg + by_deg, 360.0) : found->scope.calibrated_at_deg();
   update_setup();
-}
-
-void LiveWorkflow::keep() {
-  if (!patient_.plan()) return;
-  Operation operation;
-  operation.ct_sha256 = patient_.plan()->ct_sha256;
-  operation.ct_stated = patient_.plan()->ct_stated;
-  operation.labels_sha256 = patient_.plan()->labels_sha256;
-  operation.record_sha256 = record_sha256_;
-  const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();
-  operation.calibrated = scope;
-  operation.registered = fiducials_.registered_or_held_back();
-  operation.deformed = deformation_.found();
-  keeper_.keep(std::move(operation));
-}
-
-void LiveWorkflow::take_up() {
-  const auto operation = keeper_.take_up(patient_.plan()->ct_sha256, patient_.plan()->labels_sha256);
-  if (!operation) {
-    resume_fault_ = operation.error().what;
-    return;
-  }
-  const auto& kept = *operation;
-  if (!kept) return;
-  const std::string when = words("note_taken_up", kept->made_utc);
-  if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
-  // The calibration that is in force may be newer: a deformation then means nothing.
-  const bool same_scope = !kept->calibrated || calibration_.take_up(*kept->calibrated, when);
-  if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
-    deformation_.take_up(kept->deformed, when);
-    show_shape();
-  }
-  judge_instruments();
-  update_setup();
-  keep();
-  // Patient or transmitter may have been moved meanwhile: only a landmark tells.
-  if (fiducials_.confirmed()) return;
-  if (return_to_) {
-    return_to_ = LiveStep::check;
-  } else {
-    go_to(LiveStep::check);
-  }
 }
 
 void LiveWorkflow::go_to(LiveStep step) {

@@ -41,6 +41,8 @@ struct LiveSettings {
   std::string patient_id;        ///< of the patient on the table, where another system knows it; else a person is asked
   std::filesystem::path out;     ///< where results go; empty: none are kept
   std::filesystem::path resume;  ///< out of an earlier window, to go on from; or empty
+  Authors authors = Authors::for_once();  ///< whose records and operations are used, and who signs what is found
+  std::string recording_doubt;            ///< that no known machine signed what is played; empty: one did, or none is
 };
 
 /// The order of the operation, from the first connection to the running overlay; knows nothing of windows. It gives the
@@ -113,6 +115,8 @@ class LiveWorkflow {
   void doubt_registration(const std::string& why);
   [[nodiscard]] std::string why_unregistered() const;
   void doubt_steps(OperationView& out) const;
+  /// Of what is used that no known machine signed.
+  void tell_unsigned(OperationView& view) const;
   [[nodiscard]] std::string why_primary_refused() const;
   void take(const wire::Birds& birds);
   void take(const wire::Calibration& calibration);
@@ -151,6 +155,8 @@ class LiveWorkflow {
   std::optional<Eigen::Vector3d> record_tip_in_pointer_mm_;  ///< by the record that is in force
   std::string resume_fault_;
   std::string record_sha256_;  ///< of the last record that was in force
+  /// That no known machine signed the record that is in force, or the operation that was taken up; empty: one did.
+  std::string record_doubt_, operation_doubt_;
   std::uint64_t shapes_ = 0;
 
   ConnectionStep connection_;

@@ -47,6 +47,7 @@ OperationView LiveWorkflow::view() const {
   out.simulated = simulated_;
   out.notes = {
       connection_.note(), calibration_.note(), fiducials_.note(), views_.note(), deformation_.note(), check_, run_};
+  tell_unsigned(out);
   out.stroking = strokes_.stroking();
   out.touched_places = strokes_.places();
   out.stroke_line = strokes_.line();

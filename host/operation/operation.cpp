@@ -11,7 +11,6 @@
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/registration_file.hpp"
-#include "host/files/sealed_text.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"
 #include "host/operation/operation_010.hpp"
@@ -30,7 +29,6 @@ constexpr const char* kHandEye = "camera_from_sensor.txt";
 constexpr const char* kRegistration = "patient_from_tracker.txt";
 constexpr const char* kField = "field.mha";
 
-constexpr const char* kFormat = "birdseye operation";
 constexpr int kVersion = 2;  // 0.1.0 wrote none
 
 /// Its lens, and how well that is known, where anything says so.
@@ -54,9 +52,9 @@ StatedGeometry stated_in(const nlohmann::json& ct) {
   return out;
 }
 
-std::string sheet_text(const Operation& operation) {
+std::string sheet_text(const Operation& operation, const ThisMachine& machine) {
   std::vector<SealedPart> parts{
-      {"format", {{"name", kFormat}, {"version", kVersion}}},
+      {"format", {{"name", kOperationFormat}, {"version", kVersion}}},
       {"made", {{"made_utc", operation.made_utc}, {"software", "birdseye " BIRDSEYE_VERSION}}},
       {"ct", json_of_ct(operation)}};
   if (!operation.labels_sha256.empty()) parts.push_back({"labels", {{"sha256", operation.labels_sha256}}});
@@ -64,7 +62,8 @@ std::string sheet_text(const Operation& operation) {
   if (operation.calibrated) parts.emplace_back("calibrated", json_of(*operation.calibrated));
   if (operation.registered) parts.emplace_back("registered", json_of(*operation.registered));
   if (operation.deformed) parts.emplace_back("deformed", json_of(*operation.deformed));
-  return sealed_text(parts);
+  if (!operation.doubt.empty()) parts.push_back({"rests_on", {{"unsigned", operation.doubt}}});
+  return sealed_text(parts, kOperationFormat, machine);
 }
 
 /// For other programs. A copy of what is no more in the operation is taken away: it would be taken for the present.
@@ -90,6 +89,11 @@ Result<void> write_copies(const fs::path& folder, const Operation& operation) {
     fs::remove(folder / kField, ignored);
   }
   return write_files(copies);
+}
+
+fs::path sheet_of(const fs::path& given) {
+  std::error_code ignored;
+  return fs::is_directory(given, ignored) ? given / kSheet : given;
 }
 
 std::string sha256_in(const nlohmann::json& sheet, const char* part) {
@@ -118,13 +122,14 @@ Result<Operation> operation_of(const nlohmann::json& sheet) {
     if (!found) return found.error().with_context("deformed");
     out.deformed = std::make_shared<const DeformedOrgan>(*std::move(found));
   }
+  if (sheet.contains("rests_on")) sheet.at("rests_on").at("unsigned").get_to(out.doubt);
   return out;
 }
 
 }  // namespace
 
-Result<void> write_operation(const fs::path& folder, const Operation& operation) {
-  if (auto written = write_file(folder / kSheet, sheet_text(operation)); !written) return written;
+Result<void> write_operation(const fs::path& folder, const Operation& operation, const ThisMachine& machine) {
+  if (auto written = write_file(folder / kSheet, sheet_text(operation, machine)); !written) return written;
   return write_copies(folder, operation);
 }
 
@@ -133,9 +138,29 @@ bool has_operation(const fs::path& folder) {
   return fs::exists(folder / kSheet, ignored);
 }
 
+Result<Operation> read_operation(const fs::path& given, const Authors& authors) {
+  auto read = read_signed_operation(given);
+  if (!read) return read.error();
+  const std::string path = sheet_of(given).string();
+  Operation& operation = read->operation;
+  auto doubt = authors.admit(kOperationFormat, read->by.sha256, read->by.signature);
+  if (!doubt) return doubt.error().with_context(path);
+  const auto rests_on = authors.admit_resting_on(operation.doubt);
+  if (!rests_on) return rests_on.error().with_context(path);
+  if (!doubt->empty()) operation.doubt = *std::move(doubt);
+  return std::move(operation);
+}
+
 Result<Operation> read_operation(const fs::path& given) {
-  std::error_code ignored;
-  const fs::path path = fs::is_directory(given, ignored) ? given / kSheet : given;
+  auto read = read_signed_operation(given);
+  if (!read) return read.error();
+  if (auto noted = note_author(sheet_of(given).string(), kOperationFormat, read->by.sha256, read->by.signature); !noted)
+    return noted.error();
+  return std::move(read->operation);
+}
+
+Result<SignedOperation> read_signed_operation(const fs::path& given) {
+  const fs::path path = sheet_of(given);
   const auto refused = [&path](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
@@ -156,12 +181,13 @@ Result<Operation> read_operation(const fs::path& given) {
   }
   if (!sheet) return refused(sheet.error().what + "; give a copy that is as the window wrote it, or register anew");
   try {
-    if (sheet->at("format").at("name") != kFormat) return refused("is no operation; give the --out folder of a live");
+    if (sheet->at("format").at("name") != kOperationFormat)
+      return refused("is no operation; give the --out folder of a live");
     if (const nlohmann::json& version = sheet->at("format").at("version"); version != kVersion)
       return refused(fmt::format("is of version {}; this program reads version {}", version.dump(), kVersion));
     auto operation = operation_of(*sheet);
     if (!operation) return operation.error().with_context(path.string());
-    return operation;
+    return SignedOperation{*std::move(operation), sealed_by(text)};
   } catch (const std::exception& wrong) {
     return refused(fmt::format("makes no sense ({}); register anew", wrong.what()));
   }

@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "host/files/authors.hpp"
+#include "host/files/sealed_text.hpp"
 #include "host/operation/findings.hpp"
 #include "host/volume/volume_source.hpp"
 
@@ -21,16 +23,30 @@ struct Operation {
   std::optional<CalibratedScope> calibrated;      ///< by the board or by the record
   std::optional<RegisteredPatient> registered;    ///< by touched fiducials
   std::shared_ptr<const DeformedOrgan> deformed;  ///< by views; null: it is not
+  /// What of it rests on files that no known machine signed, or that it is itself such a file, in words; empty:
+  /// nothing.
+  std::string doubt = {};
 };
 
-/// operation.json holds all of it, sealed: not one bit of it may change. It is written first, and whole. Beside it, for
-/// other programs, stand copies of what is in it: camera.yaml, camera_from_sensor.txt, patient_from_tracker.txt and
-/// field.mha, as far as there are such; nothing here reads them.
-Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation);
+/// operation.json holds all of it, sealed and signed by this machine: not one bit of it may change. It is written
+/// first, and whole. Beside it, for other programs, stand copies of what is in it: camera.yaml, camera_from_sensor.txt,
+/// patient_from_tracker.txt and field.mha, as far as there are such; nothing here reads them.
+Result<void> write_operation(const std::filesystem::path& folder, const Operation& operation,
+                             const ThisMachine& machine);
 bool has_operation(const std::filesystem::path& folder);
 /// path: the file, or the folder that holds it. Refuses, naming the file and its part, what is missing, damaged or
-/// changed, and what 0.1.0 wrote, whose files nothing binds together.
+/// changed, and what 0.1.0 wrote, whose files nothing binds together; and what authors do not admit.
+Result<Operation> read_operation(const std::filesystem::path& path, const Authors& authors);
+/// For conversions, whoever wrote it: what is not signed by a known machine has a line on stderr.
 Result<Operation> read_operation(const std::filesystem::path& path);
+
+inline constexpr const char* kOperationFormat = "birdseye operation";
+/// An operation, and who says that they wrote it.
+struct SignedOperation {
+  Operation operation;
+  SealedBy by;
+};
+Result<SignedOperation> read_signed_operation(const std::filesystem::path& path);
 
 /// Refuses, with the remedy, a CT or labels other than the operation's; the same voxels elsewhere are another CT.
 /// ct_sha256: host/overlay/ct_sha256.hpp; labels_sha256: host/files/files_sha256.hpp, or empty where no labels are

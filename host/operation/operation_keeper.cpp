@@ -12,14 +12,14 @@
 
 namespace birdseye::host {
 
-OperationKeeper::OperationKeeper(std::filesystem::path out, std::filesystem::path resume)
-    : out_(std::move(out)), resume_(std::move(resume)) {}
+OperationKeeper::OperationKeeper(std::filesystem::path out, std::filesystem::path resume, Authors authors)
+    : out_(std::move(out)), resume_(std::move(resume)), authors_(std::move(authors)) {}
 
 Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_sha256,
                                                           const std::string& labels_sha256) {
   const std::filesystem::path folder = std::exchange(resume_, {});
   if (folder.empty()) return std::optional<Operation>();
-  auto operation = read_operation(folder);
+  auto operation = read_operation(folder, authors_);
   if (operation) {
     if (auto same = check_patient(*operation, ct_sha256, labels_sha256); !same)
       operation = Error{same.error().code,
@@ -37,8 +37,9 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
 void OperationKeeper::keep(Operation operation) {
   if (out_.empty() || !resume_.empty()) return;
   operation.made_utc = utc_now();
-  writing_.start([out = out_, kept = std::make_shared<const Operation>(std::move(operation))](
-                     const std::stop_token&, const auto&) { return write_operation(out, *kept); });
+  writing_.start(
+      [out = out_, machine = authors_.machine, kept = std::make_shared<const Operation>(std::move(operation))](
+          const std::stop_token&, const auto&) { return write_operation(out, *kept, *machine); });
 }
 
 void OperationKeeper::tick() {

@@ -13,8 +13,9 @@ namespace birdseye::host {
 /// its own, for a disk may take its time; its end waits until all is written.
 class OperationKeeper {
  public:
-  /// out: where to; empty: nowhere. resume: what is to be taken up; or empty.
-  OperationKeeper(std::filesystem::path out, std::filesystem::path resume);
+  /// out: where to; empty: nowhere. resume: what is to be taken up, if authors
+  /// admit it; or empty.
+  OperationKeeper(std::filesystem::path out, std::filesystem::path resume, Authors authors);
 
   /// Of another CT or other labels nothing is taken up. Once: the second time, and where nothing was to be taken up, it
   /// is empty. An error names the folder; nothing is written into it from then on, for what is there may yet be needed.
@@ -29,6 +30,7 @@ class OperationKeeper {
 
  private:
   std::filesystem::path out_, resume_;
+  Authors authors_;
   Background<Result<void>> writing_;
   std::string fault_;
 };

@@ -39,6 +39,7 @@ struct OperationView {
   bool deformed_with_care = false;  ///< its step's note says why
   bool surface_told = false;        ///< by figures: the last check could tell
   bool asks_for_patient = false;    ///< and waits for it before anything is registered
+  std::string not_signed;           ///< what is used that no known machine signed; empty: nothing
   bool patient_confirmed = false;   ///< a person has compared name, ID and date with the patient on the table
   std::array<StepNote, kLiveSteps> notes;
   std::string fault;

@@ -56,16 +56,14 @@ Result<Told> told_by(const ReplayInputs& inputs) {
 }
 
 /// The one that is named, or that was in force when it was recorded, if one was.
-Result<std::optional<CalibrationRecord>> record_of(const ReplayInputs& inputs, const Told& told) {
-  if (!inputs.calibration.empty()) {
-    auto record = read_record(inputs.calibration);
-    if (!record) return record.error();
-    return std::optional(*std::move(record));
-  }
-  if (told.record.empty()) return std::optional<CalibrationRecord>();
-  auto record = calibration::parse_record(told.record);
-  if (!record) return record.error().with_context(inputs.recording.string() + ": its calibration record");
-  return std::optional(*std::move(record));
+Result<std::optional<AdmittedRecord>> record_of(const ReplayInputs& inputs, const Told& told) {
+  const bool used = inputs.camera.empty() || !inputs.fiducials.empty();
+  if (inputs.calibration.empty() && (told.record.empty() || !used)) return std::optional<AdmittedRecord>();
+  auto read = inputs.calibration.empty()
+                  ? admit_record(told.record, inputs.authors).with_context(inputs.recording.string())
+                  : read_record(inputs.calibration, inputs.authors);
+  if (!read) return read.error();
+  return std::optional(*std::move(read));
 }
 
 template <typename To, typename From>
@@ -174,7 +172,7 @@ Result<void> take_registration(const ReplayInputs& inputs, const std::optional<C
 
 /// By what a window kept, and by nothing else.
 Result<ReplaySetup> setup_of_operation(const ReplayInputs& inputs, const Told& told) {
-  auto operation = read_operation(inputs.operation);
+  auto operation = read_operation(inputs.operation, inputs.authors);
   if (!operation) return operation.error();
   const std::string path = inputs.operation.string();
   if (!operation->calibrated || !operation->registered) {
@@ -193,6 +191,8 @@ Result<ReplaySetup> setup_of_operation(const ReplayInputs& inputs, const Told& t
     if (!record || calibration::sha256_of(calibration::record_text(*record)) != operation->record_sha256)
       out.cautions.emplace_back(words("why_other_record"));
   }
+  if (!operation->doubt.empty())
+    out.cautions.push_back(words("why_unsigned", words("unsigned_operation"), operation->doubt));
   out.operation = *std::move(operation);
   return out;
 }
@@ -203,15 +203,19 @@ Result<ReplaySetup> read_replay_setup(const ReplayInputs& inputs) {
   const auto told = told_by(inputs);
   if (!told) return told.error();
   if (!inputs.operation.empty()) return setup_of_operation(inputs, *told);
-  const auto record = record_of(inputs, *told);
-  if (!record) return record.error();
-  auto scope = scope_of(inputs, *record);
+  const auto admitted = record_of(inputs, *told);
+  if (!admitted) return admitted.error();
+  const std::optional<CalibrationRecord> record =
+      *admitted ? std::optional((*admitted)->record) : std::optional<CalibrationRecord>();
+  auto scope = scope_of(inputs, record);
   if (!scope) return scope.error();
   ReplaySetup out{*std::move(scope), {}, {}, {}, inputs.fre_mm, 0, !inputs.camera.empty()};
-  if (auto taken = take_registration(inputs, *record, out); !taken) return taken.error();
+  if (auto taken = take_registration(inputs, record, out); !taken) return taken.error();
+  if (*admitted && !(*admitted)->doubt.empty())
+    out.cautions.push_back(words("why_unsigned", words("unsigned_record"), (*admitted)->doubt));
   if (!out.scope_from_files) {
     out.hardware = ReplayHardware({{"the calibration record",
-                                    {(*record)->tracker, (*record)->camera},
+                                    {record->tracker, record->camera},
                                     DependsOn::tracker_and_camera,
                                     "give the record of these instruments (--calibration)"}},
                                   told->first, inputs.calibration.empty());

@@ -26,6 +26,7 @@ struct ReplayInputs {
   std::vector<double> touched_s;             ///< from and to, s of the recording: when; empty: any time
   std::filesystem::path patient_from_model;  ///< of `register views`
   std::optional<double> rod_angle_deg;       ///< of a record whose scope's rod turns; empty: nothing is drawn by it
+  Authors authors = Authors::for_once();     ///< whose records and operations are used
   std::optional<double> camera_rms_px, held_out_px, fre_mm;  ///< in place of what is found
 };
 

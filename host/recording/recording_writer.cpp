@@ -11,6 +11,7 @@
 #include "drivers/system/durable.hpp"
 #include "host/files/sequence_header.hpp"
 #include "host/files/write_files.hpp"
+#include "host/recording/recording_signature.hpp"
 
 namespace birdseye::host {
 
@@ -301,6 +302,9 @@ Result<void> RecordingWriter::write_sheet(const std::string& why, bool ended) {
     sheet["clock"]["wall_minus_monotonic_ns"] = health_->clock.wall_minus_monotonic_ns;
     sheet["appliance_frames_dropped"] = health_->frames_dropped;
     sheet["appliance_messages_shed"] = health_->messages_shed;
+  }
+  if (ended && settings_.machine) {
+    if (auto signed_now = sign_recording(settings_.folder, sheet, *settings_.machine); !signed_now) return signed_now;
   }
   return write_file(settings_.folder / kRecordingSheet,
                     sheet.dump(2, ' ', false, json::error_handler_t::replace) + "\n");

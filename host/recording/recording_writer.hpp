@@ -9,6 +9,7 @@
 
 #include "calibration/time/pose_history.hpp"
 #include "device/wire/messages.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "host/files/film.hpp"
 #include "host/recording/event_lines.hpp"
 #include "host/recording/sequence_writer.hpp"
@@ -24,10 +25,11 @@ inline constexpr int kRecordingVersion = 1;
 
 struct RecordingSettings {
   std::filesystem::path folder = {};
-  std::string source = {};      ///< whom it was recorded from, as HOST:PORT
-  std::string scope = "scope";  ///< whose poses those of the frames are
-  bool compressed = false;      ///< films by ffmpeg, which lose something
-  bool pair = false;            ///< leaves header and pixels two files
+  std::string source = {};                          ///< whom it was recorded from, as HOST:PORT
+  std::string scope = "scope";                      ///< whose poses those of the frames are
+  bool compressed = false;                          ///< films by ffmpeg, which lose something
+  bool pair = false;                                ///< leaves header and pixels two files
+  std::shared_ptr<const ThisMachine> machine = {};  ///< who signs it once it has ended; null: nobody
 };
 
 /// One file of frames of one size.

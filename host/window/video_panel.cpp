@@ -53,9 +53,12 @@ Banner banner_of(const PanelContext& context) {
 /// The safety of the picture, in words, sign and colour, over its upper edge.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
-  const Banner banner = banner_of(context);
+  Banner banner = banner_of(context);
+  if (!context.operation.not_signed.empty() && banner.grade != Grade::fail) banner.grade = Grade::marginal;
   std::string text = banner.text;
   if (context.operation.rod_angle_deg) text = words("banner_rod", *context.operation.rod_angle_deg, text);
+  const std::string& not_signed = context.operation.not_signed;
+  if (!not_signed.empty()) text = words("banner_unsigned", not_signed, text);
   if (context.facts.recorded) text = words("banner_recording", text);
   if (context.operation.simulated) text = words("banner_simulated", text);
   if (banner.grade) text = fmt::format("{} {}", sign_of(*banner.grade), text);

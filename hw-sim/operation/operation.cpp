@@ -12,6 +12,7 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
+#include "host/files/record_file.hpp"
 #include "host/operation/live_source.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/local/local_camera.hpp"
@@ -46,9 +47,10 @@ class NoEngine final : public host::Engine {
 };
 
 /// The window's workflow with the patient read: files are read in the machine's time, before the operation's begins.
-Result<std::unique_ptr<host::LiveWorkflow>> workflow_of(const host::PatientFiles& patient,
-                                                        const OperationTruth& truth) {
+Result<std::unique_ptr<host::LiveWorkflow>> workflow_of(const host::PatientFiles& patient, const OperationTruth& truth,
+                                                        const host::Authors& authors) {
   host::LiveSettings settings;
+  settings.authors = authors;
   settings.patient = patient;
   settings.make_engine = [](const auto&, const auto&, const auto&) -> Result<std::unique_ptr<host::Engine>> {
     return std::unique_ptr<host::Engine>(std::make_unique<NoEngine>());
@@ -130,7 +132,8 @@ class Announcer {
   std::size_t next_ = 0;
 };
 
-device::Config config_of(const OperationTruth& truth, const LocalLine& line, const LocalCamera& camera) {
+device::Config config_of(const OperationTruth& truth, const host::Authors& authors, const LocalLine& line,
+                         const LocalCamera& camera) {
   device::Config config;
   config.tracker.line.device = "/sim/tracker";
   config.tracker.open_line = [&line](const auto&) { return line.open(); };
@@ -140,7 +143,7 @@ device::Config config_of(const OperationTruth& truth, const LocalLine& line, con
     config.core.bird_names.emplace_back(kReference);
     config.tracker.reference = kReference;
   }
-  config.core.calibration = calibration::record_text(truth.record());
+  config.core.calibration = host::record_text(truth.record(), *authors.machine);
   config.core.pose.smoothing = Duration::from_ms(40);
   config.core.pose_wait = Duration::from_ms(60);
   config.camera.width_px = kWidth_px;
@@ -189,8 +192,8 @@ const char* words_of(const host::ShownPicture& shown) {
 }
 
 /// In virtual time.
-void operate(const SimulatedOperation& operation, OperationTruth& truth, host::LiveWorkflow& workflow,
-             OperationOutcome& out) {
+void operate(const SimulatedOperation& operation, OperationTruth& truth, const host::Authors& authors,
+             host::LiveWorkflow& workflow, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
   const LocalLine line("sim:tracker");
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
@@ -204,7 +207,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, host::L
   const LocalCamera camera(camera_settings, zero_ns);
   const LocalNetwork network({.delay = Duration::from_ms(1)});
   const auto server = wire::Server::over(network.listener());
-  const auto appliance = device::Appliance::start(config_of(truth, line, camera), *server);
+  const auto appliance = device::Appliance::start(config_of(truth, authors, line, camera), *server);
   if (!appliance) return out.broken.push_back({0, "start", appliance.error().what});
   const auto source =
       host::LiveSource::of_client("the appliance", [&network]() -> Result<std::unique_ptr<wire::Client>> {
@@ -258,9 +261,11 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   if (!folder) return folder.error();
   const auto patient = write_patient((*folder)->path(), truth);
   if (!patient) return patient.error();
-  const auto workflow = workflow_of(*patient, truth);
+  const host::Authors authors = host::Authors::for_once();  // another key changes nothing that is done
+  const auto workflow = workflow_of(*patient, truth, authors);
   if (!workflow) return workflow.error();
-  const auto ran = run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, **workflow, out); });
+  const auto ran =
+      run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, authors, **workflow, out); });
   if (!ran) return ran.error();
   out.time = *ran;
   for (const BrokenLaw& law : out.broken)

@@ -10,6 +10,7 @@
 #include "tests/support/json_file.hpp"
 #include "tests/support/latency_streams.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye {
 namespace {
@@ -90,7 +91,7 @@ TEST(LatencyCommand, OfTheSimulatedCart) {
   const Scratch scratch;
   // What is found on this cart is not entered into another's record.
   const std::string other = scratch.file(
-      "other.json", calibration::record_text(testing::example_record(384, 288, {{"model", "trakSTAR"}}, {})));
+      "other.json", testing::signed_record_text(testing::example_record(384, 288, {{"model", "trakSTAR"}}, {})));
   ASSERT_FALSE(other.empty());
   const std::string faults =
       scratch.file("faults.toml", "[[fault]]\nname = \"late_frames\"\nat_s = 500\nfor_s = 1\nms = 1\n");

@@ -22,6 +22,7 @@
 #include "tests/support/programs_folder.hpp"
 #include "tests/support/slicer.hpp"
 #include "tests/support/small_ct.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::testing {
 
@@ -78,7 +79,7 @@ void write_registered(const std::filesystem::path& folder, const std::string& ct
                           0.2,
                           {{10, 0, 0}, {-10, 0, 0}, {0, 10, 0}, {0, 0, 10}}};
   std::filesystem::create_directories(folder);
-  const auto written = host::write_operation(folder, operation);
+  const auto written = host::write_operation(folder, operation, *testing::authors().machine);
   ASSERT_TRUE(written) << written.error().what;
 }
 

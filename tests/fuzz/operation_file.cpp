@@ -14,7 +14,7 @@ std::string sealed(const std::string& text) {
   if (!json.is_object()) return text;
   std::vector<birdseye::host::SealedPart> parts;
   for (const auto& [name, value] : json.items()) {
-    if (name != "sha256" && name != "whole") parts.emplace_back(name, value);
+    if (name != "sha256" && name != "whole" && name != "signed") parts.emplace_back(name, value);
   }
   return birdseye::host::sealed_text(parts);
 }
@@ -24,13 +24,14 @@ std::string sealed(const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace birdseye;
   const std::string text = testing::as_text({data, size});
-  (void)host::read_operation(testing::as_file("damaged.json", text));
+  (void)host::read_signed_operation(testing::as_file("damaged.json", text));
   const std::string path = testing::as_file("operation.json", sealed(text));
-  const auto operation = host::read_operation(path);
-  if (!operation) {
-    testing::must_name(operation.error().what, path);
+  const auto read = host::read_signed_operation(path);
+  if (!read) {
+    testing::must_name(read.error().what, path);
     return 0;
   }
+  const host::Operation* const operation = &read->operation;
   const auto& calibrated = operation->calibrated;
   const auto& registered = operation->registered;
   testing::must(!calibrated || testing::is_pose(calibrated->scope.camera_from_sensor()), "a hand-eye is a pose");

@@ -163,6 +163,7 @@ def main(programs, source):
     faults, ran = [], 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
+        environment["BIRDSEYE_IDENTITY"] = str(folder / "identity")
         write_recordings(folder)
         for command in commands(Path(source) / PAGE):
             if "PLUS:" in command:

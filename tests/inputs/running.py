@@ -119,7 +119,8 @@ def run(row, programs, data):
         folder.mkdir()
         logs.mkdir()
         environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8",
-                       "PORT": str(PORT), "DATA": str(data or "")}
+                       "PORT": str(PORT), "DATA": str(data or ""),
+                       "BIRDSEYE_IDENTITY": str(Path(scratch) / "identity")}
         if row.make:
             row.make(folder)
         before = _listing(folder)

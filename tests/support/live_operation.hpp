@@ -10,6 +10,7 @@
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
+#include "tests/support/this_machine.hpp"
 
 /// An operation as the live window meets it, without appliance and window: a small patient, and a hand with the
 /// pointer.
@@ -27,6 +28,7 @@ inline const Transform<Tracker, Patient> kTrackerFromPatient(
 
 inline LiveSettings operation_settings(const Scratch& scratch) {
   LiveSettings out;
+  out.authors = authors();
   out.patient.ct = ct_of_tissue(scratch);
   std::ofstream fiducials(scratch / "fiducials.txt");
   for (const Eigen::Vector3d& f : kFiducials) fiducials << f.transpose() << '\n';
@@ -83,7 +85,7 @@ inline void give_record(LiveWorkflow& workflow,
                         const calibration::CalibrationRecord& record = straight_scope_record()) {
   wire::Calibration calibration;
   calibration.in_force = true;
-  calibration.record = calibration::record_text(record);
+  calibration.record = signed_record_text(record);
   workflow.take(calibration, HostTime{0}, std::nullopt);
 }
 

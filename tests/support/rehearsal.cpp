@@ -18,6 +18,7 @@
 #include "tests/support/board_views.hpp"
 #include "tests/support/hand_eye_bench.hpp"
 #include "tests/support/small_ct.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::testing {
 
@@ -130,13 +131,14 @@ void Rehearsal::give_record() {
   calibration.why_not = calibration::misfit("tracker", record.tracker, tracker);
   if (calibration.why_not.empty()) calibration.why_not = calibration::misfit("camera", record.camera, camera);
   calibration.in_force = calibration.why_not.empty();
-  if (calibration.in_force) calibration.record = calibration::record_text(record);
+  if (calibration.in_force) calibration.record = signed_record_text(record);
   if (calibration.in_force && change_record) change_record(calibration.record);
   workflow_->take(calibration, HostTime{time_ms_ * kNsPerMs}, std::nullopt);
 }
 
 bool Rehearsal::begin() {
   host::LiveSettings live;
+  live.authors = authors();
   write_ct_with_markers(scratch_ / "ct", markers_mm);
   live.patient.ct = (scratch_ / "ct").string();
   std::ofstream fiducials(scratch_ / "fiducials.txt");

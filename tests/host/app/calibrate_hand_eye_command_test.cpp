@@ -15,6 +15,7 @@
 #include "tests/support/json_file.hpp"
 #include "tests/support/lens_file.hpp"
 #include "tests/support/scratch.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye {
 namespace {
@@ -173,7 +174,7 @@ TEST(CalibrateHandEyeCommand, ARodTurnedByKnownAnglesGivesItsAxis) {
   calibration::CalibrationRecord before = testing::example_record(640, 400, {}, {});
   before.lens->camera = small_lens();
   before.hand_eye.reset();
-  const std::string record = drawn.scratch.file("record.json", record_text(before));
+  const std::string record = drawn.scratch.file("record.json", testing::signed_record_text(before));
   const auto done = run("birdseye", drawn.command + drawn.angles(20, 110) + " --record " + record + " --report " +
                                         (drawn.scratch / "x.html").string());
   ASSERT_EQ(done.code, 0) << done.output;

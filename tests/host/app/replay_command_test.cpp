@@ -16,6 +16,7 @@
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/small_ct.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye {
 namespace {
@@ -39,7 +40,8 @@ constexpr int kFrames = 24, kLost = 12;
 /// small_ct's ball, which the pointer touches at four places, then the scope looks at from 80 mm; from frame kLost on
 /// there is no pose.
 void record(const fs::path& folder) {
-  auto writer = host::RecordingWriter::create({.folder = folder, .source = "test"});
+  auto writer =
+      host::RecordingWriter::create({.folder = folder, .source = "test", .machine = testing::authors().machine});
   ASSERT_TRUE(writer) << writer.error().what;
   std::int64_t ns = 1'000'000'000;
   const auto pointer_at = [&](const Eigen::Vector3d& place, double seconds) {
@@ -194,7 +196,8 @@ wire::Health health_of(const calibration::Identity& tracker, const calibration::
 
 /// Eight frames that look at small_ct's ball. Before each stands what an appliance tells then, if anything.
 void record_told(const fs::path& folder, const std::map<int, std::vector<wire::Event>>& told) {
-  auto writer = host::RecordingWriter::create({.folder = folder, .source = "test"});
+  auto writer =
+      host::RecordingWriter::create({.folder = folder, .source = "test", .machine = testing::authors().machine});
   ASSERT_TRUE(writer) << writer.error().what;
   for (int n = 0; n < 8; ++n) {
     if (told.contains(n)) {
@@ -217,7 +220,7 @@ void record_told(const fs::path& folder, const std::map<int, std::vector<wire::E
 wire::Calibration record_of(int width_px, const calibration::Identity& camera) {
   wire::Calibration out;
   out.in_force = true;
-  out.record = calibration::record_text(testing::straight_scope_record(width_px, 48, kBird, camera));
+  out.record = testing::signed_record_text(testing::straight_scope_record(width_px, 48, kBird, camera));
   return out;
 }
 
@@ -258,7 +261,7 @@ TEST(ReplayCommand, ARecordOfAnotherInstrumentDrawsNothing) {
       "--no-motion-check --registration " + scratch.file("reg.txt", kIdentityPose) + " --calibration ";
   const auto by = [&](const calibration::Identity& tracker, const calibration::Identity& camera) {
     return replay(scratch, "r",
-                  registration + scratch.file("record.json", calibration::record_text(testing::straight_scope_record(
+                  registration + scratch.file("record.json", testing::signed_record_text(testing::straight_scope_record(
                                                                  64, 48, tracker, camera))));
   };
   const Replayed own = by(kBird, kHead);
@@ -283,6 +286,35 @@ TEST(ReplayCommand, ARecordOfAnotherInstrumentDrawsNothing) {
   EXPECT_NE(unknown.output.find("nothing tells whether the calibration record is of the recording's tracker"),
             std::string::npos)
       << unknown.output;
+}
+
+TEST(ReplayCommand, WhatNobodyKnownSignedIsUsedOnlyWhenAskedToAndTheVerdictSaysSo) {
+  const Scratch scratch;
+  record_told(scratch / "r", {{0, {health_of(kBird, kHead)}}});
+  const auto record = testing::straight_scope_record(64, 48, kBird, kHead);
+  const ThisMachine other = ThisMachine::for_once();
+  const std::string by =
+      "--no-motion-check --registration " + scratch.file("reg.txt", kIdentityPose) + " --calibration ";
+  const std::string ct = small_ct(scratch), out = (scratch / "none").string();
+  for (const auto& [text, why] : {std::pair{calibration::record_text(record), "not signed"},
+                                  {host::record_text(record, other), "not known here"}}) {
+    const std::string file = scratch.file("record.json", text);
+    expect_refused("birdseye",
+                   "replay " + (scratch / "r").string() + " --volume " + ct + " --out " + out + " " + by + file,
+                   {"record.json: the calibration record is", why, "--accept-unsigned"}, out);
+    const Replayed asked = replay(scratch, "r", by + file + " --accept-unsigned");
+    EXPECT_EQ(asked.figures["frames_overlaid"], 8) << asked.output;
+    EXPECT_EQ(asked.figures["verdict"], "marginal") << asked.output;
+    EXPECT_NE(asked.output.find("UNSIGNED: the calibration record is"), std::string::npos) << asked.output;
+  }
+  const std::string good = by + scratch.file("record.json", host::record_text(record, *testing::authors().machine));
+  EXPECT_EQ(replay(scratch, "r", good).output.find("UNSIGNED"), std::string::npos);
+  (void)scratch.file("r/more.txt", "not of the recording, and not read");
+  EXPECT_EQ(replay(scratch, "r", good).output.find("UNSIGNED"), std::string::npos);
+  std::string sheet = contents_of(scratch / "r/recording.json");
+  (void)scratch.file("r/recording.json", sheet.replace(sheet.find("done"), 4, "DONE"));
+  expect_refused("birdseye", "replay " + (scratch / "r").string() + " --volume " + ct + " --out " + out + " " + good,
+                 {"/r: its signature", "does not fit"}, out);
 }
 
 TEST(ReplayCommand, FramesAfterTheCameraWasExchangedBearNoOverlay) {
@@ -332,7 +364,7 @@ TEST(ReplayCommand, TakesWhatAWindowKeptForItsOwnCtAndInstruments) {
                      true,
                      {kBird, kHead, 0}};
   kept.registered = {{}, 0.3, {{0, 0, 0}, {30, 0, 0}, {0, 50, 0}, {10, 0, 70}}, {kBird, {}, 0}};
-  ASSERT_TRUE(host::write_operation(scratch.path(), kept));
+  ASSERT_TRUE(host::write_operation(scratch.path(), kept, *testing::authors().machine));
   const std::string arguments = "--operation " + scratch.path().string();
   const Replayed done = replay(scratch, "r", arguments);
   EXPECT_EQ(done.figures["frames_overlaid"], 6) << done.output;
@@ -377,7 +409,7 @@ TEST(ReplayCommand, ExportAndRenderTakeWhatAWindowKept) {
   kept.registered = {
       Transform<Tracker, Patient>(Eigen::Matrix3d::Identity(), {100, 0, 0}), 0.3, {{0, 0, 0}, {30, 0, 0}, {0, 50, 0}}};
   fs::create_directories(scratch / "kept");
-  ASSERT_TRUE(host::write_operation(scratch / "kept", kept));
+  ASSERT_TRUE(host::write_operation(scratch / "kept", kept, *testing::authors().machine));
   const std::string by_operation = " --volume " + ct + " --operation " + (scratch / "kept/operation.json").string();
   const auto exported = run("birdseye", "export" + by_operation + " --out " + (scratch / "slicer").string());
   ASSERT_EQ(exported.code, 0) << exported.output;
@@ -404,7 +436,7 @@ TEST(ReplayCommand, RenderAsksASnapshotWhatItWasTakenWith) {
                      {kBird, kHead, 0},
                      "no. 17"};
   fs::create_directories(scratch / "kept");
-  ASSERT_TRUE(host::write_operation(scratch / "kept", kept));
+  ASSERT_TRUE(host::write_operation(scratch / "kept", kept, *testing::authors().machine));
   host::Snapshot snapshot;
   snapshot.frame.width_px = snapshot.shown.width_px = 64;
   snapshot.frame.height_px = snapshot.shown.height_px = 48;

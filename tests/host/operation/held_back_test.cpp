@@ -5,6 +5,7 @@
 #include "host/operation/instruments.hpp"
 #include "host/operation/operation.hpp"
 #include "tests/support/live_operation.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -229,7 +230,7 @@ TEST(HeldBackOnResume, AnotherCameraTakesUpNoCalibrationByTheBoard) {
   kept.calibrated = {
       ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, 0.3, found), kept.made_utc, true, {kTracker, kCamera, 0}};
   kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {kTracker, {}, 0}};
-  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   LiveWorkflow workflow(settings);
   load(workflow);
   EXPECT_EQ(workflow.view().fault, "");

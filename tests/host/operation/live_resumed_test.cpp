@@ -7,6 +7,7 @@
 #include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "tests/host/operation/live_workflow_fixture.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -27,6 +28,77 @@ using birdseye::testing::resumed;
 using birdseye::testing::Scratch;
 using birdseye::testing::square;
 
+calibration::CalibrationRecord unsigned_scope() {
+  return testing::straight_scope_record();
+}
+
+void give_text(LiveWorkflow& workflow, const std::string& text) {
+  wire::Calibration calibration;
+  calibration.in_force = true;
+  calibration.record = text;
+  workflow.take(calibration, HostTime{0}, std::nullopt);
+}
+
+TEST(LiveWorkflow, ARecordOfNobodyKnownIsUsedOnlyWhenAskedToAndTheViewSaysSo) {
+  const Scratch scratch;
+  const ThisMachine other = ThisMachine::for_once();
+  for (const std::string& text : {record_text(unsigned_scope()), record_text(unsigned_scope(), other)}) {
+    LiveSettings settings = operation_settings(scratch);
+    LiveWorkflow careful(settings);
+    connect(careful);
+    give_text(careful, text);
+    EXPECT_FALSE(careful.view().note(LiveStep::calibrate).done);
+    EXPECT_NE(careful.view().note(LiveStep::calibrate).line.find("--accept-unsigned"), std::string::npos)
+        << careful.view().note(LiveStep::calibrate).line;
+    EXPECT_EQ(careful.view().not_signed, "");
+    settings.authors.accept_unsigned = true;
+    LiveWorkflow asked(settings);
+    connect(asked);
+    give_text(asked, text);
+    EXPECT_TRUE(asked.view().note(LiveStep::calibrate).done);
+    EXPECT_EQ(asked.view().not_signed, "calibration record");
+    EXPECT_NE(asked.view().note(LiveStep::calibrate).line.find("UNSIGNED: "), std::string::npos)
+        << asked.view().note(LiveStep::calibrate).line;
+    give_record(asked);
+    EXPECT_EQ(asked.view().not_signed, "") << "a known machine's record has come in its place";
+  }
+}
+
+TEST(LiveWorkflow, WhatRestsOnAnUnsignedRecordIsNoBetterForBeingSignedAfterwards) {
+  const Scratch scratch;
+  Operation kept = registered_operation(resumed(scratch, scratch.path()));
+  kept.doubt = "not signed";
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
+  const auto refused = read_operation(scratch.path(), testing::authors());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("rests on what no known machine signed"), std::string::npos)
+      << refused.error().what;
+  LiveSettings settings = resumed(scratch, scratch.path());
+  settings.authors.accept_unsigned = true;
+  LiveWorkflow workflow(settings);
+  connect(workflow);
+  load(workflow);
+  EXPECT_EQ(workflow.view().not_signed, "operation");
+}
+
+TEST(LiveWorkflow, AnOperationOfAnUnknownMachineIsNotTakenUp) {
+  const Scratch scratch;
+  const ThisMachine other = ThisMachine::for_once();
+  LiveSettings settings = resumed(scratch, scratch.path());
+  ASSERT_TRUE(write_operation(scratch.path(), registered_operation(settings), other));
+  LiveWorkflow careful(settings);
+  connect(careful);
+  load(careful);
+  EXPECT_NE(careful.view().fault.find("not known here"), std::string::npos) << careful.view().fault;
+  EXPECT_FALSE(careful.view().fre_mm);
+  settings.authors.accept_unsigned = true;
+  LiveWorkflow asked(settings);
+  connect(asked);
+  load(asked);
+  EXPECT_EQ(asked.view().fault, "");
+  EXPECT_EQ(asked.view().not_signed, "operation");
+}
+
 TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   const Scratch scratch;
   const LiveSettings again = resumed(scratch, scratch.path());
@@ -37,7 +109,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
   field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
   kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
-  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   LiveWorkflow workflow(again);
   connect(workflow);
   load(workflow);
@@ -204,7 +276,7 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
                        record_is_newer ? "2026-11-22T09:00:00Z" : "2026-11-22T10:00:00Z",
                        true,
                        {birdseye::testing::kTracker, birdseye::testing::kCamera, 0}};
-    ASSERT_TRUE(write_operation(scratch.path(), kept));
+    ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
     LiveWorkflow workflow(again);
     connect(workflow);
     load(workflow);
@@ -262,7 +334,7 @@ TEST(LiveWorkflow, ADeformationIsTakenUpWithTheCalibrationItWasFoundByAlone) {
   kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
   for (const bool same : {true, false}) {
     for (const bool record_comes_first : {true, false}) {
-      ASSERT_TRUE(write_operation(scratch.path(), kept));
+      ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
       LiveWorkflow workflow(resumed(scratch, scratch.path()));
       connect(workflow);
       if (record_comes_first) give_record(workflow, same ? record : other);
@@ -279,7 +351,7 @@ TEST(LiveWorkflow, AnOperationOfOtherLabelsIsNotTakenUp) {
   const Scratch scratch;
   Operation kept = registered_operation(operation_settings(scratch));
   kept.labels_sha256 = "of labels that were shown";
-  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   LiveSettings settings = resumed(scratch, scratch.path());
   settings.patient.labels = settings.patient.ct.path;  // on its grid
   settings.patient.organ = {"200"};

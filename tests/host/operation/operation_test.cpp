@@ -11,6 +11,7 @@
 #include "host/operation/calibration_step.hpp"
 #include "host/operation/operation_keeper.hpp"
 #include "tests/support/live_operation.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -55,7 +56,7 @@ Operation whole_operation() {
 TEST(Operation, IsReadBackToTheBit) {
   const Scratch scratch;
   const Operation kept = whole_operation();
-  ASSERT_TRUE(write_operation(scratch.path(), kept));
+  ASSERT_TRUE(write_operation(scratch.path(), kept, *testing::authors().machine));
   const auto read = read_operation(scratch.path());
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_EQ(read->record_sha256, "3");
@@ -94,7 +95,7 @@ std::vector<std::string> parts_at(const std::string& text, std::size_t at) {
 
 TEST(Operation, OneBitThatIsChangedAnywhereIsRefusedWithTheNameOfItsPart) {
   const Scratch scratch;
-  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
   const std::string text = contents_of(scratch / "operation.json");
   const std::size_t sums = text.find("\n\"sha256\"");
   ASSERT_NE(sums, std::string::npos);
@@ -116,7 +117,7 @@ TEST(Operation, OneBitThatIsChangedAnywhereIsRefusedWithTheNameOfItsPart) {
 
 TEST(Operation, AHalfWrittenFileIsRefusedWithTheNameOfThePartItEndsIn) {
   const Scratch scratch;
-  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
   const std::string text = contents_of(scratch / "operation.json");
   for (std::size_t length = 0; length < text.size(); ++length)
     ASSERT_FALSE(read_operation(scratch.file("cut.json", text.substr(0, length)))) << length;
@@ -125,7 +126,7 @@ TEST(Operation, AHalfWrittenFileIsRefusedWithTheNameOfThePartItEndsIn) {
   // A part that is whole, of another operation, does not fit the rest.
   Operation other = whole_operation();
   other.registered->fre_mm = 0.1;
-  ASSERT_TRUE(write_operation(scratch.path(), other));
+  ASSERT_TRUE(write_operation(scratch.path(), other, *testing::authors().machine));
   const std::string others = contents_of(scratch / "operation.json");
   const auto part = [](const std::string& from) {
     const std::size_t at = from.find("\n\"registered\"");
@@ -140,7 +141,7 @@ TEST(Operation, AHalfWrittenFileIsRefusedWithTheNameOfThePartItEndsIn) {
 
 TEST(Operation, TheCopiesBesideItAreForOthersAndAreNotRead) {
   const Scratch scratch;
-  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
   for (const char* const copy : {"patient_from_tracker.txt", "camera_from_sensor.txt", "camera.yaml", "field.mha"}) {
     ASSERT_TRUE(std::filesystem::exists(scratch / copy)) << copy;
     (void)scratch.file(copy, "1 0 0 20\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
@@ -153,7 +154,7 @@ TEST(Operation, TheCopiesBesideItAreForOthersAndAreNotRead) {
   less.calibrated.reset();
   less.registered.reset();
   less.deformed.reset();
-  ASSERT_TRUE(write_operation(scratch.path(), less));
+  ASSERT_TRUE(write_operation(scratch.path(), less, *testing::authors().machine));
   for (const char* const copy : {"patient_from_tracker.txt", "camera_from_sensor.txt", "camera.yaml", "field.mha"})
     EXPECT_FALSE(std::filesystem::exists(scratch / copy)) << copy;
 }
@@ -161,7 +162,7 @@ TEST(Operation, TheCopiesBesideItAreForOthersAndAreNotRead) {
 /// Where the power goes, there is a temporary file that was begun, and the former operation.
 TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
   const Scratch scratch;
-  ASSERT_TRUE(write_operation(scratch.path(), whole_operation()));
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
   const std::string text = contents_of(scratch / "operation.json");
   for (const std::size_t length : {std::size_t{0}, text.size() / 2, text.size()}) {
     (void)scratch.file("operation.json.part", text.substr(0, length));
@@ -170,7 +171,7 @@ TEST(Operation, WhatAPowerCutLeavesIsTheFormerOperation) {
     ASSERT_TRUE(read) << read.error().what;
     Operation next = whole_operation();
     next.registered->fre_mm = 0.2;
-    ASSERT_TRUE(write_operation(scratch.path(), next));
+    ASSERT_TRUE(write_operation(scratch.path(), next, *testing::authors().machine));
     EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 0.2);
     EXPECT_FALSE(std::filesystem::exists(scratch / "operation.json.part"));
     EXPECT_FALSE(std::filesystem::exists(scratch / "part-field.mha"));
@@ -182,12 +183,12 @@ TEST(OperationKeeper, AfterARefusalKeepsWhatIsFoundInAnotherFolderOnly) {
   const Scratch scratch;
   const auto refused = scratch / "refused", fresh = scratch / "fresh";
   for (const auto& folder : {refused, fresh}) std::filesystem::create_directory(folder);
-  ASSERT_TRUE(write_operation(refused, whole_operation()));
+  ASSERT_TRUE(write_operation(refused, whole_operation(), *testing::authors().machine));
   const std::string before = contents_of(refused / "operation.json");
   Operation next = whole_operation();
   next.ct_sha256 = "another";
   const auto keep_in = [&](const std::filesystem::path& out) {
-    OperationKeeper keeper(out, refused);
+    OperationKeeper keeper(out, refused, testing::authors());
     const auto taken = keeper.take_up("another", "2");
     EXPECT_FALSE(taken);
     keeper.keep(next);
@@ -234,11 +235,11 @@ TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
   Operation one;
   one.ct_sha256 = "1";
   one.registered = {kTrackerFromPatient, 0.3, kFiducials};
-  OperationKeeper(scratch.path(), {}).keep(one);
+  OperationKeeper(scratch.path(), {}, testing::authors()).keep(one);
   ASSERT_TRUE(has_operation(scratch.path()));
   Operation other = one;
   other.registered->fre_mm = 7;
-  OperationKeeper keeper(scratch.path(), scratch.path());
+  OperationKeeper keeper(scratch.path(), scratch.path(), testing::authors());
   keeper.keep(other);
   const auto kept = keeper.take_up("1", "");
   ASSERT_TRUE(kept) << kept.error().what;
@@ -249,7 +250,7 @@ TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
   keeper.tick();
   EXPECT_EQ(keeper.fault(), "");
   EXPECT_EQ(read_operation(scratch.path())->registered->fre_mm, 7);
-  OperationKeeper wrong(scratch.path(), scratch.path());
+  OperationKeeper wrong(scratch.path(), scratch.path(), testing::authors());
   EXPECT_FALSE(wrong.take_up("2", ""));
   wrong.keep(one);
   wait_for(wrong);
@@ -258,17 +259,17 @@ TEST(OperationKeeper, KeepsNothingBeforeItHasTakenUpNorOverAnotherCts) {
 
 TEST(OperationKeeper, OfOtherLabelsNothingIsTakenUp) {
   const Scratch scratch;
-  OperationKeeper(scratch.path(), {}).keep(whole_operation());
-  EXPECT_TRUE(OperationKeeper({}, scratch.path()).take_up("1", "2"));
-  EXPECT_TRUE(OperationKeeper({}, scratch.path()).take_up("1", "")) << "none are shown";
-  const auto other = OperationKeeper({}, scratch.path()).take_up("1", "3");
+  OperationKeeper(scratch.path(), {}, testing::authors()).keep(whole_operation());
+  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "2"));
+  EXPECT_TRUE(OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "")) << "none are shown";
+  const auto other = OperationKeeper({}, scratch.path(), testing::authors()).take_up("1", "3");
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().what.find("is of other labels"), std::string::npos) << other.error().what;
 }
 
 TEST(OperationKeeper, SaysWhatCannotBeKept) {
   const Scratch scratch;
-  OperationKeeper keeper(scratch.file("a file", ""), {});
+  OperationKeeper keeper(scratch.file("a file", ""), {}, testing::authors());
   keeper.keep(whole_operation());
   wait_for(keeper);
   keeper.tick();
@@ -282,7 +283,7 @@ TEST(OperationKeeper, AFigureThatIsNotKnownStaysUnknown) {
   one.ct_sha256 = "1";
   one.calibrated = {ScopeSetup::of_hand_eye({768, 576, 500, 500, 384, 288}, std::nullopt, {}), "2026-11-22T09:35:00Z",
                     true};
-  OperationKeeper(scratch.path(), {}).keep(one);
+  OperationKeeper(scratch.path(), {}, testing::authors()).keep(one);
   const auto read = read_operation(scratch.path());
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_FALSE(read->calibrated->scope.figures().camera_rms_px.has_value());

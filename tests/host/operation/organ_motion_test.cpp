@@ -8,6 +8,7 @@
 #include "drivers/system/wait.hpp"
 #include "host/operation/operation.hpp"
 #include "tests/support/live_operation.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -110,7 +111,7 @@ class DeformedOperation : public ::testing::Test {
     field.displacement_mm.assign(8, Eigen::Vector3f(-4, 0, 0));
     field.patient_from_lattice = Eigen::Translation3d(-500, -500, -500) * Eigen::Scaling(1000.0);
     kept.deformed = std::make_shared<const DeformedOrgan>(DeformedOrgan{field, 0.7, MotionError{0.7, 1.2}});
-    ASSERT_TRUE(write_operation(scratch_.path(), kept));
+    ASSERT_TRUE(write_operation(scratch_.path(), kept, *testing::authors().machine));
     settings.resume = scratch_.path();
     workflow_.emplace(settings);
     birdseye::testing::connect(*workflow_);

@@ -13,6 +13,7 @@
 #include "calibration/geometry/rotations.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "tests/support/live_operation.hpp"
+#include "tests/support/this_machine.hpp"
 
 namespace birdseye::host {
 namespace {
@@ -436,7 +437,7 @@ TEST_F(Referenced, TheOperationThatIsKeptNamesTheReference) {
   kept.ct_sha256 = std::string(64, '0');
   kept.made_utc = "2026-11-22T10:00:00Z";
   kept.registered = {kTrackerFromPatient, 0.3, kFiducials, {birdseye::testing::kTracker, {}, 0, "reference"}};
-  ASSERT_TRUE(write_operation(scratch_.path(), kept));
+  ASSERT_TRUE(write_operation(scratch_.path(), kept, *testing::authors().machine));
   const auto read = read_operation(scratch_.path());
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_EQ(read->registered->found_with.reference, "reference");

@@ -1,0 +1,96 @@
+// What others have found and wrote: the appliance's record, an earlier window's operation; and what is kept for the
+// next.
+#include "calibration/record/sha256.hpp"
+#include "host/files/record_file.hpp"
+#include "host/operation/live_workflow.hpp"
+#include "host/texts/texts.hpp"
+
+namespace birdseye::host {
+
+void LiveWorkflow::take(const wire::Calibration& calibration) {
+  record_tip_in_pointer_mm_.reset();
+  tip_rms_mm_.reset();
+  record_doubt_.clear();
+  if (!calibration.in_force) {
+    if (calibration_.withdraw_record(calibration.why_not)) follow_held_back();
+    return;
+  }
+  const auto admitted = admit_record(calibration.record, settings_.authors);
+  if (!admitted) {
+    if (calibration_.withdraw_record(admitted.error().what)) follow_held_back();
+    return;
+  }
+  const calibration::CalibrationRecord* const record = &admitted->record;
+  record_doubt_ = admitted->doubt;
+  record_sha256_ = calibration::sha256_of(calibration::record_text(*record));
+  if (record->tip) {
+    record_tip_in_pointer_mm_ = record->tip->tip_in_sensor_mm;
+    if (!settings_.tip_in_pointer_mm) tip_rms_mm_ = record->tip->rms_mm;
+  }
+  const auto adopted = calibration_.adopt(*record);
+  if (adopted == CalibrationStep::Adopted::no) return;
+  if (adopted == CalibrationStep::Adopted::anew) forget_views(words("note_calibrated_anew"));
+  follow_held_back();
+}
+
+void LiveWorkflow::keep() {
+  if (!patient_.plan()) return;
+  Operation operation;
+  operation.ct_sha256 = patient_.plan()->ct_sha256;
+  operation.ct_stated = patient_.plan()->ct_stated;
+  operation.labels_sha256 = patient_.plan()->labels_sha256;
+  operation.record_sha256 = record_sha256_;
+  const auto& scope = calibration_.held_back() ? calibration_.held_back() : calibration_.found();
+  operation.calibrated = scope;
+  operation.registered = fiducials_.registered_or_held_back();
+  operation.deformed = deformation_.found();
+  // What the next window finds in it rests on the same.
+  for (const std::string* doubt : {&record_doubt_, &operation_doubt_, &settings_.recording_doubt}) {
+    if (operation.doubt.empty()) operation.doubt = *doubt;
+  }
+  keeper_.keep(std::move(operation));
+}
+
+void LiveWorkflow::take_up() {
+  const auto operation = keeper_.take_up(patient_.plan()->ct_sha256, patient_.plan()->labels_sha256);
+  if (!operation) {
+    resume_fault_ = operation.error().what;
+    return;
+  }
+  const auto& kept = *operation;
+  if (!kept) return;
+  operation_doubt_ = kept->doubt;
+  const std::string when = words("note_taken_up", kept->made_utc);
+  if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
+  // The calibration that is in force may be newer: a deformation then means nothing.
+  const bool same_scope = !kept->calibrated || calibration_.take_up(*kept->calibrated, when);
+  if (fiducials_.take_up(kept->registered, when) && kept->deformed && same_scope) {
+    deformation_.take_up(kept->deformed, when);
+    show_shape();
+  }
+  judge_instruments();
+  update_setup();
+  keep();
+  // Patient or transmitter may have been moved meanwhile: only a landmark tells.
+  if (fiducials_.confirmed()) return;
+  if (return_to_) {
+    return_to_ = LiveStep::check;
+  } else {
+    go_to(LiveStep::check);
+  }
+}
+
+void LiveWorkflow::tell_unsigned(OperationView& view) const {
+  const auto tell = [&view](const std::string& what, const std::string& doubt, LiveStep step) {
+    if (doubt.empty()) return;
+    if (!view.not_signed.empty()) view.not_signed += ", ";
+    view.not_signed += what;
+    std::string& line = view.notes[static_cast<std::size_t>(step)].line;
+    line = words("note_unsigned", line, doubt);
+  };
+  tell(words("unsigned_record"), record_doubt_, LiveStep::calibrate);
+  tell(words("unsigned_operation"), operation_doubt_, LiveStep::fiducials);
+  tell(words("unsigned_recording"), settings_.recording_doubt, LiveStep::connect);
+}
+
+}  // namespace birdseye::host

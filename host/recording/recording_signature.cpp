@@ -1,0 +1,117 @@
+#include "host/recording/recording_signature.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "calibration/record/sha256.hpp"
+#include "host/files/files_sha256.hpp"
+#include "host/recording/recording_writer.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSigned = "signed";
+constexpr const char* kSums = "sha256";
+
+/// Of the sheet without its signature.
+std::string sheet_sha256(nlohmann::json sheet) {
+  sheet.erase(kSigned);
+  return calibration::sha256_of(sheet.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+/// All but the sheet.
+Result<std::set<std::string>> files_in(const fs::path& folder) {
+  std::set<std::string> out;
+  std::error_code error;
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (name != kRecordingSheet) out.insert(name);
+  }
+  if (error) return Error{Errc::unreadable, fmt::format("{}: cannot be read; check its permissions", folder.string())};
+  return out;
+}
+
+}  // namespace
+
+Result<void> sign_recording(const fs::path& folder, nlohmann::json& sheet, const ThisMachine& machine) {
+  const auto files = files_in(folder);
+  if (!files) return files.error();
+  nlohmann::json sums = nlohmann::json::object();
+  for (const std::string& name : *files) {
+    const auto sum = files_sha256(folder / name);
+    if (!sum) return sum.error();
+    sums[name] = *sum;
+  }
+  sheet[kSums] = std::move(sums);
+  sheet[kSigned] = json_of_signature(machine.sign(kSessionRecordingFormat, sheet_sha256(sheet)));
+  return {};
+}
+
+Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
+  std::ifstream in(folder / kRecordingSheet);
+  const auto sheet = nlohmann::json::parse(in, nullptr, false);
+  if (!sheet.is_object() || !sheet.contains("birdseye_recording")) {
+    return Error{Errc::bad_format, fmt::format("{}: is missing or damaged; take a copy of the recording that is whole",
+                                               (folder / kRecordingSheet).string())};
+  }
+  RecordingSeal out;
+  out.sha256 = sheet_sha256(sheet);
+  out.ended = sheet.value("ended", nlohmann::json()) == true;
+  if (!sheet.contains(kSigned)) return out;
+  const auto there = files_in(folder);
+  if (!there) return there.error();
+  try {
+    out.signature = calibration::signature_of_json(sheet.at(kSigned));
+    const auto sums = sheet.at(kSums).get<std::map<std::string, std::string>>();
+    for (const auto& [name, recorded] : sums) {
+      const bool here = there->contains(name);
+      const auto sum = here ? files_sha256(folder / name) : Result<std::string>("");
+      if (!sum) return sum.error();
+      if (!here) out.missing.push_back(name);
+      if (here && *sum != recorded) out.changed.push_back(name);
+    }
+    std::ranges::copy_if(*there, std::back_inserter(out.added), [&](const auto& name) { return !sums.contains(name); });
+  } catch (const nlohmann::json::exception&) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: what it says of its signature makes no sense", (folder / kRecordingSheet).string())};
+  }
+  return out;
+}
+
+Result<std::string> admit_recording(const fs::path& path, const Authors& authors) {
+  std::error_code ignored;
+  const bool sheet = fs::exists(path / kRecordingSheet, ignored);
+  if (!fs::is_directory(path, ignored) || (!sheet && !fs::exists(path / kRecordingEvents, ignored)))
+    return std::string();
+  RecordingSeal seal;
+  if (sheet || !authors.accept_unsigned) {
+    auto read = read_recording_seal(path);
+    if (!read) return read.error();
+    seal = *std::move(read);
+  }
+  for (const auto& [files, what] : {std::pair{&seal.changed, "changed"}, std::pair{&seal.missing, "taken away"}}) {
+    if (!files->empty())
+      return Error{Errc::bad_format,
+                   fmt::format("{}: was {} since the recording was signed: {}; take a copy that is as "
+                               "it was written",
+                               path.string(), what, fmt::join(*files, ", "))};
+  }
+  auto doubt = authors.admit(kSessionRecordingFormat, seal.sha256, seal.signature).with_context(path.string());
+  if (!doubt && !seal.signature && !seal.ended)
+    return Error{doubt.error().code, doubt.error().what + " (it was cut short, and could not be signed)"};
+  return doubt;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+
+#include "device/birdseyed/recorder.hpp"
+#include "host/operation/operation.hpp"
+#include "host/recording/recording_writer.hpp"
+#include "tests/support/command.hpp"
+#include "tests/support/example_record.hpp"
+#include "tests/support/scratch.hpp"
+#include "tests/support/this_machine.hpp"
+
+namespace birdseye {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::authors;
+using testing::Scratch;
+
+void expect(const std::string& arguments, int code, const std::vector<std::string>& words,
+            const std::string& within = {}) {
+  const auto result = testing::run("birdseye", "verify " + arguments, within);
+  EXPECT_EQ(result.code, code) << arguments << "\n" << result.output;
+  for (const std::string& word : words)
+    EXPECT_NE(result.output.find(word), std::string::npos) << word << "\n" << result.output;
+}
+
+calibration::CalibrationRecord record() {
+  return testing::example_record(640, 480, {{"model", "miniBIRD"}}, {});
+}
+
+void record_session(const fs::path& folder) {
+  const auto writer = host::RecordingWriter::create({.folder = folder, .source = "test", .machine = authors().machine});
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE((*writer)->finish("the test is over"));
+}
+
+TEST(VerifyCommand, SaysByWhomAndWhenEachKindWasSigned) {
+  const Scratch scratch;
+  (void)scratch.file("record.json", testing::signed_record_text(record()));
+  host::Operation operation;
+  operation.ct_sha256 = "1";
+  fs::create_directory(scratch / "operation");
+  ASSERT_TRUE(host::write_operation(scratch / "operation", operation, *authors().machine));
+  record_session(scratch / "session");
+  const std::string by = "signed by " + machine_name() + " (" + authors().machine->key().public_key().fingerprint();
+  for (const auto& [name, what] : {std::pair{"record.json", ": calibration record: "},
+                                   {"operation", ": operation: "},
+                                   {"session", ": session recording: "}}) {
+    expect((scratch / name).string(), 0, {std::string(name) + what + by, "and as it was signed"});
+  }
+  expect((scratch / "record.json").string() + " " + (scratch / "session").string(), 0, {"record.json: ", "session: "});
+}
+
+TEST(VerifyCommand, SaysWhatWasChanged) {
+  const Scratch scratch;
+  std::string text = testing::signed_record_text(record());
+  text.replace(text.find("640"), 3, "641");
+  expect(scratch.file("record.json", text), 3, {"calibration record: ", "checksum does not fit"});
+  record_session(scratch / "session");
+  (void)scratch.file("session/events.jsonl", "{}\n");
+  (void)scratch.file("session/more.txt", "");
+  expect((scratch / "session").string(), 3, {"changed: events.jsonl", "added: more.txt", "not as it was signed"});
+  host::Operation operation;
+  operation.ct_sha256 = "12345";
+  fs::create_directory(scratch / "operation");
+  ASSERT_TRUE(host::write_operation(scratch / "operation", operation, *authors().machine));
+  text = testing::contents_of(scratch / "operation/operation.json");
+  (void)scratch.file("operation/operation.json", text.replace(text.find("12345"), 5, "12346"));
+  expect((scratch / "operation").string(), 3, {"its part \"ct\" was changed or damaged"});
+}
+
+TEST(VerifyCommand, SaysWhatNobodySigned) {
+  const Scratch scratch;
+  expect(scratch.file("record.json", calibration::record_text(record())), 3, {"not signed: nobody says who wrote it"});
+  record_session(scratch / "session");
+  (void)scratch.file("session/recording.json", R"({"birdseye_recording": 1, "ended": false})");
+  expect((scratch / "session").string(), 3, {"not signed", "it was cut short"});
+}
+
+TEST(VerifyCommand, MakesAMachineKnownByWhatItSigned) {
+  const Scratch scratch;
+  const std::string path = scratch.file("record.json", testing::signed_record_text(record()));
+  const std::string elsewhere = "env BIRDSEYE_IDENTITY=" + (scratch / "elsewhere").string();
+  expect(path, 3, {"not known here", authors().machine->key().public_key().fingerprint()}, elsewhere);
+  expect("--trust theatre-3 " + path, 0, {"signed by theatre-3 ("}, elsewhere);
+  expect(path, 0, {"signed by theatre-3 ("}, elsewhere);
+  expect("--key", 0, {"fingerprint "}, elsewhere);
+  // Nobody becomes known by what is not signed, or not as it was.
+  expect("--trust nobody " + scratch.file("unsigned.json", calibration::record_text(record())), 3, {"not signed"},
+         elsewhere);
+}
+
+TEST(VerifyCommand, OfAnApplianceRecordingSeesEachByte) {
+  const Scratch scratch;
+  (void)authors();  // and with it this machine's key
+  device::RecordConfig config;
+  config.folder = scratch / "r";
+  fs::path path;
+  {
+    const auto recorder = device::Recorder::start(config, {});
+    ASSERT_TRUE(recorder) << recorder.error().what;
+    path = (*recorder)->path();
+    for (std::uint8_t i = 0; i < 9; ++i) (*recorder)->take(device::TrackerBytes{{{0x80, i}, DeviceTime{i}}});
+  }
+  expect(path.string(), 0, {": appliance recording: signed by " + machine_name(), "and as it was signed"});
+  const std::string text = testing::contents_of(path);
+  for (const std::size_t at : {std::size_t{9}, text.size() / 4, text.size() / 2, text.size() - 100}) {
+    std::string changed = text;
+    changed[at] = static_cast<char>(changed[at] ^ 1);
+    expect(scratch.file("changed.berec", changed), 3, {": appliance recording: "});
+  }
+  expect(scratch.file("longer.berec", text + "x"), 3, {"added: bytes behind the signature"});
+  expect(scratch.file("cut.berec", text.substr(0, text.size() - 1)), 3, {"not signed", "cut short"});
+}
+
+TEST(VerifyCommand, RefusesWhatItCannotJudge) {
+  const Scratch scratch;
+  testing::expect_refused("birdseye", "verify " + (scratch / "none").string(), {"no such file or folder"});
+  testing::expect_refused("birdseye", "verify " + scratch.file("some.txt", "text"), {"nothing that Birdseye signs"});
+  testing::expect_refused("birdseye", "verify", {"name a record, an operation or a recording"});
+  testing::expect_refused("birdseye", "verify " + scratch.file("record.json", calibration::record_text(record())),
+                          {"HOME is not set"}, {},
+                          "env -u BIRDSEYE_IDENTITY -u HOME -u XDG_CONFIG_HOME -u STATE_DIRECTORY");
+}
+
+}  // namespace
+}  // namespace birdseye
