@@ -60,7 +60,7 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
 int serve(const fs::path& path, ServiceSignals& signals) {
   auto config = device::read_config(path);
   if (!config) return refuse(config.error());
-  auto server = wire::Server::listen(config->wire.bind, config->wire.port);
+  auto server = wire::Server::listen(config->wire.bind, config->wire.port, {.tls = nullptr, .allow_plain = true});
   if (!server) return refuse(server.error());
   auto started = device::Appliance::start(*config, **server);
   if (!started) return refuse(started.error());
@@ -83,7 +83,7 @@ int serve(const fs::path& path, ServiceSignals& signals) {
 int replay(const fs::path& path, const fs::path& recording, const ServiceSignals& signals) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
-  const auto server = wire::Server::listen(config->wire.bind, config->wire.port);
+  const auto server = wire::Server::listen(config->wire.bind, config->wire.port, {.tls = nullptr, .allow_plain = true});
   if (!server) return refuse(server.error());
   spdlog::info("replaying on {} port {}", config->wire.bind, (*server)->port());
   const auto done = device::replay(recording, **server, signals.stop());

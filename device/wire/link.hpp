@@ -23,8 +23,10 @@ class Link {
   virtual bool wait_readable(Deadline deadline) = 0;
   /// Until write_some() would not give 0. False: not by the deadline.
   virtual bool wait_writable(Deadline deadline) = 0;
-  /// The machine at the other end, by its address; empty: this one, without an address.
+  /// The machine at the other end, by its address or key; empty: this one, without an address.
   [[nodiscard]] virtual std::string host() const = 0;
+  /// Whether the other end is on this machine or on one whose key is known here.
+  [[nodiscard]] virtual bool is_known() const { return host().empty(); }
 };
 
 /// A link that a listener watches, and what became of it.

@@ -7,8 +7,6 @@
 #include <map>
 #include <utility>
 
-#include "device/wire/tcp_link.hpp"
-
 namespace birdseye::wire {
 
 namespace {
@@ -25,8 +23,8 @@ bool is_address(const std::string& text) {
   return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
 }
 
-Result<std::unique_ptr<Server>> Server::listen(const std::string& bind_address, int port) {
-  auto listener = listen_tcp(bind_address, port);
+Result<std::unique_ptr<Server>> Server::listen(const std::string& bind_address, int port, Admission admission) {
+  auto listener = listen_tcp(bind_address, port, std::move(admission));
   if (!listener) return listener.error();
   return over(*std::move(listener));
 }

@@ -11,6 +11,7 @@
 #include "calibration/time/rate_limit.hpp"
 #include "device/wire/client_link.hpp"
 #include "device/wire/link.hpp"
+#include "device/wire/tcp_link.hpp"
 #include "drivers/system/thread.hpp"
 
 namespace birdseye::wire {
@@ -25,7 +26,8 @@ bool is_address(const std::string& text);
 class Server {
  public:
   /// port: 0 takes any that is free. For a port in use the error names the port and the setting.
-  static Result<std::unique_ptr<Server>> listen(const std::string& bind_address, int port);
+  /// Without an admission, only programs of this machine are let in.
+  static Result<std::unique_ptr<Server>> listen(const std::string& bind_address, int port, Admission admission = {});
   /// The same over whatever links a listener gives.
   static std::unique_ptr<Server> over(std::unique_ptr<Listener> listener);
   ~Server();

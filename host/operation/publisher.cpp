@@ -49,7 +49,7 @@ Result<std::unique_ptr<Publisher>> Publisher::listen(const std::string& address)
     return Error{Errc::bad_value,
                  fmt::format("--publish: \"{}\" is no port of this machine: give PORT, or ADDRESS:PORT", address)};
   }
-  auto server = wire::Server::listen(bind, port);
+  auto server = wire::Server::listen(bind, port, {.tls = nullptr, .allow_plain = true});
   if (!server && server.error().code == Errc::in_use) {
     return Error{
         Errc::in_use,

@@ -1,10 +1,7 @@
 // What a server does where too many want to be served, and where one asks without end.
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
-#include <array>
 #include <list>
 #include <span>
 
@@ -12,43 +9,17 @@
 #include "device/wire/server.hpp"
 #include "device/wire/tcp_link.hpp"
 #include "drivers/system/unique_fd.hpp"
-#include "drivers/system/wait.hpp"
+#include "tests/support/connection_from.hpp"
 
 namespace birdseye::wire {
 namespace {
 
 constexpr std::size_t kPlaces = 16;
 
-Deadline soon() {
-  return Deadline::after(Duration::from_ms(20'000));
-}
-
-/// A connection from an address of this machine's own network, each of which is a machine to the server.
-UniqueFd connection(const char* from, int port) {
-  UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  ::inet_pton(AF_INET, from, &address.sin_addr);
-  EXPECT_EQ(::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  ::inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
-  EXPECT_EQ(::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  return fd;
-}
-
-/// Whether the server has a place for it: what it sends first comes, or the end.
-bool is_served(const UniqueFd& fd) {
-  std::uint8_t byte = 0;
-  return wait_ready(fd.get(), POLLIN, soon()) != 0 && ::recv(fd.get(), &byte, 1, MSG_PEEK) == 1;
-}
-
-bool is_put_out(const UniqueFd& fd) {
-  std::array<std::uint8_t, 4096> bytes{};
-  while (wait_ready(fd.get(), POLLIN, soon()) != 0) {
-    if (::recv(fd.get(), bytes.data(), bytes.size(), 0) <= 0) return true;
-  }
-  return false;
-}
+using testing::connection;
+using testing::is_put_out;
+using testing::is_served;
+using testing::soon;
 
 class CrowdedServer : public ::testing::Test {
  protected:

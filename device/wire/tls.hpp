@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "drivers/identity/machine_key.hpp"
+#include "drivers/identity/public_key.hpp"
+
+using SSL_CTX = struct ssl_ctx_st;  // as OpenSSL has it, for whoever includes this and not OpenSSL
+
+namespace birdseye::wire {
+
+/// What all connections of one machine by TLS share: its key, with a certificate that says no more than the key, and
+/// whose keys it believes. TLS 1.3 alone, both sides show their key, and nothing of a connection is kept for another.
+class Tls {
+ public:
+  /// The name of the machine with this key; nothing: it is not let in. Asked for each connection.
+  using Known = std::function<std::optional<std::string>(const PublicKey&)>;
+
+  static Result<std::shared_ptr<const Tls>> make(const MachineKey& key, Known known);
+  /// Of the key and the known keys in the identity's folder. The known keys are read again for each connection, so that
+  /// a machine may be paired, or its key taken out, while this program runs.
+  static Result<std::shared_ptr<const Tls>> of_this_machine();
+
+  [[nodiscard]] SSL_CTX* context() const { return context_.get(); }
+  [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const { return known_(key); }
+  /// The certificate as PEM, the same to the byte each time: for programs that go by a file of it.
+  [[nodiscard]] const std::string& certificate() const { return certificate_; }
+
+ private:
+  Tls(std::shared_ptr<SSL_CTX> context, Known known, std::string certificate)
+      : context_(std::move(context)), known_(std::move(known)), certificate_(std::move(certificate)) {}
+
+  std::shared_ptr<SSL_CTX> context_;
+  Known known_;
+  std::string certificate_;
+};
+
+}  // namespace birdseye::wire

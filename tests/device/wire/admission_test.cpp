@@ -1,0 +1,151 @@
+// Who a server lets in, how, and what those who begin to come in and do not go on take from the others.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <list>
+#include <string>
+
+#include "device/wire/client.hpp"
+#include "device/wire/server.hpp"
+#include "device/wire/tcp_link.hpp"
+#include "device/wire/tls_link.hpp"
+#include "tests/support/connection_from.hpp"
+#include "tests/support/tls_machine.hpp"
+
+namespace birdseye::wire {
+namespace {
+
+using testing::connection;
+using testing::is_put_out;
+using testing::is_served;
+using testing::soon;
+
+constexpr const char *kHere = "127.0.0.1", *kThere = "127.0.0.2", *kElsewhere = "127.0.0.3";
+
+class AdmittedServer : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    cart_.knows(host_);
+    host_.knows(cart_);
+  }
+  /// Of this machine's own addresses one is this machine to the server, and the others are others.
+  void listen(Admission admission) {
+    admission.is_local = [](const std::string& address) { return address == kHere; };
+    server_ = *Server::listen(kHere, 0, std::move(admission));
+    server_->publish(pack(Status{true, "ready"}, {1}));
+  }
+  void listen_by_tls(bool allow_plain = false) { listen({.tls = cart_.tls(), .allow_plain = allow_plain}); }
+  [[nodiscard]] UniqueFd from(const char* host) const { return connection(host, server_->port()); }
+  [[nodiscard]] Result<std::unique_ptr<Link>> by_tls(const char* host) const {
+    UniqueFd fd = from(host);
+    ::fcntl(fd.get(), F_SETFL, O_NONBLOCK);
+    return shake_hands(*TlsLink::over(std::move(fd), host_.tls(), TlsLink::Side::client), host, soon());
+  }
+  static std::string first_word(Result<std::unique_ptr<Link>> link) {
+    if (!link) return link.error().what;
+    const auto client = Client::over(*std::move(link), "cart");
+    const auto event = client->next(soon());
+    return event && *event ? std::get<Status>(**event).text : "nothing";
+  }
+
+  testing::TlsMachine cart_, host_;
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(AdmittedServer, WithoutATlsOnlyThisMachineIsLetIn) {
+  listen({});
+  EXPECT_TRUE(is_put_out(from(kThere)));
+  EXPECT_TRUE(is_served(from(kHere)));
+}
+
+TEST_F(AdmittedServer, AnotherMachineIsLetInByTlsAlone) {
+  listen_by_tls();
+  EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+  EXPECT_TRUE(is_served(from(kHere))) << "and this one without";
+  const UniqueFd plain = from(kThere);
+  const auto question = pack_status_request().bytes();
+  (void)::send(plain.get(), question.data(), question.size(), MSG_NOSIGNAL);
+  EXPECT_TRUE(is_put_out(plain));
+}
+
+TEST_F(AdmittedServer, AMachineThatIsNotKnownIsToldSo) {
+  cart_.forgets(host_);
+  listen_by_tls();
+  EXPECT_EQ(first_word(by_tls(kThere)), "127.0.0.2: it does not know this machine's key");
+  EXPECT_EQ(server_->clients(), 0U);
+}
+
+TEST_F(AdmittedServer, WhoBeginsAHandshakeAndStopsIsPutOutAndTakesNoPlace) {
+  listen({.tls = cart_.tls(), .patience = Duration::from_ms(50)});
+  const std::array<std::uint8_t, 3> begun{22, 3, 1};
+  const UniqueFd half = from(kThere);
+  ASSERT_EQ(::send(half.get(), begun.data(), begun.size(), MSG_NOSIGNAL), 3);
+  EXPECT_TRUE(is_put_out(half));
+  EXPECT_TRUE(is_put_out(from(kThere))) << "who says nothing too";
+  EXPECT_EQ(server_->take_counters().clients_shed, 0U);
+}
+
+TEST_F(AdmittedServer, ThoseWhoBeginHandshakesKeepNobodyOut) {
+  listen({.tls = cart_.tls(), .patience = Duration::from_ms(600'000)});
+  std::list<UniqueFd> begun;
+  for (int machine = 0; machine < 40; ++machine) {
+    const std::string host = "127.0.1." + std::to_string(machine + 1);
+    for (int i = 0; i < 6; ++i) begun.push_back(from(host.c_str()));
+  }
+  EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+  EXPECT_TRUE(is_served(from(kHere)));
+}
+
+TEST_F(AdmittedServer, OneMachinesHandshakesAreBoundedInNumberAndRateAndNoOthers) {
+  listen({.tls = cart_.tls(), .patience = Duration::from_ms(600'000)});
+  std::list<UniqueFd> begun;
+  for (int i = 0; i < 4; ++i) begun.push_back(from(kElsewhere));
+  EXPECT_TRUE(is_put_out(from(kElsewhere)));
+  begun.clear();
+  int let_in = 0;
+  // Without a bound this would go on to the end; within the rate it takes ten minutes.
+  while (let_in < 3000 && by_tls(kElsewhere)) ++let_in;
+  EXPECT_GT(let_in, 0);
+  EXPECT_LT(let_in, 3000);
+  EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+}
+
+TEST_F(AdmittedServer, WherePlainIsAllowedWhoSpeaksTlsStillDoes) {
+  listen_by_tls(true);
+  EXPECT_TRUE(is_served(from(kThere))) << "who says nothing";
+  const UniqueFd asking = from(kThere);
+  const auto question = pack_status_request().bytes();
+  (void)::send(asking.get(), question.data(), question.size(), MSG_NOSIGNAL);
+  EXPECT_TRUE(is_served(asking));
+  EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+}
+
+TEST_F(AdmittedServer, AWholeMessageLargerThanARecordComesThrough) {
+  listen_by_tls();
+  auto link = by_tls(kThere);
+  ASSERT_TRUE(link) << link.error().what;
+  const auto client = Client::over(*std::move(link), "cart");
+  const auto pixels = std::make_shared<std::vector<std::uint8_t>>(1920 * 1080 * 3, std::uint8_t{7});
+  VideoFrame frame;
+  frame.width_px = 1920;
+  frame.height_px = 1080;
+  frame.rgb = pixels;
+  for (int i = 0; i < 5; ++i) {
+    frame.info.sequence = static_cast<std::uint64_t>(i);
+    server_->publish(pack(frame));
+    for (bool came = false; !came;) {
+      const auto event = client->next(soon());
+      ASSERT_TRUE(event && *event);
+      const auto* const got = std::get_if<VideoFrame>(&**event);
+      if (got == nullptr) continue;
+      came = true;
+      EXPECT_EQ(got->info.sequence, frame.info.sequence);
+      EXPECT_EQ(*got->rgb, *pixels);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace birdseye::wire
