@@ -10,6 +10,7 @@
 #include "calibration/record/calibration_record.hpp"
 #include "calibration/record/field_map_file.hpp"
 #include "device/birdseyed/config_section.hpp"
+#include "device/birdseyed/wire_admission.hpp"
 #include "device/wire/server.hpp"
 #include "drivers/identity/identity_folder.hpp"
 #include "drivers/identity/this_machine.hpp"
@@ -184,6 +185,8 @@ void read_wire(ConfigSection& section, Config& config) {
   section.integer("port", config.wire.port, 0, 65535);
   if (!wire::is_address(config.wire.bind))
     section.fail("bind", fmt::format("\"{}\": give an IPv4 address of this machine, as 127.0.0.1", config.wire.bind));
+  section.flag("allow_plain", config.wire.allow_plain);
+  config.core.notice = plain_notice(config.wire);
   section.flag("transforms", config.core.transforms);
   std::set<std::string> devices;
   for (const std::string& bird : config.core.bird_names) {

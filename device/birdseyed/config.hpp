@@ -27,6 +27,7 @@ struct TrackerConfig {
 struct WireConfig {
   std::string bind = "127.0.0.1";
   int port = 18944;
+  bool allow_plain = false;  ///< beyond this machine
   bool operator==(const WireConfig&) const = default;
 };
 

@@ -248,7 +248,9 @@ wire::Status Core::status() const {
     if (birds_[i].in_status) text += (text.empty() ? "" : "; ") + settings_.bird_names[i] + ": " + birds_[i].why;
   }
   if (!calibration_.fault().empty()) text += (text.empty() ? "" : "; ") + calibration_.fault();
-  return {text.empty(), text};
+  const bool ok = text.empty();
+  if (!settings_.notice.empty()) text += (ok ? "" : "; ") + settings_.notice;
+  return {ok, text};
 }
 
 void Core::publish_status(DeviceTime now) {

@@ -24,6 +24,7 @@ struct CoreSettings {
   /// that may be predicted.
   Duration pose_wait{0};
   FrameClock::Settings frame_clock;
+  std::string notice;                          ///< said in STATUS beside what is amiss, of which it is none
   std::string calibration;                     ///< a calibration record's text; empty: none
   std::string calibration_refused;             ///< why it is not used: nobody known signed it; empty: it may be
   std::optional<calibration::FieldMap> field;  ///< corrects every pose; poses outside the mapped volume are doubted
@@ -48,7 +49,7 @@ class Core {
   };
   [[nodiscard]] Counters counters() const;
   [[nodiscard]] const InstrumentBoard& board() const { return board_; }
-  /// What STATUS last said: all that is amiss, nothing if all is well.
+  /// What STATUS last said: all that is amiss, and the notice.
   [[nodiscard]] const std::string& status_text() const { return status_text_; }
 
  private:

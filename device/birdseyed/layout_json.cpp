@@ -72,6 +72,7 @@ void to_json(nlohmann::json& json, const CoreSettings& settings) {
           {"calibration", settings.calibration}};
   if (settings.field) json["field"] = settings.field->data();
   if (!settings.calibration_refused.empty()) json["calibration_refused"] = settings.calibration_refused;
+  if (!settings.notice.empty()) json["notice"] = settings.notice;
   if (!settings.field_of.empty()) json["field_of"] = settings.field_of;
 }
 void from_json(const nlohmann::json& json, CoreSettings& settings) {
@@ -82,6 +83,7 @@ void from_json(const nlohmann::json& json, CoreSettings& settings) {
   json.at("frame_clock").get_to(settings.frame_clock);
   json.at("calibration").get_to(settings.calibration);
   settings.calibration_refused = json.value("calibration_refused", "");
+  settings.notice = json.value("notice", "");
   if (json.contains("field_of")) json.at("field_of").get_to(settings.field_of);
   if (!json.contains("field")) return;
   auto map = calibration::FieldMap::from(json.at("field").get<calibration::FieldMapData>());

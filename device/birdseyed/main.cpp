@@ -11,6 +11,9 @@
 #include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
 #include "device/birdseyed/service.hpp"
+#include "device/birdseyed/wire_admission.hpp"
+#include "device/wire/pairing.hpp"
+#include "drivers/identity/identity_folder.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/service_signals.hpp"
 #include "drivers/system/starter.hpp"
@@ -21,6 +24,7 @@ namespace {
 using namespace birdseye;
 namespace fs = std::filesystem;
 
+constexpr Duration kPairingWindow = Duration::from_ms(120'000);
 constexpr int kUnusable = static_cast<int>(ExitCode::unusable_input);
 
 int refuse(const Error& error) {
@@ -60,7 +64,9 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
 int serve(const fs::path& path, ServiceSignals& signals) {
   auto config = device::read_config(path);
   if (!config) return refuse(config.error());
-  auto server = wire::Server::listen(config->wire.bind, config->wire.port, {.tls = nullptr, .allow_plain = true});
+  auto admission = device::admission_of(config->wire);
+  if (!admission) return refuse(admission.error());
+  auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
   if (!server) return refuse(server.error());
   auto started = device::Appliance::start(*config, **server);
   if (!started) return refuse(started.error());
@@ -80,10 +86,33 @@ int serve(const fs::path& path, ServiceSignals& signals) {
   return appliance ? 0 : kUnusable;
 }
 
+struct PairOptions {
+  int port = wire::kPairingPort;
+  std::string name;
+};
+
+/// Lets one machine that a person knows by its code connect to the wire from now on, also while the daemon runs.
+int pair(const fs::path& path, const PairOptions& options) {
+  const auto config = device::read_config(path);
+  if (!config) return refuse(config.error());
+  const auto folder = identity_folder();
+  if (!folder) return refuse(folder.error());
+  const auto paired = wire::pair_as_server({*folder, options.name, wire::ask_people}, config->wire.bind, options.port,
+                                           Deadline::after(kPairingWindow), [&](int port) {
+                                             fmt::print("for two minutes: birdseye pair THIS_MACHINE:{}\n", port);
+                                             std::fflush(stdout);
+                                           });
+  if (!paired) return refuse(paired.error().with_context("pair"));
+  fmt::print("paired with {}, in {}\n", paired->name, folder->string());
+  return 0;
+}
+
 int replay(const fs::path& path, const fs::path& recording, const ServiceSignals& signals) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
-  const auto server = wire::Server::listen(config->wire.bind, config->wire.port, {.tls = nullptr, .allow_plain = true});
+  auto admission = device::admission_of(config->wire);
+  if (!admission) return refuse(admission.error());
+  const auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
   if (!server) return refuse(server.error());
   spdlog::info("replaying on {} port {}", config->wire.bind, (*server)->port());
   const auto done = device::replay(recording, **server, signals.stop());
@@ -108,12 +137,20 @@ int main(int argc, char** argv) {
       ->excludes(probe);
   app.add_flag("--end-with-stdin", end_with_stdin,
                "end when standard input is closed: for a program that starts this one");
+  PairOptions pair_options;
+  CLI::App* const pairing =
+      app.add_subcommand("pair", "introduce this machine and a host by a code that people compare");
+  pairing->fallthrough();  // to --config
+  pairing->add_option("--port", pair_options.port, "to wait on (default 18945)")->check(CLI::Range(0, 65535));
+  pairing->add_option("--name", pair_options.name, "by which to know the host (default: as it calls itself)");
   return run_program<CLI::ParseError>(app, argc, argv, [&] {
+    if (*pairing) return pair(config_path, pair_options);
     if (check_only) {
       const auto config = device::read_config(config_path);
       if (!config) return refuse(config.error());
       if (!config->core.calibration_refused.empty()) print_error("birdseyed", config->core.calibration_refused);
       fmt::print("{}: sound\n", config_path.string());
+      if (const std::string who = device::admission_words(config->wire); !who.empty()) fmt::print("{}\n", who);
       return 0;
     }
     spdlog::set_default_logger(

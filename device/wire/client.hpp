@@ -41,6 +41,8 @@ class Client {
   void use_discipline(const ClockDiscipline& discipline, Duration wall_minus_monotonic);
   /// What a server that is no appliance of ours is, and what of it is passed over; empty for an appliance.
   [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
+  /// Whether what goes over the wire can be read and changed on its way.
+  [[nodiscard]] bool is_plain() const { return !link_->is_known(); }
 
  private:
   Client(std::unique_ptr<Link> link, std::string name, ForeignSettings foreign);

@@ -49,14 +49,6 @@ std::shared_ptr<X509> certificate_of(const MachineKey& key) {
   return certificate;
 }
 
-std::string pem_of(X509* certificate) {
-  const std::shared_ptr<BIO> out(::BIO_new(::BIO_s_mem()), ::BIO_free_all);
-  char* text = nullptr;
-  if (!out || ::PEM_write_bio_X509(out.get(), certificate) == 0) return {};
-  const long size = BIO_get_mem_data(out.get(), &text);
-  return {text, static_cast<std::size_t>(size)};
-}
-
 /// In place of OpenSSL's chains and dates: whether the key is known is all that counts. That the other side has the key
 /// itself is shown by its signature, which OpenSSL looks at.
 int verify_by_key(X509_STORE_CTX* store, void* /*unused*/) {
@@ -69,6 +61,14 @@ int verify_by_key(X509_STORE_CTX* store, void* /*unused*/) {
 }
 
 }  // namespace
+
+std::string pem_of(X509* certificate) {
+  const std::shared_ptr<BIO> out(::BIO_new(::BIO_s_mem()), ::BIO_free_all);
+  char* text = nullptr;
+  if (certificate == nullptr || !out || ::PEM_write_bio_X509(out.get(), certificate) == 0) return {};
+  const long size = BIO_get_mem_data(out.get(), &text);
+  return {text, static_cast<std::size_t>(size)};
+}
 
 Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known) {
   const std::shared_ptr<SSL_CTX> context(::SSL_CTX_new(::TLS_method()), ::SSL_CTX_free);
@@ -89,7 +89,7 @@ Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known)
   SSL_CTX_set_max_cert_list(c, kMostCertificateBytes);
   SSL_CTX_set_read_ahead(c, 1);
   ::SSL_CTX_set_default_read_buffer_len(c, kReadAheadBytes);
-  return std::shared_ptr<const Tls>(new Tls(context, std::move(known), pem_of(certificate.get())));
+  return std::shared_ptr<const Tls>(new Tls(context, key.public_key(), std::move(known), pem_of(certificate.get())));
 }
 
 Result<std::shared_ptr<const Tls>> Tls::of_this_machine() {

@@ -10,9 +10,13 @@
 #include "drivers/identity/machine_key.hpp"
 #include "drivers/identity/public_key.hpp"
 
+using X509 = struct x509_st;
 using SSL_CTX = struct ssl_ctx_st;  // as OpenSSL has it, for whoever includes this and not OpenSSL
 
 namespace birdseye::wire {
+
+/// A certificate as PEM; empty: there is none.
+std::string pem_of(X509* certificate);
 
 /// What all connections of one machine by TLS share: its key, with a certificate that says no more than the key, and
 /// whose keys it believes. TLS 1.3 alone, both sides show their key, and nothing of a connection is kept for another.
@@ -26,16 +30,21 @@ class Tls {
   /// a machine may be paired, or its key taken out, while this program runs.
   static Result<std::shared_ptr<const Tls>> of_this_machine();
 
+  [[nodiscard]] const PublicKey& own_key() const { return own_key_; }
   [[nodiscard]] SSL_CTX* context() const { return context_.get(); }
   [[nodiscard]] std::optional<std::string> name_of(const PublicKey& key) const { return known_(key); }
   /// The certificate as PEM, the same to the byte each time: for programs that go by a file of it.
   [[nodiscard]] const std::string& certificate() const { return certificate_; }
 
  private:
-  Tls(std::shared_ptr<SSL_CTX> context, Known known, std::string certificate)
-      : context_(std::move(context)), known_(std::move(known)), certificate_(std::move(certificate)) {}
+  Tls(std::shared_ptr<SSL_CTX> context, const PublicKey& own_key, Known known, std::string certificate)
+      : context_(std::move(context)),
+        own_key_(own_key),
+        known_(std::move(known)),
+        certificate_(std::move(certificate)) {}
 
   std::shared_ptr<SSL_CTX> context_;
+  PublicKey own_key_;
   Known known_;
   std::string certificate_;
 };

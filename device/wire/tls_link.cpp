@@ -136,7 +136,7 @@ Error TlsLink::failure() {
   read_ahead_ = true;  // so that whoever waits for bytes comes to read, and is told
   if (refused_) return {Errc::bad_value, "its key is not known here"};
   const int reason = ERR_GET_REASON(::ERR_peek_last_error());
-  if (reason == SSL_R_SSLV3_ALERT_BAD_CERTIFICATE) return {Errc::unsupported, "it does not know this machine's key"};
+  if (reason == SSL_R_SSLV3_ALERT_BAD_CERTIFICATE) return {Errc::bad_value, "it does not know this machine's key"};
   return {Errc::disconnected, "the other side has gone"};
 }
 
@@ -164,6 +164,10 @@ Result<bool> TlsLink::hears() {
   if (why != SSL_ERROR_WANT_READ && why != SSL_ERROR_WANT_WRITE) return failure();
   read_ahead_ = false;
   return false;
+}
+
+std::string TlsLink::peer_certificate() const {
+  return pem_of(::SSL_get0_peer_certificate(ssl_.get()));
 }
 
 std::array<std::uint8_t, 32> TlsLink::secret(const std::string& label) const {

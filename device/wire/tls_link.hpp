@@ -13,7 +13,6 @@
 #include "drivers/system/unique_fd.hpp"
 
 using SSL = struct ssl_st;
-using X509 = struct x509_st;
 
 namespace birdseye::wire {
 
@@ -31,17 +30,20 @@ class TlsLink final : public SocketLink {
   TlsLink(const TlsLink&) = delete;
   TlsLink& operator=(const TlsLink&) = delete;
 
-  /// Goes on with the handshake as far as it can without waiting. False: not done yet. Errc::bad_value: the other side
-  /// is not known here; Errc::unsupported: this side is not known there, or does not speak TLS 1.3.
+  /// Goes on with the handshake as far as it can without waiting. False: not done yet. Errc::bad_value: one
+  /// side does not know the other's key; Errc::unsupported: the other side does not speak TLS 1.3 as this one does.
   Result<bool> shake();
   /// Waits until shake() may get on.
   bool wait_shaken(Deadline deadline) { return wait_socket(deadline); }
   /// Whether something has come that read_some() would give. A client's handshake is done before the other side has
   /// seen its key: only what comes then tells whether it is let in. The errors are those of shake().
   Result<bool> hears();
+  [[nodiscard]] const PublicKey& own_key() const { return tls_->own_key(); }
+  [[nodiscard]] const std::string& own_certificate() const { return tls_->certificate(); }
   /// Of the other side: its key, and by what name it is known. Once the handshake is done.
   [[nodiscard]] const PublicKey& peer_key() const { return *peer_key_; }
   [[nodiscard]] const std::string& peer_name() const { return peer_name_; }
+  [[nodiscard]] std::string peer_certificate() const;  ///< as PEM
   /// A secret of this connection alone that both ends have (RFC 8446, 7.5).
   [[nodiscard]] std::array<std::uint8_t, 32> secret(const std::string& label) const;
 

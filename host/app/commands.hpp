@@ -33,6 +33,7 @@ void add_demo(CLI::App& app, CommandStatus& status);
 void add_doctor(CLI::App& app, CommandStatus& status);
 void add_export(CLI::App& app, CommandStatus& status);
 void add_live(CLI::App& app, CommandStatus& status);
+void add_pair(CLI::App& app, CommandStatus& status);
 void add_record(CLI::App& app, CommandStatus& status);
 void add_register(CLI::App& app, CommandStatus& status);
 void add_register_views(CLI::App& reg, CommandStatus& status);  ///< under `register`

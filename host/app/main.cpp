@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   add_doctor(app, status);
   add_export(app, status);
   add_live(app, status);
+  add_pair(app, status);
   add_record(app, status);
   add_register(app, status);
   add_render(app, status);

@@ -122,17 +122,20 @@ Result<ExitCode> run(const RecordOptions& options) {
   Progress progress;
   Ending ending;
   std::string peer;
+  bool plain = false;
   Drops drops;
   {
     EventStream stream(*std::move(client), kMostRecordFramesWaiting);
     ending = record(stream, **writer, options, progress);
     peer = stream.peer_words();
+    plain = stream.is_plain();
     drops = stream.drops();
   }
   progress.keep("completing the files");
   const auto finished = (*writer)->finish(ending.why);
   Verdict verdict = judge(**writer, ending, finished.has_value());
   if (!peer.empty()) verdict.add(Grade::pass, fmt::format("{} is {}", options.server, peer));
+  if (plain) verdict.add(Grade::pass, "recorded without TLS: others on the network could read and change what came");
   drops.tell(verdict);
   const RecordingFigures& figures = (*writer)->figures();
   if (auto written = write_file(options.json, text_of(json_of(figures, verdict))); !written) return written.error();

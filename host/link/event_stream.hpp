@@ -35,6 +35,8 @@ class EventStream : public EventSource {
   [[nodiscard]] std::optional<ClockGap> host_from_device() const;
   /// For a server that is no appliance: what it is, and which of its messages are passed over. Empty for an appliance.
   [[nodiscard]] std::string peer_words() const;
+  /// Whether what goes over the wire can be read and changed on its way.
+  [[nodiscard]] bool is_plain() const { return plain_; }
   /// What nobody took in time.
   [[nodiscard]] Drops drops() const {
     return {events_.dropped(kFrames), events_.dropped(kPoses) + events_.dropped(kOthers)};
@@ -52,6 +54,7 @@ class EventStream : public EventSource {
   static constexpr std::size_t kMostFrameBytes = 768U << 20U;  ///< two seconds of 1080p at 60 Hz
 
   std::unique_ptr<wire::Client> client_;
+  bool plain_;
   BlockingQueue<wire::Event, kLanes> events_;
   mutable std::mutex mutex_;  // of what follows
   std::optional<Error> ended_;

@@ -62,7 +62,7 @@ void LiveSource::take_link(Result<Connection> link) {
   auto stream = std::make_unique<EventStream>(std::move(link->client), kMostFramesWaiting);
   stream_ = stream.get();
   events_ = std::move(stream);
-  words_ = host::words("note_connected", name_);
+  words_ = stream_->is_plain() ? host::words("note_connected_plain", name_) : host::words("note_connected", name_);
 }
 
 Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed) {

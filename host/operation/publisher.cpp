@@ -6,13 +6,17 @@
 #include <bit>
 #include <charconv>
 #include <cstring>
+#include <string_view>
 
 #include "device/wire/clock_discipline.hpp"
+#include "device/wire/tls.hpp"
 #include "host/deform/deformed_volume.hpp"
 
 namespace birdseye::host {
 
 namespace {
+
+constexpr std::string_view kPlain = "plain:";
 
 /// 3D Slicer's world is RAS, the CT's frame LPS.
 Eigen::Affine3d lps_from_ras() {
@@ -39,9 +43,11 @@ DeviceTime now() {
 }  // namespace
 
 Result<std::unique_ptr<Publisher>> Publisher::listen(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  const std::string bind = colon == std::string::npos ? "127.0.0.1" : address.substr(0, colon);
-  const std::string digits = colon == std::string::npos ? address : address.substr(colon + 1);
+  const bool plain = address.starts_with(kPlain);
+  const std::string place = plain ? address.substr(kPlain.size()) : address;
+  const std::size_t colon = place.rfind(':');
+  const std::string bind = colon == std::string::npos ? "127.0.0.1" : place.substr(0, colon);
+  const std::string digits = colon == std::string::npos ? place : place.substr(colon + 1);
   int port = -1;
   const char* const end = digits.data() + digits.size();
   const auto [rest, fault] = std::from_chars(digits.data(), end, port);
@@ -49,7 +55,14 @@ Result<std::unique_ptr<Publisher>> Publisher::listen(const std::string& address)
     return Error{Errc::bad_value,
                  fmt::format("--publish: \"{}\" is no port of this machine: give PORT, or ADDRESS:PORT", address)};
   }
-  auto server = wire::Server::listen(bind, port, {.tls = nullptr, .allow_plain = true});
+  wire::Admission admission;
+  admission.allow_plain = plain;
+  if (!wire::is_loopback(bind)) {
+    auto tls = wire::Tls::of_this_machine();
+    if (!tls) return tls.error().with_context("--publish");
+    admission.tls = *std::move(tls);
+  }
+  auto server = wire::Server::listen(bind, port, std::move(admission));
   if (!server && server.error().code == Errc::in_use) {
     return Error{
         Errc::in_use,

@@ -25,8 +25,8 @@ struct PublishedFrame {
 /// that does not keep up loses the oldest transforms, one that takes nothing for ten seconds is disconnected.
 class Publisher {
  public:
-  /// address: "PORT", of this machine alone, or "ADDRESS:PORT"; port 0 is any that is free. A port in use is an error
-  /// that names it.
+  /// address: "PORT", of this machine alone, or "ADDRESS:PORT", of paired machines too, by TLS; "plain:ADDRESS:PORT" is
+  /// for whoever comes. Port 0 is any that is free. A port in use is an error that names it.
   static Result<std::unique_ptr<Publisher>> listen(const std::string& address);
 
   /// The CT, and how it is deformed where it is. Packed on a thread of its own; version: another number for another

@@ -5,6 +5,7 @@
 
 #include <fstream>
 
+#include "device/birdseyed/wire_admission.hpp"
 #include "drivers/identity/this_machine.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"
@@ -105,6 +106,22 @@ TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
   EXPECT_EQ(config->camera.width_px, 768);
   EXPECT_TRUE(config->core.transforms);
   EXPECT_FALSE(read(replaced("[wire]", "[wire]\ntransforms = false"))->core.transforms);
+}
+
+TEST(Config, PlainBeyondThisMachineIsAllowedOnlyWhereItIsAskedForAndIsSaid) {
+  const auto beyond = read(replaced("[wire]", "[wire]\nbind = \"0.0.0.0\"")),
+             plain = read(replaced("[wire]", "[wire]\nbind = \"0.0.0.0\"\nallow_plain = true")),
+             here = read(replaced("[wire]", "[wire]\nallow_plain = true"));
+  ASSERT_TRUE(beyond && plain && here);
+  EXPECT_FALSE(beyond->wire.allow_plain);
+  EXPECT_EQ(beyond->core.notice, "");
+  EXPECT_EQ(admission_words(beyond->wire),
+            "the wire: this machine's programs, and paired machines by TLS (birdseyed pair)");
+  EXPECT_TRUE(plain->wire.allow_plain);
+  EXPECT_EQ(plain->core.notice.rfind("the wire is plain", 0), 0U) << plain->core.notice;
+  EXPECT_EQ(admission_words(plain->wire), plain->core.notice);
+  EXPECT_EQ(here->core.notice, "");
+  EXPECT_EQ(admission_words(here->wire), "");
 }
 
 TEST(Config, TwoBirdsMayNotHaveTransformsOfOneName) {

@@ -89,6 +89,19 @@ TEST(Core, TheRecordsLatencyIsTakenOffTheFramesTimes) {
   EXPECT_FALSE(only<wire::VideoFrame>(told(session(1, 1)))[0].info.latency.has_value()) << "nobody measured it";
 }
 
+TEST(Core, ANoticeIsSaidInStatusAndIsNothingAmiss) {
+  CoreSettings settings;
+  settings.notice = "the wire is plain";
+  InstrumentChanged gone = camera_runs(0);
+  gone.state = InstrumentState::absent;
+  const auto statuses = only<wire::Status>(told({gone, camera_runs(0.1)}, settings));
+  ASSERT_GE(statuses.size(), 2U);
+  EXPECT_FALSE(statuses.front().ok);
+  EXPECT_NE(statuses.front().text.find("; the wire is plain"), std::string::npos) << statuses.front().text;
+  EXPECT_TRUE(statuses.back().ok);
+  EXPECT_EQ(statuses.back().text, "the wire is plain");
+}
+
 TEST(Core, ACameraThatCountsFromElsewhereHasLostNothing) {
   Core core({});
   for (RawEvent event : session(4, 1)) {
