@@ -14,6 +14,8 @@ class RateLimit {
 
   /// From when on the next may pass.
   [[nodiscard]] DeviceTime free_at() const { return owed_until_ - at_once_; }
+  /// Whether as many may pass at once as ever.
+  [[nodiscard]] bool rested(DeviceTime now) const { return owed_until_ <= now; }
   void passed(DeviceTime now, std::int64_t count = 1) {
     owed_until_ = std::max(owed_until_, now) + Duration{count * apart_.ns};
   }

@@ -18,8 +18,12 @@ constexpr std::int64_t kRequestsAtOnce = 200;
 
 }  // namespace
 
-ClientLink::ClientLink(std::unique_ptr<Link> link)
-    : link_(std::move(link)), host_(link_->host()), progress_(device_now()), requests_(kPerRequest, kRequestsAtOnce) {}
+ClientLink::ClientLink(std::unique_ptr<Link> link, std::shared_ptr<RateLimit> of_host)
+    : link_(std::move(link)),
+      host_(link_->host()),
+      progress_(device_now()),
+      requests_(kPerRequest, kRequestsAtOnce),
+      of_host_(std::move(of_host)) {}
 
 void ClientLink::take(const Subscription& subscription) {
   subscription_ = subscription;
@@ -89,7 +93,9 @@ Result<std::vector<Request>> ClientLink::receive() {
   auto requests = reader_.push(std::span(chunk).first(*got));
   const DeviceTime now = device_now();
   if (fresh || (requests && !requests->empty())) asking_since_ = now;
-  if (requests) requests_.passed(now, static_cast<std::int64_t>(requests->size()));
+  const auto count = requests ? static_cast<std::int64_t>(requests->size()) : 0;
+  requests_.passed(now, count);
+  if (of_host_) of_host_->passed(now, count);
   return requests;
 }
 

@@ -24,13 +24,18 @@ struct Latencies {
 /// The server's end of one client: the packets that wait for it, and the request that it has begun. Used by one thread.
 class ClientLink {
  public:
-  explicit ClientLink(std::unique_ptr<Link> link);
+  /// of_host: what all clients of its machine may ask together; null: each may ask by itself.
+  explicit ClientLink(std::unique_ptr<Link> link, std::shared_ptr<RateLimit> of_host = {});
 
   [[nodiscard]] Link& link() const { return *link_; }
   [[nodiscard]] const std::string& host() const { return host_; }
+  [[nodiscard]] bool is_known() const { return link_->is_known(); }
   /// Whether the client has asked no more than a client needs. Until it may ask again, receive() is not to be called,
   /// and what the client sends waits with the operating systems.
-  [[nodiscard]] bool may_ask() const { return device_now() >= requests_.free_at(); }
+  [[nodiscard]] bool may_ask() const {
+    const DeviceTime now = device_now();
+    return now >= requests_.free_at() && (!of_host_ || now >= of_host_->free_at());
+  }
   [[nodiscard]] bool wants_to_write() const { return sending_ || !waiting_.empty(); }
   /// Queues a packet if the client wants its kind. Returns how many older packets were dropped for it.
   std::size_t offer(const Packet& packet);
@@ -72,6 +77,7 @@ class ClientLink {
   std::size_t sent_ = 0;           ///< bytes of sending_
   DeviceTime progress_, asking_since_;
   RateLimit requests_;
+  std::shared_ptr<RateLimit> of_host_;
 };
 
 }  // namespace birdseye::wire

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::size_t kMostFrameBytesHeld = 96U << 20U;  // fifteen frames of 1080p
 constexpr std::size_t kMostClients = 16;
+constexpr std::size_t kMostStrangers = 12;          // of machines that are not known, where plain is allowed
 constexpr Duration kLook = Duration::from_ms(200);  // for clients that are stuck
 constexpr Duration kLookAgain = Duration::from_ms(1), kAsksAgain = Duration::from_ms(10);
 
@@ -63,23 +64,30 @@ void Server::accept_one() {
   accepts_.passed(device_now());
   auto link = listener_->accept();
   if (!link) return;
-  if (!make_room(link->host())) {
+  if (!make_room(*link)) {
     ++clients_shed_;  // before the client can know
     return;
   }
-  clients_.emplace_back(std::move(link));
+  auto limit = requests_.of(link->host(), device_now());
+  clients_.emplace_back(std::move(link), std::move(limit));
   if (last_status_) offer(clients_.back(), *last_status_);
   if (last_calibration_) offer(clients_.back(), *last_calibration_);
   if (last_volume_) offer(clients_.back(), *last_volume_);
   ++clients_count_;
 }
 
-bool Server::make_room(const std::string& host) {
-  if (clients_.size() < kMostClients) return true;
+bool Server::make_room(const Link& link) {
+  const auto strangers = static_cast<std::size_t>(std::ranges::count(clients_, false, &ClientLink::is_known));
+  const bool known = link.is_known();
+  if (clients_.size() < kMostClients && (known || strangers < kMostStrangers)) return true;
+  if (!known && strangers == 0) return false;
   std::map<std::string, std::size_t> held;
-  for (const ClientLink& client : clients_) ++held[client.host()];
+  for (const ClientLink& client : clients_) {
+    if (strangers == 0 || !client.is_known()) ++held[client.host()];
+  }
   const auto most = std::ranges::max_element(held, {}, [](const auto& of_host) { return of_host.second; });
-  if (most->second < held[host] + 2) return false;
+  const bool before_strangers = known && strangers > 0;
+  if (!before_strangers && most->second < held[link.host()] + 2) return false;
   // The newest: those before it were there first.
   const auto newest = std::ranges::find(clients_.rbegin(), clients_.rend(), most->first, &ClientLink::host);
   put_out(std::prev(newest.base()));
@@ -146,7 +154,7 @@ void Server::answer(ClientLink& client, const Request& request) {
   } else if (const auto* subscription = std::get_if<Subscription>(&request)) {
     client.take(*subscription);
   } else if (const auto* lock = std::get_if<CameraLock>(&request)) {
-    client.take(*lock);
+    take_lock(client, *lock);
   } else if (const auto* tracking = std::get_if<TrackingRequest>(&request)) {
     client.take(*tracking);
     offer(client, pack_tracking_reply(true));
@@ -155,6 +163,12 @@ void Server::answer(ClientLink& client, const Request& request) {
   } else if (std::holds_alternative<DamagedRequest>(request)) {
     ++requests_refused_;
   }
+}
+
+void Server::take_lock(ClientLink& client, const CameraLock& lock) {
+  if (client.is_known()) return client.take(lock);
+  const std::string why = "only this machine and paired ones may hold the camera's controls: birdseye pair";
+  offer(client, pack(CameraControls{camera_locked_, {}, {why}}, device_now()));
 }
 
 bool Server::serve(ClientLink& client, const LinkWatch& told) {

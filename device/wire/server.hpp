@@ -10,6 +10,7 @@
 
 #include "calibration/time/rate_limit.hpp"
 #include "device/wire/client_link.hpp"
+#include "device/wire/host_limits.hpp"
 #include "device/wire/link.hpp"
 #include "device/wire/tcp_link.hpp"
 #include "drivers/system/thread.hpp"
@@ -52,9 +53,10 @@ class Server {
   explicit Server(std::unique_ptr<Listener> listener);
   void run(const std::stop_token& stop);
   void accept_one();
-  /// Whether there is room for one more of this host. Where all places are taken, the host that holds most gives one up
-  /// to a host that then holds no more than it.
-  bool make_room(const std::string& host);
+  /// Whether there is room for it. Some places are kept from machines that are not known, and where all are taken such
+  /// a machine gives one up to one that is known. Otherwise the host that holds most gives one up to a host that then
+  /// holds no more than it.
+  bool make_room(const Link& link);
   /// Gives published packets to the clients; returns whether there were frames among them.
   bool distribute();
   void offer(ClientLink& client, const Packet& packet) { messages_shed_ += client.offer(packet); }
@@ -66,6 +68,7 @@ class Server {
   /// Sends to a client and reads from it. False: the client is to be disconnected.
   bool serve(ClientLink& client, const LinkWatch& told);
   void answer(ClientLink& client, const Request& request);
+  void take_lock(ClientLink& client, const CameraLock& lock);
 
   std::unique_ptr<Listener> listener_;
   std::atomic<std::size_t> clients_count_ = 0;
@@ -77,6 +80,7 @@ class Server {
   std::list<ClientLink> clients_;  ///< of the server's thread alone, as is all that follows
   // A new client gets these at once.
   std::optional<Packet> last_status_, last_calibration_, last_volume_;
+  HostLimits requests_{Duration{2'500'000}, 800};
   RateLimit accepts_{Duration{200'000}, 64};  ///< so that connections without end leave the thread time
   OwnedThread thread_;
 };

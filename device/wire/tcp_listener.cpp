@@ -89,9 +89,10 @@ void Gate::take(UniqueFd fd, std::string host) {
 }
 
 bool Gate::may_shake(const std::string& host) {
+  const DeviceTime now = device_now();
+  std::erase_if(handshakes_, [&](const auto& of_host) { return of_host.second.rested(now); });
   if (handshakes_.size() >= kMostHostsRemembered) handshakes_.clear();
   RateLimit& limit = handshakes_.try_emplace(host, kPerHandshake, kHandshakesAtOnce).first->second;
-  const DeviceTime now = device_now();
   if (now < limit.free_at()) return false;
   limit.passed(now);
   return true;

@@ -1,4 +1,5 @@
 // What a server does where too many want to be served, and where one asks without end.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
@@ -74,6 +75,62 @@ TEST_F(CrowdedServer, WhileOneAsksWithoutEndAnotherIsAnswered) {
   EXPECT_TRUE(first && *first);
 }
 
+/// Where plain is allowed, machines that are not known: all but 127.0.0.1, which is this one.
+class ServerOfStrangers : public CrowdedServer {
+ protected:
+  void SetUp() override {
+    Admission admission;
+    admission.allow_plain = true;
+    admission.is_local = [](const std::string& address) { return address == "127.0.0.1"; };
+    server_ = *Server::listen("127.0.0.1", 0, std::move(admission));
+    CrowdedServer::SetUp();
+  }
+};
+
+TEST_F(ServerOfStrangers, LeaveFourPlacesToMachinesThatAreKnown) {
+  for (const char* stranger : {"127.0.0.2", "127.0.0.3", "127.0.0.4"}) fill(stranger, 4);
+  EXPECT_TRUE(is_put_out(connect("127.0.0.4")));
+  fill("127.0.0.1", 4);
+  EXPECT_EQ(server_->clients(), kPlaces);
+  EXPECT_TRUE(is_put_out(connect("127.0.0.4")));
+}
+
+TEST_F(ServerOfStrangers, GiveUpAPlaceToAMachineThatIsKnown) {
+  fill("127.0.0.1", 14);
+  fill("127.0.0.2", 2);
+  fill("127.0.0.1", 1);
+  EXPECT_TRUE(is_put_out(*std::next(clients_.begin(), 15))) << "the stranger's newest goes";
+  EXPECT_TRUE(is_put_out(connect("127.0.0.3"))) << "and gets none by waiting for one who holds more";
+}
+
+TEST_F(ServerOfStrangers, ShareTheirPlacesAmongEachOther) {
+  fill("127.0.0.2", 12);
+  EXPECT_TRUE(is_served(connect("127.0.0.3")));
+  EXPECT_TRUE(is_put_out(clients_.back()));
+}
+
+/// Whether asking for the camera's controls held them, and what the server said to it.
+std::pair<bool, std::string> after_lock(Server& server, UniqueFd fd, bool known) {
+  ::fcntl(fd.get(), F_SETFL, O_NONBLOCK);
+  const auto client = Client::over(link_over(std::move(fd), known), "server");
+  EXPECT_TRUE(client->lock_camera(true, soon()));
+  while (!server.camera_locked()) {
+    const auto event = client->next(Deadline::after(Duration::from_ms(20)));
+    if (!event) return {false, event.error().what};
+    if (!*event) continue;
+    const auto* const controls = std::get_if<CameraControls>(&**event);
+    if (controls != nullptr && !controls->refused.empty()) return {server.camera_locked(), controls->refused.front()};
+  }
+  return {true, ""};
+}
+
+TEST_F(ServerOfStrangers, MayNotHoldTheCamerasControls) {
+  const auto strangers = after_lock(*server_, connect("127.0.0.2"), false);
+  EXPECT_FALSE(strangers.first);
+  EXPECT_EQ(strangers.second, "only this machine and paired ones may hold the camera's controls: birdseye pair");
+  EXPECT_TRUE(after_lock(*server_, connect("127.0.0.1"), true).first);
+}
+
 /// A link on which the same request comes again and again.
 class Flood final : public Link {
  public:
@@ -100,6 +157,33 @@ TEST(ClientLink, IsReadNoFurtherOnceItHasAskedTooMuch) {
   while (client.may_ask() && asked < 10'000) asked += client.receive()->size();
   EXPECT_GE(asked, 200U);
   EXPECT_LT(asked, 10'000U);
+}
+
+TEST(ClientLink, AllOfOneMachineAreReadNoFurtherOnceTheyTogetherHaveAskedTooMuch) {
+  const auto limit = std::make_shared<RateLimit>(Duration::from_ms(10'000), 300);
+  std::size_t asked = 0;
+  for (int i = 0; i < 16; ++i) {
+    ClientLink client(std::make_unique<Flood>(), limit);
+    while (client.may_ask() && asked < 10'000) asked += client.receive()->size();
+  }
+  EXPECT_GE(asked, 300U);
+  EXPECT_LT(asked, 1000U);  // 16 by themselves: 3200
+}
+
+TEST(HostLimits, AreOfAMachineAndNotOfAConnection) {
+  HostLimits limits(Duration::from_ms(1000), 10);
+  const DeviceTime now{1'000'000'000};
+  const auto one = limits.of("one", now);
+  EXPECT_EQ(limits.of("one", now), one);
+  EXPECT_NE(limits.of("other", now), one);
+}
+
+TEST(HostLimits, AreKeptUntilTheMachineHasRested) {
+  HostLimits limits(Duration::from_ms(1000), 10);
+  const DeviceTime now{1'000'000'000};
+  limits.of("one", now)->passed(now, 12);
+  EXPECT_GT(limits.of("one", now)->free_at(), now) << "it connects anew";
+  EXPECT_LE(limits.of("one", now + Duration::from_ms(12'000))->free_at(), now);
 }
 
 }  // namespace
