@@ -46,6 +46,7 @@ void add_bench(CLI::App& app, CommandStatus& status) {
   bench.require_subcommand(1);
   add_bench_device(bench, status);
   add_bench_similarity(bench, status);
+  add_bench_wire(bench, status);
   add_bench_register(bench, status);
   CLI::App& render = *bench.add_subcommand("render", "all levels of deformation, with and without pruning");
   render.add_option("--json", options->json, "write the table to this file");

@@ -26,6 +26,7 @@ std::string png_name(const std::string& file);
 void add_bench(CLI::App& app, CommandStatus& status);
 void add_bench_device(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_bench_similarity(CLI::App& bench, CommandStatus& status);
+void add_bench_wire(CLI::App& bench, CommandStatus& status);
 void add_bench_register(CLI::App& bench, CommandStatus& status);  ///< under `bench`
 void add_calibrate(CLI::App& app, CommandStatus& status);
 void add_convert(CLI::App& app, CommandStatus& status);
