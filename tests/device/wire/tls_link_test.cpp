@@ -254,12 +254,21 @@ TEST_F(Tls13, GoesOnWithANewKeyBeforeOneHasSealedTooMuch) {
   connect(100'000);
   shake();
   ASSERT_TRUE(server_shook_ && *server_shook_);
+  Bytes on_the_way;
   for (int i = 0; i < 100; ++i) {
     const Bytes bytes = some(50'000 + static_cast<std::size_t>(i));
     ASSERT_EQ(write(*server_, bytes), bytes.size());
-    carry(far_, near_);
+    carry(far_, near_, [&](const Bytes& some) { on_the_way.insert(on_the_way.end(), some.begin(), some.end()); });
     ASSERT_EQ(*read(*client_), bytes);
   }
+  constexpr std::size_t kHeader = 5, kKeyUpdate = 5 + 1 + 16;  // RFC 8446: the message, its type, the seal
+  int updates = 0;
+  for (std::size_t at = 0; at + kHeader <= on_the_way.size();) {
+    const std::size_t size = std::size_t{on_the_way[at + 3]} << 8U | on_the_way[at + 4];
+    updates += size == kKeyUpdate ? 1 : 0;
+    at += kHeader + size;
+  }
+  EXPECT_GE(updates, 45);
 }
 
 TEST_F(Tls13, ACertificateIsTheSameEachTime) {
