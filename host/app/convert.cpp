@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "drivers/identity/this_machine.hpp"
 #include "drivers/system/durable.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
@@ -27,7 +28,7 @@ void tell(const Operation& operation, const ConvertOptions& options) {
              operation.deformed ? "deformed" : "not deformed");
   print_notes(
       {fmt::format("nobody can tell whether a file of {} was changed since: that they are as the window wrote "
-                   "them, you answer for",
+                   "them, you answer for: live takes it up with --accept-unsigned",
                    options.folder.string())});
   if (operation.registered && operation.registered->found_with.tracker.empty())
     print_notes({"by which tracker the patient was registered is not known: live asks whether it is the same"});
@@ -52,8 +53,12 @@ Result<void> run(const ConvertOptions& options) {
   auto operation = read_operation_010(options.folder, ct->volume);
   if (!operation) return operation.error();
   operation->ct_stated = options.ct.stated;
+  // This machine signs that it wrote it, not that what it was made of is as it was.
+  operation->doubt = "it was made of files of version 0.1, which signed nothing";
+  const auto machine = ThisMachine::open();
+  if (!machine) return machine.error();
   if (auto made = make_folder_durably(options.out); !made) return made.error();
-  if (auto written = write_operation(options.out, *operation); !written) return written;
+  if (auto written = write_operation(options.out, *operation, *machine); !written) return written;
   tell(*operation, options);
   return {};
 }

@@ -33,11 +33,11 @@ std::string ct_checksum(const Volume& ct) {
   return fmt::format("{:016x}", crc);
 }
 
-std::optional<double> figure_of(const Json& json, const char* name) {
+std::optional<double> figure_of_010(const Json& json, const char* name) {
   return json.contains(name) ? std::optional(json.at(name).get<double>()) : std::nullopt;
 }
 
-Instruments instruments_of(const Json& found) {
+Instruments instruments_of_010(const Json& found) {
   Instruments out;
   if (found.contains("tracker")) found.at("tracker").get_to(out.tracker);
   if (found.contains("camera")) found.at("camera").get_to(out.camera);
@@ -47,9 +47,9 @@ Instruments instruments_of(const Json& found) {
 Result<CalibratedScope> calibrated_of_010(const fs::path& folder, const Json& json) {
   auto scope = ScopeSetup::of_files(
       folder / "camera.yaml", folder / "camera_from_sensor.txt",
-      {figure_of(json, "camera_rms_px"), figure_of(json, "held_out_px"), figure_of(json, "hand_eye_mm")});
+      {figure_of_010(json, "camera_rms_px"), figure_of_010(json, "held_out_px"), figure_of_010(json, "hand_eye_mm")});
   if (!scope) return scope.error();
-  return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(), true, instruments_of(json), ""};
+  return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(), true, instruments_of_010(json), ""};
 }
 
 Result<RegisteredPatient> registered_of_010(const fs::path& folder, const Json& json, const std::string& made_utc) {
@@ -59,7 +59,7 @@ Result<RegisteredPatient> registered_of_010(const fs::path& folder, const Json& 
   RegisteredPatient out{Transform<Patient, Tracker>::from_matrix(*matrix).inverse(),
                         json.at("fre_mm").get<double>(),
                         {},
-                        instruments_of(json),
+                        instruments_of_010(json),
                         made_utc};
   for (const Json& place : json.at("fiducials_in_patient_mm"))
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
@@ -94,9 +94,9 @@ Result<Operation> operation_of_010(const fs::path& folder, const Json& sheet, co
     if (!field) return field.error();
     DeformedOrgan deformed;
     deformed.field = *std::move(field);
-    deformed.seen_rms_mm = figure_of(sheet, "deformed_seen_rms_mm");
-    const auto rms_mm = figure_of(sheet, "deformed_target_rms_mm");
-    const auto radius95_mm = figure_of(sheet, "deformed_target_radius95_mm");
+    deformed.seen_rms_mm = figure_of_010(sheet, "deformed_seen_rms_mm");
+    const auto rms_mm = figure_of_010(sheet, "deformed_target_rms_mm");
+    const auto radius95_mm = figure_of_010(sheet, "deformed_target_radius95_mm");
     if (rms_mm && radius95_mm) deformed.target = {*rms_mm, *radius95_mm};
     deformed.made_utc = out.made_utc;
     out.deformed = std::make_shared<const DeformedOrgan>(std::move(deformed));

@@ -69,6 +69,7 @@ TEST(ConvertCommand, WhatTheWindowOf010KeptIsTakenUp) {
   for (const char* unknown : {"by which tracker", "how far hand-eye is off is not known", "you answer for"})
     EXPECT_NE(result.output.find(unknown), std::string::npos) << result.output;
   const auto read = host::read_operation(scratch / "new");
+  EXPECT_NE(result.output.find("--accept-unsigned"), std::string::npos) << result.output;
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_EQ(read->made_utc, "2026-11-22T10:00:00Z");
   ASSERT_TRUE(read->calibrated && read->registered && read->deformed);

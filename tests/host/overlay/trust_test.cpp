@@ -81,7 +81,8 @@ TEST(ErrorBudget, HandEyeGrowsWithTheDistance) {
 /// The 5 % quantiles of chi-square with two degrees of freedom a station, of printed tables.
 TEST(ErrorBudget, HandEyeOfFewStationsCountsForMore) {
   const double estimate_mm = std::sqrt(1.5) * 0.5;
-  for (const auto& [stations, quantile] : {std::pair{3, 1.635}, {6, 5.226}, {20, 26.509}, {50, 77.929}, {100, 168.279}}) {
+  for (const auto& [stations, quantile] :
+       {std::pair{3, 1.635}, {6, 5.226}, {20, 26.509}, {50, 77.929}, {100, 168.279}}) {
     TrustFigures known = figures();
     known.scope.hand_eye_stations = stations;
     EXPECT_NEAR(error_budget(kCamera, pose(), known)->hand_eye_mm, estimate_mm * std::sqrt(2 * stations / quantile),
