@@ -68,7 +68,9 @@ TEST(Snapshot, OfAnotherPictureNothingIsKnownAndADamagedSheetIsRefused) {
 }
 
 TEST(Snapshot, TellsTheInstrumentsOfTheFrameThatIsShown) {
-  LiveWorkflow workflow{LiveSettings{}};
+  LiveSettings settings;
+  settings.authors = birdseye::testing::authors();
+  LiveWorkflow workflow{settings};
   connect_and_calibrate(workflow);
   EXPECT_TRUE(workflow.taken_with().camera.empty()) << "no frame has come";
   workflow.take(grey_frame(), HostTime{1}, std::nullopt);
