@@ -9,9 +9,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string>
 #include <system_error>
 #include <utility>
 
+#include "calibration/base/nesting.hpp"
 #include "calibration/record/sha256.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/recording/recording_writer.hpp"
@@ -60,8 +62,11 @@ Result<void> sign_recording(const fs::path& folder, nlohmann::json& sheet, const
 }
 
 Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
-  std::ifstream in(folder / kRecordingSheet);
-  const auto sheet = nlohmann::json::parse(in, nullptr, false);
+  std::ifstream in(folder / kRecordingSheet, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  // Its sum is of its text made anew, which goes into lists as deep as they are.
+  const auto sheet =
+      nests_too_deeply(text, Notation::json) ? nlohmann::json() : nlohmann::json::parse(text, nullptr, false);
   if (!sheet.is_object() || !sheet.contains("birdseye_recording")) {
     return Error{Errc::bad_format, fmt::format("{}: is missing or damaged; take a copy of the recording that is whole",
                                                (folder / kRecordingSheet).string())};
@@ -101,7 +106,9 @@ Result<std::string> admit_recording(const fs::path& path, const Authors& authors
     if (!read) return read.error();
     seal = *std::move(read);
   }
-  for (const auto& [files, what] : {std::pair{&seal.changed, "changed"}, std::pair{&seal.missing, "taken away"}}) {
+  // One that was added may stand before another: of two files of one video the first is read.
+  for (const auto& [files, what] :
+       {std::pair{&seal.changed, "changed"}, std::pair{&seal.missing, "taken away"}, std::pair{&seal.added, "added"}}) {
     if (!files->empty())
       return Error{Errc::bad_format,
                    fmt::format("{}: was {} since the recording was signed: {}; take a copy that is as "

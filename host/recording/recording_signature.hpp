@@ -27,8 +27,8 @@ struct RecordingSeal {
 /// Reads all of the recording's files: as long as the disk takes.
 Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
-/// As Authors::admit(), with the folder's name. Refuses also where a file was changed or is missing. What is no folder,
-/// as a sequence of PLUS, nobody signs: it is admitted.
+/// As Authors::admit(), with the folder's name. Refuses also where a file was changed, is missing or was added.
+/// What is no folder, as a sequence of PLUS, nobody signs: it is admitted.
 Result<std::string> admit_recording(const std::filesystem::path& path, const Authors& authors);
 
 }  // namespace birdseye::host

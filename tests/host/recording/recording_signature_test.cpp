@@ -77,6 +77,24 @@ TEST(RecordingSignature, NamesWhatWasChangedTakenAwayAndAdded) {
   EXPECT_EQ(seal->added, std::vector<std::string>{"notes.txt"});
 }
 
+TEST(RecordingSignature, AVideoThatWasPutBeforeTheSignedOneIsRefused) {
+  const Scratch scratch;
+  const Authors own = Authors::for_once();
+  record(scratch / "r", own);
+  (void)scratch.file("r/video.igs.mhd", "other");
+  for (const bool accept : {false, true})
+    EXPECT_NE(refusal(scratch / "r", {own.machine, accept}).find("added"), std::string::npos) << accept;
+}
+
+TEST(RecordingSignature, ASheetThatNestsWithoutEndIsRefused) {
+  const Scratch scratch;
+  fs::create_directory(scratch / "r");
+  const std::size_t deep = 200'000;
+  (void)scratch.file("r/recording.json",
+                     R"({"birdseye_recording": 2, "a": )" + std::string(deep, '[') + std::string(deep, ']') + "}");
+  EXPECT_NE(refusal(scratch / "r", Authors::for_once()).find("damaged"), std::string::npos);
+}
+
 TEST(RecordingSignature, OneThatWasCutShortIsUnsignedAndSaysSo) {
   const Scratch scratch;
   const Authors own = Authors::for_once();
