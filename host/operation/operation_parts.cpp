@@ -1,5 +1,7 @@
 #include "host/operation/operation_parts.hpp"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 #include <span>
 
@@ -13,6 +15,9 @@ namespace birdseye::host {
 namespace {
 
 using Json = nlohmann::json;
+
+/// Of a lattice: more than any, and few enough that their product is what it is.
+constexpr std::size_t kMostPoints = 1U << 26U;
 
 Json rows_of(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
@@ -153,7 +158,12 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
   json.at("made_utc").get_to(out.made_utc);
   DisplacementField& field = out.field;
   json.at("size").get_to(field.size);
-  const std::size_t points = grid_count(field.size);
+  std::size_t points = 1;
+  for (const int count : field.size) {
+    if (count < 2 || static_cast<std::size_t>(count) > kMostPoints / points)
+      return Error{Errc::bad_value, fmt::format("{} is no size of a lattice", json.at("size").dump())};
+    points *= static_cast<std::size_t>(count);
+  }
   const auto values = unpacked_floats(json.at("displacement_mm_float32_zlib_base64").get<std::string>(), 3 * points);
   if (!values) return values.error();
   field.displacement_mm.reserve(points);

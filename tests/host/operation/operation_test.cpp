@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "drivers/system/wait.hpp"
+#include "host/files/packed_floats.hpp"
 #include "host/files/sealed_text.hpp"
 #include "host/operation/calibration_step.hpp"
 #include "host/operation/operation_keeper.hpp"
@@ -223,6 +225,24 @@ TEST(Operation, AFileOf010OrOfALaterVersionIsRefusedInWords) {
       read_operation(scratch.file("other.json", sealed_text({{"format", {{"name", "something"}, {"version", 2}}}})));
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().what.find("is no operation"), std::string::npos) << other.error().what;
+}
+
+TEST(Operation, ALatticeOfAnotherSizeThanItsNumbersIsRefused) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
+  const nlohmann::json sheet = *unseal(contents_of(scratch / "operation.json"));
+  // Of the first the product of the three is 0 in 64 bits; the second takes 48 GB.
+  for (const std::array<int, 3>& size : {std::array{1 << 22, 1 << 21, 1 << 21}, {2000, 2000, 1000}, {3, 2, 1}}) {
+    nlohmann::json deformed = sheet.at("deformed");
+    deformed["size"] = size;
+    if (size[0] > 2000) deformed["displacement_mm_float32_zlib_base64"] = packed_floats({});
+    const auto read = read_operation(scratch.file("other.json", sealed_text({{"format", sheet.at("format")},
+                                                                             {"made", sheet.at("made")},
+                                                                             {"ct", sheet.at("ct")},
+                                                                             {"deformed", deformed}})));
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().what.find("is no size of a lattice"), std::string::npos) << read.error().what;
+  }
 }
 
 void wait_for(const OperationKeeper& keeper) {
