@@ -12,8 +12,11 @@ namespace birdseye {
 /// What a program of ours tells whoever started it.
 enum class ExitCode : int { success = 0, unusable_input = 2, verdict_fail = 3 };
 
+/// Names and texts come from elsewhere: a line stays one line, and nothing in it moves a terminal's cursor.
+std::string in_one_line(std::string text);
+
 /// Prints "program: what" as the one line on standard error that an error is, whatever names it holds.
-void print_error(const std::string& program, std::string what);
+void print_error(const std::string& program, const std::string& what);
 
 /// What every program's main() ends in: parses, runs the callbacks, then `finish`, whose value is the exit code. Wrong
 /// usage, and whatever a library throws, becomes one line on standard error, "name: what", and unusable_input. App and

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/identity/this_machine.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/files/appliance_recording.hpp"
 #include "host/files/record_file.hpp"
@@ -120,7 +121,9 @@ Result<std::vector<Found>> found_at(const fs::path& path) {
 
 /// Prints what there is to say. True: all is as a known machine signed it.
 bool tell(const fs::path& path, const Found& found, ThisMachine& machine, const std::string& trust, Error& refused) {
-  const auto say = [&](const std::string& words) { fmt::print("{}: {}: {}\n", path.string(), found.what, words); };
+  const auto say = [&](const std::string& words) {
+    fmt::print("{}\n", in_one_line(fmt::format("{}: {}: {}", path.string(), found.what, words)));
+  };
   auto author =
       found.kind.empty() ? Result<Author>(Author()) : machine.author_of(found.kind, found.sha256, found.signature);
   if (!author) {

@@ -6,6 +6,8 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/program.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -15,13 +17,6 @@ constexpr std::array kStates{CheckState::good, CheckState::could_be_better, Chec
 
 std::ptrdiff_t count_of(const std::vector<Check>& checks, CheckState state) {
   return std::count_if(checks.begin(), checks.end(), [&](const Check& check) { return check.state == state; });
-}
-
-/// Names of devices and texts of appliances come from elsewhere: a line stays one line.
-std::string in_one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }, ' ');
-  return text;
 }
 
 }  // namespace

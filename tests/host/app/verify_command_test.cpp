@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "device/birdseyed/recorder.hpp"
 #include "host/operation/operation.hpp"
 #include "host/recording/recording_writer.hpp"
@@ -49,6 +51,16 @@ TEST(VerifyCommand, SaysByWhomAndWhenEachKindWasSigned) {
     expect((scratch / name).string(), 0, {std::string(name) + what + by, "and as it was signed"});
   }
   expect((scratch / "record.json").string() + " " + (scratch / "session").string(), 0, {"record.json: ", "session: "});
+}
+
+TEST(VerifyCommand, NoNameInAFileStandsForALineOfItsOwn) {
+  const Scratch scratch;
+  record_session(scratch / "session");
+  (void)scratch.file("session/more\x1b[2K\rsession: as it was signed\n.txt", "");
+  const auto result = testing::run("birdseye", "verify " + (scratch / "session").string());
+  EXPECT_EQ(result.code, 3);
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 2) << result.output;
+  EXPECT_EQ(result.output.find_first_of("\x1b\r"), std::string::npos) << result.output;
 }
 
 TEST(VerifyCommand, SaysWhatWasChanged) {
