@@ -24,6 +24,7 @@ namespace {
 constexpr std::size_t kNameBytes = 64;
 constexpr Duration kExchange = Duration::from_ms(10'000);  // which no person takes part in
 constexpr std::uint8_t kYes = 'y', kNo = 'n';
+constexpr const char* kOwn = "own";  // by which this machine's certificate is kept beside the others'
 
 using Sha256 = std::array<std::uint8_t, 32>;
 /// A number that nobody can guess, and what its machine calls itself, zeros behind it.
@@ -172,10 +173,12 @@ Result<Paired> settle(TlsLink& link, const Introduction& introduction, const Pai
   if (!known) return known.error();
   const std::string& name = plan.name.empty() ? introduction.name : plan.name;
   if (name.find('/') != std::string::npos) return Error{Errc::bad_value, "a machine's name has no \"/\" in it"};
+  if (name == kOwn)
+    return Error{Errc::bad_value, fmt::format("the other machine cannot be called {}: give it a --name", kOwn)};
   if (auto added = known->add(name, introduction.key); !added) return added.error();
   const std::string kept = *known->name_of(introduction.key);
   for (const auto& [file, text] :
-       {std::pair("own", link.own_certificate()), std::pair(kept.c_str(), link.peer_certificate())}) {
+       {std::pair(kOwn, link.own_certificate()), std::pair(kept.c_str(), link.peer_certificate())}) {
     if (auto written = write_text(plan.folder / (std::string(file) + ".crt"), text); !written) return written.error();
   }
   return Paired{kept, introduction.key};

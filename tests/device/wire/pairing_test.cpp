@@ -75,6 +75,21 @@ TEST(Pairing, BothSeeTheSameCodeAndKnowEachOtherAfterwards) {
   EXPECT_EQ(testing::contents_of(cart.folder / "host.crt"), testing::contents_of(host.folder / "own.crt"));
 }
 
+TEST(Pairing, AMachineThatCallsItselfOwnDoesNotTakeThePlaceOfTheOwnCertificate) {
+  Machine cart, host;
+  (void)meet(cart, host);
+  const std::string before = testing::contents_of(cart.folder / "own.crt");
+  std::filesystem::remove(cart.folder / "known");
+  std::promise<int> port;
+  auto cart_paired = std::async(std::launch::async, [&] {
+    return pair_as_server(cart.plan("own"), "127.0.0.1", 0, soon(), [&](int listening) { port.set_value(listening); });
+  });
+  (void)pair_as_client(host.plan("cart"), "127.0.0.1", port.get_future().get(), soon());
+  EXPECT_FALSE(cart_paired.get());
+  EXPECT_EQ(testing::contents_of(cart.folder / "own.crt"), before);
+  EXPECT_FALSE(cart.name_of(host));
+}
+
 TEST(Pairing, EachPairingHasACodeOfItsOwn) {
   Machine cart, host;
   (void)meet(cart, host);
