@@ -33,6 +33,8 @@ constexpr std::uint8_t kHandshakeRecord = 22;
 constexpr Duration kPerHandshake = Duration::from_ms(200);
 constexpr std::int64_t kHandshakesAtOnce = 10;
 constexpr std::size_t kMostHostsRemembered = 64;
+// Of all hosts, between two looks at the clients: the poses wait no longer for many handshakes than for these.
+constexpr int kMostStepsAtOnce = 4;
 
 /// Somebody from another machine who is not let in yet.
 struct Arrival {
@@ -119,8 +121,11 @@ Deadline Gate::next_look(Deadline deadline) const {
 
 void Gate::go_on(std::span<const pollfd> entries) {
   auto entry = entries.begin();
-  for (auto arrival = arrivals_.begin(); arrival != arrivals_.end() && entry != entries.end(); ++entry)
-    arrival = go_on(*arrival, entry->revents) ? std::next(arrival) : arrivals_.erase(arrival);
+  int steps = 0;
+  for (auto arrival = arrivals_.begin(); arrival != arrivals_.end() && entry != entries.end(); ++entry) {
+    const bool waits = arrival->tls && entry->revents != 0 && ++steps > kMostStepsAtOnce;
+    arrival = go_on(*arrival, waits ? short{0} : entry->revents) ? std::next(arrival) : arrivals_.erase(arrival);
+  }
 }
 
 bool Gate::go_on(Arrival& arrival, short told) {

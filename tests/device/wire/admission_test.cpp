@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 
+#include <algorithm>
+#include <array>
 #include <list>
 #include <string>
 
@@ -110,6 +112,28 @@ TEST_F(AdmittedServer, OneMachinesHandshakesAreBoundedInNumberAndRateAndNoOthers
   EXPECT_GT(let_in, 0);
   EXPECT_LT(let_in, 3000);
   EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+}
+
+TEST_F(AdmittedServer, ManyHandshakesAtOnceAreGoneOnWithAFewAtATime) {
+  const auto listener = *listen_tcp(kHere, 0, {.tls = cart_.tls(), .is_local = [](const auto&) { return false; }});
+  std::list<std::unique_ptr<TlsLink>> hosts;
+  for (int i = 0; i < 12; ++i) {
+    UniqueFd fd =
+        connection(std::array{kHere, kThere, kElsewhere}.at(static_cast<std::size_t>(i % 3)), listener->port());
+    ::fcntl(fd.get(), F_SETFL, O_NONBLOCK);
+    hosts.push_back(*TlsLink::over(std::move(fd), host_.tls(), TlsLink::Side::client));
+    ASSERT_TRUE(listener->wait({}, true, soon()));
+    EXPECT_EQ(listener->accept(), nullptr);
+  }
+  for (const auto& host : hosts) EXPECT_TRUE(host->shake());
+  (void)listener->wait({}, true, soon());
+  const auto is_answered = [](const auto& host) { return wait_ready(host->fd(), POLLIN, device_now()) != 0; };
+  const auto answered = std::ranges::count_if(hosts, is_answered);
+  EXPECT_GT(answered, 0);
+  EXPECT_LE(answered, 4);
+  // All of them in the end.
+  for (int i = 0; i < 12 && !std::ranges::all_of(hosts, is_answered); ++i) (void)listener->wait({}, true, soon());
+  EXPECT_TRUE(std::ranges::all_of(hosts, is_answered));
 }
 
 TEST_F(AdmittedServer, WherePlainIsAllowedWhoSpeaksTlsStillDoes) {
