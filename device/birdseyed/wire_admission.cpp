@@ -21,7 +21,7 @@ std::string plain_notice(const WireConfig& wire) {
 
 std::string admission_words(const WireConfig& wire) {
   if (wire::is_loopback(wire.bind)) return {};
-  if (const std::string plain = plain_notice(wire); !plain.empty()) return plain;
+  if (std::string plain = plain_notice(wire); !plain.empty()) return plain;
   return "the wire: this machine's programs, and paired machines by TLS (birdseyed pair)";
 }
 

@@ -215,7 +215,7 @@ TEST_F(Tls13, PlainBytesAreNoHandshake) {
 }
 
 TEST_F(Tls13, OneBitThatIsChangedOnTheWayEndsIt) {
-  for (const std::size_t where : {3, 20, 900}) {
+  for (const std::size_t where : {3U, 20U, 900U}) {
     let_in();
     ASSERT_EQ(write(*server_, some(1000)), 1000U);
     carry(far_, near_, [&](Bytes& bytes) { bytes[where] ^= 1U; });

@@ -309,12 +309,13 @@ TEST(ReplayCommand, WhatNobodyKnownSignedIsUsedOnlyWhenAskedToAndTheVerdictSaysS
   }
   const std::string good = by + scratch.file("record.json", host::record_text(record, *testing::authors().machine));
   EXPECT_EQ(replay(scratch, "r", good).output.find("UNSIGNED"), std::string::npos);
-  (void)scratch.file("r/more.txt", "not of the recording, and not read");
-  EXPECT_EQ(replay(scratch, "r", good).output.find("UNSIGNED"), std::string::npos);
+  const std::string more = scratch.file("r/more.txt", "not of the recording");
+  const std::string again = "replay " + (scratch / "r").string() + " --volume " + ct + " --out " + out + " " + good;
+  expect_refused("birdseye", again, {"was added since the recording was signed: more.txt"}, out);
+  std::filesystem::remove(more);
   std::string sheet = contents_of(scratch / "r/recording.json");
   (void)scratch.file("r/recording.json", sheet.replace(sheet.find("done"), 4, "DONE"));
-  expect_refused("birdseye", "replay " + (scratch / "r").string() + " --volume " + ct + " --out " + out + " " + good,
-                 {"/r: its signature", "does not fit"}, out);
+  expect_refused("birdseye", again, {"/r: its signature", "does not fit"}, out);
 }
 
 TEST(ReplayCommand, FramesAfterTheCameraWasExchangedBearNoOverlay) {
