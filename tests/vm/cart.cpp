@@ -13,8 +13,9 @@ namespace birdseye::vm {
 Cart::Cart(Machine& machine, const std::string& name, const std::string& config) : machine_(machine), name_(name) {
   // Not on the guest's view of the tree, which need not show what changes out here.
   std::ofstream(machine.out() / (name + ".toml"))
-      << config << fmt::format("[wire]\nbind = \"0.0.0.0\"\nport = {}\n", Machine::kGuestPort);
-  machine.must(fmt::format("start {0} {1}/birdseyed --config /run/out/{0}.toml", name, testing::programs_folder()));
+      << config << fmt::format("[wire]\nbind = \"0.0.0.0\"\nallow_plain = true\nport = {}\n", Machine::kGuestPort);
+  machine.must(fmt::format("start {0} env BIRDSEYE_IDENTITY=/run/identity {1}/birdseyed --config /run/out/{0}.toml",
+                           name, testing::programs_folder()));
   (void)some<wire::Birds>("first poses", 1);
   (void)some<wire::VideoFrame>("first frame", 1);
 }
