@@ -62,6 +62,7 @@ Result<void> run(Ft232rOptions& options) {
   if (auto finished = finish(options.behind); !finished) return finished;
   options.program.tracker = options.behind.program.tracker;
   options.program.motion = options.behind.program.motion;
+  options.program.period_s = options.behind.program.period_s;
   return run_ft232r(options.program, note_interrupts());
 }
 
@@ -81,6 +82,9 @@ Result<void> run(VideoOptions& options) {
   const auto format = frame_format_of(options.format);
   if (!format) return Error{Errc::bad_value, "--format: is none of RGB3, YUYV, UYVY, NV12, GREY"};
   program.format = *format;
+  if (!program.post.empty() && *format != FrameFormat::rgb3) {
+    return Error{Errc::bad_value, "--post: is drawn as RGB3 alone; leave out --format"};
+  }
   program.timing.stamps = !options.no_stamps;
   if (!options.faults.empty()) {
     auto script = read_fault_script(options.faults, Instruments::camera, program.timing.seed);
@@ -112,6 +116,7 @@ void add_tracker_options(CLI::App& command, MiniBirdOptions& options) {
   command.add_option("--birds", tracker.unit.birds, "in the flock")->check(CLI::Range(1, 126));
   command.add_option("--motion", program.motion, "circle, pivot (a tip in a divot) or still")
       ->check(CLI::IsMember({"circle", "pivot", "still"}));
+  command.add_option("--period-s", program.period_s, "of the circle")->check(CLI::Range(0.5, 3600.0));
   command.add_option("--position-noise-mm", tracker.noise.position_mm, "per axis and record")
       ->check(CLI::Range(0.0, 50.0));
   command.add_option("--angle-noise-deg", tracker.noise.angle_deg, "per axis and record")->check(CLI::Range(0.0, 20.0));
@@ -187,6 +192,9 @@ void add_camera_command(CLI::App& app, const Take& take) {
   command.add_option("--truth", program.truth, "JSON file that says when frames are truly exposed");
   command.add_option("--strobe", program.strobe,
                      "file that is told pull-up and pull-down with each exposure, as of a line of Linux's gpio-sim");
+  command.add_option(
+      "--post", program.post,
+      "--truth of a minibird on its circle: show what a scope on its first bird sees of a post in the middle");
   command.add_option("--seconds", program.seconds, "to run; 0: until SIGTERM")->check(CLI::Range(0.0, 1e6));
   command.callback([options, take] { take(run(*options)); });
 }

@@ -200,7 +200,7 @@ class Bench {
     TrackerSettings settings = program.tracker;
     settings.baud = 1'000'000'000;  // its bytes take their time in the chip
     const std::int64_t now_ns = device_now().ns;
-    return {settings, motion_named(program.motion, now_ns), now_ns};
+    return {settings, motion_named(program.motion, program.period_s, now_ns), now_ns};
   }
 
   const Ft232rProgram& program_;

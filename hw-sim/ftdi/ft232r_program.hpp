@@ -16,6 +16,7 @@ struct Ft232rProgram {
   Ft232rSettings chip;
   TrackerSettings tracker;  ///< at the other end of the adapter's line
   std::string motion = "circle";
+  double period_s = 2;  ///< of the circle
 };
 
 /// Plugs the adapter, with the tracker behind it, into QEMU and serves it in real time until `stop`; waits for a QEMU

@@ -43,10 +43,10 @@ BirdMotion still_motion() {
   };
 }
 
-BirdMotion motion_named(const std::string& name, std::int64_t zero_ns) {
+BirdMotion motion_named(const std::string& name, double circle_period_s, std::int64_t zero_ns) {
   if (name == "still") return still_motion();
   if (name == "pivot") return pivot_motion({}, zero_ns);
-  return circle_motion({}, zero_ns);
+  return circle_motion({.period_s = circle_period_s}, zero_ns);
 }
 
 }  // namespace birdseye::hw_sim

@@ -34,7 +34,8 @@ BirdMotion pivot_motion(const PivotMotion& pivot, std::int64_t zero_ns);
 /// Each bird rests at (400, 60 * bird, 0) mm, not turned.
 BirdMotion still_motion();
 
-/// The motion "circle", "pivot" or "still" with its default parameters; the circle for any other name.
-BirdMotion motion_named(const std::string& name, std::int64_t zero_ns);
+/// The motion "circle", "pivot" or "still" with its default parameters but for the circle's period; the circle for any
+/// other name.
+BirdMotion motion_named(const std::string& name, double circle_period_s, std::int64_t zero_ns);
 
 }  // namespace birdseye::hw_sim

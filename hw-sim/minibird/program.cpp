@@ -21,7 +21,7 @@ Result<std::unique_ptr<Endpoint>> open_endpoint(const MiniBirdProgram& program) 
 }
 
 nlohmann::json truth_of(const MiniBirdProgram& program, std::int64_t zero_ns, double rate_hz) {
-  const Circle circle;
+  const Circle circle{.period_s = program.period_s};
   nlohmann::json truth{{"zero_monotonic_ns", zero_ns},
                        {"motion", program.motion},
                        {"rate_hz", rate_hz},
@@ -56,7 +56,7 @@ Result<void> run_minibird(const MiniBirdProgram& program, const std::atomic<bool
   };
   if (auto written = write_truth(program.tracker.unit.rate_hz); !written) return written;
 
-  const BirdMotion motion = motion_named(program.motion, zero_ns);
+  const BirdMotion motion = motion_named(program.motion, program.period_s, zero_ns);
   TrackerLoop::Listeners listeners;
   listeners.on_fault = [](const FaultEvent& event) { announce(event); };
   listeners.on_rate = [&write_truth](double rate_hz) { (void)write_truth(rate_hz); };

@@ -14,6 +14,7 @@ struct MiniBirdProgram {
   std::filesystem::path tty, unix_socket;
   std::string tcp;
   std::string motion = "circle";
+  double period_s = 2;          ///< of the circle
   std::filesystem::path truth;  ///< empty: none is written
   double seconds = 0;           ///< 0: until it is stopped
   TrackerSettings tracker;

@@ -2,14 +2,19 @@
 
 #include <sys/prctl.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 
 #include "drivers/system/clock.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/video/frame_sink.hpp"
+#include "hw-sim/video/post_view.hpp"
 #include "hw-sim/video/strobe.hpp"
 
 namespace birdseye::hw_sim {
@@ -29,15 +34,41 @@ int half(int length_px) {
   return std::max(64, length_px / 2 / 2 * 2);
 }
 
+/// When the bird began its circle, and how long it takes.
+struct Round {
+  std::int64_t zero_ns = 0;
+  double period_s = 0;
+};
+
+Result<Round> read_round(const std::filesystem::path& truth) {
+  std::ifstream file(truth);
+  const auto said = nlohmann::json::parse(file, nullptr, false);
+  const auto number = [&said](const char* key) {
+    return said.is_object() && said.contains(key) && said[key].is_number() ? said[key].get<double>() : 0.0;
+  };
+  if (number("zero_monotonic_ns") > 0 && number("period_s") > 0) {
+    return Round{said["zero_monotonic_ns"].get<std::int64_t>(), number("period_s")};
+  }
+  return Error{
+      Errc::bad_value,
+      fmt::format("--post: {} is no truth of a miniBIRD on its circle; start birdseye-sim minibird with --truth "
+                  "{} before the camera",
+                  truth.string(), truth.string())};
+}
+
 class Camera {
  public:
-  Camera(const CameraProgram& program, std::unique_ptr<FrameSink> sink, std::int64_t zero_ns)
+  Camera(const CameraProgram& program, std::unique_ptr<FrameSink> sink, std::int64_t zero_ns,
+         std::optional<Round> round)
       : program_(program),
         sink_(std::move(sink)),
         script_(program.timing, zero_ns),
         zero_ns_(zero_ns),
+        round_(round),
         whole_(program.format, program.width_px, program.height_px),
-        half_(program.format, half(program.width_px), half(program.height_px)) {}
+        half_(program.format, half(program.width_px), half(program.height_px)) {
+    if (round_) post_.emplace(program.width_px, program.height_px);
+  }
 
   void run(const std::atomic<bool>& stop) {
     const std::int64_t end_ns =
@@ -62,6 +93,13 @@ class Camera {
 
  private:
   void show(const FramePlan& plan) {
+    if (post_ && !plan.half_size) {
+      const double turns = static_cast<double>(plan.exposed_ns - round_->zero_ns) * 1e-9 / round_->period_s;
+      sink_->begin(
+          plan, {post_->draw(2 * std::numbers::pi * turns), FrameFormat::rgb3, program_.width_px, program_.height_px});
+      ++sent_;
+      return;
+    }
     TestPattern& pattern = plan.half_size ? half_ : whole_;
     const double exposed_s = static_cast<double>(plan.exposed_ns - zero_ns_) * 1e-9;
     const double readout_s = program_.rolling ? 1.0 / program_.timing.rate_hz : 0;
@@ -89,6 +127,8 @@ class Camera {
   std::unique_ptr<FrameSink> sink_;
   CameraScript script_;
   std::int64_t zero_ns_;
+  std::optional<Round> round_;
+  std::optional<PostView> post_;  ///< in place of the test picture
   TestPattern whole_, half_;
   bool plugged_ = true;
   std::uint64_t sent_ = 0, skipped_ = 0;
@@ -97,6 +137,12 @@ class Camera {
 }  // namespace
 
 Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& stop) {
+  std::optional<Round> round;
+  if (!program.post.empty()) {
+    auto read = read_round(program.post);
+    if (!read) return read.error();
+    round = *read;
+  }
   auto sink = open_sink(program);
   if (!sink) return sink.error();
   std::optional<Strobe> strobe;
@@ -107,7 +153,7 @@ Result<void> run_camera(const CameraProgram& program, const std::atomic<bool>& s
   }
   ::prctl(PR_SET_TIMERSLACK, 1000UL, 0UL, 0UL, 0UL);  // frames leave on time, not when it suits the power supply
   const std::int64_t zero_ns = device_now().ns;
-  Camera camera(program, *std::move(sink), zero_ns);
+  Camera camera(program, *std::move(sink), zero_ns, round);
   const nlohmann::json truth{{"zero_monotonic_ns", zero_ns},
                              {"rate_hz", camera.rate_hz()},
                              {"width_px", program.width_px},

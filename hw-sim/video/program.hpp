@@ -17,6 +17,7 @@ struct CameraProgram {
   bool rolling = false;          ///< rows are exposed one after another, over a frame's time
   std::filesystem::path truth;   ///< empty: none is written
   std::filesystem::path strobe;  ///< empty: the camera has none
+  std::filesystem::path post;    ///< the truth of a miniBIRD on its circle: PostView is shown; empty: the test picture
   double seconds = 0;            ///< 0: until it is stopped
   CameraTiming timing;
 };
