@@ -9,6 +9,13 @@
 
 namespace birdseye {
 
+namespace {
+
+/// Samples to which a line is fitted tell by two of them where it is, and by the others how far they scatter about it.
+constexpr std::ptrdiff_t kFewest = 4;
+
+}  // namespace
+
 const char* to_string(PoseKind kind) {
   switch (kind) {
     case PoseKind::exact:
@@ -66,9 +73,11 @@ PoseAnswer PoseHistory::at(DeviceTime time) const {
     answer.kind = PoseKind::interpolated;
   }
   const Range range = around(time, after - samples_.begin());
-  if (answer.kind == PoseKind::predicted && range.end - range.begin < 2 && answer.age.ns > 0) {
+  if (const auto count = range.end - range.begin;
+      answer.kind == PoseKind::predicted && count < kFewest && answer.age.ns > 0) {
     answer.kind = PoseKind::refused;
-    answer.reason = "one pose alone does not tell where it goes";
+    answer.reason = fmt::format("a prediction takes {} poses since the last gap, and there {} {}", kFewest,
+                                count == 1 ? "is" : "are", count);
     return answer;
   }
   judge_time(range, answer);
@@ -89,11 +98,13 @@ PoseHistory::Range PoseHistory::around(DeviceTime time, std::ptrdiff_t first_aft
   const auto joined = [&](std::ptrdiff_t i) {
     return sample(i + 1).acquired - sample(i).acquired <= settings_.max_gap;
   };
-  // For a prediction at least two, to tell the speed, and the window's whole width before the newest.
+  // For a prediction as many as tell how far they scatter, and the window's whole width before the newest.
   const Duration before_newest = std::max(settings_.smoothing + settings_.smoothing, settings_.least_predicted_from);
   const DeviceTime from = predicted ? sample(count - 1).acquired - before_newest : time - settings_.smoothing;
-  if (predicted && range.begin > 0 && joined(range.begin - 1)) --range.begin;
-  while (range.begin > 0 && sample(range.begin - 1).acquired >= from && joined(range.begin - 1)) --range.begin;
+  const auto wanted = [&](std::ptrdiff_t i) {
+    return sample(i).acquired >= from || (predicted && range.end - i <= kFewest);
+  };
+  while (range.begin > 0 && wanted(range.begin - 1) && joined(range.begin - 1)) --range.begin;
   while (range.end < count && sample(range.end).acquired - time <= settings_.smoothing && joined(range.end - 1)) {
     ++range.end;
   }
@@ -141,7 +152,7 @@ void PoseHistory::fit(DeviceTime time, const Range& range, PoseAnswer& answer) c
     slope = (weight * sum_t - st * sum) / determinant;
     value = (sum - slope * st) / weight;
   }
-  if (weight > 3) {
+  if (range.end - range.begin >= kFewest) {
     double squares = 0;
     for (std::ptrdiff_t i = range.begin; i < range.end; ++i) {
       const double t = (sample(i).acquired - time).seconds();

@@ -192,7 +192,7 @@ BirdGuard::Objection BirdGuard::place(Sample sample) {
   }
   // Off the track. Either this is wrong, or the sensor is elsewhere: then the next readings agree with this one.
   // The same record once more is no other reading, where noise would have changed it.
-  const bool another = repeats_ == 0 || !noise_is_plain();
+  const bool another = repeats_ == 0 || !(noise_is_plain() || noise_.repeats < kSeldom);
   agreeing_ = candidate_ && another && within_reach(*candidate_, sample) ? agreeing_ + 1 : 0;
   // Of a bird that was frozen more is asked: damaged records differ too.
   const bool few = !was_frozen_ && (lost_sight || place == Placed::in_reach);

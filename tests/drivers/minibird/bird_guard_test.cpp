@@ -256,6 +256,17 @@ TEST(BirdGuard, WhatMovedIsFrozenAtOnce) {
   EXPECT_EQ(watch.see_often(10, kHere), 10);
 }
 
+/// Its noise did not show while it moved, but no record was one of those before.
+TEST(BirdGuard, ARecordThatRepeatsConfirmsNothingWhereRecordsSeldomDo) {
+  Watch watch;
+  const auto at = [](int i) { return Vector3d(300, 80 + i, -40); };
+  for (int i = 0; i < 800; ++i) watch.see(at(i % 400), Matrix3d::Identity(), 0.05);
+  for (int i = 0; i < 60; ++i) watch.see(Record{std::vector<std::int16_t>(12, 0), {}});  // saturated
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(watch.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+  watch.see_often(6, kHere);
+  EXPECT_EQ(watch.see_often(10, kHere), 10);
+}
+
 TEST(BirdGuard, AFlipIsNamedAsLongAsItLastsWhileTheSensorMoves) {
   Watch watch;
   const auto at = [](int i) { return Vector3d(300 - 0.5 * i, 80 + i, -40); };
