@@ -140,8 +140,7 @@ struct Round {
   double first_s = 3;
   std::vector<FaultRow> rows = {};
   std::vector<std::vector<std::string>> problems = {};  ///< by case
-  std::vector<std::size_t> to_do = {};
-  std::vector<bool> still;  ///< the machine was, when the case was last tried
+  std::vector<bool> still;                              ///< the machine was, about the case
 
   explicit Round(bool tracker, std::vector<FaultCase> faults, double first = 3)
       : of_tracker(tracker),
@@ -149,49 +148,43 @@ struct Round {
         first_s(first),
         rows(cases.size()),
         problems(cases.size()),
-        still(cases.size()) {
-    for (std::size_t i = 0; i < cases.size(); ++i) to_do.push_back(i);
-  }
+        still(cases.size()) {}
 
-  /// Leaves in to_do what was seen while the machine stood still and did not come out well.
   void go(const std::filesystem::path& folder) {
-    std::vector<FaultCase> now;
-    for (const std::size_t i : to_do) now.push_back(cases[i]);
     FaultRig::Settings settings{.folder = folder};
     (of_tracker ? settings.tracker_faults : settings.camera_faults) =
-        script_of(now, first_s, of_tracker ? "tracker" : "camera");
+        script_of(cases, first_s, of_tracker ? "tracker" : "camera");
     FaultRig rig(settings);
-    rig.listen(90, [&] { return rig.faults().size() == now.size(); });
-    rig.listen(now.back().calm_s);
+    rig.listen(90, [&] { return rig.faults().size() == cases.size(); });
+    rig.listen(cases.back().calm_s);
     const auto spans = rig.faults();
     const auto zero_ns = rig.circle_zero_ns();
-    std::vector<std::size_t> again;
-    for (std::size_t k = 0; k < to_do.size(); ++k) {
-      const std::size_t i = to_do[k];
-      problems[i].clear();
-      if (k >= spans.size()) {
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      if (i >= spans.size()) {
         problems[i].push_back(cases[i].name + ": never befell. " + rig.failure() + rig.log());
         continue;
       }
-      const std::int64_t until_ns = spans[k].end_ns + static_cast<std::int64_t>(cases[i].calm_s * 1e9);
-      rows[i] = judge(cases[i], spans[k], until_ns, of_tracker, zero_ns, rig.seen(), problems[i]);
-      still[i] = stood_still(rig.seen(), spans[k], until_ns, of_tracker);
-      const bool well = problems[i].empty() && rows[i].slow.empty();
-      if (!well && still[i]) again.push_back(i);
+      const std::int64_t until_ns = spans[i].end_ns + static_cast<std::int64_t>(cases[i].calm_s * 1e9);
+      rows[i] = judge(cases[i], spans[i], until_ns, of_tracker, zero_ns, rig.seen(), problems[i]);
+      still[i] = stood_still(rig.seen(), spans[i], until_ns, of_tracker);
     }
-    to_do = again;
     if (std::getenv("BIRDSEYE_FAULTS_LOG") != nullptr) std::fprintf(stderr, "%s\n", rig.log().c_str());
   }
-};
 
-/// A line for each fault that a round will try again, with the first complaint of the attempt before. .ci/run counts
-/// them.
-void tell_tried_again(const Round& round) {
-  for (const std::size_t i : round.to_do) {
-    const std::string& why = round.problems[i].empty() ? round.rows[i].slow.front() : round.problems[i].front();
-    std::printf("tried again: %s\n", why.substr(0, why.find('\n')).c_str());
+  /// What did not come out well fails, but for where the machine stood still: that is told, and .ci/run counts it.
+  void complain() const {
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      std::vector<std::string> all = problems[i];
+      all.insert(all.end(), rows[i].slow.begin(), rows[i].slow.end());
+      for (const std::string& problem : all) {
+        EXPECT_TRUE(still[i]) << problem;
+        if (still[i]) {
+          std::printf("not judged, the machine stood still: %s\n", problem.substr(0, problem.find('\n')).c_str());
+        }
+      }
+    }
   }
-}
+};
 
 /// Every kind of fault that there is has its row.
 void expect_complete(const std::vector<Round>& rounds) {
@@ -212,31 +205,21 @@ void settle(const std::string& name, const std::vector<FaultRow>& rows) {
 }
 
 TEST(FaultTable, TheInstrumentsFaultsAreNamedDoNotLieAndPass) {
-  constexpr int kAttempts = 4;  // where the machine stands still between
   const Scratch scratch;
   std::vector<Round> rounds{Round(true, of_the_line()),     Round(true, of_the_unit()),    Round(true, of_its_supply()),
                             Round(true, of_its_clock(), 6), Round(false, of_the_camera()), Round(false, of_its_plug())};
   expect_complete(rounds);
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (attempt > 0) std::for_each(rounds.begin(), rounds.end(), tell_tried_again);
+  {
     std::vector<std::jthread> threads;
-    for (std::size_t i = 0; i < rounds.size(); ++i) {
-      if (rounds[i].to_do.empty()) continue;
-      std::printf("attempt %d: %zu faults of rig %zu\n", attempt + 1, rounds[i].to_do.size(), i);
-      threads.emplace_back([&, i] { rounds[i].go(scratch / fmt::format("rig{}.{}", i, attempt)); });
-    }
+    threads.reserve(rounds.size());
+    for (std::size_t i = 0; i < rounds.size(); ++i)
+      threads.emplace_back([&, i] { rounds[i].go(scratch / fmt::format("rig{}", i)); });
   }
   std::vector<FaultRow> tracker, camera;
   for (const Round& round : rounds) {
     auto& table = round.of_tracker ? tracker : camera;
     table.insert(table.end(), round.rows.begin(), round.rows.end());
-    for (std::size_t i = 0; i < round.cases.size(); ++i) {
-      for (const std::string& problem : round.problems[i]) ADD_FAILURE() << problem;
-      for (const std::string& problem : round.rows[i].slow) {
-        EXPECT_TRUE(round.still[i]) << problem;
-        if (round.still[i]) std::printf("not judged, the machine stood still: %s\n", problem.c_str());
-      }
-    }
+    round.complain();
   }
   settle("tracker", tracker);
   settle("camera", camera);

@@ -175,8 +175,8 @@ bool stood_still(const WindowRig& rig, std::int64_t from_ns, std::int64_t until_
   return rig.cores().stood_still(from_ns, until_ns);
 }
 
-/// False where it is to be tried again; complaints that are not of the machine fail the test.
-bool settle(const std::string& name, const Problems& problems, bool still) {
+/// Complaints fail the test, but for those that may be of the machine: they are told.
+void settle(const std::string& name, const Problems& problems, bool still) {
   for (const std::string& problem : problems) {
     if (still) {
       fmt::print("not judged, the machine stood still: {}: {}\n", name, problem);
@@ -184,10 +184,9 @@ bool settle(const std::string& name, const Problems& problems, bool still) {
       ADD_FAILURE() << name << ": " << problem;
     }
   }
-  return problems.empty() || !still;
 }
 
-bool judge(const WindowFault& fault, const FaultSpan& span, const WindowRig& rig, const std::vector<Said>& said) {
+void judge(const WindowFault& fault, const FaultSpan& span, const WindowRig& rig, const std::vector<Said>& said) {
   const std::int64_t until_ns = span.end_ns + static_cast<std::int64_t>(fault.fault.calm_s * 1e9);
   const Seeing in = seeing(rig, said, span.begin_ns, span.end_ns), after = seeing(rig, said, span.end_ns, until_ns);
   fmt::print(
@@ -200,7 +199,7 @@ bool judge(const WindowFault& fault, const FaultSpan& span, const WindowRig& rig
   hold_safe(after, fault.extra_mm, problems);
   hold(after.overlaid > 0, "it does not come back: " + after.words, problems);
   if (!fault.gone_with.empty()) hold_gone(in, fault.gone_with, problems);
-  return settle(span.name + " " + fault.fault.parameters, problems, stood_still(rig, span.begin_ns, until_ns));
+  settle(span.name + " " + fault.fault.parameters, problems, stood_still(rig, span.begin_ns, until_ns));
 }
 
 /// What the appliance as a whole does, by a signal; the window stays.
@@ -217,8 +216,8 @@ void judge_without_appliance(WindowRig& rig, int signal) {
   settle(fmt::format("birdseyed, signal {}", signal), problems, stood_still(rig, from_ns, monotonic_ns()));
 }
 
-/// Injects them, the tracker's first; leaves those that are to be tried again.
-void inject(std::vector<WindowFault>& tracker, std::vector<WindowFault>& camera) {
+/// Injects them, the tracker's first.
+void inject(const std::vector<WindowFault>& tracker, const std::vector<WindowFault>& camera) {
   constexpr double kFirstS = 14;
   const Scratch scratch;
   const double camera_first_s = kFirstS + length_s(tracker);
@@ -228,18 +227,16 @@ void inject(std::vector<WindowFault>& tracker, std::vector<WindowFault>& camera)
   const std::size_t all = tracker.size() + camera.size();
   const double longest_s = camera_first_s + length_s(camera) + 10;
   for (int s = 0; s < longest_s && rig.appliance().faults().size() < all; ++s) rig.watch(1);
-  rig.watch((camera.empty() ? tracker : camera).back().fault.calm_s);
+  rig.watch(camera.back().fault.calm_s);
   const auto spans = rig.appliance().faults();
   ASSERT_EQ(spans.size(), all) << rig.failure();
   const auto said = rig.said();
   auto span = spans.begin();
-  for (auto* faults : {&tracker, &camera}) {
-    std::vector<WindowFault> again;
+  for (const auto* faults : {&tracker, &camera}) {
     for (const WindowFault& fault : *faults) {
       ASSERT_EQ(span->name, fault.fault.name);
-      if (!judge(fault, *span++, rig, said)) again.push_back(fault);
+      judge(fault, *span++, rig, said);
     }
-    *faults = again;
   }
 
   // What is registered went to 3D Slicer all the while: the CT, and where it is with each frame that bore it.
@@ -255,18 +252,9 @@ void inject(std::vector<WindowFault>& tracker, std::vector<WindowFault>& camera)
 }
 
 TEST(WindowFaults, NoStaleOrWrongOverlayIsOnTheScreen) {
-  constexpr int kAttempts = 2;  // where the machine stands still between
-  auto tracker = of_the_tracker(), camera = of_the_camera();
+  const auto tracker = of_the_tracker(), camera = of_the_camera();
   expect_complete(tracker, camera);
-  for (int attempt = 0; attempt < kAttempts && tracker.size() + camera.size() > 0; ++attempt) {
-    fmt::print("attempt {}: {} faults\n", attempt + 1, tracker.size() + camera.size());
-    for (const auto* faults : {&tracker, &camera}) {
-      for (const WindowFault& each : *faults) {
-        if (attempt > 0) fmt::print("tried again: {} {}\n", each.fault.name, each.fault.parameters);
-      }
-    }
-    inject(tracker, camera);
-  }
+  inject(tracker, camera);
 }
 
 }  // namespace
