@@ -89,7 +89,7 @@ void print(const OperationOutcome& out, const OperationResult& result) {
 Result<void> run(const OperationOptions& options, bool& broken) {
   SimulatedOperation operation = options.operation;
   if (!options.script.empty()) {
-    auto script = read_fault_script(options.script, Instruments::both, operation.seed);
+    auto script = read_fault_script(options.script, Instruments::with_programs, operation.seed);
     if (!script) return script.error();
     operation.faults = *std::move(script);
   }

@@ -11,7 +11,8 @@
 namespace birdseye::hw_sim {
 
 /// Every fault that a script can name. Some are a tracker's, some a camera's, some either's
-/// (docs/manual/simulated-minibird.md); the last befall the operation itself (docs/manual/simulator.md).
+/// (docs/manual/simulated-minibird.md); then those that befall the operation itself, and its programs
+/// (docs/manual/simulator.md).
 enum class FaultKind {
   drop_byte,
   duplicate_byte,
@@ -45,11 +46,17 @@ enum class FaultKind {
   resected,
   lens_zoomed,
   scope_turned,
+  link_cut,
+  appliance_restart,
+  window_restart,
 };
 
 std::string_view fault_name(FaultKind kind);
 
-enum class FaultTarget { tracker, camera, world };
+enum class FaultTarget { tracker, camera, world, program };
+
+inline constexpr FaultTarget kFaultTargets[] = {FaultTarget::tracker, FaultTarget::camera, FaultTarget::world,
+                                                FaultTarget::program};
 
 /// The name that the enumerator has.
 std::string_view target_name(FaultTarget target);

@@ -98,7 +98,10 @@ class Reader {
 
   /// Whom it befalls: who can have it, who is there, and what the entry says.
   std::optional<FaultTarget> target_of(const toml::value& entry, const FaultSpec& spec) {
-    if (spec.of_world && instruments_ == Instruments::both && !entry.contains("of")) return FaultTarget::world;
+    const bool programs = instruments_ == Instruments::with_programs;
+    if (spec.of_world && (instruments_ == Instruments::both || programs) && !entry.contains("of"))
+      return FaultTarget::world;
+    if (spec.of_program && programs && !entry.contains("of")) return FaultTarget::program;
     bool tracker = spec.of_tracker && instruments_ != Instruments::camera;
     bool camera = spec.of_camera && instruments_ != Instruments::tracker;
     if (entry.contains("of")) {
@@ -117,6 +120,12 @@ class Reader {
     }
     if (spec.of_world) {
       fail(entry, fmt::format("{}: befalls the operation and no instrument; give it to birdseye-sim cart, without of",
+                              fault_name(spec.kind)));
+      return std::nullopt;
+    }
+    if (spec.of_program) {
+      fail(entry, fmt::format("{}: befalls the cart's programs and no instrument; give it to birdseye-sim operation, "
+                              "without of",
                               fault_name(spec.kind)));
       return std::nullopt;
     }
@@ -153,11 +162,6 @@ class Reader {
     return drawn;
   }
 
-  std::vector<Fault>& faults_of(FaultTarget target) {
-    if (target == FaultTarget::world) return script.world;
-    return target == FaultTarget::tracker ? script.tracker : script.camera;
-  }
-
   void read_fault(const toml::value& entry) {
     const FaultSpec* const spec = spec_of(entry);
     if (spec == nullptr) return;
@@ -184,7 +188,7 @@ class Reader {
     const auto target = target_of(entry, *spec);
     for (const double at_s : times_of(entry)) {
       fault.at_s = at_s;
-      if (target) faults_of(*target).push_back(fault);
+      if (target) script.of(*target).push_back(fault);
     }
   }
 
@@ -195,6 +199,24 @@ class Reader {
 };
 
 }  // namespace
+
+std::vector<Fault>& FaultScript::of(FaultTarget target) {
+  switch (target) {
+    case FaultTarget::tracker:
+      return tracker;
+    case FaultTarget::camera:
+      return camera;
+    case FaultTarget::world:
+      return world;
+    case FaultTarget::program:
+      break;
+  }
+  return programs;
+}
+
+const std::vector<Fault>& FaultScript::of(FaultTarget target) const {
+  return const_cast<FaultScript*>(this)->of(target);
+}
 
 Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instruments instruments, std::uint64_t seed) {
   std::error_code error;
@@ -213,8 +235,9 @@ Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instrum
     if (const std::string problems = reader.problems(); !problems.empty()) {
       return Error{Errc::bad_value, fmt::format("{}: {}", path.string(), problems)};
     }
-    for (auto* faults : {&reader.script.tracker, &reader.script.camera, &reader.script.world}) {
-      std::stable_sort(faults->begin(), faults->end(), [](const Fault& a, const Fault& b) { return a.at_s < b.at_s; });
+    for (const FaultTarget target : kFaultTargets) {
+      auto& faults = reader.script.of(target);
+      std::stable_sort(faults.begin(), faults.end(), [](const Fault& a, const Fault& b) { return a.at_s < b.at_s; });
     }
     return std::move(reader.script);
   } catch (const toml::syntax_error& problem) {

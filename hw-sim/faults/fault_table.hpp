@@ -19,7 +19,7 @@ struct ParameterSpec {
 /// A kind of fault, and what a script may say of it.
 struct FaultSpec {
   FaultKind kind;
-  bool of_tracker, of_camera, of_world;
+  bool of_tracker, of_camera, of_world, of_program;
   WithoutEnd without_end;
   std::span<const ParameterSpec> parameters;
 };

@@ -37,7 +37,7 @@ struct LocalNetwork::State {
   Condition changed;
   std::deque<std::unique_ptr<wire::Link>> calling;
   std::vector<std::weak_ptr<OneWay>> ways;
-  bool woken = false;
+  bool woken = false, listened = false;
 };
 
 namespace {
@@ -118,7 +118,18 @@ class LocalLink final : public wire::Link {
 
 class LocalListener final : public wire::Listener {
  public:
-  explicit LocalListener(std::shared_ptr<LocalNetwork::State> network) : network_(std::move(network)) {}
+  explicit LocalListener(std::shared_ptr<LocalNetwork::State> network) : network_(std::move(network)) {
+    const std::lock_guard lock(network_->mutex);
+    network_->listened = true;
+  }
+  ~LocalListener() override {
+    std::deque<std::unique_ptr<wire::Link>> nobody_answers;  // ends without the mutex, which it takes
+    const std::lock_guard lock(network_->mutex);
+    network_->listened = false;
+    nobody_answers.swap(network_->calling);
+  }
+  LocalListener(const LocalListener&) = delete;
+  LocalListener& operator=(const LocalListener&) = delete;
 
   bool wait(std::span<wire::LinkWatch> links, bool to_accept, Deadline deadline) override {
     std::unique_lock lock(network_->mutex);
@@ -176,6 +187,10 @@ std::unique_ptr<wire::Link> LocalNetwork::connect() const {
   const auto up = std::make_shared<OneWay>(), down = std::make_shared<OneWay>();
   auto here = std::make_unique<LocalLink>(state_, down, up);
   const std::lock_guard lock(state_->mutex);
+  if (!state_->listened) {
+    up->ended = down->ended = true;
+    return here;
+  }
   std::erase_if(state_->ways, [](const auto& way) { return way.expired(); });
   state_->ways.insert(state_->ways.end(), {up, down});
   state_->calling.push_back(std::make_unique<LocalLink>(state_, up, down));

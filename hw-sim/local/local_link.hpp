@@ -17,7 +17,7 @@ class LocalNetwork {
   };
   explicit LocalNetwork(const Settings& settings);
 
-  /// For the server, once.
+  /// For the server. One at a time; where there is none, who connects is refused.
   [[nodiscard]] std::unique_ptr<wire::Listener> listener() const;
   /// A client's end of a new connection.
   [[nodiscard]] std::unique_ptr<wire::Link> connect() const;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -20,6 +21,7 @@
 #include "hw-sim/local/local_link.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/operation/operation_patient.hpp"
+#include "hw-sim/operation/operation_window.hpp"
 #include "hw-sim/operation/surgeon.hpp"
 
 namespace birdseye::hw_sim {
@@ -32,42 +34,6 @@ constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
 constexpr const char* kReference = "reference";
-
-/// Draws nothing: what is decided of each frame is all that is looked at.
-class NoEngine final : public host::Engine {
- public:
-  void deform(const host::DisplacementField& /*field*/) override {}
-  void undeform() override {}
-  host::ImageRgba render(const CameraModel& camera, const Transform<Camera, Patient>& /*camera_from_patient*/,
-                         const host::RenderSettings& /*settings*/) override {
-    const std::size_t pixels = static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px);
-    return {camera.width_px, camera.height_px, std::vector<std::uint8_t>(4 * pixels)};
-  }
-  [[nodiscard]] std::string name() const override { return "none"; }
-};
-
-/// The window's workflow with the patient read: files are read in the machine's time, before the operation's begins.
-Result<std::unique_ptr<host::LiveWorkflow>> workflow_of(const host::PatientFiles& patient, const OperationTruth& truth,
-                                                        const host::Authors& authors) {
-  host::LiveSettings settings;
-  settings.authors = authors;
-  settings.patient = patient;
-  settings.make_engine = [](const auto&, const auto&, const auto&) -> Result<std::unique_ptr<host::Engine>> {
-    return std::unique_ptr<host::Engine>(std::make_unique<NoEngine>());
-  };
-  settings.tip_in_pointer_mm = truth.tip_in_pointer_mm();
-  settings.fiducials = truth.fiducials_mm().size();
-  settings.video_must_agree = false;  // it is grey all over
-  auto workflow = std::make_unique<host::LiveWorkflow>(settings);
-  const Deadline deadline = Deadline::after(Duration::from_ms(30'000));
-  while (!workflow->view().markers_seen || workflow->view().engine_name.empty()) {
-    if (const std::string fault = workflow->view().fault; !fault.empty()) return Error{Errc::bad_value, fault};
-    if (deadline.passed()) return Error{Errc::timeout, "the simulated patient's CT is not read within 30 s"};
-    sleep_for(Duration::from_ms(2));
-    workflow->tick();
-  }
-  return workflow;
-}
 
 /// A log with the operation's time before each line, and a hash of more than it tells.
 class Journal {
@@ -111,10 +77,8 @@ class Journal {
 class Announcer {
  public:
   explicit Announcer(const FaultScript& script) {
-    for (const auto& [target, faults] :
-         {std::pair{FaultTarget::tracker, &script.tracker}, std::pair{FaultTarget::camera, &script.camera},
-          std::pair{FaultTarget::world, &script.world}}) {
-      for (const Fault& fault : *faults) {
+    for (const FaultTarget target : kFaultTargets) {
+      for (const Fault& fault : script.of(target)) {
         const std::string name = fmt::format("{} {}", target_name(target), fault_name(fault.kind));
         lines_.emplace_back(fault.at_s, "begins: " + name);
         if (fault.for_s) lines_.emplace_back(fault.at_s + *fault.for_s, "ends: " + name);
@@ -191,9 +155,70 @@ const char* words_of(const host::ShownPicture& shown) {
   return shown.overlaid ? "the overlay fades" : "there is no overlay";
 }
 
-/// In virtual time.
+/// birdseyed and its server, which end and are started again.
+class ApplianceProgram {
+ public:
+  ApplianceProgram(device::Config config, const LocalNetwork& network)
+      : config_(std::move(config)), network_(network) {}
+
+  /// False where it cannot start: why() tells.
+  bool run(bool on) {
+    if (on == (appliance_ != nullptr)) return true;
+    appliance_.reset();
+    server_.reset();
+    if (!on) return true;
+    server_ = wire::Server::over(network_.listener());
+    auto started = device::Appliance::start(config_, *server_);
+    if (!started) why_ = started.error().what;
+    if (started) appliance_ = *std::move(started);
+    return started.has_value();
+  }
+  [[nodiscard]] const std::string& why() const { return why_; }
+
+ private:
+  device::Config config_;
+  const LocalNetwork& network_;
+  std::unique_ptr<wire::Server> server_;
+  std::unique_ptr<device::Appliance> appliance_;
+  std::string why_;
+};
+
+/// The window, and its connection to the appliance.
+class WindowProgram {
+ public:
+  using Open = std::function<Result<std::unique_ptr<host::LiveWorkflow>>()>;
+  WindowProgram(Open open, const LocalNetwork& network) : open_(std::move(open)), network_(network) {}
+
+  /// True where it was opened just now. Where it cannot be opened, why() tells.
+  bool run(bool on) {
+    if (on == (workflow_ != nullptr)) return false;
+    source_.reset();
+    workflow_.reset();
+    if (!on) return false;
+    auto opened = open_();
+    if (!opened) why_ = opened.error().what;
+    if (!opened) return false;
+    workflow_ = *std::move(opened);
+    source_ = host::LiveSource::of_client("the appliance", [this]() -> Result<std::unique_ptr<wire::Client>> {
+      return wire::Client::over(network_.connect(), "the appliance");
+    });
+    return true;
+  }
+  [[nodiscard]] host::LiveWorkflow* workflow() const { return workflow_.get(); }
+  [[nodiscard]] host::LiveSource& source() const { return *source_; }
+  [[nodiscard]] const std::string& why() const { return why_; }
+
+ private:
+  Open open_;
+  const LocalNetwork& network_;
+  std::unique_ptr<host::LiveWorkflow> workflow_;
+  std::unique_ptr<host::LiveSource> source_;
+  std::string why_;
+};
+
+/// In virtual time. open: the window.
 void operate(const SimulatedOperation& operation, OperationTruth& truth, const host::Authors& authors,
-             host::LiveWorkflow& workflow, OperationOutcome& out) {
+             const WindowProgram::Open& open, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
   const LocalLine line("sim:tracker");
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
@@ -206,24 +231,42 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
   camera_settings.timing.faults = out.faults.camera;
   const LocalCamera camera(camera_settings, zero_ns);
   const LocalNetwork network({.delay = Duration::from_ms(1)});
-  const auto server = wire::Server::over(network.listener());
-  const auto appliance = device::Appliance::start(config_of(truth, authors, line, camera), *server);
-  if (!appliance) return out.broken.push_back({0, "start", appliance.error().what});
-  const auto source =
-      host::LiveSource::of_client("the appliance", [&network]() -> Result<std::unique_ptr<wire::Client>> {
-        return wire::Client::over(network.connect(), "the appliance");
-      });
+  ApplianceProgram appliance(config_of(truth, authors, line, camera), network);
+  WindowProgram window(open, network);
+  FaultTimeline befalling(out.faults.programs, FaultTarget::program);
+  befalling.begin(zero_ns);
   OperationLaws laws(
       truth, out.faults, [&camera](std::uint64_t sequence) { return camera.exposed_ns(sequence); }, zero_ns);
-  Surgeon surgeon(workflow, truth, operation.seed);
+  Surgeon surgeon(truth, operation.seed);
   Journal journal(zero_ns);
   Announcer announcer(out.faults);
   std::string said, step, screen;
+  bool registered = false;
   double acts_at_s = 0;
   const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
   while (host_now() < end) {
-    take_events(*source, workflow, laws, journal);
-    workflow.set_link(source->connected(), source->words(), source->may_retry());
+    befalling.advance(device_now().ns);
+    if (befalling.active(FaultKind::link_cut) != nullptr) {
+      network.cut();
+      befalling.done(FaultKind::link_cut, device_now().ns);
+    }
+    if (!appliance.run(befalling.active(FaultKind::appliance_restart) == nullptr))
+      return out.broken.push_back({journal.at_s(host_now()), "start", appliance.why()});
+    const bool opened = window.run(befalling.active(FaultKind::window_restart) == nullptr);
+    if (!window.why().empty()) return out.broken.push_back({journal.at_s(host_now()), "start", window.why()});
+    if (window.workflow() == nullptr) {
+      sleep_for(kScreen);
+      announcer.tell(journal, host_now());
+      continue;
+    }
+    host::LiveWorkflow& workflow = *window.workflow();
+    host::LiveSource& source = window.source();
+    if (opened) {
+      surgeon.stand_at(workflow, journal.at_s(host_now()));
+      laws.opened(registered, surgeon.checks());
+    }
+    take_events(source, workflow, laws, journal);
+    workflow.set_link(source.connected(), source.words(), source.may_retry());
     workflow.tick();
     workflow.draw();
     const HostTime now = host_now();
@@ -236,6 +279,8 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
     acts_at_s = journal.at_s(now) + kActs_s;
     surgeon.act(journal.at_s(now), now, is_whole(shown));
     const host::OperationView view = workflow.view();
+    laws.take(view, surgeon.checks(), now);
+    registered = view.note(host::LiveStep::fiducials).done;
     journal.follow(now, step, fmt::format("step {}", host::name_of(view.step)));
     journal.follow(now, said, "the appliance: " + view.link.appliance_says);
   }
@@ -254,18 +299,26 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   OperationOutcome out;
   const bool reference = hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5;
   const double ends_s = operation.minutes * 60;
-  out.faults = operation.faults ? *operation.faults
-                                : draw_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s, reference);
+  if (operation.faults) {
+    out.faults = *operation.faults;
+  } else {
+    out.faults = draw_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s, reference);
+    if (operation.programs_end)
+      out.faults.programs = draw_program_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s);
+  }
   OperationTruth truth(operation.seed, kWidth_px, kHeight_px, Happenings(out.faults.world), reference);
   const auto folder = RendezvousFolder::make();
   if (!folder) return folder.error();
   const auto patient = write_patient((*folder)->path(), truth);
   if (!patient) return patient.error();
   const host::Authors authors = host::Authors::for_once();  // another key changes nothing that is done
-  const auto workflow = workflow_of(*patient, truth, authors);
-  if (!workflow) return workflow.error();
+  const auto open = [&] { return open_window(*patient, truth, authors, (*folder)->path() / "window"); };
+  // The first reads its files in the machine's time, before the operation's begins.
+  auto first = open();
+  if (!first) return std::move(first).error();
+  const auto open_next = [&] { return *first != nullptr ? std::exchange(*first, nullptr) : open(); };
   const auto ran =
-      run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, authors, **workflow, out); });
+      run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, authors, open_next, out); });
   if (!ran) return ran.error();
   out.time = *ran;
   for (const BrokenLaw& law : out.broken)

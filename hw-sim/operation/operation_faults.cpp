@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
+#include <span>
 #include <utility>
 
 #include "hw-sim/base/hashed.hpp"
@@ -21,7 +23,8 @@ struct DrawnFault {
   double least = 0, most = 0;
 };
 
-constexpr FaultTarget kTracker = FaultTarget::tracker, kCamera = FaultTarget::camera, kWorld = FaultTarget::world;
+constexpr FaultTarget kTracker = FaultTarget::tracker, kCamera = FaultTarget::camera, kWorld = FaultTarget::world,
+                      kProgram = FaultTarget::program;
 
 constexpr DrawnFault kDrawn[] = {
     {FaultKind::drop_byte, kTracker, 1, 5, "chance", 0.2, 0.5},
@@ -55,6 +58,12 @@ constexpr DrawnFault kDrawn[] = {
     {FaultKind::patient_moved, kWorld, 5, 60, "mm", 2, 20},
 };
 
+constexpr DrawnFault kDrawnOfPrograms[] = {
+    {FaultKind::link_cut, kProgram, 0, 0},
+    {FaultKind::appliance_restart, kProgram, 1, 10},
+    {FaultKind::window_restart, kProgram, 1, 10},
+};
+
 Fault usual(FaultKind kind) {
   Fault fault;
   fault.kind = kind;
@@ -86,12 +95,19 @@ FaultSigns of_camera(const Fault& fault) {
   }
 }
 
+constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
+
+FaultSigns of_program(const Fault& fault) {
+  constexpr double kConnects_s = 1.1;  // the window tries each second
+  return {.own_s = kConnects_s + (fault.kind == FaultKind::appliance_restart ? kFlockStarts_s : 0)};
+}
+
 }  // namespace
 
 FaultSigns signs_of(const Fault& fault, FaultTarget target) {
   if (target == FaultTarget::camera) return of_camera(fault);
-  constexpr double kUnseenByte_mm = 30;   // a predicted pose makes three times of what a moving hand may have done
-  constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
+  if (target == FaultTarget::program) return of_program(fault);
+  constexpr double kUnseenByte_mm = 30;  // a predicted pose makes three times of what a moving hand may have done
   switch (fault.kind) {
     case FaultKind::line_noise:
     case FaultKind::corrupt_byte:
@@ -122,38 +138,52 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target) {
   }
 }
 
-FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference) {
-  constexpr double kBetween_s = 20;  // on average, from one beginning to the next
-  FaultScript script;
+namespace {
+
+/// Faults of these kinds one after another, between_s apart on average; all of it follows from the seed. taken: which
+/// befall.
+void draw(std::span<const DrawnFault> kinds, std::uint64_t seed, double between_s, double from_s, double until_s,
+          const std::function<void(const DrawnFault&, Fault)>& take) {
   std::uint64_t key = 0;
-  const auto uniform = [&](double least, double most) {
-    return least + (most - least) * hashed_uniform(hashed_word(seed, 3), key++);
-  };
+  const auto uniform = [&](double least, double most) { return least + (most - least) * hashed_uniform(seed, key++); };
   double at_s = from_s;
   for (;;) {
-    at_s += -kBetween_s * std::log(1 - uniform(0, 1));
-    const DrawnFault& drawn = kDrawn[static_cast<std::size_t>(uniform(0, std::size(kDrawn)))];
+    at_s += -between_s * std::log(1 - uniform(0, 1));
+    const DrawnFault& drawn = kinds[static_cast<std::size_t>(uniform(0, static_cast<double>(kinds.size())))];
     const double lasts_s = uniform(drawn.least_s, drawn.most_s), value = uniform(drawn.least, drawn.most);
-    if (at_s + lasts_s > until_s) return script;
-    if (drawn.of == kWorld && !reference) continue;
+    if (at_s + lasts_s > until_s) return;
     Fault fault = usual(drawn.kind);
     fault.at_s = std::round(at_s * 1e3) / 1e3;
-    fault.for_s = std::round(lasts_s * 1e3) / 1e3;
+    if (drawn.most_s > 0) fault.for_s = std::round(lasts_s * 1e3) / 1e3;
     if (*drawn.parameter != 0) fault.values.insert_or_assign(drawn.parameter, std::round(value * 1e3) / 1e3);
-    (drawn.of == kTracker  ? script.tracker
-     : drawn.of == kCamera ? script.camera
-                           : script.world)
-        .push_back(std::move(fault));
+    take(drawn, std::move(fault));
   }
+}
+
+}  // namespace
+
+FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference) {
+  FaultScript script;
+  draw(kDrawn, hashed_word(seed, 3), 20, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
+    if (drawn.of == kWorld && !reference) return;
+    script.of(drawn.of).push_back(std::move(fault));
+  });
+  return script;
+}
+
+std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s) {
+  std::vector<Fault> faults;
+  draw(kDrawnOfPrograms, hashed_word(seed, 6), 90, from_s, until_s,
+       [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
 }
 
 std::string text_of(const FaultScript& script) {
   std::string text;
-  for (const auto& [target, faults] :
-       {std::pair{kTracker, &script.tracker}, std::pair{kCamera, &script.camera}, std::pair{kWorld, &script.world}}) {
-    for (const Fault& fault : *faults) {
+  for (const FaultTarget target : kFaultTargets) {
+    for (const Fault& fault : script.of(target)) {
       text += fmt::format("[[fault]]\nname = \"{}\"\n", fault_name(fault.kind));
-      if (target != kWorld) text += fmt::format("of = \"{}\"\n", target_name(target));
+      if (target == kTracker || target == kCamera) text += fmt::format("of = \"{}\"\n", target_name(target));
       text += fmt::format("at_s = {}\n", fault.at_s);
       if (fault.for_s) text += fmt::format("for_s = {}\n", *fault.for_s);
       for (const auto& [name, value] : fault.values) text += fmt::format("{} = {}\n", name, value);

@@ -21,12 +21,14 @@ struct FaultSigns {
   double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
 };
 
-/// Of a fault of the tracker or the camera. Nothing to be seen: both lists are empty.
+/// Of a fault of the tracker, the camera or a program. Nothing to be seen: both lists are empty.
 FaultSigns signs_of(const Fault& fault, FaultTarget target);
 
 /// Faults of every kind that the instruments know, alone and together, at random times from from_s on until until_s;
 /// with a reference bird also the transmitter is bumped and the patient moved. All of it follows from the seed.
 FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference);
+/// What befalls the programs: the network is cut, the appliance or the window ends and is started again.
+std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s);
 
 /// As read_fault_script reads it (TOML).
 std::string text_of(const FaultScript& script);

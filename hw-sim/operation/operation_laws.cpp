@@ -43,10 +43,8 @@ std::size_t bird_of(const std::string& name) {
 OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& faults, ExposedNs exposed_ns,
                              std::int64_t zero_ns)
     : truth_(truth), exposed_ns_(std::move(exposed_ns)), zero_ns_(zero_ns) {
-  for (const auto& [target, script] :
-       {std::pair{FaultTarget::tracker, &faults.tracker}, std::pair{FaultTarget::camera, &faults.camera},
-        std::pair{FaultTarget::world, &faults.world}}) {
-    for (const Fault& fault : *script) {
+  for (const FaultTarget target : kFaultTargets) {
+    for (const Fault& fault : faults.of(target)) {
       const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
       const double ends_s = fault.at_s + fault.for_s.value_or(0) + signs.own_s;
       spans_.push_back({fault, target, signs, fault.at_s, ends_s, true, {}, {}, {}});
@@ -157,11 +155,28 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
   }
 }
 
+void OperationLaws::opened(bool registered, std::size_t checks) {
+  to_take_up_ = registered;
+  checks_when_opened_ = registered ? std::optional(checks) : std::nullopt;
+}
+
+void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {
+  using host::LiveStep;
+  if (checks_when_opened_ && checks > *checks_when_opened_) checks_when_opened_.reset();
+  const bool asks = view.asks_for_instruments || view.asks_for_patient;
+  if (!to_take_up_ || asks || !view.note(LiveStep::connect).done || !view.note(LiveStep::calibrate).done) return;
+  to_take_up_ = false;
+  if (!view.note(LiveStep::fiducials).done)
+    break_law(at_s(now.ns), "kept", "the window was opened again, and the patient is not registered any more");
+}
+
 void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {
   const double now_s = at_s(now.ns);
   ++figures_.shown;
   if (!shown.overlaid || shown.strength <= 0 || !picture.frame()) return;
   ++figures_.overlaid;
+  if (checks_when_opened_)
+    break_law(now_s, "kept", "the window was opened again, and draws before a landmark was checked");
   const auto exposed_ns = exposed_ns_(picture.frame()->info.sequence);
   if (!exposed_ns) return break_law(now_s, "age", "an overlay is on a frame that the camera never gave");
   const double exposed_s = at_s(*exposed_ns);

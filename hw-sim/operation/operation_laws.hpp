@@ -30,6 +30,8 @@ struct BrokenLaw {
 /// circle: no overlay is shown as whole that is off by more than three circles.
 /// named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
+/// kept: a window that is opened again takes up the registration that there was, and draws nothing before a landmark
+/// has been checked.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -38,6 +40,10 @@ class OperationLaws {
 
   /// An event as it reached the host.
   void take(const wire::Event& event, HostTime now);
+  /// The window was opened. registered: the patient was, when it was closed.
+  void opened(bool registered, std::size_t checks);
+  /// What the window says. checks: how often a landmark has been checked.
+  void take(const host::OperationView& view, std::size_t checks, HostTime now);
   /// What is on the screen.
   void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
   /// At the end: until_s is when the operation ended.
@@ -78,6 +84,8 @@ class OperationLaws {
   std::int64_t zero_ns_;
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
+  bool to_take_up_ = false;                        ///< the window has still to say what it took up
+  std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
   std::vector<BrokenLaw> broken_;
 };

@@ -12,19 +12,14 @@ using OneFault = std::pair<FaultTarget, Fault>;
 
 std::vector<OneFault> faults_of(const FaultScript& script) {
   std::vector<OneFault> out;
-  for (const Fault& fault : script.tracker) out.emplace_back(FaultTarget::tracker, fault);
-  for (const Fault& fault : script.camera) out.emplace_back(FaultTarget::camera, fault);
-  for (const Fault& fault : script.world) out.emplace_back(FaultTarget::world, fault);
+  for (const FaultTarget target : kFaultTargets)
+    for (const Fault& fault : script.of(target)) out.emplace_back(target, fault);
   return out;
 }
 
 FaultScript script_of(const std::vector<OneFault>& faults) {
   FaultScript out;
-  for (const auto& [target, fault] : faults)
-    (target == FaultTarget::tracker  ? out.tracker
-     : target == FaultTarget::camera ? out.camera
-                                     : out.world)
-        .push_back(fault);
+  for (const auto& [target, fault] : faults) out.of(target).push_back(fault);
   return out;
 }
 

@@ -20,8 +20,14 @@ const Eigen::Vector3d kAside_mm(0, 0, 200);
 
 }  // namespace
 
-Surgeon::Surgeon(host::LiveWorkflow& workflow, OperationTruth& truth, std::uint64_t seed)
-    : workflow_(workflow), truth_(truth), seed_(hashed_word(seed, 4)) {}
+Surgeon::Surgeon(OperationTruth& truth, std::uint64_t seed) : truth_(truth), seed_(hashed_word(seed, 4)) {}
+
+void Surgeon::stand_at(host::LiveWorkflow& workflow, double at_s) {
+  workflow_ = &workflow;
+  next_fiducial_ = touches_ = 0;
+  at_landmark_ = false;
+  bare_since_s_ = at_s;
+}
 
 Eigen::Vector3d Surgeon::drawn(double sigma) {
   const double x = hashed_normal(seed_, key_++), y = hashed_normal(seed_, key_++), z = hashed_normal(seed_, key_++);
@@ -46,7 +52,7 @@ void Surgeon::check(double at_s, HostTime now) {
     at_landmark_ = true;
     return go_to(truth_.target_mm(), at_s, kCheckRests_s);
   }
-  workflow_.primary(now);
+  workflow_->primary(now);
   ++checks_;
   at_landmark_ = false;
   bare_since_s_ = at_s;
@@ -56,24 +62,24 @@ void Surgeon::check(double at_s, HostTime now) {
 void Surgeon::act(double at_s, HostTime now, bool overlay_is_whole) {
   if (overlay_is_whole) bare_since_s_ = at_s;
   if (at_s < busy_until_s_) return;
-  const host::OperationView view = workflow_.view();
-  if (view.asks_for_instruments) workflow_.confirm_instruments();
-  if (view.asks_for_patient) workflow_.confirm_patient();
+  const host::OperationView view = workflow_->view();
+  if (view.asks_for_instruments) workflow_->confirm_instruments();
+  if (view.asks_for_patient) workflow_->confirm_patient();
   const bool connected = view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (!connected) return;
-  if (view.step == LiveStep::connect || view.step == LiveStep::calibrate) workflow_.go_to(LiveStep::fiducials);
+  if (view.step == LiveStep::connect || view.step == LiveStep::calibrate) workflow_->go_to(LiveStep::fiducials);
   if (view.step == LiveStep::fiducials) {
     at_landmark_ = false;
     return touch(view, at_s);
   }
   if (view.step == LiveStep::views || view.step == LiveStep::deform) {
     ++registrations_;
-    return workflow_.go_to(LiveStep::check);
+    return workflow_->go_to(LiveStep::check);
   }
   if (view.step == LiveStep::check) return check(at_s, now);
   if (at_s - bare_since_s_ > kPatience_s) {
     bare_since_s_ = at_s;
-    workflow_.go_to(view.note(LiveStep::fiducials).done ? LiveStep::check : LiveStep::fiducials);
+    workflow_->go_to(view.note(LiveStep::fiducials).done ? LiveStep::check : LiveStep::fiducials);
   }
 }
 

@@ -15,7 +15,10 @@ namespace birdseye::hw_sim {
 class Surgeon {
  public:
   /// truth: of the patient and of the hand, which the surgeon leads.
-  Surgeon(host::LiveWorkflow& workflow, OperationTruth& truth, std::uint64_t seed);
+  Surgeon(OperationTruth& truth, std::uint64_t seed);
+
+  /// Comes to a window that was just opened.
+  void stand_at(host::LiveWorkflow& workflow, double at_s);
 
   /// Looks at the window, and does what is to be done. Ten times a second is enough.
   void act(double at_s, HostTime now, bool overlay_is_whole);
@@ -29,7 +32,7 @@ class Surgeon {
   void go_to(const Eigen::Vector3d& place_in_patient_mm, double at_s, double rest_s);
   [[nodiscard]] Eigen::Vector3d drawn(double sigma);
 
-  host::LiveWorkflow& workflow_;
+  host::LiveWorkflow* workflow_ = nullptr;
   OperationTruth& truth_;
   std::uint64_t seed_, key_ = 0;
   std::size_t next_fiducial_ = 0, touches_ = 0, checks_ = 0, registrations_ = 0;

@@ -38,6 +38,34 @@ TEST(Operation, WithoutAFaultTheOverlayIsWholeOnceThePatientIsRegistered) {
   EXPECT_GT(out.laws.frames, 25 * 115U);
 }
 
+FaultScript programs_end(std::vector<Fault> faults) {
+  FaultScript script;
+  script.programs = std::move(faults);
+  return script;
+}
+
+TEST(Operation, GoesOnWhereALinkIsCutAndTheApplianceStartsAgain) {
+  const auto script = programs_end({{FaultKind::link_cut, 40, {}, {}}, {FaultKind::appliance_restart, 60, 3.0, {}}});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << "nobody registers again\n" << out.log;
+  EXPECT_EQ(out.checks, 1U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.7 * static_cast<double>(out.laws.shown)) << out.log;
+  EXPECT_GT(out.laws.faults_judged, 1U);
+}
+
+TEST(Operation, AWindowThatIsOpenedAgainTakesUpWhatWasFoundAndAsksForALandmark) {
+  const auto script = programs_end({{FaultKind::window_restart, 40, 5.0, {}}});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = script});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_EQ(out.checks, 2U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
+  const OperationOutcome again = operate({.seed = 11, .minutes = 2, .faults = script});
+  EXPECT_EQ(out.log, again.log) << "its files are read in no time at all";
+  EXPECT_EQ(out.hash, again.hash);
+}
+
 TEST(Operation, FaultsAtRandomBreakNoLaw) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const OperationOutcome out = operate({.seed = seed, .minutes = 4});
@@ -59,7 +87,7 @@ TEST(Operation, FaultsAtRandomBreakNoLaw) {
 class MendedSeed : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeed, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10});
+  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .programs_end = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -76,13 +104,15 @@ TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
 
 TEST(Operation, ItsFaultsAreReadBackFromTheScriptThatItWrites) {
   const birdseye::testing::Scratch scratch;
-  const FaultScript drawn = draw_faults(7, 20, 3600, true);
-  const auto read = read_fault_script(scratch.file("faults.toml", text_of(drawn)), Instruments::both, 1);
+  FaultScript drawn = draw_faults(7, 20, 3600, true);
+  drawn.programs = draw_program_faults(7, 20, 3600);
+  const auto read = read_fault_script(scratch.file("faults.toml", text_of(drawn)), Instruments::with_programs, 1);
   ASSERT_TRUE(read) << read.error().what;
   EXPECT_EQ(text_of(*read), text_of(drawn));
   EXPECT_GT(drawn.tracker.size(), 50U);
   EXPECT_GT(drawn.camera.size(), 30U);
   EXPECT_GT(drawn.world.size(), 3U);
+  EXPECT_GT(drawn.programs.size(), 10U);
 }
 
 TEST(ShortestScript, HasWhatBreaksAndNothingElse) {
