@@ -19,6 +19,7 @@ constexpr double kTimeLimit_s = 0.010;  // of [pose] max_time_sigma_ms: what TDA
 constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
+constexpr double kTakesUpWithin_s = 2;    // once the instruments are those that it was registered with
 constexpr double kAlone_s = 5;            // from another fault's end to this one's begin, and after it
 constexpr double kLinger_s = 0.5;         // after a fault's end poses may still be made of samples that it touched
 constexpr std::size_t kMostBroken = 100;  // that are told
@@ -157,17 +158,23 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 
 void OperationLaws::opened(bool registered, std::size_t checks) {
   to_take_up_ = registered;
+  ready_since_s_.reset();
   checks_when_opened_ = registered ? std::optional(checks) : std::nullopt;
 }
 
 void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {
   using host::LiveStep;
   if (checks_when_opened_ && checks > *checks_when_opened_) checks_when_opened_.reset();
+  if (!to_take_up_) return;
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
-  if (!to_take_up_ || asks || !view.note(LiveStep::connect).done || !view.note(LiveStep::calibrate).done) return;
+  const bool ready = !asks && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
+  if (!ready) return ready_since_s_.reset();
+  const double now_s = at_s(now.ns), since_s = ready_since_s_.value_or(now_s);
+  ready_since_s_ = since_s;
+  to_take_up_ = !view.note(LiveStep::fiducials).done;
+  if (!to_take_up_ || now_s - since_s < kTakesUpWithin_s) return;
   to_take_up_ = false;
-  if (!view.note(LiveStep::fiducials).done)
-    break_law(at_s(now.ns), "kept", "the window was opened again, and the patient is not registered any more");
+  break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
 void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {

@@ -84,6 +84,7 @@ class OperationLaws {
   std::int64_t zero_ns_;
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
+  std::optional<double> ready_since_s_;
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;

@@ -176,17 +176,41 @@ TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
   EXPECT_EQ(broken, (std::vector<std::string>{"named", "over", "over"}));
 }
 
+TEST(OperationLaws, AWindowThatForgetsTheRegistrationIsFound) {
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  host::OperationView view;
+  const auto note = [&view](host::LiveStep step) -> host::StepNote& {
+    return view.notes[static_cast<std::size_t>(step)];
+  };
+  note(host::LiveStep::connect).done = note(host::LiveStep::calibrate).done = true;
+  const auto broken_after = [&](bool takes_up) {
+    OperationLaws laws(
+        truth, {}, [](std::uint64_t) { return std::nullopt; }, 0);
+    laws.opened(true, 1);
+    note(host::LiveStep::fiducials).done = false;
+    laws.take(view, 1, {0});
+    note(host::LiveStep::fiducials).done = takes_up;
+    laws.take(view, 1, {5'000'000'000});
+    return laws.broken().size();
+  };
+  EXPECT_EQ(broken_after(false), 1U);
+  EXPECT_EQ(broken_after(true), 0U);
+}
+
 TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
   std::vector<std::string> drawn;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
+    for (const Fault& fault : draw_program_faults(seed, 0, 3600))
+      drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
   for (const FaultSpec& spec : fault_table()) {
     const std::string name(fault_name(spec.kind));
     EXPECT_TRUE(!spec.of_tracker || std::ranges::count(drawn, "tracker " + name) > 0) << name;
     EXPECT_TRUE(!spec.of_camera || std::ranges::count(drawn, "camera " + name) > 0) << name;
+    EXPECT_TRUE(!spec.of_program || std::ranges::count(drawn, "program " + name) > 0) << name;
   }
 }
 
