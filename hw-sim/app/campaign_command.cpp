@@ -14,12 +14,15 @@ namespace birdseye::hw_sim {
 namespace {
 
 struct CampaignOptions {
-  CampaignSettings settings;
+  SeedRun settings;
   std::string seeds;
+  double minutes = 10, patience_s = 3600;
+  std::vector<std::string> command;
+  bool print = false;
 };
 
 /// FIRST:LAST, or one number.
-Result<void> parse_seeds(const std::string& text, CampaignSettings& settings) {
+Result<void> parse_seeds(const std::string& text, SeedRun& settings) {
   const auto number = [](std::string_view part, std::uint64_t& into) {
     const auto [end, fault] = std::from_chars(part.data(), part.data() + part.size(), into);
     return fault == std::errc() && end == part.data() + part.size();
@@ -35,7 +38,7 @@ Result<void> parse_seeds(const std::string& text, CampaignSettings& settings) {
   return Error{Errc::bad_value, "--seeds " + text + ": give FIRST:LAST, as 1:2000, up to 1000000000"};
 }
 
-void print(const CampaignSettings& settings, const OperationResult& sum) {
+void print(const SeedRun& settings, const OperationResult& sum) {
   const auto share = [](std::uint64_t some, std::uint64_t all) {
     return all > 0 ? 100.0 * static_cast<double>(some) / static_cast<double>(all) : 0;
   };
@@ -50,35 +53,66 @@ void print(const CampaignSettings& settings, const OperationResult& sum) {
   fmt::print("{} laws broken\n", sum.laws_broken);
 }
 
-Result<void> run(const CampaignOptions& options, bool& broken) {
-  CampaignSettings settings = options.settings;
-  if (auto parsed = parse_seeds(options.seeds, settings); !parsed) return parsed;
-  settings.program = beside_us("birdseye-sim");
-  const auto sum = run_campaign(settings, [](const std::string& line) {
-    fmt::print("{}\n", line);
-    std::fflush(stdout);
-  });
+/// A line, at once.
+void say(std::FILE* where, const std::string& line) {
+  fmt::print(where, "{}\n", line);
+  std::fflush(where);
+}
+
+/// Operations, and their sum.
+Result<void> run_operations(const SeedRun& settings, double minutes, bool& broken) {
+  const auto results = run_seeds(study_of_operations(minutes, beside_us("birdseye-sim")), settings,
+                                 [](const std::string& line) { say(stdout, line); });
+  if (!results) return results.error();
+  const auto sum = sum_of(**results, settings.first_seed, settings.last_seed);
   if (!sum) return sum.error();
   print(settings, *sum);
   broken = sum->laws_broken > 0;
   return {};
 }
 
+/// Any other command. Standard output is for its lines.
+Result<void> run_command(const SeedRun& settings, const CampaignOptions& options) {
+  const auto results = run_seeds(study_of(options.command, Duration::from_seconds(options.patience_s)), settings,
+                                 [](const std::string& line) { say(stderr, line); });
+  if (!results) return results.error();
+  if (!options.print) return {};
+  return (*results)->for_each(settings.first_seed, settings.last_seed, [](const SeedLine& one) -> Result<void> {
+    fmt::print("{}\n", one.line);
+    return {};
+  });
+}
+
+Result<void> run(const CampaignOptions& options, bool& broken) {
+  SeedRun settings = options.settings;
+  if (auto parsed = parse_seeds(options.seeds, settings); !parsed) return parsed;
+  return options.command.empty() ? run_operations(settings, options.minutes, broken) : run_command(settings, options);
+}
+
 }  // namespace
 
 void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
   const auto options = std::make_shared<CampaignOptions>();
-  CLI::App& command = *app.add_subcommand("campaign", "operations of many seeds in virtual time, on all cores");
+  CLI::App& command = *app.add_subcommand(
+      "campaign", "operations of many seeds in virtual time, or any other command for each seed, on all cores");
   command.add_option("--seeds", options->seeds, "FIRST:LAST")->required();
-  command
-      .add_option("--out", options->settings.folder,
-                  "folder for operations.sqlite; seeds that are in it are not run again")
+  command.add_option("--out", options->settings.folder, "folder for the results; seeds that it has are not run again")
       ->required();
-  command.add_option("--minutes", options->settings.minutes, "how long each operation is")
-      ->check(CLI::Range(0.5, 600.0));
-  command.add_option("--jobs", options->settings.jobs, "operations at a time (default: as many as there are cores)")
+  CLI::Option* const minutes =
+      command.add_option("--minutes", options->minutes, "how long each operation is")->check(CLI::Range(0.5, 600.0));
+  command.add_option("--jobs", options->settings.jobs, "seeds at a time (default: as many as there are cores)")
       ->check(CLI::Range(1, 1024));
-  command.add_option("--at-most", options->settings.at_most_s, "seconds after which no operation begins")
+  command.add_option("--at-most", options->settings.at_most_s, "seconds after which no seed begins")
+      ->check(CLI::Range(1.0, 1e6));
+  CLI::Option* const other =
+      command
+          .add_option("command", options->command,
+                      "in place of an operation, after --: prints one line of JSON for the seed that stands for {}")
+          ->excludes(minutes);
+  command.add_flag("--print", options->print, "print these lines in the end, by seed")->needs(other);
+  command
+      .add_option("--patience", options->patience_s, "seconds that the command may take for one seed (default 3600)")
+      ->needs(other)
       ->check(CLI::Range(1.0, 1e6));
   command.callback([options, take, &broken] { take(run(*options, broken)); });
 }

@@ -1,29 +1,19 @@
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "calibration/base/result.hpp"
 #include "hw-sim/campaign/operation_results.hpp"
+#include "hw-sim/campaign/seed_runner.hpp"
 
 namespace birdseye::hw_sim {
 
-struct CampaignSettings {
-  std::uint64_t first_seed = 1, last_seed = 1;
-  double minutes = 10;              ///< of each operation
-  std::filesystem::path folder;     ///< gets operations.sqlite
-  int jobs = 0;                     ///< operations at a time; 0: as many as there are cores
-  std::optional<double> at_most_s;  ///< no operation begins after so long; empty: all seeds are run
-  std::string program;              ///< of this name; it knows `operation --line`
-};
+/// Simulated operations of so many minutes. One that ends without a result counts as one that broke a law.
+/// program: it knows `operation --line`.
+SeedStudy study_of_operations(double minutes, const std::string& program);
 
-/// Runs the operation of each seed that the folder has no result of, each in a process of its own, handed out by need.
-/// said: told from time to time how far it is. Gives the sum over all seeds. One that ends without a result counts as
-/// one that broke a law. A campaign that was ended goes on where it is started again.
-Result<OperationResult> run_campaign(const CampaignSettings& settings,
-                                     const std::function<void(const std::string&)>& said);
+/// Any other study: the command prints one line of JSON for each seed.
+SeedStudy study_of(const std::vector<std::string>& command, Duration patience);
 
 }  // namespace birdseye::hw_sim

@@ -1,12 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
-#include <memory>
-#include <set>
 #include <string>
 
 #include "calibration/base/result.hpp"
+#include "hw-sim/campaign/seed_results.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -23,26 +21,7 @@ struct OperationResult {
 std::string line_of(const OperationResult& result);
 /// Refuses what is no such line.
 Result<OperationResult> result_of(const std::string& line);
-
-/// The results of a campaign by seed, in one SQLite file that several programs may look at.
-class OperationResults {
- public:
-  /// Opens the file, or makes it. Refuses one of operations of another length.
-  static Result<std::unique_ptr<OperationResults>> open(const std::filesystem::path& file, double minutes);
-  ~OperationResults();
-  OperationResults(const OperationResults&) = delete;
-  OperationResults& operator=(const OperationResults&) = delete;
-
-  /// In place of what was known of the seed. It is on the disk once this returns.
-  Result<void> enter(const OperationResult& result);
-  [[nodiscard]] Result<std::set<std::uint64_t>> seeds() const;
-  /// Of the seeds from first to last: figures added up, the worst of what is worst, and what was broken.
-  [[nodiscard]] Result<OperationResult> sum(std::uint64_t first, std::uint64_t last) const;
-
- private:
-  struct Database;
-  explicit OperationResults(std::unique_ptr<Database> database);
-  std::unique_ptr<Database> database_;
-};
+/// Of the seeds from first to last: figures added up, the worst of what is worst, and what was broken.
+Result<OperationResult> sum_of(const SeedResults& results, std::uint64_t first, std::uint64_t last);
 
 }  // namespace birdseye::hw_sim

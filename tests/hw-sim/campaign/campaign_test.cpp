@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "drivers/system/local_programs.hpp"
-#include "hw-sim/campaign/operation_results.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
@@ -23,21 +22,25 @@ OperationResult result_of_seed(std::uint64_t seed) {
   return result;
 }
 
-TEST(OperationResults, AreReadBackAddedUpAndKeptOncePerSeed) {
+SeedLine entry_of(const OperationResult& result) {
+  return {result.seed, line_of(result)};
+}
+
+TEST(SeedResults, AreReadBackAddedUpAndKeptOncePerSeed) {
   const Scratch scratch;
   {
-    const auto results = OperationResults::open(scratch / "o.sqlite", 2.5);
+    const auto results = SeedResults::open(scratch / "o.sqlite", "operations of 2.5 minutes");
     ASSERT_TRUE(results) << results.error().what;
-    for (const std::uint64_t seed : {3U, 1U, 2U, 9U}) ASSERT_TRUE((*results)->enter(result_of_seed(seed)));
+    for (const std::uint64_t seed : {3U, 1U, 2U, 9U}) ASSERT_TRUE((*results)->enter({entry_of(result_of_seed(seed))}));
     OperationResult broken = result_of_seed(2);
     broken.laws_broken = 1;
     broken.broken = "12.000 s pose: scope is 20.0 mm off";
-    ASSERT_TRUE((*results)->enter(broken));
+    ASSERT_TRUE((*results)->enter({entry_of(broken)}));
   }
-  const auto again = OperationResults::open(scratch / "o.sqlite", 2.5);
+  const auto again = SeedResults::open(scratch / "o.sqlite", "operations of 2.5 minutes");
   ASSERT_TRUE(again) << again.error().what;
   EXPECT_EQ(*(*again)->seeds(), (std::set<std::uint64_t>{1, 2, 3, 9}));
-  const auto sum = (*again)->sum(1, 3);
+  const auto sum = sum_of(**again, 1, 3);
   ASSERT_TRUE(sum) << sum.error().what;
   EXPECT_EQ(sum->poses, 600U);
   EXPECT_EQ(sum->minutes, 7.5);
@@ -46,12 +49,13 @@ TEST(OperationResults, AreReadBackAddedUpAndKeptOncePerSeed) {
   EXPECT_EQ(sum->broken, "seed 2: 12.000 s pose: scope is 20.0 mm off\n");
 }
 
-TEST(OperationResults, OfAnotherLengthAreNotMixedIn) {
+TEST(SeedResults, OfAnotherLengthAreNotMixedIn) {
   const Scratch scratch;
-  ASSERT_TRUE(OperationResults::open(scratch / "o.sqlite", 2.5));
-  const auto other = OperationResults::open(scratch / "o.sqlite", 10);
+  ASSERT_TRUE(SeedResults::open(scratch / "o.sqlite", "operations of 2.5 minutes"));
+  const auto other = SeedResults::open(scratch / "o.sqlite", "operations of 10 minutes");
   ASSERT_FALSE(other);
-  EXPECT_NE(other.error().what.find("of 2.5 minutes, not 10"), std::string::npos) << other.error().what;
+  EXPECT_NE(other.error().what.find("of operations of 2.5 minutes, not of operations of 10 minutes"), std::string::npos)
+      << other.error().what;
 }
 
 TEST(OperationResults, ALineIsReadBackAndAnythingElseRefused) {
@@ -61,26 +65,36 @@ TEST(OperationResults, ALineIsReadBackAndAnythingElseRefused) {
   for (const char* const line : {"", "{}", "no JSON", "{\"seed\": \"seven\"}"}) EXPECT_FALSE(result_of(line)) << line;
 }
 
-/// Operations of half a minute of the seeds from 1 on.
-CampaignSettings short_ones(const Scratch& scratch, std::uint64_t last_seed) {
-  CampaignSettings settings;
-  settings.last_seed = last_seed;
-  settings.minutes = 0.5;
-  settings.folder = scratch / "campaign";
-  settings.program = beside_us("birdseye-sim");
-  return settings;
+constexpr double kMinutes = 0.5;
+
+/// The seeds from 1 on.
+SeedRun up_to(const Scratch& scratch, std::uint64_t last_seed) {
+  SeedRun run;
+  run.last_seed = last_seed;
+  run.folder = scratch / "campaign";
+  return run;
 }
+
+/// What comes of operations of half a minute.
+Result<OperationResult> sum_of_operations(const SeedRun& run, const std::string& program, const Said& said) {
+  const auto results = run_seeds(study_of_operations(kMinutes, program), run, said);
+  if (!results) return results.error();
+  return sum_of(**results, run.first_seed, run.last_seed);
+}
+
+void hear_nothing(const std::string&) {}
 
 TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
   const Scratch scratch;
-  const CampaignSettings settings = short_ones(scratch, 3);
+  const SeedRun run = up_to(scratch, 3);
   {
-    std::filesystem::create_directories(settings.folder);
-    const auto known = OperationResults::open(settings.folder / "operations.sqlite", settings.minutes);
-    ASSERT_TRUE(known && (*known)->enter(result_of_seed(2)));
+    std::filesystem::create_directories(run.folder);
+    const auto known = SeedResults::open(run.folder / "operations.sqlite", "operations of 0.5 minutes");
+    ASSERT_TRUE(known && (*known)->enter({entry_of(result_of_seed(2))}));
   }
   std::string said;
-  const auto sum = run_campaign(settings, [&said](const std::string& line) { said += line + "\n"; });
+  const auto sum =
+      sum_of_operations(run, beside_us("birdseye-sim"), [&said](const std::string& line) { said += line + "\n"; });
   ASSERT_TRUE(sum) << sum.error().what;
   EXPECT_EQ(said, "2 of 2, 0 broke a law\n");
   EXPECT_GT(sum->poses, 2 * 30 * 2 * 90U);
@@ -89,21 +103,68 @@ TEST(Campaign, RunsTheSeedsThatAreMissingAndNoOthers) {
 
 TEST(Campaign, BeginsNoOperationOnceItsTimeIsOver) {
   const Scratch scratch;
-  CampaignSettings settings = short_ones(scratch, 1000);
-  settings.at_most_s = 1e-9;
-  const auto sum = run_campaign(settings, [](const std::string&) {});
+  SeedRun run = up_to(scratch, 1000);
+  run.at_most_s = 1e-9;
+  const auto sum = sum_of_operations(run, beside_us("birdseye-sim"), hear_nothing);
   ASSERT_TRUE(sum) << sum.error().what;
   EXPECT_EQ(sum->minutes, 0);
 }
 
 TEST(Campaign, AnOperationThatGivesNoResultBreaksALaw) {
   const Scratch scratch;
-  CampaignSettings settings = short_ones(scratch, 1);
-  settings.program = "/bin/true";
-  const auto sum = run_campaign(settings, [](const std::string&) {});
+  std::string said;
+  const auto sum =
+      sum_of_operations(up_to(scratch, 1), "/bin/true", [&said](const std::string& line) { said += line + "\n"; });
   ASSERT_TRUE(sum) << sum.error().what;
+  EXPECT_EQ(said, "1 of 1, 1 broke a law\n");
   EXPECT_EQ(sum->laws_broken, 1U);
   EXPECT_NE(sum->broken.find("seed 1: result: none"), std::string::npos) << sum->broken;
+}
+
+/// A study that a shell does: script prints a line for the seed.
+SeedStudy by_shell(const std::string& script) {
+  return study_of({"sh", "-c", script}, Duration::from_ms(60'000));
+}
+
+/// All lines of a folder's results, by seed.
+std::string all_lines(const SeedResults& results) {
+  std::string out;
+  (void)results.for_each(0, 1'000'000'000, [&out](const SeedLine& one) -> Result<void> {
+    out += std::to_string(one.seed) + " " + one.line + "\n";
+    return {};
+  });
+  return out;
+}
+
+TEST(Campaign, OfAnyCommandKeepsItsLinesBySeed) {
+  const Scratch scratch;
+  const auto results = run_seeds(by_shell("echo '{\"twice\": '$(({} + {}))'}'"), up_to(scratch, 3), hear_nothing);
+  ASSERT_TRUE(results) << results.error().what;
+  EXPECT_EQ(all_lines(**results), "1 {\"twice\": 2}\n2 {\"twice\": 4}\n3 {\"twice\": 6}\n");
+}
+
+TEST(Campaign, TriesAgainWhatGaveNoLineOfJson) {
+  const Scratch scratch;
+  const SeedStudy study = by_shell("test -e " + (scratch / "mended").string() +
+                                   " || case {} in 2) echo none; exit ;; 3) exit 1 ;; esac; echo {}");
+  const SeedRun run = up_to(scratch, 3);
+  const auto some = run_seeds(study, run, hear_nothing);
+  ASSERT_FALSE(some);
+  EXPECT_NE(some.error().what.find("2 of 3 seeds gave no result, as seed "), std::string::npos) << some.error().what;
+  (void)scratch.file("mended", "");
+  std::string said;
+  const auto all = run_seeds(study, run, [&said](const std::string& line) { said += line + "\n"; });
+  ASSERT_TRUE(all) << all.error().what;
+  EXPECT_EQ(said, "2 of 2\n");
+  EXPECT_EQ(all_lines(**all), "1 1\n2 2\n3 3\n");
+}
+
+TEST(Campaign, EndsWhereTheProgramIsNotThere) {
+  const Scratch scratch;
+  const auto results =
+      run_seeds(study_of({"/no/such/program"}, Duration::from_ms(1000)), up_to(scratch, 1000), hear_nothing);
+  ASSERT_FALSE(results);
+  EXPECT_EQ(results.error().code, Errc::not_found) << results.error().what;
 }
 
 }  // namespace

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/base/result.hpp"
+#include "calibration/time/clock.hpp"
+#include "hw-sim/campaign/seed_results.hpp"
+
+namespace birdseye::hw_sim {
+
+/// What is run for a seed.
+struct SeedStudy {
+  std::vector<std::string> command;  ///< prints one line; {} in it stands for the seed
+  std::string what;                  ///< it is, in words
+  std::string file;                  ///< the results' name
+  Duration patience;                 ///< with one seed
+  /// The line to keep, from what the command gave: its line, or why there is none. An error: none is kept, and the seed
+  /// is run again the next time.
+  std::function<Result<std::string>(std::uint64_t seed, const Result<std::string>& given)> kept;
+  std::string told;  ///< of how many lines it is told as it goes: "broke a law"; empty: of none
+  std::function<bool(const std::string& line)> tells;
+};
+
+/// Which seeds, and how.
+struct SeedRun {
+  std::uint64_t first_seed = 1, last_seed = 1;
+  std::filesystem::path folder;     ///< gets the results, and campaign.log with what commands said
+  int jobs = 0;                     ///< at a time; 0: as many as there are cores
+  std::optional<double> at_most_s;  ///< none begins after so long; empty: all seeds are run
+};
+
+/// A line of progress.
+using Said = std::function<void(const std::string&)>;
+
+/// Runs each seed that the folder has no result of, in a process of its own, handed out by need. said: told from time
+/// to time how far it is. One that was ended goes on where it is started again. Gives all that the folder has then; an
+/// error where a seed gave nothing to keep, once all were tried.
+Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said);
+
+}  // namespace birdseye::hw_sim
