@@ -12,6 +12,6 @@ install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CONTRIBUTING.md 
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs DESTINATION usr/share/doc/birdseye COMPONENT birdseye
   FILE_PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
 
-birdseye_package(birdseye-sim SECTION 1 SUGGESTS birdseye
+birdseye_package(birdseye-sim SECTION 1 SUGGESTS "birdseye, openmpi-bin"
   SUMMARY "simulated patient, tracker and laparoscope for Birdseye"
   DESCRIPTION "birdseye-sim stands in for the instruments of a laparoscope cart, byte for\nbyte, and knows what is true: the demo, the simulated cart and cases to\nmeasure a registration on are made with it.")

@@ -18,7 +18,7 @@ struct CampaignOptions {
   std::string seeds;
   double minutes = 10, patience_s = 3600;
   std::vector<std::string> command;
-  bool print = false;
+  bool print = false, alone = false;
 };
 
 /// FIRST:LAST, or one number.
@@ -60,10 +60,12 @@ void say(std::FILE* where, const std::string& line) {
 }
 
 /// Operations, and their sum.
-Result<void> run_operations(const SeedRun& settings, double minutes, bool& broken) {
-  const auto results = run_seeds(study_of_operations(minutes, beside_us("birdseye-sim")), settings,
-                                 [](const std::string& line) { say(stdout, line); });
+Result<void> run_operations(const SeedRun& settings, double minutes, Ranks* ranks, bool& broken) {
+  const auto results = run_seeds(
+      study_of_operations(minutes, beside_us("birdseye-sim")), settings,
+      [](const std::string& line) { say(stdout, line); }, ranks);
   if (!results) return results.error();
+  if (*results == nullptr) return {};
   const auto sum = sum_of(**results, settings.first_seed, settings.last_seed);
   if (!sum) return sum.error();
   print(settings, *sum);
@@ -72,11 +74,12 @@ Result<void> run_operations(const SeedRun& settings, double minutes, bool& broke
 }
 
 /// Any other command. Standard output is for its lines.
-Result<void> run_command(const SeedRun& settings, const CampaignOptions& options) {
-  const auto results = run_seeds(study_of(options.command, Duration::from_seconds(options.patience_s)), settings,
-                                 [](const std::string& line) { say(stderr, line); });
+Result<void> run_command(const SeedRun& settings, const CampaignOptions& options, Ranks* ranks) {
+  const auto results = run_seeds(
+      study_of(options.command, Duration::from_seconds(options.patience_s)), settings,
+      [](const std::string& line) { say(stderr, line); }, ranks);
   if (!results) return results.error();
-  if (!options.print) return {};
+  if (*results == nullptr || !options.print) return {};
   return (*results)->for_each(settings.first_seed, settings.last_seed, [](const SeedLine& one) -> Result<void> {
     fmt::print("{}\n", one.line);
     return {};
@@ -86,7 +89,14 @@ Result<void> run_command(const SeedRun& settings, const CampaignOptions& options
 Result<void> run(const CampaignOptions& options, bool& broken) {
   SeedRun settings = options.settings;
   if (auto parsed = parse_seeds(options.seeds, settings); !parsed) return parsed;
-  return options.command.empty() ? run_operations(settings, options.minutes, broken) : run_command(settings, options);
+  std::unique_ptr<Ranks> ranks;
+  if (!options.alone) {
+    auto joined = Ranks::join();
+    if (!joined) return joined.error();
+    ranks = *std::move(joined);
+  }
+  return options.command.empty() ? run_operations(settings, options.minutes, ranks.get(), broken)
+                                 : run_command(settings, options, ranks.get());
 }
 
 }  // namespace
@@ -100,8 +110,11 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       ->required();
   CLI::Option* const minutes =
       command.add_option("--minutes", options->minutes, "how long each operation is")->check(CLI::Range(0.5, 600.0));
-  command.add_option("--jobs", options->settings.jobs, "seeds at a time (default: as many as there are cores)")
+  command
+      .add_option("--jobs", options->settings.jobs,
+                  "seeds at a time (default: as many as there are cores; under mpirun one a rank)")
       ->check(CLI::Range(1, 1024));
+  command.add_flag("--alone", options->alone, "run all seeds here, whatever has started this program beside others");
   command.add_option("--at-most", options->settings.at_most_s, "seconds after which no seed begins")
       ->check(CLI::Range(1.0, 1e6));
   CLI::Option* const other =

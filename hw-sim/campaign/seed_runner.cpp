@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/info.h>
 
+#include <algorithm>
 #include <deque>
 #include <mutex>
 #include <utility>
@@ -138,14 +139,82 @@ std::vector<OwnedThread> at_work(int jobs, const SeedStudy& study, const std::fi
   return threads;
 }
 
-}  // namespace
+// Kinds of messages. To rank 0: ready for a first seed; the line of its seed, or why there is none. From rank 0: a
+// seed; the end.
+constexpr int kReady = 0, kLine = 1, kNone = 2, kSeed = 3, kEnd = 4;
+constexpr Duration kMargin = Duration::from_ms(60'000);  // for messages, and for the disk
 
-Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said) {
+/// What rank 0 does beside its own seeds, until no other rank has one.
+Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
+  struct Other {
+    std::uint64_t seed = 0;
+    std::optional<Deadline> answers;  // empty: it has no seed, and waits for the end
+  };
+  std::vector<Other> others(static_cast<std::size_t>(ranks.size()));
+  const auto within = [&] { return Deadline::after(patience + kMargin); };
+  for (std::size_t i = 1; i < others.size(); ++i) others[i].answers = within();
+  const auto busy = [](const Other& other) { return other.answers.has_value(); };
+  while (std::ranges::any_of(others, busy)) {
+    // Those that have asked get their next seeds first; what they brought then goes to the disk together.
+    std::vector<Outcome> brought;
+    auto message = ranks.receive(Deadline::after(Duration::from_ms(100)));
+    while (message) {
+      Other& other = others[static_cast<std::size_t>(message->rank)];
+      if (message->kind == kLine) brought.push_back({other.seed, message->text});
+      if (message->kind == kNone) brought.push_back({other.seed, Error{Errc::disconnected, message->text}});
+      other.answers.reset();
+      if (const auto next = work.next()) {
+        other = {*next, within()};
+        ranks.send(message->rank, kSeed, fmt::format("{}", *next));
+      }
+      message = brought.size() < others.size() ? ranks.receive(Deadline::after(Duration())) : std::nullopt;
+    }
+    if (!brought.empty()) work.take(brought);
+    if (const auto fault = work.fault()) return *fault;
+    for (std::size_t i = 1; i < others.size(); ++i) {
+      if (others[i].answers && others[i].answers->passed()) {
+        return Error{Errc::timeout, fmt::format("rank {} has not answered; is its machine still there?", i)};
+      }
+    }
+  }
+  return {};
+}
+
+/// What the other ranks do.
+Result<void> work_for_rank_0(Ranks& ranks, const SeedStudy& study, const std::filesystem::path& log) {
+  ranks.send(0, kReady, "");
+  for (;;) {
+    // The last seed of another rank may have begun just now.
+    const auto message = ranks.receive(Deadline::after(study.patience + kMargin + kMargin));
+    if (!message) return Error{Errc::timeout, "rank 0 has not answered; is its machine still there?"};
+    if (message->kind == kEnd) break;
+    const auto outcome = run_one(study, log, std::stoull(message->text));
+    if (!outcome) return outcome.error();
+    outcome->line ? ranks.send(0, kLine, *outcome->line) : ranks.send(0, kNone, outcome->line.error().what);
+  }
+  ranks.leave();
+  return {};
+}
+
+Result<void> make_folder(const std::filesystem::path& folder) {
   std::error_code failed;
-  std::filesystem::create_directories(run.folder, failed);
-  if (failed) {
-    return Error{Errc::io, fmt::format("{}: cannot be made ({}); check the path and its permissions",
-                                       run.folder.string(), failed.message())};
+  std::filesystem::create_directories(folder, failed);
+  if (!failed) return {};
+  return Error{Errc::io, fmt::format("{}: cannot be made ({}); check the path and its permissions", folder.string(),
+                                     failed.message())};
+}
+
+Result<std::unique_ptr<SeedResults>> run_all(const SeedStudy& study, const SeedRun& run, const Said& said,
+                                             Ranks* ranks) {
+  if (auto made = make_folder(run.folder); !made) return made.error();
+  if (ranks != nullptr && ranks->rank() > 0) {
+    const auto log = run.folder / fmt::format("campaign-{}.log", ranks->rank());
+    if (auto worked = work_for_rank_0(*ranks, study, log); !worked) return worked.error();
+    return std::unique_ptr<SeedResults>();
+  }
+  if (ranks != nullptr && run.jobs > 0) {
+    return Error{Errc::bad_value,
+                 "--jobs is for a campaign without mpirun, whose -n says how many seeds run at a time"};
   }
   std::optional<Deadline> until;
   if (run.at_most_s) until = Deadline::after(Duration::from_seconds(*run.at_most_s));
@@ -154,9 +223,26 @@ Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const See
   auto seeds = missing(**results, run);
   if (!seeds) return seeds.error();
   Work work(study, *std::move(seeds), until, **results, said);
-  const int jobs = run.jobs > 0 ? run.jobs : tbb::info::default_concurrency();
-  for (OwnedThread& thread : at_work(jobs, study, run.folder / "campaign.log", work)) thread.join();
+  const int jobs = run.jobs > 0 ? run.jobs : ranks != nullptr ? 1 : tbb::info::default_concurrency();
+  auto threads = at_work(jobs, study, run.folder / "campaign.log", work);
+  if (ranks != nullptr) {
+    if (auto handed = hand_out(*ranks, study.patience, work); !handed) work.fail(handed.error());
+  }
+  for (OwnedThread& thread : threads) thread.join();
+  if (ranks != nullptr && !work.fault()) {
+    for (int other = 1; other < ranks->size(); ++other) ranks->send(other, kEnd, "");
+    ranks->leave();
+  }
   if (auto complete = work.complete(); !complete) return complete.error();
+  return results;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said,
+                                               Ranks* ranks) {
+  auto results = run_all(study, run, said, ranks);
+  if (!results && ranks != nullptr && !ranks->left()) ranks->give_up(results.error());
   return results;
 }
 

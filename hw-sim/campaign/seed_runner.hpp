@@ -10,6 +10,7 @@
 
 #include "calibration/base/result.hpp"
 #include "calibration/time/clock.hpp"
+#include "hw-sim/campaign/ranks.hpp"
 #include "hw-sim/campaign/seed_results.hpp"
 
 namespace birdseye::hw_sim {
@@ -31,7 +32,7 @@ struct SeedStudy {
 struct SeedRun {
   std::uint64_t first_seed = 1, last_seed = 1;
   std::filesystem::path folder;     ///< gets the results, and campaign.log with what commands said
-  int jobs = 0;                     ///< at a time; 0: as many as there are cores
+  int jobs = 0;                     ///< at a time; 0: as many as there are cores, or one a rank
   std::optional<double> at_most_s;  ///< none begins after so long; empty: all seeds are run
 };
 
@@ -41,6 +42,9 @@ using Said = std::function<void(const std::string&)>;
 /// Runs each seed that the folder has no result of, in a process of its own, handed out by need. said: told from time
 /// to time how far it is. One that was ended goes on where it is started again. Gives all that the folder has then; an
 /// error where a seed gave nothing to keep, once all were tried.
-Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said);
+/// ranks: all of them call this, and none uses MPI afterwards. Rank 0 hands out, has the results, and works itself as
+/// the others do; they get nullptr. What goes wrong in one of them ends all.
+Result<std::unique_ptr<SeedResults>> run_seeds(const SeedStudy& study, const SeedRun& run, const Said& said,
+                                               Ranks* ranks = nullptr);
 
 }  // namespace birdseye::hw_sim
