@@ -9,11 +9,14 @@
 #include <utility>
 
 #include "drivers/system/child_process.hpp"
+#include "drivers/system/condition.hpp"
 #include "drivers/system/thread.hpp"
 
 namespace birdseye::hw_sim {
 
 namespace {
+
+constexpr Duration kMargin = Duration::from_ms(60'000);  // for messages, and for the disk
 
 /// What came of a seed: the line to keep, or why there is none.
 struct Outcome {
@@ -47,12 +50,18 @@ Result<Outcome> run_one(const SeedStudy& study, const std::filesystem::path& log
   return Outcome{seed, study.kept(seed, **line)};
 }
 
-/// What several threads work off.
+/// What several threads work off. What they bring goes to the disk together, and nobody waits for that.
 class Work {
  public:
   Work(const SeedStudy& study, std::deque<std::uint64_t> seeds, std::optional<Deadline> until, SeedResults& results,
        const Said& said)
-      : study_(study), seeds_(std::move(seeds)), all_(seeds_.size()), until_(until), results_(results), said_(said) {}
+      : study_(study),
+        seeds_(std::move(seeds)),
+        all_(seeds_.size()),
+        until_(until),
+        results_(results),
+        said_(said),
+        entering_([this](const std::stop_token& stop) { enter(stop); }) {}
 
   std::optional<std::uint64_t> next() {
     const std::lock_guard lock(mutex_);
@@ -61,24 +70,13 @@ class Work {
     seeds_.pop_front();
     return seed;
   }
-  void take(const std::vector<Outcome>& outcomes) {
-    const std::lock_guard lock(mutex_);
-    const std::size_t before = done_;
-    std::vector<SeedLine> lines;
-    for (const Outcome& one : outcomes) {
-      ++done_;
-      if (one.line) {
-        lines.push_back({one.seed, *one.line});
-        told_ += !study_.told.empty() && study_.tells(*one.line) ? 1 : 0;
-      } else if (without_++ == 0) {
-        first_without_ = fmt::format("seed {}: {}", one.seed, one.line.error().what);
-      }
-    }
-    if (auto entered = results_.enter(lines); !entered) fail_locked(entered.error());
-    if (done_ / kTells == before / kTells && done_ != all_) return;
-    said_(fmt::format("{} of {}{}{}", done_, all_,
-                      study_.told.empty() ? "" : fmt::format(", {} {}", told_, study_.told),
-                      without_ == 0 ? "" : fmt::format(", {} gave no result", without_)));
+  void take(Outcome outcome) {
+    std::unique_lock lock(mutex_);
+    constexpr std::size_t kMost = 10'000;
+    if (!changed_.wait(lock, Deadline::after(kMargin), [this] { return brought_.size() < kMost; }))
+      return fail_locked({Errc::timeout, "the disk takes no results; is it full, or its server gone?"});
+    brought_.push_back(std::move(outcome));
+    changed_.notify_all();
   }
   void fail(const Error& fault) {
     const std::lock_guard lock(mutex_);
@@ -88,8 +86,10 @@ class Work {
     const std::lock_guard lock(mutex_);
     return fault_;
   }
-  /// Once all is done.
-  [[nodiscard]] Result<void> complete() const {
+  /// Once nothing more is taken: all is on the disk when this returns.
+  [[nodiscard]] Result<void> complete() {
+    entering_.request_stop();
+    entering_.join();
     if (fault_) return *fault_;
     if (without_ == 0) return {};
     return Error{Errc::io, fmt::format("{} of {} seeds gave no result, as {}; started again, these are tried again",
@@ -97,6 +97,38 @@ class Work {
   }
 
  private:
+  /// In a thread of its own, until stop is requested and nothing waits.
+  void enter(const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    while (changed_.wait(lock, stop, [this] { return !brought_.empty(); })) {
+      const std::vector<Outcome> outcomes = std::exchange(brought_, {});
+      changed_.notify_all();
+      lock.unlock();
+      std::vector<SeedLine> lines;
+      for (const Outcome& one : outcomes) {
+        if (one.line) lines.push_back({one.seed, *one.line});
+      }
+      const auto entered = results_.enter(lines);
+      lock.lock();
+      if (!entered) fail_locked(entered.error());
+      count(outcomes);
+    }
+  }
+  void count(const std::vector<Outcome>& outcomes) {
+    const std::size_t before = done_;
+    done_ += outcomes.size();
+    for (const Outcome& one : outcomes) {
+      if (one.line) {
+        told_ += !study_.told.empty() && study_.tells(*one.line) ? 1 : 0;
+      } else if (without_++ == 0) {
+        first_without_ = fmt::format("seed {}: {}", one.seed, one.line.error().what);
+      }
+    }
+    if (done_ / kTells == before / kTells && done_ != all_) return;
+    said_(fmt::format("{} of {}{}{}", done_, all_,
+                      study_.told.empty() ? "" : fmt::format(", {} {}", told_, study_.told),
+                      without_ == 0 ? "" : fmt::format(", {} gave no result", without_)));
+  }
   void fail_locked(const Error& fault) {
     if (!fault_) fault_ = fault;
   }
@@ -111,6 +143,9 @@ class Work {
   SeedResults& results_;
   const Said& said_;
   std::optional<Error> fault_;
+  std::vector<Outcome> brought_;
+  Condition changed_;
+  OwnedThread entering_;  // last: it uses all of the above
 };
 
 /// The missing ones.
@@ -132,7 +167,7 @@ std::vector<OwnedThread> at_work(int jobs, const SeedStudy& study, const std::fi
     threads.emplace_back([&study, log, &work](const std::stop_token&) {
       while (const auto seed = work.next()) {
         const auto outcome = run_one(study, log, *seed);
-        outcome ? work.take({*outcome}) : work.fail(outcome.error());
+        outcome ? work.take(*outcome) : work.fail(outcome.error());
       }
     });
   }
@@ -142,7 +177,6 @@ std::vector<OwnedThread> at_work(int jobs, const SeedStudy& study, const std::fi
 // Kinds of messages. To rank 0: ready for a first seed; the line of its seed, or why there is none. From rank 0: a
 // seed; the end.
 constexpr int kReady = 0, kLine = 1, kNone = 2, kSeed = 3, kEnd = 4;
-constexpr Duration kMargin = Duration::from_ms(60'000);  // for messages, and for the disk
 
 /// What rank 0 does beside its own seeds, until no other rank has one.
 Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
@@ -155,21 +189,16 @@ Result<void> hand_out(Ranks& ranks, Duration patience, Work& work) {
   for (std::size_t i = 1; i < others.size(); ++i) others[i].answers = within();
   const auto busy = [](const Other& other) { return other.answers.has_value(); };
   while (std::ranges::any_of(others, busy)) {
-    // Those that have asked get their next seeds first; what they brought then goes to the disk together.
-    std::vector<Outcome> brought;
-    auto message = ranks.receive(Deadline::after(Duration::from_ms(100)));
-    while (message) {
+    if (const auto message = ranks.receive(Deadline::after(Duration::from_ms(100)))) {
       Other& other = others[static_cast<std::size_t>(message->rank)];
-      if (message->kind == kLine) brought.push_back({other.seed, message->text});
-      if (message->kind == kNone) brought.push_back({other.seed, Error{Errc::disconnected, message->text}});
+      if (message->kind == kLine) work.take({other.seed, message->text});
+      if (message->kind == kNone) work.take({other.seed, Error{Errc::disconnected, message->text}});
       other.answers.reset();
       if (const auto next = work.next()) {
         other = {*next, within()};
         ranks.send(message->rank, kSeed, fmt::format("{}", *next));
       }
-      message = brought.size() < others.size() ? ranks.receive(Deadline::after(Duration())) : std::nullopt;
     }
-    if (!brought.empty()) work.take(brought);
     if (const auto fault = work.fault()) return *fault;
     for (std::size_t i = 1; i < others.size(); ++i) {
       if (others[i].answers && others[i].answers->passed()) {
