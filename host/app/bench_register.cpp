@@ -5,8 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
@@ -19,7 +24,8 @@ namespace birdseye::host {
 namespace {
 
 struct BenchRegisterOptions {
-  std::filesystem::path json, study;
+  std::filesystem::path json, study, lines;
+  std::optional<int> seed;
   std::vector<std::string> sweeps = StudyOptions{}.sweeps;
   std::optional<int> trials;
   FactorOptions factors;
@@ -38,6 +44,30 @@ std::vector<Group> groups() {
   return {{1, {{"simplex"}, {"powell"}, {"gradient"}}}, {3, {{"gradient"}}}};
 }
 
+/// Calls `each` with every kind of case that is asked for, and the methods that are tried on it.
+template <typename Each>
+Result<void> for_kinds(const BenchRegisterOptions& options, const Each& each) {
+  for (const std::string& phantom : options.phantoms) {
+    for (const Group& group : groups()) {
+      const int dof = 3 * group.inner * group.inner * group.inner;
+      if (std::find(options.dof.begin(), options.dof.end(), dof) == options.dof.end()) continue;
+      SimulatedCase wanted = options.simulated;
+      wanted.phantom = phantom;
+      wanted.inner = group.inner;
+      if (auto done = each(wanted, dof, group.methods); !done) return done;
+    }
+  }
+  return {};
+}
+
+nlohmann::json name_of(const SimulatedCase& wanted, int dof) {
+  return {{"phantom", wanted.phantom},
+          {"dof", dof},
+          {"views", wanted.views},
+          {"viewport", wanted.size},
+          {"amplitude_mm", wanted.amplitude_mm}};
+}
+
 /// The verdict is that every method leaves less error than it found; how much less depends on the trials.
 nlohmann::json report_of(const nlohmann::json& rows) {
   const bool sound = std::all_of(rows.begin(), rows.end(), [](const nlohmann::json& row) {
@@ -52,14 +82,18 @@ nlohmann::json report_of(const nlohmann::json& rows) {
 
 void print(const nlohmann::json& row) {
   fmt::print(
-      "{:6} {:8} {:3} DOF  success {:3.0f} %  epsilon {:.6f} to {:.6f}  error {:.2f} to {:.2f} mm  {:.0f} evaluations  "
-      "{:.2f} s\n",
+      "{:6} {:8} {:3} DOF  success {:3.0f} %  epsilon {:.6f} to {:.6f}  error {:.2f} to {:.2f} mm  {:.0f} "
+      "evaluations{}\n",
       row["phantom"].get<std::string>(), row["optimiser"].get<std::string>(), row["dof"].get<int>(),
       100 * row["success_rate"].get<double>(), row["epsilon_before_median"].get<double>(),
       row["epsilon_after_median"].get<double>(), row["tre_before_mm_mean"].get<double>(),
       row["tre_after_mm_mean"].get<double>(), row["evaluations_median"].get<double>(),
-      row["time_s_median"].get<double>());
+      row.contains("time_s_median") ? fmt::format("  {:.2f} s", row["time_s_median"].get<double>()) : "");
   std::fflush(stdout);
+}
+
+ExitCode code_of(const nlohmann::json& rows) {
+  return report_of(rows)["verdict"] == "pass" ? ExitCode::success : ExitCode::verdict_fail;
 }
 
 Result<ExitCode> bench_register(const BenchRegisterOptions& options) {
@@ -67,40 +101,97 @@ Result<ExitCode> bench_register(const BenchRegisterOptions& options) {
   const int trials = options.quick ? kQuick : options.trials.value_or(kTrials);
   nlohmann::json rows = nlohmann::json::array();
   Progress progress;
-  for (const std::string& phantom : options.phantoms) {
-    for (const Group& group : groups()) {
-      const int dof = 3 * group.inner * group.inner * group.inner;
-      if (std::find(options.dof.begin(), options.dof.end(), dof) == options.dof.end()) continue;
-      SimulatedCase wanted = options.simulated;
-      wanted.phantom = phantom;
-      wanted.inner = group.inner;
-      std::vector<std::vector<Trial>> of_method(group.methods.size());
-      auto done = for_cases(wanted, trials, [&](const RegistrationCase& c, int seed) -> Result<void> {
-        for (std::size_t m = 0; m < group.methods.size(); ++m) {
-          progress(fmt::format("{}, seed {}: {}", phantom, seed, group.methods[m].optimiser));
-          auto trial = try_once(c, group.methods[m]);
-          if (!trial) return trial.error();
-          of_method[m].push_back(*trial);
+  auto all =
+      for_kinds(options, [&](const SimulatedCase& wanted, int dof, const std::vector<Method>& methods) -> Result<void> {
+        std::vector<std::vector<Trial>> of_method(methods.size());
+        auto done = for_cases(wanted, trials, [&](const RegistrationCase& c, int seed) -> Result<void> {
+          for (std::size_t m = 0; m < methods.size(); ++m) {
+            progress(fmt::format("{}, seed {}: {}", wanted.phantom, seed, methods[m].optimiser));
+            auto trial = try_once(c, methods[m]);
+            if (!trial) return trial.error();
+            of_method[m].push_back(*trial);
+          }
+          return {};
+        });
+        if (!done) return done.error();
+        for (std::size_t m = 0; m < methods.size(); ++m) {
+          nlohmann::json row = summary_of(of_method[m]);
+          row.update(name_of(wanted, dof));
+          row["optimiser"] = methods[m].optimiser;
+          print(row);
+          rows.push_back(std::move(row));
+        }
+        // Many trials take an hour: what there is, is kept.
+        return write_files({{options.json, text_of(report_of(rows))}});
+      });
+  if (!all) return all.error();
+  return code_of(rows);
+}
+
+/// One line of JSON: every trial of the seed, or that the simulator refuses it. No times, which are others each time.
+Result<void> print_line(BenchRegisterOptions options) {
+  options.simulated.seed = *options.seed;
+  nlohmann::json trials = nlohmann::json::array();
+  auto all =
+      for_kinds(options, [&](const SimulatedCase& wanted, int dof, const std::vector<Method>& methods) -> Result<void> {
+        nlohmann::json trial = name_of(wanted, dof);
+        const auto c = simulate(wanted);
+        if (!c && c.error().code != Errc::bad_value) return c.error();
+        if (!c) {
+          trial["refused"] = c.error().what;
+          trials.push_back(trial);
+          return {};
+        }
+        for (const Method& method : methods) {
+          const auto tried = try_once(*c, method);
+          if (!tried) return tried.error();
+          trial["optimiser"] = method.optimiser;
+          trial["trial"] = json_of(*tried);
+          trials.push_back(trial);
         }
         return {};
       });
-      if (!done) return done.error();
-      for (std::size_t m = 0; m < group.methods.size(); ++m) {
-        nlohmann::json row = summary_of(of_method[m]);
-        row.update({{"phantom", phantom},
-                    {"optimiser", group.methods[m].optimiser},
-                    {"dof", dof},
-                    {"views", wanted.views},
-                    {"viewport", wanted.size},
-                    {"amplitude_mm", wanted.amplitude_mm}});
-        print(row);
-        rows.push_back(std::move(row));
+  if (!all) return all;
+  fmt::print("{}\n", nlohmann::json{{"seed", *options.seed}, {"trials", trials}}.dump());
+  return {};
+}
+
+/// The table of lines that print_line() printed.
+Result<ExitCode> table_of_lines(const BenchRegisterOptions& options) {
+  std::ifstream in(options.lines);
+  struct Kind {
+    nlohmann::json name;
+    std::vector<Trial> trials;
+  };
+  std::vector<Kind> kinds;
+  try {
+    for (std::string line; std::getline(in, line);) {
+      const nlohmann::json all = nlohmann::json::parse(line);
+      for (nlohmann::json kind : all.at("trials")) {
+        if (kind.contains("refused")) continue;
+        const Trial trial = trial_of(kind.at("trial"));
+        kind.erase("trial");
+        auto known = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& one) { return one.name == kind; });
+        if (known == kinds.end()) known = kinds.insert(known, {kind, {}});
+        known->trials.push_back(trial);
       }
-      // Many trials take an hour: what there is, is kept.
-      if (auto written = write_files({{options.json, text_of(report_of(rows))}}); !written) return written.error();
     }
+  } catch (const nlohmann::json::exception& wrong) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: these are no lines that --seed prints ({})", options.lines.string(), wrong.what())};
   }
-  return report_of(rows)["verdict"] == "pass" ? ExitCode::success : ExitCode::verdict_fail;
+  if (kinds.empty()) return Error{Errc::bad_format, options.lines.string() + ": has no trial"};
+  nlohmann::json rows = nlohmann::json::array();
+  for (const Kind& kind : kinds) {
+    nlohmann::json row = summary_of(kind.trials);
+    row.update(kind.name);
+    row.erase("time_s_median");
+    row.erase("processor_s_median");
+    print(row);
+    rows.push_back(std::move(row));
+  }
+  if (auto written = write_files({{options.json, text_of(report_of(rows))}}); !written) return written.error();
+  return code_of(rows);
 }
 
 Result<void> make_folder(const char* option, const std::filesystem::path& folder) {
@@ -172,13 +263,26 @@ void add_bench_register(CLI::App& bench, CommandStatus& status) {
                       "in place of the table: curves and sweeps on the liver, to this folder")
           ->excludes(views)
           ->excludes(amplitude);
+  CLI::Option* const seed =
+      command
+          .add_option("--seed", options->seed,
+                      "in place of the table: the trials of this seed, as one line of JSON without times")
+          ->check(CLI::Range(1, 1'000'000))
+          ->excludes(json)
+          ->excludes(quick)
+          ->excludes(study_folder);
+  CLI::Option* const lines =
+      command.add_option("--lines", options->lines, "the table of the lines in this file, which --seed printed")
+          ->check(CLI::ExistingFile);
+  for (CLI::Option* option : {quick, phantom, dof, views, amplitude, study_folder, seed}) lines->excludes(option);
   command.add_option("--sweep", options->sweeps, "of the study, only these: light, noise, views, error")
       ->check(CLI::IsMember(StudyOptions{}.sweeps));
-  add_factors(command, options->factors, {json, quick, phantom, dof, views, amplitude, study_folder});
+  add_factors(command, options->factors, {json, quick, phantom, dof, views, amplitude, study_folder, seed, lines});
   command.callback([options, &status] {
     if (!options->factors.folder.empty()) return status.take(factors(*options));
     if (!options->study.empty()) return status.take(study(*options));
-    const auto done = bench_register(*options);
+    if (options->seed) return status.take(print_line(*options));
+    const auto done = options->lines.empty() ? bench_register(*options) : table_of_lines(*options);
     done ? void(status.code = *done) : status.refuse(done.error());
   });
 }

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "calibration/base/median.hpp"
 #include "drivers/system/clock.hpp"
@@ -30,7 +32,28 @@ double median_over(const std::vector<Trial>& trials, double Trial::*field) {
   return median_of(std::move(values));
 }
 
+constexpr std::array<std::pair<const char*, double Trial::*>, 6> kErrors{
+    {{"epsilon_before", &Trial::epsilon_before},
+     {"epsilon_after", &Trial::epsilon_after},
+     {"tre_before_mm", &Trial::tre_before_mm},
+     {"tre_after_mm", &Trial::tre_after_mm},
+     {"surface_after_mm", &Trial::surface_after_mm},
+     {"inside_after_mm", &Trial::inside_after_mm}}};
+
 }  // namespace
+
+nlohmann::json json_of(const Trial& trial) {
+  nlohmann::json out{{"evaluations", trial.evaluations}};
+  for (const auto& [name, error] : kErrors) out[name] = trial.*error;
+  return out;
+}
+
+Trial trial_of(const nlohmann::json& json) {
+  Trial out;
+  json.at("evaluations").get_to(out.evaluations);
+  for (const auto& [name, error] : kErrors) json.at(name).get_to(out.*error);
+  return out;
+}
 
 Result<RegistrationCase> simulate(const SimulatedCase& wanted) {
   std::vector<std::string> options{"--seed",

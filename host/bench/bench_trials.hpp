@@ -32,6 +32,10 @@ struct Trial {
   double time_s = 0, processor_s = 0;  ///< processor_s: of all cores together; a busy machine adds little to it
   int evaluations = 0;
 };
+/// Without the times.
+nlohmann::json json_of(const Trial& trial);
+/// From such JSON, times zero. Throws nlohmann::json::exception for any other.
+Trial trial_of(const nlohmann::json& json);
 Result<Trial> try_once(const RegistrationCase& c, const Method& method);
 
 /// Makes `count` cases of seeds 1, 2 and on, passing over seeds that the simulator refuses, and calls `work` with each

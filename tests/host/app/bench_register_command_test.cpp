@@ -145,6 +145,27 @@ TEST(BenchRegisterCommand, FactorsGoOnWithWhatStandsThere) {
   EXPECT_TRUE(std::filesystem::exists(scratch / "calibration.svg"));
 }
 
+TEST(BenchRegisterCommand, MakesTheSameTableOfLinesThatSeedsGaveAlone) {
+  const Scratch scratch;
+  const std::string kind = " --phantom liver --dof 3 --views 2 --size 384x288";
+  ASSERT_EQ(run("birdseye", "bench register --trials 2" + kind + " --json " + (scratch / "r.json").string()).code, 0);
+  std::string lines;
+  for (const char* const seed : {"1", "2"}) {
+    const auto line = run("birdseye", "bench register --seed " + std::string(seed) + kind);
+    ASSERT_EQ(line.code, 0) << line.output;
+    lines += line.output;
+  }
+  const std::string file = scratch.file("lines", lines);
+  const auto table = run("birdseye", "bench register --lines " + file + " --json " + (scratch / "l.json").string());
+  ASSERT_EQ(table.code, 0) << table.output;
+  nlohmann::json expected = json_in(scratch / "r.json")["rows"];
+  for (nlohmann::json& row : expected) {
+    row.erase("time_s_median");
+    row.erase("processor_s_median");
+  }
+  EXPECT_EQ(json_in(scratch / "l.json")["rows"], expected);
+}
+
 TEST(BenchRegisterCommand, RefusesWhatItDoesNotKnow) {
   const Scratch scratch;
   expect_refused("birdseye", "bench register --phantom foot --json " + (scratch / "r.json").string(),
@@ -154,6 +175,7 @@ TEST(BenchRegisterCommand, RefusesWhatItDoesNotKnow) {
   expect_refused("birdseye", "bench register --only feet --factors " + (scratch / "f").string(), {"feet", "elastic"},
                  scratch / "f/trials.jsonl");
   const std::string file = scratch.file("trials.jsonl", "no trial\n");
+  expect_refused("birdseye", "bench register --lines " + file, {file, "no lines that --seed prints"});
   expect_refused("birdseye", "bench register --factors " + scratch.path().string(), {file, "line 1"});
 }
 
