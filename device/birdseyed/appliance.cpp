@@ -114,8 +114,12 @@ namespace {
 
 wire::WallClock read_wall_clock() {
   const auto read = wire::read_clock_discipline();
-  if (!read) return {};
   const std::int64_t shift_ns = wall_minus_monotonic().ns;
+  if (!read) {
+    wire::WallClock unknown;
+    unknown.wall_minus_monotonic_ns = shift_ns;
+    return unknown;
+  }
   return {true, read->synchronised, read->tai_known, read->max_error.ns, read->est_error.ns, shift_ns, read->source};
 }
 
