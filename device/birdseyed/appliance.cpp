@@ -3,14 +3,17 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "device/birdseyed/camera_thread.hpp"
 #include "device/birdseyed/gpio_thread.hpp"
+#include "device/birdseyed/safe_mode.hpp"
 #include "device/birdseyed/tracker_thread.hpp"
 #include "device/wire/clock_discipline.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/crash_note.hpp"
 #include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
@@ -32,14 +35,31 @@ Appliance::Appliance(const Config& config, wire::Server& server)
       gpio_post_(Instrument::gpio, queue_),
       core_alive_ns_(device_now().ns) {}
 
-Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::Server& server) {
+Result<std::unique_ptr<Appliance>> Appliance::start(const Config& config, wire::Server& server,
+                                                    const std::vector<std::string>& left_out) {
   std::unique_ptr<Appliance> appliance(new Appliance(config, server));
   Appliance* const a = appliance.get();
-  if (!config.record.folder.empty()) a->start_recording();
-  const auto begin = [a](InstrumentPost& post, auto run) {
-    post.tell({.state = InstrumentState::starting,
-               .text = fmt::format("the {} is being looked for", name_of(post.instrument()))});
-    a->threads_.emplace_back([run](const std::stop_token& stop) { run(stop); });
+  const auto is_left_out = [&](const char* part) {
+    return std::find(left_out.begin(), left_out.end(), part) != left_out.end();
+  };
+  if (!config.record.folder.empty() && is_left_out("recording")) {
+    a->not_recording_ = why_left_out("recording");
+    spdlog::error("{}", a->not_recording_);
+  } else if (!config.record.folder.empty()) {
+    a->start_recording();
+  }
+  const auto begin = [&](InstrumentPost& post, auto run) {
+    const char* const name = name_of(post.instrument());
+    if (is_left_out(name)) {
+      post.tell({.state = InstrumentState::absent, .text = why_left_out(name)});
+      return;
+    }
+    post.tell({.state = InstrumentState::starting, .text = fmt::format("the {} is being looked for", name)});
+    a->begun_.push_back(&post);
+    a->threads_.emplace_back([run, name](const std::stop_token& stop) {
+      name_this_thread(name);
+      run(stop);
+    });
   };
   begin(a->tracker_post_, [a](const std::stop_token& s) { run_tracker(a->config_.tracker, a->tracker_post_, s); });
   const ControlsLock lock{
@@ -79,9 +99,11 @@ void Appliance::make_messages(const std::stop_token& stop) {
   wire::Health health;
   std::optional<Core::Counters> before;
   DeviceTime measured;
+  name_this_thread("messages");
   while (!stop.stop_requested()) {
     auto event = queue_.pop(device_now() + (core.waiting() ? kTickWaiting : kTickIdle), stop);
     if (!event) event = Tick{device_now()};
+    at_work_on(origin_of(*event));
     if (recorder_) recorder_->take(*event);
     for (const wire::Packet& packet : core.take(*event)) server_.publish(packet);
     bool changed = std::holds_alternative<InstrumentChanged>(*event);
@@ -170,11 +192,12 @@ void Appliance::tell_instruments(const InstrumentBoard& board, wire::Health& hea
   }
 }
 
-bool Appliance::alive() const {
+std::string Appliance::hanging() const {
   const DeviceTime least = device_now() - kAliveWithin;
-  const bool gpio = config_.gpio.lines.chip.empty() || gpio_post_.last_alive() > least;
-  return DeviceTime{core_alive_ns_} > least && tracker_post_.last_alive() > least &&
-         camera_post_.last_alive() > least && gpio;
+  for (const InstrumentPost* const post : begun_) {
+    if (post->last_alive() <= least) return name_of(post->instrument());
+  }
+  return DeviceTime{core_alive_ns_} > least ? "" : "messages";
 }
 
 std::string Appliance::summary() const {

@@ -19,14 +19,16 @@ namespace birdseye::device {
 /// away or falls silent, the appliance says so on the wire and looks for it until it is back; the others go on.
 class Appliance {
  public:
-  /// server: outlives the appliance, so that clients stay connected when the configuration is read again.
-  static Result<std::unique_ptr<Appliance>> start(const Config& config, wire::Server& server);
+  /// server: outlives the appliance, so that clients stay connected when the configuration is read again. left_out:
+  /// instruments, and "recording", that are not begun; it says so in their place.
+  static Result<std::unique_ptr<Appliance>> start(const Config& config, wire::Server& server,
+                                                  const std::vector<std::string>& left_out = {});
   ~Appliance();
   Appliance(const Appliance&) = delete;
   Appliance& operator=(const Appliance&) = delete;
 
-  /// Whether every thread has shown a sign of life lately.
-  [[nodiscard]] bool alive() const;
+  /// The thread that has shown no sign of life lately, by its instrument; empty: all have.
+  [[nodiscard]] std::string hanging() const;
   /// The state and what is wrong, for the service manager.
   [[nodiscard]] std::string summary() const;
 
@@ -44,6 +46,7 @@ class Appliance {
   std::string not_recording_;           ///< why nothing is recorded, where something should be
   EventQueue queue_;
   InstrumentPost tracker_post_, camera_post_, gpio_post_;
+  std::vector<const InstrumentPost*> begun_;  ///< those that have a thread
   std::atomic<std::int64_t> core_alive_ns_;
   std::atomic<ApplianceState> state_ = ApplianceState::starting;
   mutable std::mutex told_mutex_;  ///< of what follows

@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
@@ -10,6 +11,7 @@
 #include "device/birdseyed/probe.hpp"
 #include "device/birdseyed/recording.hpp"
 #include "device/birdseyed/replay.hpp"
+#include "device/birdseyed/safe_mode.hpp"
 #include "device/birdseyed/service.hpp"
 #include "device/birdseyed/wire_admission.hpp"
 #include "device/wire/pairing.hpp"
@@ -35,7 +37,7 @@ int refuse(const Error& error) {
 
 /// Reads the configuration again. What cannot be used is said, and the appliance goes on as it was.
 void reload(const fs::path& path, device::Config& config, wire::Server& server,
-            std::unique_ptr<device::Appliance>& appliance) {
+            const std::vector<std::string>& left_out, std::unique_ptr<device::Appliance>& appliance) {
   device::notify_reloading();
   auto read = device::read_config(path);
   if (!read) {
@@ -48,10 +50,10 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
         "start birdseyed again");
   } else {
     appliance.reset();
-    auto started = device::Appliance::start(*read, server);
+    auto started = device::Appliance::start(*read, server, left_out);
     if (!started) {
       spdlog::error("configuration not taken, going on with the one before: {}", started.error().what);
-      started = device::Appliance::start(config, server);
+      started = device::Appliance::start(config, server, left_out);
     } else {
       config = *read;
       spdlog::info("configuration read again");
@@ -61,14 +63,14 @@ void reload(const fs::path& path, device::Config& config, wire::Server& server,
   device::notify_ready(appliance ? appliance->summary() : "cannot go on");
 }
 
-int serve(const fs::path& path, ServiceSignals& signals) {
+int serve(const fs::path& path, ServiceSignals& signals, device::SafeMode& safe_mode) {
   auto config = device::read_config(path);
   if (!config) return refuse(config.error());
   auto admission = device::admission_of(config->wire);
   if (!admission) return refuse(admission.error());
   auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
   if (!server) return refuse(server.error());
-  auto started = device::Appliance::start(*config, **server);
+  auto started = device::Appliance::start(*config, **server, safe_mode.left_out());
   if (!started) return refuse(started.error());
   std::unique_ptr<device::Appliance> appliance = *std::move(started);
   spdlog::info("publishing on {} port {}", config->wire.bind, (*server)->port());
@@ -76,14 +78,26 @@ int serve(const fs::path& path, ServiceSignals& signals) {
   const auto stop = signals.stop();
   while (!stop.stop_requested() && appliance) {
     sleep_for(Duration::from_ms(500), stop);
-    if (signals.take_reload()) reload(path, *config, **server, appliance);
+    if (signals.take_reload()) reload(path, *config, **server, safe_mode.left_out(), appliance);
     if (!appliance) break;
-    if (appliance->alive()) device::notify_alive();
+    const std::string hanging = appliance->hanging();
+    safe_mode.note_hang(hanging);
+    if (hanging.empty()) device::notify_alive();
     device::notify_status(appliance->summary());
   }
   device::notify_stopping();
   spdlog::info("ending");
   return appliance ? 0 : kUnusable;
+}
+
+/// In $RUNTIME_DIRECTORY systemd keeps what is in it from one start to the next. Who started it otherwise sees how it
+/// ends.
+int serve(const fs::path& path, ServiceSignals& signals) {
+  const char* const folder = std::getenv("RUNTIME_DIRECTORY");
+  auto safe_mode = device::SafeMode::begin(folder == nullptr ? "" : folder);
+  const int code = serve(path, signals, safe_mode);
+  safe_mode.end_in_order();
+  return code;
 }
 
 struct PairOptions {

@@ -22,4 +22,12 @@ DeviceTime time_of(const RawEvent& event) {
   return std::get<Tick>(event).at;
 }
 
+const char* origin_of(const RawEvent& event) {
+  if (std::holds_alternative<TrackerBytes>(event)) return name_of(Instrument::tracker);
+  if (std::holds_alternative<FrameCame>(event)) return name_of(Instrument::camera);
+  if (std::holds_alternative<EdgesCame>(event)) return name_of(Instrument::gpio);
+  if (const auto* changed = std::get_if<InstrumentChanged>(&event)) return name_of(changed->instrument);
+  return nullptr;
+}
+
 }  // namespace birdseye::device

@@ -63,5 +63,7 @@ using RawEvent = std::variant<InstrumentChanged, TrackerBytes, FrameCame, EdgesC
 
 /// When the event was handed over, on the appliance's clock.
 DeviceTime time_of(const RawEvent& event);
+/// The instrument that it came from, by its name; null: none.
+const char* origin_of(const RawEvent& event);
 
 }  // namespace birdseye::device

@@ -17,6 +17,7 @@
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/condition.hpp"
+#include "drivers/system/crash_note.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/unique_fd.hpp"
 
@@ -158,6 +159,7 @@ Result<std::filesystem::path> Recorder::Writer::begin() {
 }
 
 void Recorder::Writer::run() {
+  name_this_thread("recording");
   auto begun = begin();
   const bool good = begun.has_value();
   {

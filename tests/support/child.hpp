@@ -75,6 +75,7 @@ class Child {
     while (::poll(&entry, 1, 0) > 0 && read_more(Deadline::after(Duration::from_ms(1000)))) {
     }
   }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const {
     if (pid_ > 0) ::kill(pid_, number);
   }
