@@ -74,10 +74,9 @@ TEST(CrashNote, SaysWhatAThreadHasTurnedTo) {
 
 TEST(CrashNote, IsNobodysWhereTheWholeProcessIsSignalled) {
   const Ended ended = ended_by([] {
-    in_thread("camera", [] {
-      ::kill(::getpid(), SIGABRT);  // as a service manager's watchdog does; this thread may be the one that takes it
-      for (;;) ::pause();
-    });
+    at_work_on("camera");
+    ::kill(::getpid(), SIGABRT);  // as a service manager's watchdog does
+    for (;;) ::pause();
   });
   EXPECT_EQ(ended.note, "");
   EXPECT_EQ(ended.by, SIGABRT);
