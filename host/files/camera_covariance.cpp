@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "host/files/stored_matrix.hpp"
+
 namespace birdseye::host {
 
 namespace fs = std::filesystem;
@@ -17,8 +19,7 @@ Result<std::optional<CameraMatrix>> read_camera_covariance(const fs::path& path)
   try {
     const cv::FileStorage file(path.string(), cv::FileStorage::READ);
     if (file["camera_covariance"].empty()) return std::optional<CameraMatrix>();
-    file["camera_covariance"] >> matrix;
-    matrix.convertTo(matrix, CV_64F);
+    matrix = stored_matrix(file["camera_covariance"]);
   } catch (const cv::Exception&) {
     return std::optional<CameraMatrix>();  // ROS's or Kalibr's
   }

@@ -13,6 +13,7 @@
 
 #include "calibration/base/nesting.hpp"
 #include "host/files/record_file.hpp"
+#include "host/files/stored_matrix.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -86,10 +87,8 @@ Result<CameraModel> opencv_camera(const fs::path& path) {
       return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
     camera.width_px = static_cast<int>(file["image_width"]);
     camera.height_px = static_cast<int>(file["image_height"]);
-    file["camera_matrix"] >> matrix;
-    file["distortion_coefficients"] >> distortion;
-    matrix.convertTo(matrix, CV_64F);
-    distortion.convertTo(distortion, CV_64F);
+    matrix = stored_matrix(file["camera_matrix"]);
+    distortion = stored_matrix(file["distortion_coefficients"]);
   } catch (const cv::Exception&) {
     return Error{Errc::bad_format, "is no camera file in OpenCV's YAML"};
   }

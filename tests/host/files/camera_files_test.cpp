@@ -81,6 +81,17 @@ TEST(CameraFiles, ACalibrationRecordIsToldFromALens) {
   EXPECT_THAT(camera.error().what, HasSubstr("is a calibration record; `birdseye export lens --record " + path));
 }
 
+/// Without the refusal OpenCV asks for 85 GB, which ends the program under AddressSanitizer.
+TEST(CameraFiles, AMatrixOfMoreNumbersThanAreThereIsRefused) {
+  std::string text = camera_text(kLens);
+  const auto rows = text.find("rows: 1");
+  ASSERT_NE(rows, std::string::npos);
+  text.replace(rows, 7, "rows: 2147483646");
+  const auto camera = read_lens_text(text);
+  ASSERT_FALSE(camera);
+  EXPECT_THAT(camera.error().what, HasSubstr("is no camera file"));
+}
+
 /// A chain as Kalibr writes it, of the EuRoC data set's kind.
 const std::string kChain =
     "cam0:\n  T_cam_imu:\n  - [0.01, -0.99, 0.004, 0.02]\n  - [0.99, 0.01, 0.02, -0.06]\n"
