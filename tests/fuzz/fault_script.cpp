@@ -8,9 +8,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace birdseye;
   const std::string path = testing::as_file("faults.toml", testing::as_text({data, size}));
-  for (const auto instruments :
-       {hw_sim::Instruments::tracker, hw_sim::Instruments::camera, hw_sim::Instruments::both,
-        hw_sim::Instruments::with_programs}) {
+  for (const auto instruments : {hw_sim::Instruments::tracker, hw_sim::Instruments::camera, hw_sim::Instruments::both,
+                                 hw_sim::Instruments::with_programs}) {
     const auto script = hw_sim::read_fault_script(path, instruments, 1);
     if (!script) {
       testing::must_name(script.error().what, path);
