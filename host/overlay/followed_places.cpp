@@ -19,6 +19,8 @@ using Relative = Transform<Camera, Camera>;
 constexpr int kWidthPx = 320;
 constexpr int kPlaces = 80;
 constexpr double kThereAndBackPx = 0.7;
+constexpr int kLevels = 3;
+const cv::Size kWindow(15, 15);
 
 /// From a place to a line's part between two others.
 double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
@@ -30,13 +32,15 @@ double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const
 
 }  // namespace
 
-cv::Mat grey_to_follow(const wire::VideoFrame& frame) {
+PictureToFollow picture_to_follow(const wire::VideoFrame& frame) {
   const cv::Mat rgb = mat_of(RgbView{*frame.rgb, frame.width_px, frame.height_px});
   const double scale = std::max(1.0, static_cast<double>(frame.width_px) / kWidthPx);
-  cv::Mat small, grey;
-  cv::resize(rgb, small, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
-  cv::cvtColor(small, grey, cv::COLOR_RGB2GRAY);
-  return grey;
+  PictureToFollow out;
+  cv::Mat grey;
+  cv::cvtColor(rgb, grey, cv::COLOR_RGB2GRAY);
+  cv::resize(grey, out.grey, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
+  cv::buildOpticalFlowPyramid(out.grey, out.pyramid, kWindow, kLevels);
+  return out;
 }
 
 std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
@@ -52,17 +56,15 @@ std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
   return places;
 }
 
-std::vector<std::optional<cv::Point2f>> follow_places(const cv::Mat& from, const cv::Mat& to,
+std::vector<std::optional<cv::Point2f>> follow_places(const PictureToFollow& from, const PictureToFollow& to,
                                                       const std::vector<cv::Point2f>& places) {
   std::vector<std::optional<cv::Point2f>> out(places.size());
-  if (places.empty() || from.size() != to.size()) return out;
-  const cv::Size window(15, 15);
-  constexpr int kLevels = 3;
+  if (places.empty() || from.grey.size() != to.grey.size()) return out;
   std::vector<cv::Point2f> there, back;
   std::vector<std::uint8_t> found, found_back;
   std::vector<float> unused;
-  cv::calcOpticalFlowPyrLK(from, to, places, there, found, unused, window, kLevels);
-  cv::calcOpticalFlowPyrLK(to, from, there, back, found_back, unused, window, kLevels);
+  cv::calcOpticalFlowPyrLK(from.pyramid, to.pyramid, places, there, found, unused, kWindow, kLevels);
+  cv::calcOpticalFlowPyrLK(to.pyramid, from.pyramid, there, back, found_back, unused, kWindow, kLevels);
   for (std::size_t i = 0; i < places.size(); ++i)
     if (found[i] != 0 && found_back[i] != 0 && cv::norm(back[i] - places[i]) <= kThereAndBackPx) out[i] = there[i];
   return out;

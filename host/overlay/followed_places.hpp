@@ -17,14 +17,18 @@ inline constexpr double kFollowedPx = 1.5;  ///< of the small picture: how far a
 inline constexpr double kNearestSeen_mm = 15, kFarthestSeen_mm = 600;
 
 /// A frame in grey and small: more tells no more of the motion, and takes longer.
-cv::Mat grey_to_follow(const wire::VideoFrame& frame);
+struct PictureToFollow {
+  cv::Mat grey;
+  std::vector<cv::Mat> pyramid;  ///< of it, with its gradients: made once, for all that is followed from it and to it
+};
+PictureToFollow picture_to_follow(const wire::VideoFrame& frame);
 
 /// Places of such a picture that can be followed: within the round field, and away from reflections, which go with the
 /// lamp.
 std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey);
 
 /// Where places of one picture lie in another. Empty: it is not found there, or leads back to another place.
-std::vector<std::optional<cv::Point2f>> follow_places(const cv::Mat& from, const cv::Mat& to,
+std::vector<std::optional<cv::Point2f>> follow_places(const PictureToFollow& from, const PictureToFollow& to,
                                                       const std::vector<cv::Point2f>& places);
 
 /// A place of the small picture of so many columns as a direction of unit Z; empty: no ray of the camera ends there.

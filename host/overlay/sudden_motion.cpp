@@ -32,7 +32,7 @@ struct SuddenMotion::Seen {
 };
 
 struct SuddenMotion::Tracks {
-  cv::Mat newest;  ///< picture
+  PictureToFollow newest;
   std::deque<Seen> seen;
   std::size_t chosen = 0;
 };
@@ -91,10 +91,11 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
     return false;
   }
   if (target_mm) now->farthest_mm = std::clamp(2 * *target_mm, 2 * kNearestSeen_mm, kFarthestSeen_mm);
-  cv::Mat grey = grey_to_follow(frame);
+  PictureToFollow picture = picture_to_follow(frame);
   if (tracks_) {
     const Seen& last = tracks_->seen.back();
-    if (now->at <= last.at || now->at - last.at > kGap || tracks_->newest.size() != grey.size()) tracks_.reset();
+    if (now->at <= last.at || now->at - last.at > kGap || tracks_->newest.grey.size() != picture.grey.size())
+      tracks_.reset();
   }
   bool sudden = false;
   if (tracks_) {
@@ -102,7 +103,7 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
     std::vector<cv::Point2f> from;
     for (const auto& place : before)
       if (place) from.push_back(*place);
-    const auto there = follow_places(tracks_->newest, grey, from);
+    const auto there = follow_places(tracks_->newest, picture, from);
     now->places.resize(before.size());
     std::size_t next = 0, found = 0;
     for (std::size_t i = 0; i < before.size(); ++i) {
@@ -115,13 +116,13 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
     if (lost || 2 * found < tracks_->chosen) tracks_.reset();
   }
   if (!tracks_) {
-    const auto places = places_to_follow(grey);
+    const auto places = places_to_follow(picture.grey);
     if (places.size() < kFewest) return sudden;
     tracks_ = std::make_unique<Tracks>();
     tracks_->chosen = places.size();
     now->places.assign(places.begin(), places.end());
   }
-  tracks_->newest = std::move(grey);
+  tracks_->newest = std::move(picture);
   tracks_->seen.push_back(std::move(*now));
   while (tracks_->seen.back().at - tracks_->seen.front().at > kSpan) tracks_->seen.pop_front();
   return sudden;
@@ -130,7 +131,7 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
 bool SuddenMotion::differs(const Seen& now) const {
   const Seen& then = tracks_->seen.front();
   const CameraModel& camera = of_->camera();
-  const int columns = tracks_->newest.cols;
+  const int columns = tracks_->newest.grey.cols;
   std::vector<FollowedPlace> places;
   places.reserve(now.places.size());
   for (std::size_t i = 0; i < now.places.size(); ++i) {

@@ -34,14 +34,14 @@ PoseHistory averaged_poses() {
 struct VideoMotion::Waiting {
   DeviceTime at;
   double times_apart_s = 0;  ///< of the frame and the poses
-  cv::Mat grey;
+  PictureToFollow picture;
 };
 
 struct VideoMotion::Key {
   DeviceTime at;
   SeenFrom from;
   std::vector<cv::Point2f> places;  ///< in the key's picture
-  cv::Mat newest;                   ///< the last picture that they were followed to
+  PictureToFollow newest;           ///< the last picture that they were followed to
   std::vector<cv::Point2f> now;     ///< and where they are in it
   std::array<bool, 3> told{};       ///< by pictures since, about each axis
 };
@@ -110,15 +110,15 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
   next->times_apart_s = times_apart_s(
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
       frame.info.latency.has_value());
-  next->grey = grey_to_follow(frame);
+  next->picture = picture_to_follow(frame);
   waiting_ = std::move(next);
   return changed;
 }
 
-std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& picture, const ScopeSetup& scope) const {
+std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiting, const ScopeSetup& scope) const {
   std::array<std::optional<Transform<Camera, Tracker>>, 3> at;  // before, at and after the picture
   for (std::size_t i = 0; i < at.size(); ++i) {
-    const PoseAnswer pose = poses_.at(picture.at + Duration{(static_cast<std::int64_t>(i) - 1) * kAverage.ns});
+    const PoseAnswer pose = poses_.at(waiting.at + Duration{(static_cast<std::int64_t>(i) - 1) * kAverage.ns});
     if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) return std::nullopt;
     at[i] = scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
   }
@@ -133,36 +133,36 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& pictu
     const double bend = ((from + to) / 2 - middle).norm();
     const double rate_s = (to - from).norm() / (2 * kAverage.seconds());
     out.unsure_px =
-        std::max(out.unsure_px, scope.camera().fx_px * std::hypot(bend, 2 * rate_s * picture.times_apart_s));
+        std::max(out.unsure_px, scope.camera().fx_px * std::hypot(bend, 2 * rate_s * waiting.times_apart_s));
   }
   return out;
 }
 
 /// True: state() is another now.
-bool VideoMotion::look(const Waiting& picture, const ScopeSetup& scope) {
-  const auto from = seen_from(picture, scope);
+bool VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
+  const auto from = seen_from(waiting, scope);
   if (!from) {
     key_.reset();
     return false;
   }
   const VideoAgreement before = state_;
-  if (key_) follow(picture);
-  const bool told = key_ && key_->places.size() >= kFewest && judge(picture.at, *from, scope);
-  if (key_ && key_->places.size() >= kFewest && picture.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
+  if (key_) follow(waiting);
+  const bool told = key_ && key_->places.size() >= kFewest && judge(waiting.at, *from, scope);
+  if (key_ && key_->places.size() >= kFewest && waiting.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
     return state_ != before;
   key_ = std::make_unique<Key>();
-  key_->at = picture.at;
+  key_->at = waiting.at;
   key_->from = *from;
-  key_->places = places_to_follow(picture.grey);
+  key_->places = places_to_follow(waiting.picture.grey);
   key_->now = key_->places;
-  key_->newest = picture.grey;
+  key_->newest = waiting.picture;
   return state_ != before;
 }
 
 /// To the next picture; what is not found there, or leads back to another place, is let go.
-void VideoMotion::follow(const Waiting& picture) {
-  if (key_->places.empty() || key_->newest.size() != picture.grey.size()) return key_.reset();
-  const auto there = follow_places(key_->newest, picture.grey, key_->now);
+void VideoMotion::follow(const Waiting& waiting) {
+  if (key_->places.empty() || key_->newest.grey.size() != waiting.picture.grey.size()) return key_.reset();
+  const auto there = follow_places(key_->newest, waiting.picture, key_->now);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < there.size(); ++i) {
     if (!there[i]) continue;
@@ -176,7 +176,7 @@ void VideoMotion::follow(const Waiting& picture) {
   }
   key_->places.resize(kept);
   key_->now.resize(kept);
-  key_->newest = picture.grey;
+  key_->newest = waiting.picture;
 }
 
 /// True: the picture does not agree.
@@ -184,7 +184,7 @@ bool VideoMotion::judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& sc
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return false;  // nothing says how far off a picture may be
   const CameraModel& camera = scope.camera();
-  const int columns = key_->newest.cols;
+  const int columns = key_->newest.grey.cols;
   std::vector<FollowedPlace> places;
   places.reserve(key_->places.size());
   for (std::size_t i = 0; i < key_->places.size(); ++i) {

@@ -48,9 +48,9 @@ class VideoMotion {
     double unsure_px = 0;  ///< how far the camera's motion may have places off
   };
 
-  [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& picture, const ScopeSetup& scope) const;
-  bool look(const Waiting& picture, const ScopeSetup& scope);
-  void follow(const Waiting& picture);
+  [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& waiting, const ScopeSetup& scope) const;
+  bool look(const Waiting& waiting, const ScopeSetup& scope);
+  void follow(const Waiting& waiting);
   bool judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& scope);
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with

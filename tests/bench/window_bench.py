@@ -4,7 +4,7 @@
 usage: window_bench.py BIN [--seconds 60] [--size 768x576] [--rate 25]
 
 A simulated operation gives the patient, the registration and the deformation. Then the simulated tracker goes round the
-liver once in eight seconds, 102 mm/s at the scope's tip, and the simulated camera shows a patterned post in the liver's
+liver once in 16 seconds, 51 mm/s at the scope's tip, and the simulated camera shows a patterned post in the liver's
 place, which costs it little, so that the machine is the window's and the appliance's as it is at a cart. The last line is
 JSON.
 """
@@ -105,7 +105,7 @@ port = 18977
         running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
 
     start(simulator, "minibird", "--tty", folder / "tty", "--boot-ms", "100", "--position-noise-mm", "0.1",
-          "--angle-noise-deg", "0.05", "--period-s", "8", "--truth", circle)
+          "--angle-noise-deg", "0.05", "--period-s", "16", "--truth", circle)
     for _ in range(100):
         if circle.exists():
             break
