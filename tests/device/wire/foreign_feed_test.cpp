@@ -42,8 +42,7 @@ TEST(ForeignFeed, ATransformOfThePicturesOwnStampIsItsPoseThoughItComesAfter) {
 
 TEST(ForeignFeed, APictureWaitsForPosesNoLongerThanItMay) {
   FeedLink link;
-  link.transform("ProbeToTracker", 0, pose_at(0));
-  link.transform("ProbeToTracker", 20, pose_at(10));
+  for (const int ms : {0, 10, 14, 20}) link.transform("ProbeToTracker", ms, pose_at(ms / 2));
   link.image(30);
   EXPECT_TRUE(link.of<VideoFrame>(60).empty());
   const auto frames = link.of<VideoFrame>(75);
