@@ -169,9 +169,12 @@ class ApplianceProgram {
     if (!on) return true;
     server_ = wire::Server::over(network_.listener());
     auto started = device::Appliance::start(config_, *server_);
-    if (!started) why_ = started.error().what;
-    if (started) appliance_ = *std::move(started);
-    return started.has_value();
+    if (!started) {
+      why_ = started.error().what;
+      return false;
+    }
+    appliance_ = *std::move(started);
+    return true;
   }
   [[nodiscard]] const std::string& why() const { return why_; }
 
