@@ -11,7 +11,7 @@ namespace birdseye {
 
 namespace {
 
-/// Samples to which a line is fitted tell by two of them where it is, and by the others how far they scatter about it.
+/// Two samples give a line. Only those beyond two tell how far samples scatter about it.
 constexpr std::ptrdiff_t kFewest = 4;
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 namespace birdseye {
 
-/// As long as it is there, the calling thread's time is the machine's, and a simulator's stands still: for what another
-/// process does on its behalf, and the kernel tells of.
+/// While one of these lives, its thread has the machine's time, and a simulator's time stands still. For work that
+/// another process does for the thread: only the kernel tells when that is done.
 class MachineTime {
  public:
   MachineTime() : keeper_(TimeKeeper::present()) { TimeKeeper::put(nullptr); }

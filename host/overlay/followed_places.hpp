@@ -19,7 +19,7 @@ inline constexpr double kNearestSeen_mm = 15, kFarthestSeen_mm = 600;
 /// A frame in grey and small: more tells no more of the motion, and takes longer.
 struct PictureToFollow {
   cv::Mat grey;
-  std::vector<cv::Mat> pyramid;  ///< of it, with its gradients: made once, for all that is followed from it and to it
+  std::vector<cv::Mat> pyramid;  ///< of grey, with gradients; OpenCV would make it anew for each use
 };
 PictureToFollow picture_to_follow(const wire::VideoFrame& frame);
 

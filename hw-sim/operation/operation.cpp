@@ -155,35 +155,30 @@ const char* words_of(const host::ShownPicture& shown) {
   return shown.overlaid ? "the overlay fades" : "there is no overlay";
 }
 
-/// birdseyed and its server, which end and are started again.
+/// birdseyed and its server. An operation ends both and starts them again.
 class ApplianceProgram {
  public:
   ApplianceProgram(device::Config config, const LocalNetwork& network)
       : config_(std::move(config)), network_(network) {}
 
-  /// False where it cannot start: why() tells.
-  bool run(bool on) {
-    if (on == (appliance_ != nullptr)) return true;
+  /// Starts it, or ends it, where it does not run or end already.
+  Result<void> run(bool on) {
+    if (on == (appliance_ != nullptr)) return {};
     appliance_.reset();
     server_.reset();
-    if (!on) return true;
+    if (!on) return {};
     server_ = wire::Server::over(network_.listener());
     auto started = device::Appliance::start(config_, *server_);
-    if (!started) {
-      why_ = started.error().what;
-      return false;
-    }
+    if (!started) return std::move(started).error();
     appliance_ = *std::move(started);
-    return true;
+    return {};
   }
-  [[nodiscard]] const std::string& why() const { return why_; }
 
  private:
   device::Config config_;
   const LocalNetwork& network_;
   std::unique_ptr<wire::Server> server_;
   std::unique_ptr<device::Appliance> appliance_;
-  std::string why_;
 };
 
 /// The window, and its connection to the appliance.
@@ -192,15 +187,14 @@ class WindowProgram {
   using Open = std::function<Result<std::unique_ptr<host::LiveWorkflow>>()>;
   WindowProgram(Open open, const LocalNetwork& network) : open_(std::move(open)), network_(network) {}
 
-  /// True where it was opened just now. Where it cannot be opened, why() tells.
-  bool run(bool on) {
+  /// Opens it, or closes it, where it is not open or closed already. True: it was opened just now.
+  Result<bool> run(bool on) {
     if (on == (workflow_ != nullptr)) return false;
     source_.reset();
     workflow_.reset();
     if (!on) return false;
     auto opened = open_();
-    if (!opened) why_ = opened.error().what;
-    if (!opened) return false;
+    if (!opened) return std::move(opened).error();
     workflow_ = *std::move(opened);
     source_ = host::LiveSource::of_client("the appliance", [this]() -> Result<std::unique_ptr<wire::Client>> {
       return wire::Client::over(network_.connect(), "the appliance");
@@ -209,17 +203,15 @@ class WindowProgram {
   }
   [[nodiscard]] host::LiveWorkflow* workflow() const { return workflow_.get(); }
   [[nodiscard]] host::LiveSource& source() const { return *source_; }
-  [[nodiscard]] const std::string& why() const { return why_; }
 
  private:
   Open open_;
   const LocalNetwork& network_;
   std::unique_ptr<host::LiveWorkflow> workflow_;
   std::unique_ptr<host::LiveSource> source_;
-  std::string why_;
 };
 
-/// In virtual time. open: the window.
+/// Runs the operation, in virtual time. open: opens a window.
 void operate(const SimulatedOperation& operation, OperationTruth& truth, const host::Authors& authors,
              const WindowProgram::Open& open, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
@@ -253,10 +245,10 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
       network.cut();
       befalling.done(FaultKind::link_cut, device_now().ns);
     }
-    if (!appliance.run(befalling.active(FaultKind::appliance_restart) == nullptr))
-      return out.broken.push_back({journal.at_s(host_now()), "start", appliance.why()});
-    const bool opened = window.run(befalling.active(FaultKind::window_restart) == nullptr);
-    if (!window.why().empty()) return out.broken.push_back({journal.at_s(host_now()), "start", window.why()});
+    const auto serves = appliance.run(befalling.active(FaultKind::appliance_restart) == nullptr);
+    if (!serves) return out.broken.push_back({journal.at_s(host_now()), "start", serves.error().what});
+    const auto opened = window.run(befalling.active(FaultKind::window_restart) == nullptr);
+    if (!opened) return out.broken.push_back({journal.at_s(host_now()), "start", opened.error().what});
     if (window.workflow() == nullptr) {
       sleep_for(kScreen);
       announcer.tell(journal, host_now());
@@ -264,7 +256,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
     }
     host::LiveWorkflow& workflow = *window.workflow();
     host::LiveSource& source = window.source();
-    if (opened) {
+    if (*opened) {
       surgeon.stand_at(workflow, journal.at_s(host_now()));
       laws.opened(registered, surgeon.checks());
     }
@@ -316,7 +308,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   if (!patient) return patient.error();
   const host::Authors authors = host::Authors::for_once();  // another key changes nothing that is done
   const auto open = [&] { return open_window(*patient, truth, authors, (*folder)->path() / "window"); };
-  // The first reads its files in the machine's time, before the operation's begins.
+  // The first window reads its files before virtual time begins.
   auto first = open();
   if (!first) return std::move(first).error();
   const auto open_next = [&] { return *first != nullptr ? std::exchange(*first, nullptr) : open(); };

@@ -17,7 +17,7 @@ struct SimulatedOperation {
   std::uint64_t seed = 1;  ///< all that is random follows from it
   double minutes = 10;
   std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
-  bool programs_end = true;             ///< where it is drawn: also the link is cut, and programs end and start again
+  bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
 };
 
 /// What came of it.

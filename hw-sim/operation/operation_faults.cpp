@@ -140,8 +140,8 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target) {
 
 namespace {
 
-/// Faults of these kinds one after another, between_s apart on average; all of it follows from the seed. taken: which
-/// befall.
+/// Draws faults of these kinds one after another, between_s apart on average, and gives each to take. All of it follows
+/// from the seed.
 void draw(std::span<const DrawnFault> kinds, std::uint64_t seed, double between_s, double from_s, double until_s,
           const std::function<void(const DrawnFault&, Fault)>& take) {
   std::uint64_t key = 0;

@@ -54,8 +54,7 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
       if (&other == &span) continue;
-      // Whether a bird is frozen or at rest its noise tells, and of that an appliance knows nothing that has just
-      // started.
+      // Only its noise tells a frozen bird from one at rest, and an appliance that has just started has met no noise.
       const bool starts_within = other.fault.kind == FaultKind::appliance_restart && other.begins_s < span.ends_s &&
                                  other.ends_s > span.begins_s;
       if (span.fault.kind == FaultKind::frozen_pose && starts_within) span.signs.lies = true;

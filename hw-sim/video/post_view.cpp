@@ -11,9 +11,9 @@ namespace birdseye::hw_sim {
 namespace {
 
 constexpr std::uint32_t kColumns = 4096, kRows = 2048;  // once round the axis; along it
-constexpr double kRowsPerMm = 12;                       // on the post; on the wall a row is as much farther as the wall
+constexpr double kRowsPerMm = 12;                       // on the post; on the wall fewer, so that both look alike
 
-/// Smooth, from 0 to 1, cells of so many columns and rows; it goes on where once round the axis ends.
+/// Smooth noise from 0 to 1, in cells of so many columns and rows. Its last column joins its first.
 double smooth_noise(std::uint64_t seed, std::uint32_t column, std::uint32_t row, std::uint32_t cell) {
   const auto at = [seed](std::uint32_t x, std::uint32_t y) {
     return hashed_uniform(seed, (static_cast<std::uint64_t>(y) << 32U) | x);

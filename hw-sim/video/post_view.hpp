@@ -7,13 +7,13 @@
 
 namespace birdseye::hw_sim {
 
-/// What a scope sees that rides on the first bird of a miniBIRD's circle and looks inwards at a patterned post, which
-/// stands on the circle's middle, its axis the circle's. The pattern is given to each pixel once; a picture then costs
-/// no more than a look into a table, so that a machine whose window is measured has its time for the window.
+/// The view of a scope on a post. The scope rides on the first bird of a miniBIRD's circle and looks inwards. The post
+/// has a pattern, and stands in the circle's middle along the circle's axis; behind the post is a round wall about the
+/// same axis. Where each pixel looks is worked out once. A picture then costs a look into a table for each pixel, so
+/// that a machine whose window is measured has its time for the window.
 ///
-/// The scope: x of its picture along the circle, the way the bird goes; y along the axis, downwards; its lens a pinhole
-/// of focal length 0.78 times the picture's width, in the middle, kFromAxisMm before the axis. Behind the post is a
-/// round wall about the same axis.
+/// The scope's picture: x is the way that the bird goes, y is down the axis. The lens is a pinhole, kFromAxisMm before
+/// the axis, with a focal length of kFocalPerWidth times the picture's width.
 class PostView {
  public:
   static constexpr double kFromAxisMm = 130, kPostRadiusMm = 60, kWallRadiusMm = 400, kFocalPerWidth = 0.78;
