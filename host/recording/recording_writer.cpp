@@ -23,6 +23,8 @@ constexpr double kUsualRateHz = 25;
 /// More than any tracker has: names are what somebody sends.
 constexpr std::size_t kMostBirds = 64;
 constexpr std::size_t kMostVideos = 20;  // a file each
+/// No two birds are this close: each has a housing, and mostly an instrument around it.
+constexpr double kSameBirdMm = 5;
 
 }  // namespace
 
@@ -116,13 +118,18 @@ Result<void> RecordingWriter::write_measurement() {
   return {};
 }
 
-/// Whose pose that of the frame is; none where that is not known, so that no transform is invented.
+/// Whose pose that of the frame is; none where that is not known, so that no transform is invented. The only bird that
+/// has told its name yet may be another than the scope's: its own poses must say the same as the frame's.
 std::optional<std::string> RecordingWriter::scope_of(const wire::VideoFrame& frame) const {
   for (const std::string& name : {settings_.scope, std::string("scope")}) {
     if (transform_of_.contains(name)) return name;
   }
-  if (frame.info.pose.tracker_from_sensor && transform_of_.size() == 1) return transform_of_.begin()->first;
-  return std::nullopt;
+  const auto& pose = frame.info.pose.tracker_from_sensor;
+  if (!pose || transform_of_.size() != 1) return std::nullopt;
+  const std::string& only = transform_of_.begin()->first;
+  const auto own = histories_.at(only).at(frame.info.acquired).tracker_from_sensor;
+  if (!own || (own->translation() - pose->translation()).norm() > kSameBirdMm) return std::nullopt;
+  return only;
 }
 
 SequenceWriter::Fields RecordingWriter::fields_of(const wire::VideoFrame& frame) const {

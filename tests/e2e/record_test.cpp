@@ -1,6 +1,7 @@
 // `birdseye record` of the simulated cart, from the outside.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/clock.hpp"
@@ -34,12 +35,13 @@ cat film.log gone.log
 
 struct Played {
   std::size_t frames = 0, birds = 0;
-  std::size_t posed = 0;  ///< of the frames after the first measurement: before it no bird has told its name
+  std::size_t posed = 0;  ///< of the frames after the scope's first measurement: before it the scope has told no name
   std::string ending;
 };
 
 Played play(const fs::path& path) {
   Played played;
+  bool scope_told = false;
   auto reader = host::RecordingReader::open(path, {});
   EXPECT_TRUE(reader) << reader.error().what;
   while (reader) {
@@ -50,11 +52,14 @@ Played play(const fs::path& path) {
       break;
     }
     if (!*event) continue;
-    played.birds += std::holds_alternative<wire::Birds>(**event) ? 1 : 0;
+    if (const auto* birds = std::get_if<wire::Birds>(&**event)) {
+      ++played.birds;
+      scope_told |= std::ranges::any_of(birds->birds, [](const auto& bird) { return bird.name == "scope"; });
+    }
     const auto* frame = std::get_if<wire::VideoFrame>(&**event);
     if (frame == nullptr) continue;
     ++played.frames;
-    played.posed += played.birds > 0 && frame->info.pose.tracker_from_sensor ? 1 : 0;
+    played.posed += scope_told && frame->info.pose.tracker_from_sensor ? 1 : 0;
     EXPECT_EQ(frame->rgb->size(), 3U * 192 * 144);
   }
   return played;

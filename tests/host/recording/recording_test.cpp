@@ -7,6 +7,7 @@
 #include "drivers/system/clock.hpp"
 #include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
+#include "host/recording/sequence_writer.hpp"
 #include "tests/support/json_file.hpp"
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
@@ -195,6 +196,34 @@ TEST(Recording, ASequenceAloneIsPlayedToo) {
   }
   const Played other = play(scratch / "r/video.igs.mha", {.transform = "ProbeToTracker"});
   EXPECT_NE(other.ending.what.find("PointerToTracker, ScopeToTracker"), std::string::npos) << other.ending.what;
+}
+
+/// What video.igs.mha says of the transforms of frame 4, where only one bird has told its name before.
+std::string transforms_after(const std::string& bird, const Eigen::Vector3d& off_mm) {
+  const Scratch scratch;
+  const wire::VideoFrame posed = frame(4, 16, 12);
+  const Transform<Tracker, Sensor>& pose = *posed.info.pose.tracker_from_sensor;
+  std::vector<wire::Event> events;
+  for (int n = -4; n < 4; ++n) {
+    events.emplace_back(wire::Birds{posed.info.acquired + Duration::from_ms(10 * n),
+                                    {{bird, {pose.rotation(), pose.translation() + off_mm}}}});
+  }
+  events.emplace_back(posed);
+  record(scratch / "r", events);
+  const Played played = play(scratch / "r/video.igs.mha", {.transform = transform_name(bird)});
+  for (const wire::Event& event : played.events) {
+    const auto* f = std::get_if<wire::VideoFrame>(&event);
+    if (f == nullptr) continue;
+    if (!f->info.pose.tracker_from_sensor) return f->info.pose.reason;
+    return f->info.pose.tracker_from_sensor->matrix().isApprox(pose.matrix()) ? "the frame's" : "the bird's own";
+  }
+  return played.ending.what;
+}
+
+TEST(Recording, APoseOfAFrameIsOfNoBirdButTheOneThatItAgreesWith) {
+  EXPECT_EQ(transforms_after("scope", {0, 300, 0}), "the frame's") << "the scope by name";
+  EXPECT_EQ(transforms_after("probe", {0, 0.4, 0}), "the frame's") << "the only bird, with no scope beside it";
+  EXPECT_EQ(transforms_after("pointer", {0, 300, 0}), "the bird's own") << "the scope has not told its name yet";
 }
 
 TEST(Recording, ACompressedOneHasAllFramesAndAllEvents) {
