@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "calibration/base/units.hpp"
 
@@ -25,6 +26,7 @@ constexpr std::size_t kRecent = 16;           // records, among which one that r
 constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading
 constexpr double kSeldom = 0.02;              // two just now are less; three then are chance once in 10^6
 constexpr int kFrozenWhereSeldom = 3;
+constexpr std::size_t kAlive = 4;  // different records among the recent: a frozen bird's, and two damaged, are three
 constexpr double kMuchNearer = 3;  // the mirrored position, than the one reported
 
 Duration gap_between(DeviceTime earlier, DeviceTime later) {
@@ -51,6 +53,17 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
                      fmt::format("position beyond the scale of {:.0f} mm", layout_.mm_per_count * 32768)};
   }
   return std::nullopt;
+}
+
+/// Only what a sensor has sent before tells frozen from at rest, and at first there is nothing before.
+std::optional<BirdGuard::Objection> BirdGuard::doubt_of_life() {
+  if (noise_.alive || limits_.frozen_after <= 0) return std::nullopt;
+  const std::set<std::vector<std::int16_t>> different(recent_words_.begin(), recent_words_.end());
+  noise_.alive = different.size() >= kAlive;
+  if (noise_.alive) return std::nullopt;
+  if (recent_words_.size() < kRecent)
+    return Objection{DoubtKind::unconfirmed, "not yet confirmed: its records since the start are hardly different"};
+  return Objection{DoubtKind::frozen, "frozen, or without noise and at rest, since the start: move the sensor"};
 }
 
 std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vector<std::int16_t>& words,
@@ -246,6 +259,7 @@ BirdReading BirdGuard::judge_itself(const Record& record, DeviceTime acquired, D
   if (pose->position_mm) sample.position_mm = *pose->position_mm;
   if (pose->rotation) sample.rotation = *pose->rotation;
   if (const Objection objection = place(sample); objection.kind != DoubtKind::none) return withhold(objection);
+  if (const auto doubt = doubt_of_life()) return withhold(*doubt);
   reading.kind = DoubtKind::none;
   reading.doubt.clear();
   reading.pose = *std::move(pose);

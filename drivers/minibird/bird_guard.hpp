@@ -24,6 +24,7 @@ class BirdGuard {
     double restless = 0;     ///< how often, of late, a way led back: noise is there
     double back_counts = 0;  ///< how far such a way was, on average
     double repeats = 1;      ///< how often, of late, a record was one of those before
+    bool alive = false;      ///< several records in a row differed: what is frozen since before the stream shows none
   };
   [[nodiscard]] const Noise& noise() const { return noise_; }
   void expect(const Noise& noise) { noise_ = noise; }
@@ -45,6 +46,7 @@ class BirdGuard {
   };
 
   [[nodiscard]] std::optional<Objection> doubt_of_words(const std::vector<std::int16_t>& words) const;
+  std::optional<Objection> doubt_of_life();
   std::optional<Objection> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
   Objection place(Sample sample);
   BirdReading judge_itself(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain);

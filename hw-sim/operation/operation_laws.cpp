@@ -54,10 +54,6 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
       if (&other == &span) continue;
-      // Only its noise tells a frozen bird from one at rest, and an appliance that has just started has met no noise.
-      const bool starts_within = other.fault.kind == FaultKind::appliance_restart && other.begins_s < span.ends_s &&
-                                 other.ends_s > span.begins_s;
-      if (span.fault.kind == FaultKind::frozen_pose && starts_within) span.signs.lies = true;
       if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
     }
   }

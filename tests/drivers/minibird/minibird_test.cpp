@@ -105,6 +105,7 @@ class Stream {
 MiniBirdSettings quick(int birds) {
   MiniBirdSettings settings;
   settings.birds = birds;
+  settings.plausibility.frozen_after = 0;  // the line's sensors have no noise
   settings.reset_hold = settings.reset_settle = settings.configure_wait = settings.bus_reset_wait =
       settings.run_wait = {};
   settings.quiet = Duration::from_ms(3);

@@ -94,6 +94,17 @@ TEST_P(MendedSeed, BreaksNoLawAnyMore) {
 INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104, 1003, 1004, 1009, 1023, 1076, 1093),
                          [](const auto& of) { return std::to_string(of.param); });
 
+/// - 106, 168, 229, 260: a bird that had frozen before birdseyed was started again had poses, as one at rest has.
+class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
+  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
+INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms, ::testing::Values(106, 168, 229, 260),
+                         [](const auto& of) { return std::to_string(of.param); });
+
 TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
   const OperationOutcome first = operate({.seed = 5, .minutes = 1.5}), again = operate({.seed = 5, .minutes = 1.5});
   EXPECT_EQ(first.log, again.log);
