@@ -22,6 +22,14 @@ namespace {
 namespace fs = std::filesystem;
 using Row = std::vector<std::string>;
 
+constexpr std::string_view kNotInACell = ",;\t\n\r\"#";
+
+std::string without(std::string_view characters, std::string text) {
+  std::ranges::replace_if(
+      text, [&](char c) { return characters.find(c) != std::string_view::npos; }, '-');
+  return text;
+}
+
 struct TextTable {
   Row columns;
   std::vector<double> mm_per;  ///< of each column as the header names its unit; 0 where it names none
@@ -275,16 +283,14 @@ Result<std::vector<calibration::FieldCheck>> read_history(const fs::path& path) 
 }
 
 std::string day_name(std::string when) {
-  std::replace_if(
-      when.begin(), when.end(), [](char c) { return std::string_view(",;\t\n\r\" ").find(c) < 7; }, '-');
-  return when;
+  return without(" ", without(kNotInACell, std::move(when)));
 }
 
 std::string history_text(const std::vector<calibration::FieldCheck>& history) {
   std::string out = "when,rms_mm,scale_percent,worst_mm,worst_place\n";
   for (const auto& day : history) {
     out += fmt::format("{},{:.4f},{:.4f},{:.4f},{}\n", day_name(day.when), day.rms_mm, day.scale_percent, day.worst_mm,
-                       day.worst_place);
+                       without(kNotInACell, day.worst_place));
   }
   return out;
 }

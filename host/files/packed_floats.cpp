@@ -29,6 +29,9 @@ Result<std::vector<float>> unpacked_floats(const std::string& text, std::size_t 
   const int decoded = EVP_DecodeBlock(compressed.data(), reinterpret_cast<const unsigned char*>(text.data()),
                                       static_cast<int>(text.size()));
   if (decoded < 0) return other;
+  // Zlib packs a thousand bytes into one and no more: no room is made for what the text cannot hold.
+  constexpr std::size_t kMostPacked = 1100;
+  if (count > compressed.size() * kMostPacked / sizeof(float)) return other;
   std::vector<float> values(count);
   uLongf bytes = count * sizeof(float);
   // Bytes of padding at the end are passed over.
