@@ -9,9 +9,12 @@ namespace birdseye::wire {
 
 namespace {
 
+/// What a client asks in JSON takes a tenth of that. To parse what a flood sends beyond it takes time that poses need.
+constexpr std::size_t kMostJsonBytes = 1024;
+
 Request string_request(const Header& header, std::span<const std::uint8_t> body) {
   const auto text = text_of_string(header, body);
-  if (!text) return DamagedRequest{header.type};
+  if (!text || text->size() > kMostJsonBytes) return DamagedRequest{header.type};
   try {
     if (header.device == kClockPingDevice) return nlohmann::json::parse(*text).get<ClockPing>();
     if (header.device == kSubscribeDevice) return nlohmann::json::parse(*text).get<Subscription>();

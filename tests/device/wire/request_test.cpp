@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <igtlStatusMessage.h>
+#include <igtlStringMessage.h>
 #include <igtlTrackingDataMessage.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -76,6 +77,19 @@ TEST(RequestReader, RefusesDamageAndGarbage) {
   auto large = pack(ClockPing{1}).bytes();
   large[46] = 1;  // a body of 16 MiB
   EXPECT_FALSE(RequestReader().push(large));
+}
+
+/// So that a flood of such takes no time from poses.
+TEST(RequestReader, ParsesNoMoreJsonThanARequestNeeds) {
+  const auto asked = [](std::size_t spaces) {
+    const auto message = igtl::StringMessage::New();
+    message->SetDeviceName("ClockPing");
+    std::string text = "{\"host_sent_ns\": 7" + std::string(spaces, ' ') + "}";
+    message->SetString(text);
+    return RequestReader().push(packed(*message))->front();
+  };
+  EXPECT_TRUE(std::holds_alternative<ClockPing>(asked(900)));
+  EXPECT_TRUE(std::holds_alternative<DamagedRequest>(asked(1024)));
 }
 
 /// A socket of somebody else's, to send what we would not.
