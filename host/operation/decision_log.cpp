@@ -85,10 +85,24 @@ std::optional<LoggedDecision> decision_of(const std::vector<std::string>& cells)
   return out;
 }
 
+/// The log of the window before, which a window that goes on in its folder may not write over.
+Result<void> keep_former(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::exists(folder / kFile, error)) return {};
+  std::filesystem::path kept;
+  for (int n = 1; kept.empty() || std::filesystem::exists(kept, error); ++n)
+    kept = folder / fmt::format("frames-{}.csv", n);
+  std::filesystem::rename(folder / kFile, kept, error);
+  if (!error) return {};
+  return Error{Errc::io, fmt::format("{}: cannot be kept as {} ({}); choose another --out", (folder / kFile).string(),
+                                     kept.filename().string(), error.message())};
+}
+
 }  // namespace
 
 Result<DecisionLog> DecisionLog::open(const std::filesystem::path& folder) {
   if (auto made = make_folder_durably(folder); !made) return made.error();
+  if (auto kept = keep_former(folder); !kept) return kept.error();
   DecisionLog log;
   log.folder_ = folder;
   log.file_.open(folder / kFile, std::ios::trunc);

@@ -34,7 +34,7 @@ struct LoggedDecision {
 /// memory.
 class DecisionLog {
  public:
-  /// folder: made if need be.
+  /// folder: made if need be. A log that is there already is kept beside it, as frames-1.csv, or the next that is free.
   static Result<DecisionLog> open(const std::filesystem::path& folder);
   void add(const LoggedDecision& decision);
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <utility>
 
 #include "tests/support/scratch.hpp"
 
@@ -64,6 +65,25 @@ TEST(DecisionLog, SaysOfEachFrameWhyAndByWhichFigures) {
   EXPECT_EQ(b.pose, PoseKind::refused);
   EXPECT_FALSE(b.expected) << "what is not known is absent";
   EXPECT_FALSE(b.camera_from_patient);
+}
+
+TEST(DecisionLog, AWindowThatGoesOnInAFolderKeepsTheLogsOfThoseBefore) {
+  const testing::Scratch scratch;
+  for (std::uint64_t n = 1; n <= 3; ++n) {
+    auto log = DecisionLog::open(scratch / "out");
+    ASSERT_TRUE(log) << log.error().what;
+    LoggedDecision decision = withheld();
+    decision.sequence = n;
+    log->add(decision);
+    ASSERT_TRUE(log->close());
+  }
+  for (const auto& [file, sequence] : {std::pair{"frames-1.csv", 1U}, {"frames-2.csv", 2U}, {"frames.csv", 3U}}) {
+    const auto read = read_decisions(scratch / "out" / file);
+    ASSERT_TRUE(read) << read.error().what;
+    ASSERT_EQ(read->size(), 1U) << file;
+    EXPECT_EQ(read->front().sequence, sequence) << file;
+  }
+  EXPECT_EQ(read_decisions(scratch / "out")->front().sequence, 3U) << "the newest is the folder's";
 }
 
 TEST(DecisionLog, ALineThatIsCutShortIsTheLastOrAnError) {
