@@ -147,16 +147,17 @@ Result<void> check_geometry(const fs::path& path, const ImageFile& image) {
   }
   // The grid of a displacement field may be as wide as its author likes.
   constexpr double kLeastSpacing_mm = 0.02, kWidestSpacing_mm = 20;
+  constexpr double kRounding = 1e-6;  // NIfTI's spacings are floats: their 0.02 is less than this one
   const double least_mm = image.spacing_mm.minCoeff(), widest_mm = image.spacing_mm.maxCoeff();
   if (!image.spacing_mm.allFinite() || !(least_mm > 0) || widest_mm > kFurthest_mm)
     return refused(Errc::bad_value, path, "has no sensible voxel spacing; export it again");
-  if (image.components == 1 && least_mm < kLeastSpacing_mm) {
+  if (image.components == 1 && least_mm < (1 - kRounding) * kLeastSpacing_mm) {
     return refused(Errc::bad_value, path,
                    fmt::format("has voxels {:.4g} mm apart, and those of a CT are {:.2g} to {:.2g} mm apart; is it in "
                                "metres? Export it in mm",
                                least_mm, kLeastSpacing_mm, kWidestSpacing_mm));
   }
-  if (image.components == 1 && widest_mm > kWidestSpacing_mm) {
+  if (image.components == 1 && widest_mm > (1 + kRounding) * kWidestSpacing_mm) {
     return refused(Errc::bad_value, path,
                    fmt::format("has voxels {:.4g} mm apart, and those of a CT are {:.2g} to {:.2g} mm apart; is it in "
                                "another unit than mm? Export it in mm",

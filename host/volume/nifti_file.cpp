@@ -149,9 +149,22 @@ std::string NiftiFile::code_fault() const {
   return {};
 }
 
+std::string NiftiFile::quaternion_fault() const {
+  if (quaternion_code() <= 0) return {};
+  // b, c and d of a unit quaternion; its a is what they leave of 1. Readers cut longer ones to a half turn.
+  const Eigen::Vector3d parts(number<float>(256), number<float>(260), number<float>(264));
+  constexpr double kRounding = 1e-3;
+  if (parts.squaredNorm() <= 1 + kRounding) return {};
+  return fmt::format(
+      "has a qform that is no rotation: its quaternion ({:.4g}, {:.4g}, {:.4g}) is longer than 1; export it again, or, "
+      "where its sform is right, keep that alone (as by fslorient -copysform2qform)",
+      parts.x(), parts.y(), parts.z());
+}
+
 GeometryGaps NiftiFile::gaps() const {
   GeometryGaps gaps;
   if (is_nifti()) gaps.beyond = code_fault();
+  if (gaps.beyond.empty() && is_nifti()) gaps.beyond = quaternion_fault();
   if (!gaps.beyond.empty()) return gaps;
   const Eigen::Vector3d apart = spacing();
   if (!(apart.minCoeff() > 0)) gaps.spacing = "does not say how far apart its voxels are (a pixdim is not above 0)";

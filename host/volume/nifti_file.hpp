@@ -57,6 +57,8 @@ class NiftiFile {
   [[nodiscard]] std::int16_t matrix_code() const { return number<std::int16_t>(254); }
   /// Why these are no codes of a patient's CT, with the remedy; empty where they are.
   [[nodiscard]] std::string code_fault() const;
+  /// Why the qform's quaternion is no rotation, with the remedy; empty where it is one, or does not count.
+  [[nodiscard]] std::string quaternion_fault() const;
   [[nodiscard]] std::string two_spacings() const;
   [[nodiscard]] double unit_mm() const;
   /// Of a place in the header's own frame and unit.

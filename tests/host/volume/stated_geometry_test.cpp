@@ -141,6 +141,7 @@ TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
   EXPECT_TRUE(import_volume(fs::path(scratch.file("by_matrix.nii", nifti(0, 2, 30.0F)))));
   EXPECT_TRUE(import_volume(fs::path(scratch.file("by_quaternion.nii", nifti(1, 0, 30.0F)))));
   EXPECT_TRUE(import_volume(fs::path(scratch.file("rounded.nii", nifti(1, 1, 0.01F)))));
+  EXPECT_TRUE(import_volume(fs::path(scratch.file("half_turn.nii", with_number(nifti(1, 0, 0.0F), 264, 1.0001F)))));
   for (const auto& [name, text, why] : std::vector<std::array<std::string, 3>>{
            {"none.nii", nifti(0, 0, 0.0F), "neither its qform nor its sform"},
            {"two.nii", nifti(1, 1, 12.0F), "12.0 mm apart"},
@@ -155,6 +156,8 @@ TEST(StatedGeometry, ANiftiFileSaysOnePlaceForItsVoxels) {
            {"both.nii", nifti(1, 4, 12.0F), "its sform is in the space of the MNI152 atlas"},
            {"unknown.nii", nifti(1, 9, 0.0F), "the sform code 9"},
            {"negative.nii", nifti(-1, 1, 0.0F), "the qform code -1"},
+           {"no_rotation.nii", with_number(nifti(1, 0, 0.0F), 256, 1.2F),
+            "its quaternion (1.2, 0, 0) is longer than 1"},
            {"far.nii", nifti(1, 1, 3.4e38F), "header"}}) {
     expect_refused(import_volume(fs::path(scratch.file(name, text))), name, why);
   }
@@ -309,6 +312,10 @@ TEST(StatedGeometry, VoxelsAndBodiesThatNoCtHasAreRefused) {
   };
   EXPECT_TRUE(import_volume(file("least.mha", 4, 0.02)));
   EXPECT_TRUE(import_volume(file("widest.mha", 4, 20)));
+  std::string floats = nifti(1, 0, 0);
+  for (const auto& [at, apart_mm] : {std::pair{80UL, 0.02F}, {84UL, 20.0F}, {88UL, 0.02F}})
+    floats = with_number(floats, at, apart_mm);
+  EXPECT_TRUE(import_volume(fs::path(scratch.file("floats.nii", floats)))) << "0.02 as a float is less than 0.02";
   expect_refused(import_volume(file("fine.mha", 4, 0.019)), "fine.mha", "metres");
   expect_refused(import_volume(file("coarse.mha", 4, 20.1)), "coarse.mha", "another unit");
   const auto body = [](const fs::path& path) -> Result<Volume> {
