@@ -323,6 +323,10 @@ Verdict judge_fiducials(const FiducialsFound& out) {
   // Three markers fit whatever one of them is, mirrored or not: the figures above then rest on nothing.
   const bool unchecked = out.fit.residuals_mm.size() == 3;
   verdict.add(wrong || unchecked ? Grade::marginal : Grade::pass, out.odd.told);
+  if (unchecked) {
+    verdict.add(Grade::marginal, "three markers lie in one plane: whether a file is mirrored cannot be told",
+                "touch one of the two off the plane of the three");
+  }
   if (out.refinement) verdict.add(out.refinement->accepted ? Grade::pass : Grade::marginal, out.refinement->told);
   return verdict;
 }
