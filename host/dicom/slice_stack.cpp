@@ -29,6 +29,18 @@ double tilt_of(const std::vector<DicomSlice>& slices, const Eigen::Vector3d& nor
   return 0;
 }
 
+/// How far the slice that is furthest from it lies beside the line from the first to the last, on which a tilted gantry
+/// leaves them all.
+double beside_line_mm(const std::vector<DicomSlice>& slices, const Eigen::Vector3d& normal) {
+  const Eigen::Vector3d whole = slices.back().position_mm - slices.front().position_mm;
+  double most_mm = 0;
+  for (const DicomSlice& slice : slices) {
+    const Eigen::Vector3d move = slice.position_mm - slices.front().position_mm;
+    most_mm = std::max(most_mm, (move - move.dot(normal) / whole.dot(normal) * whole).norm());
+  }
+  return most_mm;
+}
+
 /// Whether each slice reaches to the next; not where they do not say how thick they are.
 bool touch(const std::vector<DicomSlice>& slices, const std::vector<double>& steps) {
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -63,6 +75,15 @@ SliceStack stack_slices(std::vector<DicomSlice> slices, const SliceName& name) {
   }
   stack.step_mm = (s.back().position_mm - s.front().position_mm).dot(normal) / static_cast<double>(s.size() - 1);
   stack.tilt_deg = tilt_of(s, normal);
+  if (const double beside_mm = beside_line_mm(s, normal);
+      stack.tilt_deg > 0 && beside_mm > 0.5 * s.front().spacing_mm.minCoeff()) {
+    stack.tilt_deg = 0;
+    stack.problem = fmt::format(
+        "its slices are shifted sideways unevenly, one of them by {:.2f} mm from the line of the first and the last: a "
+        "tilted gantry shifts all alike; export the whole series again",
+        beside_mm);
+    return stack;
+  }
   // Against the median, which a hole does not move.
   std::vector<double> sorted = steps;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());

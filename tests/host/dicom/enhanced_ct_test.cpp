@@ -294,6 +294,23 @@ TEST(Untilt, EvensOutStepsThatLeaveNoHole) {
   EXPECT_NE(hole.error().what.find("missing or unevenly spaced"), std::string::npos) << hole.error().what;
 }
 
+TEST(Untilt, IsNoRemedyForSlicesThatAreShiftedUnevenly) {
+  const Scratch scratch;
+  for (int k = 0; k < 5; ++k) {
+    testing::CtSlice slice;
+    slice.instance = k + 1;
+    slice.place_mm = {k == 2 ? 10.0 : 0.0, 0, 2.0 * k};
+    testing::write_ct_slice(scratch / "ct" / fmt::format("{}.dcm", k), slice);
+  }
+  VolumeSource source(scratch / "ct");
+  for (const bool untilt : {false, true}) {
+    source.untilt = untilt;
+    const auto read = import_volume(source);
+    ASSERT_FALSE(read) << untilt;
+    EXPECT_NE(read.error().what.find("unevenly, one of them by 10.00 mm"), std::string::npos) << read.error().what;
+  }
+}
+
 TEST(Untilt, LeavesAStraightStackAsItIs) {
   const Scratch scratch;
   testing::write_ct_series(scratch / "ct", {}, 5);
