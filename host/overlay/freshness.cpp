@@ -28,10 +28,10 @@ Freshness freshness_at(HostTime now, const Exposure& exposure, Duration pose_age
     out.why_too_old = words("why_stopped", age.seconds());
   } else if (age > limits.most_age) {
     out.why_too_old = words("why_old_picture", age.seconds() * 1e3);
+  } else if (!exposure.doubt.empty()) {  // stamps that are ahead make poses look old, which are not
+    out.why_too_old = exposure.doubt;
   } else if (pose_age > Duration{} && age + pose_age > limits.most_age) {
     out.why_too_old = words("why_old_pose", (age + pose_age).seconds() * 1e3);
-  } else {
-    out.why_too_old = exposure.doubt;
   }
   out.overlaid_until = exposed + (limits.most_age - std::max(pose_age, Duration{})) + limits.late;
   out.bare_until = exposed + limits.stopped + limits.late;

@@ -71,7 +71,8 @@ std::vector<Row> while_running() {
           [](Rehearsal& o) { o.frames_repeat = true; }),
       row("the same picture again and again, with fresh stamps", Must::end, kVideo,
           [](Rehearsal& o) { o.picture_frozen = true; }),
-      row("stamps 1 s ahead", Must::refuse, "", [](Rehearsal& o) { o.frame_stamp_off = Duration::from_ms(1000); }),
+      row("stamps 1 s ahead", Must::refuse, "980 ms ahead of the clock",
+          [](Rehearsal& o) { o.frame_stamp_off = Duration::from_ms(1000); }),
       row(
           "stamps 10 ms ahead", Must::withhold, "", [](Rehearsal& o) { o.frame_stamp_off = Duration::from_ms(10); },
           "the pose is predicted; the circle counts it"),
@@ -80,7 +81,7 @@ std::vector<Row> while_running() {
           "at this scope's speed less than the circle"),
       row("stamps 200 ms late", Must::refuse, "the picture is",
           [](Rehearsal& o) { o.frame_stamp_off = Duration::from_ms(-200); }),
-      row("the camera's clock stepped by 5 s", Must::refuse, "",
+      row("the camera's clock stepped by 5 s", Must::refuse, "4980 ms ahead of the clock",
           [](Rehearsal& o) { o.frame_stamp_off = Duration::from_ms(5000); }),
       row("frames come 200 ms late", Must::refuse, "the picture is",
           [](Rehearsal& o) { o.frame_delay = Duration::from_ms(200); }),

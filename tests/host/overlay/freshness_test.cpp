@@ -56,6 +56,8 @@ TEST(Freshness, OfAStampAheadOfTheClockTheArrivalCounts) {
   EXPECT_EQ(ahead.at.ns, arrived.ns);
   EXPECT_EQ(ahead.doubt, "the frames' stamps lie 500 ms ahead of the clock: how old they are is not known");
   EXPECT_EQ(freshness_at(arrived, ahead, {}, {}).why_too_old, ahead.doubt) << "no overlay from the first frame on";
+  EXPECT_EQ(freshness_at(arrived, ahead, Duration::from_ms(510), {}).why_too_old, ahead.doubt)
+      << "it is the stamp that makes the pose look old";
   EXPECT_TRUE(freshness_at(arrived + Duration::from_ms(301), ahead, {}, {}).stopped);
   EXPECT_EQ(exposure_of(std::nullopt, sigma, arrived).at.ns, arrived.ns);
 }
