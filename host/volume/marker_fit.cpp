@@ -83,18 +83,32 @@ Neighbourhood neighbourhood(const Volume& ct, const MarkerShape& shape, const Ve
   out.hu.resize(static_cast<Eigen::Index>(marker.size()));
   out.surroundings_hu.resize(out.hu.size());
   const std::size_t stride = clear.size() / kMostSources + 1;
-  for (std::size_t at = 0; at < marker.size(); ++at) {
-    double sum = 0;
-    double weights = 0;
+  // A few voxels at a time, whose sums the processor makes side by side.
+  constexpr std::size_t kAtOnce = 4;
+  using Lanes = Eigen::Array<double, static_cast<int>(kAtOnce), 1>;
+  for (std::size_t first = 0; first < marker.size(); first += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, marker.size() - first);
+    std::array<Lanes, 3> place;
+    for (std::size_t n = 0; n < kAtOnce; ++n) {
+      const Vector3d& p = marker[first + std::min(n, count - 1)].first;
+      for (std::size_t a = 0; a < 3; ++a) place[a][static_cast<Eigen::Index>(n)] = p[static_cast<Eigen::Index>(a)];
+    }
+    Lanes sums = Lanes::Zero(), weights = Lanes::Zero();
     for (std::size_t c = 0; c < clear.size(); c += stride) {
+      const Vector3d& from = clear[c].first;
+      const Lanes squared_mm2 =
+          (place[0] - from.x()).square() + (place[1] - from.y()).square() + (place[2] - from.z()).square();
       // Steep: what is next to a voxel counts, not what there is most of.
-      const double weight = 1 / std::pow((marker[at].first - clear[c].first).squaredNorm(), 2);
-      sum += weight * clear[c].second;
+      const Lanes weight = squared_mm2.square().inverse();
+      sums += weight * clear[c].second;
       weights += weight;
     }
-    out.from_start_mm.push_back(marker[at].first);
-    out.hu[static_cast<Eigen::Index>(at)] = marker[at].second;
-    out.surroundings_hu[static_cast<Eigen::Index>(at)] = sum / weights;
+    for (std::size_t n = 0; n < count; ++n) {
+      const auto lane = static_cast<Eigen::Index>(n), at = static_cast<Eigen::Index>(first + n);
+      out.from_start_mm.push_back(marker[first + n].first);
+      out.hu[at] = marker[first + n].second;
+      out.surroundings_hu[at] = sums[lane] / weights[lane];
+    }
   }
   return out;
 }

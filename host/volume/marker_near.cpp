@@ -40,35 +40,57 @@ Volume part_of(const Volume& ct, const Vector3d& place, double reach_mm) {
   return part;
 }
 
-using BrightVoxels = std::vector<std::pair<Vector3d, double>>;  ///< where, and their HU
+/// The voxels of a part that lie within reach of a place.
+class Surroundings {
+ public:
+  Surroundings(const Volume& part, const Vector3d& place, double reach_mm)
+      : part_(part), voxel_from_patient_(part.patient_from_voxel.inverse()), place_(place), reach_mm_(reach_mm) {}
+
+  /// Gives of those within a radius, in their order, place and HU. It looks at no more voxels than such a ball's box
+  /// has.
+  template <class Use>
+  void within(const Vector3d& at, double radius_mm, const Use& use) const {
+    const Eigen::Array3d middle = (voxel_from_patient_ * at).array();
+    const Eigen::Array3d reach = radius_mm * voxel_from_patient_.linear().rowwise().norm().array() + 0.01;
+    const Eigen::Array3d last(part_.size[0] - 1, part_.size[1] - 1, part_.size[2] - 1);
+    const Eigen::Array3i low = (middle - reach).ceil().max(0).cast<int>();
+    const Eigen::Array3i high = (middle + reach).floor().min(last).cast<int>();
+    for (int k = low.z(); k <= high.z(); ++k) {
+      for (int j = low.y(); j <= high.y(); ++j) {
+        for (int i = low.x(); i <= high.x(); ++i) {
+          const Vector3d p = part_.patient_from_voxel * Vector3d(i, j, k);
+          if ((p - at).norm() > radius_mm || (p - place_).norm() > reach_mm_) continue;
+          use(p, static_cast<double>(part_.at(i, j, k)));
+        }
+      }
+    }
+  }
+
+ private:
+  const Volume& part_;
+  const Eigen::Affine3d voxel_from_patient_;
+  const Vector3d place_;
+  const double reach_mm_;
+};
 
 /// Whether a ball about a place is brighter than what lies as far again round it, by more than noise leaves of a mean.
-bool stands_out(const BrightVoxels& voxels, const Vector3d& at, double radius_mm) {
+bool stands_out(const Surroundings& voxels, const Vector3d& at, double radius_mm) {
   constexpr double kLeast_hu = 40;
   double inside = 0, around = 0, inside_count = 1e-9, around_count = 1e-9;
-  for (const auto& [p, hu] : voxels) {
+  voxels.within(at, 2 * radius_mm, [&](const Vector3d& p, double hu) {
     const double off_mm = (p - at).norm();
-    if (off_mm > 2 * radius_mm) continue;
     (off_mm <= radius_mm ? inside : around) += hu;
     (off_mm <= radius_mm ? inside_count : around_count) += 1;
-  }
+  });
   return inside / inside_count > around / around_count + kLeast_hu;
 }
 
 /// The centres of what is bright about a place: each start moves to the middle of what is brightest within a radius.
 std::vector<Vector3d> bright_places(const Volume& part, const Vector3d& place, double radius_mm) {
-  BrightVoxels voxels;
+  const double reach_mm = kPickReach_mm + 2 * radius_mm;
+  const Surroundings voxels(part, place, reach_mm);
   double low = 1e9;
-  for (int k = 0; k < part.size[2]; ++k) {
-    for (int j = 0; j < part.size[1]; ++j) {
-      for (int i = 0; i < part.size[0]; ++i) {
-        const Vector3d p = part.patient_from_voxel * Vector3d(i, j, k);
-        if ((p - place).norm() > kPickReach_mm + 2 * radius_mm) continue;
-        voxels.emplace_back(p, part.at(i, j, k));
-        low = std::min(low, voxels.back().second);
-      }
-    }
-  }
+  voxels.within(place, reach_mm, [&](const Vector3d&, double hu) { low = std::min(low, hu); });
   std::vector<Vector3d> places;
   for (int start = 0; start < 27; ++start) {
     constexpr int kRounds = 12;
@@ -77,12 +99,11 @@ std::vector<Vector3d> bright_places(const Volume& part, const Vector3d& place, d
     for (int round = 0; round < kRounds; ++round) {
       Vector3d sum = Vector3d::Zero();
       double weights = 1e-9;
-      for (const auto& [p, hu] : voxels) {
-        if ((p - at).norm() > radius_mm) continue;
+      voxels.within(at, radius_mm, [&](const Vector3d& p, double hu) {
         const double weight = (hu - low) * (hu - low);
         sum += weight * p;
         weights += weight;
-      }
+      });
       const Vector3d before = at;
       at = sum.isZero() ? at : Vector3d(sum / weights);
       if ((at - before).norm() < 1e-3) break;
