@@ -48,9 +48,10 @@ endfunction()
 # The key of the machine on which tests run: never that of whoever runs them.
 set(BIRDSEYE_TEST_IDENTITY ${CMAKE_BINARY_DIR}/test-identity)
 
-# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. Those of e2e run the cart in real time, each alone.
+# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. ALONE: nothing else runs beside one of them, for a machine
+# that is busy with other things would rightly show or keep less than it looks for.
 function(birdseye_test name)
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "ALONE" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options GTest::gmock_main)
   if(NOT ARG_LABEL)
@@ -64,7 +65,7 @@ function(birdseye_test name)
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
   target_compile_definitions(${name} PRIVATE BIRDSEYE_EMULATOR="${emulator}")
   set(alone "")
-  if(ARG_LABEL STREQUAL "e2e")
+  if(ARG_ALONE)
     set(alone RUN_SERIAL TRUE)
   endif()
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
