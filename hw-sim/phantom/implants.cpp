@@ -51,7 +51,7 @@ class Grower {
       length *= 0.88;
       to = from + length * direction;
     }
-    tree_.push_back({from, to, radius, thinner});
+    tree_.emplace_back(from, to, radius, thinner);
     Vector3d across = plane.cross(direction);
     if (across.norm() < 0.1) across = direction.unitOrthogonal();
     across.normalize();
@@ -97,9 +97,17 @@ std::vector<Vector3d> choose_markers(const Body& body, const Vector3d& liver_cen
 
 }  // namespace
 
-double distance_mm(const VesselTree& tree, const Vector3d& point) {
-  double nearest = std::numeric_limits<double>::max();
+Rod::Rod(const Vector3d& from, const Vector3d& to, double radius_from_mm, double radius_to_mm)
+    : a(from), b(to), radius_a_mm(radius_from_mm), radius_b_mm(radius_to_mm), middle(0.5 * (from + to)) {
+  constexpr double kRounding_mm = 1e-6;
+  reach_mm = 0.5 * (to - from).norm() + std::max(radius_from_mm, radius_to_mm) + kRounding_mm;
+}
+
+double distance_mm(const VesselTree& tree, const Vector3d& point, double at_most_mm) {
+  double nearest = at_most_mm;
   for (const Rod& rod : tree) {
+    const double within_mm = nearest + rod.reach_mm;
+    if (within_mm < 0 || (point - rod.middle).squaredNorm() > within_mm * within_mm) continue;
     nearest = std::min(nearest, tapered_rod_mm(point, rod.a, rod.b, rod.radius_a_mm, rod.radius_b_mm));
   }
   return nearest;
@@ -178,8 +186,8 @@ std::vector<std::uint8_t> implant(Body& body, const Implants& implants, std::uin
         if (body.liver_mm(p) < 0) {
           labels[at] = kLiver;
           const double noise = 6.0 * hashed_normal(seed + 21, at);
-          const double hepatic = distance_mm(implants.hepatic, p);
-          const double portal = distance_mm(implants.portal, p);
+          const double hepatic = distance_mm(implants.hepatic, p, edge_mm);
+          const double portal = distance_mm(implants.portal, p, edge_mm);
           const double tumour = ellipsoid_mm(p, implants.tumour_centre_mm, implants.tumour_radii_mm);
           blend(hu, occupancy(hepatic, edge_mm), kHepaticHu + noise);
           blend(hu, occupancy(portal, edge_mm), kPortalHu + noise);

@@ -12,12 +12,17 @@ namespace birdseye::hw_sim {
 enum Label : std::uint8_t { kBackground = 0, kLiver = 1, kPortal = 2, kHepatic = 3, kTumour = 4 };
 
 struct Rod {
+  Rod(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius_from_mm, double radius_to_mm);
+
   Eigen::Vector3d a, b;
   double radius_a_mm, radius_b_mm;
+  Eigen::Vector3d middle;
+  double reach_mm;  ///< no part of it is farther from the middle
 };
 using VesselTree = std::vector<Rod>;
 
-double distance_mm(const VesselTree& tree, const Eigen::Vector3d& point);
+/// Less than at_most_mm, or that: what is farther is not looked at.
+double distance_mm(const VesselTree& tree, const Eigen::Vector3d& point, double at_most_mm);
 
 /// What is put into a body: everything that the demo looks for and whose truth is known.
 struct Implants {

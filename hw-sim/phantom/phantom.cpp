@@ -51,17 +51,18 @@ Result<void> write_surfaces(const std::filesystem::path& folder, const Body& bod
     for (const Vector3d& m : implants.markers_mm) nearest = std::min(nearest, (p - m).norm() - kMarkerRadiusMm);
     return nearest;
   };
+  // Of a field a surface takes the corners of the cells that it goes through, none of which is as far from it as this.
+  constexpr double kVessels_mm = 1, kAtMost_mm = 4 * kVessels_mm;
+  const auto vessels = [](const VesselTree& tree) {
+    return [&tree](const Vector3d& p) { return distance_mm(tree, p, kAtMost_mm); };
+  };
   const auto portal_box = tree_box(implants.portal);
   const auto hepatic_box = tree_box(implants.hepatic);
   for (const Result<void>& written : {
            write("liver.ply", body.liver_mm, low, high, 2.5),
            write("skin.ply", body.skin_mm, low, high, 4.0),
-           write(
-               "portal.ply", [&](const Vector3d& p) { return distance_mm(implants.portal, p); }, portal_box.first,
-               portal_box.second, 1.0),
-           write(
-               "hepatic.ply", [&](const Vector3d& p) { return distance_mm(implants.hepatic, p); }, hepatic_box.first,
-               hepatic_box.second, 1.0),
+           write("portal.ply", vessels(implants.portal), portal_box.first, portal_box.second, kVessels_mm),
+           write("hepatic.ply", vessels(implants.hepatic), hepatic_box.first, hepatic_box.second, kVessels_mm),
            write(
                "tumour.ply",
                [&](const Vector3d& p) { return ellipsoid_mm(p, implants.tumour_centre_mm, implants.tumour_radii_mm); },

@@ -123,7 +123,7 @@ Head procedural_head(std::uint64_t seed, const Grid& grid) {
           lay(brain, 36);
           lay(ellipsoid_mm(half, {13, 6, 40}, {6, 32, 10}), 8);  // ventricles
           if (skin < 0) head.labels[at] = kHead;
-          const double artery = distance_mm(head.arteries, p);
+          const double artery = distance_mm(head.arteries, p, kEdgeMm);
           const double tumour = ellipsoid_mm(p, head.tumour_centre_mm, kTumourRadiiMm);
           lay(artery, 260);
           lay(tumour, 130);
