@@ -153,10 +153,10 @@ Result<std::unique_ptr<SimulatedCart>> SimulatedCart::start(const SimulatedCartS
   auto simulator = ChildProcess::start(command, folder / "simulator.log", ChildProcess::Pipe::stdout_from_child,
                                        ChildProcess::Signals::with_us, ChildProcess::Life::ours);
   if (!simulator) return std::move(simulator).error();
-  const auto line = simulator->read_line(Deadline::after(Duration::from_ms(30'000)));
+  const auto line = simulator->read_line(Deadline::after(Duration::from_ms(120'000)));
   if (!line) return line.error();
   if (!*line || line->value().find("\"ready\"") == std::string::npos) {
-    return Error{Errc::timeout, "birdseye-sim: not ready within 30 s; see simulator.log"};
+    return Error{Errc::timeout, "birdseye-sim: not ready within 120 s; see simulator.log"};
   }
   auto sheet = read_sheet(folder / "cart.json");
   if (!sheet) return std::move(sheet).error();
