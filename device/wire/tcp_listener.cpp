@@ -9,11 +9,10 @@
 #include <cerrno>
 #include <deque>
 #include <list>
-#include <map>
 #include <utility>
 #include <vector>
 
-#include "calibration/time/rate_limit.hpp"
+#include "device/wire/handshake_limits.hpp"
 #include "device/wire/socket_link.hpp"
 #include "device/wire/tcp_link.hpp"
 #include "device/wire/tls_link.hpp"
@@ -32,7 +31,7 @@ constexpr std::uint8_t kHandshakeRecord = 22;
 // A handshake takes a good part of a millisecond of the thread that sends poses.
 constexpr Duration kPerHandshake = Duration::from_ms(200);
 constexpr std::int64_t kHandshakesAtOnce = 10;
-constexpr std::size_t kMostHostsRemembered = 64;
+constexpr std::size_t kMostHostsRemembered = 1024;  // as four whole networks have, in some 100 kB
 // Of all hosts, between two looks at the clients: the poses wait no longer for many handshakes than for these.
 constexpr int kMostStepsAtOnce = 4;
 
@@ -67,13 +66,12 @@ class Gate {
   /// Whether it stays.
   bool go_on(Arrival& arrival, short told);
   bool begin_tls(Arrival& arrival);
-  [[nodiscard]] bool may_shake(const std::string& host);
   void let_in(std::unique_ptr<Link> link) { let_in_.push_back(std::move(link)); }
 
   Admission admission_;
   std::list<Arrival> arrivals_;
   std::deque<std::unique_ptr<Link>> let_in_;
-  std::map<std::string, RateLimit> handshakes_;
+  HandshakeLimits handshakes_{kPerHandshake, kHandshakesAtOnce, kMostHostsRemembered};
 };
 
 void Gate::take(UniqueFd fd, std::string host) {
@@ -90,18 +88,8 @@ void Gate::take(UniqueFd fd, std::string host) {
   if (!admission_.allow_plain && !begin_tls(arrivals_.back())) arrivals_.pop_back();
 }
 
-bool Gate::may_shake(const std::string& host) {
-  const DeviceTime now = device_now();
-  std::erase_if(handshakes_, [&](const auto& of_host) { return of_host.second.rested(now); });
-  if (handshakes_.size() >= kMostHostsRemembered) handshakes_.clear();
-  RateLimit& limit = handshakes_.try_emplace(host, kPerHandshake, kHandshakesAtOnce).first->second;
-  if (now < limit.free_at()) return false;
-  limit.passed(now);
-  return true;
-}
-
 bool Gate::begin_tls(Arrival& arrival) {
-  if (!may_shake(arrival.host)) return false;
+  if (!handshakes_.pass(arrival.host, device_now())) return false;
   auto link = TlsLink::over(std::move(arrival.fd), admission_.tls, TlsLink::Side::server);
   if (!link) return false;
   arrival.tls = *std::move(link);

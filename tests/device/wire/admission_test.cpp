@@ -10,6 +10,7 @@
 #include <string>
 
 #include "device/wire/client.hpp"
+#include "device/wire/handshake_limits.hpp"
 #include "device/wire/server.hpp"
 #include "device/wire/tcp_link.hpp"
 #include "device/wire/tls_link.hpp"
@@ -112,6 +113,36 @@ TEST_F(AdmittedServer, OneMachinesHandshakesAreBoundedInNumberAndRateAndNoOthers
   EXPECT_GT(let_in, 0);
   EXPECT_LT(let_in, 3000);
   EXPECT_EQ(first_word(by_tls(kThere)), "ready");
+}
+
+TEST(HandshakeLimits, AMachineThatHasToWaitIsNotFreedByManyOthers) {
+  HandshakeLimits limits(Duration::from_ms(200), 10, 64);
+  const DeviceTime now{1'000'000'000};
+  while (limits.pass("one", now)) continue;
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(limits.pass("other " + std::to_string(i), now)) << i;
+  EXPECT_FALSE(limits.pass("one", now));
+  EXPECT_TRUE(limits.pass("one", now + Duration::from_ms(200))) << "its own turn comes as ever";
+}
+
+TEST(HandshakeLimits, WhereAllHaveToWaitSoHasANewMachine) {
+  HandshakeLimits limits(Duration::from_ms(200), 10, 64);
+  const DeviceTime now{1'000'000'000};
+  for (int i = 0; i < 64; ++i) {
+    while (limits.pass("one of many " + std::to_string(i), now)) continue;
+  }
+  EXPECT_FALSE(limits.pass("new", now));
+  EXPECT_TRUE(limits.pass("new", now + Duration::from_ms(200)));
+}
+
+TEST(HandshakeLimits, OfTwoThatNeedNotWaitTheOneWithLessBehindItIsForgotten) {
+  HandshakeLimits limits(Duration::from_ms(200), 10, 2);
+  const DeviceTime now{1'000'000'000};
+  for (int i = 0; i < 9; ++i) EXPECT_TRUE(limits.pass("busy", now));
+  EXPECT_TRUE(limits.pass("other", now));
+  EXPECT_TRUE(limits.pass("new", now));
+  EXPECT_TRUE(limits.pass("busy", now));
+  EXPECT_TRUE(limits.pass("busy", now));
+  EXPECT_FALSE(limits.pass("busy", now)) << "all eleven of its own count";
 }
 
 TEST_F(AdmittedServer, ManyHandshakesAtOnceAreGoneOnWithAFewAtATime) {
