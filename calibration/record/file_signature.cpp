@@ -18,6 +18,8 @@ nlohmann::json json_of_signature(const FileSignature& signature) {
 }
 
 FileSignature signature_of_json(const nlohmann::json& json) {
+  // Anything more would be signed by nobody.
+  if (json.size() != 4) throw nlohmann::json::other_error::create(501, "a signature has four parts and no more", &json);
   return {json.at("machine").get<std::string>(), json.at("key").get<std::string>(), json.at("utc").get<std::string>(),
           json.at("signature").get<std::string>()};
 }

@@ -22,7 +22,7 @@ std::string signed_words(std::string_view kind, std::string_view sha256, const F
 inline constexpr const char* kApplianceRecordingFormat = "birdseye appliance recording";
 
 nlohmann::json json_of_signature(const FileSignature& signature);
-/// Throws what nlohmann throws where it is none.
+/// Throws what nlohmann throws where it is none, or more than one.
 FileSignature signature_of_json(const nlohmann::json& json);
 
 }  // namespace birdseye::calibration

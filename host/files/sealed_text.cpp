@@ -72,6 +72,20 @@ class TextWithSums {
   nlohmann::json sums_ = nlohmann::json::object();
 };
 
+/// The text that was signed, of its lines before the signature and that of the signature.
+std::string signed_text_of(std::string_view lines, std::string_view signature) {
+  TextWithSums out;
+  lines.remove_prefix(std::min(lines.size(), kBegin.size()));
+  while (!lines.empty()) {
+    const std::size_t end = std::min(lines.find(",\n"), lines.size());
+    const std::string_view line = lines.substr(0, end);
+    out.add(line.substr(0, line.find("\": ")).substr(std::min<std::size_t>(line.size(), 1)), std::string(line));
+    lines.remove_prefix(std::min(lines.size(), end + 2));
+  }
+  out.add(kSigned, std::string(signature));
+  return out.sealed();
+}
+
 /// What of a text that does not fit its sums is damaged, in words.
 std::string damage(const std::string& text) {
   if (!text.starts_with("{\n\"")) return "is empty, or its beginning was changed or damaged";
@@ -127,8 +141,10 @@ Result<nlohmann::json> unseal(const std::string& text) {
   if (end == std::string::npos || text.substr(end + 1) != end_of(text.substr(0, end + 1)))
     return Error{Errc::bad_format, damage(text)};
   if (nests_too_deeply(text, Notation::json)) return Error{Errc::bad_format, "nests lists deeper than any"};
-  // What stands behind a signature it does not hold for: it is not read.
   const auto line = find_line(text, kSigned);
+  // What stands behind a signature it does not hold for: there are the sums of what stands before, and nothing else.
+  if (line && text != signed_text_of(before(text, *line), *line))
+    return Error{Errc::bad_format, "holds more than was signed: something was put in behind its signature"};
   const std::string read = line ? without_comma(before(text, *line)) + "\n}\n" : text;
   nlohmann::json json = nlohmann::json::parse(read, nullptr, false);
   if (!json.is_object()) return Error{Errc::bad_format, "is no object of JSON"};

@@ -93,6 +93,13 @@ TEST(SignedRecord, AnEntryIsNotMadeIntoARecordOfAnUnknownMachine) {
   EXPECT_EQ(read->record.scope, "no. 18");
 }
 
+TEST(FileSignature, HasFourPartsAndNoMore) {
+  nlohmann::json json = calibration::json_of_signature({"machine", "key", "utc", "signature"});
+  EXPECT_EQ(calibration::signature_of_json(json).machine, "machine");
+  json["more"] = 1;
+  EXPECT_THROW(calibration::signature_of_json(json), nlohmann::json::exception);
+}
+
 TEST(SealedText, OfASignedOneOnlyWhatWasSignedIsRead) {
   const Authors own = Authors::for_once();
   const std::string text = sealed_text({{"a", 1}, {"b", "two"}}, "a kind", *own.machine);
@@ -109,12 +116,13 @@ TEST(SealedText, OfASignedOneOnlyWhatWasSignedIsRead) {
     ASSERT_FALSE(damaged) << bit;
     EXPECT_NE(damaged.error().what.find("was changed or damaged"), std::string::npos) << damaged.error().what;
   }
-  // More parts, with sums that fit, behind the signature of the first: they are not read.
+  // More parts, with sums that fit, behind the signature of the first: they are refused.
   const std::size_t from = text.find("\"signed\": "), to = text.find('\n', from);
   const nlohmann::json signature = nlohmann::json::parse("{" + text.substr(from, to - from - 1) + "}").at("signed");
   const std::string longer = sealed_text({{"a", 1}, {"b", "two"}, {"signed", signature}, {"c", 3}});
-  ASSERT_TRUE(unseal(longer));
-  EXPECT_FALSE(unseal(longer)->contains("c"));
+  ASSERT_FALSE(unseal(longer));
+  EXPECT_NE(unseal(longer).error().what.find("holds more than was signed"), std::string::npos);
+  EXPECT_EQ(*unseal(sealed_text({{"a", 1}, {"b", "two"}, {"signed", signature}})), *read) << "the signed one alone";
   // Another part before it: it does not fit.
   const SealedBy other = sealed_by(sealed_text({{"a", 2}, {"b", "two"}, {"signed", signature}}));
   EXPECT_FALSE(own.admit("a kind", other.sha256, other.signature));
