@@ -12,6 +12,7 @@
 
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/system/program.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/app/commands.hpp"
 #include "host/files/appliance_recording.hpp"
 #include "host/files/record_file.hpp"
@@ -103,6 +104,8 @@ Result<std::vector<Found>> found_at(const fs::path& path) {
     if (has_operation(path)) out.push_back(of_operation(path));
     if (fs::exists(path / kRecordingSheet, ignored) || fs::exists(path / kRecordingEvents, ignored))
       out.push_back(of_session(path));
+  } else if (const auto file = open_file(path); !file) {
+    return file.error();
   } else if (is_appliance_recording(path)) {
     out.push_back(of_appliance(path));
   } else if (path.filename() == kRecordingSheet) {

@@ -8,10 +8,10 @@
 #include <array>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <sstream>
 #include <vector>
 
 #include "calibration/base/nesting.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/record_file.hpp"
 #include "host/files/stored_matrix.hpp"
 #include "host/files/text_files.hpp"
@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using Numbers = std::vector<double>;
 
-constexpr std::uintmax_t kMostBytes = 10'000'000;
+constexpr std::size_t kMostBytes = 10'000'000;
 constexpr double kMmPerM = 1000;  // Kalibr's lengths are metres
 constexpr const char* kAnotherModel = "; calibrate with plumb_bob (radtan) distortion, k1 k2 p1 p2 k3";
 
@@ -221,14 +221,11 @@ bool is_opencv(const fs::path& path) {
 }
 
 Result<void> check_file(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored))
-    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
-  if (fs::file_size(path, ignored) > kMostBytes)
+  const auto text = read_whole_file(path, kMostBytes);
+  if (!text && text.error().code == Errc::unsupported)
     return Error{Errc::bad_format, fmt::format("{}: is no camera file: it is larger than 10 MB", path.string())};
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  if (nests_too_deeply(text.str(), Notation::yaml_or_xml))
+  if (!text) return text.error();
+  if (nests_too_deeply(*text, Notation::yaml_or_xml))
     return Error{Errc::bad_format,
                  fmt::format("{}: is no camera file: it nests lists deeper than any; write it anew", path.string())};
   return {};

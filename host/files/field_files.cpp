@@ -8,10 +8,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <optional>
-#include <sstream>
 
+#include "drivers/system/whole_file.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/text_rows.hpp"
 
@@ -229,12 +228,9 @@ Result<FieldPairs> read_field_pairs(const PoseFile& a, const PoseFile& b) {
 }
 
 Result<calibration::FieldMapFile> read_field_map(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file.is_open() || file.bad())
-    return Error{Errc::not_found, path.string() + ": no such map of the field, or not to be read"};
-  auto map = calibration::parse_field_map(text.str());
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return Error{text.error().code, text.error().what + "; give a map of the field"};
+  auto map = calibration::parse_field_map(*text);
   if (!map) return map.error().with_context(path.string());
   return map;
 }

@@ -1,15 +1,20 @@
 #include "host/files/files_sha256.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <system_error>
 #include <vector>
 
 #include "calibration/record/sha256.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -22,14 +27,16 @@ Error unreadable(const fs::path& path) {
 }
 
 Result<std::string> file_sha256(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return unreadable(path);
+  const auto fd = open_file(path);
+  if (!fd) return fd.error();
   calibration::Sha256 sum;
-  std::array<char, 65536> block{};
-  while (in.read(block.data(), block.size()) || in.gcount() > 0)
-    sum.add({reinterpret_cast<const std::uint8_t*>(block.data()), static_cast<std::size_t>(in.gcount())});
-  if (in.bad()) return unreadable(path);
-  return sum.hex();
+  std::array<std::uint8_t, 65536> block{};
+  for (;;) {
+    const ssize_t got = ::read(fd->get(), block.data(), block.size());
+    if (got == 0) return sum.hex();
+    if (got < 0 && errno != EINTR) return unreadable(path);
+    if (got > 0) sum.add(std::span(block).first(static_cast<std::size_t>(got)));
+  }
 }
 
 }  // namespace

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
 #include "calibration/base/lower_case.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {
@@ -17,20 +16,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMostBytes = 10'000'000;
+constexpr std::size_t kMostBytes = 10'000'000;
 
 Result<std::string> text_of_file(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored))
-    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
-  if (fs::file_size(path, ignored) > kMostBytes)
-    return Error{Errc::unsupported, fmt::format("{}: is larger than 10 MB; is it a list of points?", path.string())};
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file.is_open() || file.bad())
-    return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
-  return text.str();
+  auto text = read_whole_file(path, kMostBytes);
+  if (text || text.error().code != Errc::unsupported) return text;
+  return Error{Errc::unsupported, fmt::format("{}: is larger than 10 MB; is it a list of points?", path.string())};
 }
 
 /// Whether a markup's unit is mm: not told, "mm", or a coded term as ["mm", "UCUM", "millimeter"].

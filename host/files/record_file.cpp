@@ -2,21 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <sstream>
-
 #include "drivers/system/clock.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
 Result<calibration::SignedRecord> read_signed_record(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    return Error{Errc::unreadable,
-                 path.string() + ": cannot be read; give a record that birdseye calibrate has written (--record)"};
-  std::ostringstream text;
-  text << file.rdbuf();
-  auto record = calibration::parse_signed_record(text.str());
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) {
+    return Error{text.error().code,
+                 text.error().what + "; give a record that birdseye calibrate has written (--record)"};
+  }
+  auto record = calibration::parse_signed_record(*text);
   if (!record) return record.error().with_context(path.string());
   return record;
 }

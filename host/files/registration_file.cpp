@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "calibration/record/sha256.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/text_files.hpp"
 
 namespace birdseye::host {
@@ -52,11 +51,12 @@ std::string registration_text(const RegistrationFile& registration) {
 }
 
 Result<RegistrationFile> read_registration(const fs::path& path) {
-  const auto matrix = read_pose(path);
+  const auto read = read_whole_file(path, kMostTextBytes);
+  if (!read) return read.error();
+  const std::string& text = *read;
+  const auto matrix = parse_pose(text, path);
   if (!matrix) return matrix.error();
   RegistrationFile out{Transform<Patient, Tracker>::from_matrix(*matrix)};
-  std::ifstream in(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(in), {}};
   const bool sealed = text.starts_with(kTitle) || text.find(kSum) != std::string::npos;
   if (!sealed) return out;
   const auto refused = [&path](const Error& why) {

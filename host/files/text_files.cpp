@@ -4,8 +4,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <fstream>
 #include <sstream>
+
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -18,13 +19,9 @@ struct NumberRow {
   std::vector<double> numbers;
 };
 
-/// The lines of numbers in a file; with headed, its first line may be one of names.
-Result<std::vector<NumberRow>> read_rows(const fs::path& path, bool headed = false) {
-  std::error_code ignored;
-  if (!fs::is_regular_file(path, ignored))
-    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
-  std::ifstream in(path);
-  if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
+/// The lines of numbers in a text; with headed, its first line may be one of names.
+Result<std::vector<NumberRow>> rows_of(const std::string& all, const fs::path& path, bool headed = false) {
+  std::istringstream in(all);
   std::vector<NumberRow> rows;
   std::string text;
   for (int line = 1; std::getline(in, text); ++line) {
@@ -76,7 +73,13 @@ Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& m, const std::string&
 }
 
 Result<Eigen::Matrix4d> read_pose(const fs::path& path) {
-  const auto rows = read_rows(path);
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return text.error();
+  return parse_pose(*text, path);
+}
+
+Result<Eigen::Matrix4d> parse_pose(const std::string& text, const fs::path& path) {
+  const auto rows = rows_of(text, path);
   if (!rows) return rows.error();
   if (rows->size() != 4) {
     return Error{Errc::bad_format,
@@ -109,7 +112,9 @@ Result<std::vector<Transform<Camera, Patient>>> read_path(const fs::path& path) 
       keys.push_back(Transform<Camera, Patient>::from_matrix(*pose));
     }
   } else {
-    const auto rows = read_rows(path, true);
+    const auto text = read_whole_file(path, kMostTextBytes);
+    if (!text) return text.error();
+    const auto rows = rows_of(*text, path, true);
     if (!rows) return rows.error();
     for (const NumberRow& row : *rows) {
       const std::string where = fmt::format("{}: line {}", path.string(), row.line);

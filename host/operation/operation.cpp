@@ -4,10 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "drivers/system/whole_file.hpp"
 #include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/registration_file.hpp"
@@ -164,16 +163,14 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
   const auto refused = [&path](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
-  std::ifstream in(path, std::ios::binary);
-  if (!in) {
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text && text.error().code == Errc::not_found) {
     return Error{Errc::not_found,
                  fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
   }
-  std::ostringstream read;
-  read << in.rdbuf();
-  const std::string text = read.str();
-  const auto sheet = unseal(text);
-  if (!sheet && is_of_010(text)) {
+  if (!text) return text.error();
+  const auto sheet = unseal(*text);
+  if (!sheet && is_of_010(*text)) {
     return refused(
         "was kept by version 0.1.0, which did not bind its files together: whether they were changed since, nobody can "
         "tell. Where you answer for them, `birdseye convert FOLDER --ct CT --out NEW` makes an operation of them; else "
@@ -187,7 +184,7 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
       return refused(fmt::format("is of version {}; this program reads version {}", version.dump(), kVersion));
     auto operation = operation_of(*sheet);
     if (!operation) return operation.error().with_context(path.string());
-    return SignedOperation{*std::move(operation), sealed_by(text)};
+    return SignedOperation{*std::move(operation), sealed_by(*text)};
   } catch (const std::exception& wrong) {
     return refused(fmt::format("makes no sense ({}); register anew", wrong.what()));
   }

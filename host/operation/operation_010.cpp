@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
-#include <sstream>
 
 #include "calibration/base/nesting.hpp"
 #include "device/wire/igtl_bytes.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/overlay/ct_sha256.hpp"
 
@@ -114,19 +113,17 @@ bool is_of_010(const std::string& text) {
 
 Result<Operation> read_operation_010(const fs::path& folder, const Volume& ct) {
   const fs::path path = folder / "operation.json";
-  std::ifstream in(path, std::ios::binary);
-  if (!in) {
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text && text.error().code == Errc::not_found) {
     return Error{Errc::not_found,
                  fmt::format("{}: is not there; give the --out folder of a live of 0.1.0", path.string())};
   }
-  std::ostringstream read;
-  read << in.rdbuf();
-  const std::string text = read.str();
-  if (!is_of_010(text))
+  if (!text) return text.error();
+  if (!is_of_010(*text))
     return Error{Errc::bad_format,
                  fmt::format("{}: is not of 0.1.0, or is damaged: there is nothing to convert", path.string())};
   try {
-    return operation_of_010(folder, Json::parse(text), ct);
+    return operation_of_010(folder, Json::parse(*text), ct);
   } catch (const Json::exception& wrong) {
     return Error{Errc::bad_format, fmt::format("{}: is damaged ({}); register anew", path.string(), wrong.what())};
   }
