@@ -10,11 +10,11 @@
 #include <system_error>
 #include <vector>
 
+#include "drivers/identity/appliance_seal.hpp"
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/system/program.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/app/commands.hpp"
-#include "host/files/appliance_recording.hpp"
 #include "host/files/record_file.hpp"
 #include "host/operation/operation.hpp"
 #include "host/recording/recording_signature.hpp"

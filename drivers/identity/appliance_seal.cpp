@@ -1,4 +1,4 @@
-#include "host/files/appliance_recording.hpp"
+#include "drivers/identity/appliance_seal.hpp"
 
 #include <fmt/format.h>
 
@@ -9,11 +9,12 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "calibration/record/sha256.hpp"
 
-namespace birdseye::host {
+namespace birdseye {
 
 namespace {
 
@@ -42,6 +43,8 @@ void add(calibration::Sha256& sum, const char* bytes, std::size_t size) {
 }  // namespace
 
 bool is_appliance_recording(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
   std::ifstream in(path, std::ios::binary);
   std::array<char, kMagic.size()> magic{};
   in.read(magic.data(), magic.size());
@@ -83,4 +86,4 @@ Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
   }
 }
 
-}  // namespace birdseye::host
+}  // namespace birdseye

@@ -7,7 +7,7 @@
 #include "calibration/base/result.hpp"
 #include "calibration/record/file_signature.hpp"
 
-namespace birdseye::host {
+namespace birdseye {
 
 /// Who says that they wrote an appliance recording (docs/manual/appliance-recording.md).
 struct ApplianceSeal {
@@ -20,4 +20,4 @@ bool is_appliance_recording(const std::filesystem::path& path);
 /// Reads all of it. Refuses what is none, or damaged so that its blocks cannot be told.
 Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path);
 
-}  // namespace birdseye::host
+}  // namespace birdseye
