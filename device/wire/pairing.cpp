@@ -164,24 +164,35 @@ Result<void> write_text(const std::filesystem::path& path, const std::string& te
   return replace_durably(part, path);
 }
 
+/// By which the other machine is to be known here: the name that it has here already, the one that was asked for, or
+/// what it calls itself, with a number behind it where another machine has that name.
+Result<std::string> name_for(const Introduction& introduction, const PairingPlan& plan, const KnownKeys& known) {
+  if (auto has = known.name_of(introduction.key)) return *std::move(has);
+  if (plan.name.empty()) return known.free_name(introduction.name == kOwn ? "the-other" : introduction.name);
+  if (plan.name.find('/') != std::string::npos) return Error{Errc::bad_value, "a machine's name has no \"/\" in it"};
+  if (plan.name == kOwn)
+    return Error{Errc::bad_value, fmt::format("the other machine cannot be called {}: give it another --name", kOwn)};
+  if (const std::string why = known.objection({plan.name, introduction.key}); !why.empty())
+    return Error{Errc::bad_value, why};
+  return plan.name;
+}
+
 /// From the codes to the known keys.
 Result<Paired> settle(TlsLink& link, const Introduction& introduction, const PairingPlan& plan, const MachineKey& key,
                       Deadline deadline) {
-  const bool yes = plan.ask(introduction, deadline);
-  if (auto agreed = agree(link, yes, deadline); !agreed) return agreed.error();
   auto known = KnownKeys::read(plan.folder, KnownKeys::Machine{machine_name(), key.public_key()});
-  if (!known) return known.error();
-  const std::string& name = plan.name.empty() ? introduction.name : plan.name;
-  if (name.find('/') != std::string::npos) return Error{Errc::bad_value, "a machine's name has no \"/\" in it"};
-  if (name == kOwn)
-    return Error{Errc::bad_value, fmt::format("the other machine cannot be called {}: give it a --name", kOwn)};
-  if (auto added = known->add(name, introduction.key); !added) return added.error();
-  const std::string kept = *known->name_of(introduction.key);
+  const auto name = known ? name_for(introduction, plan, *known) : Result<std::string>(known.error());
+  // Before anybody is asked: who has said yes is to be known by both machines.
+  const bool yes = name && plan.ask(introduction, deadline);
+  const auto agreed = agree(link, yes, deadline);
+  if (!name) return name.error();
+  if (!agreed) return agreed.error();
+  if (auto added = known->add(*name, introduction.key); !added) return added.error();
   for (const auto& [file, text] :
-       {std::pair(kOwn, link.own_certificate()), std::pair(kept.c_str(), link.peer_certificate())}) {
+       {std::pair(kOwn, link.own_certificate()), std::pair(name->c_str(), link.peer_certificate())}) {
     if (auto written = write_text(plan.folder / (std::string(file) + ".crt"), text); !written) return written.error();
   }
-  return Paired{kept, introduction.key};
+  return Paired{*name, introduction.key};
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/system/durable.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye {
 
@@ -31,23 +32,37 @@ std::string KnownKeys::objection(const Machine& machine) const {
     return fmt::format("\"{}\" is no name of a machine: give one word without spaces", machine.name);
   for (const Machine& known : machines_) {
     if (known.name == machine.name && known.key != machine.key)
-      return fmt::format("another key has the name {} already: give another name", machine.name);
+      return fmt::format("another key has the name {} already: give another name, as {}", machine.name,
+                         free_name(machine.name));
   }
   return {};
 }
 
+std::string KnownKeys::free_name(const std::string& name) const {
+  std::string free = name;
+  const auto has_it = [&free](const Machine& known) { return known.name == free; };
+  for (int number = 2; std::ranges::any_of(machines_, has_it); ++number) free = fmt::format("{}-{}", name, number);
+  return free;
+}
+
 Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Machine>& own) {
   KnownKeys out(folder / "known");
+  // First, so that its key has its own name whatever a line says.
+  const auto with_own = [&] {
+    if (own) out.machines_.insert(out.machines_.begin(), Machine{out.free_name(own->name), own->key});
+    return out;
+  };
   std::error_code ignored;
-  if (own) out.machines_.push_back(*own);
-  if (!fs::exists(out.file_, ignored)) return out;
+  if (!fs::exists(out.file_, ignored)) return with_own();
   struct stat status {};
   if (::stat(out.file_.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
     return Error{Errc::bad_value, fmt::format("{}: others than its owner may say in it which machines are known: chmod "
                                               "644 {}, and look whether each line is yours",
                                               out.file_.string(), out.file_.string())};
   }
-  std::ifstream in(out.file_);
+  const auto text = read_whole_file(out.file_, kMostTextBytes);
+  if (!text) return text.error();
+  std::istringstream in(*text);
   std::string line;
   int number = 1;
   for (; std::getline(in, line); ++number) {
@@ -65,8 +80,7 @@ Result<KnownKeys> KnownKeys::read(const fs::path& folder, const std::optional<Ma
                    fmt::format("{}: line {}: {}; mend or remove the line", out.file_.string(), number, why)};
     out.machines_.push_back(std::move(machine));
   }
-  if (in.eof()) return out;
-  return Error{Errc::unreadable, fmt::format("{}: cannot be read; check its permissions", out.file_.string())};
+  return with_own();
 }
 
 KnownKeys KnownKeys::of_own(const Machine& own) {
@@ -88,7 +102,11 @@ Result<void> KnownKeys::add(const std::string& name, const PublicKey& key) {
   if (const std::string why = objection(machine); !why.empty()) return Error{Errc::bad_value, why};
   if (auto made = make_folder_durably(file_.parent_path()); !made) return made;
   std::string text;
-  if (std::ifstream in(file_); in) text.assign(std::istreambuf_iterator<char>(in), {});
+  if (auto there = read_whole_file(file_, kMostTextBytes)) {
+    text = *std::move(there);
+  } else if (there.error().code != Errc::not_found) {
+    return there.error();
+  }
   if (!text.empty() && text.back() != '\n') text += '\n';
   text += fmt::format("{} {}\n", name, key.hex());
   const fs::path part = file_.string() + ".part";

@@ -19,8 +19,9 @@ class KnownKeys {
     PublicKey key;
   };
 
-  /// Of the folder, where there may be no such file. own: this machine's key, or nothing where it has none yet. Refuses
-  /// a line that is damaged, by its number, and a file that others may change.
+  /// Of the folder, where there may be no such file. own: this machine's key, or nothing where it has none yet; where a
+  /// line has its name already, it is called as free_name() says. Refuses a line that is damaged, by its number, and a
+  /// file that others may change.
   static Result<KnownKeys> read(const std::filesystem::path& folder, const std::optional<Machine>& own);
   /// This machine alone, and no file: none can be added.
   static KnownKeys of_own(const Machine& own);
@@ -30,13 +31,14 @@ class KnownKeys {
   /// Also into the file, and onto the disk. A key that is known stays with its name. Refuses a name that is no single
   /// word, and one that another key has.
   Result<void> add(const std::string& name, const PublicKey& key);
+  /// The name, or where a machine has it already the first of NAME-2, NAME-3 that none has.
+  [[nodiscard]] std::string free_name(const std::string& name) const;
+  /// Why add() would refuse the machine; empty where it would not.
+  [[nodiscard]] std::string objection(const Machine& machine) const;
   [[nodiscard]] const std::vector<Machine>& machines() const { return machines_; }
 
  private:
   explicit KnownKeys(std::filesystem::path file) : file_(std::move(file)) {}
-
-  /// Why the machine cannot be entered; empty where it can.
-  [[nodiscard]] std::string objection(const Machine& machine) const;
 
   std::filesystem::path file_;
   std::vector<Machine> machines_;  ///< this one first, where it has a key

@@ -90,6 +90,36 @@ TEST(Pairing, AMachineThatCallsItselfOwnDoesNotTakeThePlaceOfTheOwnCertificate) 
   EXPECT_FALSE(cart.name_of(host));
 }
 
+TEST(Pairing, AMachineThatHasTheNameOfAnotherIsKnownByAnotherName) {
+  Machine cart, first, second;
+  std::vector<std::string> names;
+  for (Machine* const host : {&first, &second}) {
+    std::promise<int> port;
+    auto cart_paired = std::async(std::launch::async, [&] {
+      return pair_as_server(cart.plan(""), "127.0.0.1", 0, soon(), [&](int listening) { port.set_value(listening); });
+    });
+    EXPECT_TRUE(pair_as_client(host->plan("cart"), "127.0.0.1", port.get_future().get(), soon()));
+    const auto paired = cart_paired.get();
+    ASSERT_TRUE(paired) << paired.error().what;
+    names.push_back(paired->name);
+  }
+  // All three are this machine, and so is called whoever has no other name.
+  EXPECT_EQ(names, (std::vector<std::string>{machine_name() + "-2", machine_name() + "-3"}));
+  EXPECT_EQ(cart.name_of(second), names.back());
+  EXPECT_TRUE(std::filesystem::exists(cart.folder / (names.back() + ".crt")));
+}
+
+TEST(Pairing, ANameThatAnotherMachineHasPairsNeither) {
+  Machine cart, first, second;
+  (void)meet(cart, first);
+  const auto [cart_paired, second_paired] = meet(cart, second);
+  ASSERT_FALSE(cart_paired);
+  EXPECT_NE(cart_paired.error().what.find("give another name, as host-2"), std::string::npos);
+  EXPECT_FALSE(second_paired);
+  EXPECT_FALSE(second.name_of(cart));
+  EXPECT_FALSE(cart.name_of(second));
+}
+
 TEST(Pairing, EachPairingHasACodeOfItsOwn) {
   Machine cart, host;
   (void)meet(cart, host);

@@ -1,6 +1,7 @@
 #include "drivers/identity/known_keys.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/support/scratch.hpp"
 #include "tests/support/synced_files.hpp"
@@ -78,13 +79,36 @@ TEST(KnownKeys, AddsNoKeyTwiceNoNameOfAnotherKeyAndNoNameThatIsNoWord) {
 
 TEST(KnownKeys, RefusesADamagedLineByItsNumber) {
   const std::string hex = key_of(2).hex();
-  for (const std::string& line : {std::string("cart-1"), "cart-1 " + hex.substr(1), "cart-1 x" + hex.substr(1),
-                                  "cart-1 " + hex + " more", "theatre-3 " + hex}) {
+  for (const std::string& line :
+       {std::string("cart-1"), "cart-1 " + hex.substr(1), "cart-1 x" + hex.substr(1), "cart-1 " + hex + " more"}) {
     const Scratch folder;
     (void)folder.file("known", "# carts\n" + line + "\ncart-2 " + key_of(3).hex() + "\n");
     fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
     EXPECT_NE(error_of(folder).find("known: line 2: "), std::string::npos) << line << ": " << error_of(folder);
   }
+}
+
+TEST(KnownKeys, AnotherMachineMayHaveTheNameThatThisOneHas) {
+  const Scratch folder;
+  (void)folder.file("known", "theatre-3 " + key_of(2).hex() + "\ntheatre-3-2 " + key_of(3).hex() + "\n");
+  fs::permissions(folder / "known", fs::perms::owner_read | fs::perms::owner_write);
+  auto known = KnownKeys::read(folder.path(), kOwn);
+  ASSERT_TRUE(known) << known.error().what;
+  EXPECT_EQ(known->name_of(key_of(2)), "theatre-3");
+  EXPECT_EQ(known->name_of(key_of(1)), "theatre-3-3");
+  EXPECT_EQ(known->free_name("theatre-3"), "theatre-3-4");
+  EXPECT_EQ(known->free_name("theatre-4"), "theatre-4");
+  const auto refused = known->add("theatre-3", key_of(4));
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().what.find("give another name, as theatre-3-4"), std::string::npos) << refused.error().what;
+  ASSERT_TRUE(known->add("theatre-3-4", key_of(4)));
+  EXPECT_TRUE(KnownKeys::read(folder.path(), kOwn));
+}
+
+TEST(KnownKeys, APipeInPlaceOfTheFileIsRefusedAndNotWaitedFor) {
+  const Scratch folder;
+  ASSERT_EQ(::mkfifo((folder / "known").c_str(), 0600), 0);
+  EXPECT_NE(error_of(folder).find("known: is no file but a pipe"), std::string::npos) << error_of(folder);
 }
 
 TEST(KnownKeys, RefusesAFileThatOthersMayChange) {
