@@ -187,11 +187,12 @@ Result<Paired> settle(TlsLink& link, const Introduction& introduction, const Pai
   const auto agreed = agree(link, yes, deadline);
   if (!name) return name.error();
   if (!agreed) return agreed.error();
-  if (auto added = known->add(*name, introduction.key); !added) return added.error();
+  // The certificates first: they let nobody in, and what is in the known keys is whole whenever a machine goes down.
   for (const auto& [file, text] :
        {std::pair(kOwn, link.own_certificate()), std::pair(name->c_str(), link.peer_certificate())}) {
     if (auto written = write_text(plan.folder / (std::string(file) + ".crt"), text); !written) return written.error();
   }
+  if (auto added = known->add(*name, introduction.key); !added) return added.error();
   return Paired{*name, introduction.key};
 }
 

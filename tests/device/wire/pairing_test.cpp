@@ -120,6 +120,19 @@ TEST(Pairing, ANameThatAnotherMachineHasPairsNeither) {
   EXPECT_FALSE(cart.name_of(second));
 }
 
+TEST(Pairing, AKeyIsKnownOnlyOnceAllElseIsOnTheDisk) {
+  Machine cart, host;
+  std::filesystem::create_directories(cart.folder / "host.crt" / "in the way");
+  std::filesystem::permissions(cart.folder, std::filesystem::perms::owner_all);
+  EXPECT_FALSE(meet(cart, host).cart);
+  EXPECT_FALSE(cart.name_of(host));
+  std::filesystem::remove_all(cart.folder / "host.crt");
+  testing::forget_synced();
+  EXPECT_TRUE(meet(cart, host).cart);
+  EXPECT_EQ(cart.name_of(host), "host");
+  EXPECT_TRUE(testing::is_synced(cart.folder / "host.crt"));
+}
+
 TEST(Pairing, EachPairingHasACodeOfItsOwn) {
   Machine cart, host;
   (void)meet(cart, host);
