@@ -250,10 +250,10 @@ Result<ExitCode> run(LiveOptions& options) {
   if (!window) return window.error();
   std::unique_ptr<LiveSource> source;
   if (!options.recording.empty()) {
-    auto doubt = admit_recording(options.recording, options.live.authors);
-    if (!doubt) return doubt.error();
-    options.live.recording_doubt = *std::move(doubt);
-    auto opened = LiveSource::of_recording(options.recording, options.speed);
+    auto admitted = admit_recording(options.recording, options.live.authors);
+    if (!admitted) return admitted.error();
+    options.live.recording_doubt = std::move(admitted->doubt);
+    auto opened = LiveSource::of_recording(options.recording, options.speed, admitted->events_sha256);
     if (!opened) return opened.error();
     source = *std::move(opened);
   } else {

@@ -136,9 +136,12 @@ Result<ExitCode> run(ReplayOptions& options) {
   auto authors = Authors::of_this_machine(options.accept_unsigned);
   if (!authors) return authors.error();
   options.inputs.authors = *std::move(authors);
-  const auto doubt = admit_recording(options.inputs.recording, options.inputs.authors);
-  if (!doubt) return doubt.error();
-  auto reader = RecordingReader::open(options.inputs.recording, {.speed = 0, .transform = options.inputs.transform});
+  const auto admitted = admit_recording(options.inputs.recording, options.inputs.authors);
+  if (!admitted) return admitted.error();
+  options.inputs.events_sha256 = admitted->events_sha256;
+  auto reader = RecordingReader::open(
+      options.inputs.recording,
+      {.speed = 0, .transform = options.inputs.transform, .events_sha256 = options.inputs.events_sha256});
   if (!reader) return reader.error();
   for (const fs::path* file : {&options.inputs.patient_from_model, &options.deformation}) {
     if (file->empty()) continue;
@@ -146,7 +149,8 @@ Result<ExitCode> run(ReplayOptions& options) {
   }
   auto setup = read_replay_setup(options.inputs);
   if (!setup) return setup.error();
-  if (!doubt->empty()) setup->cautions.push_back(words("why_unsigned", words("unsigned_recording"), *doubt));
+  if (!admitted->doubt.empty())
+    setup->cautions.push_back(words("why_unsigned", words("unsigned_recording"), admitted->doubt));
   ShownChoice choice = options.shown;
   choice.summed = true;  // what is replayed by, and what is written, says which CT it is of
   const auto fiducials_inside = [&](const Volume& ct) -> Result<void> {

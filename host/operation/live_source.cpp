@@ -65,9 +65,11 @@ void LiveSource::take_link(Result<Connection> link) {
   words_ = stream_->is_plain() ? host::words("note_connected_plain", name_) : host::words("note_connected", name_);
 }
 
-Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed) {
+Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed,
+                                                             const std::string& events_sha256) {
   RecordingReader::Settings settings;
   settings.speed = speed;
+  settings.events_sha256 = events_sha256;
   auto reader = RecordingReader::open(path, settings);
   if (!reader) return reader.error();
   std::unique_ptr<LiveSource> source(new LiveSource(path.string(), {}));

@@ -28,8 +28,10 @@ class LiveSource {
   /// Makes the patient in settings.folder first.
   static std::unique_ptr<LiveSource> of_simulator(SimulatedCartSettings settings);
 
-  /// A recording, as fast as it was made. Errors: there is none, or it is damaged from its first line on.
-  static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path, double speed = 1);
+  /// A recording, as fast as it was made. events_sha256: as RecordingReader::Settings has it. Errors: there is none, or
+  /// it is damaged from its first line on.
+  static Result<std::unique_ptr<LiveSource>> of_recording(const std::filesystem::path& path, double speed = 1,
+                                                          const std::string& events_sha256 = {});
 
   /// The next event, waiting for it until the deadline.
   std::optional<wire::Event> next(Deadline deadline);

@@ -22,8 +22,9 @@ using calibration::CalibrationRecord;
 /// Calls take with every event but the pixels.
 template <typename Take>
 Result<void> look_through(const ReplayInputs& inputs, const Take& take) {
-  const auto reader =
-      RecordingReader::open(inputs.recording, {.speed = 0, .transform = inputs.transform, .pictures = false});
+  const auto reader = RecordingReader::open(
+      inputs.recording,
+      {.speed = 0, .transform = inputs.transform, .pictures = false, .events_sha256 = inputs.events_sha256});
   if (!reader) return reader.error();
   for (;;) {
     const auto event = (*reader)->next(host_now());

@@ -15,6 +15,7 @@ namespace birdseye::host {
 /// Where `birdseye replay` is to take calibration and registration from; what is not named stays empty.
 struct ReplayInputs {
   std::filesystem::path recording;
+  std::string events_sha256;          ///< as RecordingReader::Settings has it
   std::string transform;              ///< of a PLUS sequence
   std::filesystem::path operation;    ///< what a window kept, in place of all that follows
   std::filesystem::path calibration;  ///< a record; without it and a camera, the recording's own

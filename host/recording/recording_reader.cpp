@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/wait.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/recording/recording_writer.hpp"
 
@@ -24,6 +25,10 @@ std::string bird_name(std::string transform) {
   if (transform.ends_with(kTo) && transform.size() > kTo.size()) transform.resize(transform.size() - kTo.size());
   transform[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(transform[0])));
   return transform;
+}
+
+void add(calibration::Sha256& sum, const std::string& text) {
+  sum.add({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 std::optional<DeviceTime> time_of(const wire::Event& event) {
@@ -45,15 +50,18 @@ Result<std::unique_ptr<RecordingReader>> RecordingReader::open(const fs::path& p
 }
 
 Result<void> RecordingReader::open_folder() {
-  lines_.open(path_ / kRecordingEvents);
-  if (!lines_) {
+  const auto events = open_file(path_ / kRecordingEvents);
+  if (!events && events.error().code != Errc::not_found) return events.error();
+  if (events) lines_.open(path_ / kRecordingEvents);
+  if (!lines_.is_open()) {
     return Error{Errc::not_found,
                  fmt::format("{}: holds no recording ({}); give a folder that birdseye record made, or "
                              "a .igs.mha",
                              path_.string(), kRecordingEvents)};
   }
-  std::ifstream file(path_ / kRecordingSheet);
-  const auto sheet = nlohmann::json::parse(file, nullptr, false);
+  const auto text = read_whole_file(path_ / kRecordingSheet, kMostTextBytes);
+  if (!text && text.error().code != Errc::not_found) return text.error();
+  const auto sheet = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   if (!sheet.is_object()) {
     notes_.push_back(fmt::format("{} is missing or damaged; the rest is read without it", kRecordingSheet));
     return {};
@@ -88,12 +96,25 @@ Result<void> RecordingReader::open_sequence() {
   return {};
 }
 
+Result<void> RecordingReader::check_events() {
+  if (settings_.events_sha256.empty() || lines_sum_.hex() == settings_.events_sha256) return {};
+  return Error{Errc::bad_format,
+               fmt::format("{}: was changed after it was verified: nothing that was made of it holds; "
+                           "take a copy that is as it was written",
+                           (path_ / kRecordingEvents).string())};
+}
+
 Result<std::optional<EventOfLine>> RecordingReader::take_line() {
   std::string line;
-  if (!std::getline(lines_, line)) return std::optional<EventOfLine>();
-  ++line_;
+  const bool there = static_cast<bool>(std::getline(lines_, line));
   // What was cut lacks its end.
   const bool cut = lines_.eof();
+  if (there) add(lines_sum_, cut ? line : line + '\n');
+  if (!there || cut) {
+    if (auto same = check_events(); !same) return same.error();
+  }
+  if (!there) return std::optional<EventOfLine>();
+  ++line_;
   auto event = parse_event_line(line);
   if (event && !cut) return std::optional(*std::move(event));
   if (cut) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/record/sha256.hpp"
 #include "host/files/film.hpp"
 #include "host/link/event_source.hpp"
 #include "host/recording/event_lines.hpp"
@@ -23,6 +24,9 @@ class RecordingReader : public EventSource {
     double speed = 0;            ///< 1: as fast as it was recorded; 0: as fast as it is taken
     std::string transform = {};  ///< of a PLUS sequence: the scope's, where there are several
     bool pictures = true;        ///< false: frames come without pixels
+    /// Of its events as they were signed: where they were changed after they were verified, the recording ends with an
+    /// error. Empty: nobody signed.
+    std::string events_sha256 = {};
   };
 
   /// path: a folder that `birdseye record` made, or a .igs.mha or .igs.mhd. Refuses, naming it, what is neither.
@@ -41,6 +45,8 @@ class RecordingReader : public EventSource {
   Result<void> open_folder();
   Result<void> open_sequence();
   Result<std::optional<EventOfLine>> take_line();
+  /// Whether the events that were read are those that were verified.
+  Result<void> check_events();
   Result<std::optional<EventOfLine>> take_of_sequence();
   Result<void> make_events(std::size_t number, const SequenceHeader::Fields& fields);
   Result<bool> fetch_next();
@@ -54,6 +60,7 @@ class RecordingReader : public EventSource {
   Settings settings_;
   std::ifstream lines_;
   std::size_t line_ = 0;
+  calibration::Sha256 lines_sum_;
   std::string video_;  ///< the one that is open
   std::optional<SequenceReader> sequence_;
   std::optional<FilmReader> film_;

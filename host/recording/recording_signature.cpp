@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -15,6 +14,8 @@
 
 #include "calibration/base/nesting.hpp"
 #include "calibration/record/sha256.hpp"
+#include "drivers/identity/appliance_seal.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/files_sha256.hpp"
 #include "host/recording/recording_writer.hpp"
 
@@ -62,11 +63,11 @@ Result<void> sign_recording(const fs::path& folder, nlohmann::json& sheet, const
 }
 
 Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
-  std::ifstream in(folder / kRecordingSheet, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const auto text = read_whole_file(folder / kRecordingSheet, kMostTextBytes);
+  if (!text && text.error().code != Errc::not_found) return text.error();
   // Its sum is of its text made anew, which goes into lists as deep as they are.
-  const auto sheet =
-      nests_too_deeply(text, Notation::json) ? nlohmann::json() : nlohmann::json::parse(text, nullptr, false);
+  const auto sheet = !text || nests_too_deeply(*text, Notation::json) ? nlohmann::json()
+                                                                      : nlohmann::json::parse(*text, nullptr, false);
   if (!sheet.is_object() || !sheet.contains("birdseye_recording")) {
     return Error{Errc::bad_format, fmt::format("{}: is missing or damaged; take a copy of the recording that is whole",
                                                (folder / kRecordingSheet).string())};
@@ -84,6 +85,7 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
       const bool here = there->contains(name);
       const auto sum = here ? files_sha256(folder / name) : Result<std::string>("");
       if (!sum) return sum.error();
+      if (name == kRecordingEvents) out.events_sha256 = recorded;
       if (!here) out.missing.push_back(name);
       if (here && *sum != recorded) out.changed.push_back(name);
     }
@@ -95,11 +97,29 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
   return out;
 }
 
-Result<std::string> admit_recording(const fs::path& path, const Authors& authors) {
+namespace {
+
+Result<AdmittedRecording> admit_appliance_recording(const fs::path& path, const Authors& authors) {
+  const auto seal = read_appliance_seal(path);
+  if (!seal) return seal.error();
+  if (seal->more)
+    return Error{Errc::bad_format, fmt::format("{}: bytes were added behind its signature; take a copy that is as it "
+                                               "was written",
+                                               path.string())};
+  auto doubt =
+      authors.admit(calibration::kApplianceRecordingFormat, seal->sha256, seal->signature).with_context(path.string());
+  if (!doubt) return doubt.error();
+  return AdmittedRecording{*std::move(doubt), ""};
+}
+
+}  // namespace
+
+Result<AdmittedRecording> admit_recording(const fs::path& path, const Authors& authors) {
+  if (is_appliance_recording(path)) return admit_appliance_recording(path, authors);
   std::error_code ignored;
   const bool sheet = fs::exists(path / kRecordingSheet, ignored);
   if (!fs::is_directory(path, ignored) || (!sheet && !fs::exists(path / kRecordingEvents, ignored)))
-    return std::string();
+    return AdmittedRecording();
   RecordingSeal seal;
   if (sheet || !authors.accept_unsigned) {
     auto read = read_recording_seal(path);
@@ -118,7 +138,8 @@ Result<std::string> admit_recording(const fs::path& path, const Authors& authors
   auto doubt = authors.admit(kSessionRecordingFormat, seal.sha256, seal.signature).with_context(path.string());
   if (!doubt && !seal.signature && !seal.ended)
     return Error{doubt.error().code, doubt.error().what + " (it was cut short, and could not be signed)"};
-  return doubt;
+  if (!doubt) return doubt.error();
+  return AdmittedRecording{*std::move(doubt), seal.events_sha256};
 }
 
 }  // namespace birdseye::host

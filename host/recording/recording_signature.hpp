@@ -23,12 +23,19 @@ struct RecordingSeal {
   std::optional<calibration::FileSignature> signature;  ///< empty: nobody
   bool ended = false;                                   ///< false: it was cut short, so that nobody could sign it
   std::vector<std::string> changed, missing, added;     ///< files, by their names
+  std::string events_sha256;                            ///< of the events as they were signed; empty: nobody signed
 };
 /// Reads all of the recording's files: as long as the disk takes.
 Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
-/// As Authors::admit(), with the folder's name. Refuses also where a file was changed, is missing or was added.
-/// What is no folder, as a sequence of PLUS, nobody signs: it is admitted.
-Result<std::string> admit_recording(const std::filesystem::path& path, const Authors& authors);
+struct AdmittedRecording {
+  std::string doubt;          ///< empty where the author is known, as of Authors::admit()
+  std::string events_sha256;  ///< which whoever reads it holds its events to; empty: nobody signed
+};
+
+/// As Authors::admit(), with the recording's name: of a session recording, and of an appliance recording. Refuses also
+/// where a file was changed, is missing or was added, and bytes behind a signature. Anything else, as a sequence of
+/// PLUS, nobody signs: it is admitted.
+Result<AdmittedRecording> admit_recording(const std::filesystem::path& path, const Authors& authors);
 
 }  // namespace birdseye::host

@@ -1,9 +1,11 @@
 #include "host/recording/recording_signature.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
 
+#include "host/recording/recording_reader.hpp"
 #include "host/recording/recording_writer.hpp"
 #include "tests/support/scratch.hpp"
 
@@ -77,6 +79,47 @@ TEST(RecordingSignature, NamesWhatWasChangedTakenAwayAndAdded) {
   EXPECT_EQ(seal->added, std::vector<std::string>{"notes.txt"});
 }
 
+/// Why it ends, read as far as it goes.
+Error end_of(RecordingReader& reader) {
+  for (;;) {
+    const auto event = reader.next(Deadline::after(Duration::from_ms(20'000)));
+    if (!event) return event.error();
+  }
+}
+
+TEST(RecordingSignature, EventsThatWereChangedAfterTheyWereVerifiedAreFoundOut) {
+  const Scratch scratch;
+  const Authors own = Authors::for_once();
+  record(scratch / "r", own);
+  const auto admitted = admit_recording(scratch / "r", own);
+  ASSERT_TRUE(admitted) << admitted.error().what;
+  const std::string text = contents_of(scratch / "r" / "events.jsonl");
+  const std::size_t last = text.rfind('\n', text.size() - 2) + 1;
+  for (const std::string& read : {text, text.substr(0, last), text + text.substr(last)}) {
+    (void)scratch.file("r/events.jsonl", read);
+    const auto reader = RecordingReader::open(scratch / "r", {.events_sha256 = admitted->events_sha256});
+    ASSERT_TRUE(reader) << reader.error().what;
+    const Error end = end_of(**reader);
+    EXPECT_EQ(end.code, read == text ? Errc::disconnected : Errc::bad_format) << end.what;
+    EXPECT_EQ(end.what.find("changed after it was verified") != std::string::npos, read != text) << end.what;
+  }
+}
+
+TEST(RecordingSignature, AFileThatIsNoneIsRefusedByItsNameAndWaitedForByNobody) {
+  const Authors own = Authors::for_once();
+  for (const char* file : {"events.jsonl", "video.igs.mha", "recording.json"}) {
+    const Scratch scratch;
+    record(scratch / "r", own);
+    fs::remove(scratch / "r" / file);
+    ASSERT_EQ(::mkfifo((scratch / "r" / file).c_str(), 0600), 0);
+    const std::string why = refusal(scratch / "r", {own.machine, true});
+    EXPECT_NE(why.find(std::string(file) + ": is no file but a pipe"), std::string::npos) << why;
+    if (std::string(file) != "video.igs.mha") {
+      EXPECT_FALSE(RecordingReader::open(scratch / "r", {}));
+    }
+  }
+}
+
 TEST(RecordingSignature, AVideoThatWasPutBeforeTheSignedOneIsRefused) {
   const Scratch scratch;
   const Authors own = Authors::for_once();
@@ -102,7 +145,7 @@ TEST(RecordingSignature, OneThatWasCutShortIsUnsignedAndSaysSo) {
   EXPECT_NE(refusal(scratch / "r", own).find("cut short"), std::string::npos) << refusal(scratch / "r", own);
   const auto accepted = admit_recording(scratch / "r", {own.machine, true});
   ASSERT_TRUE(accepted) << accepted.error().what;
-  EXPECT_NE(accepted->find("not signed"), std::string::npos) << *accepted;
+  EXPECT_NE(accepted->doubt.find("not signed"), std::string::npos) << accepted->doubt;
 }
 
 TEST(RecordingSignature, OfAnUnknownMachineIsUsedOnlyWhenAskedTo) {
