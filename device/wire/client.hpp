@@ -43,6 +43,8 @@ class Client {
   [[nodiscard]] std::string peer_words() const { return foreign_ ? foreign_->words() : ""; }
   /// Whether what goes over the wire can be read and changed on its way.
   [[nodiscard]] bool is_plain() const { return !link_->is_known(); }
+  /// By what name the machine that answers is known here, by its key; empty: none was asked for.
+  [[nodiscard]] std::string machine() const { return link_->peer_name(); }
 
  private:
   Client(std::unique_ptr<Link> link, std::string name, ForeignSettings foreign);

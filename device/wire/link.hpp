@@ -27,6 +27,8 @@ class Link {
   [[nodiscard]] virtual std::string host() const = 0;
   /// Whether the other end is on this machine or on one whose key is known here.
   [[nodiscard]] virtual bool is_known() const { return host().empty(); }
+  /// By what name the machine at the other end is known here, by the key that it has shown; empty: it has shown none.
+  [[nodiscard]] virtual std::string peer_name() const { return {}; }
 };
 
 /// A link that a listener watches, and what became of it.

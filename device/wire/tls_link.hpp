@@ -40,9 +40,8 @@ class TlsLink final : public SocketLink {
   Result<bool> hears();
   [[nodiscard]] const PublicKey& own_key() const { return tls_->own_key(); }
   [[nodiscard]] const std::string& own_certificate() const { return tls_->certificate(); }
-  /// Of the other side: its key, and by what name it is known. Once the handshake is done.
+  /// Of the other side. Once the handshake is done.
   [[nodiscard]] const PublicKey& peer_key() const { return *peer_key_; }
-  [[nodiscard]] const std::string& peer_name() const { return peer_name_; }
   [[nodiscard]] std::string peer_certificate() const;  ///< as PEM
   /// A secret of this connection alone that both ends have (RFC 8446, 7.5).
   [[nodiscard]] std::array<std::uint8_t, 32> secret(const std::string& label) const;
@@ -54,6 +53,7 @@ class TlsLink final : public SocketLink {
   /// By its key: a machine has several addresses, and another may have taken one of them.
   [[nodiscard]] std::string host() const override { return peer_key_ ? peer_key_->hex() : ""; }
   [[nodiscard]] bool is_known() const override { return peer_key_.has_value(); }
+  [[nodiscard]] std::string peer_name() const override { return peer_key_ ? peer_name_ : ""; }
   [[nodiscard]] int fd() const override { return fd_.get(); }
   [[nodiscard]] bool has_read_ahead() const override { return read_ahead_; }
   [[nodiscard]] bool has_unsent() const override { return sent_ < unsent_.size(); }

@@ -234,7 +234,7 @@ void add_calibrate_field(CLI::App& calibrate, CommandStatus& status) {
   field
       ->add_option("--bind", options->bind,
                    "an appliance whose tracker the field is of; with another one birdseyed uses no pose")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   add_result_options(*field, options->results, "the map, for [calibration] field of birdseyed (JSON)", false);
   CLI::App* check = add_calibrate_field_check(*field, status);
   field->callback([options, field, check, &status] {

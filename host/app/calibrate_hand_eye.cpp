@@ -361,7 +361,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("FOLDER");
   LivePlan& plan = options->plan;
   command->add_option("--server", plan.server, "with --live: the appliance (default 127.0.0.1)")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   command->add_option("--bird", plan.guide.bird,
                       "with --live or --recording: the scope's bird, by its name (default: scope)");
   command->add_option("--keep", plan.guide.keep, "likewise: a folder for the stations' pictures and poses")

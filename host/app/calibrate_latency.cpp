@@ -220,7 +220,8 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   auto options = std::make_shared<CalibrateLatencyOptions>();
   CLI::App& command = *calibrate.add_subcommand(
       "latency", "how late the video's times are against the tracker's, from motion that both see");
-  command.add_option("--server", options->server, "an appliance that runs: record from it now")->type_name("HOST:PORT");
+  command.add_option("--server", options->server, "an appliance that runs: record from it now")
+      ->type_name("[NAME@]HOST:PORT");
   command.add_option("--seconds", options->source.seconds, "how long to record from it (default 20)")
       ->check(CLI::Range(8.0, 600.0));
   command

@@ -103,7 +103,7 @@ void add_calibrate_record(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("record", options->record, "the calibration record")->type_name("FILE")->required();
   command->add_option("--scope", options->scope, "the scope's name or serial number, to be written into it");
   command->add_option("--bind", options->bind, "an appliance whose tracker and camera it holds for")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   command->add_flag("--accept-unsigned", options->accept_unsigned,
                     "sign also a record that is not signed, or signed by a machine that is not known here");
   command->callback([options, &status] { status.take(run(*options)); });

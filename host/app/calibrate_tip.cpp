@@ -129,7 +129,7 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
       "poses while the tip stands in a divot: a folder of 4x4 matrices, a table, an NDI log, a PLUS sequence "
       "or a session recording");
   tip.add_option("--server", options->server, "an appliance that runs: take the poses from it, now")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   tip.add_option("--bird", options->bird, "the pointer's bird, as the appliance names it (default: pointer)");
   tip.add_option("--seconds", options->seconds, "how long to take poses from it (default: 20)")
       ->check(CLI::Range(2.0, 600.0));

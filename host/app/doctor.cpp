@@ -44,7 +44,7 @@ void add_doctor(CLI::App& app, CommandStatus& status) {
       "doctor", "what of this machine works, what does not, and what to do about it; changes nothing");
   Examination& named = options->examination;
   command->add_option("--server", named.server, "the appliance: whether it answers, and what it says of itself")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   command
       ->add_option("--config", named.config, "a configuration of birdseyed: whether it is sound, and its devices here")
       ->type_name("FILE");

@@ -296,7 +296,7 @@ void add_live(CLI::App& app, CommandStatus& status) {
   options->cart.wait_ms = 30;
   CLI::App* command = app.add_subcommand("live", "the window at the cart: live video, and the CT over it");
   command->add_option("--server", options->server, "the appliance, or another OpenIGTLink server of tracked video")
-      ->type_name("HOST:PORT");
+      ->type_name("[NAME@]HOST:PORT");
   add_foreign_options(*command, options->foreign);
   command->add_option("--recording", options->recording, "a session recording, or a PLUS sequence: played again")
       ->type_name("PATH");

@@ -23,8 +23,9 @@ Result<void> pair(const PairOptions& options) {
   if (!server) return server.error();
   const auto folder = identity_folder();
   if (!folder) return folder.error();
-  const auto paired = wire::pair_as_client({*folder, options.name, wire::ask_people}, server->host, server->port,
-                                           Deadline::after(kWithin));
+  const std::string& name = options.name.empty() ? server->machine : options.name;
+  const auto paired =
+      wire::pair_as_client({*folder, name, wire::ask_people}, server->host, server->port, Deadline::after(kWithin));
   if (!paired) return paired.error().with_context("pair");
   fmt::print("paired with {}, in {}\n", paired->name, folder->string());
   return {};

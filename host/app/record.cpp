@@ -121,19 +121,21 @@ Result<ExitCode> run(const RecordOptions& options) {
   if (!writer) return writer.error();
   Progress progress;
   Ending ending;
-  std::string peer;
+  std::string peer, answered;
   bool plain = false;
   Drops drops;
   {
     EventStream stream(*std::move(client), kMostRecordFramesWaiting);
     ending = record(stream, **writer, options, progress);
     peer = stream.peer_words();
+    answered = answered_words(options.server, stream.machine());
     plain = stream.is_plain();
     drops = stream.drops();
   }
   progress.keep("completing the files");
   const auto finished = (*writer)->finish(ending.why);
   Verdict verdict = judge(**writer, ending, finished.has_value());
+  if (!answered.empty()) verdict.add(Grade::pass, answered);
   if (!peer.empty()) verdict.add(Grade::pass, fmt::format("{} is {}", options.server, peer));
   if (plain) verdict.add(Grade::pass, "recorded without TLS: others on the network could read and change what came");
   drops.tell(verdict);
@@ -151,7 +153,8 @@ Result<ExitCode> run(const RecordOptions& options) {
 void add_record(CLI::App& app, CommandStatus& status) {
   const auto options = std::make_shared<RecordOptions>();
   CLI::App& command = *app.add_subcommand("record", "keep video and poses for Slicer, PLUS and birdseye replay");
-  command.add_option("--server", options->server, "the appliance or another OpenIGTLink server, HOST:PORT")->required();
+  command.add_option("--server", options->server, "the appliance or another OpenIGTLink server, [NAME@]HOST:PORT")
+      ->required();
   add_foreign_options(command, options->foreign);
   command.add_option("--out", options->out, "folder, which is made")->required();
   command.add_option("--seconds", options->seconds, "that it lasts (default: until it is interrupted)")

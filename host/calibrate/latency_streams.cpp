@@ -156,6 +156,7 @@ Result<LatencyStreams> record_streams(const std::string& server, const LatencySo
   note_interrupts();
   auto client = connect_appliance(server);
   if (!client) return client.error();
+  if (const std::string who = answered_words(server, (*client)->machine()); !who.empty()) progress.keep(who);
   EventStream stream(*std::move(client), kMostFramesWaiting);
   return gather_streams(stream, source, progress);
 }

@@ -89,6 +89,7 @@ Result<GuidedStations> guide_hand_eye(const LivePlan& plan, Progress& progress) 
   if (const auto sound = HandEyeGuide::check(plan.guide); !sound) return sound.error();
   auto client = connect_appliance(plan.server);
   if (!client) return client.error();
+  if (const std::string who = answered_words(plan.server, (*client)->machine()); !who.empty()) progress.keep(who);
   // Focus or exposure that changes from view to view would be another lens.
   if (const auto locked = (*client)->lock_camera(true, Deadline::after(Duration::from_ms(2000))); !locked)
     return locked.error();

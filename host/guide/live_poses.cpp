@@ -24,6 +24,7 @@ Result<PoseSet> collect_poses(const std::string& server, const std::string& bird
   foreign.scope_bird.clear();  // bird is the name that the server gives
   auto client = connect_appliance(server, foreign);
   if (!client) return client.error();
+  if (const std::string who = answered_words(server, (*client)->machine()); !who.empty()) progress.keep(who);
   if (const auto done = (*client)->subscribe({.frames = false, .tracking = true}, Deadline::after(kPoseSilence)); !done)
     return done.error();
   note_interrupts();

@@ -14,6 +14,7 @@ constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
 EventStream::EventStream(std::unique_ptr<wire::Client> client, std::size_t most_frames)
     : client_(std::move(client)),
       plain_(client_->is_plain()),
+      machine_(client_->machine()),
       events_({{{most_frames, WhenFull::drop_oldest, kMostFrameBytes},
                 {kMostOthers, WhenFull::refuse, kMostOtherBytes},
                 {kMostOthers, WhenFull::refuse, kMostOtherBytes}}}) {

@@ -37,6 +37,8 @@ class EventStream : public EventSource {
   [[nodiscard]] std::string peer_words() const;
   /// Whether what goes over the wire can be read and changed on its way.
   [[nodiscard]] bool is_plain() const { return plain_; }
+  /// By what name the machine that answers is known here, by its key; empty: none was asked for.
+  [[nodiscard]] const std::string& machine() const { return machine_; }
   /// What nobody took in time.
   [[nodiscard]] Drops drops() const {
     return {events_.dropped(kFrames), events_.dropped(kPoses) + events_.dropped(kOthers)};
@@ -55,6 +57,7 @@ class EventStream : public EventSource {
 
   std::unique_ptr<wire::Client> client_;
   bool plain_;
+  std::string machine_;
   BlockingQueue<wire::Event, kLanes> events_;
   mutable std::mutex mutex_;  // of what follows
   std::optional<Error> ended_;

@@ -62,7 +62,10 @@ void LiveSource::take_link(Result<Connection> link) {
   auto stream = std::make_unique<EventStream>(std::move(link->client), kMostFramesWaiting);
   stream_ = stream.get();
   events_ = std::move(stream);
-  words_ = stream_->is_plain() ? host::words("note_connected_plain", name_) : host::words("note_connected", name_);
+  const std::string& machine = stream_->machine();
+  words_ = stream_->is_plain() ? host::words("note_connected_plain", name_)
+           : machine.empty()   ? host::words("note_connected", name_)
+                               : host::words("note_connected_known", name_, machine);
 }
 
 Result<std::unique_ptr<LiveSource>> LiveSource::of_recording(const std::filesystem::path& path, double speed,

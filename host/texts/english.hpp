@@ -395,6 +395,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"simulated_cart", "the simulated cart"},
     {"note_more", "and {} more"},
     {"note_connected", "connected to {}"},
+    {"note_connected_known", "connected to {}, which is {} by its key"},
     {"note_connected_plain", "connected to {} without TLS: others on the network may read and change what comes"},
     {"note_playing", "playing {}"},
 

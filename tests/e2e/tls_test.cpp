@@ -95,6 +95,25 @@ TEST_F(Beyond, TheApplianceSpeaksTlsToMachinesThatItKnowsAndToNoOther) {
   EXPECT_NE(status_of("127.0.0.1:" + std::to_string(port_)).find("tracker"), std::string::npos);
 }
 
+TEST_F(Beyond, AnotherKnownMachineThanTheOneThatIsNamedIsRefusedByName) {
+  start();
+  know(host_folder_, cart_folder_, "cart-2");
+  know(cart_folder_, host_folder_, "host");
+  EXPECT_NE(status_of("cart-2@" + server()).find("tracker"), std::string::npos);
+  const std::string other = status_of("cart-1@" + server());
+  EXPECT_NE(other.find("cart-2 answers there, and not cart-1"), std::string::npos) << other;
+  const std::string here = status_of("cart-2@127.0.0.1:" + std::to_string(port_));
+  EXPECT_NE(here.find("nothing shows whether it is cart-2"), std::string::npos) << here;
+}
+
+TEST_F(Beyond, WhereNobodyIsNamedItIsToldWhoAnswers) {
+  start();
+  know(host_folder_, cart_folder_, "cart-2");
+  know(cart_folder_, host_folder_, "host");
+  EXPECT_EQ((*host::connect_appliance(server()))->machine(), "cart-2");
+  EXPECT_EQ((*host::connect_appliance("127.0.0.1:" + std::to_string(port_)))->machine(), "");
+}
+
 TEST_F(Beyond, PlainIsSaidWhereItIsAllowed) {
   start("allow_plain = true\n");
   EXPECT_NE(status_of("plain:" + server()).find("the wire is plain"), std::string::npos);
