@@ -84,6 +84,9 @@ Result<std::shared_ptr<const Tls>> Tls::make(const MachineKey& key, Known known)
   SSL_CTX_set_session_cache_mode(c, SSL_SESS_CACHE_OFF);
   ::SSL_CTX_set_options(c, SSL_OP_NO_TICKET | SSL_OP_NO_COMPRESSION | SSL_OP_NO_RENEGOTIATION);
   SSL_CTX_set_mode(c, SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER | SSL_MODE_RELEASE_BUFFERS);
+  // It is set by itself, for sockets that block. Here it would have one read go on for as long as records come that
+  // carry nothing, as new keys without end, past every deadline and with no turn for others.
+  SSL_CTX_clear_mode(c, SSL_MODE_AUTO_RETRY);
   ::SSL_CTX_set_verify(c, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, nullptr);
   ::SSL_CTX_set_cert_verify_callback(c, verify_by_key, nullptr);
   SSL_CTX_set_max_cert_list(c, kMostCertificateBytes);

@@ -15,11 +15,13 @@
 
 #include "device/wire/tcp_link.hpp"
 #include "drivers/system/wait.hpp"
+#include "tests/support/scratch.hpp"
 #include "tests/support/tls_machine.hpp"
 
 namespace birdseye::wire {
 namespace {
 
+using testing::Scratch;
 using Bytes = std::vector<std::uint8_t>;
 
 struct Pair {
@@ -269,6 +271,48 @@ TEST_F(Tls13, GoesOnWithANewKeyBeforeOneHasSealedTooMuch) {
     at += kHeader + size;
   }
   EXPECT_GE(updates, 45);
+}
+
+TEST_F(Tls13, NewKeysWithoutEndAreNotReadOnAndOnInOneGo) {
+  connect();
+  // Of this kind of socket a read gets what one write put, so that there is an end to what is there at once.
+  std::array<int, 2> fds{};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, fds.data()), 0);
+  far_ = UniqueFd(fds[1]);
+  server_ = *TlsLink::over(UniqueFd(fds[0]), cart_.tls(), TlsLink::Side::server);
+  const std::shared_ptr<SSL_CTX> context(::SSL_CTX_new(::TLS_client_method()), ::SSL_CTX_free);
+  const Scratch scratch;
+  const std::string certificate = scratch.file("host.crt", host_.tls()->certificate());
+  ASSERT_EQ(::SSL_CTX_use_certificate_file(context.get(), certificate.c_str(), SSL_FILETYPE_PEM), 1);
+  ASSERT_EQ(::SSL_CTX_use_PrivateKey(context.get(), host_.key().evp_pkey()), 1);
+  auto [client, near] = socket_pair();
+  near_ = std::move(near);
+  const std::shared_ptr<SSL> ssl(::SSL_new(context.get()), ::SSL_free);
+  ::SSL_set_fd(ssl.get(), client.get());
+  ::SSL_set_connect_state(ssl.get());
+  server_shook_ = false;
+  for (int i = 0; i < 10; ++i) {
+    ::SSL_do_handshake(ssl.get());
+    carry(near_, far_);
+    if (server_shook_ && !*server_shook_) server_shook_ = server_->shake();
+    carry(far_, near_);
+  }
+  ASSERT_TRUE(server_shook_ && *server_shook_);
+  constexpr int kNewKeys = 20;
+  for (int i = 0; i < kNewKeys; ++i) {
+    ASSERT_EQ(::SSL_key_update(ssl.get(), SSL_KEY_UPDATE_NOT_REQUESTED), 1);
+    ASSERT_EQ(::SSL_do_handshake(ssl.get()), 1);
+    ASSERT_GT(carry(near_, far_), 0U);
+  }
+  int reads = 0;
+  for (std::uint8_t byte = 0; ::recv(server_->fd(), &byte, 1, MSG_PEEK) == 1; ++reads) {
+    ASSERT_TRUE(server_->wait_readable(device_now())) << "whoever waits is told that there is more";
+    ASSERT_EQ(*read(*server_), Bytes());
+  }
+  EXPECT_EQ(reads, kNewKeys);
+  ASSERT_EQ(::SSL_write(ssl.get(), "said", 4), 4);
+  carry(near_, far_);
+  EXPECT_EQ(*read(*server_), (Bytes{'s', 'a', 'i', 'd'}));
 }
 
 TEST_F(Tls13, ACertificateIsTheSameEachTime) {
