@@ -25,6 +25,8 @@ ApplianceTold listen_to(wire::Client& client) {
     if (const auto* calibration = std::get_if<wire::Calibration>(&**event)) told.calibration = *calibration;
   }
   told.peer = client.peer_words();
+  told.plain = client.is_plain();
+  told.machine = client.machine();
   return told;
 }
 
@@ -109,6 +111,15 @@ std::vector<Check> ask_appliance(const std::string& address) {
 std::vector<Check> appliance_checks(const std::string& address, const ApplianceTold& told) {
   std::vector<Check> checks{{kAppliance, "connection", CheckState::good, address + " answers", ""}};
   if (!told.peer.empty()) checks.front().found = fmt::format("{} answers: {}", address, told.peer);
+  if (const std::string who = answered_words(address, told.machine); !who.empty()) checks.front().found += "; " + who;
+  if (told.plain) {
+    checks.front().state = CheckState::could_be_better;
+    checks.front().found += "; without TLS: others on the network may read and change what comes";
+    checks.front().remedy =
+        "pair the two machines (birdseye pair) and leave out plain:; where the other is no Birdseye, have nobody else "
+        "on "
+        "that network";
+  }
   if (told.status) checks.push_back(status_check(*told.status));
   if (told.health) {
     for (const wire::InstrumentHealth& instrument : told.health->instruments)

@@ -15,7 +15,9 @@ struct ApplianceTold {
   std::optional<wire::Status> status;
   std::optional<wire::Health> health;
   std::optional<wire::Calibration> calibration;
-  std::string peer;  ///< what it is, where it is no appliance
+  std::string peer;          ///< what it is, where it is no appliance
+  bool plain = false;        ///< others on the network may read and change what comes
+  std::string machine = {};  ///< by what name it is known here, by its key; empty: it has shown none
 };
 
 /// What it comes to. address: as it was named.

@@ -345,6 +345,22 @@ TEST(DoctorAppliance, AFewLineErrorsAreNoTroubleAndASteadyTrickleIs) {
   EXPECT_EQ(named(appliance_checks("a", told), "losses").state, CheckState::could_be_better);
 }
 
+TEST(DoctorAppliance, SaysWhoAnswersAndWhetherOthersMayReadAndChangeWhatComes) {
+  ApplianceTold told;
+  told.health.emplace();
+  told.machine = "cart-1";
+  const Check known = appliance_checks("cart:18944", told).front();
+  EXPECT_EQ(known.state, CheckState::good);
+  EXPECT_THAT(known.found, HasSubstr("cart:18944 is cart-1, by its key"));
+  EXPECT_THAT(known.found, ::testing::Not(HasSubstr("without TLS")));
+  told.machine.clear();
+  told.plain = true;
+  const Check plain = appliance_checks("plain:cart:18944", told).front();
+  EXPECT_EQ(plain.state, CheckState::could_be_better);
+  EXPECT_THAT(plain.found, HasSubstr("without TLS: others on the network may read and change"));
+  EXPECT_THAT(plain.remedy, HasSubstr("birdseye pair"));
+}
+
 TEST(DoctorAppliance, WhatSaysNothingOfBirdseyedIsNone) {
   EXPECT_EQ(only(appliance_checks("a", {})).state, CheckState::bad);
   ApplianceTold other;
