@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
 #include <optional>
 #include <set>
 
@@ -15,6 +14,7 @@
 #include "drivers/identity/identity_folder.hpp"
 #include "drivers/identity/this_machine.hpp"
 #include "drivers/io/serial_port.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::device {
 
@@ -214,22 +214,17 @@ void read_recording(ConfigSection& section, Config& config) {
   section.number("most_gb", config.record.most_gb, 0.001, 100'000);
 }
 
-/// The whole file, at most so many bytes.
-std::optional<std::string> text_of_file(const std::filesystem::path& path, std::size_t most_bytes) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text(most_bytes + 1, 0);
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (!file.is_open() || file.bad()) return std::nullopt;
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  return text;
-}
-
 constexpr std::size_t kMostFieldBytes = 4U << 20U;
 constexpr std::size_t kMostRecordBytes = 60'000;  // one message of the wire carries it
 
+std::string why_unread(const std::string& path, const Error& error) {
+  if (error.code != Errc::not_found && error.code != Errc::unreadable) return error.what;
+  return path + ": cannot be read; see whether it is there, its owner and mode";
+}
+
 void read_field_map(const std::string& path, ConfigSection& section, Config& config) {
-  const auto text = text_of_file(path, kMostFieldBytes);
-  if (!text) return section.fail("field", path + ": cannot be read; see whether it is there, its owner and mode");
+  const auto text = read_whole_file(path, kMostFieldBytes);
+  if (!text) return section.fail("field", why_unread(path, text.error()));
   auto parsed = calibration::parse_field_map(*text);
   if (!parsed) return section.fail("field", parsed.error().with_context(path).what);
   config.core.field = std::move(parsed->map);
@@ -253,9 +248,10 @@ Result<std::string> refusal_of(const calibration::SignedRecord& record, const st
 }
 
 void read_calibration_record(const std::string& path, bool accept_unsigned, ConfigSection& section, Config& config) {
-  const auto text = text_of_file(path, kMostRecordBytes);
-  if (!text) return section.fail("record", path + ": cannot be read; see whether it is there, its owner and mode");
-  if (text->size() > kMostRecordBytes) return section.fail("record", path + ": is no calibration record");
+  const auto text = read_whole_file(path, kMostRecordBytes);
+  if (!text && text.error().code == Errc::unsupported)
+    return section.fail("record", path + ": is no calibration record");
+  if (!text) return section.fail("record", why_unread(path, text.error()));
   const auto record = calibration::parse_signed_record(*text);
   if (!record) return section.fail("record", record.error().with_context(path).what);
   auto refusal = refusal_of(*record, path);
@@ -301,9 +297,9 @@ Result<std::string> read_text(const std::filesystem::path& path) {
     return Error{Errc::not_found, fmt::format("{}: is a folder, not a configuration file", path.string())};
   if (!std::filesystem::exists(path, ignored))
     return Error{Errc::not_found, fmt::format("{}: no such configuration file", path.string())};
-  auto text = text_of_file(path, kMostBytes);
-  if (!text) return Error{Errc::unreadable, fmt::format("{}: cannot be read; see its owner and mode", path.string())};
-  if (text->size() > kMostBytes || is_too_deep(*text))
+  auto text = read_whole_file(path, kMostBytes);
+  if (!text && text.error().code != Errc::unsupported) return text.error();
+  if (!text || is_too_deep(*text))
     return Error{Errc::bad_format, fmt::format("{}: is no configuration file of birdseyed", path.string())};
   return *std::move(text);
 }

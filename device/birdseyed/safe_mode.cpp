@@ -11,6 +11,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/crash_note.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::device {
 
@@ -39,11 +40,9 @@ bool write_whole(const fs::path& path, const std::string& text) {
 }
 
 std::optional<RunMemory> read(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) return std::nullopt;
-  std::ostringstream text;
-  text << in.rdbuf();
-  return parse_run_memory(text.str());
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return std::nullopt;
+  return parse_run_memory(*text);
 }
 
 }  // namespace

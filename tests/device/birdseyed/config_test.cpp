@@ -94,6 +94,15 @@ TEST(Config, AFieldMapThatIsNotThereHidesNoMistakeInTheRecord) {
   EXPECT_EQ(what.find("unknown key"), std::string::npos) << what;
 }
 
+TEST(Config, ADeviceInPlaceOfAFileIsRefusedByItsName) {
+  const auto config = read(kSound + std::string("[calibration]\nfield = \"/dev/zero\"\nrecord = \"/dev/zero\"\n"));
+  ASSERT_FALSE(config);
+  for (const char* key : {"field", "record"}) {
+    const std::string says = std::string("[calibration] ") + key + ": /dev/zero: is no file but";
+    EXPECT_NE(config.error().what.find(says), std::string::npos) << config.error().what;
+  }
+}
+
 TEST(Config, ReadsWhatItIsToldAndDefaultsTheRest) {
   const auto config = read(kSound);
   ASSERT_TRUE(config) << config.error().what;
