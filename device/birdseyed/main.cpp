@@ -121,9 +121,11 @@ int pair(const fs::path& path, const PairOptions& options) {
   return 0;
 }
 
-int replay(const fs::path& path, const fs::path& recording, const ServiceSignals& signals) {
+int replay(const fs::path& path, const fs::path& recording, bool accept_unsigned, const ServiceSignals& signals) {
   const auto config = device::read_config(path);
   if (!config) return refuse(config.error());
+  if (const auto admitted = device::admit_replay(recording, accept_unsigned); !admitted)
+    return refuse(admitted.error());
   auto admission = device::admission_of(config->wire);
   if (!admission) return refuse(admission.error());
   const auto server = wire::Server::listen(config->wire.bind, config->wire.port, *std::move(admission));
@@ -139,16 +141,20 @@ int main(int argc, char** argv) {
   CLI::App app{"birdseyed: tracker and camera of a laparoscope cart, on one clock, over OpenIGTLink", "birdseyed"};
   fs::path config_path, recording;
   app.set_version_flag("--version", "birdseyed " BIRDSEYE_VERSION);
-  bool check_only = false, probe_only = false, end_with_stdin = false;
+  bool check_only = false, probe_only = false, end_with_stdin = false, accept_unsigned = false;
   app.add_option("--config", config_path, "configuration file (TOML)")->required();
   CLI::Option* const check =
       app.add_flag("--check", check_only, "read the configuration, say whether it is sound, and end");
   CLI::Option* const probe =
       app.add_flag("--probe", probe_only, "open each instrument once, say what it is or what is wrong, and end")
           ->excludes(check);
-  app.add_option("--replay", recording, "an appliance recording, to be published in place of instruments")
-      ->excludes(check)
-      ->excludes(probe);
+  CLI::Option* const replayed =
+      app.add_option("--replay", recording, "an appliance recording, to be published in place of instruments")
+          ->excludes(check)
+          ->excludes(probe);
+  app.add_flag("--accept-unsigned", accept_unsigned,
+               "replay a recording also where it is not signed, or signed by a machine that is not known here")
+      ->needs(replayed);
   app.add_flag("--end-with-stdin", end_with_stdin,
                "end when standard input is closed: for a program that starts this one");
   PairOptions pair_options;
@@ -177,6 +183,6 @@ int main(int argc, char** argv) {
       const auto faults = device::probe(*config, signals.stop());
       return faults ? 0 : refuse(faults.error());
     }
-    return recording.empty() ? serve(config_path, signals) : replay(config_path, recording, signals);
+    return recording.empty() ? serve(config_path, signals) : replay(config_path, recording, accept_unsigned, signals);
   });
 }

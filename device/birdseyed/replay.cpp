@@ -1,12 +1,36 @@
 #include "device/birdseyed/replay.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <string>
+
 #include "device/birdseyed/instrument_thread.hpp"
+#include "drivers/identity/appliance_seal.hpp"
+#include "drivers/identity/this_machine.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 
 namespace birdseye::device {
+
+Result<void> admit_replay(const std::filesystem::path& recording, bool accept_unsigned) {
+  const auto seal = read_appliance_seal(recording);
+  if (!seal) return seal.error();
+  const auto refused = [&recording](const std::string& why) {
+    return Error{Errc::bad_value, fmt::format("{}: {}", recording.string(), why)};
+  };
+  if (seal->more) return refused("bytes were added behind its signature; take a copy that is as it was written");
+  const auto machine = ThisMachine::open();
+  if (!machine && !accept_unsigned) return machine.error();
+  const auto author = machine
+                          ? machine->author_of(calibration::kApplianceRecordingFormat, seal->sha256, seal->signature)
+                          : Result<Author>(Author());
+  if (!author) return refused(author.error().what);
+  if (author->standing == Author::Standing::known) return {};
+  if (!accept_unsigned) return refused(fmt::format("is {}; --accept-unsigned plays it all the same", author->words()));
+  spdlog::warn("UNSIGNED: {} is {}", recording.string(), author->words());
+  return {};
+}
 
 Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop) {
   auto reader = RawEventReader::open(recording);

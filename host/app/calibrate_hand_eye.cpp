@@ -163,7 +163,7 @@ Result<void> check_record(const CalibrateHandEyeOptions& options) {
 }
 
 /// Of an appliance that runs, or of a recording of one.
-Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
+Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options, const AdmittedRecording& recording) {
   LivePlan plan = options.plan;
   auto pattern = calibration::parse_pattern(options.files.board);
   if (!pattern) return pattern.error();
@@ -178,7 +178,7 @@ Result<HandEyeRecording> record_live(const CalibrateHandEyeOptions& options) {
   if (options.recording.empty()) {
     session = guide_hand_eye(plan, progress);
   } else {
-    const auto reader = RecordingReader::open(options.recording, {});
+    const auto reader = RecordingReader::open(options.recording, {.events_sha256 = recording.events_sha256});
     if (!reader) return reader.error();
     session = stations_of_recording(**reader, plan.guide, progress);
     if (!session) return session.error().with_context(options.recording.string());
@@ -274,7 +274,10 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
     if (!read) return status.refuse(read.error());
     angles = *std::move(read);
   }
-  auto recording = options.live || !options.recording.empty() ? record_live(options) : read_hand_eye_stations(files);
+  const auto source = admit_source(options.recording, options.results);
+  if (!source) return status.refuse(source.error());
+  auto recording =
+      options.live || !options.recording.empty() ? record_live(options, *source) : read_hand_eye_stations(files);
   if (!recording) return status.refuse(recording.error());
   if (options.position_sigma_mm > 0)
     recording->input.tracker_noise =
@@ -282,8 +285,9 @@ void run(const CLI::App& command, CalibrateHandEyeOptions& options, CommandStatu
   recording->directions_said = !options.poses_are.direction.empty() && !options.eye_direction.empty();
   recording->sensor_inverted = files.of_sensor.inverted;
   recording->eye_inverted = files.of_eye.inverted;
-  const auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
+  auto found = solve_hand_eye(*recording, angles, !files.eye_poses.empty());
   if (!found) return status.refuse(found.error());
+  tell_doubt(*source, found->verdict);
   finish(options, *recording, *found, status);
 }
 
@@ -373,6 +377,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
   command->add_option("--seconds", plan.seconds, "with --live: then it ends in any case (default 300)")
       ->check(CLI::Range(5.0, 7200.0));
   add_result_options(*command, options->results, "camera_from_sensor, a 4x4 matrix, mm");
+  allow_unsigned_recording(*command);
   command->callback([options, command, &status] { run(*command, *options, status); });
 }
 

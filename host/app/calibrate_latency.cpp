@@ -64,12 +64,13 @@ std::string advice_of(const Latency& latency, const std::optional<double>& delay
                             late ? "lower" : "raise");
 }
 
-Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, Progress& progress) {
+Result<LatencyFound> of_appliance(const CalibrateLatencyOptions& options, const AdmittedRecording& recording,
+                                  Progress& progress) {
   Result<LatencyStreams> streams = Error{};
   if (!options.recording.empty()) {
     LatencySource all = options.source;
     all.seconds = 0;
-    streams = is_session(options.recording) ? session_streams(options.recording, all, progress)
+    streams = is_session(options.recording) ? session_streams(options.recording, recording.events_sha256, all, progress)
                                             : replay_streams(options.recording, all, progress);
   } else {
     streams = record_streams(options.server, options.source, progress);
@@ -187,11 +188,14 @@ void run(const CLI::App& command, const CalibrateLatencyOptions& options, Comman
     const auto fits = check_bound_record(options.paths.record, options.server, {"tracker", "camera"});
     if (!fits) return status.refuse(fits.error());
   }
-  const auto found = files ? of_files(options, odd) : of_appliance(options, progress);
+  const auto recording = admit_source(options.recording, options.paths);
+  if (!recording) return status.refuse(recording.error());
+  const auto found = files ? of_files(options, odd) : of_appliance(options, *recording, progress);
   if (!found) return status.refuse(found.error());
   Verdict verdict = calibration::latency_verdict(found->latency, found->names.a, found->names.b);
   for (const std::string& reason : odd.reasons) verdict.add(Grade::pass, reason);
   found->drops.tell(verdict);
+  tell_doubt(*recording, verdict);
   if (verdict.grade != Grade::fail) {
     const Latency& l = found->latency;
     fmt::print("offset {:.2f} ms (95 %: {:.2f} to {:.2f}), drift {:.1f} ppm (95 %: {:.1f} to {:.1f})\n{}\n",
@@ -240,6 +244,7 @@ void add_calibrate_latency(CLI::App& calibrate, CommandStatus& status) {
   add_eye_time_unit(command, options->eye_time_unit);
   command.add_flag("--no-drift", options->no_drift, "both clocks are known to run at one rate");
   add_result_options(command, options->paths, "offset and drift (TOML)");
+  allow_unsigned_recording(command);
   command.callback([options, &command, &status] {
     options->settings.find_drift = !options->no_drift;
     run(command, *options, status);

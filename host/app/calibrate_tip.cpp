@@ -145,12 +145,16 @@ void add_calibrate_tip(CLI::App& calibrate, CommandStatus& status) {
   tip.add_option("--spin", options->spin, "poses while the pointer is spun about its shaft: gives its axis, too");
   add_pose_options(tip, options->poses_are);
   add_result_options(tip, options->results, "the tip, x y z in the sensor's frame, mm");
+  allow_unsigned_recording(tip);
   tip.callback([options, &tip, &status] {
     if (const auto fine = check(tip, *options); !fine) return status.refuse(fine.error());
+    const auto source = admit_source(options->poses, options->results);
+    if (!source) return status.refuse(source.error());
     const auto input = read_input(*options);
     if (!input) return status.refuse(input.error());
-    const auto found = calibrate_tip(*input);
+    auto found = calibrate_tip(*input);
     if (!found) return status.refuse(found.error());
+    tell_doubt(*source, found->verdict);
     print(*found, *input);
     finish_calibration(options->results, tip_text(*found), tip_json(*found, *input), tip_page(*found, *input),
                        found->verdict, status, entry_of(*found, *input));

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/files/write_files.hpp"
+#include "host/texts/texts.hpp"
 
 namespace birdseye::host {
 
@@ -64,6 +65,25 @@ void add_result_options(CLI::App& command, ResultPaths& paths, const std::string
   command.add_option("--report", paths.report, "a page with the figures and pictures (HTML)")
       ->type_name("FILE")
       ->check(folder_is_there);
+}
+
+void allow_unsigned_recording(CLI::App& command) {
+  CLI::Option* const accept = command.get_option("--accept-unsigned");
+  accept->remove_needs(command.get_option("--record"));
+  accept->description(
+      "go on also from a record or a recording that is not signed, or signed by a machine that is not known here");
+}
+
+Result<AdmittedRecording> admit_source(const std::filesystem::path& recording, const ResultPaths& paths) {
+  if (recording.empty()) return AdmittedRecording();
+  const auto authors = Authors::of_this_machine(paths.accept_unsigned);
+  if (!authors) return authors.error();
+  return admit_recording(recording, *authors);
+}
+
+void tell_doubt(const AdmittedRecording& recording, Verdict& verdict) {
+  if (!recording.doubt.empty())
+    verdict.add(Grade::marginal, words("why_unsigned", words("unsigned_recording"), recording.doubt));
 }
 
 void tell_not_written(const std::filesystem::path& path) {

@@ -166,10 +166,10 @@ bool is_session(const std::filesystem::path& recording) {
   return std::filesystem::exists(recording / kRecordingEvents, ignored);
 }
 
-Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const LatencySource& source,
-                                       Progress& progress) {
+Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const std::string& events_sha256,
+                                       const LatencySource& source, Progress& progress) {
   note_interrupts();
-  const auto reader = RecordingReader::open(recording, {});
+  const auto reader = RecordingReader::open(recording, {.events_sha256 = events_sha256});
   if (!reader) return reader.error();
   return gather(**reader, source, progress);
 }
@@ -192,8 +192,9 @@ Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, co
   const auto config = (*folder)->path() / "replay.toml", log = (*folder)->path() / "birdseyed.log";
   const auto port = port_for_replay(config);
   if (!port) return port.error();
-  auto birdseyed =
-      ChildProcess::start({beside_us("birdseyed"), "--config", config.string(), "--replay", recording.string()}, log);
+  // Whether it is to be used has been decided here.
+  auto birdseyed = ChildProcess::start(
+      {beside_us("birdseyed"), "--config", config.string(), "--replay", recording.string(), "--accept-unsigned"}, log);
   if (!birdseyed) return std::move(birdseyed).error();
   // What it refuses, it says at once; what it plays, it plays to whoever is there.
   auto client = wire::Client::connect("127.0.0.1", *port, Deadline::after(Duration::from_ms(5000)));

@@ -37,8 +37,9 @@ Result<LatencyStreams> replay_streams(const std::filesystem::path& recording, co
 
 /// Whether the path is a session recording: a folder with its events.
 bool is_session(const std::filesystem::path& recording);
-/// From a session recording. source.bird: as the server named it that was recorded.
-Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const LatencySource& source,
-                                       Progress& progress);
+/// From a session recording. events_sha256: as RecordingReader::Settings has it. source.bird: as the server named it
+/// that was recorded.
+Result<LatencyStreams> session_streams(const std::filesystem::path& recording, const std::string& events_sha256,
+                                       const LatencySource& source, Progress& progress);
 
 }  // namespace birdseye::host
