@@ -87,6 +87,7 @@ Result<void> write_snapshot(const fs::path& folder, const Snapshot& snapshot) {
   if (!with.tracker.empty()) sheet["tracker"] = with.tracker;
   if (!with.camera.empty()) sheet["camera"] = with.camera;
   if (!with.scope.empty()) sheet["scope"] = with.scope;
+  if (!snapshot.not_signed.empty()) sheet["unsigned"] = snapshot.not_signed;
   if (snapshot.fre_mm) sheet["fre_mm"] = *snapshot.fre_mm;
   if (snapshot.identity) sheet["patient"] = json_of(*snapshot.identity);
   if (shown.overlaid && snapshot.setup && snapshot.camera_from_patient && snapshot.transfer) {

@@ -28,6 +28,7 @@ struct Snapshot {
   PatientFiles patient;
   std::shared_ptr<const DeformedOrgan> deformed;  ///< null: the CT as it was taken
   std::optional<double> fre_mm;
+  std::string not_signed;                   ///< what no known machine signed, as OperationView has it
   std::optional<PatientIdentity> identity;  ///< empty: the snapshot is not to name the patient
 };
 

@@ -365,6 +365,7 @@ void LiveApp::snapshot(const std::filesystem::path& path, const ShownPicture& sh
     parts->patient = operation_.patient_files;
     parts->deformed = operation_.deformed;
     parts->fre_mm = operation_.fre_mm;
+    parts->not_signed = operation_.not_signed;
     if (identify_ && operation_.patient) parts->identity = operation_.patient->identity;
   }
   saving_.start([path, shot = window_->shot(), parts = std::move(parts)](const std::stop_token&, const auto&) {

@@ -43,10 +43,18 @@ TEST(Snapshot, SaysWhatItsPictureWasTakenWith) {
   }
 }
 
+TEST(Snapshot, SaysWhatItRestsOnThatNobodyKnownSigned) {
+  const Scratch scratch;
+  Snapshot unsigned_one = snapshot_with({});
+  unsigned_one.not_signed = "recording";
+  ASSERT_TRUE(write_snapshot(scratch / "one", unsigned_one));
+  EXPECT_NE(contents_of(scratch / "one/snapshot.json").find("\"unsigned\": \"recording\""), std::string::npos);
+}
+
 TEST(Snapshot, LeavesOutWhatNobodyHasTold) {
   const Scratch scratch;
   ASSERT_TRUE(write_snapshot(scratch / "one", snapshot_with({})));
-  for (const char* key : {"tracker", "camera", "scope"})
+  for (const char* key : {"tracker", "camera", "scope", "unsigned"})
     EXPECT_EQ(contents_of(scratch / "one/snapshot.json").find('"' + std::string(key) + '"'), std::string::npos) << key;
   const auto told = read_taken_with(scratch / "one/video.png");
   ASSERT_TRUE(told);
