@@ -22,6 +22,14 @@ Result<void> check(const CameraModel& c) {
   for (const double v : {c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3}) {
     if (!std::isfinite(v)) return Error{Errc::bad_value, "camera: a parameter is not a finite number"};
   }
+  // Far beyond any lens single precision ends, in which pictures are drawn.
+  constexpr double kMost = 1e6;
+  for (const double v : {c.fx_px, c.fy_px, 1 / c.fx_px, 1 / c.fy_px, c.cx_px, c.cy_px, c.k1, c.k2, c.p1, c.p2, c.k3}) {
+    if (std::abs(v) > kMost)
+      return Error{Errc::bad_value,
+                   "camera: a parameter is beyond that of any lens (a millionth or a million); "
+                   "calibrate again"};
+  }
   return {};
 }
 

@@ -1,5 +1,7 @@
 #include "device/wire/foreign_messages.hpp"
 
+#include "calibration/geometry/rigid_matrix.hpp"
+
 #include <fmt/format.h>
 #include <igtl_image.h>
 #include <igtl_qtdata.h>
@@ -41,12 +43,11 @@ constexpr double kOrthonormal = 1e-3;
 
 /// Empty where the matrix is no pose. The identity, which many send for a tool that is out of sight, is none either.
 std::optional<Transform<Tracker, Sensor>> pose_of_matrix(ByteView numbers) {
-  Eigen::Matrix<double, 3, 4> columns;
-  for (std::size_t i = 0; i < 12; ++i) columns.data()[i] = number_at(numbers, i);
-  const Eigen::Matrix3d r = columns.leftCols<3>();
-  if (!columns.allFinite() || !(r * r.transpose()).isIdentity(kOrthonormal) || r.determinant() < 0) return std::nullopt;
-  if (columns.isIdentity(0)) return std::nullopt;
-  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(columns.col(3)));
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  for (std::size_t i = 0; i < 12; ++i) m(static_cast<int>(i % 3), static_cast<int>(i / 3)) = number_at(numbers, i);
+  if (!is_rigid(m, kOrthonormal) || m.isIdentity(0)) return std::nullopt;
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>())),
+                                    Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
 /// Position, then the quaternion x y z w; of a quaternion without its w it is the positive one that makes it a unit.
@@ -55,7 +56,8 @@ std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(ByteView numbers) {
   const Eigen::Vector3d xyz(number_at(numbers, 3), number_at(numbers, 4), number_at(numbers, 5));
   const double w = numbers.size() >= 28 ? number_at(numbers, 6) : std::sqrt(std::max(0.0, 1 - xyz.squaredNorm()));
   const Eigen::Quaterniond rotation(w, xyz.x(), xyz.y(), xyz.z());
-  if (!position.allFinite() || !(std::abs(rotation.norm() - 1) < kOrthonormal)) return std::nullopt;
+  if (!(position.cwiseAbs().maxCoeff() <= kFarthestMm) || !(std::abs(rotation.norm() - 1) < kOrthonormal))
+    return std::nullopt;
   if (position.isZero(0) && xyz.isZero(0)) return std::nullopt;
   return Transform<Tracker, Sensor>(rotation, position);
 }

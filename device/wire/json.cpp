@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/geometry/rigid_matrix.hpp"
+
 namespace birdseye::wire {
 
 using nlohmann::json;
@@ -104,8 +106,7 @@ void from_json(const json& in, FrameInfo& info) {
     Eigen::Matrix4d m;
     for (int i = 0; i < 16; ++i) m(i / 4, i % 4) = matrix[static_cast<std::size_t>(i)].get<double>();
     // A pose that is no pose is refused here, whoever sent it: nothing downstream may draw by it.
-    const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-    if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-6) || r.determinant() < 0) break;
+    if (!is_rigid(m, 1e-6)) break;
     info.pose.kind = known;
     info.pose.tracker_from_sensor = Transform<Tracker, Sensor>::from_matrix(m);
   }

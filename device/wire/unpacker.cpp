@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "device/wire/igtl_bytes.hpp"
 #include "device/wire/json.hpp"
 
@@ -70,10 +71,10 @@ std::optional<Transform<Tracker, Sensor>> pose_of(igtl::TrackingDataElement& ele
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(matrix[row][column]);
   }
-  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-  if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-4) || r.determinant() < 0) return std::nullopt;
+  if (!is_rigid(m, 1e-4)) return std::nullopt;
   // Through a quaternion: single precision leaves the rotation a little off orthonormal.
-  return Transform<Tracker, Sensor>(Eigen::Quaterniond(r), Eigen::Vector3d(m.topRightCorner<3, 1>()));
+  return Transform<Tracker, Sensor>(Eigen::Quaterniond(Eigen::Matrix3d(m.topLeftCorner<3, 3>())),
+                                    Eigen::Vector3d(m.topRightCorner<3, 1>()));
 }
 
 /// Empty where one of them is no pose.

@@ -12,6 +12,7 @@
 #include <map>
 
 #include "calibration/base/lower_case.hpp"
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "host/files/text_rows.hpp"
 
 namespace birdseye::host {
@@ -21,14 +22,13 @@ namespace {
 /// How far a recorded rotation may be from one: files with three decimals pass, and at 400 mm from the sensor that is
 /// 0.4 mm.
 constexpr double kRotationTolerance = 1e-3;
-/// No tracker sees so far; what is beyond stands for "not seen", as NDI's -3.697314E28 does.
-constexpr double kFarthest_mm = 1e5;
 
 /// What is wrong with a position, if anything.
 std::string problem_of(const Eigen::Vector3d& position_mm) {
   if (!position_mm.allFinite()) return "not finite";
+  // No tracker sees so far; what is beyond stands for "not seen", as NDI's -3.697314E28 does.
   const double farthest_mm = position_mm.cwiseAbs().maxCoeff();
-  if (farthest_mm <= kFarthest_mm) return {};
+  if (farthest_mm <= kFarthestMm) return {};
   Eigen::Index which = 0;
   position_mm.cwiseAbs().maxCoeff(&which);
   return fmt::format("{:.6g} mm is no position (a stand-in for a missing one)", position_mm[which]);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
@@ -54,9 +55,12 @@ Result<std::vector<NumberRow>> rows_of(const std::string& all, const fs::path& p
 
 Result<Eigen::Matrix4d> check_rigid(const Eigen::Matrix4d& m, const std::string& where) {
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-  if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() > 0 &&
-      (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() <= 1e-9) {
-    return m;
+  const bool last_row = (m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() <= 1e-9;
+  if (last_row && is_rigid(m, 1e-3)) return m;
+  if (const double most_mm = m.topRightCorner<3, 1>().cwiseAbs().maxCoeff(); last_row && most_mm > kFarthestMm) {
+    return Error{Errc::bad_value,
+                 fmt::format("{}: is {:.6g} mm away, further than {:.0f} m: give the translation in mm", where, most_mm,
+                             kFarthestMm / 1000)};
   }
   if (m.allFinite() && (r * r.transpose()).isIdentity(1e-3) && r.determinant() < 0) {
     return Error{Errc::bad_value, where +

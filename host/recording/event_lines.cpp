@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calibration/geometry/rigid_matrix.hpp"
 #include "device/wire/json.hpp"
 
 namespace birdseye::host {
@@ -32,9 +33,7 @@ wire::Birds birds_of(const json& in) {
     if (rows.size() != 16) throw std::invalid_argument("a pose has 16 numbers");
     Eigen::Matrix4d m;
     for (int i = 0; i < 16; ++i) m(i / 4, i % 4) = rows[static_cast<std::size_t>(i)].get<double>();
-    const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-    if (!m.allFinite() || !(r * r.transpose()).isIdentity(1e-6) || r.determinant() < 0)
-      throw std::invalid_argument("a pose that is no pose");
+    if (!is_rigid(m, 1e-6)) throw std::invalid_argument("a pose that is no pose");
     birds.birds.push_back({bird.at("name").get<std::string>(), Transform<Tracker, Sensor>::from_matrix(m)});
   }
   return birds;

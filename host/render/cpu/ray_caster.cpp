@@ -61,6 +61,9 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   image.rgba.resize(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * 4);
   const Transform<Patient, Camera> patient_from_camera = camera_from_patient.inverse();
   const Eigen::Vector3d& eye = patient_from_camera.translation();
+  // From ten kilometres nothing is seen, and single precision would end in places that are none of the volume's.
+  constexpr double kFarthestEyeMm = 1e7;
+  if (!(eye.cwiseAbs().maxCoeff() < kFarthestEyeMm)) return image;
   const Eigen::Affine3d voxel_from_patient = volume_.patient_from_voxel.inverse();
   grid_.light(eye, settings);
 

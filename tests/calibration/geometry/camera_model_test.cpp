@@ -100,6 +100,14 @@ TEST(CameraModel, RefusesWhatIsNoCamera) {
   c = wide_lens();
   c.k2 = NAN;
   EXPECT_FALSE(check(c));
+  for (double CameraModel::*const field : {&CameraModel::fx_px, &CameraModel::cy_px, &CameraModel::k3}) {
+    c = wide_lens();
+    c.*field = 1e38;
+    EXPECT_FALSE(check(c));
+  }
+  c = wide_lens();
+  c.fy_px = 1e-320;
+  EXPECT_FALSE(check(c));
 }
 
 TEST(CameraModel, LiverSurfaceProjectsAsItsReadmeSays) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 #include <random>
+
+#include "calibration/geometry/rigid_matrix.hpp"
 
 namespace birdseye {
 namespace {
@@ -11,6 +14,21 @@ namespace {
 Eigen::Vector3d random_vector(std::mt19937& rng, double scale) {
   std::uniform_real_distribution<double> u(-scale, scale);
   return {u(rng), u(rng), u(rng)};
+}
+
+TEST(RigidMatrix, IsARightHandedRotationAndAPlaceThatPicturesCanBeDrawnFrom) {
+  std::mt19937 rng(2);
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m.topLeftCorner<3, 3>() = rotation_exp(random_vector(rng, 2));
+  m.topRightCorner<3, 1>() << 0, -1e5, 3;
+  EXPECT_TRUE(is_rigid(m, 1e-6));
+  Eigen::Matrix4d mirrored = m, scaled = m, beyond = m, nothing = m;
+  mirrored.col(0) *= -1;
+  scaled.topLeftCorner<3, 3>() *= 1.001;
+  beyond(1, 3) = -1.001e5;
+  nothing(2, 3) = std::nan("");
+  for (const Eigen::Matrix4d& no : {mirrored, scaled, beyond, nothing}) EXPECT_FALSE(is_rigid(no, 1e-6)) << no;
+  EXPECT_TRUE(is_rigid(scaled, 1e-2));
 }
 
 TEST(Transform, InverseUndoesAndChainAssociates) {

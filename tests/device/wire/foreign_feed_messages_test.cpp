@@ -59,7 +59,9 @@ TEST(ForeignFeed, WhatIsNoPoseIsNone) {
   mirrored.linear().col(0) *= -1;
   Eigen::Isometry3d nothing = pose_at(1);
   nothing.translation().x() = std::nan("");
-  for (const Eigen::Isometry3d& no_pose : {scaled, mirrored, nothing, Eigen::Isometry3d::Identity()}) {
+  Eigen::Isometry3d beyond = pose_at(1);
+  beyond.translation().y() = 3e38;
+  for (const Eigen::Isometry3d& no_pose : {scaled, mirrored, nothing, beyond, Eigen::Isometry3d::Identity()}) {
     FeedLink link;
     link.transform("ProbeToTracker", 0, no_pose);
     link.image(0);

@@ -70,5 +70,12 @@ TEST(RegistrationFile, OfAnotherCtIsRefusedWithTheRemedy) {
   EXPECT_NE(other.error().what.find("--spacing"), std::string::npos);
 }
 
+TEST(PoseText, OfWhatIsFurtherThanAnyRoomIsRefused) {
+  const testing::Scratch scratch;
+  const auto far = read_pose(scratch.file("far.txt", "1 0 0 0\n0 1 0 -1e308\n0 0 1 0\n0 0 0 1\n"));
+  ASSERT_FALSE(far);
+  EXPECT_NE(far.error().what.find("give the translation in mm"), std::string::npos) << far.error().what;
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "host/render/cpu/ray_caster.hpp"
@@ -38,6 +40,18 @@ TEST(RayCaster, AgreesWithTheReference) {
   RenderSettings settings;
   settings.step_mm = 0.8;
   expect_agreement(scene(), settings);
+}
+
+TEST(RayCaster, DrawsNothingFromWhereSinglePrecisionEnds) {
+  const Volume volume = scene();
+  for (const cpu::Isa isa : cpu::supported_isas()) {
+    RayCaster caster(volume, soft(), isa);
+    for (const double far_mm : {1e8, 1e38, 1e308, std::numeric_limits<double>::infinity()}) {
+      const Transform<Camera, Patient> from(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, -far_mm, 100));
+      const ImageRgba picture = caster.render(LensRays(lens()), from, {});
+      EXPECT_EQ(std::ranges::count(picture.rgba, 0), std::ssize(picture.rgba)) << far_mm;
+    }
+  }
 }
 
 TEST(RayCaster, AgreesWithTheReferenceWhenClippedAndFromInside) {
