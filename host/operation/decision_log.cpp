@@ -17,9 +17,9 @@ namespace {
 
 constexpr const char* kFile = "frames.csv";
 constexpr const char* kHeader =
-    "sequence,age_ms,strength,shape,expected_mm,reason,circle_mm,fiducials_mm,hand_eye_mm,lens_mm,pose_mm,time_mm,"
-    "motion_mm,pose,pose_sigma_mm,pose_age_ms,camera_from_patient (16 numbers, row by row; none: no overlay)";
-constexpr std::size_t kBeforeMatrix = 16;
+    "sequence,age_ms,strength,shape,expected_mm,reason,said,grade,circle_mm,fiducials_mm,hand_eye_mm,lens_mm,pose_mm,"
+    "time_mm,motion_mm,pose,pose_sigma_mm,pose_age_ms,camera_from_patient (16 numbers, row by row; none: no overlay)";
+constexpr std::size_t kBeforeMatrix = 18;
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> out(1);
@@ -33,6 +33,12 @@ std::vector<std::string> cells_of(const std::string& line) {
   return out;
 }
 
+std::string in_a_cell(std::string words) {
+  std::ranges::replace(words, ',', ';');
+  std::ranges::replace(words, '\n', ' ');
+  return words;
+}
+
 std::optional<double> number_in(const std::string& cell) {
   double out = 0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), out);
@@ -42,16 +48,16 @@ std::optional<double> number_in(const std::string& cell) {
 
 std::optional<ErrorBudget> budget_of(const std::vector<std::string>& cells) {
   ErrorBudget out;
-  const auto circle_mm = number_in(cells[6]);
+  const auto circle_mm = number_in(cells[8]);
   const std::array parts{&out.fiducials_mm, &out.hand_eye_mm, &out.lens_mm, &out.pose_mm, &out.time_mm};
   for (std::size_t i = 0; i < parts.size(); ++i) {
-    const auto part_mm = number_in(cells[7 + i]);
+    const auto part_mm = number_in(cells[9 + i]);
     if (!part_mm) return std::nullopt;
     *parts[i] = *part_mm;
   }
   if (!circle_mm) return std::nullopt;
-  if (cells[12].empty()) return out;
-  const auto motion_mm = number_in(cells[12]);
+  if (cells[14].empty()) return out;
+  const auto motion_mm = number_in(cells[14]);
   if (!motion_mm) return std::nullopt;
   const double rigid_mm = out.radius95_mm();  // the circle's, but for the motion
   out.motion = MotionError{*motion_mm, std::sqrt(std::max(0.0, *circle_mm * *circle_mm - rigid_mm * rigid_mm))};
@@ -70,10 +76,13 @@ std::optional<LoggedDecision> decision_of(const std::vector<std::string>& cells)
   out.shape = static_cast<std::uint64_t>(*shape);
   if (!cells[4].empty() && !(out.expected = budget_of(cells))) return std::nullopt;
   out.reason = cells[5];
+  out.said = cells[6];
+  for (const Grade grade : {Grade::pass, Grade::marginal, Grade::fail})
+    if (cells[7] == name_of(grade)) out.grade = grade;
   for (const PoseKind kind : {PoseKind::exact, PoseKind::interpolated, PoseKind::predicted})
-    if (cells[13] == to_string(kind)) out.pose = kind;
-  out.pose_sigma_mm = number_in(cells[14]).value_or(0);
-  out.pose_age_ms = number_in(cells[15]).value_or(0);
+    if (cells[15] == to_string(kind)) out.pose = kind;
+  out.pose_sigma_mm = number_in(cells[16]).value_or(0);
+  out.pose_age_ms = number_in(cells[17]).value_or(0);
   if (cells.size() == kBeforeMatrix) return out;
   Eigen::Matrix4d m;
   for (std::size_t i = 0; i < 16; ++i) {
@@ -112,12 +121,11 @@ Result<DecisionLog> DecisionLog::open(const std::filesystem::path& folder) {
 }
 
 void DecisionLog::add(const LoggedDecision& decision) {
-  std::string reason = decision.reason;
-  std::replace(reason.begin(), reason.end(), ',', ';');
-  std::replace(reason.begin(), reason.end(), '\n', ' ');
   const auto& expected = decision.expected;
-  file_ << fmt::format("{},{:.2f},{:.3f},{},{},{}", decision.sequence, decision.age_ms, decision.strength,
-                       decision.shape, expected ? fmt::format("{:.3f}", expected->rms_mm()) : "", reason);
+  file_ << fmt::format("{},{:.2f},{:.3f},{},{},{},{},{}", decision.sequence, decision.age_ms, decision.strength,
+                       decision.shape, expected ? fmt::format("{:.3f}", expected->rms_mm()) : "",
+                       in_a_cell(decision.reason), in_a_cell(decision.said),
+                       decision.grade ? name_of(*decision.grade) : "");
   if (expected) {
     file_ << fmt::format(",{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{}", expected->radius95_mm(),
                          expected->fiducials_mm, expected->hand_eye_mm, expected->lens_mm, expected->pose_mm,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "calibration/base/result.hpp"
+#include "calibration/base/verdict.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "calibration/time/pose_history.hpp"
@@ -24,6 +25,8 @@ struct LoggedDecision {
   double strength = 0;         ///< of the overlay, 0 to 1
   std::uint64_t shape = 0;     ///< OperationView::shapes: which CT the overlay is of
   std::string reason;          ///< why it is not whole; empty where it is
+  std::string said;            ///< over the picture
+  std::optional<Grade> grade;  ///< of what was said: green, amber or red; empty: what somebody had asked for
   PoseKind pose = PoseKind::refused;
   double pose_sigma_mm = 0, pose_age_ms = 0;
   std::optional<ErrorBudget> expected;                            ///< of the target; empty: it is not known

@@ -35,7 +35,9 @@ std::string ReplayPlayer::row_of(const wire::VideoFrame& frame, const OverlayGat
   row += expected && output_.error_known ? fmt::format("{:.3f},{:.3f},", expected->rms_mm(), expected->radius95_mm())
                                          : ",,";
   const auto live = output_.live.find(frame.info.sequence);
-  row += live == output_.live.end() ? ",," : fmt::format("{:.3f},{},", live->second.strength, live->second.reason);
+  row += live == output_.live.end()
+             ? ",,,"
+             : fmt::format("{:.3f},{},{},", live->second.strength, live->second.reason, live->second.said);
   if (painted) {
     const Eigen::Matrix4d m = painted->camera_from_patient.matrix();
     for (int i = 0; i < 16; ++i) row += fmt::format("{}{}", i > 0 ? " " : "", m(i / 4, i % 4));

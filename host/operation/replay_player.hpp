@@ -37,7 +37,8 @@ struct Replayed {
   bool video_told = false;     ///< whether the video has shown anything of whether it moves as the poses say
   std::uint32_t checksum = 0;  ///< CRC-32 of all pictures' pixels in order
   std::string table =
-      "sequence,acquired_ns,pose,strength,reason,expected_mm,circle_mm,live_strength,live_reason,camera_from_patient\n";
+      "sequence,acquired_ns,pose,strength,reason,expected_mm,circle_mm,live_strength,live_reason,live_said,camera_from_"
+      "patient\n";
 };
 
 /// Draws every frame of a recording, writes some as pictures and, where asked, all as a film.

@@ -10,6 +10,8 @@
 #include "host/operation/snapshot.hpp"
 #include "host/render/scene/transfer_function.hpp"
 #include "host/texts/texts.hpp"
+#include "host/window/banner.hpp"
+#include "host/window/banner.hpp"
 #include "host/window/stall_picture.hpp"
 
 namespace birdseye::host {
@@ -202,6 +204,9 @@ void LiveApp::draw() {
       decision.strength = shown.strength;
       decision.shape = operation_.shapes;
       decision.reason = shown.reason;
+      Banner banner = banner_of(operation_, shown, facts_);
+      decision.said = std::move(banner.text);
+      decision.grade = banner.grade;
       const PoseAnswer& pose = picture.frame()->info.pose;
       decision.pose = pose.kind;
       decision.pose_sigma_mm = pose.position_sigma_mm;

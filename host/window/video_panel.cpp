@@ -9,6 +9,7 @@
 
 #include "host/overlay/margins.hpp"
 #include "host/texts/texts.hpp"
+#include "host/window/banner.hpp"
 #include "host/window/inset_place.hpp"
 #include "host/window/inset_view.hpp"
 #include "host/window/panel_context.hpp"
@@ -20,47 +21,11 @@ namespace {
 constexpr ImU32 kGround = IM_COL32(0, 0, 0, 235);
 constexpr float kBannerPx = 28;
 
-/// What is said over the picture, and how good it is; no grade: somebody has asked for it, and nothing is wrong.
-struct Banner {
-  std::string text;
-  std::optional<Grade> grade = Grade::marginal;
-};
-
-/// Of an overlay that is whole: what it leaves open, and how far off the target may be.
-Banner whole_overlay(const OperationView& operation, const OverlayLook& look) {
-  if (look.opacity <= 0) return {words("banner_none", words("banner_opacity"))};
-  const auto& target = operation.target;
-  const std::string error = target ? words("banner_target", target->error.radius95_mm()) : words("banner_no_target");
-  if (look.render.clip) return {words("banner_cut", error)};
-  if (!operation.deformed) return {words("banner_unmatched", error)};
-  if (!operation.watched) return {words("banner_unwatched", error)};
-  if (!operation.checked) return {words("banner_unchecked", error)};
-  return {words("banner_checked", operation.checked->off_mm, operation.checked->name, error), Grade::pass};
-}
-
-Banner banner_of(const PanelContext& context) {
-  const ShownPicture& shown = context.shown;
-  if (context.operation.frozen) return {words("banner_frozen")};
-  if (!shown.any) return {shown.reason, Grade::fail};
-  if (shown.stale) return {words("banner_stale", shown.reason), Grade::fail};
-  if (!context.operation.patient_fault.empty()) return {words("banner_none", shown.reason), Grade::fail};
-  if (shown.overlaid && shown.reason.empty()) return whole_overlay(context.operation, context.facts.look);
-  if (shown.overlaid) return {words("banner_fades", shown.reason)};
-  if (context.operation.overlay_hidden) return {words("banner_none", shown.reason), std::nullopt};
-  return {words("banner_none", shown.reason)};
-}
-
 /// The safety of the picture, in words, sign and colour, over its upper edge.
 void draw_banner(const PanelContext& context, ImVec2 from, float wide) {
   const float scale = context.at.scale;
-  Banner banner = banner_of(context);
-  if (!context.operation.not_signed.empty() && banner.grade != Grade::fail) banner.grade = Grade::marginal;
+  const Banner banner = banner_of(context.operation, context.shown, context.facts);
   std::string text = banner.text;
-  if (context.operation.rod_angle_deg) text = words("banner_rod", *context.operation.rod_angle_deg, text);
-  const std::string& not_signed = context.operation.not_signed;
-  if (!not_signed.empty()) text = words("banner_unsigned", not_signed, text);
-  if (context.facts.recorded) text = words("banner_recording", text);
-  if (context.operation.simulated) text = words("banner_simulated", text);
   if (banner.grade) text = fmt::format("{} {}", sign_of(*banner.grade), text);
   const Theme& theme = context.theme;  // a dark line dazzles nobody in a dark room, and hides in a light one
   const ImU32 ground = ImGui::GetColorU32(colour(theme.background));

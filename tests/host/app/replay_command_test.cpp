@@ -115,7 +115,7 @@ TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
   };
   EXPECT_NE(row(0).find("7,"), std::string::npos);
   EXPECT_NE(row(0).find(",interpolated,1,,"), std::string::npos) << row(0);
-  EXPECT_NE(row(0).find(",,,1 0 0"), std::string::npos) << row(0);  // no live window's decisions were given
+  EXPECT_NE(row(0).find(",,,,1 0 0"), std::string::npos) << row(0);  // no live window's decisions were given
   EXPECT_NE(row(kLost).find(",refused,0,the tracker is silent,"), std::string::npos) << row(kLost);
   EXPECT_GT(a.at("overlay-000007.png").size(), 2 * a.at("overlay-000023.png").size());
 }
@@ -129,6 +129,7 @@ TEST(ReplayCommand, SaysWhatTheLiveWindowDecidedThen) {
   then.sequence = 7;
   then.strength = 0.5;
   then.reason = "the picture is 170 ms old";
+  then.said = "Fades: the picture is 170 ms old";
   log->add(then);
   ASSERT_TRUE(log->close());
   const std::string arguments = inputs(scratch, small_ct(scratch)) + " --registration " +
@@ -142,8 +143,9 @@ TEST(ReplayCommand, SaysWhatTheLiveWindowDecidedThen) {
   std::getline(table, first);
   std::getline(table, second);
   EXPECT_EQ(first.rfind("7,", 0), 0U) << first;
-  EXPECT_NE(first.find(",0.500,the picture is 170 ms old,1 0 0"), std::string::npos) << first;
-  EXPECT_NE(second.find(",,,1 0 0"), std::string::npos) << second;
+  EXPECT_NE(first.find(",0.500,the picture is 170 ms old,Fades: the picture is 170 ms old,1 0 0"), std::string::npos)
+      << first;
+  EXPECT_NE(second.find(",,,,1 0 0"), std::string::npos) << second;
   expect_refused("birdseye", arguments + scratch.file("other.csv", "a,b\n"), {"--live-log", "live --out"});
 }
 

@@ -16,6 +16,8 @@ LoggedDecision drawn() {
   out.age_ms = 81.25;
   out.strength = 1;
   out.shape = 2;
+  out.said = "Checked, 1.2 mm at the cyst";
+  out.grade = Grade::pass;
   out.pose = PoseKind::interpolated;
   out.pose_sigma_mm = 0.125;
   out.pose_age_ms = -12.5;
@@ -52,6 +54,8 @@ TEST(DecisionLog, SaysOfEachFrameWhyAndByWhichFigures) {
   EXPECT_EQ(a.strength, 1);
   EXPECT_EQ(a.shape, 2U);
   EXPECT_EQ(a.reason, "");
+  EXPECT_EQ(a.said, "Checked; 1.2 mm at the cyst");
+  EXPECT_EQ(a.grade, Grade::pass);
   EXPECT_EQ(a.pose, PoseKind::interpolated);
   EXPECT_EQ(a.pose_sigma_mm, 0.125);
   EXPECT_EQ(a.pose_age_ms, -12.5);
@@ -61,6 +65,8 @@ TEST(DecisionLog, SaysOfEachFrameWhyAndByWhichFigures) {
   EXPECT_EQ(a.expected->hand_eye_mm, 2);
   EXPECT_TRUE(a.camera_from_patient->matrix().isApprox(drawn().camera_from_patient->matrix(), 1e-6));
   EXPECT_EQ(b.reason, "the tracker scatters; by 9.0 mm");
+  EXPECT_EQ(b.said, "");
+  EXPECT_FALSE(b.grade);
   EXPECT_EQ(b.strength, 0);
   EXPECT_EQ(b.pose, PoseKind::refused);
   EXPECT_FALSE(b.expected) << "what is not known is absent";
