@@ -12,8 +12,13 @@ namespace birdseye {
 /// What a program of ours tells whoever started it.
 enum class ExitCode : int { success = 0, unusable_input = 2, verdict_fail = 3 };
 
-/// Names and texts come from elsewhere: a line stays one line, and nothing in it moves a terminal's cursor.
+/// Names and texts come from elsewhere: a line stays one line, and nothing in it moves a terminal's cursor or is longer
+/// than somebody reads. Control characters become blanks, what is no UTF-8 a question mark, and of a text of more than
+/// 2000 bytes the middle is left out.
 std::string in_one_line(std::string text);
+
+/// Prints that and the line's end on standard output.
+void print_line(std::string text);
 
 /// Prints "program: what" as the one line on standard error that an error is, whatever names it holds.
 void print_error(const std::string& program, const std::string& what);

@@ -6,6 +6,7 @@
 
 #include "calibration/record/field_map_file.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/calibrate_field_check.hpp"
 #include "host/app/pose_options.hpp"
@@ -195,7 +196,7 @@ void run(const CLI::App& field, const CalibrateFieldOptions& options, CommandSta
   }
   const auto fitted = fit(field, options);
   if (!fitted) return status.refuse(fitted.error());
-  for (const std::string& line : by_kind(fitted->rejected)) fmt::print("rejected {}\n", line);
+  for (const std::string& line : by_kind(fitted->rejected)) print_line(fmt::format("rejected {}", line));
   const Verdict verdict = verdict_of(fitted->fit);
   fmt::print("{} of order {}: {:.2f} mm before, {:.2f} mm after, held out\n", name_of(fitted->fit.chosen.basis),
              fitted->fit.chosen.order, fitted->fit.before_mm, fitted->fit.held_out_mm);

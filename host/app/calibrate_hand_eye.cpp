@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/base/units.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
@@ -236,7 +237,7 @@ RecordEntry entry_of(const CalibrateHandEyeOptions& options, const HandEyeRecord
 void finish(const CalibrateHandEyeOptions& options, const HandEyeRecording& recording, const HandEyeFound& found,
             CommandStatus& status) {
   const calibration::HandEyeResult& result = found.result;
-  for (const std::string& note : recording.notes) fmt::print("{}\n", note);
+  for (const std::string& note : recording.notes) print_line(note);
   if (recording.stream_correlation > 0 && result.solved) {
     const double late_ms = -1000 * (recording.stream_offset_s + result.time_offset_s.value_or(0));
     fmt::print("the times of the pictures are {:.1f} +- {:.1f} ms too {} against those of the poses\n",

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "drivers/system/program.hpp"
 #include "host/app/calibrate_commands.hpp"
 #include "host/app/pose_options.hpp"
 #include "host/app/results.hpp"
@@ -92,9 +93,9 @@ void print(const TipFound& found, const TipInput& input) {
   };
   if (!input.set.rejected.empty()) {
     fmt::print("{} {} rejected:\n", input.set.rejected.size(), input.set.rejected.size() == 1 ? "pose" : "poses");
-    for (const std::string& line : by_kind(input.set.rejected)) fmt::print("  {}\n", line);
+    for (const std::string& line : by_kind(input.set.rejected)) print_line(fmt::format("  {}", line));
   }
-  for (const std::string& note : input.set.notes) fmt::print("{}\n", note);
+  for (const std::string& note : input.set.notes) print_line(note);
   if (found.pivot) {
     const Pivot& p = *found.pivot;
     fmt::print("tip in the sensor's frame {} mm, standard error {:.3f} mm\n", xyz_text(p.robust.tip_in_sensor_mm, 3),

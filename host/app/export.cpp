@@ -7,6 +7,7 @@
 
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/export_lens.hpp"
@@ -245,7 +246,7 @@ Result<ExitCode> run(const ExportOptions& options) {
   for (const auto& [name, told] : files.items())
     fmt::print("{}: {}\n", (options.out / name).string(), told.get<std::string>());
   fmt::print("all in the {} frame\n", options.frame == "tracker" ? "tracker's" : "patient's");
-  fmt::print("verdict: {} ({})\n", name_of(verdict.grade), verdict.reasons.front());
+  print_line(fmt::format("verdict: {} ({})", name_of(verdict.grade), verdict.reasons.front()));
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

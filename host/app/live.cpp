@@ -7,6 +7,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/foreign_options.hpp"
@@ -276,7 +277,7 @@ Result<ExitCode> run(LiveOptions& options) {
   json["verdict"] = name_of(verdict.grade);
   json["reasons"] = verdict.reasons;
   if (auto written = write_file(options.json, text_of(json)); !written) return written.error();
-  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  for (const std::string& reason : verdict.reasons) print_line(reason);
   if (const auto patient = app.operation().patient) print_notes(patient->notes);
   if (!ran) return ran.error();
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;

@@ -10,6 +10,7 @@
 #include "calibration/base/verdict.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/foreign_options.hpp"
@@ -143,7 +144,7 @@ Result<ExitCode> run(const RecordOptions& options) {
   if (auto written = write_file(options.json, text_of(json_of(figures, verdict))); !written) return written.error();
   fmt::print("{}: {:.1f} s, {} frames, {} measurements\n", options.out.string(), figures.seconds(), figures.frames,
              figures.measurements);
-  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  for (const std::string& reason : verdict.reasons) print_line(reason);
   fmt::print("verdict: {}\n", name_of(verdict.grade));
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }

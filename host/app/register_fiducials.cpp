@@ -7,6 +7,7 @@
 #include "calibration/base/verdict.hpp"
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/app/results.hpp"
@@ -27,7 +28,7 @@ struct RegisterFiducialsOptions {
 };
 
 void print(const FiducialInput& input, const FiducialsFound& out, const Verdict& verdict) {
-  for (const std::string& note : input.notes) fmt::print("{}\n", note);
+  for (const std::string& note : input.notes) print_line(note);
   for (std::size_t i = 0; i < input.touched_mm.size(); ++i) {
     fmt::print("fiducial {:2}", i + 1);
     if (!input.names.empty()) fmt::print(" ({})", input.names[i]);
@@ -43,8 +44,8 @@ void print(const FiducialInput& input, const FiducialsFound& out, const Verdict&
     fmt::print("predicted error over the CT: {:.2f} to {:.2f} mm, median {:.2f} mm\n", out.range->least_mm,
                out.range->most_mm, out.range->median_mm);
   }
-  for (const calibration::OddPoint& p : out.odd.named) fmt::print("fiducial {} {}\n", p.index + 1, p.reason);
-  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  for (const calibration::OddPoint& p : out.odd.named) print_line(fmt::format("fiducial {} {}", p.index + 1, p.reason));
+  for (const std::string& reason : verdict.reasons) print_line(reason);
   for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
   fmt::print("verdict: {}\n", name_of(verdict.grade));
 }

@@ -13,6 +13,7 @@
 #include "calibration/record/sha256.hpp"
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/case/error_picture.hpp"
@@ -340,7 +341,7 @@ Result<ExitCode> run(const RegisterViewsOptions& options) {
   files->push_back({options.json, text_of(json)});
   if (auto written = write_files(*files); !written) return written.error();
   progress.keep(fmt::format("{}: {}", (options.out / "report.html").string(), verdict.reasons.front()));
-  for (const std::string& note : c.notes) fmt::print("{}\n", note);
+  for (const std::string& note : c.notes) print_line(note);
   for (std::size_t n = 0; n < found.matched.size(); ++n) {
     if (!found.matched[n].thought_wrong()) continue;
     fmt::print("{} is {:.1f} mm off all else and was thought to be wrong: check its places\n", c.matched[n].name,

@@ -12,6 +12,7 @@
 #include "drivers/system/clock.hpp"
 #include "drivers/system/durable.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/program.hpp"
 #include "drivers/system/progress.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
@@ -221,7 +222,7 @@ Result<ExitCode> run(ReplayOptions& options) {
   }
   progress.keep(fmt::format("{} frames, {} with an overlay, pictures {:08x}: {}", player.done().frames,
                             player.done().overlaid, player.done().checksum, name_of(verdict.grade)));
-  for (const std::string& reason : verdict.reasons) fmt::print("{}\n", reason);
+  for (const std::string& reason : verdict.reasons) print_line(reason);
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

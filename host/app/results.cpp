@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/program.hpp"
 #include "host/files/write_files.hpp"
 #include "host/texts/texts.hpp"
 
@@ -113,8 +114,8 @@ void finish_calibration(const ResultPaths& paths, const std::string& out_text, n
   }
   if (const auto written = write_files(files); !written) return status.refuse(written.error());
   fmt::print("verdict: {}\n", name_of(verdict.grade));
-  for (const std::string& reason : verdict.reasons) fmt::print("  {}\n", reason);
-  for (const std::string& step : verdict.next_steps) fmt::print("next: {}\n", step);
+  for (const std::string& reason : verdict.reasons) print_line(fmt::format("  {}", reason));
+  for (const std::string& step : verdict.next_steps) print_line(fmt::format("next: {}", step));
   if (verdict.grade == Grade::fail) {
     status.code = ExitCode::verdict_fail;
     for (const auto& path : {paths.out, paths.record}) tell_not_written(path);

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/dicom/series_choice.hpp"
@@ -132,7 +133,7 @@ void print_grid(const Volume& volume, nlohmann::json& json) {
 void print_series(const SeriesList& list, nlohmann::json& json) {
   json["series"] = nlohmann::json::array();
   for (const SeriesInfo& info : list.series) {
-    fmt::print("{}\n", line_of(info));
+    print_line(line_of(info));
     json["series"].push_back(json_of(info));
   }
   for (const std::string& unreadable : list.unreadable) fmt::print("passed over  {}\n", unreadable);
@@ -197,7 +198,7 @@ Result<void> volume_info(const InfoOptions& options) {
   print_values(imported->volume, labels, json);
   print_labels(imported->label_names, json);
   if (!imported->notes.empty()) json["notes"] = imported->notes;
-  for (const std::string& note : imported->notes) fmt::print("note         {}\n", note);
+  for (const std::string& note : imported->notes) print_line(fmt::format("note         {}", note));
   return write_file(options.json, text_of(json));
 }
 

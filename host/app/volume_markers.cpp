@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "calibration/base/verdict.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/case/marker_picture.hpp"
@@ -221,7 +222,7 @@ Result<ExitCode> volume_markers(const VolumeMarkersOptions& options) {
                c.x(), c.y(), c.z(), kSigmasOf95 * m.sigma_mm, name_of(m.kind), m.diameter_mm, m.hu,
                options.near.empty() ? "" : ", ", options.near.empty() ? "" : findings.of_picks[i]);
   }
-  for (const std::string& reason : findings.verdict.reasons) fmt::print("{}\n", reason);
+  for (const std::string& reason : findings.verdict.reasons) print_line(reason);
   fmt::print("verdict: {}\n", name_of(findings.verdict.grade));
   return findings.verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
