@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <sstream>
@@ -73,6 +75,32 @@ bool has_several_values(const std::string& kinds) {
   return false;
 }
 
+/// Which number of a NRRD's geometry is none, as "12abc", or beyond any that a volume has. Its reader takes what it can
+/// of such: 12, or 1 without a word.
+std::string odd_number(const HeaderFields& fields) {
+  constexpr double kMost = 1e6;
+  for (const char* name :
+       {"sizes", "spacings", "thicknesses", "axis mins", "axis maxs", "space directions", "space origin"}) {
+    std::string text = field_of(fields, name);
+    std::ranges::replace_if(
+        text, [](char c) { return std::string_view("(),").find(c) != std::string_view::npos; }, ' ');
+    std::istringstream words(text);
+    for (std::string word; words >> word;) {
+      double number = 0;
+      const char* const from = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
+      const auto [end, error] = std::from_chars(from, word.data() + word.size(), number);
+      const bool whole = error == std::errc() && end == word.data() + word.size();
+      if (lower_case(word) == "none" || lower_case(word) == "nan") continue;
+      if (!whole || !(std::abs(number) <= kMost)) {
+        return fmt::format(
+            "says \"{}\" in its field \"{}\", which is no number that a volume can have; export it again", shown(word),
+            name);
+      }
+    }
+  }
+  return {};
+}
+
 std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
   static constexpr std::array<std::string_view, 7> kEncodings = {"raw", "ascii", "txt", "text", "hex", "gzip", "gz"};
   static constexpr std::array<std::string_view, 4> kOneByte = {"uchar", "unsigned char", "uint8", "uint8_t"};
@@ -81,6 +109,7 @@ std::string unread_nrrd(const fs::path& path, const HeaderFields& fields) {
     if (field_of(fields, name).empty())
       return fmt::format("lacks the field \"{}\" in its header; export it again", name);
   }
+  if (std::string odd = odd_number(fields); !odd.empty()) return odd;
   const std::string dimension = field_of(fields, "dimension"), kinds = lower_case(field_of(fields, "kinds"));
   if (dimension < "3") return "is a picture, not a volume; give the whole stack";
   if (dimension > "4" || (dimension == "4" && !has_several_values(kinds)))

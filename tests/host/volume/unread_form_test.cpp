@@ -25,6 +25,10 @@ std::string nrrd(const std::string& type = "short", const std::string& encoding 
          "\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace origin: (1,2,3)\n" + more;
 }
 
+std::string with(std::string text, const std::string& old, const std::string& now) {
+  return text.replace(text.find(old), old.size(), now);
+}
+
 std::string meta_image(const std::string& type = "MET_SHORT", const std::string& more = "",
                        const std::string& data = "LOCAL") {
   return "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n" + more +
@@ -61,6 +65,11 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"beside.nhdr", nrrd() + "data file: there.raw\n\n", ""},
            {"bytes.nrrd", nrrd("uchar", "raw", "") + "\n" + kVoxels, ""},
            {"bzip2.nrrd", nrrd("short", "bzip2") + "\n" + kVoxels, "the encoding \"bzip2\", which is not read"},
+           {"letters.nrrd", with(nrrd(), "(0,0,2)", "(0,0,12abc)") + "\n" + kVoxels, "\"12abc\" in its field"},
+           {"hex.nrrd", with(nrrd(), "(1,2,3)", "(0x10,2,3)") + "\n" + kVoxels, "\"0x10\" in its field"},
+           {"huge.nrrd", with(nrrd(), "(1,0,0)", "(1e308,0,0)") + "\n" + kVoxels, "\"1e308\" in its field"},
+           {"sizes.nrrd", with(nrrd(), "4 3 2", "4 3abc 2") + "\n" + kVoxels, "\"3abc\" in its field \"sizes\""},
+           {"plus.nrrd", with(nrrd(), "(0,0,2)", "(0,0,+2.0e0)") + "\n" + kVoxels, ""},
            {"block.nrrd", nrrd("block", "raw", "block size: 2\n") + "\n" + kVoxels, "the type \"block\""},
            {"endless.nrrd", nrrd("short", "raw", "") + "\n" + kVoxels, "no \"endian\""},
            {"both.nrrd", nrrd() + "spacings: 1 1 2\n\n" + kVoxels, "both \"spacings\" and \"space directions\""},
