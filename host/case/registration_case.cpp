@@ -396,7 +396,8 @@ Result<void> read_further(const fs::path& file, const toml::value& all, Registra
 
 Result<RegistrationCase> read_case(const fs::path& path) {
   std::error_code no_file;
-  if (!fs::is_regular_file(path, no_file)) {
+  constexpr std::uintmax_t kMostBytes = 64U << 20U;
+  if (!fs::is_regular_file(path, no_file) || fs::file_size(path, no_file) > kMostBytes) {
     return Error{
         Errc::unreadable,
         fmt::format("{}: is no file; name the case's TOML file, as birdseye-sim case writes it", path.string())};

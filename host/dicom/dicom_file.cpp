@@ -219,6 +219,8 @@ std::string slice_key_words(SliceKey key, const std::string& value) {
 }
 
 bool begins_as_dicom(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return false;  // a pipe would be waited for
   std::array<char, 132> head{};
   std::ifstream in(path, std::ios::binary);
   in.read(head.data(), head.size());

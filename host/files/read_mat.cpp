@@ -57,6 +57,8 @@ bool is_cut_png(const std::filesystem::path& path) {
 }  // namespace
 
 cv::Mat read_mat(const std::filesystem::path& path, cv::ImreadModes mode) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return {};  // a pipe would be waited for
   if (is_cut_png(path)) return {};
   const QuietCerr quiet;
   try {
@@ -69,6 +71,9 @@ cv::Mat read_mat(const std::filesystem::path& path, cv::ImreadModes mode) {
 const char* why_no_picture(const std::filesystem::path& path) {
   std::error_code failed;
   const auto bytes = std::filesystem::file_size(path, failed);
+  if (std::error_code ignored;
+      std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    return "it is no file but a folder, a pipe or a device";
   if (!failed && bytes == 0) return "the file is empty";
   if (!std::ifstream(path)) return "the file cannot be opened";
   return is_cut_png(path) ? "the file is cut short" : "the file is damaged, or no picture";

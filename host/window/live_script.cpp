@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <sstream>
+
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -39,8 +40,9 @@ std::string why_not(const OperationView& operation, const std::string& awaited) 
 }  // namespace
 
 Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) return Error{Errc::unreadable, path.string() + ": cannot be read"};
+  const auto whole = read_whole_file(path, kMostTextBytes);
+  if (!whole) return whole.error();
+  std::istringstream file(*whole);
   LiveScript script;
   script.name_ = path.string();
   std::string text;

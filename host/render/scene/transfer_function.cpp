@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -95,8 +96,10 @@ std::vector<std::string> transfer_presets() {
 
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path) {
   if (const auto found = presets().find(name_or_path); found != presets().end()) return TransferFunction(found->second);
-  std::ifstream in(name_or_path);
-  if (!in) {
+  std::error_code ignored;
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(name_or_path, ignored)) in.open(name_or_path);  // a pipe would be waited for
+  if (!in.is_open()) {
     return Error{Errc::not_found, fmt::format("transfer function \"{}\": neither a file nor one of {}", name_or_path,
                                               fmt::join(transfer_presets(), ", "))};
   }
