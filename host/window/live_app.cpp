@@ -11,7 +11,6 @@
 #include "host/render/scene/transfer_function.hpp"
 #include "host/texts/texts.hpp"
 #include "host/window/banner.hpp"
-#include "host/window/banner.hpp"
 #include "host/window/stall_picture.hpp"
 
 namespace birdseye::host {
