@@ -56,7 +56,8 @@ std::optional<Transform<Tracker, Sensor>> pose_of_quaternion(ByteView numbers) {
   const Eigen::Vector3d xyz(number_at(numbers, 3), number_at(numbers, 4), number_at(numbers, 5));
   const double w = numbers.size() >= 28 ? number_at(numbers, 6) : std::sqrt(std::max(0.0, 1 - xyz.squaredNorm()));
   const Eigen::Quaterniond rotation(w, xyz.x(), xyz.y(), xyz.z());
-  if (!(position.cwiseAbs().maxCoeff() <= kFarthestMm) || !(std::abs(rotation.norm() - 1) < kOrthonormal))
+  if (!position.allFinite() || position.cwiseAbs().maxCoeff() > kFarthestMm ||
+      !(std::abs(rotation.norm() - 1) < kOrthonormal))
     return std::nullopt;
   if (position.isZero(0) && xyz.isZero(0)) return std::nullopt;
   return Transform<Tracker, Sensor>(rotation, position);

@@ -63,7 +63,7 @@ ImageRgba RayCaster::render(const LensRays& rays, const Transform<Camera, Patien
   const Eigen::Vector3d& eye = patient_from_camera.translation();
   // From ten kilometres nothing is seen, and single precision would end in places that are none of the volume's.
   constexpr double kFarthestEyeMm = 1e7;
-  if (!(eye.cwiseAbs().maxCoeff() < kFarthestEyeMm)) return image;
+  if (!eye.allFinite() || eye.cwiseAbs().maxCoeff() > kFarthestEyeMm) return image;
   const Eigen::Affine3d voxel_from_patient = volume_.patient_from_voxel.inverse();
   grid_.light(eye, settings);
 

@@ -52,6 +52,20 @@ TEST(ForeignFeed, PosesOfAllTypesAreTheSame) {
   }
 }
 
+TEST(ForeignFeed, APositionThatIsNoPlaceIsNoPose) {
+  const float nothing = std::nanf("");
+  for (const Eigen::Vector3f& place :
+       {Eigen::Vector3f(nothing, 1, 2), Eigen::Vector3f(1, nothing, 2), Eigen::Vector3f(1, 2, nothing),
+        Eigen::Vector3f(1, -3e38F, 2), Eigen::Vector3f(nothing, nothing, nothing)}) {
+    Bytes position;
+    for (const float v : place) put_float(position, v);
+    for (const double v : {0.0, 0.6, 0.0, 0.8}) put_float(position, v);
+    FeedLink link({.scope_device = "another"});
+    link.push(testing::foreign_message("POSITION", "Stylus", FeedLink::at(0, 1), position), 0);
+    EXPECT_TRUE(link.of<Birds>(5).empty()) << place.transpose();
+  }
+}
+
 TEST(ForeignFeed, WhatIsNoPoseIsNone) {
   Eigen::Isometry3d scaled = pose_at(1);
   scaled.linear() *= 1.1;

@@ -90,6 +90,26 @@ class Tls13 : public ::testing::Test {
       carry(far_, near_);
     }
   }
+  /// A client that is OpenSSL itself. Keep it as long as its socket is to stay open.
+  struct Stranger {
+    UniqueFd socket;
+    std::shared_ptr<SSL> ssl;
+  };
+  Stranger shake_with(SSL_CTX& context) {
+    auto [client, near] = socket_pair();
+    near_ = std::move(near);
+    Stranger out{std::move(client), {::SSL_new(&context), ::SSL_free}};
+    ::SSL_set_fd(out.ssl.get(), out.socket.get());
+    ::SSL_set_connect_state(out.ssl.get());
+    server_shook_ = false;
+    for (int i = 0; i < 10; ++i) {
+      ::SSL_do_handshake(out.ssl.get());
+      carry(near_, far_);
+      if (server_shook_ && !*server_shook_) server_shook_ = server_->shake();
+      carry(far_, near_);
+    }
+    return out;
+  }
   void let_in() {
     connect();
     shake();
@@ -176,18 +196,7 @@ TEST_F(Tls13, ACartThatTheHostDoesNotKnowIsNotSpokenTo) {
 TEST_F(Tls13, WhoShowsNoKeyIsNotLetIn) {
   connect();
   const std::shared_ptr<SSL_CTX> keyless(::SSL_CTX_new(::TLS_client_method()), ::SSL_CTX_free);
-  auto [client, near] = socket_pair();
-  near_ = std::move(near);
-  const std::shared_ptr<SSL> ssl(::SSL_new(keyless.get()), ::SSL_free);
-  ::SSL_set_fd(ssl.get(), client.get());
-  ::SSL_set_connect_state(ssl.get());
-  server_shook_ = false;
-  for (int i = 0; i < 10; ++i) {
-    ::SSL_do_handshake(ssl.get());
-    carry(near_, far_);
-    if (server_shook_ && !*server_shook_) server_shook_ = server_->shake();
-    carry(far_, near_);
-  }
+  (void)shake_with(*keyless);
   EXPECT_FALSE(server_shook_);
 }
 
@@ -285,23 +294,12 @@ TEST_F(Tls13, NewKeysWithoutEndAreNotReadOnAndOnInOneGo) {
   const std::string certificate = scratch.file("host.crt", host_.tls()->certificate());
   ASSERT_EQ(::SSL_CTX_use_certificate_file(context.get(), certificate.c_str(), SSL_FILETYPE_PEM), 1);
   ASSERT_EQ(::SSL_CTX_use_PrivateKey(context.get(), host_.key().evp_pkey()), 1);
-  auto [client, near] = socket_pair();
-  near_ = std::move(near);
-  const std::shared_ptr<SSL> ssl(::SSL_new(context.get()), ::SSL_free);
-  ::SSL_set_fd(ssl.get(), client.get());
-  ::SSL_set_connect_state(ssl.get());
-  server_shook_ = false;
-  for (int i = 0; i < 10; ++i) {
-    ::SSL_do_handshake(ssl.get());
-    carry(near_, far_);
-    if (server_shook_ && !*server_shook_) server_shook_ = server_->shake();
-    carry(far_, near_);
-  }
+  const Stranger stranger = shake_with(*context);
   ASSERT_TRUE(server_shook_ && *server_shook_);
   constexpr int kNewKeys = 20;
   for (int i = 0; i < kNewKeys; ++i) {
-    ASSERT_EQ(::SSL_key_update(ssl.get(), SSL_KEY_UPDATE_NOT_REQUESTED), 1);
-    ASSERT_EQ(::SSL_do_handshake(ssl.get()), 1);
+    ASSERT_EQ(::SSL_key_update(stranger.ssl.get(), SSL_KEY_UPDATE_NOT_REQUESTED), 1);
+    ASSERT_EQ(::SSL_do_handshake(stranger.ssl.get()), 1);
     ASSERT_GT(carry(near_, far_), 0U);
   }
   int reads = 0;
@@ -310,7 +308,7 @@ TEST_F(Tls13, NewKeysWithoutEndAreNotReadOnAndOnInOneGo) {
     ASSERT_EQ(*read(*server_), Bytes());
   }
   EXPECT_EQ(reads, kNewKeys);
-  ASSERT_EQ(::SSL_write(ssl.get(), "said", 4), 4);
+  ASSERT_EQ(::SSL_write(stranger.ssl.get(), "said", 4), 4);
   carry(near_, far_);
   EXPECT_EQ(*read(*server_), (Bytes{'s', 'a', 'i', 'd'}));
 }

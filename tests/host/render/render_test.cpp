@@ -46,7 +46,8 @@ TEST(RayCaster, DrawsNothingFromWhereSinglePrecisionEnds) {
   const Volume volume = scene();
   for (const cpu::Isa isa : cpu::supported_isas()) {
     RayCaster caster(volume, soft(), isa);
-    for (const double far_mm : {1e8, 1e38, 1e308, std::numeric_limits<double>::infinity()}) {
+    for (const double far_mm :
+         {1e8, 1e38, 1e308, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
       const Transform<Camera, Patient> from(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, -far_mm, 100));
       const ImageRgba picture = caster.render(LensRays(lens()), from, {});
       EXPECT_EQ(std::ranges::count(picture.rgba, 0), std::ssize(picture.rgba)) << far_mm;
