@@ -400,7 +400,8 @@ Result<RegistrationCase> read_case(const fs::path& path) {
   if (!fs::is_regular_file(path, no_file) || fs::file_size(path, no_file) > kMostBytes) {
     return Error{
         Errc::unreadable,
-        fmt::format("{}: is no file; name the case's TOML file, as birdseye-sim case writes it", path.string())};
+        fmt::format("{}: is no file, or larger than 64 MB; name the case's TOML file, as birdseye-sim case writes it",
+                    path.string())};
   }
   std::stringstream text;
   text << std::ifstream(path).rdbuf();

@@ -29,8 +29,7 @@ double tilt_of(const std::vector<DicomSlice>& slices, const Eigen::Vector3d& nor
   return 0;
 }
 
-/// How far the slice that is furthest from it lies beside the line from the first to the last, on which a tilted gantry
-/// leaves them all.
+/// A tilted gantry leaves all slices on the line from the first to the last: how far the worst one lies off that line.
 double beside_line_mm(const std::vector<DicomSlice>& slices, const Eigen::Vector3d& normal) {
   const Eigen::Vector3d whole = slices.back().position_mm - slices.front().position_mm;
   double most_mm = 0;

@@ -30,7 +30,7 @@ Result<RecordingSeal> read_recording_seal(const std::filesystem::path& folder);
 
 struct AdmittedRecording {
   std::string doubt;          ///< empty where the author is known, as of Authors::admit()
-  std::string events_sha256;  ///< which whoever reads it holds its events to; empty: nobody signed
+  std::string events_sha256;  ///< that its reader compares the events with; empty: nobody signed
 };
 
 /// As Authors::admit(), with the recording's name: of a session recording, and of an appliance recording. Refuses also

@@ -46,8 +46,8 @@ class Surroundings {
   Surroundings(const Volume& part, const Vector3d& place, double reach_mm)
       : part_(part), voxel_from_patient_(part.patient_from_voxel.inverse()), place_(place), reach_mm_(reach_mm) {}
 
-  /// Gives of those within a radius, in their order, place and HU. It looks at no more voxels than such a ball's box
-  /// has.
+  /// Calls use(place, HU) for each voxel within radius_mm of a place, in the volume's order. Looks only at the box
+  /// about that ball.
   template <class Use>
   void within(const Vector3d& at, double radius_mm, const Use& use) const {
     const Eigen::Array3d middle = (voxel_from_patient_ * at).array();
