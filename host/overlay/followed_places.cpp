@@ -19,8 +19,10 @@ using Relative = Transform<Camera, Camera>;
 constexpr int kWidthPx = 320;
 constexpr int kPlaces = 80;
 constexpr double kThereAndBackPx = 0.7;
-constexpr int kLevels = 3;
+constexpr int kLevels = 3, kLevelsAbout = 1;
 const cv::Size kWindow(15, 15);
+constexpr int kAlikeWithinPx = 20, kAlikeFromPx = 6;
+constexpr double kAlike = 0.95;  // correlation of grey values
 
 /// From a place to a line's part between two others.
 double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
@@ -28,6 +30,25 @@ double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const
   const double squared = along.squaredNorm();
   const double share = squared > 0 ? std::clamp((place - from).dot(along) / squared, 0.0, 1.0) : 0.0;
   return (place - from - share * along).norm();
+}
+
+/// Whether a place looks as another that lies within reach of the search: on a board, or woven cloth, it may be
+/// followed to that one. In half the size, which is enough for it.
+bool repeats(const cv::Mat& half, const cv::Point2f& place) {
+  constexpr int kPatch = 4, kReach = kPatch + kAlikeWithinPx / 2, kFrom = kAlikeFromPx / 2;
+  const cv::Point at(cvRound(place.x / 2), cvRound(place.y / 2));
+  const cv::Rect whole(0, 0, half.cols, half.rows);
+  const cv::Rect patch(at.x - kPatch, at.y - kPatch, 2 * kPatch + 1, 2 * kPatch + 1);
+  if ((patch & whole) != patch) return false;
+  const cv::Rect about = cv::Rect(at.x - kReach, at.y - kReach, 2 * kReach + 1, 2 * kReach + 1) & whole;
+  cv::Mat alike;
+  cv::matchTemplate(half(about), half(patch), alike, cv::TM_CCOEFF_NORMED);
+  // The place itself.
+  const cv::Point self = patch.tl() - about.tl();
+  alike(cv::Rect(self.x - kFrom, self.y - kFrom, 2 * kFrom + 1, 2 * kFrom + 1) & cv::Rect({}, alike.size())).setTo(0);
+  double most = 0;
+  cv::minMaxLoc(alike, nullptr, &most);
+  return most >= kAlike;
 }
 
 }  // namespace
@@ -53,18 +74,30 @@ std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
   mask.setTo(0, glare);
   std::vector<cv::Point2f> places;
   cv::goodFeaturesToTrack(grey, places, kPlaces, 0.01, 8, mask);
+  cv::Mat half;
+  cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  std::erase_if(places, [&half](const cv::Point2f& place) { return repeats(half, place); });
   return places;
 }
 
 std::vector<std::optional<cv::Point2f>> follow_places(const PictureToFollow& from, const PictureToFollow& to,
-                                                      const std::vector<cv::Point2f>& places) {
+                                                      const std::vector<cv::Point2f>& places,
+                                                      const std::vector<cv::Point2f>* about) {
   std::vector<std::optional<cv::Point2f>> out(places.size());
   if (places.empty() || from.grey.size() != to.grey.size()) return out;
   std::vector<cv::Point2f> there, back;
+  int levels = kLevels, flags = 0;
+  if (about != nullptr) {
+    there = *about;
+    back = places;
+    levels = kLevelsAbout;
+    flags = cv::OPTFLOW_USE_INITIAL_FLOW;
+  }
+  const cv::TermCriteria enough(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 30, 0.01);
   std::vector<std::uint8_t> found, found_back;
   std::vector<float> unused;
-  cv::calcOpticalFlowPyrLK(from.pyramid, to.pyramid, places, there, found, unused, kWindow, kLevels);
-  cv::calcOpticalFlowPyrLK(to.pyramid, from.pyramid, there, back, found_back, unused, kWindow, kLevels);
+  cv::calcOpticalFlowPyrLK(from.pyramid, to.pyramid, places, there, found, unused, kWindow, levels, enough, flags);
+  cv::calcOpticalFlowPyrLK(to.pyramid, from.pyramid, there, back, found_back, unused, kWindow, levels, enough, flags);
   for (std::size_t i = 0; i < places.size(); ++i)
     if (found[i] != 0 && found_back[i] != 0 && cv::norm(back[i] - places[i]) <= kThereAndBackPx) out[i] = there[i];
   return out;

@@ -27,9 +27,12 @@ PictureToFollow picture_to_follow(const wire::VideoFrame& frame);
 /// lamp.
 std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey);
 
-/// Where places of one picture lie in another. Empty: it is not found there, or leads back to another place.
+/// Where places of one picture lie in another. Empty: it is not found there, or leads back to another place. about:
+/// where they are known to lie to within a few pixels, one each; without it, they are looked for some twenty pixels
+/// about.
 std::vector<std::optional<cv::Point2f>> follow_places(const PictureToFollow& from, const PictureToFollow& to,
-                                                      const std::vector<cv::Point2f>& places);
+                                                      const std::vector<cv::Point2f>& places,
+                                                      const std::vector<cv::Point2f>* about = nullptr);
 
 /// A place of the small picture of so many columns as a direction of unit Z; empty: no ray of the camera ends there.
 std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_columns, const cv::Point2f& place);

@@ -79,7 +79,8 @@ std::optional<SuddenMotion::Seen> SuddenMotion::seen(const wire::VideoFrame& fra
                     frame.info.latency.has_value())};
 }
 
-bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, std::optional<double> target_mm) {
+bool SuddenMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope,
+                        std::optional<double> target_mm) {
   if (of_ && !of_->sees_as(scope)) {
     tracks_.reset();
     squares_.clear();
@@ -91,7 +92,6 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
     return false;
   }
   if (target_mm) now->farthest_mm = std::clamp(2 * *target_mm, 2 * kNearestSeen_mm, kFarthestSeen_mm);
-  PictureToFollow picture = picture_to_follow(frame);
   if (tracks_) {
     const Seen& last = tracks_->seen.back();
     if (now->at <= last.at || now->at - last.at > kGap || tracks_->newest.grey.size() != picture.grey.size())
@@ -122,7 +122,7 @@ bool SuddenMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope, 
     tracks_->chosen = places.size();
     now->places.assign(places.begin(), places.end());
   }
-  tracks_->newest = std::move(picture);
+  tracks_->newest = picture;
   tracks_->seen.push_back(std::move(*now));
   while (tracks_->seen.back().at - tracks_->seen.front().at > kSpan) tracks_->seen.pop_front();
   return sudden;

@@ -7,6 +7,7 @@
 
 #include "calibration/time/clock.hpp"
 #include "device/wire/messages.hpp"
+#include "host/overlay/followed_places.hpp"
 #include "host/overlay/scope_setup.hpp"
 
 namespace birdseye::host {
@@ -21,10 +22,11 @@ class SuddenMotion {
 
   /// A pose of the scope's sensor, as they come: how they scatter is measured by them.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
-  /// A frame, as they come, and the scope that took it. target_mm: how far from the camera the target is drawn; of
-  /// what is seen about it, half lies no more than twice as far. Empty: it is not drawn. True: the video has moved
-  /// otherwise, or shows another scene.
-  bool take(const wire::VideoFrame& frame, const ScopeSetup& scope, std::optional<double> target_mm);
+  /// A frame, as they come, that frame small and grey, and the scope that took it. target_mm: how far from the camera
+  /// the target is drawn; of what is seen about it, half lies no more than twice as far. Empty: it is not drawn. True:
+  /// the video has moved otherwise, or shows another scene.
+  bool take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope,
+            std::optional<double> target_mm);
 
  private:
   struct Seen;

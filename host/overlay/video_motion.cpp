@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
+#include "calibration/base/median.hpp"
 #include "host/overlay/followed_places.hpp"
 
 namespace birdseye::host {
@@ -18,9 +20,17 @@ constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
-constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
-constexpr double kPlainly = 3;         // so many times as far off would be plain
+constexpr double kNotModelled = 0.15;   // of what a hand-eye turned by kTurned_rad would do
+constexpr double kPlainly = 3;          // so many times as far off would be plain
+constexpr double kHastePx = 5;          // of the small picture: so unsure a key hides what is wrong
+constexpr double kHastyStepPx = 5;      // of the small picture, from a frame to the next
+constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one step is not followed safely
 constexpr int kOddInRow = 4, kMostWanted = 32;
+
+/// By which it is told how fast what is seen moves.
+std::array<Eigen::Vector3d, 3> places_ahead_mm() {
+  return {Eigen::Vector3d(0, 0, 100), Eigen::Vector3d(40, 0, 100), Eigen::Vector3d(0, 40, 100)};
+}
 
 PoseHistory averaged_poses() {
   PoseHistory::Settings settings;
@@ -33,17 +43,25 @@ PoseHistory averaged_poses() {
 
 struct VideoMotion::Waiting {
   DeviceTime at;
-  double times_apart_s = 0;  ///< of the frame and the poses
-  PictureToFollow picture;
+  double times_apart_s = 0;         ///< of the frame and the poses
+  std::vector<cv::Point2f> then{};  ///< the key's places; empty: this is the key's picture
+  std::vector<cv::Point2f> now{};   ///< where they are in this one
 };
 
 struct VideoMotion::Key {
   DeviceTime at;
-  SeenFrom from;
+  std::optional<SeenFrom> from;     ///< empty: the poses after it have not come yet
   std::vector<cv::Point2f> places;  ///< in the key's picture
-  PictureToFollow newest;           ///< the last picture that they were followed to
-  std::vector<cv::Point2f> now;     ///< and where they are in it
-  std::array<bool, 3> told{};       ///< by pictures since, about each axis
+  std::optional<SeenFrom> looked_from;
+  PictureToFollow looked_at;        ///< the last picture that was looked at
+  std::vector<cv::Point2f> looked;  ///< and where they were in it
+  std::size_t kept = 0;             ///< so many
+  PictureToFollow newest;           ///< the last frame
+  DeviceTime newest_at;
+  std::vector<cv::Point2f> now;  ///< and about where they are in it
+  Duration longest_step{0};      ///< between two frames, since one was judged
+  double farthest_step_px = 0;   ///< of half of the places, from a frame to the next, since one was judged
+  std::array<bool, 3> told{};    ///< by pictures since, about each axis
 };
 
 VideoMotion::VideoMotion() : poses_(averaged_poses()) {}
@@ -84,35 +102,77 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
   poses_.push(acquired, Duration{0}, tracker_from_sensor);
 }
 
-bool VideoMotion::take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
-  bool changed = false;
-  if (of_ && !of_->sees_as(scope)) {
-    changed = state_ != VideoAgreement::untold;
-    reset();
-  }
+bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope) {
+  const VideoAgreement before = state_;
+  if (of_ && !of_->sees_as(scope)) reset();
   of_ = scope;
   const DeviceTime at = frame.info.acquired;
   if (waiting_) {
     const auto newest = poses_.newest();
     if (newest && *newest >= waiting_->at + kAverage + kAverage) {
-      changed = look(*waiting_, scope);
+      look(*waiting_, scope);
       waiting_.reset();
     } else if (at - waiting_->at > kEvery || at < waiting_->at) {
+      if (key_ && !key_->from) key_.reset();
       waiting_.reset();  // no poses come
     }
   }
   const CameraModel& camera = scope.camera();
-  const bool due = !looked_at_ || at - *looked_at_ >= kEvery || at < *looked_at_;
-  if (waiting_ || !due || frame.width_px != camera.width_px || frame.height_px != camera.height_px) return changed;
-  looked_at_ = at;
-  auto next = std::make_unique<Waiting>();
-  next->at = at;
-  next->times_apart_s = times_apart_s(
+  if (frame.width_px == camera.width_px && frame.height_px == camera.height_px) {
+    if (key_) follow(at, picture);
+    const bool due = !looked_at_ || at - *looked_at_ >= kEvery || at < *looked_at_;
+    if (!waiting_ && due) {
+      looked_at_ = at;
+      wait(frame, picture);
+    }
+  }
+  return state_ != before;
+}
+
+/// Until the poses after the frame have come.
+void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& picture) {
+  waiting_ = std::make_unique<Waiting>();
+  waiting_->at = frame.info.acquired;
+  waiting_->times_apart_s = times_apart_s(
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
       frame.info.latency.has_value());
-  next->picture = picture_to_follow(frame);
-  waiting_ = std::move(next);
-  return changed;
+  if (!key_) {
+    key_ = std::make_unique<Key>();
+    key_->at = key_->newest_at = waiting_->at;
+    key_->places = key_->looked = key_->now = places_to_follow(picture.grey);
+    key_->kept = key_->places.size();
+    key_->looked_at = key_->newest = picture;
+    return;
+  }
+  // What is followed from frame to frame drifts with each: they only tell where to look, from the last that was looked
+  // at.
+  const std::size_t kept = keep(follow_places(key_->looked_at, picture, key_->looked, &key_->now));
+  // Where most are lost at once the picture is another, and what is left is chance.
+  if (2 * kept < std::exchange(key_->kept, kept)) {
+    if (state_ == VideoAgreement::agrees || state_ == VideoAgreement::in_doubt) forget_agreement();
+    key_.reset();
+    waiting_.reset();
+    return;
+  }
+  key_->looked_at = picture;
+  key_->looked = key_->now;
+  waiting_->then = key_->places;
+  waiting_->now = key_->now;
+}
+
+/// Of the key's places those that were found, and where.
+std::size_t VideoMotion::keep(const std::vector<std::optional<cv::Point2f>>& found) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!found[i]) continue;
+    key_->places[kept] = key_->places[i];
+    key_->looked[kept] = key_->looked[i];
+    key_->now[kept++] = *found[i];
+  }
+  key_->places.resize(kept);
+  key_->looked.resize(kept);
+  key_->now.resize(kept);
+  return kept;
 }
 
 std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiting, const ScopeSetup& scope) const {
@@ -122,11 +182,11 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiti
     if (!pose.tracker_from_sensor || pose.kind == PoseKind::predicted) return std::nullopt;
     at[i] = scope.camera_from_sensor() * pose.tracker_from_sensor->inverse();
   }
-  SeenFrom out{*at[1]};
+  SeenFrom out{waiting.at, *at[1]};
   // Where the camera speeds up the average of its poses is off, and where it is fast so is what it sees of another
   // time.
   const Transform<Tracker, Camera> back = at[1]->inverse();
-  for (const Eigen::Vector3d& place_mm : {Eigen::Vector3d(0, 0, 100), Eigen::Vector3d(40, 0, 100)}) {
+  for (const Eigen::Vector3d& place_mm : places_ahead_mm()) {
     const Eigen::Vector3d before = *at[0] * (back * place_mm), after = *at[2] * (back * place_mm);
     if (!(before.z() > kNearestSeen_mm && after.z() > kNearestSeen_mm)) return std::nullopt;
     const Eigen::Vector2d from = before.hnormalized(), to = after.hnormalized(), middle = place_mm.hnormalized();
@@ -134,65 +194,74 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiti
     const double rate_s = (to - from).norm() / (2 * kAverage.seconds());
     out.unsure_px =
         std::max(out.unsure_px, scope.camera().fx_px * std::hypot(bend, 2 * rate_s * waiting.times_apart_s));
+    out.rate_px_s = std::max(out.rate_px_s, scope.camera().fx_px * rate_s);
   }
   return out;
 }
 
-/// True: state() is another now.
-bool VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
+void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
+  if (!key_) return;  // lost since
   const auto from = seen_from(waiting, scope);
-  if (!from) {
-    key_.reset();
-    return false;
+  if (!from) return key_.reset();
+  if (!key_->from) {
+    key_->from = key_->looked_from = from;
+    return;
   }
-  const VideoAgreement before = state_;
-  if (key_) follow(waiting);
-  const bool told = key_ && key_->places.size() >= kFewest && judge(waiting.at, *from, scope);
-  if (key_ && key_->places.size() >= kFewest && waiting.at - key_->at < kLongest && !(told && odd_ >= kOddInRow))
-    return state_ != before;
-  key_ = std::make_unique<Key>();
-  key_->at = waiting.at;
-  key_->from = *from;
-  key_->places = places_to_follow(waiting.picture.grey);
-  key_->now = key_->places;
-  key_->newest = waiting.picture;
-  return state_ != before;
+  const double small_px = static_cast<double>(scope.camera().width_px) / key_->newest.grey.cols;
+  const double rate_px_s =
+      std::max(from->rate_px_s, fastest_px_s(*std::exchange(key_->looked_from, from), *from, scope.camera()));
+  const double step_px = rate_px_s * std::exchange(key_->longest_step, Duration{0}).seconds();
+  // Poses that leap while the picture does not are no haste.
+  const bool hasty = std::exchange(key_->farthest_step_px, 0) > kHastyStepPx && step_px > kFarthestStepPx * small_px;
+  if (hasty || waiting.then.size() < kFewest) return key_.reset();
+  const bool odd = judge(waiting, *from, scope);
+  // A key that was seen in haste tells little of what comes.
+  const bool calmer = key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
+  if ((odd && odd_ >= kOddInRow) || calmer || waiting.at - key_->at >= kLongest) key_.reset();
 }
 
 /// To the next picture; what is not found there, or leads back to another place, is let go.
-void VideoMotion::follow(const Waiting& waiting) {
-  if (key_->places.empty() || key_->newest.grey.size() != waiting.picture.grey.size()) return key_.reset();
-  const auto there = follow_places(key_->newest, waiting.picture, key_->now);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < there.size(); ++i) {
-    if (!there[i]) continue;
-    key_->places[kept] = key_->places[i];
-    key_->now[kept++] = *there[i];
+void VideoMotion::follow(DeviceTime at, const PictureToFollow& picture) {
+  if (key_->newest.grey.size() != picture.grey.size()) return key_.reset();
+  const auto there = follow_places(key_->newest, picture, key_->now);
+  std::vector<double> steps_px;
+  steps_px.reserve(there.size());
+  for (std::size_t i = 0; i < there.size(); ++i)
+    if (there[i]) steps_px.push_back(cv::norm(*there[i] - key_->now[i]));
+  if (!steps_px.empty()) key_->farthest_step_px = std::max(key_->farthest_step_px, median_of(std::move(steps_px)));
+  keep(there);
+  key_->newest = picture;
+  key_->longest_step = std::max(key_->longest_step, at - key_->newest_at);
+  key_->newest_at = at;
+}
+
+/// Of places ahead of the camera, from one picture to the next that was looked at: what goes and stops between them is
+/// at its fastest twice as fast as on the average.
+double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera) {
+  const auto now_from_then = now.camera_from_tracker * then.camera_from_tracker.inverse();
+  double farthest = 0;
+  for (const Eigen::Vector3d& place_mm : places_ahead_mm()) {
+    const Eigen::Vector3d there = now_from_then * place_mm;
+    if (!(there.z() > kNearestSeen_mm)) return std::numeric_limits<double>::infinity();
+    farthest = std::max(farthest, (there.hnormalized() - place_mm.hnormalized()).norm());
   }
-  // Where most are lost at once the picture is another, and what is left is chance.
-  if (2 * kept < there.size()) {
-    if (state_ == VideoAgreement::agrees || state_ == VideoAgreement::in_doubt) forget_agreement();
-    return key_.reset();
-  }
-  key_->places.resize(kept);
-  key_->now.resize(kept);
-  key_->newest = waiting.picture;
+  return 2 * camera.fx_px * farthest / (now.at - then.at).seconds();
 }
 
 /// True: the picture does not agree.
-bool VideoMotion::judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& scope) {
+bool VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return false;  // nothing says how far off a picture may be
   const CameraModel& camera = scope.camera();
   const int columns = key_->newest.grey.cols;
   std::vector<FollowedPlace> places;
-  places.reserve(key_->places.size());
-  for (std::size_t i = 0; i < key_->places.size(); ++i) {
-    const auto then = ray_of(camera, columns, key_->places[i]), later = ray_of(camera, columns, key_->now[i]);
+  places.reserve(waiting.then.size());
+  for (std::size_t i = 0; i < waiting.then.size(); ++i) {
+    const auto then = ray_of(camera, columns, waiting.then[i]), later = ray_of(camera, columns, waiting.now[i]);
     if (then && later) places.push_back({*then, *later});
   }
   if (places.size() < kFewest) return false;
-  const Relative motion = now.camera_from_tracker * key_->from.camera_from_tracker.inverse();
+  const Relative motion = now.camera_from_tracker * key_->from->camera_from_tracker.inverse();
   const auto off = median_off_line(places, motion);
   if (!off) return false;
   off_px_ = *off * camera.fx_px;
@@ -204,8 +273,8 @@ bool VideoMotion::judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& sc
   const double scale = static_cast<double>(camera.width_px) / columns;
   // The errors of hand-eye and of two poses, of two axes, with a probability of 99.9 %, for many pictures are asked;
   // how well a place is found; how sure the two poses are; and what of the motion itself is not as it is modelled.
-  const double still_px =
-      std::hypot(std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale), now.unsure_px + key_->from.unsure_px);
+  const double still_px = std::hypot(std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale),
+                                     now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
@@ -224,7 +293,7 @@ bool VideoMotion::judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& sc
     if (!(otherwise_px[axis] > std::max(still_px, kPlainly * *off_px_))) continue;
     if (!std::exchange(key_->told[axis], true)) ++told_[axis];
   }
-  if (doubted_since_ && at < *doubted_since_) return false;
+  if (doubted_since_ && waiting.at < *doubted_since_) return false;
   if (std::ranges::all_of(told_, [this](int times) { return times >= wanted_; })) state_ = VideoAgreement::agrees;
   return false;
 }

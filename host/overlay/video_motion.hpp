@@ -3,9 +3,11 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "calibration/time/pose_history.hpp"
 #include "device/wire/messages.hpp"
+#include "host/overlay/followed_places.hpp"
 #include "host/overlay/scope_setup.hpp"
 #include "host/overlay/trust.hpp"
 
@@ -25,9 +27,10 @@ class VideoMotion {
 
   /// A pose of the scope's sensor, as they come.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
-  /// A frame, as they come, and the scope that took it; of another than before all is forgotten. Ten a second are
-  /// looked at, each once the poses after it have come. True: state() is another now.
-  bool take(const wire::VideoFrame& frame, const ScopeSetup& scope);
+  /// A frame, as they come, that frame small and grey, and the scope that took it; of another than before all is
+  /// forgotten. In each the places are followed; ten a second are looked at, each once the poses after it have come.
+  /// True: state() is another now.
+  bool take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope);
 
   /// Something else speaks against a frame of that time: what agreed is in doubt until a picture that was taken then or
   /// later agrees. True: state() is another now.
@@ -44,14 +47,19 @@ class VideoMotion {
   struct Waiting;
   /// Where a picture was seen from.
   struct SeenFrom {
+    DeviceTime at;
     Transform<Camera, Tracker> camera_from_tracker;
     double unsure_px = 0;  ///< how far the camera's motion may have places off
+    double rate_px_s = 0;  ///< how fast places move by it
   };
 
   [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& waiting, const ScopeSetup& scope) const;
-  bool look(const Waiting& waiting, const ScopeSetup& scope);
-  void follow(const Waiting& waiting);
-  bool judge(DeviceTime at, const SeenFrom& now, const ScopeSetup& scope);
+  static double fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera);
+  void wait(const wire::VideoFrame& frame, const PictureToFollow& picture);
+  void look(const Waiting& waiting, const ScopeSetup& scope);
+  void follow(DeviceTime at, const PictureToFollow& picture);
+  std::size_t keep(const std::vector<std::optional<cv::Point2f>>& found);
+  bool judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope);
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
   PoseHistory poses_;

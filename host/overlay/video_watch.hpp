@@ -30,8 +30,9 @@ class VideoWatch {
       sudden_.take(frame.info.acquired, *pose);
     }
     const VideoAgreement before = motion_.state();
-    motion_.take(frame, scope);
-    if (sudden_.take(frame, scope, target_mm)) motion_.doubt(frame.info.acquired);
+    const PictureToFollow picture = picture_to_follow(frame);
+    motion_.take(frame, picture, scope);
+    if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
     return {motion_.state() != before, field_.take(frame, scope)};
   }
 

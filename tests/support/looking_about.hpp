@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
@@ -27,6 +28,27 @@ inline host::ScopeSetup scope_with(const Transform<Camera, Sensor>& camera_from_
   return *host::ScopeSetup::of_values(kLookingScope, std::nullopt, camera_from_sensor, figures);
 }
 
+inline std::vector<std::uint8_t> picture_of_board(const Transform<Camera, Patient>& view) {
+  constexpr double kSquare_mm = 5;
+  constexpr int kSamples = 2;  // of a pixel, along each side: an edge is soft
+  const Transform<Patient, Camera> back = view.inverse();
+  std::vector<std::uint8_t> rgb;
+  for (int y = 0; y < kLookingScope.height_px; ++y)
+    for (int x = 0; x < kLookingScope.width_px; ++x) {
+      int white = 0;
+      for (int i = 0; i < kSamples * kSamples; ++i) {
+        const Eigen::Vector2d at_px(x + (i % kSamples + 0.5) / kSamples - 0.5,
+                                    y + (i / kSamples + 0.5) / kSamples - 0.5);
+        const Eigen::Vector3d ray = back.rotation() * *unproject(kLookingScope, at_px), eye_mm = back.translation();
+        const Eigen::Vector3d place_mm = eye_mm - ray * (eye_mm.z() / ray.z());
+        const auto square = [](double mm) { return static_cast<int>(std::floor(mm / kSquare_mm)); };
+        white += (square(place_mm.x()) + square(place_mm.y())) & 1;
+      }
+      rgb.insert(rgb.end(), 3, static_cast<std::uint8_t>(40 + 160 * white / (kSamples * kSamples)));
+    }
+  return rgb;
+}
+
 /// A scope that looks about over a scene, and who watches its video: by take() of a time and a pose, and of a frame and
 /// the scope.
 template <class Watcher>
@@ -35,12 +57,15 @@ struct LookingAbout {
                                                Eigen::Vector3d(5, -3, -300)};
   Transform<Camera, Sensor> told = camera_from_sensor;  ///< as the window has it
   double haste = 1;                                     ///< 0: it rests
+  std::optional<double> swings_s{};                     ///< each second so long, and then it rests; empty: it sways
   double late_s = 0;                                    ///< of the pictures' stamps
   bool latency_measured = true;
   std::function<Eigen::Vector3d(double t_s)> scene_moves{};  ///< against the tracker
   Eigen::Vector3d bumped_mm{0, 0, 0};                        ///< by which the tracker has every pose elsewhere
   Transform<Camera, Camera> turned{};  ///< of the scope in its holder: pictures turn, the sensor does not
+  CameraModel lens = kLookingScope;    ///< as it is; the scope's record has kLookingScope
   bool pattern = true;
+  bool board = false;  ///< squares of 5 mm are what it looks about over
   Watcher motion;
 
   void look(double from_s, double seconds) {
@@ -50,7 +75,10 @@ struct LookingAbout {
     const auto normal3 = [&](auto& of) { return Eigen::Vector3d(of(random), of(random), of(random)); };
     const host::ScopeSetup scope = scope_with(told);
     for (int i = 0; i < static_cast<int>(seconds * 100); ++i) {
-      const double t_s = from_s + i * 0.01, s = haste * t_s;
+      const double t_s = from_s + i * 0.01, second = std::floor(t_s);
+      // From rest to rest.
+      const double swung = swings_s ? std::min(1.0, (t_s - second) / *swings_s) : 0;
+      const double s = haste * (swings_s ? second + swung * swung * (3 - 2 * swung) : t_s);
       const Eigen::Matrix3d turn =
           rotation_exp(Eigen::Vector3d(0.3 * std::sin(1.4 * s), 0.35 * std::sin(1.1 * s + 1), 0.4 * std::sin(0.8 * s)));
       const Transform<Camera, Patient> view(
@@ -68,8 +96,8 @@ struct LookingAbout {
       frame.width_px = kLookingScope.width_px;
       frame.height_px = kLookingScope.height_px;
       const Eigen::Vector3d moved = scene_moves ? scene_moves(t_s) : Eigen::Vector3d::Zero().eval();
-      auto rgb =
-          scene.picture(kLookingScope, turned * view * Transform<Patient, Patient>(Eigen::Matrix3d::Identity(), moved));
+      const auto seen = turned * view * Transform<Patient, Patient>(Eigen::Matrix3d::Identity(), moved);
+      auto rgb = board ? picture_of_board(seen) : scene.picture(lens, seen);
       if (!pattern) std::fill(rgb.begin(), rgb.end(), std::uint8_t{90});
       frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::move(rgb));
       motion.take(frame, scope);

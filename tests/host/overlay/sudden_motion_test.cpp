@@ -22,7 +22,8 @@ struct Watcher {
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& pose) { sudden.take(acquired, pose); }
   void take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
     ++frames;
-    if (sudden.take(frame, scope, target_mm)) sudden_s.push_back((frame.info.acquired - DeviceTime{}).seconds());
+    if (sudden.take(frame, picture_to_follow(frame), scope, target_mm))
+      sudden_s.push_back((frame.info.acquired - DeviceTime{}).seconds());
   }
 };
 using LookingAbout = testing::LookingAbout<Watcher>;
