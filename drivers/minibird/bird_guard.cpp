@@ -57,10 +57,10 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
 
 /// Only what a sensor has sent before tells frozen from at rest, and at first there is nothing before.
 std::optional<BirdGuard::Objection> BirdGuard::doubt_of_life() {
-  if (noise_.alive || limits_.frozen_after <= 0) return std::nullopt;
+  if (alive_ || limits_.frozen_after <= 0) return std::nullopt;
   const std::set<std::vector<std::int16_t>> different(recent_words_.begin(), recent_words_.end());
-  noise_.alive = different.size() >= kAlive;
-  if (noise_.alive) return std::nullopt;
+  alive_ = different.size() >= kAlive;
+  if (alive_) return std::nullopt;
   if (recent_words_.size() < kRecent)
     return Objection{DoubtKind::unconfirmed, "not yet confirmed: its records since the start are hardly different"};
   return Objection{DoubtKind::frozen, "frozen, or without noise and at rest, since the start: move the sensor"};

@@ -24,7 +24,6 @@ class BirdGuard {
     double restless = 0;     ///< how often, of late, a way led back: noise is there
     double back_counts = 0;  ///< how far such a way was, on average
     double repeats = 1;      ///< how often, of late, a record was one of those before
-    bool alive = false;      ///< several records in a row differed: what is frozen since before the stream shows none
   };
   [[nodiscard]] const Noise& noise() const { return noise_; }
   void expect(const Noise& noise) { noise_ = noise; }
@@ -69,7 +68,8 @@ class BirdGuard {
   int agreeing_ = 0;
   std::vector<std::int16_t> last_words_;
   std::deque<std::vector<std::int16_t>> recent_words_;  ///< of the records before, newest last
-  bool was_frozen_ = false;                             ///< until a reading is good again
+  bool alive_ = false;       ///< several records in a row differed: what is frozen since before the stream shows none
+  bool was_frozen_ = false;  ///< until a reading is good again
   DeviceTime repeated_since_;
   int repeats_ = 0;
   double speed_mm_s_ = 0;                                  ///< when the words last changed

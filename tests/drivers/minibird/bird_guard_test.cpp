@@ -236,6 +236,15 @@ TEST(BirdGuard, ANewStreamThatRepeatsItselfFromTheStartIsFrozenWhereTheOneBefore
   EXPECT_EQ(after.see_often(10, kHere), 10);
 }
 
+/// Of a bird whose records often repeat, a repeated one says nothing of itself.
+TEST(BirdGuard, ABirdThatIsFrozenAsItsUnitStartsAgainHasNoPose) {
+  Watch before, after;
+  for (int i = 0; i < 200; ++i) before.see(kHere + Vector3d(0.1 * (i / 3 % 5), 0, 0), Matrix3d::Identity(), 0);
+  ASSERT_TRUE(before.see(kHere, Matrix3d::Identity(), 0).pose);
+  after.expect(before.noise());
+  for (int i = 0; i < 300; ++i) EXPECT_FALSE(after.see(kHere, Matrix3d::Identity(), 0).pose) << i;
+}
+
 /// The bird froze before birdseyed started.
 TEST(BirdGuard, WhatHasRepeatedItselfSinceTheStartHasNoPose) {
   Watch watch;

@@ -94,7 +94,8 @@ TEST_P(MendedSeed, BreaksNoLawAnyMore) {
 INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104, 1003, 1004, 1009, 1023, 1076, 1093),
                          [](const auto& of) { return std::to_string(of.param); });
 
-/// - 106, 168, 229, 260: a bird that had frozen before birdseyed was started again had poses, as one at rest has.
+/// - 106, 168, 229, 260: a bird that had frozen before birdseyed was started again had poses, as one at rest has;
+/// - 1307: so had one that was frozen as its unit fell silent and came back.
 class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
@@ -102,7 +103,7 @@ TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
-INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms, ::testing::Values(106, 168, 229, 260),
+INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms, ::testing::Values(106, 168, 229, 260, 1307),
                          [](const auto& of) { return std::to_string(of.param); });
 
 TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
