@@ -23,7 +23,7 @@ constexpr double kRestless = 0.2;             // of ways lead back where there i
 constexpr double kDamageMemory = 1.0 / 32;    // of how often readings make no sense, per reading
 constexpr double kMostDamaged = 0.08;         // three of the last readings: a jerk and a bump make two
 constexpr std::size_t kRecent = 16;           // records, among which one that repeats is looked for
-constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading
+constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading; of all of them at first
 constexpr double kSeldom = 0.02;              // two just now are less; three then are chance once in 10^6
 constexpr int kFrozenWhereSeldom = 3;
 constexpr std::size_t kAlive = 4;  // different records among the recent: a frozen bird's, and two damaged, are three
@@ -77,7 +77,8 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_repeats(const std::vecto
     if (words == last_words_) ++repeats_;
     return Objection{DoubtKind::frozen, fmt::format("frozen: the same record {} times", same + 1)};
   }
-  noise_.repeats += kRepeatsMemory * ((same > 0 ? 1 : 0) - noise_.repeats);
+  noise_.newest = std::max(noise_.newest / (1 + noise_.newest), kRepeatsMemory);
+  noise_.repeats += noise_.newest * ((same > 0 ? 1 : 0) - noise_.repeats);
   if (words != last_words_) {
     last_words_ = words;
     repeats_ = 0;

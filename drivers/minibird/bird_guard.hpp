@@ -24,6 +24,7 @@ class BirdGuard {
     double restless = 0;     ///< how often, of late, a way led back: noise is there
     double back_counts = 0;  ///< how far such a way was, on average
     double repeats = 1;      ///< how often, of late, a record was one of those before
+    double newest = 0.2;     ///< what the newest record counts in that: as if five had repeated before the first
   };
   [[nodiscard]] const Noise& noise() const { return noise_; }
   void expect(const Noise& noise) { noise_ = noise; }
