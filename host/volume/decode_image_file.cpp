@@ -19,6 +19,7 @@
 #include "host/volume/nifti_file.hpp"
 #include "host/volume/stated_geometry.hpp"
 #include "host/volume/unread_form.hpp"
+#include "host/volume/voxel_bytes.hpp"
 #include "host/volume/voxel_types.hpp"
 
 namespace birdseye::host {
@@ -185,10 +186,14 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
       image.origin_mm[axis] = io->GetOrigin(axis);
       for (unsigned row = 0; row < 3; ++row) image.axes(row, axis) = io->GetDirection(axis)[row];
     }
+    const std::size_t row = static_cast<std::size_t>(components) * io->GetDimensions(0);
     if (nifti) {
       // By the file's own type: a slope makes the reader give floats where the file holds integers.
-      const std::string fault = nifti->fault(nifti->bytes_of(count));
+      const std::string fault = nifti->fault(nifti->bytes_of(count), nifti->bytes_of(row));
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);
+    } else if (const auto held = voxel_bytes(path)) {
+      const std::size_t said = count * io->GetComponentSize();
+      if (*held >= said + row * io->GetComponentSize()) return refused(Errc::bad_format, path, too_many(*held, said));
     }
     if (!gaps.place.empty() && source.stated.orientation.empty()) {
       // Of a field, and of nothing else, all numbers depend on it: a CT and its labels are compared voxel by voxel.

@@ -30,4 +30,9 @@ HeaderFields header_fields(std::istream& file, char sign, const std::string& las
   return fields;
 }
 
+std::string field_of(const HeaderFields& fields, const char* name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? std::string() : found->second;
+}
+
 }  // namespace birdseye::host

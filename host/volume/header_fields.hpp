@@ -19,4 +19,7 @@ inline constexpr std::string_view kAgain = " again";
 /// "name:=value" the value begins with '='. The last of several different values of a name stands under "name again".
 HeaderFields header_fields(std::istream& file, char sign, const std::string& last);
 
+/// Empty where the header has no such field.
+std::string field_of(const HeaderFields& fields, const char* name);
+
 }  // namespace birdseye::host

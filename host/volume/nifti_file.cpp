@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "host/volume/volume.hpp"
+#include "host/volume/voxel_bytes.hpp"
 
 namespace birdseye::host {
 
@@ -236,7 +237,7 @@ std::size_t NiftiFile::bytes_of(std::size_t count) const {
   return count * static_cast<std::size_t>(std::max<std::int16_t>(8, number<std::int16_t>(72))) / 8;
 }
 
-std::string NiftiFile::fault(std::size_t image_bytes) const {
+std::string NiftiFile::fault(std::size_t image_bytes, std::size_t row_bytes) const {
   if (!offset_is_sound_) return "is damaged in its header; export it again";
   const gzFile file = gzopen(voxels_.c_str(), "rb");
   if (file == nullptr)
@@ -258,6 +259,7 @@ std::string NiftiFile::fault(std::size_t image_bytes) const {
   }
   const bool sound = gzclose_r(file) == Z_OK && got == 0;
   if (!sound || count < image_bytes) return "is cut short or damaged; export it again";
+  if (count >= image_bytes + row_bytes) return too_many(count, image_bytes);
   if (!finite) return "has voxels that are not finite numbers; export it again";
   return {};
 }

@@ -44,8 +44,8 @@ class NiftiFile {
   /// Of so many numbers, by bitpix.
   [[nodiscard]] std::size_t bytes_of(std::size_t count) const;
 
-  /// What is wrong with the voxels, of so many bytes; empty where they are whole and finite.
-  [[nodiscard]] std::string fault(std::size_t image_bytes) const;
+  /// What is wrong with the voxels, of so many bytes, and rows of so many; empty where they are whole and finite.
+  [[nodiscard]] std::string fault(std::size_t image_bytes, std::size_t row_bytes) const;
 
  private:
   static constexpr std::int32_t kHeaderBytes = 348;

@@ -22,12 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A header's field; empty where there is none.
-std::string field_of(const HeaderFields& fields, const char* name) {
-  const auto found = fields.find(name);
-  return found == fields.end() ? std::string() : found->second;
-}
-
 std::string shown(const std::string& text) {
   return text.substr(0, 80);
 }

@@ -1,6 +1,8 @@
 #include "host/volume/unread_form.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cstdint>
 #include <cstring>
@@ -37,6 +39,20 @@ std::string meta_image(const std::string& type = "MET_SHORT", const std::string&
          type + "\nElementDataFile = " + data + "\n";
 }
 
+std::string gzip(const std::string& bytes) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string in = bytes, out(1000, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(in.data());
+  stream.avail_in = static_cast<uInt>(in.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
 /// A NIfTI-1 file, of a pair its header.
 std::string nifti(std::int16_t datatype, std::int16_t bits, const char* magic = "n+1") {
   std::string file(352, '\0');
@@ -59,11 +75,22 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
   struct Case {
     std::string name, text, why;  // why it is refused; empty: it is read
   };
-  const std::string compressed = "CompressedData = True\n";
+  const std::string compressed = "CompressedData = True\n", packed = gzip(kVoxels);
+  const std::string sized = fmt::format("{}CompressedDataSize = {}\n", compressed, packed.size());
   for (const Case& c : std::vector<Case>{
            {"good.nrrd", nrrd() + "\n" + kVoxels, ""},
            {"beside.nhdr", nrrd() + "data file: there.raw\n\n", ""},
-           {"bytes.nrrd", nrrd("uchar", "raw", "") + "\n" + kVoxels, ""},
+           {"bytes.nrrd", nrrd("uchar", "raw", "") + "\n" + kVoxels.substr(24), ""},
+           {"more.nrrd", with(nrrd(), "4 3 2", "3 3 2") + "\n" + kVoxels, "holds 48 bytes of voxels, and the size in"},
+           {"less.nrrd", with(nrrd(), "4 3 2", "5 3 2") + "\n" + kVoxels, "cut short or damaged"},
+           {"padded.nrrd", nrrd() + "\n" + kVoxels + "\n", ""},
+           {"more.nhdr", with(nrrd(), "4 3 2", "4 2 2") + "data file: there.raw\n\n",
+            "and the size in its header is of 32"},
+           {"skips.nhdr", with(nrrd(), "4 3 2", "4 2 2") + "byte skip: 16\ndata file: there.raw\n\n", ""},
+           {"packed.nrrd", nrrd("short", "gzip") + "\n" + packed, ""},
+           {"more_packed.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 3 1") + "\n" + packed,
+            "a picture, not a volume"},
+           {"packed_rows.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + packed, "is of 32"},
            {"bzip2.nrrd", nrrd("short", "bzip2") + "\n" + kVoxels, "the encoding \"bzip2\", which is not read"},
            {"letters.nrrd", with(nrrd(), "(0,0,2)", "(0,0,12abc)") + "\n" + kVoxels, "\"12abc\" in its field"},
            {"hex.nrrd", with(nrrd(), "(1,2,3)", "(0x10,2,3)") + "\n" + kVoxels, "\"0x10\" in its field"},
@@ -85,7 +112,11 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"list.nhdr", nrrd() + "data file: LIST\nthere.raw\ngone.raw\n", "\"gone.raw\" is not there"},
            {"cut.nrrd", nrrd() + "\nshort", "cut short or damaged"},
            {"good.mha", meta_image() + kVoxels, ""},
+           {"more.mha", with(meta_image(), "4 3 2", "4 2 2") + kVoxels, "is of 32"},
+           {"packed.mha", meta_image("MET_SHORT", sized) + packed, ""},
+           {"more_packed.mha", with(meta_image("MET_SHORT", sized), "4 3 2", "3 3 2") + packed, "is of 36"},
            {"beside.mhd", meta_image("MET_SHORT", "", "there.raw"), ""},
+           {"more.mhd", with(meta_image("MET_SHORT", "", "there.raw"), "4 3 2", "3 3 2"), "is of 36"},
            {"text.mha", meta_image("MET_STRING") + kVoxels, "the type MET_STRING"},
            {"half.mha", meta_image("MET_HALF") + kVoxels, "the type MET_HALF"},
            {"lone.mhd", meta_image("MET_SHORT", "", "gone.raw"), "\"gone.raw\" is not there"},
@@ -95,6 +126,8 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
             "take 9 bytes (CompressedDataSize), and 48 follow"},
            {"cut.mha", meta_image() + "short", "cut short or damaged"},
            {"good.nii", nifti(4, 16) + kVoxels, ""},
+           {"more.nii", nifti(4, 16) + kVoxels + kVoxels,
+            "holds 96 bytes of voxels, and the size in its header is of 48"},
            {"colours.nii", nifti(128, 24) + kVoxels + kVoxels, "colours (datatype 128)"},
            {"complex.nii", nifti(32, 64) + kVoxels + kVoxels + kVoxels + kVoxels, "complex numbers (datatype 32)"},
            {"bits.nii", nifti(1, 1) + kVoxels, "single bits (datatype 1)"},
