@@ -32,6 +32,13 @@ Result<void> admit_replay(const std::filesystem::path& recording, bool accept_un
   return {};
 }
 
+namespace {
+
+// birdseyed records what it does several times a second.
+constexpr Duration kLongWait = Duration::from_ms(10'000), kLongestWait = Duration::from_ms(3'600'000);
+
+}  // namespace
+
 Result<void> replay(const std::filesystem::path& recording, wire::Server& server, const std::stop_token& stop) {
   auto reader = RawEventReader::open(recording);
   if (!reader) return reader.error();
@@ -43,7 +50,15 @@ Result<void> replay(const std::filesystem::path& recording, wire::Server& server
     if (!*event) break;
     const DeviceTime at = time_of(**event);
     if (!shift) shift = device_now() - at;
-    sleep_for(at + *shift - device_now(), stop);
+    const Duration wait = at + *shift - device_now();
+    if (wait > kLongestWait) {
+      return Error{Errc::bad_value,
+                   fmt::format("{}: its next event is {:.0f} h later than the one before: a stamp is damaged",
+                               recording.string(), wait.seconds() / 3600)};
+    }
+    if (wait > kLongWait)
+      spdlog::warn("{}: nothing was recorded for the next {:.0f} s: waiting", recording.string(), wait.seconds());
+    sleep_for(wait, stop);
     for (const wire::Packet& packet : core.take(**event)) server.publish(packet);
   }
   if (reader->cut_short()) spdlog::warn("{}: ends inside a block, as after a power cut", recording.string());

@@ -57,5 +57,23 @@ TEST(Replay, ARecordingOfNobodyKnownIsPlayedOnlyWhenAskedToAndAChangedOneNever) 
   own.empty() ? ::unsetenv("BIRDSEYE_IDENTITY") : ::setenv("BIRDSEYE_IDENTITY", own.c_str(), 1);
 }
 
+TEST(Replay, AnEventThatIsAnHourLaterIsDamaged) {
+  const Scratch scratch;
+  RecordConfig config;
+  config.folder = scratch / "r";
+  std::filesystem::path path;
+  {
+    const auto recorder = Recorder::start(config, {});
+    ASSERT_TRUE(recorder) << recorder.error().what;
+    path = (*recorder)->path();
+    for (const int at_s : {0, 3 * 3600})
+      (*recorder)->take(TrackerBytes{{{0x80}, DeviceTime{} + Duration::from_seconds(at_s)}});
+  }
+  const auto server = *wire::Server::listen("127.0.0.1", 0);
+  const auto played = replay(path, *server, {});
+  ASSERT_FALSE(played);
+  EXPECT_NE(played.error().what.find("3 h later"), std::string::npos) << played.error().what;
+}
+
 }  // namespace
 }  // namespace birdseye::device
