@@ -17,12 +17,12 @@ namespace {
 using Relative = Transform<Camera, Camera>;
 
 constexpr int kWidthPx = 320;
-constexpr int kPlaces = 80;
+constexpr int kCandidates = 240;  // of which those that repeat are left out
 constexpr double kThereAndBackPx = 0.7;
 constexpr int kLevels = 3, kLevelsAbout = 1;
 const cv::Size kWindow(15, 15);
-constexpr int kAlikeWithinPx = 20, kAlikeFromPx = 6;
-constexpr double kAlike = 0.95;  // correlation of grey values
+constexpr int kAlikeFromPx = 6, kAlikeWithinPx = 20;  // nearer, it is the place itself; farther, none is followed to
+constexpr double kAlike = 0.93;                       // correlation of grey values
 
 /// From a place to a line's part between two others.
 double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
@@ -64,7 +64,7 @@ PictureToFollow picture_to_follow(const wire::VideoFrame& frame) {
   return out;
 }
 
-std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
+std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey, int at_most) {
   double least = 0, most = 0;
   cv::minMaxLoc(grey, &least, &most);
   if (least == most) return {};  // no signal, or grey all over: to look for them takes longest where there are none
@@ -73,10 +73,20 @@ std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey) {
   cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
   mask.setTo(0, glare);
   std::vector<cv::Point2f> places;
-  cv::goodFeaturesToTrack(grey, places, kPlaces, 0.01, 8, mask);
+  cv::goodFeaturesToTrack(grey, places, at_most, 0.01, 8, mask);
+  return places;
+}
+
+std::vector<cv::Point2f> distinct_places_to_follow(const cv::Mat& grey) {
+  const std::vector<cv::Point2f> candidates = places_to_follow(grey, kCandidates);
+  std::vector<cv::Point2f> places;
   cv::Mat half;
   cv::resize(grey, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  std::erase_if(places, [&half](const cv::Point2f& place) { return repeats(half, place); });
+  std::size_t asked = 0;
+  for (; asked < candidates.size() && places.size() < static_cast<std::size_t>(kPlaces); ++asked)
+    if (!repeats(half, candidates[asked])) places.push_back(candidates[asked]);
+  // Of a board that fills the picture, what is left is hardly better.
+  if (4 * places.size() < asked) places.clear();
   return places;
 }
 

@@ -12,6 +12,7 @@
 /// Places of the tissue that are followed from one picture to the next, and where the poses say that they lie.
 namespace birdseye::host {
 
+inline constexpr int kPlaces = 80;          ///< are followed at most
 inline constexpr double kFollowedPx = 1.5;  ///< of the small picture: how far a place that is followed may be off
 /// From the camera: what a laparoscope sees lies between.
 inline constexpr double kNearestSeen_mm = 15, kFarthestSeen_mm = 600;
@@ -25,7 +26,9 @@ PictureToFollow picture_to_follow(const wire::VideoFrame& frame);
 
 /// Places of such a picture that can be followed: within the round field, and away from reflections, which go with the
 /// lamp.
-std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey);
+std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey, int at_most = kPlaces);
+/// Of such places those that look as no other within reach of the search, as a board's squares do.
+std::vector<cv::Point2f> distinct_places_to_follow(const cv::Mat& grey);
 
 /// Where places of one picture lie in another. Empty: it is not found there, or leads back to another place. about:
 /// where they are known to lie to within a few pixels, one each; without it, they are looked for some twenty pixels

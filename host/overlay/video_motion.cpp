@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -20,11 +19,11 @@ constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
-constexpr double kNotModelled = 0.15;   // of what a hand-eye turned by kTurned_rad would do
-constexpr double kPlainly = 3;          // so many times as far off would be plain
-constexpr double kHastePx = 5;          // of the small picture: so unsure a key hides what is wrong
-constexpr double kHastyStepPx = 5;      // of the small picture, from a frame to the next
-constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one step is not followed safely
+constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
+constexpr double kPlainly = 3;         // so many times as far off would be plain
+constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
+constexpr double kFarthestStepPx = 20;  // of the small picture: what moves farther in one frame is not followed safely
+constexpr double kOfHaste = 0.4;        // of the poses' haste, places move so much at least; where poses leap, less
 constexpr int kOddInRow = 4, kMostWanted = 32;
 
 /// By which it is told how fast what is seen moves.
@@ -46,22 +45,24 @@ struct VideoMotion::Waiting {
   double times_apart_s = 0;         ///< of the frame and the poses
   std::vector<cv::Point2f> then{};  ///< the key's places; empty: this is the key's picture
   std::vector<cv::Point2f> now{};   ///< where they are in this one
+  double farthest_step_px = 0;      ///< of half of them, from a frame to the next, since the picture before that waited
+  Duration longest_step{0};         ///< between two such frames
 };
 
 struct VideoMotion::Key {
   DeviceTime at;
-  std::optional<SeenFrom> from;     ///< empty: the poses after it have not come yet
-  std::vector<cv::Point2f> places;  ///< in the key's picture
-  std::optional<SeenFrom> looked_from;
-  PictureToFollow looked_at;        ///< the last picture that was looked at
-  std::vector<cv::Point2f> looked;  ///< and where they were in it
-  std::size_t kept = 0;             ///< so many
-  PictureToFollow newest;           ///< the last frame
+  std::optional<SeenFrom> from;         ///< empty: the poses after it have not come yet
+  std::vector<cv::Point2f> places;      ///< in the key's picture
+  PictureToFollow looked_at;            ///< the last picture that was looked at
+  std::optional<SeenFrom> looked_from;  ///< the last picture that was judged, or the key's
+  std::vector<cv::Point2f> looked;      ///< where they were in the last picture that was looked at
+  std::size_t kept = 0;                 ///< so many
+  PictureToFollow newest;               ///< the last frame in which most of them were found
+  std::vector<cv::Point2f> now;         ///< and about where they are in it
   DeviceTime newest_at;
-  std::vector<cv::Point2f> now;  ///< and about where they are in it
-  Duration longest_step{0};      ///< between two frames, since one was judged
-  double farthest_step_px = 0;   ///< of half of the places, from a frame to the next, since one was judged
-  std::array<bool, 3> told{};    ///< by pictures since, about each axis
+  double farthest_step_px = 0;  ///< since a picture last waited, as it has it
+  Duration longest_step{0};
+  std::array<bool, 3> told{};  ///< by pictures since, about each axis
 };
 
 VideoMotion::VideoMotion() : poses_(averaged_poses()) {}
@@ -136,14 +137,7 @@ void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& pic
   waiting_->times_apart_s = times_apart_s(
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
       frame.info.latency.has_value());
-  if (!key_) {
-    key_ = std::make_unique<Key>();
-    key_->at = key_->newest_at = waiting_->at;
-    key_->places = key_->looked = key_->now = places_to_follow(picture.grey);
-    key_->kept = key_->places.size();
-    key_->looked_at = key_->newest = picture;
-    return;
-  }
+  if (!key_) return begin_key(waiting_->at, picture, std::nullopt);
   // What is followed from frame to frame drifts with each: they only tell where to look, from the last that was looked
   // at.
   const std::size_t kept = keep(follow_places(key_->looked_at, picture, key_->looked, &key_->now));
@@ -158,6 +152,18 @@ void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& pic
   key_->looked = key_->now;
   waiting_->then = key_->places;
   waiting_->now = key_->now;
+  waiting_->farthest_step_px = std::exchange(key_->farthest_step_px, 0);
+  waiting_->longest_step = std::exchange(key_->longest_step, Duration{0});
+}
+
+void VideoMotion::begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from) {
+  auto key = std::make_unique<Key>();
+  key->at = key->newest_at = at;
+  key->from = key->looked_from = from;
+  key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
+  key->kept = key->places.size();
+  key->looked_at = key->newest = picture;
+  key_ = std::move(key);
 }
 
 /// Of the key's places those that were found, and where.
@@ -194,7 +200,6 @@ std::optional<VideoMotion::SeenFrom> VideoMotion::seen_from(const Waiting& waiti
     const double rate_s = (to - from).norm() / (2 * kAverage.seconds());
     out.unsure_px =
         std::max(out.unsure_px, scope.camera().fx_px * std::hypot(bend, 2 * rate_s * waiting.times_apart_s));
-    out.rate_px_s = std::max(out.rate_px_s, scope.camera().fx_px * rate_s);
   }
   return out;
 }
@@ -208,16 +213,24 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
     return;
   }
   const double small_px = static_cast<double>(scope.camera().width_px) / key_->newest.grey.cols;
-  const double rate_px_s =
-      std::max(from->rate_px_s, fastest_px_s(*std::exchange(key_->looked_from, from), *from, scope.camera()));
-  const double step_px = rate_px_s * std::exchange(key_->longest_step, Duration{0}).seconds();
-  // Poses that leap while the picture does not are no haste.
-  const bool hasty = std::exchange(key_->farthest_step_px, 0) > kHastyStepPx && step_px > kFarthestStepPx * small_px;
-  if (hasty || waiting.then.size() < kFewest) return key_.reset();
-  const bool odd = judge(waiting, *from, scope);
-  // A key that was seen in haste tells little of what comes.
+  // Poses that leap, as of a transmitter that is bumped, are no haste: the places do not go with them.
+  const double poses_step_px = fastest_px_s(*std::exchange(key_->looked_from, from), *from, scope.camera()) / small_px *
+                               waiting.longest_step.seconds();
+  const bool hasty = poses_step_px > kFarthestStepPx && waiting.farthest_step_px > kOfHaste * poses_step_px;
+  const bool lost = hasty || waiting.then.size() < kFewest;
+  const bool odd = !lost && judge(waiting, *from, scope);
   const bool calmer = key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
-  if ((odd && odd_ >= kOddInRow) || calmer || waiting.at - key_->at >= kLongest) key_.reset();
+  const bool renew = odd ? odd_ >= kOddInRow : calmer || waiting.at - key_->at >= kLongest;
+  if (!lost && !renew) return;
+  // From the picture that was judged, so that no motion lies between two keys.
+  const PictureToFollow newest = key_->newest;
+  const DeviceTime newest_at = key_->newest_at;
+  begin_key(waiting.at, PictureToFollow(key_->looked_at), from);
+  if (newest.grey.data != key_->looked_at.grey.data) {
+    keep(follow_places(key_->looked_at, newest, key_->places));
+    key_->newest = newest;
+    key_->newest_at = newest_at;
+  }
 }
 
 /// To the next picture; what is not found there, or leads back to another place, is let go.
@@ -228,7 +241,9 @@ void VideoMotion::follow(DeviceTime at, const PictureToFollow& picture) {
   steps_px.reserve(there.size());
   for (std::size_t i = 0; i < there.size(); ++i)
     if (there[i]) steps_px.push_back(cv::norm(*there[i] - key_->now[i]));
-  if (!steps_px.empty()) key_->farthest_step_px = std::max(key_->farthest_step_px, median_of(std::move(steps_px)));
+  // A flash, or smoke: the next frame may show them again. Where it does not, the next look tells.
+  if (steps_px.empty() || 2 * steps_px.size() < there.size()) return;
+  key_->farthest_step_px = std::max(key_->farthest_step_px, median_of(std::move(steps_px)));
   keep(there);
   key_->newest = picture;
   key_->longest_step = std::max(key_->longest_step, at - key_->newest_at);
@@ -242,10 +257,10 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
   double farthest = 0;
   for (const Eigen::Vector3d& place_mm : places_ahead_mm()) {
     const Eigen::Vector3d there = now_from_then * place_mm;
-    if (!(there.z() > kNearestSeen_mm)) return std::numeric_limits<double>::infinity();
-    farthest = std::max(farthest, (there.hnormalized() - place_mm.hnormalized()).norm());
+    const double z_mm = std::max(there.z(), kNearestSeen_mm);
+    farthest = std::max(farthest, (there.head<2>() / z_mm - place_mm.hnormalized()).norm());
   }
-  return 2 * camera.fx_px * farthest / (now.at - then.at).seconds();
+  return 2 * camera.fx_px * farthest / std::max((now.at - then.at).seconds(), 1e-3);
 }
 
 /// True: the picture does not agree.

@@ -50,13 +50,13 @@ class VideoMotion {
     DeviceTime at;
     Transform<Camera, Tracker> camera_from_tracker;
     double unsure_px = 0;  ///< how far the camera's motion may have places off
-    double rate_px_s = 0;  ///< how fast places move by it
   };
 
   [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& waiting, const ScopeSetup& scope) const;
-  static double fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera);
   void wait(const wire::VideoFrame& frame, const PictureToFollow& picture);
   void look(const Waiting& waiting, const ScopeSetup& scope);
+  static double fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera);
+  void begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
   void follow(DeviceTime at, const PictureToFollow& picture);
   std::size_t keep(const std::vector<std::optional<cv::Point2f>>& found);
   bool judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope);

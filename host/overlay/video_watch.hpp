@@ -30,7 +30,9 @@ class VideoWatch {
       sudden_.take(frame.info.acquired, *pose);
     }
     const VideoAgreement before = motion_.state();
-    const PictureToFollow picture = picture_to_follow(frame);
+    // Of another size it is not looked at, and may be as flat as a line.
+    const bool fits = frame.width_px == scope.camera().width_px && frame.height_px == scope.camera().height_px;
+    const PictureToFollow picture = fits ? picture_to_follow(frame) : PictureToFollow{};
     motion_.take(frame, picture, scope);
     if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
     return {motion_.state() != before, field_.take(frame, scope)};

@@ -122,7 +122,7 @@ std::vector<Row> while_running() {
           },
           "the check of the deformed surface, once views are kept; a breath hold"),
       row(
-          "half of the organ is resected", Must::unseen, "",
+          "half of the organ is resected", Must::withhold, "",
           [](Rehearsal& o) {
             o.resect();
             o.look_about();  // what the video shows is another scene, and has to move as the poses say anew
