@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <map>
 
 #include "calibration/base/units.hpp"
 
@@ -16,7 +16,10 @@ constexpr std::size_t kTrack = 4;  // readings that a line is laid through
 // A line through so many readings misses the next on a parabola by five times a t^2 / 2.
 constexpr double kParabola = 2.5;
 constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line through readings foretells the next
-constexpr double kNoiseMemory = 1.0 / 64;                 // of the mean square, per reading
+// Where no line foretells it, what goes farther than a sensor does in so long is confirmed by the next, however long
+// ago the one before was.
+constexpr Duration kUnforeseen = Duration::from_ms(10);
+constexpr double kNoiseMemory = 1.0 / 64;  // of the mean square, per reading
 constexpr double kNoiseSigmas = 3.5;
 constexpr double kMostNoiseMm = 5;            // beyond that it is not noise
 constexpr double kRestless = 0.2;             // of ways lead back where there is noise; without, hardly any
@@ -26,7 +29,9 @@ constexpr std::size_t kRecent = 16;           // records, among which one that r
 constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading; of all of them at first
 constexpr double kSeldom = 0.02;              // two just now are less; three then are chance once in 10^6
 constexpr int kFrozenWhereSeldom = 3;
-constexpr std::size_t kAlive = 4;  // different records among the recent: a frozen bird's, and two damaged, are three
+// Of a bird that is frozen half of the records are alike, even where the line damages the other half. Of one that is
+// alive no more than a quarter of so many are, or none of kRecent; before, an eighth is believed.
+constexpr std::size_t kFirst = 4, kManyRecords = 64;
 constexpr double kMuchNearer = 3;  // the mirrored position, than the one reported
 
 Duration gap_between(DeviceTime earlier, DeviceTime later) {
@@ -58,10 +63,14 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
 /// Only what a sensor has sent before tells frozen from at rest, and at first there is nothing before.
 std::optional<BirdGuard::Objection> BirdGuard::doubt_of_life() {
   if (alive_ || limits_.frozen_after <= 0) return std::nullopt;
-  const std::set<std::vector<std::int16_t>> different(recent_words_.begin(), recent_words_.end());
-  alive_ = different.size() >= kAlive;
-  if (alive_) return std::nullopt;
-  if (recent_words_.size() < kRecent)
+  const std::size_t count = first_words_.size();
+  std::map<std::vector<std::int16_t>, std::size_t> alike;
+  std::size_t most = 0;
+  for (const auto& record : first_words_) most = std::max(most, ++alike[record]);
+  alive_ = (count >= kRecent && most == 1) || (count == kManyRecords && 4 * most <= count);
+  if (alive_) first_words_.clear();
+  if (alive_ || (count >= kFirst && most <= std::max(std::size_t{1}, count / 8))) return std::nullopt;
+  if (count < kRecent)
     return Objection{DoubtKind::unconfirmed, "not yet confirmed: its records since the start are hardly different"};
   return Objection{DoubtKind::frozen, "frozen, or without noise and at rest, since the start: move the sensor"};
 }
@@ -129,7 +138,11 @@ BirdGuard::Placed BirdGuard::placed(const Sample& sample) {
   const Duration gap = gap_between(track_.back().time, sample.time);
   bool after_doubt = candidate_ || !made_sense_;
   const auto predicted = predicted_mm(sample.time);
-  if (!predicted || !sample.time_certain) return after_doubt ? Placed::in_reach : Placed::on_track;
+  if (!predicted || !sample.time_certain) {
+    const double went_mm = (sample.position_mm - last_mm_).norm();
+    const bool sudden = went_mm > limits_.slack_mm + limits_.most_speed_mm_s * kUnforeseen.seconds();
+    return after_doubt || sudden ? Placed::in_reach : Placed::on_track;
+  }
   Duration usual = gap;
   for (std::size_t i = 1; i < track_.size(); ++i)
     usual = std::min(usual, gap_between(track_[i - 1].time, track_[i].time));
@@ -174,6 +187,7 @@ void BirdGuard::follow(const Sample& sample) {
   candidate_.reset();
   agreeing_ = 0;
   was_frozen_ = false;
+  last_mm_ = sample.position_mm;
   if (!track_.empty() && track_.front().time_certain != sample.time_certain) {
     if (!sample.time_certain) return;
     track_.clear();
@@ -248,6 +262,8 @@ BirdReading BirdGuard::judge_itself(const Record& record, DeviceTime acquired, D
   if (const auto doubt = doubt_of_words(record.words)) return withhold(*doubt);
   auto pose = decode_pose(layout_.format, record.words, layout_.mm_per_count);
   if (!pose) return withhold({DoubtKind::senseless, pose.error().what});
+  if (!alive_) first_words_.push_back(record.words);
+  if (first_words_.size() > kManyRecords) first_words_.pop_front();
   if (const auto doubt = doubt_of_repeats(record.words, acquired)) {
     was_frozen_ = true;
     candidate_.reset();

@@ -64,12 +64,14 @@ class BirdGuard {
   Plausibility limits_;
   std::deque<Sample> track_;  ///< where the sensor has been, newest last; positions are put back where they flipped
                               ///< from. The times of all of them are certain, or of none
-  double noise_mm2_ = 0;      ///< mean square of the readings about the line through those before
+  Eigen::Vector3d last_mm_ = Eigen::Vector3d::Zero();  ///< of the last reading in place, its time certain or not
+  double noise_mm2_ = 0;             ///< mean square of the readings about the line through those before
   std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
   int agreeing_ = 0;
   std::vector<std::int16_t> last_words_;
   std::deque<std::vector<std::int16_t>> recent_words_;  ///< of the records before, newest last
-  bool alive_ = false;       ///< several records in a row differed: what is frozen since before the stream shows none
+  std::deque<std::vector<std::int16_t>> first_words_;   ///< those since the start, until alive_
+  bool alive_ = false;       ///< these differed: what is frozen since before the stream shows damaged ones at most
   bool was_frozen_ = false;  ///< until a reading is good again
   DeviceTime repeated_since_;
   int repeats_ = 0;
