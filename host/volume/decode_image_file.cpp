@@ -191,9 +191,10 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
       // By the file's own type: a slope makes the reader give floats where the file holds integers.
       const std::string fault = nifti->fault(nifti->bytes_of(count), nifti->bytes_of(row));
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);
-    } else if (const auto held = voxel_bytes(path)) {
-      const std::size_t said = count * io->GetComponentSize();
-      if (*held >= said + row * io->GetComponentSize()) return refused(Errc::bad_format, path, too_many(*held, said));
+    } else {
+      const std::size_t said = count * io->GetComponentSize(), most = said + row * io->GetComponentSize();
+      if (const auto held = voxel_bytes(path, most); held && *held >= most)
+        return refused(Errc::bad_format, path, too_many(*held, said));
     }
     if (!gaps.place.empty() && source.stated.orientation.empty()) {
       // Of a field, and of nothing else, all numbers depend on it: a CT and its labels are compared voxel by voxel.

@@ -35,4 +35,9 @@ std::string field_of(const HeaderFields& fields, const char* name) {
   return found == fields.end() ? std::string() : found->second;
 }
 
+bool says_true(const HeaderFields& fields, const char* name) {
+  const std::string value = field_of(fields, name);
+  return !value.empty() && (value[0] == 'T' || value[0] == 't' || value[0] == '1');
+}
+
 }  // namespace birdseye::host

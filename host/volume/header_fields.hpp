@@ -22,4 +22,7 @@ HeaderFields header_fields(std::istream& file, char sign, const std::string& las
 /// Empty where the header has no such field.
 std::string field_of(const HeaderFields& fields, const char* name);
 
+/// As MetaIO takes it: "True", "T", "1" and what begins as these is true, all else is not.
+bool says_true(const HeaderFields& fields, const char* name);
+
 }  // namespace birdseye::host

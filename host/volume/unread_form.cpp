@@ -149,7 +149,7 @@ std::string unread_meta_image(const fs::path& path, const HeaderFields& fields, 
     return fmt::format("has voxels of the type {}, which is not read; save it as MET_SHORT", shown(type));
   const std::string data = field_of(fields, "elementdatafile");
   if (lower_case(data) == "local") {
-    if (lower_case(field_of(fields, "compresseddata")) != "true") return {};
+    if (!says_true(fields, "compresseddata")) return {};
     const std::string said = field_of(fields, "compresseddatasize");
     if (said.empty() || said == "0")
       return "does not say how long its compressed voxels are (CompressedDataSize); save it again, uncompressed";

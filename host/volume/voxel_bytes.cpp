@@ -47,26 +47,31 @@ std::optional<Place> place_in_nrrd(const fs::path& path, std::ifstream& file) {
 
 std::optional<Place> place_in_meta_image(const fs::path& path, std::ifstream& file) {
   const HeaderFields fields = header_fields(file, '=', "elementdatafile");
-  if (lower_case(field_of(fields, "ndims")).empty() || lower_case(field_of(fields, "binarydata")) == "false")
-    return std::nullopt;
+  if (field_of(fields, "ndims").empty() || !says_true(fields, "binarydata")) return std::nullopt;
   if (const std::string skipped = lower_case(field_of(fields, "headersize")); !skipped.empty() && skipped != "0")
     return std::nullopt;
-  const bool packed = lower_case(field_of(fields, "compresseddata")) == "true";
+  const bool packed = says_true(fields, "compresseddata");
   const auto beside = fields.find("elementdatafile");
   if (beside == fields.end()) return std::nullopt;
   if (lower_case(beside->second) != "local") return place_beside(path, beside->second, packed);
   return Place{path, static_cast<std::streamoff>(file.tellg()), packed};
 }
 
-/// Empty where the stream is damaged.
-std::optional<std::size_t> unpacked_bytes(std::ifstream& file) {
+/// Of all that was packed one after the other, as gzip allows; what follows and is not packed counts as nothing. Empty
+/// where the first stream is damaged.
+std::optional<std::size_t> unpacked_bytes(std::ifstream& file, std::size_t enough) {
   constexpr int kZlibOrGzip = 15 + 32;
   z_stream stream{};
   if (inflateInit2(&stream, kZlibOrGzip) != Z_OK) return std::nullopt;
   std::vector<char> in(1U << 18U), out(1U << 18U);
-  std::size_t count = 0;
-  int state = Z_OK;
-  while (state == Z_OK) {
+  std::size_t count = 0, of_whole_streams = 0;
+  bool any_whole = false;
+  for (int state = Z_OK; count < enough && (state == Z_OK || state == Z_STREAM_END);) {
+    if (state == Z_STREAM_END) {
+      any_whole = true;
+      of_whole_streams = count;
+      inflateReset(&stream);
+    }
     if (stream.avail_in == 0) {
       file.read(in.data(), static_cast<std::streamsize>(in.size()));
       if (file.gcount() == 0) break;
@@ -79,12 +84,13 @@ std::optional<std::size_t> unpacked_bytes(std::ifstream& file) {
     count += out.size() - stream.avail_out;
   }
   inflateEnd(&stream);
-  return state == Z_STREAM_END ? std::optional(count) : std::nullopt;
+  if (count >= enough) return count;
+  return any_whole ? std::optional(of_whole_streams) : std::nullopt;
 }
 
 }  // namespace
 
-std::optional<std::size_t> voxel_bytes(const fs::path& path) {
+std::optional<std::size_t> voxel_bytes(const fs::path& path, std::size_t enough) {
   std::ifstream header(path, std::ios::binary);
   std::array<char, 4> first{};
   header.read(first.data(), first.size());
@@ -96,7 +102,7 @@ std::optional<std::size_t> voxel_bytes(const fs::path& path) {
   std::ifstream file(place->file, std::ios::binary);
   if (place->packed) {
     file.seekg(place->begins);
-    return file ? unpacked_bytes(file) : std::nullopt;
+    return file ? unpacked_bytes(file, enough) : std::nullopt;
   }
   std::error_code error;
   const auto all_bytes = fs::file_size(place->file, error);
@@ -107,9 +113,8 @@ std::optional<std::size_t> voxel_bytes(const fs::path& path) {
 
 std::string too_many(std::size_t held_bytes, std::size_t said_bytes) {
   return fmt::format(
-      "holds {} bytes of voxels, and the size in its header is of {}: the header was edited, or is another file's; "
-      "export "
-      "it again",
+      "holds {} bytes of voxels or more, and the size in its header is of {}: the header was edited, or is another "
+      "file's; export it again",
       held_bytes, said_bytes);
 }
 

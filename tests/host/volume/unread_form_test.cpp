@@ -27,6 +27,8 @@ std::string nrrd(const std::string& type = "short", const std::string& encoding 
          "\nspace directions: (1,0,0) (0,1,0) (0,0,2)\nspace origin: (1,2,3)\n" + more;
 }
 
+const std::string kDigits = "1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1\n";
+
 std::string with(std::string text, const std::string& old, const std::string& now) {
   return text.replace(text.find(old), old.size(), now);
 }
@@ -81,7 +83,7 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"good.nrrd", nrrd() + "\n" + kVoxels, ""},
            {"beside.nhdr", nrrd() + "data file: there.raw\n\n", ""},
            {"bytes.nrrd", nrrd("uchar", "raw", "") + "\n" + kVoxels.substr(24), ""},
-           {"more.nrrd", with(nrrd(), "4 3 2", "3 3 2") + "\n" + kVoxels, "holds 48 bytes of voxels, and the size in"},
+           {"more.nrrd", with(nrrd(), "4 3 2", "3 3 2") + "\n" + kVoxels, "holds 48 bytes of voxels or more, and the"},
            {"less.nrrd", with(nrrd(), "4 3 2", "5 3 2") + "\n" + kVoxels, "cut short or damaged"},
            {"padded.nrrd", nrrd() + "\n" + kVoxels + "\n", ""},
            {"more.nhdr", with(nrrd(), "4 3 2", "4 2 2") + "data file: there.raw\n\n",
@@ -91,6 +93,12 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"more_packed.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 3 1") + "\n" + packed,
             "a picture, not a volume"},
            {"packed_rows.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + packed, "is of 32"},
+           {"twice_packed.nrrd", nrrd("short", "gzip") + "\n" + gzip(kVoxels.substr(0, 24)) + gzip(kVoxels.substr(24)),
+            ""},
+           {"more_twice_packed.nrrd",
+            with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + gzip(kVoxels.substr(0, 24)) +
+                gzip(kVoxels.substr(24)),
+            "is of 32"},
            {"bzip2.nrrd", nrrd("short", "bzip2") + "\n" + kVoxels, "the encoding \"bzip2\", which is not read"},
            {"letters.nrrd", with(nrrd(), "(0,0,2)", "(0,0,12abc)") + "\n" + kVoxels, "\"12abc\" in its field"},
            {"hex.nrrd", with(nrrd(), "(1,2,3)", "(0x10,2,3)") + "\n" + kVoxels, "\"0x10\" in its field"},
@@ -115,6 +123,9 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"more.mha", with(meta_image(), "4 3 2", "4 2 2") + kVoxels, "is of 32"},
            {"packed.mha", meta_image("MET_SHORT", sized) + packed, ""},
            {"more_packed.mha", with(meta_image("MET_SHORT", sized), "4 3 2", "3 3 2") + packed, "is of 36"},
+           {"one_packed.mha",
+            with(meta_image("MET_SHORT", sized), "CompressedData = True", "CompressedData = 1") + packed, ""},
+           {"digits.mha", with(meta_image(), "BinaryData = True", "BinaryData = 0") + kDigits, ""},
            {"beside.mhd", meta_image("MET_SHORT", "", "there.raw"), ""},
            {"more.mhd", with(meta_image("MET_SHORT", "", "there.raw"), "4 3 2", "3 3 2"), "is of 36"},
            {"text.mha", meta_image("MET_STRING") + kVoxels, "the type MET_STRING"},
@@ -127,7 +138,7 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"cut.mha", meta_image() + "short", "cut short or damaged"},
            {"good.nii", nifti(4, 16) + kVoxels, ""},
            {"more.nii", nifti(4, 16) + kVoxels + kVoxels,
-            "holds 96 bytes of voxels, and the size in its header is of 48"},
+            "holds 96 bytes of voxels or more, and the size in its header is of 48"},
            {"colours.nii", nifti(128, 24) + kVoxels + kVoxels, "colours (datatype 128)"},
            {"complex.nii", nifti(32, 64) + kVoxels + kVoxels + kVoxels + kVoxels, "complex numbers (datatype 32)"},
            {"bits.nii", nifti(1, 1) + kVoxels, "single bits (datatype 1)"},
