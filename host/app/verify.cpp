@@ -88,11 +88,11 @@ Found of_appliance(const fs::path& path) {
   return out;
 }
 
-bool begins_as_record(const fs::path& path) {
+bool begins_as(const char* format, const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   std::string begin(200, ' ');
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  return begin.find(calibration::kRecordFormat) != std::string::npos;
+  return begin.find(format) != std::string::npos;
 }
 
 Result<std::vector<Found>> found_at(const fs::path& path) {
@@ -110,10 +110,12 @@ Result<std::vector<Found>> found_at(const fs::path& path) {
     out.push_back(of_appliance(path));
   } else if (path.filename() == kRecordingSheet) {
     out.push_back(of_session(path.parent_path().empty() ? fs::path(".") : path.parent_path()));
-  } else if (begins_as_record(path)) {
+  } else if (begins_as(calibration::kRecordFormat, path)) {
     out.push_back(of_record(path));
-  } else if (const auto read = read_signed_operation(path); read || path.extension() == ".json") {
+  } else if (const auto read = read_signed_operation(path); read || begins_as(kOperationFormat, path)) {
     out.push_back(of_operation(path));
+  } else if (path.extension() == ".json") {
+    out.push_back(changed("neither record nor operation, or damaged", read.error()));
   }
   if (!out.empty()) return out;
   return Error{Errc::bad_format,
