@@ -22,7 +22,7 @@ constexpr double kThereAndBackPx = 0.7;
 constexpr int kLevels = 3, kLevelsAbout = 1;
 const cv::Size kWindow(15, 15);
 constexpr int kAlikeFromPx = 6, kAlikeWithinPx = 20;  // nearer, it is the place itself; farther, none is followed to
-constexpr double kAlike = 0.93;                       // correlation of grey values
+constexpr double kAlike = 0.9;                        // correlation of grey values
 
 /// From a place to a line's part between two others.
 double distance(const Eigen::Vector2d& place, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {

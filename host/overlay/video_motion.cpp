@@ -57,6 +57,7 @@ struct VideoMotion::Key {
   std::optional<SeenFrom> looked_from;  ///< the last picture that was judged, or the key's
   std::vector<cv::Point2f> looked;      ///< where they were in the last picture that was looked at
   std::size_t kept = 0;                 ///< so many
+  std::size_t agreed = 0;               ///< so many were left when they last agreed, and the scope was calm
   PictureToFollow newest;               ///< the last frame in which most of them were found
   std::vector<cv::Point2f> now;         ///< and about where they are in it
   DeviceTime newest_at;
@@ -161,7 +162,7 @@ void VideoMotion::begin_key(DeviceTime at, const PictureToFollow& picture, const
   key->at = key->newest_at = at;
   key->from = key->looked_from = from;
   key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
-  key->kept = key->places.size();
+  key->agreed = key->kept = key->places.size();
   key->looked_at = key->newest = picture;
   key_ = std::move(key);
 }
@@ -218,9 +219,11 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
                                waiting.longest_step.seconds();
   const bool hasty = poses_step_px > kFarthestStepPx && waiting.farthest_step_px > kOfHaste * poses_step_px;
   const bool lost = hasty || waiting.then.size() < kFewest;
-  const bool odd = !lost && judge(waiting, *from, scope);
+  const Judged judged = lost ? Judged::not_odd : judge(waiting, *from, scope);
   const bool calmer = key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
-  const bool renew = odd ? odd_ >= kOddInRow : calmer || waiting.at - key_->at >= kLongest;
+  const bool renew = judged == Judged::odd
+                         ? odd_ >= kOddInRow
+                         : judged == Judged::of_what_is_left || calmer || waiting.at - key_->at >= kLongest;
   if (!lost && !renew) return;
   // From the picture that was judged, so that no motion lies between two keys.
   const PictureToFollow newest = key_->newest;
@@ -263,10 +266,11 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
   return 2 * camera.fx_px * farthest / std::max((now.at - then.at).seconds(), 1e-3);
 }
 
-/// True: the picture does not agree.
-bool VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
+/// odd: the picture does not agree. of_what_is_left: nor do the few places that are left of a quick motion, which may
+/// have been followed to places that look alike: they accuse nobody, and what agreed before has to agree anew.
+VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
-  if (!held_out_px) return false;  // nothing says how far off a picture may be
+  if (!held_out_px) return Judged::not_odd;  // nothing says how far off a picture may be
   const CameraModel& camera = scope.camera();
   const int columns = key_->newest.grey.cols;
   std::vector<FollowedPlace> places;
@@ -275,10 +279,10 @@ bool VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const Scope
     const auto then = ray_of(camera, columns, waiting.then[i]), later = ray_of(camera, columns, waiting.now[i]);
     if (then && later) places.push_back({*then, *later});
   }
-  if (places.size() < kFewest) return false;
+  if (places.size() < kFewest) return Judged::not_odd;
   const Relative motion = now.camera_from_tracker * key_->from->camera_from_tracker.inverse();
   const auto off = median_off_line(places, motion);
-  if (!off) return false;
+  if (!off) return Judged::not_odd;
   off_px_ = *off * camera.fx_px;
   std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -292,25 +296,30 @@ bool VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const Scope
                                      now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
+    if (odd_ == 0 && 3 * waiting.then.size() < 2 * key_->agreed) {
+      if (state_ != VideoAgreement::differs) forget_agreement();
+      return Judged::of_what_is_left;
+    }
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
     if (odd_ < kOddInRow) {
       // The next pictures tell. Until then nothing says that this one is right.
       if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::in_doubt;
-      return true;
+      return Judged::odd;
     }
     if (state_ != VideoAgreement::differs) wanted_ = std::min(2 * wanted_, kMostWanted);
     state_ = VideoAgreement::differs;
     told_ = {};
-    return true;
+    return Judged::odd;
   }
   odd_ = 0;
+  if (now.unsure_px < kHastePx * scale) key_->agreed = waiting.then.size();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!(otherwise_px[axis] > std::max(still_px, kPlainly * *off_px_))) continue;
     if (!std::exchange(key_->told[axis], true)) ++told_[axis];
   }
-  if (doubted_since_ && waiting.at < *doubted_since_) return false;
+  if (doubted_since_ && waiting.at < *doubted_since_) return Judged::not_odd;
   if (std::ranges::all_of(told_, [this](int times) { return times >= wanted_; })) state_ = VideoAgreement::agrees;
-  return false;
+  return Judged::not_odd;
 }
 
 }  // namespace birdseye::host

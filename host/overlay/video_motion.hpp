@@ -59,7 +59,8 @@ class VideoMotion {
   void begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
   void follow(DeviceTime at, const PictureToFollow& picture);
   std::size_t keep(const std::vector<std::optional<cv::Point2f>>& found);
-  bool judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope);
+  enum class Judged { not_odd, odd, of_what_is_left };
+  Judged judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope);
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
   PoseHistory poses_;

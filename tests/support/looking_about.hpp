@@ -28,23 +28,25 @@ inline host::ScopeSetup scope_with(const Transform<Camera, Sensor>& camera_from_
   return *host::ScopeSetup::of_values(kLookingScope, std::nullopt, camera_from_sensor, figures);
 }
 
-inline std::vector<std::uint8_t> picture_of_board(const Transform<Camera, Patient>& view) {
+/// marks: by so much black squares differ, as by the markers of a ChArUco board.
+inline std::vector<std::uint8_t> picture_of_board(const Transform<Camera, Patient>& view, int marks) {
   constexpr double kSquare_mm = 5;
   constexpr int kSamples = 2;  // of a pixel, along each side: an edge is soft
   const Transform<Patient, Camera> back = view.inverse();
   std::vector<std::uint8_t> rgb;
   for (int y = 0; y < kLookingScope.height_px; ++y)
     for (int x = 0; x < kLookingScope.width_px; ++x) {
-      int white = 0;
+      int grey = 0;
       for (int i = 0; i < kSamples * kSamples; ++i) {
         const Eigen::Vector2d at_px(x + (i % kSamples + 0.5) / kSamples - 0.5,
                                     y + (i / kSamples + 0.5) / kSamples - 0.5);
         const Eigen::Vector3d ray = back.rotation() * *unproject(kLookingScope, at_px), eye_mm = back.translation();
         const Eigen::Vector3d place_mm = eye_mm - ray * (eye_mm.z() / ray.z());
         const auto square = [](double mm) { return static_cast<int>(std::floor(mm / kSquare_mm)); };
-        white += (square(place_mm.x()) + square(place_mm.y())) & 1;
+        const int column = square(place_mm.x()), row = square(place_mm.y());
+        grey += ((column + row) & 1) != 0 ? 200 : 40 + marks * (((column * 7 + row * 13) % 5 + 5) % 5);
       }
-      rgb.insert(rgb.end(), 3, static_cast<std::uint8_t>(40 + 160 * white / (kSamples * kSamples)));
+      rgb.insert(rgb.end(), 3, static_cast<std::uint8_t>(grey / (kSamples * kSamples)));
     }
   return rgb;
 }
@@ -65,6 +67,7 @@ struct LookingAbout {
   Transform<Camera, Camera> turned{};  ///< of the scope in its holder: pictures turn, the sensor does not
   CameraModel lens = kLookingScope;    ///< as it is; the scope's record has kLookingScope
   bool pattern = true;
+  int marks = 0;       ///< and by so much the black ones differ
   bool board = false;  ///< squares of 5 mm are what it looks about over
   Watcher motion;
 
@@ -97,7 +100,7 @@ struct LookingAbout {
       frame.height_px = kLookingScope.height_px;
       const Eigen::Vector3d moved = scene_moves ? scene_moves(t_s) : Eigen::Vector3d::Zero().eval();
       const auto seen = turned * view * Transform<Patient, Patient>(Eigen::Matrix3d::Identity(), moved);
-      auto rgb = board ? picture_of_board(seen) : scene.picture(lens, seen);
+      auto rgb = board ? picture_of_board(seen, marks) : scene.picture(lens, seen);
       if (!pattern) std::fill(rgb.begin(), rgb.end(), std::uint8_t{90});
       frame.rgb = std::make_shared<std::vector<std::uint8_t>>(std::move(rgb));
       motion.take(frame, scope);

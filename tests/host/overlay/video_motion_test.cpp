@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "calibration/base/units.hpp"
@@ -161,6 +162,22 @@ TEST(VideoMotion, ASwingIsNoHandEyeThatIsOff) {
     }
     EXPECT_EQ(differs, 0) << swung_s;
     EXPECT_GT(agrees, swung_s > 0.3 ? 1 : -1) << swung_s;
+  }
+}
+
+/// A board whose black squares differ, as by markers.
+TEST(VideoMotion, ASwingOverABoardWithMarkersAccusesNobody) {
+  for (const auto& [marks, swung_s] : {std::pair{10, 0.2}, {20, 0.2}, {20, 0.4}}) {
+    LookingAbout about;
+    about.board = true;
+    about.marks = marks;
+    about.swings_s = swung_s;
+    int differs = 0;
+    for (int i = 0; i < 8; ++i) {
+      about.look(0.5 * i, 0.5);
+      differs += about.motion.state() == VideoAgreement::differs ? 1 : 0;
+    }
+    EXPECT_EQ(differs, 0) << marks << ", " << swung_s;
   }
 }
 
