@@ -83,7 +83,8 @@ TEST(VerifyCommand, SaysWhatWasChanged) {
 
 TEST(VerifyCommand, SaysWhatNobodySigned) {
   const Scratch scratch;
-  expect(scratch.file("other.json", R"({"format": {"name": "x"}})"), 3, {": neither record nor operation, or damaged: "});
+  expect(scratch.file("other.json", R"({"format": {"name": "x"}})"), 3,
+         {": neither record nor operation, or damaged: "});
   expect(scratch.file("record.json", calibration::record_text(record())), 3, {"not signed: nobody says who wrote it"});
   record_session(scratch / "session");
   (void)scratch.file("session/recording.json", R"({"birdseye_recording": 1, "ended": false})");
