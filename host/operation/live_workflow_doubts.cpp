@@ -72,11 +72,10 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (!scope) return;
   const VideoWatch::News news = video_.take(frame, *scope, picture_.target_distance_mm(frame));
   if (news.field) update_setup();
-  if (!settings_.video_must_agree || !news.motion) return;
+  if (!settings_.video_must_agree) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
-  if (video_.motion() == VideoAgreement::differs && fiducials_.registered_or_held_back())
-    return doubt_registration(words("why_video_differs"));
-  update_setup();
+  if (news.contradicted && fiducials_.registered_or_held_back()) return doubt_registration(words("why_video_differs"));
+  if (news.motion) update_setup();
 }
 
 void LiveWorkflow::take(const CheckedSurface& checked) {

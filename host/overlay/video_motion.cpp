@@ -58,6 +58,7 @@ struct VideoMotion::Key {
   std::vector<cv::Point2f> looked;      ///< where they were in the last picture that was looked at
   std::size_t kept = 0;                 ///< so many
   std::size_t agreed = 0;               ///< so many were left when they last agreed, and the scope was calm
+  std::size_t left = 0;                 ///< and so many in the first picture after since that did not agree
   PictureToFollow newest;               ///< the last frame in which most of them were found
   std::vector<cv::Point2f> now;         ///< and about where they are in it
   DeviceTime newest_at;
@@ -106,6 +107,7 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
 
 bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope) {
   const VideoAgreement before = state_;
+  contradicted_ = false;
   if (of_ && !of_->sees_as(scope)) reset();
   of_ = scope;
   const DeviceTime at = frame.info.acquired;
@@ -162,7 +164,7 @@ void VideoMotion::begin_key(DeviceTime at, const PictureToFollow& picture, const
   key->at = key->newest_at = at;
   key->from = key->looked_from = from;
   key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
-  key->agreed = key->kept = key->places.size();
+  key->kept = key->places.size();
   key->looked_at = key->newest = picture;
   key_ = std::move(key);
 }
@@ -296,19 +298,22 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
                                      now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
-    if (odd_ == 0 && 3 * waiting.then.size() < 2 * key_->agreed) {
-      if (state_ != VideoAgreement::differs) forget_agreement();
-      return Judged::of_what_is_left;
-    }
+    if (odd_ == 0) key_->left = waiting.then.size();
     odd_ += *off_px_ > kPlainly * allowed_px ? kOddInRow : 1;
     if (odd_ < kOddInRow) {
       // The next pictures tell. Until then nothing says that this one is right.
       if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::in_doubt;
       return Judged::odd;
     }
+    contradicted_ = state_ != VideoAgreement::differs;
+    told_ = {};
+    if (3 * key_->left < 2 * key_->agreed) {
+      if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;
+      odd_ = 0;
+      return Judged::of_what_is_left;
+    }
     if (state_ != VideoAgreement::differs) wanted_ = std::min(2 * wanted_, kMostWanted);
     state_ = VideoAgreement::differs;
-    told_ = {};
     return Judged::odd;
   }
   odd_ = 0;

@@ -37,6 +37,9 @@ class VideoMotion {
   bool doubt(DeviceTime since);
 
   [[nodiscard]] VideoAgreement state() const { return state_; }
+  /// Whether by the last frame taken something has moved other than the poses say; where state() does not say so, it
+  /// may be that places were followed wrongly.
+  [[nodiscard]] bool contradicted() const { return contradicted_; }
   /// Of the last picture that could tell, the median of how far the places lie off their lines; empty before one could.
   [[nodiscard]] const std::optional<double>& off_px() const { return off_px_; }
 
@@ -70,6 +73,7 @@ class VideoMotion {
   std::array<int, 3> told_{};         ///< how often it agreed, by axis of the camera
   int wanted_ = 1;                    ///< so often about each; twice as often each time that it has differed
   int odd_ = 0;                       ///< pictures in a row that do not agree
+  bool contradicted_ = false;
   VideoAgreement state_ = VideoAgreement::untold;
   std::optional<double> off_px_;
 };

@@ -20,6 +20,7 @@ class VideoWatch {
   }
   struct News {
     bool motion = false, field = false;  ///< that it says something else now
+    bool contradicted = false;           ///< VideoMotion::contradicted()
     [[nodiscard]] bool any() const { return motion || field; }
   };
   /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, the poses
@@ -35,7 +36,7 @@ class VideoWatch {
     const PictureToFollow picture = fits ? picture_to_follow(frame) : PictureToFollow{};
     motion_.take(frame, picture, scope);
     if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
-    return {motion_.state() != before, field_.take(frame, scope)};
+    return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted()};
   }
 
   [[nodiscard]] VideoAgreement motion() const { return motion_.state(); }

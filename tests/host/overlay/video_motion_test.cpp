@@ -19,8 +19,11 @@ using Vector = Eigen::Vector3d;
 struct Watcher : VideoMotion {
   using VideoMotion::take;
   bool take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
-    return VideoMotion::take(frame, picture_to_follow(frame), scope);
+    const bool another = VideoMotion::take(frame, picture_to_follow(frame), scope);
+    contradictions += contradicted() ? 1 : 0;
+    return another;
   }
+  int contradictions = 0;
 };
 using LookingAbout = testing::LookingAbout<Watcher>;
 
@@ -195,6 +198,7 @@ TEST(VideoMotion, PosesThatLeapWhileTheScopeIsFastAreSeen) {
         differs = differs || about.motion.state() == VideoAgreement::differs;
       }
       EXPECT_TRUE(differs) << haste << ", " << at_s;
+      EXPECT_GE(about.motion.contradictions, 1) << haste << ", " << at_s;
     }
 }
 
