@@ -16,8 +16,8 @@ constexpr std::size_t kTrack = 4;  // readings that a line is laid through
 // A line through so many readings misses the next on a parabola by five times a t^2 / 2.
 constexpr double kParabola = 2.5;
 constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line through readings foretells the next
-// Where no line foretells it, what goes farther than a sensor does in so long is confirmed by the next, however long
-// ago the one before was.
+// Where no line foretells it, what goes farther than a sensor does in so long, or in one and a half periods, is
+// confirmed by the next, however long ago the one before was.
 constexpr Duration kUnforeseen = Duration::from_ms(10);
 constexpr double kNoiseMemory = 1.0 / 64;  // of the mean square, per reading
 constexpr double kNoiseSigmas = 3.5;
@@ -60,6 +60,17 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
   return std::nullopt;
 }
 
+/// Whether records lie about the commonest as those of a sensor at rest whose noise is of a step or two do; damaged
+/// ones do not all lie so near. alike: how often each came.
+bool BirdGuard::is_quiet(const std::map<std::vector<std::int16_t>, std::size_t>& alike) {
+  constexpr int kNear = 8;  // two steps of what a word counts in
+  const auto& commonest = std::ranges::max_element(alike, {}, [](const auto& record) { return record.second; })->first;
+  const auto near = [&commonest](const auto& record) {
+    return std::ranges::equal(record.first, commonest, [](int a, int b) { return std::abs(a - b) <= kNear; });
+  };
+  return alike.size() >= kFirst && std::ranges::all_of(alike, near);
+}
+
 /// Only what a sensor has sent before tells frozen from at rest, and at first there is nothing before.
 std::optional<BirdGuard::Objection> BirdGuard::doubt_of_life() {
   if (alive_ || limits_.frozen_after <= 0) return std::nullopt;
@@ -67,7 +78,7 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_life() {
   std::map<std::vector<std::int16_t>, std::size_t> alike;
   std::size_t most = 0;
   for (const auto& record : first_words_) most = std::max(most, ++alike[record]);
-  alive_ = (count >= kRecent && most == 1) || (count == kManyRecords && 4 * most <= count);
+  alive_ = (count >= kRecent && most == 1) || (count == kManyRecords && (4 * most <= count || is_quiet(alike)));
   if (alive_) first_words_.clear();
   if (alive_ || (count >= kFirst && most <= std::max(std::size_t{1}, count / 8))) return std::nullopt;
   if (count < kRecent)
@@ -140,7 +151,8 @@ BirdGuard::Placed BirdGuard::placed(const Sample& sample) {
   const auto predicted = predicted_mm(sample.time);
   if (!predicted || !sample.time_certain) {
     const double went_mm = (sample.position_mm - last_mm_).norm();
-    const bool sudden = went_mm > limits_.slack_mm + limits_.most_speed_mm_s * kUnforeseen.seconds();
+    const Duration one{std::max(kUnforeseen.ns, usual_.ns * 3 / 2)};
+    const bool sudden = went_mm > limits_.slack_mm + limits_.most_speed_mm_s * one.seconds();
     return after_doubt || sudden ? Placed::in_reach : Placed::on_track;
   }
   Duration usual = gap;
@@ -269,6 +281,11 @@ BirdReading BirdGuard::judge_itself(const Record& record, DeviceTime acquired, D
     candidate_.reset();
     return withhold(*doubt);
   }
+  if (judged_at_) {
+    const Duration since{std::max<std::int64_t>(gap_between(*judged_at_, acquired).ns, 1'000'000)};
+    usual_ = usual_.ns == 0 ? since : std::min(since, Duration{usual_.ns + usual_.ns / 8});
+  }
+  judged_at_ = acquired;
   Sample sample;
   sample.time = acquired;
   sample.sigma = sigma;

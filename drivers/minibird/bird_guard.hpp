@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <deque>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -47,6 +48,7 @@ class BirdGuard {
 
   [[nodiscard]] std::optional<Objection> doubt_of_words(const std::vector<std::int16_t>& words) const;
   std::optional<Objection> doubt_of_life();
+  static bool is_quiet(const std::map<std::vector<std::int16_t>, std::size_t>& alike);
   std::optional<Objection> doubt_of_repeats(const std::vector<std::int16_t>& words, DeviceTime time);
   Objection place(Sample sample);
   BirdReading judge_itself(const Record& record, DeviceTime acquired, Duration sigma, bool time_certain);
@@ -65,6 +67,8 @@ class BirdGuard {
   std::deque<Sample> track_;  ///< where the sensor has been, newest last; positions are put back where they flipped
                               ///< from. The times of all of them are certain, or of none
   Eigen::Vector3d last_mm_ = Eigen::Vector3d::Zero();  ///< of the last reading in place, its time certain or not
+  std::optional<DeviceTime> judged_at_;
+  Duration usual_{0};                ///< from one reading to the next, as a rule
   double noise_mm2_ = 0;             ///< mean square of the readings about the line through those before
   std::optional<Sample> candidate_;  ///< the newest reading of those that are off the track but agree
   int agreeing_ = 0;

@@ -286,6 +286,21 @@ TEST(BirdGuard, WhatIsFrozenSinceTheStartShowsNoLifeByHalfOfItsRecordsDamaged) {
   EXPECT_LT(early, 200 * 40 / 100);
 }
 
+TEST(BirdGuard, AQuietSensorThatRestsSinceTheStartIsAlive) {
+  Watch watch;
+  for (int i = 0; i < 64; ++i) watch.see(kHere, Matrix3d::Identity(), 0.03);
+  EXPECT_TRUE(watch.see(kHere, Matrix3d::Identity(), 0.03).pose);
+}
+
+TEST(BirdGuard, AHandIsAsFastAtASlowRate) {
+  Watch watch;
+  for (int i = 0; i < 100; ++i) {
+    watch.seconds += 1.0 / 14 - kPeriodS;
+    const bool believed = watch.see(kHere + Vector3d(0, 60 * std::sin(8 * watch.seconds), 0)).pose.has_value();
+    EXPECT_TRUE(i < 8 || believed) << i;
+  }
+}
+
 TEST(BirdGuard, WhereverASensorMayHaveComeInAGapOneReadingAloneIsNotBelieved) {
   Watch watch;
   watch.see_often(60, kHere);
