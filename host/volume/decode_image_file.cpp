@@ -193,8 +193,9 @@ Result<ImageFile> decode_image_file(const VolumeSource& source, int components, 
       if (!fault.empty()) return refused(Errc::bad_format, path, fault);
     } else {
       const std::size_t said = count * io->GetComponentSize(), most = said + row * io->GetComponentSize();
-      if (const auto held = voxel_bytes(path, most); held && *held >= most)
-        return refused(Errc::bad_format, path, too_many(*held, said));
+      const auto held = voxel_bytes(path, most);
+      if (held && *held >= most) return refused(Errc::bad_format, path, too_many(*held, said));
+      if (held && *held < said) return refused(Errc::bad_format, path, "is cut short or damaged; export it again");
     }
     if (!gaps.place.empty() && source.stated.orientation.empty()) {
       // Of a field, and of nothing else, all numbers depend on it: a CT and its labels are compared voxel by voxel.

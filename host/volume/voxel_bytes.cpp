@@ -24,11 +24,12 @@ struct Place {
   fs::path file;
   std::streamoff begins = 0;
   bool packed = false;
+  bool in_parts = false;  ///< what is packed is read to the end of the file, part by part; else the first part alone
 };
 
-std::optional<Place> place_beside(const fs::path& header, const std::string& name, bool packed) {
+std::optional<Place> place_beside(const fs::path& header, const std::string& name, bool packed, bool in_parts) {
   if (name.find('%') != std::string::npos || lower_case(name.substr(0, 4)) == "list") return std::nullopt;
-  return Place{header.parent_path() / name, 0, packed};
+  return Place{header.parent_path() / name, 0, packed, in_parts};
 }
 
 std::optional<Place> place_in_nrrd(const fs::path& path, std::ifstream& file) {
@@ -41,25 +42,26 @@ std::optional<Place> place_in_nrrd(const fs::path& path, std::ifstream& file) {
   if (!packed && encoding != "raw") return std::nullopt;
   for (const char* name : {"data file", "datafile"})
     if (const auto beside = fields.find(name); beside != fields.end())
-      return place_beside(path, beside->second, packed);
-  return Place{path, static_cast<std::streamoff>(file.tellg()), packed};
+      return place_beside(path, beside->second, packed, true);
+  return Place{path, static_cast<std::streamoff>(file.tellg()), packed, true};
 }
 
 std::optional<Place> place_in_meta_image(const fs::path& path, std::ifstream& file) {
   const HeaderFields fields = header_fields(file, '=', "elementdatafile");
-  if (field_of(fields, "ndims").empty() || !says_true(fields, "binarydata")) return std::nullopt;
+  const bool text = !field_of(fields, "binarydata").empty() && !says_true(fields, "binarydata");
+  if (field_of(fields, "ndims").empty() || text) return std::nullopt;
   if (const std::string skipped = lower_case(field_of(fields, "headersize")); !skipped.empty() && skipped != "0")
     return std::nullopt;
   const bool packed = says_true(fields, "compresseddata");
   const auto beside = fields.find("elementdatafile");
   if (beside == fields.end()) return std::nullopt;
-  if (lower_case(beside->second) != "local") return place_beside(path, beside->second, packed);
-  return Place{path, static_cast<std::streamoff>(file.tellg()), packed};
+  if (lower_case(beside->second) != "local") return place_beside(path, beside->second, packed, false);
+  return Place{path, static_cast<std::streamoff>(file.tellg()), packed, false};
 }
 
-/// Of all that was packed one after the other, as gzip allows; what follows and is not packed counts as nothing. Empty
-/// where the first stream is damaged.
-std::optional<std::size_t> unpacked_bytes(std::ifstream& file, std::size_t enough) {
+/// in_parts: of all that was packed one after the other, as gzip allows; what follows and is not packed counts as
+/// nothing. Empty where the first stream is damaged.
+std::optional<std::size_t> unpacked_bytes(std::ifstream& file, bool in_parts, std::size_t enough) {
   constexpr int kZlibOrGzip = 15 + 32;
   z_stream stream{};
   if (inflateInit2(&stream, kZlibOrGzip) != Z_OK) return std::nullopt;
@@ -70,6 +72,7 @@ std::optional<std::size_t> unpacked_bytes(std::ifstream& file, std::size_t enoug
     if (state == Z_STREAM_END) {
       any_whole = true;
       of_whole_streams = count;
+      if (!in_parts) break;
       inflateReset(&stream);
     }
     if (stream.avail_in == 0) {
@@ -102,7 +105,7 @@ std::optional<std::size_t> voxel_bytes(const fs::path& path, std::size_t enough)
   std::ifstream file(place->file, std::ios::binary);
   if (place->packed) {
     file.seekg(place->begins);
-    return file ? unpacked_bytes(file, enough) : std::nullopt;
+    return file ? unpacked_bytes(file, place->in_parts, enough) : std::nullopt;
   }
   std::error_code error;
   const auto all_bytes = fs::file_size(place->file, error);

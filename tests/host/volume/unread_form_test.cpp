@@ -79,6 +79,8 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
   };
   const std::string compressed = "CompressedData = True\n", packed = gzip(kVoxels);
   const std::string sized = fmt::format("{}CompressedDataSize = {}\n", compressed, packed.size());
+  const std::string twice = gzip(kVoxels.substr(0, 24)) + gzip(kVoxels.substr(24));
+  const std::string twice_sized = fmt::format("{}CompressedDataSize = {}\n", compressed, twice.size());
   for (const Case& c : std::vector<Case>{
            {"good.nrrd", nrrd() + "\n" + kVoxels, ""},
            {"beside.nhdr", nrrd() + "data file: there.raw\n\n", ""},
@@ -93,12 +95,8 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"more_packed.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 3 1") + "\n" + packed,
             "a picture, not a volume"},
            {"packed_rows.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + packed, "is of 32"},
-           {"twice_packed.nrrd", nrrd("short", "gzip") + "\n" + gzip(kVoxels.substr(0, 24)) + gzip(kVoxels.substr(24)),
-            ""},
-           {"more_twice_packed.nrrd",
-            with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + gzip(kVoxels.substr(0, 24)) +
-                gzip(kVoxels.substr(24)),
-            "is of 32"},
+           {"twice_packed.nrrd", nrrd("short", "gzip") + "\n" + twice, ""},
+           {"more_twice_packed.nrrd", with(nrrd("short", "gzip"), "4 3 2", "4 2 2") + "\n" + twice, "is of 32"},
            {"bzip2.nrrd", nrrd("short", "bzip2") + "\n" + kVoxels, "the encoding \"bzip2\", which is not read"},
            {"letters.nrrd", with(nrrd(), "(0,0,2)", "(0,0,12abc)") + "\n" + kVoxels, "\"12abc\" in its field"},
            {"hex.nrrd", with(nrrd(), "(1,2,3)", "(0x10,2,3)") + "\n" + kVoxels, "\"0x10\" in its field"},
@@ -126,6 +124,11 @@ TEST(UnreadForm, AWholeFileThatIsNotReadIsToldByWhatItHolds) {
            {"one_packed.mha",
             with(meta_image("MET_SHORT", sized), "CompressedData = True", "CompressedData = 1") + packed, ""},
            {"digits.mha", with(meta_image(), "BinaryData = True", "BinaryData = 0") + kDigits, ""},
+           {"less_packed.mha", with(meta_image("MET_SHORT", sized), "4 3 2", "5 3 2") + packed, "cut short or damaged"},
+           {"twice_packed.mha", meta_image("MET_SHORT", twice_sized) + twice, "cut short or damaged"},
+           {"plain.mha", with(meta_image(), "BinaryData = True\n", "") + kVoxels, ""},
+           {"more_plain.mha", with(with(meta_image(), "BinaryData = True\n", ""), "4 3 2", "4 2 2") + kVoxels,
+            "is of 32"},
            {"beside.mhd", meta_image("MET_SHORT", "", "there.raw"), ""},
            {"more.mhd", with(meta_image("MET_SHORT", "", "there.raw"), "4 3 2", "3 3 2"), "is of 36"},
            {"text.mha", meta_image("MET_STRING") + kVoxels, "the type MET_STRING"},
