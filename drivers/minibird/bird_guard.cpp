@@ -16,8 +16,9 @@ constexpr std::size_t kTrack = 4;  // readings that a line is laid through
 // A line through so many readings misses the next on a parabola by five times a t^2 / 2.
 constexpr double kParabola = 2.5;
 constexpr Duration kTrackHolds = Duration::from_ms(100);  // for so long a line through readings foretells the next
-// Where no line foretells it, what goes farther than a sensor does in so long, or in one and a half periods, is
-// confirmed by the next, however long ago the one before was.
+// Where no line through the last readings foretells the next, a reading may be as far away as a sensor gets in this
+// time, or in one and a half periods of the stream. One that is farther is believed once the next reading agrees, also
+// after a long gap.
 constexpr Duration kUnforeseen = Duration::from_ms(10);
 constexpr double kNoiseMemory = 1.0 / 64;  // of the mean square, per reading
 constexpr double kNoiseSigmas = 3.5;
@@ -29,8 +30,10 @@ constexpr std::size_t kRecent = 16;           // records, among which one that r
 constexpr double kRepeatsMemory = 1.0 / 128;  // of how often one does, per reading; of all of them at first
 constexpr double kSeldom = 0.02;              // two just now are less; three then are chance once in 10^6
 constexpr int kFrozenWhereSeldom = 3;
-// Of a bird that is frozen half of the records are alike, even where the line damages the other half. Of one that is
-// alive no more than a quarter of so many are, or none of kRecent; before, an eighth is believed.
+// A frozen bird repeats one record in half of its records or more, even where the line damages the other half. A bird
+// is alive once its first kRecent records all differ, or once no record makes up more than a quarter of the last
+// kManyRecords. Until then, and from kFirst records on, a bird is believed as long as none makes up more than an
+// eighth.
 constexpr std::size_t kFirst = 4, kManyRecords = 64;
 constexpr double kMuchNearer = 3;  // the mirrored position, than the one reported
 
@@ -60,8 +63,8 @@ std::optional<BirdGuard::Objection> BirdGuard::doubt_of_words(const std::vector<
   return std::nullopt;
 }
 
-/// Whether records lie about the commonest as those of a sensor at rest whose noise is of a step or two do; damaged
-/// ones do not all lie so near. alike: how often each came.
+/// Whether all records lie within two steps of the commonest one, as those of a live sensor at rest do that has little
+/// noise. Damaged records lie farther away. alike: each record, and how often it came.
 bool BirdGuard::is_quiet(const std::map<std::vector<std::int16_t>, std::size_t>& alike) {
   constexpr int kNear = 8;  // two steps of what a word counts in
   const auto& commonest = std::ranges::max_element(alike, {}, [](const auto& record) { return record.second; })->first;

@@ -268,8 +268,9 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
   return 2 * camera.fx_px * farthest / std::max((now.at - then.at).seconds(), 1e-3);
 }
 
-/// odd: the picture does not agree. of_what_is_left: nor do the few places that are left of a quick motion, which may
-/// have been followed to places that look alike: they accuse nobody, and what agreed before has to agree anew.
+/// odd: the places do not lie where the poses say. of_what_is_left: the same, but a quick motion has lost more than a
+/// third of the places, and the rest may have been followed to others that look alike. Then state() becomes untold, not
+/// differs, and the video has to agree anew about each axis.
 VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return Judged::not_odd;  // nothing says how far off a picture may be
