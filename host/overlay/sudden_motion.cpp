@@ -40,6 +40,8 @@ struct SuddenMotion::Tracks {
 SuddenMotion::SuddenMotion() = default;
 
 SuddenMotion::~SuddenMotion() = default;
+SuddenMotion::SuddenMotion(SuddenMotion&&) noexcept = default;
+SuddenMotion& SuddenMotion::operator=(SuddenMotion&&) noexcept = default;
 
 void SuddenMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   if (!newest_.empty() && (acquired <= newest_.back().first || acquired - newest_.back().first > kGap)) newest_.clear();

@@ -19,6 +19,8 @@ class SuddenMotion {
  public:
   SuddenMotion();
   ~SuddenMotion();
+  SuddenMotion(SuddenMotion&&) noexcept;
+  SuddenMotion& operator=(SuddenMotion&&) noexcept;
 
   /// A pose of the scope's sensor, as they come: how they scatter is measured by them.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);

@@ -19,6 +19,7 @@ constexpr Duration kEvery = Duration::from_ms(100), kLongest = Duration::from_ms
 constexpr Duration kAverage = Duration::from_ms(40);  // half the width of what a pose is averaged over
 constexpr std::size_t kFewest = 15;
 constexpr double kTurned_rad = 15 * M_PI / 180;
+constexpr double kAhead_mm = 100;      // from the camera to what is told of noise
 constexpr double kNotModelled = 0.15;  // of what a hand-eye turned by kTurned_rad would do
 constexpr double kPlainly = 3;         // so many times as far off would be plain
 constexpr double kHastePx = 5;         // of the small picture: a key whose poses leave so much open hides what is wrong
@@ -70,6 +71,8 @@ struct VideoMotion::Key {
 VideoMotion::VideoMotion() : poses_(averaged_poses()) {}
 
 VideoMotion::~VideoMotion() = default;
+VideoMotion::VideoMotion(VideoMotion&&) noexcept = default;
+VideoMotion& VideoMotion::operator=(VideoMotion&&) noexcept = default;
 
 /// What has agreed before tells nothing of what comes.
 void VideoMotion::forget_agreement() {
@@ -94,6 +97,7 @@ void VideoMotion::reset() {
   odd_ = 0;
   state_ = VideoAgreement::untold;
   off_px_.reset();
+  watched_mm_.reset();
 }
 
 void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
@@ -102,7 +106,33 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
     reset();
     poses_ = averaged_poses();
   }
+  note_noise(acquired, tracker_from_sensor);
   poses_.push(acquired, Duration{0}, tracker_from_sensor);
+}
+
+/// Of a single pose, at a place ahead of the camera; another one once the camera has turned from it.
+void VideoMotion::note_noise(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
+  constexpr double kFarthest_mm = 200, kOfNewest = 0.1;
+  if (const auto newest = poses_.newest())
+    between_poses_s_ += (between_poses_s_ == 0 ? 1 : kOfNewest) * ((acquired - *newest).seconds() - between_poses_s_);
+  if (!of_) return;
+  const Transform<Camera, Tracker> camera_from_tracker = of_->camera_from_sensor() * tracker_from_sensor.inverse();
+  const auto is_ahead = [](const Eigen::Vector3d& place_mm) {
+    return place_mm.z() > kNearestSeen_mm && place_mm.norm() < kFarthest_mm;
+  };
+  if (!watched_mm_ || !is_ahead(camera_from_tracker * *watched_mm_)) {
+    watched_mm_ = camera_from_tracker.inverse() * Eigen::Vector3d(0, 0, kAhead_mm);
+    jitter_ = TargetJitter();
+  }
+  jitter_.push(acquired, camera_from_tracker * *watched_mm_);
+}
+
+/// One sigma of an axis, as if all noise were across the line of sight.
+double VideoMotion::noise_of_average_px(const CameraModel& camera) const {
+  const auto rms_mm = jitter_.rms_mm();
+  if (!rms_mm || between_poses_s_ <= 0) return 0;
+  const double averaged = std::max(1.0, 2 * kAverage.seconds() / between_poses_s_);
+  return camera.fx_px / kAhead_mm * *rms_mm / std::sqrt(2 * averaged);
 }
 
 bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope) {
@@ -295,8 +325,10 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
   const double scale = static_cast<double>(camera.width_px) / columns;
   // The errors of hand-eye and of two poses, of two axes, with a probability of 99.9 %, for many pictures are asked;
   // how well a place is found; how sure the two poses are; and what of the motion itself is not as it is modelled.
-  const double still_px = std::hypot(std::hypot(std::sqrt(13.8) * *held_out_px, kFollowedPx * scale),
-                                     now.unsure_px + key_->from->unsure_px);
+  // Hand-eye is held out at poses of a scope at rest, which averaged longer.
+  const double sigma_px = std::hypot(*held_out_px, std::sqrt(2) * noise_of_average_px(camera));
+  const double still_px =
+      std::hypot(std::hypot(std::sqrt(13.8) * sigma_px, kFollowedPx * scale), now.unsure_px + key_->from->unsure_px);
   const double allowed_px = std::hypot(still_px, kNotModelled * *std::ranges::max_element(otherwise_px));
   if (*off_px_ > allowed_px) {
     if (odd_ == 0) key_->left = waiting.then.size();

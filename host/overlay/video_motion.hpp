@@ -9,6 +9,7 @@
 #include "device/wire/messages.hpp"
 #include "host/overlay/followed_places.hpp"
 #include "host/overlay/scope_setup.hpp"
+#include "host/overlay/target_jitter.hpp"
 #include "host/overlay/trust.hpp"
 
 namespace birdseye::host {
@@ -24,6 +25,8 @@ class VideoMotion {
  public:
   VideoMotion();
   ~VideoMotion();
+  VideoMotion(VideoMotion&&) noexcept;
+  VideoMotion& operator=(VideoMotion&&) noexcept;
 
   /// A pose of the scope's sensor, as they come.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
@@ -58,6 +61,8 @@ class VideoMotion {
   [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& waiting, const ScopeSetup& scope) const;
   void wait(const wire::VideoFrame& frame, const PictureToFollow& picture);
   void look(const Waiting& waiting, const ScopeSetup& scope);
+  void note_noise(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
+  [[nodiscard]] double noise_of_average_px(const CameraModel& camera) const;
   static double fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera);
   void begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
   void follow(DeviceTime at, const PictureToFollow& picture);
@@ -67,6 +72,9 @@ class VideoMotion {
 
   std::optional<ScopeSetup> of_;  ///< that the last frame was taken with
   PoseHistory poses_;
+  std::optional<Eigen::Vector3d> watched_mm_;  ///< a place in the tracker's frame, whose jitter_ is
+  TargetJitter jitter_;
+  double between_poses_s_ = 0;  ///< on the average of the last few; 0: there were none
   std::optional<DeviceTime> looked_at_, doubted_since_;
   std::unique_ptr<Waiting> waiting_;  ///< the newest picture that is looked at, until the poses after it have come
   std::unique_ptr<Key> key_;          ///< the picture in which the places that are followed were chosen
