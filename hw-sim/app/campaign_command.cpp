@@ -16,7 +16,8 @@ namespace {
 struct CampaignOptions {
   SeedRun settings;
   std::string seeds;
-  double minutes = 10, patience_s = 3600;
+  StudiedOperations operations;
+  double patience_s = 3600;
   std::vector<std::string> command;
   bool print = false, alone = false;
 };
@@ -60,9 +61,9 @@ void say(std::FILE* where, const std::string& line) {
 }
 
 /// Operations, and their sum.
-Result<void> run_operations(const SeedRun& settings, double minutes, Ranks* ranks, bool& broken) {
+Result<void> run_operations(const SeedRun& settings, const StudiedOperations& operations, Ranks* ranks, bool& broken) {
   const auto results = run_seeds(
-      study_of_operations(minutes, beside_us("birdseye-sim")), settings,
+      study_of_operations(operations, beside_us("birdseye-sim")), settings,
       [](const std::string& line) { say(stdout, line); }, ranks);
   if (!results) return results.error();
   if (*results == nullptr) return {};
@@ -95,7 +96,7 @@ Result<void> run(const CampaignOptions& options, bool& broken) {
     if (!joined) return joined.error();
     ranks = *std::move(joined);
   }
-  return options.command.empty() ? run_operations(settings, options.minutes, ranks.get(), broken)
+  return options.command.empty() ? run_operations(settings, options.operations, ranks.get(), broken)
                                  : run_command(settings, options, ranks.get());
 }
 
@@ -109,7 +110,10 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
   command.add_option("--out", options->settings.folder, "folder for the results; seeds that it has are not run again")
       ->required();
   CLI::Option* const minutes =
-      command.add_option("--minutes", options->minutes, "how long each operation is")->check(CLI::Range(0.5, 600.0));
+      command.add_option("--minutes", options->operations.minutes, "how long each operation is")
+          ->check(CLI::Range(0.5, 600.0));
+  CLI::Option* const pictures = command.add_flag("--pictures", options->operations.pictures,
+                                                 "the video of each operation shows what the scope sees");
   command
       .add_option("--jobs", options->settings.jobs,
                   "seeds at a time (default: as many as there are cores; under mpirun one a rank)")
@@ -121,7 +125,8 @@ void add_campaign_command(CLI::App& app, const Take& take, bool& broken) {
       command
           .add_option("command", options->command,
                       "in place of an operation, after --: prints one line of JSON for the seed that stands for {}")
-          ->excludes(minutes);
+          ->excludes(minutes)
+          ->excludes(pictures);
   command.add_flag("--print", options->print, "print these lines in the end, by seed")->needs(other);
   command
       .add_option("--patience", options->patience_s, "seconds that the command may take for one seed (default 3600)")

@@ -76,9 +76,11 @@ Result<void> print_shortest(const SimulatedOperation& operation, const Operation
 void print(const OperationOutcome& out, const OperationResult& result) {
   const double share = result.shown > 0 ? static_cast<double>(result.green) / static_cast<double>(result.shown) : 0;
   for (const BrokenLaw& law : out.broken) fmt::print("broken at {:.3f} s: {}: {}\n", law.at_s, law.law, law.what);
-  fmt::print("seed {}: {:g} minutes, {} faults ({} of them alone), {} poses, {} frames, {} registrations, {} checks\n",
-             result.seed, result.minutes, result.faults, result.faults_alone, result.poses, result.frames,
-             result.registrations, result.checks);
+  fmt::print(
+      "seed {}: {:g} minutes, {} faults ({} of them alone), {} poses, {} frames, {} registrations, {} deformations, {} "
+      "checks\n",
+      result.seed, result.minutes, result.faults, result.faults_alone, result.poses, result.frames,
+      result.registrations, out.deformations, result.checks);
   fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
              100 * share, result.beyond, result.green, result.worst_circles, result.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; faults named within {:.2f} s, over within {:.2f} s\n",
@@ -112,6 +114,8 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
       "operation", "one operation in virtual time, with faults at random: whether anything breaks a law");
   command.add_option("--seed", options->operation.seed, "everything random follows from it");
   command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
+  command.add_flag("--pictures", options->operation.pictures,
+                   "the video shows what the scope sees, and the window watches how it moves");
   command.add_option("--script", options->script, "these faults (TOML) in place of random ones");
   command.add_option("--log", options->log, "write what happened to this file");
   command.add_option("--faults", options->faults, "write the faults that befell to this file, as --script takes them");

@@ -8,15 +8,19 @@
 
 namespace birdseye::hw_sim {
 
-SeedStudy study_of_operations(double minutes, const std::string& program) {
+SeedStudy study_of_operations(const StudiedOperations& operations, const std::string& program) {
   SeedStudy out;
-  out.command = {program,     "--end-with-stdin",        "operation", "--line", "--seed", "{}",
-                 "--minutes", fmt::format("{}", minutes)};
-  out.what = fmt::format("operations of {} minutes", minutes);
+  out.command = {program,     "--end-with-stdin",
+                 "operation", "--line",
+                 "--seed",    "{}",
+                 "--minutes", fmt::format("{}", operations.minutes)};
+  if (operations.pictures) out.command.emplace_back("--pictures");
+  out.what = fmt::format("operations of {} minutes{}", operations.minutes, operations.pictures ? " with pictures" : "");
   out.file = "operations.sqlite";
-  // For the slowest operation: a hundredth of its time is usual.
-  out.patience = Duration::from_seconds(std::max(60.0, 60 * minutes));
-  out.kept = [minutes](std::uint64_t seed, const Result<std::string>& given) -> Result<std::string> {
+  // For the slowest operation: a hundredth of its time is usual, and with pictures a tenth.
+  out.patience = Duration::from_seconds(std::max(60.0, 60 * operations.minutes));
+  out.kept = [minutes = operations.minutes](std::uint64_t seed,
+                                            const Result<std::string>& given) -> Result<std::string> {
     const auto result = given ? result_of(*given) : Result<OperationResult>(given.error());
     if (result) return line_of(*result);
     OperationResult none;

@@ -9,9 +9,14 @@
 
 namespace birdseye::hw_sim {
 
-/// Simulated operations of so many minutes. One that ends without a result counts as one that broke a law.
+struct StudiedOperations {
+  double minutes = 10;
+  bool pictures = false;  ///< the video shows what the scope sees
+};
+
+/// Simulated operations. One that ends without a result counts as one that broke a law.
 /// program: it knows `operation --line`.
-SeedStudy study_of_operations(double minutes, const std::string& program);
+SeedStudy study_of_operations(const StudiedOperations& operations, const std::string& program);
 
 /// Any other study: the command prints one line of JSON for each seed.
 SeedStudy study_of(const std::vector<std::string>& command, Duration patience);

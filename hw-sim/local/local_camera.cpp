@@ -11,6 +11,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
+#include "hw-sim/video/half_size.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -41,6 +42,14 @@ struct LocalCamera::State {
   void remember(const FramePlan& plan) {
     exposed.emplace_back(plan.sequence, plan.exposed_ns);
     if (exposed.size() > kRemembered) exposed.pop_front();
+  }
+
+  /// Only of frames that arrive is anything drawn.
+  [[nodiscard]] Pixels picture(const FramePlan& plan) const {
+    if (!settings.look) return plan.half_size ? half : whole;
+    auto seen = settings.look(plan.exposed_ns);
+    if (plan.half_size) seen = half_size_of(seen, settings.width_px, settings.height_px);
+    return std::make_shared<const std::vector<std::uint8_t>>(std::move(seen));
   }
 
   const Settings settings;
@@ -115,7 +124,7 @@ class LocalCameraEnd final : public drivers::FrameSource {
       return Error{Errc::bad_format, name() + ": what it sends is not a frame"};
     if (plan.lost) return std::optional<Frame>();
     torn_ = plan.part < 1;  // what follows begins where nobody expects it
-    frame_.rgb = plan.half_size ? camera_->half : camera_->whole;
+    frame_.rgb = camera_->picture(plan);
     frame_.width_px = camera_->settings.width_px / (plan.half_size ? 2 : 1);
     frame_.height_px = camera_->settings.height_px / (plan.half_size ? 2 : 1);
     frame_.sequence = plan.sequence;

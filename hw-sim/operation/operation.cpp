@@ -21,6 +21,7 @@
 #include "hw-sim/local/local_link.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
 #include "hw-sim/operation/operation_patient.hpp"
+#include "hw-sim/operation/operation_scene.hpp"
 #include "hw-sim/operation/operation_window.hpp"
 #include "hw-sim/operation/surgeon.hpp"
 
@@ -28,8 +29,12 @@ namespace birdseye::hw_sim {
 
 namespace {
 
-constexpr int kWidth_px = 96, kHeight_px = 72;
+struct VideoSize {
+  int width_px, height_px;
+};
+constexpr VideoSize kGrey{96, 72}, kPictures{160, 120}, kOfBoard{192, 144};  // smaller, no board is found
 constexpr double kVideo_hz = 25;
+constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is calibrated at their beginning
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
 constexpr double kActs_s = 0.1;                      // from one look of the surgeon to the next
@@ -40,10 +45,12 @@ class Journal {
  public:
   explicit Journal(std::int64_t zero_ns) : zero_ns_(zero_ns) {}
   void say(HostTime now, const std::string& what) { text_ += fmt::format("{:10.3f} {}\n", at_s(now), what); }
-  /// What is no more as it was when it was last said; why: told with it, whatever it was before.
-  void follow(HostTime now, std::string& last, const std::string& what, const std::string& why = {}) {
-    if (what != last) say(now, why.empty() ? what : fmt::format("{}: {}", what, why));
-    last = what;
+  /// What is no more as it was when it was last said, but for the numbers in it.
+  void follow(HostTime now, std::string& last, const std::string& what) {
+    std::string without_numbers = what;
+    std::erase_if(without_numbers, [](char c) { return c >= '0' && c <= '9'; });
+    if (without_numbers != last) say(now, what);
+    last = std::move(without_numbers);
   }
   void enter(std::uint64_t value) { hash_ = splitmix64(hash_ ^ value); }
   void enter(double value) { enter(std::bit_cast<std::uint64_t>(value)); }
@@ -107,11 +114,11 @@ device::Config config_of(const OperationTruth& truth, const host::Authors& autho
     config.core.bird_names.emplace_back(kReference);
     config.tracker.reference = kReference;
   }
-  config.core.calibration = host::record_text(truth.record(), *authors.machine);
+  if (!truth.at_board(0)) config.core.calibration = host::record_text(truth.record(), *authors.machine);
   config.core.pose.smoothing = Duration::from_ms(40);
   config.core.pose_wait = Duration::from_ms(60);
-  config.camera.width_px = kWidth_px;
-  config.camera.height_px = kHeight_px;
+  config.camera.width_px = truth.lens().width_px;
+  config.camera.height_px = truth.lens().height_px;
   config.camera.rate_hz = kVideo_hz;
   config.open_camera = [&camera](const auto&) { return camera.open(); };
   return config;
@@ -145,14 +152,10 @@ void take_events(host::LiveSource& source, host::LiveWorkflow& workflow, Operati
   }
 }
 
-bool is_whole(const host::ShownPicture& shown) {
-  return shown.overlaid && shown.strength >= 1 && shown.reason.empty();
-}
-
-const char* words_of(const host::ShownPicture& shown) {
+std::string words_of(const host::ShownPicture& shown) {
   if (!shown.any) return "nothing is on the screen";
   if (is_whole(shown)) return "the overlay is whole";
-  return shown.overlaid ? "the overlay fades" : "there is no overlay";
+  return fmt::format("{}: {}", shown.overlaid ? "the overlay fades" : "there is no overlay", shown.reason);
 }
 
 /// birdseyed and its server. An operation ends both and starts them again.
@@ -211,16 +214,21 @@ class WindowProgram {
   std::unique_ptr<host::LiveSource> source_;
 };
 
-/// Runs the operation, in virtual time. open: opens a window.
-void operate(const SimulatedOperation& operation, OperationTruth& truth, const host::Authors& authors,
-             const WindowProgram::Open& open, OperationOutcome& out) {
+/// Runs the operation, in virtual time. open: opens a window. scene: null where the video is grey.
+void operate(const SimulatedOperation& operation, OperationTruth& truth, OperationScene* scene,
+             const host::Authors& authors, const WindowProgram::Open& open, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
   const LocalLine line("sim:tracker");
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
   unit.align(zero_ns + 1);  // before the first measurement
   LocalCamera::Settings camera_settings;
-  camera_settings.width_px = kWidth_px;
-  camera_settings.height_px = kHeight_px;
+  camera_settings.width_px = truth.lens().width_px;
+  camera_settings.height_px = truth.lens().height_px;
+  if (scene != nullptr) {
+    camera_settings.look = [scene, zero_ns](std::int64_t exposed_ns) {
+      return scene->look(static_cast<double>(exposed_ns - zero_ns) * 1e-9);
+    };
+  }
   camera_settings.timing.rate_hz = kVideo_hz;
   camera_settings.timing.seed = operation.seed;
   camera_settings.timing.faults = out.faults.camera;
@@ -232,7 +240,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
   befalling.begin(zero_ns);
   OperationLaws laws(
       truth, out.faults, [&camera](std::uint64_t sequence) { return camera.exposed_ns(sequence); }, zero_ns);
-  Surgeon surgeon(truth, operation.seed);
+  Surgeon surgeon(truth, operation.seed, operation.pictures ? SurgeonDoes::views_too : SurgeonDoes::no_views);
   Journal journal(zero_ns);
   Announcer announcer(out.faults);
   std::string said, step, screen;
@@ -269,20 +277,24 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, const h
     laws.take(shown, workflow.picture(), now);
     journal.enter(shown.strength);
     announcer.tell(journal, now);
-    journal.follow(now, screen, words_of(shown), shown.reason);
+    journal.follow(now, screen, words_of(shown));
     if (journal.at_s(now) < acts_at_s) continue;
     acts_at_s = journal.at_s(now) + kActs_s;
-    surgeon.act(journal.at_s(now), now, is_whole(shown));
+    surgeon.act(journal.at_s(now), now, shown);
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
     registered = view.note(host::LiveStep::fiducials).done;
-    journal.follow(now, step, fmt::format("step {}", host::name_of(view.step)));
+    const host::StepNote& note = view.note(view.step);
+    journal.follow(now, step,
+                   fmt::format("step {}: {}", host::name_of(view.step),
+                               view.guide_lines.empty() ? note.line : view.guide_lines.back()));
     journal.follow(now, said, "the appliance: " + view.link.appliance_says);
   }
   laws.finish(operation.minutes * 60);
   out.broken = laws.broken();
   out.laws = laws.figures();
   out.registrations = surgeon.registrations();
+  out.deformations = surgeon.deformations();
   out.checks = surgeon.checks();
   out.log = journal.text();
   out.hash = journal.hash();
@@ -301,19 +313,37 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     if (operation.programs_end)
       out.faults.programs = draw_program_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s);
   }
-  OperationTruth truth(operation.seed, kWidth_px, kHeight_px, Happenings(out.faults.world), reference);
+  const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
+  const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;
+  OperationTruth truth(operation.seed, size.width_px, size.height_px, Happenings(out.faults.world), reference);
+  WindowSettings window;
+  window.video_must_agree = operation.pictures;
+  if (at_board) {
+    truth.begin_at_board(operation.seed);
+    const auto pattern = calibration::parse_pattern(BenchPath::spec());
+    if (!pattern) return pattern.error();
+    window.pattern = *pattern;
+  }
+  std::unique_ptr<OperationScene> scene;
+  if (operation.pictures) {
+    auto created = OperationScene::create(truth, operation.seed);
+    if (!created) return std::move(created).error();
+    scene = *std::move(created);
+  }
   const auto folder = RendezvousFolder::make();
   if (!folder) return folder.error();
-  const auto patient = write_patient((*folder)->path(), truth);
+  const auto patient =
+      write_patient((*folder)->path(), truth, operation.pictures ? PatientHas::markers_and_organ : PatientHas::markers);
   if (!patient) return patient.error();
+  window.patient = *patient;
   const host::Authors authors = host::Authors::for_once();  // another key changes nothing that is done
-  const auto open = [&] { return open_window(*patient, truth, authors, (*folder)->path() / "window"); };
+  const auto open = [&] { return open_window(window, truth, authors, (*folder)->path() / "window"); };
   // The first window reads its files before virtual time begins.
   auto first = open();
   if (!first) return std::move(first).error();
   const auto open_next = [&] { return *first != nullptr ? std::exchange(*first, nullptr) : open(); };
-  const auto ran =
-      run_in_virtual_time({.seed = operation.seed}, [&] { operate(operation, truth, authors, open_next, out); });
+  const auto ran = run_in_virtual_time({.seed = operation.seed},
+                                       [&] { operate(operation, truth, scene.get(), authors, open_next, out); });
   if (!ran) return ran.error();
   out.time = *ran;
   for (const BrokenLaw& law : out.broken)

@@ -18,6 +18,7 @@ struct SimulatedOperation {
   double minutes = 10;
   std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
   bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
+  bool pictures = false;                ///< the video shows what the scope sees; else it is grey all over, and small
 };
 
 /// What came of it.
@@ -25,13 +26,13 @@ struct OperationOutcome {
   std::vector<BrokenLaw> broken;
   OperationLaws::Figures laws;
   VirtualTimeFigures time;
-  std::size_t registrations = 0, checks = 0;
+  std::size_t registrations = 0, deformations = 0, checks = 0;
   FaultScript faults;      ///< that befell
   std::string log;         ///< what happened, a line each
   std::uint64_t hash = 0;  ///< of every event that reached the host, and of all that was on the screen
 };
 
-/// One operation from power-on to the last frame, in virtual time and without pictures: the tracker, the camera, the
+/// One operation from power-on to the last frame, in virtual time: the tracker, the camera, the
 /// appliance, the wire, and the window's workflow up to what it decides of each frame, as the programs have them; and a
 /// surgeon. The same operation gives the same outcome.
 Result<OperationOutcome> run_operation(const SimulatedOperation& operation);

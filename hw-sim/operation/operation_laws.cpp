@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "device/wire/json.hpp"
+#include "host/texts/texts.hpp"
+#include "hw-sim/operation/operation_window.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -20,6 +22,7 @@ constexpr double kMostAge_ms = 150;
 constexpr double kMostCircles = 3, kPromisedCircles = 1.5;
 constexpr double kNamedWithin_s = 2, kOverWithin_s = 2;
 constexpr double kTakesUpWithin_s = 2;    // once the instruments are those that it was registered with
+constexpr double kCalm_s = 10;            // after a fault's end what it had the window see may still be weighed
 constexpr double kAlone_s = 5;            // from another fault's end to this one's begin, and after it
 constexpr double kLinger_s = 0.5;         // after a fault's end poses may still be made of samples that it touched
 constexpr std::size_t kMostBroken = 100;  // that are told
@@ -177,9 +180,19 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
+/// What the video shows is true: where no fault has touched its times or the poses, nobody may say that they differ.
+void OperationLaws::judge_accusation(bool accused, double now_s) {
+  const bool begins = accused && !accused_;
+  accused_ = accused;
+  const auto touches = [now_s](const Span& span) { return span.begins_s <= now_s && now_s < span.ends_s + kCalm_s; };
+  if (begins && std::ranges::none_of(spans_, touches))
+    break_law(now_s, "accused", "the window says that video and poses do not agree, and nothing has befallen them");
+}
+
 void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {
   const double now_s = at_s(now.ns);
   ++figures_.shown;
+  judge_accusation(shown.reason == host::words("why_video_differs"), now_s);
   if (!shown.overlaid || shown.strength <= 0 || !picture.frame()) return;
   ++figures_.overlaid;
   if (checks_when_opened_)
@@ -200,7 +213,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
     break_law(now_s, "age", fmt::format("an overlay's frame was exposed {:.0f} ms ago", age_ms));
   const auto drawn_from = picture.camera_from_patient();
   const auto& budget = picture.decision().expected;
-  if (shown.strength < 1 || !shown.reason.empty() || !drawn_from || !budget) return;
+  if (!is_whole(shown) || !drawn_from || !budget) return;
   ++figures_.green;
   if (lies) return;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();

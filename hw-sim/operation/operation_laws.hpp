@@ -78,6 +78,7 @@ class OperationLaws {
   void take(const wire::Health& health, double now_s);
   void name(double now_s, const std::string& words);
   void judge(const Span& span, double until_s);
+  void judge_accusation(bool accused, double now_s);
 
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
@@ -85,6 +86,7 @@ class OperationLaws {
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
+  bool accused_ = false;                           ///< the window says that video and poses do not agree
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;

@@ -8,8 +8,15 @@
 
 namespace birdseye::hw_sim {
 
-/// Writes what is known of the patient before the operation into the folder: a CT of soft tissue with a marker at each
-/// fiducial (DICOM), the fiducials, and the target as a landmark.
-Result<host::PatientFiles> write_patient(const std::filesystem::path& folder, const OperationTruth& truth);
+/// What is known of the patient before the operation.
+enum class PatientHas {
+  markers,  ///< a CT of soft tissue with a marker at each fiducial (DICOM), the fiducials, and the target as a
+            ///< landmark
+  markers_and_organ,  ///< the organ too, in the CT and as a label
+};
+
+/// Writes it into the folder.
+Result<host::PatientFiles> write_patient(const std::filesystem::path& folder, const OperationTruth& truth,
+                                         PatientHas has);
 
 }  // namespace birdseye::hw_sim

@@ -1,5 +1,6 @@
 #include "hw-sim/operation/operation_truth.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -8,6 +9,8 @@
 #include "calibration/geometry/rotations.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/laparoscope.hpp"
+#include "hw-sim/phantom/body.hpp"
+#include "hw-sim/world/between.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -15,7 +18,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kLook_mm = 100;  // from the camera to the target
+constexpr double kLook_mm = 100;     // from the camera to the target
+constexpr double kHurryAhead_s = 6;  // of its way the scope goes in a hurry, beside what it goes without
+constexpr std::size_t kHurriesRemembered = 8;
 
 /// Numbers that follow from a seed, one after the other.
 class Numbers {
@@ -46,7 +51,7 @@ OperationTruth::OperationTruth(std::uint64_t seed, int width_px, int height_px, 
   // Six markers on the skin round about the organ, in a CT of 100 x 110 x 90 mm that begins at (-20, -20, -20).
   fiducials_mm_ = {{0, 0, 0}, {60, 5, -5}, {65, 75, 0}, {-5, 70, 20}, {30, 20, 55}, {35, 70, 50}};
   for (Vector3d& place : fiducials_mm_) place += drawn.within(4);
-  target_mm_ = Vector3d(30, 35, 20) + drawn.within(8);
+  target_mm_ = organ_middle_mm() + drawn.within(8);
   hand_.rest_at({0, 0, 200}, 0);
   calibrate(hashed_word(seed, 2));
 }
@@ -100,18 +105,64 @@ void OperationTruth::calibrate(std::uint64_t seed) {
   record_.latency = calibration::LatencyEntry{provenance, 0, -1, 1, 0};
 }
 
+const Vector3d& OperationTruth::organ_middle_mm() {
+  static const Vector3d middle_mm(30, 35, 20);
+  return middle_mm;
+}
+
+/// A liver, as small as the CT.
+double OperationTruth::organ_mm(const Vector3d& point_in_patient_mm) {
+  constexpr double kScale = 0.4;
+  const Vector3d middle_of_body_mm(-40, -10, 20);
+  return kScale * procedural_liver_mm((point_in_patient_mm - organ_middle_mm()) / kScale + middle_of_body_mm);
+}
+
 Transform<Tracker, Patient> OperationTruth::tracker_from_patient(double at_s) const {
   const Vector3d table_mm(30, 140, 20);  // the patient lies on it
   return happenings_.transmitter(at_s) * at_rest_ * happenings_.table(at_s, table_mm) *
          happenings_.patient(at_s, table_mm);
 }
 
+void OperationTruth::hurry(double from_s) {
+  hurried_s_.push_back(from_s);
+  if (hurried_s_.size() <= kHurriesRemembered) return;
+  hurried_s_.pop_front();
+  ahead_s_ += kHurryAhead_s;
+}
+
+/// How far the scope is on its way: as long as it goes at its usual pace, where nobody hurried it.
+double OperationTruth::on_its_way_s(double at_s) const {
+  double way_s = at_s + ahead_s_;
+  for (const double from_s : hurried_s_) way_s += kHurryAhead_s * ease((at_s - from_s) / kHurry_s);
+  return way_s;
+}
+
 /// The scope turns about the target as about a port; it goes with the patient, in whose wall it is.
-Transform<Camera, Patient> OperationTruth::camera_from_patient(double at_s) const {
+Transform<Camera, Patient> OperationTruth::camera_within_patient(double now_s) const {
+  const double at_s = on_its_way_s(now_s);
   const Eigen::Matrix3d turn =
       rotation_exp(Vector3d(0.25 * std::sin(0.7 * at_s), 0.3 * std::sin(0.5 * at_s + 1), 0.2 * std::sin(0.3 * at_s)));
   const Vector3d aside(8 * std::sin(0.45 * at_s), 6 * std::cos(0.6 * at_s), kLook_mm + 10 * std::sin(0.35 * at_s));
   return {turn, Vector3d(aside - turn * target_mm_)};
+}
+
+Transform<Camera, Patient> OperationTruth::camera_from_patient(double at_s) const {
+  if (!bench_ || at_s > left_board_s_ + kCarry_s) return camera_within_patient(at_s);
+  const Transform<Tracker, Patient> on = tracker_from_patient(at_s);
+  const Transform<Tracker, Camera> over_board =
+      happenings_.transmitter(at_s) * bench_->at(std::min(at_s, left_board_s_));
+  const Transform<Tracker, Camera> there = on * camera_within_patient(at_s).inverse();
+  return between(over_board, there, ease((at_s - left_board_s_) / kCarry_s)).inverse() * on;
+}
+
+Transform<Camera, Marker> OperationTruth::camera_from_marker(double at_s) const {
+  return bench_->at(at_s).inverse() * bench_->tracker_from_marker();
+}
+
+/// As far from the transmitter as the patient, so that all sensors are in range above it too.
+void OperationTruth::begin_at_board(std::uint64_t seed) {
+  const Vector3d place_mm(380, -30, 160);
+  bench_.emplace(Transform<Tracker, Marker>(at_rest_.rotation(), place_mm), lens_, hashed_word(seed, 7));
 }
 
 Transform<Tracker, Sensor> OperationTruth::tracker_from_sensor(std::size_t bird, double at_s) const {

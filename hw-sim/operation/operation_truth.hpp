@@ -2,12 +2,16 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "calibration/record/calibration_record.hpp"
 #include "hw-sim/minibird/tracker_script.hpp"
+#include "hw-sim/operation/bench_path.hpp"
 #include "hw-sim/operation/hand_path.hpp"
 #include "hw-sim/world/happenings.hpp"
 
@@ -21,18 +25,37 @@ class OperationTruth {
   /// third bird is fixed on the patient.
   OperationTruth(std::uint64_t seed, int width_px, int height_px, Happenings happenings, bool reference);
 
+  /// The scope has yet to be calibrated: from the beginning on it goes about over a board.
+  void begin_at_board(std::uint64_t seed);
+  /// It goes to the patient from then on.
+  void leave_board(double at_s) { left_board_s_ = at_s; }
+  [[nodiscard]] bool at_board(double at_s) const { return bench_ && at_s < left_board_s_; }
+
+  /// From the board to the patient.
+  [[nodiscard]] bool carried(double at_s) const {
+    return bench_ && at_s >= left_board_s_ && at_s < left_board_s_ + kCarry_s;
+  }
+
   [[nodiscard]] Transform<Tracker, Patient> tracker_from_patient(double at_s) const;
   [[nodiscard]] Transform<Camera, Patient> camera_from_patient(double at_s) const;
+  /// Only at the board.
+  [[nodiscard]] Transform<Camera, Marker> camera_from_marker(double at_s) const;
   /// Of the birds scope, pointer and reference, in this order.
   [[nodiscard]] Transform<Tracker, Sensor> tracker_from_sensor(std::size_t bird, double at_s) const;
   [[nodiscard]] std::size_t birds() const { return reference_ ? 3 : 2; }
 
+  /// The scope is moved about quickly from then on, for kHurry_s.
+  void hurry(double from_s);
+  static constexpr double kHurry_s = 4, kCarry_s = 3;
   /// Where the pointer's tip goes, patient frame.
   HandPath& hand() { return hand_; }
 
   // Patient frame, mm.
   [[nodiscard]] const std::vector<Eigen::Vector3d>& fiducials_mm() const { return fiducials_mm_; }
   [[nodiscard]] const Eigen::Vector3d& target_mm() const { return target_mm_; }
+  /// The signed distance to the surface of the organ that the target lies in.
+  [[nodiscard]] static double organ_mm(const Eigen::Vector3d& point_in_patient_mm);
+  [[nodiscard]] static const Eigen::Vector3d& organ_middle_mm();
   [[nodiscard]] const CameraModel& lens() const { return lens_; }
   [[nodiscard]] const Eigen::Vector3d& tip_in_pointer_mm() const { return tip_in_pointer_mm_; }
 
@@ -44,10 +67,16 @@ class OperationTruth {
 
  private:
   void calibrate(std::uint64_t seed);
+  [[nodiscard]] double on_its_way_s(double at_s) const;
+  [[nodiscard]] Transform<Camera, Patient> camera_within_patient(double at_s) const;
 
   Happenings happenings_;
   bool reference_;
   HandPath hand_;
+  std::deque<double> hurried_s_;  ///< since when, the last few
+  double ahead_s_ = 0;            ///< by those before
+  std::optional<BenchPath> bench_;
+  double left_board_s_ = std::numeric_limits<double>::infinity();
   Transform<Tracker, Patient> at_rest_;  ///< tracker_from_patient before anything befell
   Transform<Camera, Sensor> camera_from_sensor_;
   Transform<Patient, Sensor> patient_from_reference_{Eigen::Matrix3d::Identity(), {40, 90, -10}};

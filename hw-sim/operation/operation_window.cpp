@@ -27,7 +27,7 @@ class NoEngine final : public host::Engine {
 
 }  // namespace
 
-Result<std::unique_ptr<host::LiveWorkflow>> open_window(const host::PatientFiles& patient, const OperationTruth& truth,
+Result<std::unique_ptr<host::LiveWorkflow>> open_window(const WindowSettings& window, const OperationTruth& truth,
                                                         const host::Authors& authors,
                                                         const std::filesystem::path& folder) {
   host::LiveSettings settings;
@@ -36,13 +36,14 @@ Result<std::unique_ptr<host::LiveWorkflow>> open_window(const host::PatientFiles
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (host::has_operation(folder)) settings.resume = folder;
-  settings.patient = patient;
+  settings.patient = window.patient;
   settings.make_engine = [](const auto&, const auto&, const auto&) -> Result<std::unique_ptr<host::Engine>> {
     return std::unique_ptr<host::Engine>(std::make_unique<NoEngine>());
   };
   settings.tip_in_pointer_mm = truth.tip_in_pointer_mm();
   settings.fiducials = truth.fiducials_mm().size();
-  settings.video_must_agree = false;  // it is grey all over
+  settings.video_must_agree = window.video_must_agree;
+  settings.pattern = window.pattern;
   auto workflow = std::make_unique<host::LiveWorkflow>(settings);
   const Deadline deadline = Deadline::after(Duration::from_ms(30'000));
   while (!workflow->view().markers_seen || workflow->view().engine_name.empty()) {
@@ -52,6 +53,10 @@ Result<std::unique_ptr<host::LiveWorkflow>> open_window(const host::PatientFiles
     workflow->tick();
   }
   return workflow;
+}
+
+bool is_whole(const host::ShownPicture& shown) {
+  return shown.overlaid && shown.strength >= 1 && shown.reason.empty();
 }
 
 }  // namespace birdseye::hw_sim

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "calibration/base/units.hpp"
+#include "host/texts/texts.hpp"
 #include "hw-sim/base/hashed.hpp"
+#include "hw-sim/operation/operation_window.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -15,18 +17,20 @@ constexpr double kTouch_mm = 0.3;    // how the tip is set on a marker, one sigm
 constexpr double kTilt_deg = 15;     // no hand holds a pointer upright
 constexpr double kTouchRests_s = 1;  // and is taken for a touch
 constexpr double kCheckRests_s = 1.2;
+constexpr double kBetweenViews_s = 3, kViewsPatience_s = 90;
 constexpr double kPatience_s = 5;  // without an overlay, before the landmark is checked again
 const Eigen::Vector3d kAside_mm(0, 0, 200);
 
 }  // namespace
 
-Surgeon::Surgeon(OperationTruth& truth, std::uint64_t seed) : truth_(truth), seed_(hashed_word(seed, 4)) {}
+Surgeon::Surgeon(OperationTruth& truth, std::uint64_t seed, SurgeonDoes does)
+    : truth_(truth), does_(does), seed_(hashed_word(seed, 4)) {}
 
 void Surgeon::stand_at(host::LiveWorkflow& workflow, double at_s) {
   workflow_ = &workflow;
   next_fiducial_ = touches_ = 0;
-  at_landmark_ = false;
-  bare_since_s_ = at_s;
+  at_landmark_ = matching_ = false;
+  bare_since_s_ = views_since_s_ = at_s;
 }
 
 Eigen::Vector3d Surgeon::drawn(double sigma) {
@@ -47,6 +51,41 @@ void Surgeon::touch(const host::OperationView& view, double at_s) {
   go_to(places[next_fiducial_++ % places.size()] + drawn(kTouch_mm), at_s, kTouchRests_s);
 }
 
+/// The scope goes about over the board by itself; the window tells when that is enough. A surgeon who has been at all
+/// of the stations ends it.
+void Surgeon::calibrate(const host::OperationView& view, double at_s, HostTime now) {
+  if (view.note(LiveStep::calibrate).done) return workflow_->go_to(LiveStep::fiducials);
+  if (!view.primary_refused.empty()) return;
+  const bool ends = view.guide && view.guide->collecting && at_s - guided_since_s_ > BenchPath::round_s();
+  if (view.guiding && !ends) return;
+  guided_since_s_ = at_s;
+  workflow_->primary(now);
+}
+
+/// One after the other, as the scope goes about the organ.
+void Surgeon::keep_view(const host::OperationView& view, double at_s, HostTime now) {
+  if (does_ == SurgeonDoes::no_views || at_s - views_since_s_ > kViewsPatience_s) {
+    ++registrations_;
+    return workflow_->go_to(LiveStep::check);
+  }
+  if (!view.primary_refused.empty()) return;
+  workflow_->primary(now);  // where there are enough, it goes on
+  busy_until_s_ = at_s + kBetweenViews_s;
+}
+
+void Surgeon::deform(const host::OperationView& view, HostTime now) {
+  if (view.deforming) return;
+  const bool done = view.note(LiveStep::deform).done;
+  if (does_ == SurgeonDoes::views_too && !matching_ && !done) {
+    matching_ = true;
+    return workflow_->primary(now);
+  }
+  ++registrations_;
+  if (matching_ && done) ++deformations_;
+  matching_ = false;
+  workflow_->go_to(LiveStep::check);
+}
+
 void Surgeon::check(double at_s, HostTime now) {
   if (!at_landmark_) {
     at_landmark_ = true;
@@ -59,23 +98,28 @@ void Surgeon::check(double at_s, HostTime now) {
   go_to(kAside_mm, at_s, 0);
 }
 
-void Surgeon::act(double at_s, HostTime now, bool overlay_is_whole) {
-  if (overlay_is_whole) bare_since_s_ = at_s;
+void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
+  if (is_whole(shown)) bare_since_s_ = at_s;
+  if (shown.reason == host::words("why_video_untold") && at_s >= hurries_until_s_) {
+    truth_.hurry(at_s);
+    hurries_until_s_ = at_s + OperationTruth::kHurry_s;
+  }
   if (at_s < busy_until_s_) return;
   const host::OperationView view = workflow_->view();
   if (view.asks_for_instruments) workflow_->confirm_instruments();
   if (view.asks_for_patient) workflow_->confirm_patient();
   const bool connected = view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
+  if (view.board_named && view.step == LiveStep::calibrate) return calibrate(view, at_s, now);
   if (!connected) return;
+  if (truth_.at_board(at_s)) truth_.leave_board(at_s);
   if (view.step == LiveStep::connect || view.step == LiveStep::calibrate) workflow_->go_to(LiveStep::fiducials);
   if (view.step == LiveStep::fiducials) {
-    at_landmark_ = false;
+    at_landmark_ = matching_ = false;
+    views_since_s_ = at_s;
     return touch(view, at_s);
   }
-  if (view.step == LiveStep::views || view.step == LiveStep::deform) {
-    ++registrations_;
-    return workflow_->go_to(LiveStep::check);
-  }
+  if (view.step == LiveStep::views) return keep_view(view, at_s, now);
+  if (view.step == LiveStep::deform) return deform(view, now);
   if (view.step == LiveStep::check) return check(at_s, now);
   if (at_s - bare_since_s_ > kPatience_s) {
     bare_since_s_ = at_s;

@@ -10,6 +10,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "hw-sim/faults/announce.hpp"
+#include "hw-sim/video/half_size.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -116,13 +117,7 @@ bool FrameCamera::take(Rendered& rendered, const std::stop_token& stop) {
 FramePixels FrameCamera::picture_of(const Rendered& rendered, bool half_size) {
   const int width = settings_.lens.width_px, height = settings_.lens.height_px;
   if (!half_size) return {rendered.rgb, FrameFormat::rgb3, width, height};
-  half_.clear();
-  for (int y = 0; y + 1 < height; y += 2) {
-    for (int x = 0; x + 1 < width; x += 2) {
-      const auto pixel = rendered.rgb.begin() + 3 * (static_cast<std::ptrdiff_t>(y) * width + x);
-      half_.insert(half_.end(), pixel, pixel + 3);
-    }
-  }
+  half_ = half_size_of(rendered.rgb, width, height);
   return {half_, FrameFormat::rgb3, width / 2, height / 2};
 }
 

@@ -11,10 +11,10 @@
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
-#include "hw-sim/base/hashed.hpp"
 #include "hw-sim/camera/look_at.hpp"
 #include "hw-sim/phantom/implants.hpp"
-#include "hw-sim/world/ease.hpp"
+#include "hw-sim/world/between.hpp"
+#include "hw-sim/world/board_stations.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -22,7 +22,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kStations = 24;
+constexpr std::size_t kStations = 24;
 constexpr double kMoveS = 0.14;                           // from station to station over the board
 constexpr double kTouchDwellS = 0.7, kTouchMoveS = 0.75;  // of the pointer
 constexpr double kCarryS = 2;                             // of the scope from the board to the patient
@@ -32,14 +32,6 @@ constexpr double kRangeMm = 700;                          // of the transmitter
 
 Vector3d rotation_vector(const Vector3d& axis_deg) {
   return axis_deg * kRadPerDeg;
-}
-
-/// Between two poses: along a line, and about one axis.
-template <typename To, typename From>
-Transform<To, From> between(const Transform<To, From>& a, const Transform<To, From>& b, double u) {
-  const Vector3d turn = rotation_log(a.rotation().transpose() * b.rotation());
-  return Transform<To, From>(Eigen::Matrix3d(a.rotation() * rotation_exp(u * turn)),
-                             Vector3d(a.translation() + u * (b.translation() - a.translation())));
 }
 
 }  // namespace
@@ -84,7 +76,8 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
       world.look_at_in_patient_mm_ = vertex.cast<double>();
     }
   }
-  world.plan_stations(lens, seed);
+  for (const auto& station : stations_over(world.board_, lens, seed, kStations))
+    world.stations_.push_back(world.tracker_from_marker_ * station);
   if (pace.views) world.plan_views();
 
   const Vector3d park_in_patient_mm = truth.liver_centre_mm + Vector3d(170, -190, -40);
@@ -105,7 +98,7 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
 
   const auto stops = static_cast<double>(world.tip_stops_in_tracker_mm_.size());
   world.calibrate_s_ = pace.sway_s;
-  world.touch_s_ = world.calibrate_s_ + kStations * (pace.dwell_s + kMoveS) + pace.pause_s;
+  world.touch_s_ = world.calibrate_s_ + static_cast<double>(kStations) * (pace.dwell_s + kMoveS) + pace.pause_s;
   world.stroke_s_ = world.touch_s_ + stops * kTouchDwellS + (stops - 1) * kTouchMoveS;
   world.views_s_ = world.stroke_s_ + world.stroke_.lasts_s();
   world.look_s_ = world.views_s_ + static_cast<double>(world.views_.size()) * (kViewDwellS + kViewMoveS);
@@ -117,37 +110,6 @@ Result<World> World::create(const PhantomTruth& truth, const Mesh& liver, const 
   world.stages_.insert(world.stages_.end(), {{"look", world.look_s_}, {"end", world.ends_s_}});
   if (const auto in_range = world.check_range(); !in_range) return in_range.error();
   return world;
-}
-
-void World::plan_stations(const CameraModel& lens, std::uint64_t seed) {
-  std::uint64_t draw = 0;
-  const auto uniform = [&](double low, double high) { return low + (high - low) * hashed_uniform(seed + 41, draw++); };
-  const double width = (board_.columns - 1) * board_.square_mm;
-  const double height = (board_.rows - 1) * board_.square_mm;
-  while (stations_.size() < kStations) {
-    // Tilts spread round the clock and rolls to both sides: rotations about many axes are what hand-eye needs.
-    const double azimuth = 2 * std::numbers::pi * uniform(0, 1);
-    const double tilt = uniform(12, 32) * kRadPerDeg;
-    const double distance = uniform(74, 112);
-    const double roll = uniform(-65, 65) * kRadPerDeg;
-    const Vector3d target(0.5 * width + uniform(-14, 14), 0.5 * height + uniform(-10, 10), 0);
-    const Vector3d eye = target - distance * Vector3d(std::sin(tilt) * std::cos(azimuth),
-                                                      std::sin(tilt) * std::sin(azimuth), std::cos(tilt));
-    const Transform<Marker, Camera> pose = look_at<Marker>(eye, target, Vector3d(0, 1, 0), roll);
-    // All inner corners, and the squares round them, must lie in the round field.
-    bool whole = true;
-    const double s = board_.square_mm;
-    for (const double x : {-s, width + s}) {
-      for (const double y : {-s, height + s}) {
-        const auto seen = project(lens, pose.inverse() * Vector3d(x, y, 0));
-        const Eigen::Vector2d centre(lens.cx_px, lens.cy_px);
-        whole = whole && seen && (*seen - centre).norm() < 0.49 * lens.width_px && seen->x() > 6 && seen->y() > 6 &&
-                seen->x() < lens.width_px - 7 && seen->y() < lens.height_px - 7;
-      }
-    }
-    if (whole) stations_.push_back(tracker_from_marker_ * pose);
-    if (draw > 100'000) break;
-  }
 }
 
 void World::plan_views() {

@@ -75,7 +75,6 @@ class World {
 
  private:
   World() = default;
-  void plan_stations(const CameraModel& lens, std::uint64_t seed);
   void plan_views();
   [[nodiscard]] Result<void> check_range() const;
   [[nodiscard]] Transform<Tracker, Camera> sweep(double since_s) const;

@@ -77,7 +77,7 @@ SeedRun up_to(const Scratch& scratch, std::uint64_t last_seed) {
 
 /// What comes of operations of half a minute.
 Result<OperationResult> sum_of_operations(const SeedRun& run, const std::string& program, const Said& said) {
-  const auto results = run_seeds(study_of_operations(kMinutes, program), run, said);
+  const auto results = run_seeds(study_of_operations({.minutes = kMinutes}, program), run, said);
   if (!results) return results.error();
   return sum_of(**results, run.first_seed, run.last_seed);
 }

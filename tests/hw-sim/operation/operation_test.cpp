@@ -15,6 +15,8 @@
 namespace birdseye::hw_sim {
 namespace {
 
+constexpr std::uint64_t kSeedAtBoard = 5;  // whose scope has yet to be calibrated
+
 OperationOutcome operate(const SimulatedOperation& operation) {
   auto out = run_operation(operation);
   EXPECT_TRUE(out) << out.error().what;
@@ -111,12 +113,43 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms,
                          ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751),
                          [](const auto& of) { return std::to_string(of.param); });
 
+TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
+  const OperationOutcome out = operate({.seed = 3, .minutes = 1, .faults = FaultScript{}, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_EQ(out.deformations, 1U) << out.log;
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.4 * static_cast<double>(out.laws.shown)) << out.log;
+  EXPECT_EQ(out.laws.beyond, 0U);
+}
+
+TEST(OperationWithPictures, AScopeIsCalibratedOverABoardAndTheOverlayIsAsGoodAsItSays) {
+  const OperationOutcome out =
+      operate({.seed = kSeedAtBoard, .minutes = 1.5, .faults = FaultScript{}, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_NE(out.log.find("step calibrate"), std::string::npos) << out.log;
+  EXPECT_EQ(out.registrations, 1U) << out.log;
+  EXPECT_GT(out.laws.green, 100U) << out.log;
+  EXPECT_EQ(out.laws.beyond, 0U);
+}
+
+/// The window learns of the reference sensor a moment after the first poses.
+TEST(OperationWithPictures, AWindowThatIsOpenedAgainDoesNotAccuseThePoses) {
+  const OperationOutcome out = operate({.seed = 4,
+                                        .minutes = 0.8,
+                                        .faults = programs_end({{FaultKind::window_restart, 25, 2.0, {}}}),
+                                        .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.log.find("do not agree"), std::string::npos) << out.log;
+}
+
 TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
   const OperationOutcome first = operate({.seed = 5, .minutes = 1.5}), again = operate({.seed = 5, .minutes = 1.5});
   EXPECT_EQ(first.log, again.log);
   EXPECT_EQ(first.hash, again.hash);
   EXPECT_EQ(first.time.order_hash, again.time.order_hash);
   EXPECT_NE(operate({.seed = 6, .minutes = 1.5}).hash, first.hash);
+  const SimulatedOperation seen{.seed = 5, .minutes = 0.5, .pictures = true};
+  EXPECT_EQ(operate(seen).hash, operate(seen).hash);
 }
 
 TEST(Operation, ItsFaultsAreReadBackFromTheScriptThatItWrites) {

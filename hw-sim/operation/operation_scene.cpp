@@ -1,0 +1,42 @@
+#include "hw-sim/operation/operation_scene.hpp"
+
+#include <bit>
+#include <utility>
+
+#include "hw-sim/phantom/mesh.hpp"
+
+namespace birdseye::hw_sim {
+
+namespace {
+
+constexpr double kSurface_mm = 2;  // between the vertices of the organ's surface
+constexpr double kWall_mm = 130;   // the cavity's, about the target: behind the scope and behind the organ
+const Eigen::Vector3d kReach_mm = Eigen::Vector3d::Constant(70);  // of the organ, about its middle
+
+std::size_t bytes_of_picture(const CameraModel& lens) {
+  return std::size_t{3} * static_cast<std::size_t>(lens.width_px) * static_cast<std::size_t>(lens.height_px);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<OperationScene>> OperationScene::create(const OperationTruth& truth, std::uint64_t seed) {
+  auto scope = Laparoscope::create({.lens = truth.lens(), .seed = seed});
+  if (!scope) return std::move(scope).error();
+  const Eigen::Vector3d& middle = OperationTruth::organ_middle_mm();
+  Cavity cavity;
+  cavity.organ = closed_surface(OperationTruth::organ_mm, middle - kReach_mm, middle + kReach_mm, kSurface_mm);
+  cavity.wall_centre_mm = truth.target_mm();
+  cavity.wall_radius_mm = kWall_mm;
+  (*scope)->set_cavity(cavity);
+  (*scope)->set_bench(BenchPath::board());
+  return std::unique_ptr<OperationScene>(new OperationScene(truth, *std::move(scope)));
+}
+
+std::vector<std::uint8_t> OperationScene::look(double at_s) {
+  const auto noise = std::bit_cast<std::uint64_t>(at_s);
+  if (truth_.at_board(at_s)) return scope_->look_at_bench(truth_.camera_from_marker(at_s), noise);
+  if (truth_.carried(at_s)) return std::vector<std::uint8_t>(bytes_of_picture(truth_.lens()));  // nothing near is lit
+  return scope_->look_into_cavity(truth_.camera_from_patient(at_s), noise);
+}
+
+}  // namespace birdseye::hw_sim
