@@ -118,11 +118,11 @@ std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_colum
   return unproject(camera, Eigen::Vector2d((place.x + 0.5) * scale - 0.5, (place.y + 0.5) * scale - 0.5));
 }
 
-std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
-                                      double farthest_mm) {
-  std::vector<double> off;
-  off.reserve(places.size());
-  for (const FollowedPlace& place : places) {
+std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                            double farthest_mm) {
+  std::vector<std::optional<double>> off(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const FollowedPlace& place = places[i];
     // From the nearest depth on at which the place is before the camera in both pictures.
     const double ahead = (now_from_then.rotation() * place.then).z();
     if (!(ahead > 0)) continue;
@@ -130,8 +130,17 @@ std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, 
     if (nearest_mm >= farthest_mm) continue;
     const Eigen::Vector3d nearest = now_from_then * Eigen::Vector3d(nearest_mm * place.then);
     const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(farthest_mm * place.then);
-    off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
+    off[i] = distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized());
   }
+  return off;
+}
+
+std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                      double farthest_mm) {
+  std::vector<double> off;
+  off.reserve(places.size());
+  for (const std::optional<double>& one : off_line(places, now_from_then, farthest_mm))
+    if (one) off.push_back(*one);
   if (2 * off.size() <= places.size()) return std::nullopt;
   return median_of(std::move(off));
 }

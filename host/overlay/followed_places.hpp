@@ -46,8 +46,12 @@ struct FollowedPlace {
 };
 
 /// Where a place may lie in the later picture, at whatever depth, the poses tell: on a line (the epipolar line), of
-/// which the part from 15 mm to farthest_mm counts. The median of how far the places are off it, of unit focal length.
-/// Empty where most places would be behind the camera.
+/// which the part from 15 mm to farthest_mm counts. How far each place is off it, of unit focal length; empty where it
+/// would be behind the camera.
+std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& places,
+                                            const Transform<Camera, Camera>& now_from_then,
+                                            double farthest_mm = kFarthestSeen_mm);
+/// Their median. Empty where most places would be behind the camera.
 std::optional<double> median_off_line(const std::vector<FollowedPlace>& places,
                                       const Transform<Camera, Camera>& now_from_then,
                                       double farthest_mm = kFarthestSeen_mm);

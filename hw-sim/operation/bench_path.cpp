@@ -8,6 +8,7 @@
 
 #include "hw-sim/world/between.hpp"
 #include "hw-sim/world/board_stations.hpp"
+#include "hw-sim/world/ease.hpp"
 
 namespace birdseye::hw_sim {
 

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
+#include "calibration/detect/pattern.hpp"
 #include "device/birdseyed/appliance.hpp"
 #include "device/wire/server.hpp"
 #include "drivers/system/clock.hpp"
@@ -20,6 +23,7 @@
 #include "hw-sim/local/local_line.hpp"
 #include "hw-sim/local/local_link.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
+#include "hw-sim/operation/bench_path.hpp"
 #include "hw-sim/operation/operation_patient.hpp"
 #include "hw-sim/operation/operation_scene.hpp"
 #include "hw-sim/operation/operation_window.hpp"
@@ -43,7 +47,8 @@ constexpr const char* kReference = "reference";
 /// A log with the operation's time before each line, and a hash of more than it tells.
 class Journal {
  public:
-  explicit Journal(std::int64_t zero_ns) : zero_ns_(zero_ns) {}
+  /// pictures: what frames show is hashed too.
+  Journal(std::int64_t zero_ns, bool pictures) : zero_ns_(zero_ns), pictures_(pictures) {}
   void say(HostTime now, const std::string& what) { text_ += fmt::format("{:10.3f} {}\n", at_s(now), what); }
   /// What is no more as it was when it was last said, but for the numbers in it.
   void follow(HostTime now, std::string& last, const std::string& what) {
@@ -54,6 +59,14 @@ class Journal {
   }
   void enter(std::uint64_t value) { hash_ = splitmix64(hash_ ^ value); }
   void enter(double value) { enter(std::bit_cast<std::uint64_t>(value)); }
+  /// Eight bytes at a time.
+  void enter(const std::vector<std::uint8_t>& bytes) {
+    std::uint64_t word = 0;
+    for (std::size_t i = 0; i + sizeof word <= bytes.size(); i += sizeof word) {
+      std::memcpy(&word, &bytes[i], sizeof word);
+      enter(word);
+    }
+  }
   void enter(const wire::Event& event, HostTime now) {
     enter(static_cast<std::uint64_t>(now.ns));
     enter(static_cast<std::uint64_t>(event.index()));
@@ -65,6 +78,7 @@ class Journal {
     if (const auto* const frame = std::get_if<wire::VideoFrame>(&event)) {
       enter(frame->info.sequence);
       enter(static_cast<std::uint64_t>(frame->info.acquired.ns));
+      if (pictures_) enter(*frame->rgb);
       enter(static_cast<std::uint64_t>(frame->info.pose.kind));
       if (const auto& pose = frame->info.pose.tracker_from_sensor)
         for (const double value : pose->translation()) enter(value);
@@ -76,6 +90,7 @@ class Journal {
 
  private:
   std::int64_t zero_ns_;
+  bool pictures_;
   std::string text_;
   std::uint64_t hash_ = 0;
 };
@@ -241,7 +256,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   OperationLaws laws(
       truth, out.faults, [&camera](std::uint64_t sequence) { return camera.exposed_ns(sequence); }, zero_ns);
   Surgeon surgeon(truth, operation.seed, operation.pictures ? SurgeonDoes::views_too : SurgeonDoes::no_views);
-  Journal journal(zero_ns);
+  Journal journal(zero_ns, operation.pictures);
   Announcer announcer(out.faults);
   std::string said, step, screen;
   bool registered = false;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <span>
@@ -72,6 +73,12 @@ Fault usual(FaultKind kind) {
   return fault;
 }
 
+/// Until a frame is hit, of those that each are with the fault's chance.
+double strikes_within_s(const Fault& fault) {
+  constexpr double kNever = 1e-6, kFrames_hz = 25, kMostChance = 0.99;
+  return std::log(kNever) / std::log1p(-std::min(fault.value("chance"), kMostChance)) / kFrames_hz;
+}
+
 FaultSigns of_camera(const Fault& fault) {
   switch (fault.kind) {
     case FaultKind::drop_frames:
@@ -89,7 +96,7 @@ FaultSigns of_camera(const Fault& fault) {
       return {.counters = {"clock_events"}, .extra_s = std::abs(fault.value("ms")) * 1e-3};
     case FaultKind::garbage:
     case FaultKind::torn_frame:
-      return {.words = {"is not a frame"}};
+      return {.words = {"is not a frame"}, .strikes_within_s = strikes_within_s(fault)};
     default:
       return {.words = {"the camera has gone", "no camera listens"}};
   }

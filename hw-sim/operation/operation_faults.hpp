@@ -19,6 +19,7 @@ struct FaultSigns {
   double extra_mm = 0;                  ///< poses may be off by so much more
   double extra_s = 0;                   ///< and by as much as things move in this time
   double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
+  double strikes_within_s = 0;          ///< after its begin: a fault that comes by chance has then surely come once
 };
 
 /// Of a fault of the tracker, the camera or a program. Nothing to be seen: both lists are empty.

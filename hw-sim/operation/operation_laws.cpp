@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "device/wire/json.hpp"
 #include "host/texts/texts.hpp"
+#include "hw-sim/faults/fault_table.hpp"
 #include "hw-sim/operation/operation_window.hpp"
 
 namespace birdseye::hw_sim {
@@ -38,6 +40,13 @@ double speed_mm_s(const OperationTruth& truth, std::size_t bird, double at_s) {
   return most;
 }
 
+/// On the operation's clock. Infinite: it lasts for good.
+double end_of(const Fault& fault) {
+  if (fault.for_s) return fault.at_s + *fault.for_s;
+  const bool once = fault_spec(fault_name(fault.kind))->without_end == WithoutEnd::once;
+  return once ? fault.at_s : std::numeric_limits<double>::infinity();
+}
+
 std::size_t bird_of(const std::string& name) {
   return name == "scope" ? 0 : name == "pointer" ? 1 : 2;
 }
@@ -50,8 +59,7 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   for (const FaultTarget target : kFaultTargets) {
     for (const Fault& fault : faults.of(target)) {
       const FaultSigns signs = target == FaultTarget::world ? FaultSigns{} : signs_of(fault, target);
-      const double ends_s = fault.at_s + fault.for_s.value_or(0) + signs.own_s;
-      spans_.push_back({fault, target, signs, fault.at_s, ends_s, true, {}, {}, {}});
+      spans_.push_back({fault, target, signs, fault.at_s, end_of(fault) + signs.own_s, true, {}, {}, {}});
     }
   }
   for (Span& span : spans_) {
@@ -77,7 +85,7 @@ void OperationLaws::judge_pose(const char* of, std::size_t bird, const Transform
     // A hand does not move like a transmitter that is pushed: what is made of samples about the push is off.
     if (span.of == FaultTarget::world) {
       const double over_s = span.fault.value("over_s");
-      for (const double change_s : {span.begins_s, span.begins_s + *span.fault.for_s})
+      for (const double change_s : {span.begins_s, span.ends_s})
         if (true_s > change_s - kLinger_s && true_s < change_s + over_s + kLinger_s) return;
     }
     extra_mm += span.signs.extra_mm;
@@ -238,9 +246,10 @@ void OperationLaws::judge(const Span& span, double until_s) {
   if (!signs.counters.empty() || !signs.words.empty() || signs.half_size) {
     const double took_s = span.named_s.value_or(until_s) - span.begins_s;
     figures_.slowest_named_s = std::max(figures_.slowest_named_s, took_s);
-    if (took_s > kNamedWithin_s)
+    if (took_s > kNamedWithin_s + signs.strikes_within_s)
       break_law(span.begins_s, "named", fmt::format("{} was {}", name, span.named_s ? "named late" : "never named"));
   }
+  if (span.ends_s + kAlone_s >= until_s) return;
   for (const auto& [what, again_s] : {std::pair{"poses", span.poses_again_s}, {"frames", span.frames_again_s}}) {
     const double took_s = again_s.value_or(until_s) - span.ends_s;
     figures_.slowest_over_s = std::max(figures_.slowest_over_s, took_s);
@@ -251,7 +260,10 @@ void OperationLaws::judge(const Span& span, double until_s) {
 
 void OperationLaws::finish(double until_s) {
   for (const Span& span : spans_) {
-    if (span.alone && span.of != FaultTarget::world && span.ends_s + kAlone_s < until_s) judge(span, until_s);
+    // One that lasts for good is named all the same.
+    const bool ends = std::isfinite(span.ends_s);
+    if (span.alone && span.of != FaultTarget::world && (ends ? span.ends_s : span.begins_s) + kAlone_s < until_s)
+      judge(span, until_s);
   }
 }
 

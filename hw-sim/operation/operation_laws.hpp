@@ -30,6 +30,7 @@ struct BrokenLaw {
 /// circle: no overlay is shown as whole that is off by more than three circles.
 /// named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
+/// accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// kept: a window that is opened again takes up the registration that there was, and draws nothing before a landmark
 /// has been checked.
 class OperationLaws {

@@ -1,8 +1,10 @@
 #include "hw-sim/operation/operation_scene.hpp"
 
 #include <bit>
+#include <cstddef>
 #include <utility>
 
+#include "hw-sim/operation/bench_path.hpp"
 #include "hw-sim/phantom/mesh.hpp"
 
 namespace birdseye::hw_sim {

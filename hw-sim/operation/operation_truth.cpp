@@ -11,6 +11,7 @@
 #include "hw-sim/camera/laparoscope.hpp"
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/world/between.hpp"
+#include "hw-sim/world/ease.hpp"
 
 namespace birdseye::hw_sim {
 
@@ -19,7 +20,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kLook_mm = 100;     // from the camera to the target
-constexpr double kHurryAhead_s = 6;  // of its way the scope goes in a hurry, beside what it goes without
+constexpr double kHurryAhead_s = 6;  // of its way that the scope goes more in a hurry
 constexpr std::size_t kHurriesRemembered = 8;
 
 /// Numbers that follow from a seed, one after the other.
@@ -138,11 +139,11 @@ double OperationTruth::on_its_way_s(double at_s) const {
 }
 
 /// The scope turns about the target as about a port; it goes with the patient, in whose wall it is.
-Transform<Camera, Patient> OperationTruth::camera_within_patient(double now_s) const {
-  const double at_s = on_its_way_s(now_s);
-  const Eigen::Matrix3d turn =
-      rotation_exp(Vector3d(0.25 * std::sin(0.7 * at_s), 0.3 * std::sin(0.5 * at_s + 1), 0.2 * std::sin(0.3 * at_s)));
-  const Vector3d aside(8 * std::sin(0.45 * at_s), 6 * std::cos(0.6 * at_s), kLook_mm + 10 * std::sin(0.35 * at_s));
+Transform<Camera, Patient> OperationTruth::camera_within_patient(double at_s) const {
+  const double way_s = on_its_way_s(at_s);
+  const Eigen::Matrix3d turn = rotation_exp(
+      Vector3d(0.25 * std::sin(0.7 * way_s), 0.3 * std::sin(0.5 * way_s + 1), 0.2 * std::sin(0.3 * way_s)));
+  const Vector3d aside(8 * std::sin(0.45 * way_s), 6 * std::cos(0.6 * way_s), kLook_mm + 10 * std::sin(0.35 * way_s));
   return {turn, Vector3d(aside - turn * target_mm_)};
 }
 

@@ -5,6 +5,7 @@
 #include "calibration/base/units.hpp"
 #include "host/texts/texts.hpp"
 #include "hw-sim/base/hashed.hpp"
+#include "hw-sim/operation/bench_path.hpp"
 #include "hw-sim/operation/operation_window.hpp"
 
 namespace birdseye::hw_sim {
@@ -29,6 +30,7 @@ Surgeon::Surgeon(OperationTruth& truth, std::uint64_t seed, SurgeonDoes does)
 void Surgeon::stand_at(host::LiveWorkflow& workflow, double at_s) {
   workflow_ = &workflow;
   next_fiducial_ = touches_ = 0;
+  guided_since_s_ = at_s;
   at_landmark_ = matching_ = false;
   bare_since_s_ = views_since_s_ = at_s;
 }
@@ -105,11 +107,11 @@ void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
     hurries_until_s_ = at_s + OperationTruth::kHurry_s;
   }
   if (at_s < busy_until_s_) return;
+  if (workflow_->view().asks_for_instruments) workflow_->confirm_instruments();
+  if (workflow_->view().asks_for_patient) workflow_->confirm_patient();
   const host::OperationView view = workflow_->view();
-  if (view.asks_for_instruments) workflow_->confirm_instruments();
-  if (view.asks_for_patient) workflow_->confirm_patient();
   const bool connected = view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
-  if (view.board_named && view.step == LiveStep::calibrate) return calibrate(view, at_s, now);
+  if (truth_.at_board(at_s) && view.step == LiveStep::calibrate) return calibrate(view, at_s, now);
   if (!connected) return;
   if (truth_.at_board(at_s)) truth_.leave_board(at_s);
   if (view.step == LiveStep::connect || view.step == LiveStep::calibrate) workflow_->go_to(LiveStep::fiducials);

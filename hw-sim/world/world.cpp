@@ -15,6 +15,7 @@
 #include "hw-sim/phantom/implants.hpp"
 #include "hw-sim/world/between.hpp"
 #include "hw-sim/world/board_stations.hpp"
+#include "hw-sim/world/ease.hpp"
 
 namespace birdseye::hw_sim {
 

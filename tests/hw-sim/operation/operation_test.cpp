@@ -101,7 +101,8 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104
 /// - 1477: a bird that froze six seconds after birdseyed was started again, three of them over a damaged line, was
 ///   found out after eight records in place of three, for how often its record repeats was not known yet;
 /// - 66263751: damaged records among those of a bird that froze before birdseyed was started passed for signs of life;
-/// - 66263737: on a line that loses and damages records, one that came after 116 ms was 286 mm off.
+/// - 66263737: on a line that loses and damages records, one that came after 116 ms was 286 mm off;
+/// - 206351423: a law was wrong: of frames that are damaged by chance, the first comes when it comes.
 class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
@@ -110,11 +111,14 @@ TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms,
-                         ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751),
+                         ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751, 206351423),
                          [](const auto& of) { return std::to_string(of.param); });
 
 TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
-  const OperationOutcome out = operate({.seed = 3, .minutes = 1, .faults = FaultScript{}, .pictures = true});
+  const SimulatedOperation operation{.seed = 3, .minutes = 1, .faults = FaultScript{}, .pictures = true};
+  const OperationOutcome out = operate(operation), again = operate(operation);
+  EXPECT_EQ(out.log, again.log);
+  EXPECT_EQ(out.hash, again.hash);
   EXPECT_TRUE(out.broken.empty()) << told(out);
   EXPECT_EQ(out.registrations, 1U) << out.log;
   EXPECT_EQ(out.deformations, 1U) << out.log;
@@ -142,14 +146,19 @@ TEST(OperationWithPictures, AWindowThatIsOpenedAgainDoesNotAccuseThePoses) {
   EXPECT_EQ(out.log.find("do not agree"), std::string::npos) << out.log;
 }
 
+/// What is left of the places that are followed lies on rims and reflections, and does not go with the tissue.
+TEST(OperationWithPictures, PlacesThatAreWornAccuseNobody) {
+  const OperationOutcome out = operate({.seed = 41, .minutes = 0.5, .faults = FaultScript{}, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.log.find("do not agree"), std::string::npos) << out.log;
+}
+
 TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
   const OperationOutcome first = operate({.seed = 5, .minutes = 1.5}), again = operate({.seed = 5, .minutes = 1.5});
   EXPECT_EQ(first.log, again.log);
   EXPECT_EQ(first.hash, again.hash);
   EXPECT_EQ(first.time.order_hash, again.time.order_hash);
   EXPECT_NE(operate({.seed = 6, .minutes = 1.5}).hash, first.hash);
-  const SimulatedOperation seen{.seed = 5, .minutes = 0.5, .pictures = true};
-  EXPECT_EQ(operate(seen).hash, operate(seen).hash);
 }
 
 TEST(Operation, ItsFaultsAreReadBackFromTheScriptThatItWrites) {
@@ -224,6 +233,20 @@ TEST(OperationLaws, AFaultThatNobodyNamesAndThatDoesNotEndIsFound) {
   std::vector<std::string> broken;
   for (const BrokenLaw& law : laws.broken()) broken.push_back(law.law);
   EXPECT_EQ(broken, (std::vector<std::string>{"named", "over", "over"}));
+}
+
+TEST(OperationLaws, AFaultThatLastsForGoodIsNamedAndNotOver) {
+  FaultScript faults;
+  Fault frozen;
+  frozen.kind = FaultKind::frozen_pose;
+  frozen.at_s = 10;
+  faults.tracker.push_back(frozen);
+  const OperationTruth truth(1, 96, 72, Happenings(), false);
+  OperationLaws laws(
+      truth, faults, [](std::uint64_t) { return std::nullopt; }, 0);
+  laws.finish(60);
+  ASSERT_EQ(laws.broken().size(), 1U);
+  EXPECT_EQ(laws.broken().front().law, "named");
 }
 
 TEST(OperationLaws, AWindowThatForgetsTheRegistrationIsFound) {
