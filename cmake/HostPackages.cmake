@@ -35,6 +35,7 @@ target_link_libraries(birdseye_dcmtk INTERFACE DCMTK::dcmjpls DCMTK::dcmjpeg DCM
 find_path(GDCM_INCLUDE_DIR gdcmJPEG2000Codec.h PATH_SUFFIXES gdcm-3.0 REQUIRED)
 find_library(GDCM_MSFF_LIBRARY gdcmMSFF REQUIRED)
 find_library(GDCM_DSED_LIBRARY gdcmDSED REQUIRED)
+find_library(GDCM_COMMON_LIBRARY gdcmCommon REQUIRED)
 add_library(birdseye_gdcm INTERFACE)
 target_include_directories(birdseye_gdcm SYSTEM INTERFACE ${GDCM_INCLUDE_DIR})
-target_link_libraries(birdseye_gdcm INTERFACE ${GDCM_MSFF_LIBRARY} ${GDCM_DSED_LIBRARY})
+target_link_libraries(birdseye_gdcm INTERFACE ${GDCM_MSFF_LIBRARY} ${GDCM_DSED_LIBRARY} ${GDCM_COMMON_LIBRARY})
