@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   (void)file->type_fault();
   (void)file->gaps();
   (void)file->unread_place();
-  (void)file->fault(file->bytes_of(8));
+  (void)file->fault(file->bytes_of(8), file->bytes_of(2));
   if (const auto place = file->place_by("LPS"))
     testing::must(place->axes.allFinite() && file->says_a_place(), "a place of voxels is one");
   return 0;
