@@ -93,7 +93,7 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
 }
 
 void LiveWorkflow::use_reference(const std::string& name) {
-  if (name != reference_.name()) video_ = VideoWatch();  // from one pose to the next it would see a leap of the frame
+  if (name != reference_.name()) video_.forget_motion();
   reference_.use(name, settings_.scope);
   instruments_.set_reference(name);
 }

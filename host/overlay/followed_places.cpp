@@ -135,14 +135,18 @@ std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& pl
   return off;
 }
 
+std::optional<double> median_of_known(const std::vector<std::optional<double>>& off) {
+  std::vector<double> known;
+  known.reserve(off.size());
+  for (const std::optional<double>& one : off)
+    if (one) known.push_back(*one);
+  if (2 * known.size() <= off.size()) return std::nullopt;
+  return median_of(std::move(known));
+}
+
 std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
                                       double farthest_mm) {
-  std::vector<double> off;
-  off.reserve(places.size());
-  for (const std::optional<double>& one : off_line(places, now_from_then, farthest_mm))
-    if (one) off.push_back(*one);
-  if (2 * off.size() <= places.size()) return std::nullopt;
-  return median_of(std::move(off));
+  return median_of_known(off_line(places, now_from_then, farthest_mm));
 }
 
 std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& places, const Relative& now_from_then,

@@ -51,7 +51,9 @@ struct FollowedPlace {
 std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& places,
                                             const Transform<Camera, Camera>& now_from_then,
                                             double farthest_mm = kFarthestSeen_mm);
-/// Their median. Empty where most places would be behind the camera.
+/// The median of those that are known. Empty where most are not: they would be behind the camera.
+std::optional<double> median_of_known(const std::vector<std::optional<double>>& off);
+/// The same of how far places are off their lines.
 std::optional<double> median_off_line(const std::vector<FollowedPlace>& places,
                                       const Transform<Camera, Camera>& now_from_then,
                                       double farthest_mm = kFarthestSeen_mm);

@@ -114,7 +114,8 @@ void VideoMotion::take(DeviceTime acquired, const Transform<Tracker, Sensor>& tr
 /// Of a single pose, at a place ahead of the camera; another one once the camera has turned from it.
 void VideoMotion::note_noise(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor) {
   constexpr double kFarthest_mm = 200, kOfNewest = 0.1;
-  if (const auto newest = poses_.newest())
+  constexpr Duration kGap = Duration::from_ms(130);  // no longer than that tells how often poses come
+  if (const auto newest = poses_.newest(); newest && acquired - *newest <= kGap)
     between_poses_s_ += (between_poses_s_ == 0 ? 1 : kOfNewest) * ((acquired - *newest).seconds() - between_poses_s_);
   if (!of_) return;
   const Transform<Camera, Tracker> camera_from_tracker = of_->camera_from_sensor() * tracker_from_sensor.inverse();
@@ -299,20 +300,19 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
   return 2 * camera.fx_px * farthest / std::max((now.at - then.at).seconds(), 1e-3);
 }
 
-/// Whether a third of the places has been lost since the key's picture, and of what is left a quarter lies where it
-/// may. Places on rims and reflections do not go with the tissue, and are the last to be lost: in simulated operations
-/// they were more than half of what was left after two seconds.
-bool VideoMotion::are_worn(const std::vector<FollowedPlace>& places, const Transform<Camera, Camera>& motion,
-                           double allowed) const {
-  if (3 * places.size() >= 2 * key_->chosen) return false;
-  const auto off = off_line(places, motion);
+/// Whether a third of the key's places has been lost since they were chosen, and of what is left a quarter lies where
+/// it may. Places on rims and reflections do not go with the tissue, and are the last to be lost: where simulated
+/// operations without a fault accused the poses, half and more of what was left were such places.
+bool VideoMotion::is_worn(const std::vector<std::optional<double>>& off, double allowed) const {
+  if (3 * off.size() >= 2 * key_->chosen) return false;
   const auto agree = std::ranges::count_if(off, [allowed](const auto& one) { return one && *one <= allowed; });
-  return 4 * static_cast<std::size_t>(agree) >= places.size();
+  return 4 * static_cast<std::size_t>(agree) >= off.size();
 }
 
-/// odd: the places do not lie where the poses say. of_what_is_left: the same, but they are worn, or a quick motion has
-/// lost more than a third of them, and the rest may have been followed to others that look alike. Then state() becomes
-/// untold, not differs, and the video has to agree anew about each axis. What is worn does not contradict either.
+/// odd: the places do not lie where the poses say. of_what_is_left: the same, but a quick motion has lost more than a
+/// third of them, and the rest may have been followed to others that look alike; or the key is worn. Then state()
+/// becomes untold, not differs, and the video has to agree anew about each axis. A key that is worn, and not by a quick
+/// motion, does not contradict either.
 VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return Judged::not_odd;  // nothing says how far off a picture may be
@@ -326,9 +326,10 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
   }
   if (places.size() < kFewest) return Judged::not_odd;
   const Relative motion = now.camera_from_tracker * key_->from->camera_from_tracker.inverse();
-  const auto off = median_off_line(places, motion);
-  if (!off) return Judged::not_odd;
-  off_px_ = *off * camera.fx_px;
+  const auto off = off_line(places, motion);
+  const auto median_off = median_of_known(off);
+  if (!median_off) return Judged::not_odd;
+  off_px_ = *median_off * camera.fx_px;
   std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     const auto off_if_turned = median_off_if_turned(places, motion, axis, kTurned_rad);
@@ -350,10 +351,11 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
       if (state_ == VideoAgreement::agrees) state_ = VideoAgreement::in_doubt;
       return Judged::odd;
     }
-    const bool worn = are_worn(places, motion, allowed_px / camera.fx_px);
-    contradicted_ = state_ != VideoAgreement::differs && !worn;
+    const bool swung = 3 * key_->left < 2 * key_->agreed;
+    const bool worn = is_worn(off, allowed_px / camera.fx_px);
+    contradicted_ = state_ != VideoAgreement::differs && (swung || !worn);
     told_ = {};
-    if (3 * key_->left < 2 * key_->agreed || worn) {
+    if (swung || worn) {
       if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;
       odd_ = 0;
       return Judged::of_what_is_left;

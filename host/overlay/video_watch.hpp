@@ -39,6 +39,12 @@ class VideoWatch {
     return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted()};
   }
 
+  /// The poses are in another frame from now on: from one to the next they would leap.
+  void forget_motion() {
+    motion_ = VideoMotion();
+    sudden_ = SuddenMotion();
+  }
+
   [[nodiscard]] VideoAgreement motion() const { return motion_.state(); }
   [[nodiscard]] calibration::FieldSize field() const { return field_.state(); }
   void enter(TrustFigures& figures) const {

@@ -32,10 +32,17 @@ std::string BenchPath::spec() {
   return fmt::format("chessboard:{}x{}:{:g}mm", board().columns, board().rows, board().square_mm);
 }
 
-BenchPath::BenchPath(const Transform<Tracker, Marker>& tracker_from_marker, const CameraModel& lens, std::uint64_t seed)
-    : tracker_from_marker_(tracker_from_marker) {
-  for (const auto& station : stations_over(board(), lens, seed, kStations))
-    stations_.push_back(tracker_from_marker * station);
+Result<BenchPath> BenchPath::create(const Transform<Tracker, Marker>& tracker_from_marker, const CameraModel& lens,
+                                    std::uint64_t seed) {
+  const auto stations = stations_over(board(), lens, seed, kStations);
+  if (stations.size() < kStations)
+    return Error{Errc::degenerate,
+                 fmt::format("the scope sees the whole board from {} stations only, of {}: take another seed",
+                             stations.size(), kStations)};
+  BenchPath path;
+  path.tracker_from_marker_ = tracker_from_marker;
+  for (const auto& station : stations) path.stations_.push_back(tracker_from_marker * station);
+  return path;
 }
 
 Transform<Tracker, Camera> BenchPath::at(double at_s) const {

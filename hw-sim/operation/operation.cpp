@@ -37,7 +37,6 @@ struct VideoSize {
   int width_px, height_px;
 };
 constexpr VideoSize kGrey{96, 72}, kPictures{160, 120}, kOfBoard{192, 144};  // smaller, no board is found
-constexpr double kVideo_hz = 25;
 constexpr double kAtBoard = 0.3;  // of operations with pictures: the scope is calibrated at their beginning
 constexpr double kFaultsFrom_s = 20, kQuietAtEnd_s = 10;
 constexpr Duration kScreen = Duration::from_ms(20);  // from one picture on the screen to the next
@@ -334,7 +333,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   WindowSettings window;
   window.video_must_agree = operation.pictures;
   if (at_board) {
-    truth.begin_at_board(operation.seed);
+    if (const auto begun = truth.begin_at_board(operation.seed); !begun) return begun.error();
     const auto pattern = calibration::parse_pattern(BenchPath::spec());
     if (!pattern) return pattern.error();
     window.pattern = *pattern;

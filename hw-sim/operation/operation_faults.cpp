@@ -75,8 +75,8 @@ Fault usual(FaultKind kind) {
 
 /// Until a frame is hit, of those that each are with the fault's chance.
 double strikes_within_s(const Fault& fault) {
-  constexpr double kNever = 1e-6, kFrames_hz = 25, kMostChance = 0.99;
-  return std::log(kNever) / std::log1p(-std::min(fault.value("chance"), kMostChance)) / kFrames_hz;
+  constexpr double kNever = 1e-6, kMostChance = 0.99;
+  return std::log(kNever) / std::log1p(-std::min(fault.value("chance"), kMostChance)) / kVideo_hz;
 }
 
 FaultSigns of_camera(const Fault& fault) {

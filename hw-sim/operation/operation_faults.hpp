@@ -9,6 +9,8 @@
 
 namespace birdseye::hw_sim {
 
+inline constexpr double kVideo_hz = 25;  ///< frames a second of an operation's camera
+
 /// What a fault of an instrument may do to what the appliance says, and by what the appliance tells of it
 /// (docs/manual/faults.md).
 struct FaultSigns {

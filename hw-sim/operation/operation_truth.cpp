@@ -161,9 +161,13 @@ Transform<Camera, Marker> OperationTruth::camera_from_marker(double at_s) const 
 }
 
 /// As far from the transmitter as the patient, so that all sensors are in range above it too.
-void OperationTruth::begin_at_board(std::uint64_t seed) {
+Result<void> OperationTruth::begin_at_board(std::uint64_t seed) {
   const Vector3d place_mm(380, -30, 160);
-  bench_.emplace(Transform<Tracker, Marker>(at_rest_.rotation(), place_mm), lens_, hashed_word(seed, 7));
+  auto bench =
+      BenchPath::create(Transform<Tracker, Marker>(at_rest_.rotation(), place_mm), lens_, hashed_word(seed, 7));
+  if (!bench) return std::move(bench).error();
+  bench_ = *std::move(bench);
+  return {};
 }
 
 Transform<Tracker, Sensor> OperationTruth::tracker_from_sensor(std::size_t bird, double at_s) const {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
 #include "calibration/geometry/transform.hpp"
 #include "calibration/record/calibration_record.hpp"
@@ -26,7 +27,7 @@ class OperationTruth {
   OperationTruth(std::uint64_t seed, int width_px, int height_px, Happenings happenings, bool reference);
 
   /// The scope has yet to be calibrated: from the beginning on it goes about over a board.
-  void begin_at_board(std::uint64_t seed);
+  Result<void> begin_at_board(std::uint64_t seed);
   /// It goes to the patient from then on.
   void leave_board(double at_s) { left_board_s_ = at_s; }
   [[nodiscard]] bool at_board(double at_s) const { return bench_ && at_s < left_board_s_; }
