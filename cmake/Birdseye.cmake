@@ -48,10 +48,12 @@ endfunction()
 # The key of the machine on which tests run: never that of whoever runs them.
 set(BIRDSEYE_TEST_IDENTITY ${CMAKE_BINARY_DIR}/test-identity)
 
-# One executable of GoogleTests; LABEL is unit, hw, gl or e2e. ALONE: nothing else runs beside one of them, for a machine
-# that is busy with other things would rightly show or keep less than it looks for.
+# One executable of GoogleTests; LABEL is unit, hw, gl, e2e or realtime. Beside one of realtime nothing else runs, for a
+# machine that is busy with other things would rightly show or keep less than it looks for.
+# STUDIES: those of its tests that take long, by GoogleTest's patterns. Their label is study: ./run studies runs them, and
+# ./run test all others.
 function(birdseye_test name)
-  cmake_parse_arguments(ARG "ALONE" "LABEL;TIMEOUT" "SOURCES;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;PRIVATE;STUDIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_PRIVATE} birdseye_options GTest::gmock_main)
   if(NOT ARG_LABEL)
@@ -65,13 +67,23 @@ function(birdseye_test name)
   list(JOIN CMAKE_CROSSCOMPILING_EMULATOR " " emulator)
   target_compile_definitions(${name} PRIVATE BIRDSEYE_EMULATOR="${emulator}")
   set(alone "")
-  if(ARG_ALONE)
+  if(ARG_LABEL STREQUAL "realtime")
     set(alone RUN_SERIAL TRUE)
   endif()
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-    PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT} ${alone}
-      ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}"
-      ENVIRONMENT_MODIFICATION "BIRDSEYE_IDENTITY=set:${BIRDSEYE_TEST_IDENTITY}")
+  list(JOIN ARG_STUDIES ":" studies)
+  foreach(label ${ARG_LABEL} study)
+    if(label STREQUAL "study")
+      set(filter "${studies}")
+    else()
+      set(filter "*-${studies}")
+    endif()
+    if(NOT filter STREQUAL "")
+      gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${filter}" TEST_LIST ${name}_${label}
+        PROPERTIES LABELS ${label} TIMEOUT ${ARG_TIMEOUT} ${alone}
+          ENVIRONMENT "BIRDSEYE_SOURCE_DIR=${CMAKE_SOURCE_DIR}"
+          ENVIRONMENT_MODIFICATION "BIRDSEYE_IDENTITY=set:${BIRDSEYE_TEST_IDENTITY}")
+    endif()
+  endforeach()
 endfunction()
 
 # A program that gives bytes to one parser: main is libFuzzer's, which clang alone has. Built by its name or with all of its

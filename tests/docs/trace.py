@@ -27,7 +27,7 @@ class Evidence:
 
     def __init__(self, root):
         self.places = {}  # of each name the file, from the root
-        self.apart = set()  # what ./run test does not run
+        self.apart = set()  # what neither ./run test nor ./run studies runs
         self.useless = {}  # what is there and holds nothing, and why
         self._tests(root)
         for page, read in (("lies", self._lie), ("faults", self._fault), ("inputs", self._input)):
@@ -101,7 +101,7 @@ def faults_of_tests(tests, evidence):
         if tests.count(name) > 1:
             yield f"tests: {name}: stands twice"
     if all(name in evidence.apart for name in tests):
-        yield "tests: ./run test runs none of them"
+        yield "tests: neither ./run test nor ./run studies runs one of them"
 
 
 def faults_of(one, folder, evidence):

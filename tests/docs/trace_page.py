@@ -18,7 +18,7 @@ How to read it:
   puts this into a medical device judges both in a risk file of their own, for which these rows are a beginning.
 - **Control** is what the product does about it; after *it leaves* stands what that does not see.
 - **Held by**: a name as `Suite.Name` is a GoogleTest. *lies*, *faults* and *inputs* are rows of [lies](lies.md),
-  [faults](faults.md) and [inputs](inputs.md), each written and held by a test. `./run test` runs them, but for those with a star:
+  [faults](faults.md) and [inputs](inputs.md), each written and held by a test. `./run test` and `./run studies` run them, but for those with a star:
   `./run faults` and `./run vm-test` run these.
 
 """

@@ -113,7 +113,7 @@ class Trace(unittest.TestCase):
             (self.citing("inputs: record: a fish"), "tests: inputs: record: a fish: what happens is not what is expected"),
             (self.citing("inputs: replay: a full folder"), "tests: inputs: replay: a full folder: there is no such test or row"),
             (self.citing("Overlay.Goes", "Overlay.Goes"), "tests: Overlay.Goes: stands twice"),
-            (self.citing("Apart.Runs", "faults: tracker unplug"), "tests: ./run test runs none of them"),
+            (self.citing("Apart.Runs", "faults: tracker unplug"), "tests: neither ./run test nor ./run studies runs one of them"),
             (without("control"), "control: is missing"),
             (changed('"The overlay goes."', '""'), "control: needs words"),
             (without("harm"), "harm: is missing"),

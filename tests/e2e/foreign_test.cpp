@@ -85,15 +85,15 @@ TEST(ForeignCommands, LiveGoesOnOnlyOnceTheScopeIsNamed) {
   ForeignServer server(true);
   const Scratch scratch;
   const testing::Display display("1280x720");
+  const std::string brief = scratch.file("brief.txt", "wait connect 3\nend\n");
   const std::string script = scratch.file("script.txt", "wait connect 15\nsleep 1\nend\n");
   const std::string common = "live --server 127.0.0.1:" + std::to_string(server.port()) + " --ct " +
-                             testing::small_ct(scratch) + " --script " + script + " --json " +
-                             (scratch / "live.json").string();
-  const auto unnamed = run("birdseye", common, display.env());
+                             testing::small_ct(scratch) + " --json " + (scratch / "live.json").string() + " --script ";
+  const auto unnamed = run("birdseye", common + brief, display.env());
   EXPECT_NE(unnamed.code, 0);
   EXPECT_THAT(unnamed.output, HasSubstr("several devices send poses, \"ProbeToTracker\", \"StylusToTracker\": say by "
                                         "--scope-device which are the scope's"));
-  const auto named = run("birdseye", common + " --scope-device ProbeToTracker", display.env());
+  const auto named = run("birdseye", common + script + " --scope-device ProbeToTracker", display.env());
   ASSERT_EQ(named.code, 0) << named.output;
   const nlohmann::json json = read_json(scratch / "live.json");
   EXPECT_GT(json["frames"].get<int>(), 10);

@@ -8,7 +8,7 @@ INTRODUCTION = """# Inputs, and what comes of them
 
 What the commands do with good, odd and wrong inputs. The table is written by a test (`tests/inputs`) that makes each input, runs the command
 and holds exit code, verdict, words, files and figures against what a user would expect: `./run inputs` writes the page anew and fails where a
-row differs. `./run test` runs all rows but the slow ones. Expectations were written before the commands were run first; where the two differed, the
+row differs. `./run studies` runs all rows but the slow ones. Expectations were written before the commands were run first; where the two differed, the
 program was mended, or the expectation was put right.
 
 How to read it:
