@@ -5,10 +5,12 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <mutex>
@@ -35,11 +37,38 @@ bool& is_copy() {
   return is;
 }
 
-/// The copy's part: never returns.
-[[noreturn]] void run_copy(int fd, pid_t parent, const std::function<void(const ProcessCopy::Send&)>& work) {
+/// Whether all of them came.
+bool take_from(int fd, void* to, std::size_t size) {
+  auto* bytes = static_cast<char*>(to);
+  while (size > 0) {
+    const ssize_t got = ::read(fd, bytes, size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    bytes += got;
+    size -= static_cast<std::size_t>(got);
+  }
+  return true;
+}
+
+/// All that is open but standard input, output and error, and these two; -1: none.
+void close_all_but(int one, int other) {
+  unsigned from = STDERR_FILENO + 1;
+  for (const int kept : {std::min(one, other), std::max(one, other)}) {
+    if (kept < static_cast<int>(from)) continue;
+    if (static_cast<unsigned>(kept) > from) ::close_range(from, static_cast<unsigned>(kept) - 1, 0);
+    from = static_cast<unsigned>(kept) + 1;
+  }
+  ::close_range(from, ~0U, 0);
+}
+
+/// The copy's part: never returns. from: what it is given, -1 where it does not listen.
+[[noreturn]] void run_copy(int fd, int from, pid_t parent,
+                           const std::function<void(const ProcessCopy::Take&, const ProcessCopy::Send&)>& work) {
   is_copy() = true;
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(1);  // it has ended already, which no signal tells any more
+  if (from < 0) {  // one that listens is told of its parent's end by nothing more to take
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(1);  // it has ended already, which no signal tells any more
+  }
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
   if (const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {
@@ -47,21 +76,20 @@ bool& is_copy() {
     ::dup2(nowhere, STDERR_FILENO);
   }
   // Links to an appliance and files that are being written are the parent's alone.
-  const auto own = static_cast<unsigned>(fd);
-  if (own > STDERR_FILENO + 1) ::close_range(STDERR_FILENO + 1, own - 1, 0);
-  ::close_range(own + 1, ~0U, 0);
+  close_all_but(fd, from);
   // What work throws must not unwind into the copied stack: the objects on it are not ours to end.
   try {
-    work([fd](const void* data, std::size_t size) {
-      const auto* bytes = static_cast<const char*>(data);
-      while (size > 0) {
-        const ssize_t put = ::write(fd, bytes, size);
-        if (put < 0 && errno == EINTR) continue;
-        if (put <= 0) ::_exit(1);
-        bytes += put;
-        size -= static_cast<std::size_t>(put);
-      }
-    });
+    work([from](void* to, std::size_t size) { return take_from(from, to, size); },
+         [fd](const void* data, std::size_t size) {
+           const auto* bytes = static_cast<const char*>(data);
+           while (size > 0) {
+             const ssize_t put = ::write(fd, bytes, size);
+             if (put < 0 && errno == EINTR) continue;
+             if (put <= 0) ::_exit(1);
+             bytes += put;
+             size -= static_cast<std::size_t>(put);
+           }
+         });
   } catch (...) {
     ::_exit(1);
   }
@@ -74,6 +102,18 @@ CopiesHeldOff::CopiesHeldOff()
     : held_(is_copy() ? std::shared_lock<std::shared_mutex>() : std::shared_lock(copying())) {}
 
 Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& work) {
+  return start([&work](const Take&, const Send& send) { work(send); }, UniqueFd(), UniqueFd());
+}
+
+Result<ProcessCopy> ProcessCopy::start_listening(const std::function<void(const Take&, const Send&)>& work) {
+  std::array<int, 2> ends{};  // a pipe whose reader has ended would end this process too, by SIGPIPE
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
+    return Error{Errc::io, fmt::format("no way to a process of its own: {}", std::strerror(errno))};
+  return start(work, UniqueFd(ends[0]), UniqueFd(ends[1]));
+}
+
+Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Take&, const Send&)>& work, UniqueFd from,
+                                       UniqueFd to) {
   auto pipe = Pipe::open();
   if (!pipe) return std::move(pipe).error();
   constexpr int kPipeBytes = 1 << 20;  // a volume is hundreds of megabytes
@@ -90,9 +130,23 @@ Result<ProcessCopy> ProcessCopy::start(const std::function<void(const Send&)>& w
   }
   if (child == 0) {
     pipe->out = UniqueFd();
-    run_copy(pipe->in.get(), parent, work);
+    run_copy(pipe->in.get(), from.get(), parent, work);
   }
-  return ProcessCopy(child, std::move(pipe->out));
+  return ProcessCopy(child, std::move(pipe->out), std::move(to));
+}
+
+Result<void> ProcessCopy::give(const void* data, std::size_t size, Deadline deadline) {
+  const auto* bytes = static_cast<const char*>(data);
+  while (size > 0) {
+    if (deadline.passed()) return Error{Errc::timeout, "did not take what it was given"};
+    if (wait_ready(to_.get(), POLLOUT, deadline) == 0) continue;
+    const ssize_t put = ::send(to_.get(), bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (put < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (put <= 0) return ended();
+    bytes += put;
+    size -= static_cast<std::size_t>(put);
+  }
+  return {};
 }
 
 ProcessCopy::~ProcessCopy() {

@@ -26,8 +26,8 @@ class CopiesHeldOff {
 };
 
 /// A copy of this process that does one piece of work and sends what comes of it through a pipe. Its output goes
-/// nowhere, its death does not end this process, and it does not outlive the thread that made it. It is killed when
-/// this goes out of scope.
+/// nowhere, its death does not end this process, and it does not outlive the thread that made it, or, where it listens,
+/// this process. It is killed when this goes out of scope.
 class ProcessCopy {
  public:
   /// Sends bytes to the process that asked for the work.
@@ -36,7 +36,16 @@ class ProcessCopy {
   /// work: must not use threads of this process, and what it throws ends the copy. It may start further copies, which
   /// end with it.
   static Result<ProcessCopy> start(const std::function<void(const Send&)>& work);
-  ProcessCopy(ProcessCopy&& other) noexcept : process_(std::exchange(other.process_, -1)), fd_(std::move(other.fd_)) {}
+
+  /// Takes the next bytes of give(). False: no more will come.
+  using Take = std::function<bool(void* to, std::size_t size)>;
+  /// The same for work that listens, and returns when nothing more comes.
+  static Result<ProcessCopy> start_listening(const std::function<void(const Take&, const Send&)>& work);
+  /// To work that listens. Errc::timeout: it had not taken all by the deadline. Errc::disconnected: it has ended.
+  Result<void> give(const void* data, std::size_t size, Deadline deadline);
+
+  ProcessCopy(ProcessCopy&& other) noexcept
+      : process_(std::exchange(other.process_, -1)), fd_(std::move(other.fd_)), to_(std::move(other.to_)) {}
   ProcessCopy& operator=(ProcessCopy&&) = delete;
   ~ProcessCopy();
 
@@ -47,12 +56,15 @@ class ProcessCopy {
   [[nodiscard]] pid_t pid() const { return process_; }
 
  private:
-  ProcessCopy(pid_t process, UniqueFd fd) : process_(process), fd_(std::move(fd)) {}
+  ProcessCopy(pid_t process, UniqueFd fd, UniqueFd to) : process_(process), fd_(std::move(fd)), to_(std::move(to)) {}
+  static Result<ProcessCopy> start(const std::function<void(const Take&, const Send&)>& work, UniqueFd from,
+                                   UniqueFd to);
   std::optional<int> kill();
   Error ended();
 
   pid_t process_;
-  UniqueFd fd_;
+  UniqueFd fd_;  ///< what it sends
+  UniqueFd to_;  ///< what it is given; none where it does not listen
 };
 
 }  // namespace birdseye

@@ -10,7 +10,6 @@
 #include "host/calibrate/camera_report.hpp"
 #include "host/calibrate/picture_views.hpp"
 #include "host/calibrate/view_pairs.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 #include "host/files/write_files.hpp"

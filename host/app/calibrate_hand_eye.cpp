@@ -14,7 +14,6 @@
 #include "host/calibrate/hand_eye_rod.hpp"
 #include "host/calibrate/hand_eye_solution.hpp"
 #include "host/calibrate/picture_views.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/column_names.hpp"
 #include "host/files/text_files.hpp"

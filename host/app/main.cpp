@@ -1,8 +1,10 @@
 #include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
+#include "host/confine/run_confined.hpp"
 
 int main(int argc, char** argv) {
   using namespace birdseye::host;
+  stand_by_to_confine();  // before there are threads
   CLI::App app{"birdseye: a registered, deformable CT over live laparoscopic video", "birdseye"};
   app.set_version_flag("--version", "birdseye " BIRDSEYE_VERSION);
   app.require_subcommand(1);

@@ -9,7 +9,6 @@
 #include "calibration/detect/pattern.hpp"
 #include "host/calibrate/hand_eye_stereo.hpp"
 #include "host/calibrate/picture_views.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/name_order.hpp"
 

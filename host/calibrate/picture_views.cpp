@@ -102,7 +102,7 @@ void bring_back(const cv::Mat& stretched, const cv::Mat& grey, calibration::Patt
 
 Looked look(const calibration::Pattern& pattern, const fs::path& path, double pixel_aspect) {
   Looked looked;
-  const cv::Mat grey = read_mat(path, cv::IMREAD_GRAYSCALE);
+  const cv::Mat grey = read_grey_mat(path);
   if (grey.empty()) return looked;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;

@@ -16,7 +16,6 @@
 #include "calibration/base/nesting.hpp"
 #include "calibration/base/parser_words.hpp"
 #include "host/case/named_landmarks.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/read_mat.hpp"
 #include "host/files/text_files.hpp"
@@ -258,7 +257,7 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   const auto image = table.path("image");
   if (!image) return image.error();
   view.name = fs::relative(*image, folder.empty() ? "." : folder).string();
-  const cv::Mat bgr = read_mat(*image, cv::IMREAD_COLOR);
+  const cv::Mat bgr = read_bgr_mat(*image);
   if (bgr.empty()) return table.wrong("image", image->string() + " is no picture that can be read");
   const auto camera = table.get<std::string>("camera");  // which may name one of several behind a colon
   if (!camera) return camera.error();
@@ -284,7 +283,7 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   if (table.has("mask")) {
     const auto mask_path = table.path("mask");
     if (!mask_path) return mask_path.error();
-    const cv::Mat mask = read_mat(*mask_path, cv::IMREAD_GRAYSCALE);
+    const cv::Mat mask = read_grey_mat(*mask_path);
     if (mask.size() != grey.size())
       return table.wrong("mask", mask_path->string() + " is no picture of the image's size");
     constexpr int kCounts = 128;

@@ -66,8 +66,9 @@ struct Released {
 };
 
 /// Allows what a decoder does, on any machine, and nothing that opens a socket, starts a program, ends another process,
-/// or writes to a file. What is not allowed fails with EPERM, as it does for a user without the right.
-bool bound_system_calls() {
+/// or writes to a file; opens: it may open files to read. What is not allowed fails with EPERM, as it does for a user
+/// without the right.
+bool bound_system_calls(bool opens) {
   const std::unique_ptr<void, Released> filter(seccomp_init(SCMP_ACT_ERRNO(EPERM)));
   if (filter == nullptr) return false;
   constexpr std::array kFree{
@@ -99,8 +100,10 @@ bool bound_system_calls() {
   };
   for (const char* name : kFree) allow(name);
   constexpr scmp_datum_t kWrites = O_ACCMODE | O_CREAT | O_TRUNC | O_APPEND;
-  allow("open", {SCMP_A1(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
-  allow("openat", {SCMP_A2(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
+  if (opens) {
+    allow("open", {SCMP_A1(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
+    allow("openat", {SCMP_A2(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
+  }
   // Its own limits, and its own end where an assertion fails; a copy of it ends in another way then.
   const auto self = static_cast<scmp_datum_t>(::getpid());
   allow("prlimit64", {SCMP_A0(SCMP_CMP_EQ, 0)});
@@ -109,10 +112,7 @@ bool bound_system_calls() {
   return holds && seccomp_load(filter.get()) == 0;
 }
 
-}  // namespace
-
-Confinement confine_to(const fs::path& input) {
-  const Readable readable = readable_for(input);
+Confinement confine_to(const Readable& readable, bool opens) {
   const Allowance allowance = allowance_of(readable.bytes);
   bound_memory(allowance.memory_bytes);
   bound_processor_time(allowance.processor_time);
@@ -120,8 +120,18 @@ Confinement confine_to(const fs::path& input) {
   Confinement confinement;
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return confinement;
   confinement.files = bound_files(readable.paths);
-  confinement.system_calls = bound_system_calls();
+  confinement.system_calls = bound_system_calls(opens);
   return confinement;
+}
+
+}  // namespace
+
+Confinement confine_to(const fs::path& input) {
+  return confine_to(readable_for(input), true);
+}
+
+Confinement confine_to_bytes(std::uintmax_t bytes) {
+  return confine_to(Readable{{}, bytes}, false);
 }
 
 void allow_time_for(const fs::path& file) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 #include "host/confine/allowance.hpp"
@@ -16,6 +17,8 @@ struct Confinement {
 /// allowance of the input's size and at most half of the machine's memory, and write to what is open. For a decoder's
 /// process (ProcessCopy), which has one thread. docs/decisions/0039-confined-decoders.md says what is left out.
 Confinement confine_to(const std::filesystem::path& input);
+/// The same of an input of so many bytes that this process has already: it opens no file at all.
+Confinement confine_to_bytes(std::uintmax_t bytes);
 
 /// In a confined process, before it reads a file of its input: the processor time that this file justifies begins now.
 /// A process that takes longer ends by SIGXCPU.

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "calibration/base/result.hpp"
 #include "calibration/geometry/camera_model.hpp"
+#include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/geometry/transform.hpp"
 
 namespace birdseye::host {
@@ -31,5 +33,12 @@ Result<std::string> kalibr_text(const CameraModel& left, const CameraModel& righ
 
 /// right_from_left, mm: a 4x4 matrix as text, or T_cn_cnm1 of a camera of Kalibr's camchain (camchain.yaml:cam1).
 Result<Eigen::Matrix4d> read_camera_relation(const std::filesystem::path& path);
+
+/// camera_covariance (9x9: fx fy cx cy in px, k1 k2 p1 p2 k3) of a camera file in OpenCV's YAML, as `calibrate camera`
+/// writes it. Empty where the file holds none or is of another program; an error where it holds another matrix, or one
+/// with a variance below zero.
+Result<std::optional<CameraMatrix>> read_camera_covariance(const std::filesystem::path& path);
+/// What to append to camera_text.
+std::string camera_covariance_text(const CameraMatrix& covariance);
 
 }  // namespace birdseye::host

@@ -34,7 +34,7 @@ cv::Point point_of(const Eigen::Vector2d& p) {
 Result<Picture> read_picture(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) return Error{Errc::not_found, path.string() + ": no such file"};
-  const cv::Mat read = read_mat(path, cv::IMREAD_COLOR);
+  const cv::Mat read = read_bgr_mat(path);
   if (read.empty()) return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};
   Picture picture{read.cols, read.rows, {}};
   picture.rgb.resize(3 * read.total());

@@ -1,71 +1,80 @@
 #include "host/files/read_mat.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <iostream>
-#include <mutex>
+#include <cstdint>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <string_view>
 #include <system_error>
+
+#include "drivers/system/whole_file.hpp"
+#include "host/confine/run_confined.hpp"
 
 namespace birdseye::host {
 
 namespace {
 
-/// While any of these lives, what is written to std::cerr is lost: OpenCV's readers tell their faults there, and their
-/// exceptions, in words for programmers.
-class QuietCerr {
- public:
-  QuietCerr() {
-    const std::lock_guard lock(mutex());
-    if (alive()++ == 0) said_to() = std::cerr.rdbuf(nullptr);
-  }
-  ~QuietCerr() {
-    const std::lock_guard lock(mutex());
-    if (--alive() == 0) std::cerr.rdbuf(said_to());
-  }
-  QuietCerr(const QuietCerr&) = delete;
-  QuietCerr& operator=(const QuietCerr&) = delete;
+constexpr std::size_t kMostFileBytes = 256U << 20U;
+constexpr std::size_t kMostPixelBytes = 768U << 20U;  // 16,384 pixels squared, of three bytes
+constexpr std::int32_t kMostSidePx = 1 << 16;
 
- private:
-  static std::mutex& mutex() {
-    static std::mutex one;
-    return one;
-  }
-  static int& alive() {
-    static int count = 0;
-    return count;
-  }
-  static std::streambuf*& said_to() {
-    static std::streambuf* buffer = nullptr;
-    return buffer;
-  }
+/// Of a picture that comes back; its pixels follow, row by row.
+struct Size {
+  std::int32_t rows = 0, columns = 0;
 };
 
-/// Whether it is a PNG without its last chunk; the reader would say so on standard error, past std::cerr.
-bool is_cut_png(const std::filesystem::path& path) {
-  constexpr std::streamoff kLastBytes = 64;
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const std::streamoff size = file.tellg();
-  std::string first(4, '\0'), last(static_cast<std::size_t>(std::clamp<std::streamoff>(size, 0, kLastBytes)), '\0');
-  file.seekg(0);
-  file.read(first.data(), static_cast<std::streamsize>(first.size()));
-  file.seekg(std::max<std::streamoff>(0, size - kLastBytes));
-  file.read(last.data(), static_cast<std::streamsize>(last.size()));
-  return first == "\x89PNG" && last.find("IEND") == std::string::npos;
+/// In the confined process: Size and pixels; nothing where it is no picture.
+template <cv::ImreadModes kMode>
+std::string decoded(std::string_view file) {
+  const auto bytes = static_cast<int>(file.size());
+  const cv::Mat in(1, bytes, CV_8U, const_cast<char*>(file.data()));  // NOLINT: it is only read
+  cv::Mat picture;
+  try {
+    picture = cv::imdecode(in, kMode);
+  } catch (const cv::Exception&) {  // a size that no picture has
+    return {};
+  }
+  if (picture.empty()) return {};
+  const Size size{picture.rows, picture.cols};
+  std::string out(sizeof size + picture.total() * picture.elemSize(), '\0');
+  std::memcpy(out.data(), &size, sizeof size);
+  std::memcpy(out.data() + sizeof size, picture.data, out.size() - sizeof size);
+  return out;
+}
+
+/// Whether it is a PNG without its last chunk, of which the decoder gives a part.
+bool is_cut_png(std::string_view file) {
+  constexpr std::size_t kLastBytes = 64;
+  const std::string_view last = file.substr(file.size() - std::min(file.size(), kLastBytes));
+  return file.substr(0, 4) == "\x89PNG" && last.find("IEND") == std::string_view::npos;
+}
+
+/// By what the confined process sends, which is not to be trusted.
+cv::Mat read_mat(const std::filesystem::path& path, ConfinedWork decode, int type) {
+  const auto file = read_whole_file(path, kMostFileBytes);
+  if (!file || file->empty() || is_cut_png(*file)) return {};
+  const auto came = run_confined(decode, *file, sizeof(Size) + kMostPixelBytes);
+  Size size;
+  if (!came || came->size() < sizeof size) return {};
+  std::memcpy(&size, came->data(), sizeof size);
+  const std::string_view pixels = std::string_view(*came).substr(sizeof size);
+  if (size.rows <= 0 || size.columns <= 0 || size.rows > kMostSidePx || size.columns > kMostSidePx) return {};
+  const auto side = [](std::int32_t px) { return static_cast<std::size_t>(px); };
+  if (side(size.rows) * side(size.columns) * side(CV_ELEM_SIZE(type)) != pixels.size()) return {};
+  cv::Mat picture(size.rows, size.columns, type);
+  std::memcpy(picture.data, pixels.data(), pixels.size());
+  return picture;
 }
 
 }  // namespace
 
-cv::Mat read_mat(const std::filesystem::path& path, cv::ImreadModes mode) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return {};  // a pipe would be waited for
-  if (is_cut_png(path)) return {};
-  const QuietCerr quiet;
-  try {
-    return cv::imread(path.string(), mode);
-  } catch (const cv::Exception&) {  // a size that no picture has
-    return {};
-  }
+cv::Mat read_grey_mat(const std::filesystem::path& path) {
+  return read_mat(path, decoded<cv::IMREAD_GRAYSCALE>, CV_8UC1);
+}
+
+cv::Mat read_bgr_mat(const std::filesystem::path& path) {
+  return read_mat(path, decoded<cv::IMREAD_COLOR>, CV_8UC3);
 }
 
 const char* why_no_picture(const std::filesystem::path& path) {
@@ -75,8 +84,10 @@ const char* why_no_picture(const std::filesystem::path& path) {
       std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
     return "it is no file but a folder, a pipe or a device";
   if (!failed && bytes == 0) return "the file is empty";
-  if (!std::ifstream(path)) return "the file cannot be opened";
-  return is_cut_png(path) ? "the file is cut short" : "the file is damaged, or no picture";
+  if (!failed && bytes > kMostFileBytes) return "the file is larger than any picture";
+  const auto file = read_whole_file(path, kMostFileBytes);
+  if (!file) return "the file cannot be opened";
+  return is_cut_png(*file) ? "the file is cut short" : "the file is damaged, or no picture";
 }
 
 }  // namespace birdseye::host

@@ -2,15 +2,16 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 namespace birdseye::host {
 
-/// A picture as OpenCV reads it; empty where it is none, or cut short. OpenCV says nothing on standard error: the
-/// caller names the file.
-cv::Mat read_mat(const std::filesystem::path& path, cv::ImreadModes mode);
+/// A picture in grey; empty where it is none, or cut short: the caller names the file. OpenCV decodes it in a process
+/// of its own, confined (docs/decisions/0039-confined-decoders.md).
+cv::Mat read_grey_mat(const std::filesystem::path& path);
+/// The same in OpenCV's blue, green and red.
+cv::Mat read_bgr_mat(const std::filesystem::path& path);
 
-/// Why read_mat gives nothing: "the file is empty".
+/// Why they give nothing: "the file is empty".
 const char* why_no_picture(const std::filesystem::path& path);
 
 }  // namespace birdseye::host

@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/whole_file.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/registration_file.hpp"
 #include "host/files/text_files.hpp"

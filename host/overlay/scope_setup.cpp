@@ -5,7 +5,6 @@
 #include "calibration/base/units.hpp"
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
 #include "calibration/record/calibration_record.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/text_files.hpp"
 

@@ -1,6 +1,5 @@
 // A lens as OpenCV, ROS and Kalibr write it, and where a camera is against another.
 
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/poses.hpp"

@@ -102,7 +102,7 @@ class Build:
         for word in words[1:]:
             if re.fullmatch("[A-Z_]+", word):
                 part = word if word != "EXCLUDE_FROM_ALL" else part
-                if strict and part not in ("SOURCES", "NOT_ALONE", "PUBLIC", "PRIVATE", "LABEL", "TIMEOUT", "STUDIES"):
+                if strict and part not in ("SOURCES", "NOT_ALONE", "PUBLIC", "PRIVATE", "LABEL", "STUDIES"):
                     self.tell(f"{word} of {target.name}")
             elif part in ("SOURCES", "NOT_ALONE"):
                 self.source(here, target.sources if part == "SOURCES" else target.not_alone, word, strict)

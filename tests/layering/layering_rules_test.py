@@ -250,7 +250,7 @@ KEEPS = [
     {"calibration/base/CMakeLists.txt": ("NOT_ALONE words.hpp)", "NOT_ALONE words.hpp)\ninclude(more.cmake)"),
      "tests/layering/rules.ini": ("that are not read]", "that are not read]\ncalibration/base/more.cmake = why")},
     {"CMakeLists.txt": ("host/app)\n", "host/app)\nadd_subdirectory(tests/host)\n"),
-     "tests/host/CMakeLists.txt": "birdseye_test(files_test SOURCES files/files_test.cpp PRIVATE birdseye_host_files LABEL gl TIMEOUT 9 STUDIES Files.Are*)\n"
+     "tests/host/CMakeLists.txt": "birdseye_test(files_test SOURCES files/files_test.cpp PRIVATE birdseye_host_files LABEL gl STUDIES Files.Are*)\n"
                                   "add_executable(other_test EXCLUDE_FROM_ALL files/files_test.cpp ../support/more.cpp)\n"
                                   "target_link_libraries(other_test PRIVATE birdseye_host_files birdseye_options GTest::gmock_main)\n",
      "tests/support/more.cpp": "#include <string>\n",

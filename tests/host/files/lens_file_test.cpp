@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "tests/support/lens.hpp"
 #include "tests/support/scratch.hpp"

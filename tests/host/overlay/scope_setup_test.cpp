@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "calibration/hand_eye/hand_eye_calibration.hpp"
-#include "host/files/camera_covariance.hpp"
 #include "host/files/camera_files.hpp"
 #include "tests/support/example_record.hpp"
 #include "tests/support/scratch.hpp"

@@ -1,0 +1,241 @@
+#include "host/files/camera_text.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "host/files/stored_matrix.hpp"
+
+namespace birdseye::host {
+
+namespace {
+
+using Numbers = std::vector<double>;
+
+constexpr int kInMemory = cv::FileStorage::READ | cv::FileStorage::MEMORY;
+constexpr const char* kAnotherModel = "; calibrate with plumb_bob (radtan) distortion, k1 k2 p1 p2 k3";
+
+/// The matrix, row by row, of a camera without skew.
+Result<void> set_matrix(const Numbers& k, CameraModel& camera) {
+  if (k.size() != 9) return Error{Errc::bad_format, "lacks camera_matrix, 3x3"};
+  if (k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1)
+    return Error{Errc::unsupported, "camera_matrix has a skew, or a last row other than 0 0 1"};
+  camera.fx_px = k[0];
+  camera.cx_px = k[2];
+  camera.fy_px = k[4];
+  camera.cy_px = k[5];
+  return {};
+}
+
+/// k1 k2 p1 p2 k3 and what else OpenCV orders behind them, which may be 0 only.
+Result<void> set_distortion(const Numbers& terms, CameraModel& camera) {
+  const std::size_t count = terms.size();
+  if (count != 0 && count != 4 && count != 5 && count != 8 && count != 12 && count != 14) {
+    return Error{Errc::unsupported,
+                 fmt::format("has {} distortion_coefficients; 4 or 5 are read (k1 k2 p1 p2 k3)", count)};
+  }
+  std::array<double*, 5> known{&camera.k1, &camera.k2, &camera.p1, &camera.p2, &camera.k3};
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i < known.size()) {
+      *known.at(i) = terms[i];
+    } else if (terms[i] != 0) {
+      return Error{Errc::unsupported,
+                   fmt::format("its distortion coefficient {} of {} is {:g}, and a lens here has five "
+                               "(k1 k2 p1 p2 k3){}",
+                               i + 1, count, terms[i], kAnotherModel)};
+    }
+  }
+  return {};
+}
+
+Error unknown_model(const char* key, const std::string& model) {
+  return {Errc::unsupported, fmt::format("{} {} cannot be said by a lens here{}", key, model, kAnotherModel)};
+}
+
+Result<CameraModel> opencv_camera(const std::string& text) {
+  CameraModel camera;
+  cv::Mat matrix, distortion;
+  try {
+    const cv::FileStorage file(text, kInMemory);
+    if (!file["image_width"].isInt() || !file["image_height"].isInt())
+      return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
+    camera.width_px = static_cast<int>(file["image_width"]);
+    camera.height_px = static_cast<int>(file["image_height"]);
+    matrix = stored_matrix(file["camera_matrix"]);
+    distortion = stored_matrix(file["distortion_coefficients"]);
+  } catch (const cv::Exception&) {
+    return Error{Errc::bad_format, "is no camera file in OpenCV's YAML"};
+  }
+  const auto numbers = [](const cv::Mat& of) { return of.empty() ? Numbers{} : Numbers(of.reshape(1, 1)); };
+  if (const auto sound = set_matrix(numbers(matrix), camera); !sound) return sound.error();
+  if (const auto sound = set_distortion(numbers(distortion), camera); !sound) return sound.error();
+  return camera;
+}
+
+/// Numbers under the first of the keys that is there; of a matrix, its data.
+Numbers numbers_under(const YAML::Node& node, std::initializer_list<const char*> keys) {
+  for (const char* key : keys) {
+    const YAML::Node found = node[key];
+    if (!found) continue;
+    return (found.IsMap() ? found["data"] : found).as<Numbers>();
+  }
+  return {};
+}
+
+Result<CameraModel> ros_camera(const YAML::Node& node) {
+  CameraModel camera;
+  const YAML::Node width = node["image_width"] ? node["image_width"] : node["width"];
+  const YAML::Node height = node["image_height"] ? node["image_height"] : node["height"];
+  if (!width || !height)
+    return Error{Errc::bad_format, "lacks image_width and image_height; add the size the lens was calibrated at"};
+  camera.width_px = width.as<int>();
+  camera.height_px = height.as<int>();
+  const auto model = node["distortion_model"] ? node["distortion_model"].as<std::string>() : std::string("plumb_bob");
+  if (model != "plumb_bob" && model != "rational_polynomial" && !model.empty())
+    return unknown_model("its distortion_model", model);
+  for (const char* binning : {"binning_x", "binning_y"}) {
+    if (node[binning] && node[binning].as<int>() > 1)
+      return Error{Errc::unsupported,
+                   fmt::format("its {} is over 1: give the lens of the pictures as they are, all lengths of them in "
+                               "px divided by it",
+                               binning)};
+  }
+  // Width and K are the whole sensor's; of the pictures they hold only where the region of interest is all of it.
+  if (const YAML::Node roi = node["roi"]) {
+    const auto of_roi = [&roi](const char* key) { return roi[key] ? roi[key].as<int>() : 0; };
+    const int x = of_roi("x_offset"), y = of_roi("y_offset"), wide = of_roi("width"), high = of_roi("height");
+    if (x != 0 || y != 0 || (wide != 0 && wide != camera.width_px) || (high != 0 && high != camera.height_px)) {
+      return Error{
+          Errc::unsupported,
+          fmt::format("its roi is a part of the picture ({}x{} px from {}, {}): give the lens of the pictures as "
+                      "they are: the roi's width and height, cx less {} and cy less {}, and no roi",
+                      wide, high, x, y, x, y)};
+    }
+  }
+  if (const auto sound = set_matrix(numbers_under(node, {"camera_matrix", "K", "k"}), camera); !sound)
+    return sound.error();
+  if (const auto sound = set_distortion(numbers_under(node, {"distortion_coefficients", "D", "d"}), camera); !sound)
+    return sound.error();
+  return camera;
+}
+
+Result<CameraModel> kalibr_camera(const YAML::Node& node) {
+  const auto model = node["camera_model"].as<std::string>();
+  if (model != "pinhole") return unknown_model("its camera_model", model);
+  const auto distortion = node["distortion_model"] ? node["distortion_model"].as<std::string>() : std::string("none");
+  if (distortion != "radtan" && distortion != "none") return unknown_model("its distortion_model", distortion);
+  const auto size = node["resolution"].as<std::vector<int>>();
+  const Numbers f = node["intrinsics"].as<Numbers>();
+  const Numbers d = distortion == "none" ? Numbers{} : node["distortion_coeffs"].as<Numbers>();
+  if (size.size() != 2 || f.size() != 4 || (distortion == "radtan" && d.size() != 4))
+    return Error{Errc::bad_format, "has not 2 numbers of resolution, 4 of intrinsics and 4 of distortion_coeffs"};
+  CameraModel camera{size[0], size[1], f[0], f[1], f[2], f[3]};
+  if (const auto sound = set_distortion(d, camera); !sound) return sound.error();
+  return camera;
+}
+
+bool is_kalibr(const YAML::Node& root) {
+  return root.IsMap() && std::any_of(root.begin(), root.end(), [](const auto& item) {
+           return item.second.IsMap() && item.second["camera_model"] && item.second["intrinsics"];
+         });
+}
+
+/// The camera of a camchain that is meant: the one that is named, or the only one.
+Result<YAML::Node> kalibr_node(const YAML::Node& root, const std::string& name) {
+  std::vector<std::string> names;
+  for (const auto& item : root) {
+    if (item.second.IsMap() && item.second["camera_model"]) names.push_back(item.first.as<std::string>());
+  }
+  if (std::find(names.begin(), names.end(), name) != names.end()) return root[name];
+  if (name.empty() && names.size() == 1) return root[names.front()];
+  return Error{Errc::bad_value, fmt::format("{}; it holds {}: name one behind the path, as camchain.yaml:{}",
+                                            name.empty() ? "say which of its cameras" : "has no camera " + name,
+                                            fmt::join(names, ", "), names.empty() ? "cam0" : names.front())};
+}
+
+/// The name of the one camera that tells where it is against the one before; empty where there is no such, or several.
+std::string only_related(const YAML::Node& root) {
+  std::vector<std::string> names;
+  for (const auto& item : root) {
+    if (item.second.IsMap() && item.second["T_cn_cnm1"]) names.push_back(item.first.as<std::string>());
+  }
+  return names.size() == 1 ? names.front() : std::string();
+}
+
+/// The text as plain YAML; what parse makes of it may throw what yaml-cpp throws.
+template <typename Parse>
+auto of_yaml(const std::string& text, const Parse& parse) -> decltype(parse(YAML::Node())) {
+  try {
+    return parse(YAML::Load(text));
+  } catch (const YAML::Exception& error) {
+    return Error{Errc::bad_format, fmt::format("is no camera file of OpenCV, ROS or Kalibr: {}", error.what())};
+  }
+}
+
+Result<CameraModel> plain_camera(const std::string& text, const std::string& name) {
+  return of_yaml(text, [&](const YAML::Node& root) -> Result<CameraModel> {
+    if (is_kalibr(root)) {
+      const auto node = kalibr_node(root, name);
+      if (!node) return node.error();
+      return kalibr_camera(*node);
+    }
+    if (!root.IsMap()) return Error{Errc::bad_format, "is no camera file of OpenCV, ROS or Kalibr"};
+    if (!name.empty()) return Error{Errc::bad_value, fmt::format("holds one camera: leave :{} out", name)};
+    return ros_camera(root);
+  });
+}
+
+/// Whether OpenCV wrote it, by its first bytes.
+bool is_opencv(const std::string& text) {
+  return text.starts_with("%YAML") || text.starts_with("<?xml") || text.starts_with("{");
+}
+
+}  // namespace
+
+Result<CameraModel> parse_camera(const std::string& text, const std::string& name) {
+  if (!is_opencv(text)) return plain_camera(text, name);
+  if (!name.empty()) return Error{Errc::bad_value, fmt::format("holds one camera: leave :{} out", name)};
+  return opencv_camera(text);
+}
+
+Result<std::array<double, 16>> parse_camera_relation(const std::string& text, const std::string& name) {
+  return of_yaml(text, [&](const YAML::Node& root) -> Result<std::array<double, 16>> {
+    if (!is_kalibr(root)) return Error{Errc::bad_format, "is no camchain of Kalibr, which would hold T_cn_cnm1"};
+    const auto node = kalibr_node(root, name.empty() ? only_related(root) : name);
+    if (!node) return node.error();
+    if (!(*node)["T_cn_cnm1"])
+      return Error{Errc::bad_format, "lacks T_cn_cnm1 of this camera: name the one that has it, as camchain.yaml:cam1"};
+    const auto rows = (*node)["T_cn_cnm1"].as<std::vector<Numbers>>();
+    std::array<double, 16> out{};
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      if (rows.size() != 4 || rows[i / 4].size() != 4) return Error{Errc::bad_format, "its T_cn_cnm1 is no 4x4 matrix"};
+      out[i] = rows[i / 4][i % 4];
+    }
+    return out;
+  });
+}
+
+Result<StoredCovariance> parse_camera_covariance(const std::string& text) {
+  StoredCovariance out;
+  cv::Mat matrix;
+  try {
+    const cv::FileStorage file(text, kInMemory);
+    if (file["camera_covariance"].empty()) return out;
+    matrix = stored_matrix(file["camera_covariance"]);
+  } catch (const cv::Exception&) {
+    return out;  // ROS's or Kalibr's
+  }
+  constexpr int kSide = CameraModel::kParameters;
+  if (matrix.rows != kSide || matrix.cols != kSide)
+    return Error{Errc::bad_format, fmt::format("camera_covariance is {}x{}, of 9x9; take it out to work without",
+                                               matrix.rows, matrix.cols)};
+  out.is_there = true;
+  std::copy_n(matrix.ptr<double>(), out.by_rows.size(), out.by_rows.begin());
+  return out;
+}
+
+}  // namespace birdseye::host

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "calibration/base/result.hpp"
+#include "calibration/geometry/camera_model.hpp"
+
+/// What the texts of camera files say (camera_files.hpp has which), parsed by OpenCV and yaml-cpp in this process.
+/// Errors go on from the file's name. name: which of several cameras is meant, as "cam1"; empty where none is named.
+namespace birdseye::host {
+
+Result<CameraModel> parse_camera(const std::string& text, const std::string& name);
+
+/// T_cn_cnm1 of a camera of Kalibr's camchain, row by row, its lengths in metres.
+Result<std::array<double, 16>> parse_camera_relation(const std::string& text, const std::string& name);
+
+/// camera_covariance, row by row.
+struct StoredCovariance {
+  bool is_there = false;
+  std::array<double, CameraModel::kParameters * CameraModel::kParameters> by_rows{};
+};
+Result<StoredCovariance> parse_camera_covariance(const std::string& text);
+
+}  // namespace birdseye::host
