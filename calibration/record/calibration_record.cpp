@@ -11,6 +11,7 @@
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/round_field_json.hpp"
 #include "calibration/record/sha256.hpp"
+#include "calibration/record/strict_json.hpp"
 
 namespace birdseye::calibration {
 
@@ -264,6 +265,11 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
   if (!checksum.is_string() || !has_checksum(told.dump(), checksum.get<std::string>())) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
+  }
+  if (!is_strict_json(text)) {
+    return Error{Errc::bad_format,
+                 "the calibration record was changed by hand: it says something twice, or goes on behind its end; "
+                 "calibrate again"};
   }
   try {
     SignedRecord out{record_of(json), "", std::nullopt, checksum.get<std::string>().starts_with("crc64")};

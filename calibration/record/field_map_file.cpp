@@ -8,6 +8,7 @@
 #include "calibration/base/nesting.hpp"
 #include "calibration/record/checksum.hpp"
 #include "calibration/record/field_map_json.hpp"
+#include "calibration/record/strict_json.hpp"
 
 namespace birdseye::calibration {
 
@@ -69,7 +70,7 @@ std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
 Result<FieldMapFile> parse_field_map(const std::string& text) {
   if (nests_too_deeply(text, Notation::json)) return no_map("it nests lists deeper than any");
   try {
-    nlohmann::json json = nlohmann::json::parse(text);
+    auto json = nlohmann::json::parse(text);
     if (!json.is_object() || json.value("format", "") != kFieldMapFormat)
       return no_map("it does not say that it is one");
     if (json.at("version").get<int>() != kVersion)
@@ -78,6 +79,8 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
     json.erase("checksum");
     if (!has_checksum(json.dump(), checksum))
       return no_map("or was changed since it was made: its checksum does not fit");
+    if (!is_strict_json(text))
+      return no_map("or was changed since it was made: it says something twice, or goes on behind its end");
     return map_of(json);
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own
     return no_map("or not a whole one");

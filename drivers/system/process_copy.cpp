@@ -14,6 +14,7 @@
 #include <cerrno>
 #include <cstring>
 #include <mutex>
+#include <utility>
 
 #include "drivers/system/pipe.hpp"
 #include "drivers/system/reap.hpp"
@@ -64,14 +65,20 @@ void close_all_but(int one, int other) {
 /// The copy's part: never returns. from: what it is given, -1 where it does not listen.
 [[noreturn]] void run_copy(int fd, int from, pid_t parent,
                            const std::function<void(const ProcessCopy::Take&, const ProcessCopy::Send&)>& work) {
-  is_copy() = true;
+  const bool of_copy = std::exchange(is_copy(), true);
+  // One that listens ends when its parent does, and not by what ends or stops a program from outside; its copies do.
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    if (from >= 0) ::signal(signal, SIG_IGN);
+    if (from < 0 && of_copy) ::signal(signal, SIG_DFL);
+  }
   if (from < 0) {  // one that listens is told of its parent's end by nothing more to take
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent) ::_exit(1);  // it has ended already, which no signal tells any more
   }
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
-  if (const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {
+  if (const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC); nowhere >= 0) {
+    ::dup2(nowhere, STDIN_FILENO);
     ::dup2(nowhere, STDOUT_FILENO);
     ::dup2(nowhere, STDERR_FILENO);
   }
@@ -149,6 +156,12 @@ Result<void> ProcessCopy::give(const void* data, std::size_t size, Deadline dead
   return {};
 }
 
+ProcessCopy::ProcessCopy(ProcessCopy&& other) noexcept
+    : process_(std::exchange(other.process_, -1)),
+      maker_(other.maker_),
+      fd_(std::move(other.fd_)),
+      to_(std::move(other.to_)) {}
+
 ProcessCopy::~ProcessCopy() {
   fd_ = UniqueFd();  // a copy that waits for room in its pipe ends by that, also where it may not be killed
   kill();
@@ -157,7 +170,7 @@ ProcessCopy::~ProcessCopy() {
 /// Its status; empty where it was none any more, or where the system does not end it in time: it then stays until this
 /// process ends.
 std::optional<int> ProcessCopy::kill() {
-  if (process_ <= 0) return std::nullopt;
+  if (process_ <= 0 || maker_ != ::getpid()) return std::nullopt;  // a copy of its maker has no part in it
   ::kill(process_, SIGKILL);
   return reap(std::exchange(process_, -1), Deadline::after(kEnds));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <sys/types.h>
+#include <unistd.h>
 
 #include <cstddef>
 #include <functional>
@@ -26,8 +27,8 @@ class CopiesHeldOff {
 };
 
 /// A copy of this process that does one piece of work and sends what comes of it through a pipe. Its output goes
-/// nowhere, its death does not end this process, and it does not outlive the thread that made it, or, where it listens,
-/// this process. It is killed when this goes out of scope.
+/// nowhere, its input is empty, its death does not end this process, and it does not outlive the thread that made it,
+/// or, where it listens, this process. It is killed when this goes out of scope.
 class ProcessCopy {
  public:
   /// Sends bytes to the process that asked for the work.
@@ -44,8 +45,7 @@ class ProcessCopy {
   /// To work that listens. Errc::timeout: it had not taken all by the deadline. Errc::disconnected: it has ended.
   Result<void> give(const void* data, std::size_t size, Deadline deadline);
 
-  ProcessCopy(ProcessCopy&& other) noexcept
-      : process_(std::exchange(other.process_, -1)), fd_(std::move(other.fd_)), to_(std::move(other.to_)) {}
+  ProcessCopy(ProcessCopy&& other) noexcept;
   ProcessCopy& operator=(ProcessCopy&&) = delete;
   ~ProcessCopy();
 
@@ -56,13 +56,14 @@ class ProcessCopy {
   [[nodiscard]] pid_t pid() const { return process_; }
 
  private:
-  ProcessCopy(pid_t process, UniqueFd fd, UniqueFd to) : process_(process), fd_(std::move(fd)), to_(std::move(to)) {}
+  ProcessCopy(pid_t process, UniqueFd fd, UniqueFd to)
+      : process_(process), maker_(::getpid()), fd_(std::move(fd)), to_(std::move(to)) {}
   static Result<ProcessCopy> start(const std::function<void(const Take&, const Send&)>& work, UniqueFd from,
                                    UniqueFd to);
   std::optional<int> kill();
   Error ended();
 
-  pid_t process_;
+  pid_t process_, maker_;
   UniqueFd fd_;  ///< what it sends
   UniqueFd to_;  ///< what it is given; none where it does not listen
 };

@@ -77,7 +77,8 @@ Result<std::vector<fs::path>> pictures_of(const std::vector<fs::path>& images_or
 }
 
 struct Looked {
-  int width_px = 0, height_px = 0;  // 0: not read
+  std::string unread;  // why; empty: it was read
+  int width_px = 0, height_px = 0;
   calibration::Detection detection;
   std::optional<RoundField> round_field;
 };
@@ -102,8 +103,12 @@ void bring_back(const cv::Mat& stretched, const cv::Mat& grey, calibration::Patt
 
 Looked look(const calibration::Pattern& pattern, const fs::path& path, double pixel_aspect) {
   Looked looked;
-  const cv::Mat grey = read_grey_mat(path);
-  if (grey.empty()) return looked;
+  const auto read = read_grey_mat(path);
+  if (!read) {
+    looked.unread = read.error().what;
+    return looked;
+  }
+  const cv::Mat& grey = *read;
   looked.width_px = grey.cols;
   looked.height_px = grey.rows;
   if (grey.isContinuous())
@@ -199,8 +204,8 @@ Result<PictureViews> read_picture_views(const calibration::Pattern& pattern,
   for (std::size_t i = 0; i < looked.size(); ++i) {
     const std::string name = (*pictures)[i].filename().string();
     Looked& one = looked[i];
-    if (one.width_px == 0) {
-      views.rejected.push_back({name, fmt::format("cannot be read as a picture: {}", why_no_picture((*pictures)[i]))});
+    if (!one.unread.empty()) {
+      views.rejected.push_back({name, fmt::format("cannot be read as a picture: {}", one.unread)});
       continue;
     }
     if (first.empty()) {

@@ -257,8 +257,11 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   const auto image = table.path("image");
   if (!image) return image.error();
   view.name = fs::relative(*image, folder.empty() ? "." : folder).string();
-  const cv::Mat bgr = read_bgr_mat(*image);
-  if (bgr.empty()) return table.wrong("image", image->string() + " is no picture that can be read");
+  const auto read = read_bgr_mat(*image);
+  if (!read)
+    return table.wrong("image",
+                       fmt::format("{} is no picture that can be read: {}", image->string(), read.error().what));
+  const cv::Mat& bgr = *read;
   const auto camera = table.get<std::string>("camera");  // which may name one of several behind a colon
   if (!camera) return camera.error();
   const auto model = read_camera(folder / *camera);
@@ -283,9 +286,10 @@ Result<void> read_view(const CaseTable& table, const fs::path& folder, Registrat
   if (table.has("mask")) {
     const auto mask_path = table.path("mask");
     if (!mask_path) return mask_path.error();
-    const cv::Mat mask = read_grey_mat(*mask_path);
-    if (mask.size() != grey.size())
+    const auto read_mask = read_grey_mat(*mask_path);
+    if (!read_mask || read_mask->size() != grey.size())
       return table.wrong("mask", mask_path->string() + " is no picture of the image's size");
+    const cv::Mat& mask = *read_mask;
     constexpr int kCounts = 128;
     std::transform(mask.begin<std::uint8_t>(), mask.end<std::uint8_t>(), left_out.begin(),
                    [](std::uint8_t m) { return static_cast<std::uint8_t>(m < kCounts ? 1 : 0); });

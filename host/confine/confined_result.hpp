@@ -24,14 +24,14 @@ std::string result_as_bytes(std::string_view input) {
 }
 
 /// What kWork(std::string_view) makes of the input, in a confined process (run_confined): a Result of a value without
-/// pointers, which is not to be trusted. Errors: its own; and how its process ended, beginning with "its decoder".
+/// pointers, which is not to be trusted: each of its bits may be any. Errors: its own, and run_confined's.
 template <auto kWork>
 auto result_of_confined(std::string_view input) -> decltype(kWork(input)) {
   using Value = std::remove_cvref_t<decltype(*kWork(input))>;
   static_assert(std::is_trivially_copyable_v<Value>);
   constexpr std::size_t kMostBytes = sizeof(Value) + (1U << 16U);
   const auto came = run_confined(result_as_bytes<kWork>, input, kMostBytes);
-  if (!came) return Error{came.error().code, "its decoder " + came.error().what};
+  if (!came) return came.error();
   if (came->size() >= 2 && came->front() == 'e' && (*came)[1] >= 0 && (*came)[1] <= static_cast<char>(Errc::io))
     return Error{static_cast<Errc>((*came)[1]), came->substr(2)};
   if (came->size() != 1 + sizeof(Value) || came->front() != 'v')

@@ -1,6 +1,7 @@
 #include "host/confine/confinement.hpp"
 
 #include <fcntl.h>
+#include <sched.h>
 #include <seccomp.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -66,9 +67,9 @@ struct Released {
 };
 
 /// Allows what a decoder does, on any machine, and nothing that opens a socket, starts a program, ends another process,
-/// or writes to a file; opens: it may open files to read. What is not allowed fails with EPERM, as it does for a user
-/// without the right.
-bool bound_system_calls(bool opens) {
+/// or writes to a file; for_files: it may open files to read, and make copies of itself, as a decoder of many files
+/// does. What is not allowed fails with EPERM, as it does for a user without the right.
+bool bound_system_calls(bool for_files) {
   const std::unique_ptr<void, Released> filter(seccomp_init(SCMP_ACT_ERRNO(EPERM)));
   if (filter == nullptr) return false;
   constexpr std::array kFree{
@@ -83,10 +84,10 @@ bool bound_system_calls(bool opens) {
       // time
       "clock_gettime", "clock_gettime64", "clock_getres", "clock_nanosleep", "clock_nanosleep_time64", "gettimeofday",
       "nanosleep", "time", "times",
-      // signals of its own, threads, and copies of it
+      // signals of its own, and threads
       "rt_sigaction", "rt_sigprocmask", "rt_sigreturn", "rt_sigtimedwait", "sigaltstack", "restart_syscall", "futex",
       "futex_time64", "set_robust_list", "rseq", "set_tid_address", "arch_prctl", "sched_yield", "sched_getaffinity",
-      "getcpu", "fork", "vfork", "clone", "clone3", "wait4", "waitid", "exit", "exit_group",
+      "getcpu", "exit", "exit_group",
       // what it is
       "getpid", "getppid", "gettid", "getuid", "geteuid", "getgid", "getegid", "getrusage", "getrlimit", "ugetrlimit",
       "setrlimit", "getrandom", "uname", "sysinfo"};
@@ -100,9 +101,17 @@ bool bound_system_calls(bool opens) {
   };
   for (const char* name : kFree) allow(name);
   constexpr scmp_datum_t kWrites = O_ACCMODE | O_CREAT | O_TRUNC | O_APPEND;
-  if (opens) {
+  if (for_files) {
+    for (const char* name : {"fork", "vfork", "clone", "clone3", "wait4", "waitid"}) allow(name);
     allow("open", {SCMP_A1(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
     allow("openat", {SCMP_A2(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY)});
+  }
+  if (!for_files) {
+    // Threads, by clone alone: the C library takes it where a kernel has no clone3, whose flags no filter can see.
+    constexpr scmp_datum_t kThread = CLONE_THREAD;
+    allow("clone", {SCMP_A0(SCMP_CMP_MASKED_EQ, kThread, kThread)});
+    const int newer = seccomp_syscall_resolve_name("clone3");
+    holds = seccomp_rule_add(filter.get(), SCMP_ACT_ERRNO(ENOSYS), newer, 0) == 0 && holds;
   }
   // Its own limits, and its own end where an assertion fails; a copy of it ends in another way then.
   const auto self = static_cast<scmp_datum_t>(::getpid());
@@ -112,7 +121,7 @@ bool bound_system_calls(bool opens) {
   return holds && seccomp_load(filter.get()) == 0;
 }
 
-Confinement confine_to(const Readable& readable, bool opens) {
+Confinement confine_to(const Readable& readable, bool for_files) {
   const Allowance allowance = allowance_of(readable.bytes);
   bound_memory(allowance.memory_bytes);
   bound_processor_time(allowance.processor_time);
@@ -120,7 +129,7 @@ Confinement confine_to(const Readable& readable, bool opens) {
   Confinement confinement;
   if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return confinement;
   confinement.files = bound_files(readable.paths);
-  confinement.system_calls = bound_system_calls(opens);
+  confinement.system_calls = bound_system_calls(for_files);
   return confinement;
 }
 

@@ -17,7 +17,7 @@ struct Confinement {
 /// allowance of the input's size and at most half of the machine's memory, and write to what is open. For a decoder's
 /// process (ProcessCopy), which has one thread. docs/decisions/0039-confined-decoders.md says what is left out.
 Confinement confine_to(const std::filesystem::path& input);
-/// The same of an input of so many bytes that this process has already: it opens no file at all.
+/// The same of an input of so many bytes that this process has already: it opens no file at all, and makes no copies.
 Confinement confine_to_bytes(std::uintmax_t bytes);
 
 /// In a confined process, before it reads a file of its input: the processor time that this file justifies begins now.

@@ -13,7 +13,7 @@ namespace birdseye::host {
 
 namespace {
 
-constexpr Duration kLongest = Duration::from_ms(60'000);  // the processor time that is allowed ends it before
+constexpr Duration kLongest = Duration::from_ms(60'000);  // also of a decoder that waits, or of a very large file
 constexpr Duration kToAnswer = Duration::from_ms(90'000);
 
 struct Request {
@@ -27,6 +27,11 @@ struct Answer {
   std::size_t bytes = 0;
 };
 
+Error of_decoder(Error error) {
+  error.what.insert(0, "its decoder ");
+  return error;
+}
+
 /// In a copy of the process that stands by.
 Result<std::string> run_in_copy(const Request& request, std::string_view input) {
   auto copy = ProcessCopy::start([&](const ProcessCopy::Send& send) {
@@ -39,10 +44,10 @@ Result<std::string> run_in_copy(const Request& request, std::string_view input) 
   if (!copy) return std::move(copy).error();
   const Deadline deadline = Deadline::after(kLongest);
   std::size_t size = 0;
-  if (auto came = copy->receive(&size, sizeof size, deadline); !came) return std::move(came).error();
-  if (size > request.most_bytes) return Error{Errc::bad_value, "gave more than such a file can hold"};
+  if (const auto came = copy->receive(&size, sizeof size, deadline); !came) return of_decoder(came.error());
+  if (size > request.most_bytes) return Error{Errc::bad_value, "its decoder gave more than such a file can hold"};
   std::string made(size, '\0');
-  if (auto came = copy->receive(made.data(), size, deadline); !came) return std::move(came).error();
+  if (const auto came = copy->receive(made.data(), size, deadline); !came) return of_decoder(came.error());
   return made;
 }
 
@@ -106,7 +111,7 @@ Result<std::string> run_confined(ConfinedWork work, std::string_view input, std:
     if (auto answer = standing.ask(request, input)) return *std::move(answer);
     standing.process.reset();
   }
-  return Error{Errc::disconnected, "ended before it had sent all"};
+  return Error{Errc::disconnected, "its decoder ended before it had sent all"};
 }
 
 void stand_by_to_confine() {

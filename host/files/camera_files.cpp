@@ -169,7 +169,7 @@ Result<std::optional<CameraMatrix>> read_camera_covariance(const fs::path& path)
   if (!text) return text.error();
   const auto stored = result_of_confined<covariance_of>(*text);
   if (!stored) return stored.error().with_context(path.string());
-  if (!stored->is_there) return std::optional<CameraMatrix>();
+  if (stored->count == 0) return std::optional<CameraMatrix>();
   const CameraMatrix out(stored->by_rows.data());  // as its transpose, where it is none
   const bool sound = out.allFinite() && out.diagonal().minCoeff() >= 0 &&
                      (out - out.transpose()).cwiseAbs().maxCoeff() <= 1e-6 * out.diagonal().maxCoeff();

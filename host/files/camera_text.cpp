@@ -233,7 +233,7 @@ Result<StoredCovariance> parse_camera_covariance(const std::string& text) {
   if (matrix.rows != kSide || matrix.cols != kSide)
     return Error{Errc::bad_format, fmt::format("camera_covariance is {}x{}, of 9x9; take it out to work without",
                                                matrix.rows, matrix.cols)};
-  out.is_there = true;
+  out.count = 1;
   std::copy_n(matrix.ptr<double>(), out.by_rows.size(), out.by_rows.begin());
   return out;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 
 #include "calibration/base/result.hpp"
@@ -17,7 +18,7 @@ Result<std::array<double, 16>> parse_camera_relation(const std::string& text, co
 
 /// camera_covariance, row by row.
 struct StoredCovariance {
-  bool is_there = false;
+  std::uint8_t count = 0;  ///< of the matrices that are there: 0 or 1
   std::array<double, CameraModel::kParameters * CameraModel::kParameters> by_rows{};
 };
 Result<StoredCovariance> parse_camera_covariance(const std::string& text);

@@ -34,12 +34,14 @@ cv::Point point_of(const Eigen::Vector2d& p) {
 Result<Picture> read_picture(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) return Error{Errc::not_found, path.string() + ": no such file"};
-  const cv::Mat read = read_bgr_mat(path);
-  if (read.empty()) return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};
-  Picture picture{read.cols, read.rows, {}};
-  picture.rgb.resize(3 * read.total());
+  const auto read = read_bgr_mat(path);
+  if (!read && read.error().code == Errc::bad_format)
+    return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};
+  if (!read) return read.error().with_context(path.string());
+  Picture picture{read->cols, read->rows, {}};
+  picture.rgb.resize(3 * read->total());
   cv::Mat rgb = view_of(picture);
-  cv::cvtColor(read, rgb, cv::COLOR_BGR2RGB);
+  cv::cvtColor(*read, rgb, cv::COLOR_BGR2RGB);
   return picture;
 }
 

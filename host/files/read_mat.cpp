@@ -51,17 +51,28 @@ bool is_cut_png(std::string_view file) {
 }
 
 /// By what the confined process sends, which is not to be trusted.
-cv::Mat read_mat(const std::filesystem::path& path, ConfinedWork decode, int type) {
+Result<cv::Mat> read_mat(const std::filesystem::path& path, ConfinedWork decode, int type) {
+  const auto wrong = [](const char* why) { return Error{Errc::bad_format, why}; };
+  std::error_code ignored;
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+    return wrong("it is no file but a folder, a pipe or a device");
   const auto file = read_whole_file(path, kMostFileBytes);
-  if (!file || file->empty() || is_cut_png(*file)) return {};
+  if (!file && file.error().code == Errc::unsupported) return wrong("the file is larger than any picture");
+  if (!file) return wrong("the file cannot be opened");
+  if (file->empty()) return wrong("the file is empty");
+  if (is_cut_png(*file)) return wrong("the file is cut short");
   const auto came = run_confined(decode, *file, sizeof(Size) + kMostPixelBytes);
+  if (!came && came.error().code == Errc::bad_value) return wrong("it has more than 16,384 x 16,384 pixels");
+  if (!came) return came.error();
+  constexpr const char* kDamaged = "the file is damaged, or no picture";
   Size size;
-  if (!came || came->size() < sizeof size) return {};
+  if (came->size() < sizeof size) return wrong(kDamaged);
   std::memcpy(&size, came->data(), sizeof size);
   const std::string_view pixels = std::string_view(*came).substr(sizeof size);
-  if (size.rows <= 0 || size.columns <= 0 || size.rows > kMostSidePx || size.columns > kMostSidePx) return {};
+  if (size.rows <= 0 || size.columns <= 0 || size.rows > kMostSidePx || size.columns > kMostSidePx)
+    return wrong(kDamaged);
   const auto side = [](std::int32_t px) { return static_cast<std::size_t>(px); };
-  if (side(size.rows) * side(size.columns) * side(CV_ELEM_SIZE(type)) != pixels.size()) return {};
+  if (side(size.rows) * side(size.columns) * side(CV_ELEM_SIZE(type)) != pixels.size()) return wrong(kDamaged);
   cv::Mat picture(size.rows, size.columns, type);
   std::memcpy(picture.data, pixels.data(), pixels.size());
   return picture;
@@ -69,25 +80,12 @@ cv::Mat read_mat(const std::filesystem::path& path, ConfinedWork decode, int typ
 
 }  // namespace
 
-cv::Mat read_grey_mat(const std::filesystem::path& path) {
+Result<cv::Mat> read_grey_mat(const std::filesystem::path& path) {
   return read_mat(path, decoded<cv::IMREAD_GRAYSCALE>, CV_8UC1);
 }
 
-cv::Mat read_bgr_mat(const std::filesystem::path& path) {
+Result<cv::Mat> read_bgr_mat(const std::filesystem::path& path) {
   return read_mat(path, decoded<cv::IMREAD_COLOR>, CV_8UC3);
-}
-
-const char* why_no_picture(const std::filesystem::path& path) {
-  std::error_code failed;
-  const auto bytes = std::filesystem::file_size(path, failed);
-  if (std::error_code ignored;
-      std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
-    return "it is no file but a folder, a pipe or a device";
-  if (!failed && bytes == 0) return "the file is empty";
-  if (!failed && bytes > kMostFileBytes) return "the file is larger than any picture";
-  const auto file = read_whole_file(path, kMostFileBytes);
-  if (!file) return "the file cannot be opened";
-  return is_cut_png(*file) ? "the file is cut short" : "the file is damaged, or no picture";
 }
 
 }  // namespace birdseye::host

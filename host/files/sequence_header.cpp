@@ -6,6 +6,8 @@
 #include <fstream>
 #include <optional>
 
+#include "host/files/next_line.hpp"
+
 namespace birdseye::host {
 
 namespace {
@@ -55,7 +57,7 @@ Result<SequenceHeader> read_sequence_header(const fs::path& path) {
   if (!in) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   SequenceHeader header;
   std::string line;
-  for (bool nrrd = false, first = true; std::getline(in, line) && line.size() < kLongestLine; first = false) {
+  for (bool nrrd = false, first = true; next_line(in, line, kLongestLine); first = false) {
     if (first) nrrd = line.starts_with("NRRD");
     take_line(line, header);
     // Here the header ends and the pixels begin.

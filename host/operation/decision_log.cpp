@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "drivers/system/durable.hpp"
+#include "host/files/next_line.hpp"
 #include "host/simulated/simulated_truth.hpp"
 #include "host/texts/texts.hpp"
 
@@ -20,6 +21,7 @@ constexpr const char* kHeader =
     "sequence,age_ms,strength,shape,expected_mm,reason,said,grade,circle_mm,fiducials_mm,hand_eye_mm,lens_mm,pose_mm,"
     "time_mm,motion_mm,pose,pose_sigma_mm,pose_age_ms,camera_from_patient (16 numbers, row by row; none: no overlay)";
 constexpr std::size_t kBeforeMatrix = 18;
+constexpr std::size_t kLongestLine = 1 << 16;
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> out(1);
@@ -153,15 +155,17 @@ Result<void> DecisionLog::close() {
 
 Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& path) {
   const std::filesystem::path file = std::filesystem::is_directory(path) ? path / kFile : path;
-  std::ifstream in(file);
+  std::error_code ignored;
+  std::ifstream in;
+  if (std::filesystem::is_regular_file(file, ignored)) in.open(file);  // a pipe would be waited for
   std::string line;
-  if (!in || !std::getline(in, line))
+  if (!in.is_open() || !next_line(in, line, kLongestLine))
     return Error{Errc::unreadable, file.string() + ": cannot be read; give the folder that live --out wrote"};
   if (line != kHeader)
     return Error{Errc::bad_format,
                  file.string() + ": is no table of a live window's decisions; give the folder that live --out wrote"};
   std::vector<LoggedDecision> out;
-  while (std::getline(in, line)) {
+  while (next_line(in, line, kLongestLine)) {
     auto decision = decision_of(cells_of(line));
     // A window that was killed leaves its last line cut short.
     if (!decision && in.peek() == std::ifstream::traits_type::eof()) break;
@@ -171,6 +175,9 @@ Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& 
                                file.string(), out.size() + 2)};
     out.push_back(*std::move(decision));
   }
+  if (in.fail() && !in.eof())
+    return Error{Errc::bad_format, fmt::format("{}: line {} is longer than any; give the file as the window wrote it",
+                                               file.string(), out.size() + 2)};
   return out;
 }
 

@@ -48,9 +48,15 @@ const std::string& pattern_of(std::size_t index) {
 }
 
 Result<void> speak(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) return Error{Errc::not_found, fmt::format("{}: cannot be read; give a language's file", file.string())};
-  const auto json = nlohmann::json::parse(in, nullptr, false);
+  constexpr std::uintmax_t kMostBytes = 1'000'000;
+  std::error_code failed;
+  const bool is_file = std::filesystem::is_regular_file(file, failed);  // a pipe would be waited for
+  std::ifstream in;
+  if (is_file) in.open(file);
+  if (!in.is_open())
+    return Error{Errc::not_found, fmt::format("{}: cannot be read; give a language's file", file.string())};
+  const bool is_small = std::filesystem::file_size(file, failed) <= kMostBytes;
+  const auto json = is_small ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
   const auto wrong = [&file](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", file.string(), why)};
   };

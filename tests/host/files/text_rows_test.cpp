@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+
+#include "host/files/next_line.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -51,6 +54,25 @@ TEST(TextRows, RemarksKeepTheirFieldsAndTheMarkOfUtf8IsPassedOver) {
   EXPECT_EQ(row->line, 2U);
   EXPECT_EQ(row->fields, (Fields{"1", "2"}));
   EXPECT_FALSE(rows->next());
+}
+
+TEST(NextLine, IsAsGetlineHasItAndNoLongerThanMayBe) {
+  for (const std::string text : {"", "\n", "a", "a\n", "a\n\nbc", "\na\n"}) {
+    std::istringstream one(text), other(text);
+    std::string line, expected;
+    while (std::getline(other, expected)) {
+      ASSERT_TRUE(next_line(one, line, 2)) << text;
+      EXPECT_EQ(line, expected);
+      EXPECT_EQ(one.eof(), other.eof()) << text;
+    }
+    EXPECT_FALSE(next_line(one, line, 2)) << text;
+    EXPECT_TRUE(one.eof());
+  }
+  std::istringstream in("abc\nd");
+  std::string line;
+  EXPECT_FALSE(next_line(in, line, 2));
+  EXPECT_FALSE(in.eof()) << "it is longer, and not the end";
+  EXPECT_FALSE(next_line(in, line, 2));
 }
 
 TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {

@@ -1,6 +1,7 @@
 #include "host/operation/decision_log.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <utility>
@@ -116,6 +117,9 @@ TEST(DecisionLog, AnotherTableIsRefused) {
   ASSERT_FALSE(read);
   EXPECT_NE(read.error().what.find("live --out"), std::string::npos);
   EXPECT_FALSE(read_decisions(scratch / "none"));
+  ASSERT_EQ(::mkfifo((scratch / "pipe").c_str(), 0600), 0);
+  EXPECT_FALSE(read_decisions(scratch / "pipe")) << "nobody writes to it";
+  EXPECT_FALSE(read_decisions(scratch.file("long.csv", std::string(1U << 20U, 'x'))));
 }
 
 TEST(DecisionLog, SaysWhetherOverlaysWereOfAnotherShapeOrThereWereNone) {

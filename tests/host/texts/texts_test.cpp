@@ -1,6 +1,7 @@
 #include "host/texts/texts.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
 #include <set>
@@ -75,6 +76,11 @@ TEST_F(Language, AFileThatIsNoneChangesNothing) {
     EXPECT_EQ(words("do_go_on"), "go on");
   }
   EXPECT_EQ(speak("/no/such/file").error().code, Errc::not_found);
+  const Scratch scratch;
+  ASSERT_EQ(::mkfifo((scratch / "pipe").c_str(), 0600), 0);
+  for (const auto& none : {scratch.path(), scratch / "pipe"})
+    EXPECT_NE(speak(none).error().what.find(none.string()), std::string::npos);
+  EXPECT_FALSE(speak(scratch.file("large.json", std::string(2'000'000, ' ') + "{}")));
 }
 
 TEST_F(Language, TheTableIsAFileThatIsReadBack) {

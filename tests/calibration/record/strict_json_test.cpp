@@ -1,0 +1,43 @@
+#include "calibration/record/strict_json.hpp"
+
+#include <gtest/gtest.h>
+
+#include "calibration/record/calibration_record.hpp"
+#include "tests/support/example_record.hpp"
+
+namespace birdseye::calibration {
+namespace {
+
+TEST(StrictJson, TakesATextThatSaysOneThing) {
+  for (const char* text : {"{}", R"({"a": {"b": 1}, "b": [{"b": 2}, {"b": 3}]})", " [1, 2]\n"})
+    EXPECT_TRUE(is_strict_json(text)) << text;
+}
+
+TEST(StrictJson, RefusesANameTwice) {
+  for (const char* text :
+       {R"({"a": 1, "a": 1})", R"({"a": 1, "b": {}, "a": 2})", R"([{"x": {"a": 1, "b": 2, "a": 3}}])"})
+    EXPECT_FALSE(is_strict_json(text)) << text;
+}
+
+TEST(StrictJson, RefusesWhatStandsBehind) {
+  const std::string whole = R"({"a": 1})";
+  for (const std::string& tail :
+       {std::string("\0", 1), std::string("\0anything", 9), std::string("{}"), std::string("x")})
+    EXPECT_FALSE(is_strict_json(whole + tail));
+}
+
+TEST(StrictJson, RefusesListsWithoutEnd) {
+  EXPECT_FALSE(is_strict_json(std::string(100'000, '[') + std::string(100'000, ']')));
+}
+
+TEST(StrictJson, ARecordThatOthersReadOtherwiseIsNone) {
+  const std::string text = record_text(testing::straight_scope_record());
+  ASSERT_TRUE(parse_signed_record(text)) << parse_signed_record(text).error().what;
+  EXPECT_FALSE(parse_signed_record(text + std::string("\0more", 5)));
+  const std::size_t format = text.find("\"format\"");
+  ASSERT_NE(format, std::string::npos);
+  EXPECT_FALSE(parse_signed_record(text.substr(0, format) + "\"format\": \"another\", " + text.substr(format)));
+}
+
+}  // namespace
+}  // namespace birdseye::calibration
