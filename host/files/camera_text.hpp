@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -19,7 +20,8 @@ Result<std::array<double, 16>> parse_camera_relation(const std::string& text, co
 /// camera_covariance, row by row.
 struct StoredCovariance {
   std::uint8_t count = 0;  ///< of the matrices that are there: 0 or 1
-  std::array<double, CameraModel::kParameters * CameraModel::kParameters> by_rows{};
+  static constexpr std::size_t kNumbers = CameraModel::kParameters * std::size_t{CameraModel::kParameters};
+  std::array<double, kNumbers> by_rows{};
 };
 Result<StoredCovariance> parse_camera_covariance(const std::string& text);
 
