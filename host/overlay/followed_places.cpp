@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
@@ -118,11 +119,11 @@ std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_colum
   return unproject(camera, Eigen::Vector2d((place.x + 0.5) * scale - 0.5, (place.y + 0.5) * scale - 0.5));
 }
 
-std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
-                                            double farthest_mm) {
-  std::vector<std::optional<double>> off(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const FollowedPlace& place = places[i];
+std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                      double farthest_mm) {
+  std::vector<double> off;
+  off.reserve(places.size());
+  for (const FollowedPlace& place : places) {
     // From the nearest depth on at which the place is before the camera in both pictures.
     const double ahead = (now_from_then.rotation() * place.then).z();
     if (!(ahead > 0)) continue;
@@ -130,23 +131,10 @@ std::vector<std::optional<double>> off_line(const std::vector<FollowedPlace>& pl
     if (nearest_mm >= farthest_mm) continue;
     const Eigen::Vector3d nearest = now_from_then * Eigen::Vector3d(nearest_mm * place.then);
     const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(farthest_mm * place.then);
-    off[i] = distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized());
+    off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
   }
-  return off;
-}
-
-std::optional<double> median_of_known(const std::vector<std::optional<double>>& off) {
-  std::vector<double> known;
-  known.reserve(off.size());
-  for (const std::optional<double>& one : off)
-    if (one) known.push_back(*one);
-  if (2 * known.size() <= off.size()) return std::nullopt;
-  return median_of(std::move(known));
-}
-
-std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
-                                      double farthest_mm) {
-  return median_of_known(off_line(places, now_from_then, farthest_mm));
+  if (2 * off.size() <= places.size()) return std::nullopt;
+  return median_of(std::move(off));
 }
 
 std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
@@ -159,6 +147,27 @@ std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& pla
     least = std::min(least.value_or(*off), *off);
   }
   return least;
+}
+
+bool go_as_one(const std::vector<FollowedPlace>& places, double within) {
+  constexpr std::size_t kFitted = 5;  // any five lie on the lines of some motion, so they tell nothing
+  constexpr double kMost = 0.7;       // of the others: 0.6 of places that were followed wrongly did
+  constexpr int kTries = 100;         // where so many go as one, all tries miss them in one case of 10^8
+  constexpr double kConfidence = 0.999;
+  if (places.size() <= kFitted) return false;
+  std::vector<cv::Point2d> then, now;
+  then.reserve(places.size());
+  now.reserve(places.size());
+  for (const FollowedPlace& place : places) {
+    then.emplace_back(place.then.x() / place.then.z(), place.then.y() / place.then.z());
+    now.emplace_back(place.now.x() / place.now.z(), place.now.y() / place.now.z());
+  }
+  cv::Mat near;
+  const cv::Mat essential =
+      cv::findEssentialMat(then, now, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence, within, kTries, near);
+  if (essential.empty()) return false;
+  const auto others = static_cast<double>(places.size() - kFitted);
+  return cv::countNonZero(near) - static_cast<double>(kFitted) >= kMost * others;
 }
 
 }  // namespace birdseye::host

@@ -57,7 +57,6 @@ struct VideoMotion::Key {
   PictureToFollow looked_at;            ///< the last picture that was looked at
   std::optional<SeenFrom> looked_from;  ///< the last picture that was judged, or the key's
   std::vector<cv::Point2f> looked;      ///< where they were in the last picture that was looked at
-  std::size_t chosen = 0;               ///< so many were chosen
   std::size_t kept = 0;                 ///< so many
   std::size_t agreed = 0;               ///< so many were left when they last agreed, and the scope was calm
   std::size_t left = 0;                 ///< and so many in the first picture after since that did not agree
@@ -196,7 +195,7 @@ void VideoMotion::begin_key(DeviceTime at, const PictureToFollow& picture, const
   key->at = key->newest_at = at;
   key->from = key->looked_from = from;
   key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
-  key->chosen = key->kept = key->places.size();
+  key->kept = key->places.size();
   key->looked_at = key->newest = picture;
   key_ = std::move(key);
 }
@@ -300,19 +299,11 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
   return 2 * camera.fx_px * farthest / std::max((now.at - then.at).seconds(), 1e-3);
 }
 
-/// Whether a third of the key's places has been lost since they were chosen, and of what is left a quarter lies where
-/// it may. Places on rims and reflections do not go with the tissue, and are the last to be lost: where simulated
-/// operations without a fault accused the poses, half and more of what was left were such places.
-bool VideoMotion::is_worn(const std::vector<std::optional<double>>& off, double allowed) const {
-  if (3 * off.size() >= 2 * key_->chosen) return false;
-  const auto agree = std::ranges::count_if(off, [allowed](const auto& one) { return one && *one <= allowed; });
-  return 4 * static_cast<std::size_t>(agree) >= off.size();
-}
-
 /// odd: the places do not lie where the poses say. of_what_is_left: the same, but a quick motion has lost more than a
-/// third of them, and the rest may have been followed to others that look alike; or the key is worn. Then state()
-/// becomes untold, not differs, and the video has to agree anew about each axis. A key that is worn, and not by a quick
-/// motion, does not contradict either.
+/// third of them, and the rest may have been followed to others that look alike; or no motion at all has what is left
+/// where it lies. Then state() becomes untold, not differs, and the video has to agree anew about each axis. What is
+/// left without a quick motion, and lies where no motion has it, does not contradict either: places on rims and
+/// reflections do not go with the tissue, and are the last to be lost.
 VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return Judged::not_odd;  // nothing says how far off a picture may be
@@ -326,8 +317,7 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
   }
   if (places.size() < kFewest) return Judged::not_odd;
   const Relative motion = now.camera_from_tracker * key_->from->camera_from_tracker.inverse();
-  const auto off = off_line(places, motion);
-  const auto median_off = median_of_known(off);
+  const auto median_off = median_off_line(places, motion);
   if (!median_off) return Judged::not_odd;
   off_px_ = *median_off * camera.fx_px;
   std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
@@ -352,10 +342,11 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
       return Judged::odd;
     }
     const bool swung = 3 * key_->left < 2 * key_->agreed;
-    const bool worn = is_worn(off, allowed_px / camera.fx_px);
-    contradicted_ = state_ != VideoAgreement::differs && (swung || !worn);
+    const bool moved =
+        *off_px_ > kPlainly * allowed_px || go_as_one(places, kFollowedPx * scale / std::sqrt(2) / camera.fx_px);
+    contradicted_ = state_ != VideoAgreement::differs && (swung || moved);
     told_ = {};
-    if (swung || worn) {
+    if (swung || !moved) {
       if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;
       odd_ = 0;
       return Judged::of_what_is_left;

@@ -67,7 +67,6 @@ class VideoMotion {
   void begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
   void follow(DeviceTime at, const PictureToFollow& picture);
   std::size_t keep(const std::vector<std::optional<cv::Point2f>>& found);
-  [[nodiscard]] bool is_worn(const std::vector<std::optional<double>>& off, double allowed) const;
   enum class Judged { not_odd, odd, of_what_is_left };
   Judged judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope);
 
