@@ -9,18 +9,26 @@
 #include <system_error>
 #include <vector>
 
+#include "drivers/system/disk_keeper.hpp"
 #include "drivers/system/unique_fd.hpp"
 
 namespace birdseye {
 
 namespace {
 
-Result<void> sync(const std::filesystem::path& path, int flags) {
+/// Gives the number of an error, or 0.
+int sync_by_kernel(const std::filesystem::path& path, int flags) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | flags));
   // Some file systems that are reached over a network cannot sync a folder, and say so by EINVAL.
-  if (fd && (::fsync(fd.get()) == 0 || errno == EINVAL)) return {};
+  return fd && (::fsync(fd.get()) == 0 || errno == EINVAL) ? 0 : errno;
+}
+
+Result<void> sync(const std::filesystem::path& path, int flags) {
+  DiskKeeper* const keeper = DiskKeeper::present();
+  const int error = keeper != nullptr ? keeper->sync(path) : sync_by_kernel(path, flags);
+  if (error == 0) return {};
   return Error{Errc::io, fmt::format("{}: cannot be brought onto the disk ({}); is it full, or gone?", path.string(),
-                                     std::strerror(errno))};
+                                     std::strerror(error))};
 }
 
 }  // namespace

@@ -60,6 +60,7 @@ OperationView LiveWorkflow::view() const {
   for (const std::string* fault : {&resume_fault_, &patient_.fault(), &patient_.engine_fault(), &keeper_.fault()}) {
     if (out.fault.empty()) out.fault = *fault;
   }
+  out.writing = keeper_.writing();
   if (is_other_patients())
     out.patient_fault = words("patient_wrong", patient_.plan()->identity.id, settings_.patient_id);
   out.asks_for_patient = asks_for_patient();

@@ -49,6 +49,9 @@ enum class FaultKind {
   link_cut,
   appliance_restart,
   window_restart,
+  disk_late,
+  disk_full,
+  power_cut,
 };
 
 std::string_view fault_name(FaultKind kind);

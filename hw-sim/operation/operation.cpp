@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -14,12 +15,15 @@
 #include "device/birdseyed/appliance.hpp"
 #include "device/wire/server.hpp"
 #include "drivers/system/clock.hpp"
+#include "drivers/system/disk_keeper.hpp"
+#include "drivers/system/durable.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "drivers/system/wait.hpp"
 #include "host/files/record_file.hpp"
 #include "host/operation/live_source.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/local/local_camera.hpp"
+#include "hw-sim/local/local_disk.hpp"
 #include "hw-sim/local/local_line.hpp"
 #include "hw-sim/local/local_link.hpp"
 #include "hw-sim/minibird/tracker_loop.hpp"
@@ -228,9 +232,42 @@ class WindowProgram {
   std::unique_ptr<host::LiveSource> source_;
 };
 
+/// The disk of the window's machine, and whether that machine has power.
+class WindowDisk {
+ public:
+  WindowDisk(LocalDisk& disk, WindowProgram& window) : disk_(disk), window_(window) { DiskKeeper::put(&disk); }
+  ~WindowDisk() { DiskKeeper::put(nullptr); }
+  WindowDisk(const WindowDisk&) = delete;
+  WindowDisk& operator=(const WindowDisk&) = delete;
+
+  /// What befalls it now. Where it has power again, it has what the disk kept. True: it has power.
+  Result<bool> befall(const FaultTimeline& befalling, double at_s) {
+    const Fault* const late = befalling.active(FaultKind::disk_late);
+    disk_.set_late(Duration::from_seconds(late != nullptr ? late->value("ms") * 1e-3 : 0));
+    disk_.set_full(befalling.active(FaultKind::disk_full) != nullptr);
+    const Fault* const cut = befalling.active(FaultKind::power_cut);
+    if (cut != nullptr) {
+      if (!std::exchange(cutting_, true)) disk_.lose_power_after(static_cast<std::uint64_t>(cut->value("after_syncs")));
+      // Where nothing is written any more.
+      if (at_s > cut->at_s + *cut->for_s / 2) disk_.lose_power();
+      return !disk_.powerless();
+    }
+    if (!std::exchange(cutting_, false)) return true;
+    disk_.lose_power();
+    if (const auto closed = window_.run(false); !closed) return closed.error();
+    if (const auto up = disk_.power_up(); !up) return up.error();
+    return true;
+  }
+
+ private:
+  LocalDisk& disk_;
+  WindowProgram& window_;
+  bool cutting_ = false;
+};
+
 /// Runs the operation, in virtual time. open: opens a window. scene: null where the video is grey.
 void operate(const SimulatedOperation& operation, OperationTruth& truth, OperationScene* scene,
-             const host::Authors& authors, const WindowProgram::Open& open, OperationOutcome& out) {
+             const host::Authors& authors, LocalDisk& disk, const WindowProgram::Open& open, OperationOutcome& out) {
   const std::int64_t zero_ns = device_now().ns;
   const LocalLine line("sim:tracker");
   TrackerLoop unit(line.instrument(), tracker_of(truth, operation.seed, out.faults, zero_ns), {});
@@ -250,6 +287,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   const LocalNetwork network({.delay = Duration::from_ms(1)});
   ApplianceProgram appliance(config_of(truth, authors, line, camera), network);
   WindowProgram window(open, network);
+  WindowDisk window_disk(disk, window);
   FaultTimeline befalling(out.faults.programs, FaultTarget::program);
   befalling.begin(zero_ns);
   OperationLaws laws(
@@ -258,7 +296,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   Journal journal(zero_ns, operation.pictures);
   Announcer announcer(out.faults);
   std::string said, step, screen;
-  bool registered = false;
+  bool registered = false, had_power = true;
   double acts_at_s = 0;
   const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
   while (host_now() < end) {
@@ -269,7 +307,10 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     }
     const auto serves = appliance.run(befalling.active(FaultKind::appliance_restart) == nullptr);
     if (!serves) return out.broken.push_back({journal.at_s(host_now()), "start", serves.error().what});
-    const auto opened = window.run(befalling.active(FaultKind::window_restart) == nullptr);
+    const auto powered = window_disk.befall(befalling, journal.at_s(host_now()));
+    if (!powered) return out.broken.push_back({journal.at_s(host_now()), "start", powered.error().what});
+    if (std::exchange(had_power, *powered) && !*powered) journal.say(host_now(), "the window's machine has no power");
+    const auto opened = window.run(*powered && befalling.active(FaultKind::window_restart) == nullptr);
     if (!opened) return out.broken.push_back({journal.at_s(host_now()), "start", opened.error().what});
     if (window.workflow() == nullptr) {
       sleep_for(kScreen);
@@ -297,7 +338,9 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     surgeon.act(journal.at_s(now), now, shown);
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
-    registered = view.note(host::LiveStep::fiducials).done;
+    laws.take_failed(disk.failed(), view, now);
+    const bool done = view.note(host::LiveStep::fiducials).done, kept = !view.writing && view.fault.empty();
+    registered = done && (registered || kept);
     const host::StepNote& note = view.note(view.step);
     journal.follow(now, step,
                    fmt::format("step {}: {}", host::name_of(view.step),
@@ -323,9 +366,12 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   if (operation.faults) {
     out.faults = *operation.faults;
   } else {
-    out.faults = draw_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s, reference);
-    if (operation.programs_end)
-      out.faults.programs = draw_program_faults(operation.seed, kFaultsFrom_s, ends_s - kQuietAtEnd_s);
+    const double until_s = ends_s - kQuietAtEnd_s;
+    out.faults = draw_faults(operation.seed, kFaultsFrom_s, until_s, reference);
+    if (operation.programs_end) out.faults.programs = draw_program_faults(operation.seed, kFaultsFrom_s, until_s);
+    if (operation.disk_fails)
+      std::ranges::move(draw_disk_faults(operation.seed, kFaultsFrom_s, until_s),
+                        std::back_inserter(out.faults.programs));
   }
   const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;
@@ -351,13 +397,16 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   if (!patient) return patient.error();
   window.patient = *patient;
   const host::Authors authors = host::Authors::for_once();  // another key changes nothing that is done
-  const auto open = [&] { return open_window(window, truth, authors, (*folder)->path() / "window"); };
+  const auto kept = (*folder)->path() / "window";
+  if (const auto made = make_folder_durably(kept); !made) return made.error();
+  LocalDisk disk(kept, hashed_word(operation.seed, 10));
+  const auto open = [&] { return open_window(window, truth, authors, kept); };
   // The first window reads its files before virtual time begins.
   auto first = open();
   if (!first) return std::move(first).error();
   const auto open_next = [&] { return *first != nullptr ? std::exchange(*first, nullptr) : open(); };
   const auto ran = run_in_virtual_time({.seed = operation.seed},
-                                       [&] { operate(operation, truth, scene.get(), authors, open_next, out); });
+                                       [&] { operate(operation, truth, scene.get(), authors, disk, open_next, out); });
   if (!ran) return ran.error();
   out.time = *ran;
   for (const BrokenLaw& law : out.broken)

@@ -18,6 +18,7 @@ struct SimulatedOperation {
   double minutes = 10;
   std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
   bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
+  bool disk_fails = true;               ///< and the disk of the window's machine is late, is full, or loses power
   bool pictures = false;                ///< the video shows what the scope sees; else it is grey all over, and small
 };
 

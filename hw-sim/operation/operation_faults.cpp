@@ -65,6 +65,12 @@ constexpr DrawnFault kDrawnOfPrograms[] = {
     {FaultKind::window_restart, kProgram, 1, 10},
 };
 
+constexpr DrawnFault kDrawnOfDisk[] = {
+    {FaultKind::disk_late, kProgram, 5, 60, "ms", 10, 1500},
+    {FaultKind::disk_full, kProgram, 5, 60},
+    {FaultKind::power_cut, kProgram, 10, 60, "after_syncs", 0, 8},
+};
+
 Fault usual(FaultKind kind) {
   Fault fault;
   fault.kind = kind;
@@ -105,6 +111,7 @@ FaultSigns of_camera(const Fault& fault) {
 constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
 
 FaultSigns of_program(const Fault& fault) {
+  if (fault.kind == FaultKind::disk_late || fault.kind == FaultKind::disk_full) return {.aside = true};
   constexpr double kConnects_s = 1.1;  // the window tries each second
   return {.own_s = kConnects_s + (fault.kind == FaultKind::appliance_restart ? kFlockStarts_s : 0)};
 }
@@ -182,6 +189,18 @@ std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double
   std::vector<Fault> faults;
   draw(kDrawnOfPrograms, hashed_word(seed, 6), 90, from_s, until_s,
        [&](const DrawnFault&, Fault fault) { faults.push_back(std::move(fault)); });
+  return faults;
+}
+
+std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s) {
+  std::vector<Fault> faults;
+  draw(kDrawnOfDisk, hashed_word(seed, 9), 120, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
+    if (drawn.kind == FaultKind::power_cut) {
+      double& after_syncs = fault.values.find("after_syncs")->second;
+      after_syncs = std::floor(after_syncs);
+    }
+    faults.push_back(std::move(fault));
+  });
   return faults;
 }
 

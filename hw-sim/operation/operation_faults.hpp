@@ -21,6 +21,7 @@ struct FaultSigns {
   double extra_mm = 0;                  ///< poses may be off by so much more
   double extra_s = 0;                   ///< and by as much as things move in this time
   double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
+  bool aside = false;                   ///< it touches neither instruments nor programs, but the disk alone
   double strikes_within_s = 0;          ///< after its begin: a fault that comes by chance has then surely come once
 };
 
@@ -32,6 +33,8 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target);
 FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference);
 /// What befalls the programs: the network is cut, the appliance or the window ends and is started again.
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s);
+/// What befalls the machine of the window: its disk is late, or full, or its power is cut.
+std::vector<Fault> draw_disk_faults(std::uint64_t seed, double from_s, double until_s);
 
 /// As read_fault_script reads it (TOML).
 std::string text_of(const FaultScript& script);

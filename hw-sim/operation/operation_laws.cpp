@@ -64,7 +64,7 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   }
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
-      if (&other == &span) continue;
+      if (&other == &span || other.signs.aside) continue;
       if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
     }
   }
@@ -170,6 +170,7 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 void OperationLaws::opened(bool registered, std::size_t checks) {
   to_take_up_ = registered;
   ready_since_s_.reset();
+  unsaid_since_s_.reset();
   checks_when_opened_ = registered ? std::optional(checks) : std::nullopt;
 }
 
@@ -188,11 +189,22 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
+void OperationLaws::take_failed(std::uint64_t syncs, const host::OperationView& view, HostTime now) {
+  const double now_s = at_s(now.ns);
+  if (std::exchange(failed_syncs_, syncs) < syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
+  if (!view.fault.empty()) unsaid_since_s_.reset();
+  if (!unsaid_since_s_ || now_s - *unsaid_since_s_ < kNamedWithin_s) return;
+  unsaid_since_s_.reset();
+  break_law(now_s, "kept", "what was found could not be kept, and the window does not say so");
+}
+
 /// What the video shows is true: where no fault has touched its times or the poses, nobody may say that they differ.
 void OperationLaws::judge_accusation(bool accused, double now_s) {
   const bool begins = accused && !accused_;
   accused_ = accused;
-  const auto touches = [now_s](const Span& span) { return span.begins_s <= now_s && now_s < span.ends_s + kCalm_s; };
+  const auto touches = [now_s](const Span& span) {
+    return !span.signs.aside && span.begins_s <= now_s && now_s < span.ends_s + kCalm_s;
+  };
   if (begins && std::ranges::none_of(spans_, touches))
     break_law(now_s, "accused", "the window says that video and poses do not agree, and nothing has befallen them");
 }

@@ -32,7 +32,8 @@ struct BrokenLaw {
 /// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
 /// accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
 /// kept: a window that is opened again takes up the registration that there was, and draws nothing before a landmark
-/// has been checked.
+/// has been checked. registered: what the window had as it was last neither writing nor said that something was not
+/// kept. A window that cannot keep something says so within 2 s.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -45,6 +46,8 @@ class OperationLaws {
   void opened(bool registered, std::size_t checks);
   /// What the window says. checks: how often a landmark has been checked.
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
+  /// The same, of a disk on which so many syncs have failed so far.
+  void take_failed(std::uint64_t syncs, const host::OperationView& view, HostTime now);
   /// What is on the screen.
   void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
   /// At the end: until_s is when the operation ended.
@@ -87,7 +90,9 @@ class OperationLaws {
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
-  bool accused_ = false;                           ///< the window says that video and poses do not agree
+  bool accused_ = false;  ///< the window says that video and poses do not agree
+  std::uint64_t failed_syncs_ = 0;
+  std::optional<double> unsaid_since_s_;           ///< a sync failed then, and the window has not said so
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;

@@ -170,11 +170,11 @@ MUTANTS = (
            "if (!settings_.reference.empty()) use_reference(health->reference);",
            "The reference that the appliance names is not used: a bumped transmitter takes the overlay along.",
            r"^Referenced\.", ("host_operation_test",)),
-    # What no campaign can see: no lock and no disk is in it, no queue is full, and the latency is none.
     Mutant("fsync", "host/files/write_files.cpp",
            "    if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());\n", "",
            "A file gets its name before its bytes are on the disk.", r"^WriteFiles\.IsOnTheDiskByItsName",
-           ("host_files_test",), False),
+           ("host_files_test",)),
+    # What no campaign can see: no lock and no disk of the appliance is in it, no queue is full, and the latency is none.
     Mutant("folder-fsync", "device/birdseyed/recorder.cpp",
            "bool named_ = false;", "bool named_ = true;",
            "A recording's name is never brought onto the disk.", r"^Recorder\.KeepsEverythingItIsGiven", BIRDSEYED, False),

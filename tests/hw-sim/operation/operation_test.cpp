@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <map>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hw-sim/faults/fault_table.hpp"
@@ -89,7 +93,7 @@ TEST(Operation, FaultsAtRandomBreakNoLaw) {
 class MendedSeed : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeed, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .programs_end = false});
+  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .programs_end = false, .disk_fails = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -106,13 +110,48 @@ INSTANTIATE_TEST_SUITE_P(Operation, MendedSeed, ::testing::Values(4, 17, 85, 104
 class MendedSeedOfPrograms : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(MendedSeedOfPrograms, BreaksNoLawAnyMore) {
-  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10});
+  const OperationOutcome out = operate({.seed = GetParam(), .minutes = 10, .disk_fails = false});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
 INSTANTIATE_TEST_SUITE_P(Operation, MendedSeedOfPrograms,
                          ::testing::Values(106, 168, 229, 260, 1307, 1477, 66263737, 66263751, 206351423),
                          [](const auto& of) { return std::to_string(of.param); });
+
+Fault usual(FaultKind kind, double at_s, double for_s, std::map<std::string, double, std::less<>> values = {}) {
+  return {kind, at_s, for_s, std::move(values)};
+}
+
+/// The window opens, takes the calibration and the registration, each of which it keeps; the power goes after any of
+/// the syncs of that, or while nothing is written.
+TEST(Operation, APowerCutAfterAnySyncLosesNothingThatWasKept) {
+  std::set<bool> taken_up;
+  for (int syncs = 0; syncs <= 28; ++syncs) {
+    const auto cut = usual(FaultKind::power_cut, 5, 70, {{"after_syncs", syncs}});
+    const OperationOutcome out = operate({.seed = 11, .minutes = 2.5, .faults = programs_end({cut})});
+    EXPECT_TRUE(out.broken.empty()) << syncs << "\n" << told(out);
+    EXPECT_NE(out.log.find("no power"), std::string::npos) << syncs;
+    EXPECT_GT(out.laws.green, 100U) << syncs << "\n" << out.log;
+    // Where it went before the registration was kept, the patient is registered again.
+    taken_up.insert(out.log.find("step fiducials: 0 touched", out.log.find("no power")) == std::string::npos);
+  }
+  EXPECT_EQ(taken_up.size(), 2U);
+}
+
+TEST(Operation, AWindowWhoseDiskIsFullSaysSoAndGoesOn) {
+  const auto full = usual(FaultKind::disk_full, 1, 80);
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = programs_end({full})});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
+}
+
+TEST(Operation, ALateDiskDelaysNoPicture) {
+  const auto late = usual(FaultKind::disk_late, 1, 110, {{"ms", 1500}});
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = programs_end({late})});
+  const OperationOutcome quick = operate({.seed = 11, .minutes = 2, .faults = FaultScript{}});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.laws.green, quick.laws.green);
+}
 
 TEST(OperationWithPictures, ViewsAreKeptAndTheCtIsMatchedWithThem) {
   const SimulatedOperation operation{.seed = 3, .minutes = 1, .faults = FaultScript{}, .pictures = true};
@@ -155,7 +194,7 @@ TEST(OperationWithPictures, PlacesThatAreWornAccuseNobody) {
 
 /// Places that had been followed wrongly, and were fewer than a third, accused the poses at 216 s.
 TEST(OperationWithPictures, MendedSeed33AccusesNobody) {
-  const OperationOutcome out = operate({.seed = 33, .minutes = 4, .pictures = true});
+  const OperationOutcome out = operate({.seed = 33, .minutes = 4, .disk_fails = false, .pictures = true});
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
@@ -282,8 +321,8 @@ TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
     const FaultScript script = draw_faults(seed, 0, 3600, true);
     for (const Fault& fault : script.tracker) drawn.push_back("tracker " + std::string(fault_name(fault.kind)));
     for (const Fault& fault : script.camera) drawn.push_back("camera " + std::string(fault_name(fault.kind)));
-    for (const Fault& fault : draw_program_faults(seed, 0, 3600))
-      drawn.push_back("program " + std::string(fault_name(fault.kind)));
+    for (const auto& faults : {draw_program_faults(seed, 0, 3600), draw_disk_faults(seed, 0, 3600)})
+      for (const Fault& fault : faults) drawn.push_back("program " + std::string(fault_name(fault.kind)));
   }
   for (const FaultSpec& spec : fault_table()) {
     const std::string name(fault_name(spec.kind));
