@@ -1,6 +1,7 @@
 #include "host/overlay/followed_places.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -151,8 +152,9 @@ std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& pla
 
 bool go_as_one(const std::vector<FollowedPlace>& places, double within) {
   constexpr std::size_t kFitted = 5;  // any five lie on the lines of some motion, so they tell nothing
-  constexpr double kMost = 0.7;       // of the others: 0.6 of places that were followed wrongly did
-  constexpr int kTries = 100;         // where so many go as one, all tries miss them in one case of 10^8
+  constexpr double kByChance = 0.45;  // of the others lie so on the average where many were followed wrongly
+  constexpr double kSigmas = 2.3;     // more than that
+  constexpr int kTries = 100;         // where seven tenths go as one, all tries miss them in one case of 10^8
   constexpr double kConfidence = 0.999;
   if (places.size() <= kFitted) return false;
   std::vector<cv::Point2d> then, now;
@@ -167,7 +169,8 @@ bool go_as_one(const std::vector<FollowedPlace>& places, double within) {
       cv::findEssentialMat(then, now, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, kConfidence, within, kTries, near);
   if (essential.empty()) return false;
   const auto others = static_cast<double>(places.size() - kFitted);
-  return cv::countNonZero(near) - static_cast<double>(kFitted) >= kMost * others;
+  const double by_chance = kByChance * others + kSigmas * std::sqrt(kByChance * (1 - kByChance) * others);
+  return cv::countNonZero(near) - static_cast<double>(kFitted) >= by_chance;
 }
 
 }  // namespace birdseye::host

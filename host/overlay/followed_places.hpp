@@ -57,9 +57,9 @@ std::optional<double> median_off_if_turned(const std::vector<FollowedPlace>& pla
                                            const Transform<Camera, Camera>& now_from_then, Eigen::Index axis,
                                            double by_rad);
 
-/// Whether most places go as one rigid scene before a camera that moves, whichever way it moves: there is an essential
-/// matrix by which seven tenths of them, five left out, lie within so much (Sampson's distance, of unit focal
-/// length). Where many places were followed wrongly there is none.
+/// Whether the places go as one rigid scene before a camera that moves, whichever way it moves: there is an essential
+/// matrix by which more of them lie within so much (Sampson's distance, of unit focal length) than do by chance where
+/// many were followed wrongly.
 bool go_as_one(const std::vector<FollowedPlace>& places, double within);
 
 }  // namespace birdseye::host
