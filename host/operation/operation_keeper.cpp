@@ -37,13 +37,24 @@ Result<std::optional<Operation>> OperationKeeper::take_up(const std::string& ct_
 void OperationKeeper::keep(Operation operation) {
   if (out_.empty() || !resume_.empty()) return;
   operation.made_utc = utc_now();
-  writing_.start(
-      [out = out_, machine = authors_.machine, kept = std::make_shared<const Operation>(std::move(operation))](
-          const std::stop_token&, const auto&) { return write_operation(out, *kept, *machine); });
+  newest_ = std::make_shared<const Operation>(std::move(operation));
+  write();
+}
+
+void OperationKeeper::write() {
+  again_.reset();
+  writing_.start([out = out_, machine = authors_.machine, kept = newest_](const std::stop_token&, const auto&) {
+    return write_operation(out, *kept, *machine);
+  });
 }
 
 void OperationKeeper::tick() {
-  if (const auto written = writing_.take()) fault_ = *written ? "" : words("note_not_kept", written->error().what);
+  constexpr Duration kAgainAfter = Duration::from_ms(5000);
+  if (const auto written = writing_.take()) {
+    fault_ = *written ? "" : words("note_not_kept", written->error().what);
+    if (!*written) again_ = Deadline::after(kAgainAfter);
+  }
+  if (again_ && again_->passed() && !writing_.running()) write();
 }
 
 }  // namespace birdseye::host

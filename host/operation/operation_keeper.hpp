@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "drivers/system/background.hpp"
+#include "drivers/system/clock.hpp"
 #include "host/operation/operation.hpp"
 
 namespace birdseye::host {
@@ -22,16 +24,20 @@ class OperationKeeper {
   Result<std::optional<Operation>> take_up(const std::string& ct_sha256, const std::string& labels_sha256);
   /// Stamped now. Not before what is there has been taken up. Of several in a row the last is written at any rate.
   void keep(Operation operation);
-  /// Hears what became of the last that was written.
+  /// Hears what became of the last that was written. Where it could not be, it is written again every five seconds.
   void tick();
   [[nodiscard]] bool writing() const { return writing_.running(); }
   /// Why it could not be kept.
   [[nodiscard]] const std::string& fault() const { return fault_; }
 
  private:
+  void write();
+
   std::filesystem::path out_, resume_;
   Authors authors_;
   Background<Result<void>> writing_;
+  std::shared_ptr<const Operation> newest_;  ///< that was to be kept
+  std::optional<Deadline> again_;            ///< once what could not be kept is written again
   std::string fault_;
 };
 

@@ -139,10 +139,14 @@ TEST(Operation, APowerCutAfterAnySyncLosesNothingThatWasKept) {
 }
 
 TEST(Operation, AWindowWhoseDiskIsFullSaysSoAndGoesOn) {
-  const auto full = usual(FaultKind::disk_full, 1, 80);
-  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = programs_end({full})});
+  const auto full = usual(FaultKind::disk_full, 1, 60), again = usual(FaultKind::window_restart, 80, 2);
+  const OperationOutcome out = operate({.seed = 11, .minutes = 2, .faults = programs_end({full, again})});
   EXPECT_TRUE(out.broken.empty()) << told(out);
   EXPECT_GT(static_cast<double>(out.laws.green), 0.6 * static_cast<double>(out.laws.shown)) << out.log;
+  // Once the disk has room, it is kept after all.
+  const std::size_t opened = out.log.find("ends: program window_restart");
+  ASSERT_NE(opened, std::string::npos) << out.log;
+  EXPECT_EQ(out.log.find("step fiducials", opened), std::string::npos) << out.log;
 }
 
 TEST(Operation, ALateDiskDelaysNoPicture) {
