@@ -38,8 +38,7 @@ LocalDisk::LocalDisk(const fs::path& root, std::uint64_t seed) : seed_(seed) {
   root_ = fs::weakly_canonical(root, ignored);
   held_ = root_.string() + ".held";
   fs::create_directories(held_, ignored);
-  for (const auto& entry : fs::recursive_directory_iterator(root_, ignored)) sync(entry.path());
-  sync(root_);
+  note_all();
 }
 
 LocalDisk::~LocalDisk() {
@@ -72,6 +71,22 @@ LocalDisk::Names LocalDisk::names_in(const fs::path& folder) {
   return names;
 }
 
+/// That a file, or the names in a folder, are on the disk.
+void LocalDisk::note(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
+    synced_names_[path] = names_in(path);
+  } else {
+    synced_text_[hold(path)] = text_in(path);
+  }
+}
+
+void LocalDisk::note_all() {
+  std::error_code ignored;
+  for (const auto& entry : fs::recursive_directory_iterator(root_, ignored)) note(entry.path());
+  note(root_);
+}
+
 int LocalDisk::sync(const fs::path& path) {
   std::error_code error;
   const fs::path whole = fs::weakly_canonical(path, error);
@@ -83,11 +98,7 @@ int LocalDisk::sync(const fs::path& path) {
     return ENOSPC;
   }
   if (!fs::exists(whole, error)) return ENOENT;
-  if (fs::is_directory(whole, error)) {
-    synced_names_[whole] = names_in(whole);
-  } else {
-    synced_text_[hold(whole)] = text_in(whole);
-  }
+  note(whole);
   if (goes_after_ && *goes_after_ > 0 && --*goes_after_ == 0) lose_power();
   return 0;
 }
@@ -107,11 +118,11 @@ void LocalDisk::lose_power() {
 
 /// Of what was written and not synced a part may be there, and where it ends zeros.
 std::string LocalDisk::surviving_text(std::uint64_t number) {
-  const std::string now = text_in(held(number));
+  std::string now = text_in(held(number));
   const auto found = synced_text_.find(number);
   if (found != synced_text_.end() && found->second == now) return now;
   // What was appended comes after what was synced; what was written over it may have replaced any of it.
-  const std::string synced = found == synced_text_.end() ? "" : found->second;
+  std::string synced = found == synced_text_.end() ? "" : found->second;
   const bool appended = now.starts_with(synced);
   if (!appended && drawn() < 0.5) return synced;
   const std::size_t kept = appended ? synced.size() : 0;
@@ -164,13 +175,7 @@ Result<void> LocalDisk::power_up() {
     out.flush();
     if (!out) return Error{Errc::io, fmt::format("{}: cannot be put back; is the disk full?", path.string())};
   }
-  // All of it is on the disk now.
-  const Duration late = std::exchange(late_, Duration{});
-  const bool full = std::exchange(full_, false);
-  for (const auto& [path, text] : image) sync(path);
-  sync(root_);
-  late_ = late;
-  full_ = full;
+  note_all();
   return {};
 }
 

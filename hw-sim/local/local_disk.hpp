@@ -14,7 +14,7 @@ namespace birdseye::hw_sim {
 
 /// A folder, as a disk has it that may be late, be full, or lose its power. What programs wrote and did not sync may
 /// then be there, in part, or not at all: of each name and of each file the seed decides.
-class LocalDisk : public DiskKeeper {
+class LocalDisk final : public DiskKeeper {
  public:
   /// root: there already. Nothing outside of it is this disk's.
   LocalDisk(const std::filesystem::path& root, std::uint64_t seed);
@@ -50,6 +50,8 @@ class LocalDisk : public DiskKeeper {
   /// What is there after a power cut, by its path below root; a folder has no text.
   using Image = std::map<std::filesystem::path, std::optional<std::string>>;
 
+  void note(const std::filesystem::path& path);
+  void note_all();
   [[nodiscard]] Names names_in(const std::filesystem::path& folder);
   [[nodiscard]] std::filesystem::path held(std::uint64_t number) const;
   std::uint64_t hold(const std::filesystem::path& file);
