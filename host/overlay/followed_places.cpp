@@ -120,8 +120,8 @@ std::optional<Eigen::Vector3d> ray_of(const CameraModel& camera, int small_colum
   return unproject(camera, Eigen::Vector2d((place.x + 0.5) * scale - 0.5, (place.y + 0.5) * scale - 0.5));
 }
 
-std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
-                                      double farthest_mm) {
+std::vector<double> off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                             double farthest_mm) {
   std::vector<double> off;
   off.reserve(places.size());
   for (const FollowedPlace& place : places) {
@@ -134,6 +134,12 @@ std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, 
     const Eigen::Vector3d farthest = now_from_then * Eigen::Vector3d(farthest_mm * place.then);
     off.push_back(distance(place.now.hnormalized(), nearest.hnormalized(), farthest.hnormalized()));
   }
+  return off;
+}
+
+std::optional<double> median_off_line(const std::vector<FollowedPlace>& places, const Relative& now_from_then,
+                                      double farthest_mm) {
+  std::vector<double> off = off_line(places, now_from_then, farthest_mm);
   if (2 * off.size() <= places.size()) return std::nullopt;
   return median_of(std::move(off));
 }

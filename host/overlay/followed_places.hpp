@@ -46,8 +46,11 @@ struct FollowedPlace {
 };
 
 /// Where a place may lie in the later picture, at whatever depth, the poses tell: on a line (the epipolar line), of
-/// which the part from 15 mm to farthest_mm counts. The median of how far the places are off it, of unit focal length;
-/// empty where most of them would be behind the camera.
+/// which the part from 15 mm to farthest_mm counts. How far each place is off it, of unit focal length, but for those
+/// that would be behind the camera.
+std::vector<double> off_line(const std::vector<FollowedPlace>& places, const Transform<Camera, Camera>& now_from_then,
+                             double farthest_mm = kFarthestSeen_mm);
+/// The median of these; empty where most places would be behind the camera.
 std::optional<double> median_off_line(const std::vector<FollowedPlace>& places,
                                       const Transform<Camera, Camera>& now_from_then,
                                       double farthest_mm = kFarthestSeen_mm);

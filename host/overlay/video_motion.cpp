@@ -39,6 +39,12 @@ PoseHistory averaged_poses() {
   return PoseHistory(settings);
 }
 
+/// Of places that are followed wrongly one in five and more lie by chance where the poses say.
+bool few_agree(const std::vector<FollowedPlace>& places, const Relative& motion, double allowed) {
+  const auto off = off_line(places, motion);
+  return 5 * std::ranges::count_if(off, [allowed](double one) { return one <= allowed; }) < std::ssize(places);
+}
+
 }  // namespace
 
 struct VideoMotion::Waiting {
@@ -300,10 +306,10 @@ double VideoMotion::fastest_px_s(const SeenFrom& then, const SeenFrom& now, cons
 }
 
 /// odd: the places do not lie where the poses say. of_what_is_left: the same, but a quick motion has lost more than a
-/// third of them, and the rest may have been followed to others that look alike; or no motion at all has what is left
-/// where it lies. Then state() becomes untold, not differs, and the video has to agree anew about each axis. What is
-/// left without a quick motion, and lies where no motion has it, does not contradict either: places on rims and
-/// reflections do not go with the tissue, and are the last to be lost.
+/// third of them, and the rest may have been followed to others that look alike; or some agree, and no motion at all
+/// has the rest where it lies. Then state() becomes untold, not differs, and the video has to agree anew about each
+/// axis. The latter does not contradict either: places on rims and reflections do not go with the tissue, and are the
+/// last to be lost.
 VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& now, const ScopeSetup& scope) {
   const auto& held_out_px = scope.figures().held_out_px;
   if (!held_out_px) return Judged::not_odd;  // nothing says how far off a picture may be
@@ -342,8 +348,8 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
       return Judged::odd;
     }
     const bool swung = 3 * key_->left < 2 * key_->agreed;
-    const bool moved =
-        *off_px_ > kPlainly * allowed_px || go_as_one(places, kFollowedPx * scale / std::sqrt(2) / camera.fx_px);
+    const bool moved = *off_px_ > kPlainly * allowed_px || few_agree(places, motion, allowed_px / camera.fx_px) ||
+                       go_as_one(places, kFollowedPx * scale / std::sqrt(2) / camera.fx_px);
     contradicted_ = state_ != VideoAgreement::differs && (swung || moved);
     told_ = {};
     if (swung || !moved) {
