@@ -25,7 +25,8 @@ Result<void> put(const fs::path& path, const std::string& text, const fs::path& 
   out.flush();
   if (out) return {};
   return Error{Errc::unreadable,
-               fmt::format("{}: cannot be written; check the folder and its permissions", named.string())};
+               fmt::format("{}: cannot be written; check the folder, its permissions, and whether the disk is full",
+                           named.string())};
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ struct OperationView {
   bool patient_confirmed = false;   ///< a person has compared name, ID and date with the patient on the table
   std::array<StepNote, kLiveSteps> notes;
   std::string fault;
-  bool writing = false;  ///< what was found is being written, and is not yet kept
+  bool writing = false;  ///< what was found, and is not yet kept; the simulator's laws ask
   std::string
       primary_refused;  ///< why Space and the pedal would do nothing now; empty: they do what primary_words() says
 

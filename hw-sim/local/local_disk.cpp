@@ -8,9 +8,11 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "drivers/system/clock.hpp"
 #include "drivers/system/wait.hpp"
 #include "hw-sim/base/hashed.hpp"
 
@@ -58,6 +60,7 @@ std::uint64_t LocalDisk::hold(const fs::path& file) {
   const std::uint64_t number = number_of(file);
   std::error_code there;
   fs::create_hard_link(file, held(number), there);
+  if (there && there != std::errc::file_exists) throw std::runtime_error(file.string() + ": cannot have a second name");
   return number;
 }
 
@@ -69,6 +72,13 @@ LocalDisk::Names LocalDisk::names_in(const fs::path& folder) {
     names.emplace(entry.path().filename().string(), Node{is_folder, is_folder ? 0 : hold(entry.path())});
   }
   return names;
+}
+
+/// A machine that loses its power waits for no disk.
+void LocalDisk::wait_for_disk() const {
+  constexpr Duration kLook = Duration::from_ms(10);
+  const Deadline until = Deadline::after(late_);
+  while (!left_ && !until.passed()) sleep_for(std::min(kLook, until.left()));
 }
 
 /// That a file, or the names in a folder, are on the disk.
@@ -92,7 +102,8 @@ int LocalDisk::sync(const fs::path& path) {
   const fs::path whole = fs::weakly_canonical(path, error);
   const auto [rest, unused] = std::mismatch(root_.begin(), root_.end(), whole.begin(), whole.end());
   if (rest != root_.end()) return 0;
-  if (late_.ns > 0) sleep_for(late_);
+  wait_for_disk();
+  if (left_) return EIO;  // the program that waits here is of a machine that has no power any more
   if (full_) {
     ++failed_;
     return ENOSPC;
@@ -121,14 +132,17 @@ std::string LocalDisk::surviving_text(std::uint64_t number) {
   std::string now = text_in(held(number));
   const auto found = synced_text_.find(number);
   if (found != synced_text_.end() && found->second == now) return now;
-  // What was appended comes after what was synced; what was written over it may have replaced any of it.
+  // What was appended comes after what was synced. What was written over it: all of it is the former, or a part of the
+  // new is there.
   std::string synced = found == synced_text_.end() ? "" : found->second;
   const bool appended = now.starts_with(synced);
   if (!appended && drawn() < 0.5) return synced;
   const std::size_t kept = appended ? synced.size() : 0;
   const auto there = static_cast<std::size_t>(drawn() * static_cast<double>(now.size() - kept + 1));
   std::string text = now.substr(0, kept + there);
-  if (drawn() < 0.3) text.resize(kept + there + static_cast<std::size_t>(drawn() * 1000), '\0');
+  const std::size_t longest = std::max(now.size(), synced.size());
+  if (drawn() < 0.3)
+    text.resize(text.size() + static_cast<std::size_t>(drawn() * static_cast<double>(longest - text.size() + 1)), '\0');
   return text;
 }
 

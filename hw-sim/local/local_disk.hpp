@@ -13,7 +13,8 @@
 namespace birdseye::hw_sim {
 
 /// A folder, as a disk has it that may be late, be full, or lose its power. What programs wrote and did not sync may
-/// then be there, in part, or not at all: of each name and of each file the seed decides.
+/// then be there, in part, or not at all: of each name and of each file the seed decides, apart from the others, so
+/// that of a file that was given another name both may be there, or neither.
 class LocalDisk final : public DiskKeeper {
  public:
   /// root: there already. Nothing outside of it is this disk's.
@@ -31,7 +32,8 @@ class LocalDisk final : public DiskKeeper {
   /// How many syncs have failed.
   [[nodiscard]] std::uint64_t failed() const { return failed_; }
 
-  /// The power goes after so many syncs more. Programs go on; what they write from then on is lost.
+  /// The power goes after so many syncs more. Until somebody ends them programs go on; what they write from then on is
+  /// lost, and each sync fails.
   void lose_power_after(std::uint64_t syncs);
   /// The power goes now, where it has not gone before.
   void lose_power();
@@ -50,6 +52,7 @@ class LocalDisk final : public DiskKeeper {
   /// What is there after a power cut, by its path below root; a folder has no text.
   using Image = std::map<std::filesystem::path, std::optional<std::string>>;
 
+  void wait_for_disk() const;
   void note(const std::filesystem::path& path);
   void note_all();
   [[nodiscard]] Names names_in(const std::filesystem::path& folder);

@@ -249,7 +249,7 @@ class WindowDisk {
     if (cut != nullptr) {
       if (!std::exchange(cutting_, true)) disk_.lose_power_after(static_cast<std::uint64_t>(cut->value("after_syncs")));
       // Where nothing is written any more.
-      if (at_s > cut->at_s + *cut->for_s / 2) disk_.lose_power();
+      if (at_s > cut->at_s + cut->for_s.value_or(0) / 2) disk_.lose_power();
       return !disk_.powerless();
     }
     if (!std::exchange(cutting_, false)) return true;
@@ -339,8 +339,10 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
     laws.take_failed(disk.failed(), view, now);
-    const bool done = view.note(host::LiveStep::fiducials).done, kept = !view.writing && view.fault.empty();
-    registered = done && (registered || kept);
+    const bool done = view.note(host::LiveStep::fiducials).done;
+    const bool kept = !view.writing && view.fault.empty() && !disk.powerless();
+    // What a window has not taken up yet is there all the same.
+    if (!laws.waits_for_what_was_kept()) registered = done && (registered || kept);
     const host::StepNote& note = view.note(view.step);
     journal.follow(now, step,
                    fmt::format("step {}: {}", host::name_of(view.step),

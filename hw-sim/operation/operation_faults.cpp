@@ -66,7 +66,7 @@ constexpr DrawnFault kDrawnOfPrograms[] = {
 };
 
 constexpr DrawnFault kDrawnOfDisk[] = {
-    {FaultKind::disk_late, kProgram, 5, 60, "ms", 10, 1500},
+    {FaultKind::disk_late, kProgram, 5, 20, "ms", 10, 1500},
     {FaultKind::disk_full, kProgram, 5, 60},
     {FaultKind::power_cut, kProgram, 10, 60, "after_syncs", 0, 8},
 };
@@ -111,8 +111,9 @@ FaultSigns of_camera(const Fault& fault) {
 constexpr double kFlockStarts_s = 1.5;  // the waits that a flock needs from its first answer to its first record
 
 FaultSigns of_program(const Fault& fault) {
-  if (fault.kind == FaultKind::disk_late || fault.kind == FaultKind::disk_full) return {.aside = true};
-  constexpr double kConnects_s = 1.1;  // the window tries each second
+  if (fault.kind == FaultKind::disk_full) return {.aside = true};
+  if (fault.kind == FaultKind::disk_late) return {};  // a window that is closed waits for it
+  constexpr double kConnects_s = 1.1;                 // the window tries each second
   return {.own_s = kConnects_s + (fault.kind == FaultKind::appliance_restart ? kFlockStarts_s : 0)};
 }
 

@@ -21,7 +21,7 @@ struct FaultSigns {
   double extra_mm = 0;                  ///< poses may be off by so much more
   double extra_s = 0;                   ///< and by as much as things move in this time
   double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
-  bool aside = false;                   ///< it touches neither instruments nor programs, but the disk alone
+  bool aside = false;                   ///< neither instruments nor programs are touched by it, nor how long they take
   double strikes_within_s = 0;          ///< after its begin: a fault that comes by chance has then surely come once
 };
 

@@ -192,7 +192,9 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
 void OperationLaws::take_failed(std::uint64_t syncs, const host::OperationView& view, HostTime now) {
   const double now_s = at_s(now.ns);
   if (std::exchange(failed_syncs_, syncs) < syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
-  if (!view.fault.empty()) unsaid_since_s_.reset();
+  const bool said = view.fault.starts_with(host::words("note_not_kept", ""));
+  const bool kept_after_all = view.fault.empty() && !view.writing;
+  if (said || kept_after_all) unsaid_since_s_.reset();
   if (!unsaid_since_s_ || now_s - *unsaid_since_s_ < kNamedWithin_s) return;
   unsaid_since_s_.reset();
   break_law(now_s, "kept", "what was found could not be kept, and the window does not say so");

@@ -44,6 +44,8 @@ class OperationLaws {
   void take(const wire::Event& event, HostTime now);
   /// The window was opened. registered: the patient was, when it was closed.
   void opened(bool registered, std::size_t checks);
+  /// It has not yet taken up what there was.
+  [[nodiscard]] bool waits_for_what_was_kept() const { return to_take_up_; }
   /// What the window says. checks: how often a landmark has been checked.
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
   /// The same, of a disk on which so many syncs have failed so far.

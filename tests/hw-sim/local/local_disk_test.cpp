@@ -10,6 +10,7 @@
 #include <string>
 
 #include "drivers/system/durable.hpp"
+#include "hw-sim/time/virtual_time.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::hw_sim {
@@ -104,7 +105,7 @@ TEST(LocalDisk, WhereThePowerGoesMeanwhileItIsTheOldOneOrTheNewOneAndWhole) {
       ASSERT_TRUE(replace_durably(on.part, on.file));
       on.disk->lose_power_after(syncs);
       write(on.part, "new");
-      ASSERT_TRUE(replace_durably(on.part, on.file));
+      EXPECT_EQ(replace_durably(on.part, on.file).has_value(), syncs == 2);
       EXPECT_TRUE(on.disk->powerless());
     }));
   }
@@ -127,10 +128,43 @@ TEST(LocalDisk, WhatWasWrittenAfterThePowerWentIsLost) {
   EXPECT_EQ(left_after([](OnTheDisk& on) {
               on.disk->lose_power();
               write(on.file, "late");
-              ASSERT_TRUE(sync_file(on.file));
-              ASSERT_TRUE(sync_folder(on.root));
+              EXPECT_FALSE(sync_file(on.file));
+              EXPECT_FALSE(sync_folder(on.root));
             }),
             (std::set<std::string>{"gone"}));
+}
+
+TEST(LocalDisk, WhatWasWrittenOverItIsTheFormerOrAPartOfTheNew) {
+  const auto left = left_after([](OnTheDisk& on) {
+    write(on.file, "former");
+    ASSERT_TRUE(sync_file(on.file));
+    ASSERT_TRUE(sync_folder(on.root));
+    write(on.file, "0123456789");
+  });
+  EXPECT_TRUE(left.contains("former"));
+  EXPECT_GT(left.size(), 4U);
+  for (const std::string& text : left) EXPECT_LE(text.size(), 10U) << "no longer than it ever was";
+}
+
+TEST(LocalDisk, WhereAPartIsThereZerosMayFollow) {
+  int zeros = 0;
+  for (const std::string& text : left_after([](OnTheDisk& on) {
+         write(on.file, "0123456789");
+         ASSERT_TRUE(sync_folder(on.root));
+       }))
+    zeros += text.ends_with('\0') ? 1 : 0;
+  EXPECT_GT(zeros, 0);
+}
+
+TEST(LocalDisk, ALateOneTakesItsTime) {
+  const auto ran = run_in_virtual_time({.seed = 1}, [] {
+    OnTheDisk on(1);
+    write(on.file, "text");
+    on.disk->set_late(Duration::from_ms(250));
+    EXPECT_TRUE(sync_file(on.file));
+  });
+  ASSERT_TRUE(ran) << ran.error().what;
+  EXPECT_GE(ran->elapsed_ns, Duration::from_ms(250).ns);
 }
 
 TEST(LocalDisk, AFullOneFailsEachSyncAndSaysSo) {

@@ -122,8 +122,8 @@ Fault usual(FaultKind kind, double at_s, double for_s, std::map<std::string, dou
   return {kind, at_s, for_s, std::move(values)};
 }
 
-/// The window opens, takes the calibration and the registration, each of which it keeps; the power goes after any of
-/// the syncs of that, or while nothing is written.
+/// The window keeps what it has after each touch from the third on; the power goes after any of the syncs of that, or
+/// while nothing is written.
 TEST(Operation, APowerCutAfterAnySyncLosesNothingThatWasKept) {
   std::set<bool> taken_up;
   for (int syncs = 0; syncs <= 28; ++syncs) {
@@ -136,6 +136,26 @@ TEST(Operation, APowerCutAfterAnySyncLosesNothingThatWasKept) {
     taken_up.insert(out.log.find("step fiducials: 0 touched", out.log.find("no power")) == std::string::npos);
   }
   EXPECT_EQ(taken_up.size(), 2U);
+}
+
+/// It writes what it took up, and loses its power again.
+TEST(Operation, APowerCutWhileTheRegistrationIsTakenUpLosesNothing) {
+  for (int syncs = 1; syncs <= 4; ++syncs) {
+    const auto again = usual(FaultKind::window_restart, 30, 2),
+               cut = usual(FaultKind::power_cut, 31, 16, {{"after_syncs", syncs}});
+    const OperationOutcome out = operate({.seed = 11, .minutes = 1.5, .faults = programs_end({again, cut})});
+    EXPECT_TRUE(out.broken.empty()) << syncs << "\n" << told(out);
+    const std::size_t gone = out.log.find("no power");
+    ASSERT_NE(gone, std::string::npos) << out.log;
+    EXPECT_EQ(out.log.find("step fiducials: 0 touched", gone), std::string::npos) << out.log;
+  }
+}
+
+TEST(Operation, ACutOfPowerIsTheSameEachTime) {
+  const auto script = programs_end({usual(FaultKind::power_cut, 10, 20, {{"after_syncs", 3}})});
+  const OperationOutcome out = operate({.seed = 12, .minutes = 1.5, .faults = script});
+  EXPECT_EQ(out.hash, operate({.seed = 12, .minutes = 1.5, .faults = script}).hash);
+  EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
 TEST(Operation, AWindowWhoseDiskIsFullSaysSoAndGoesOn) {
