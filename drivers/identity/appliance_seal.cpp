@@ -8,10 +8,13 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
 
+#include "calibration/base/crc64.hpp"
 #include "calibration/record/sha256.hpp"
 
 namespace birdseye {
@@ -36,8 +39,31 @@ Head head_of(const std::array<char, kHeadBytes>& bytes) {
   return head;
 }
 
-void add(calibration::Sha256& sum, const char* bytes, std::size_t size) {
-  sum.add({reinterpret_cast<const std::uint8_t*>(bytes), size});
+std::span<const std::uint8_t> as_bytes(std::span<const char> bytes) {
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
+}
+
+/// Whether the sum behind a payload is of it and its head.
+bool sum_fits(std::span<const char> head, std::span<const char> payload_and_sum) {
+  const auto payload = payload_and_sum.first(payload_and_sum.size() - kSumBytes);
+  std::uint64_t sum = 0;
+  std::memcpy(&sum, payload_and_sum.last(kSumBytes).data(), kSumBytes);
+  return sum == ~crc64_ecma(as_bytes(payload), crc64_ecma(as_bytes(head), ~std::uint64_t{0}));
+}
+
+/// Whether a signature stands at a file's end, whatever its block says of itself: damage to the kind or the size of a
+/// block must not make a signed recording one that nobody signed.
+bool ends_in_a_signature(std::ifstream& in) {
+  constexpr std::streamoff kMostBytes = 4096;  // more than a signature has
+  in.clear();
+  in.seekg(0, std::ios::end);
+  const std::streamoff size = in.tellg();
+  std::string end(static_cast<std::size_t>(std::min(size, kMostBytes)), '\0');
+  in.seekg(size - static_cast<std::streamoff>(end.size()));
+  in.read(end.data(), static_cast<std::streamsize>(end.size()));
+  end.resize(end.size() - std::min(end.size(), kSumBytes));
+  const auto has = [&end](const char* name) { return end.find(name) != std::string::npos; };
+  return end.ends_with('}') && (has("\"signature\":") || has("\"utc\":"));  // either may be damaged
 }
 
 }  // namespace
@@ -52,6 +78,7 @@ bool is_appliance_recording(const std::filesystem::path& path) {
 }
 
 Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
+  constexpr const char* kDamagedSignature = "is damaged in its signature; take a copy that is as it was written";
   const auto refused = [&path](const char* why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
@@ -59,7 +86,7 @@ Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   in.ignore(kMagic.size());
   calibration::Sha256 sum;
-  add(sum, kMagic.data(), kMagic.size());
+  sum.add(as_bytes(kMagic));
   std::vector<char> bytes;
   for (;;) {
     std::array<char, kHeadBytes> head_bytes{};
@@ -69,18 +96,22 @@ Result<ApplianceSeal> read_appliance_seal(const std::filesystem::path& path) {
     if (whole && head.size > kMostPayload) return refused("is damaged: a block's size makes no sense");
     bytes.resize(whole ? head.size + kSumBytes : 0);
     in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (!whole || static_cast<std::size_t>(in.gcount()) != bytes.size()) return ApplianceSeal{sum.hex(), {}};
+    if (!whole || static_cast<std::size_t>(in.gcount()) != bytes.size()) {
+      if (ends_in_a_signature(in)) return refused(kDamagedSignature);
+      return ApplianceSeal{sum.hex(), {}};
+    }
     if (head.kind != kSignatureBlock) {
-      add(sum, head_bytes.data(), head_bytes.size());
-      add(sum, bytes.data(), bytes.size());
+      sum.add(as_bytes(head_bytes));
+      sum.add(as_bytes(bytes));
       continue;
     }
+    if (!sum_fits(head_bytes, bytes)) return refused(kDamagedSignature);
     ApplianceSeal out{sum.hex(), calibration::FileSignature(), in.peek() != std::char_traits<char>::eof()};
     try {
       out.signature = calibration::signature_of_json(
           nlohmann::json::parse(bytes.begin(), bytes.end() - static_cast<std::ptrdiff_t>(kSumBytes)));
     } catch (const nlohmann::json::exception&) {
-      return refused("is damaged in its signature");
+      return refused(kDamagedSignature);
     }
     return out;
   }

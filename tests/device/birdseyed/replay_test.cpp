@@ -25,22 +25,28 @@ std::string refusal(const std::filesystem::path& recording, bool accept_unsigned
   return admitted ? "" : admitted.error().what;
 }
 
+/// A recording of nine readings.
+std::string recording_text(const std::filesystem::path& folder) {
+  RecordConfig config;
+  config.folder = folder;
+  std::filesystem::path path;
+  {
+    const auto recorder = Recorder::start(config, {});
+    if (!recorder) return "";
+    path = (*recorder)->path();
+    for (std::uint8_t i = 0; i < 9; ++i) (*recorder)->take(TrackerBytes{{{0x80, i}, DeviceTime{i}}});
+  }
+  return contents_of(path);
+}
+
 TEST(Replay, ARecordingOfNobodyKnownIsPlayedOnlyWhenAskedToAndAChangedOneNever) {
   const char* const before = ::getenv("BIRDSEYE_IDENTITY");
   const std::string own = before == nullptr ? "" : before;
   const Scratch scratch;
   be(scratch / "cart");
-  RecordConfig config;
-  config.folder = scratch / "r";
-  std::filesystem::path path;
-  {
-    const auto recorder = Recorder::start(config, {});
-    ASSERT_TRUE(recorder) << recorder.error().what;
-    path = (*recorder)->path();
-    for (std::uint8_t i = 0; i < 9; ++i) (*recorder)->take(TrackerBytes{{{0x80, i}, DeviceTime{i}}});
-  }
+  const std::string text = recording_text(scratch / "r");
+  const std::string path = scratch.file("whole.berec", text);
   EXPECT_EQ(refusal(path), "");
-  const std::string text = contents_of(path);
   std::string changed = text;
   changed[text.size() / 2] = static_cast<char>(changed[text.size() / 2] ^ 1);
   const std::string cut = scratch.file("cut.berec", text.substr(0, text.size() - 1));
@@ -55,6 +61,26 @@ TEST(Replay, ARecordingOfNobodyKnownIsPlayedOnlyWhenAskedToAndAChangedOneNever) 
   EXPECT_NE(refusal(path).find("not known here"), std::string::npos) << refusal(path);
   EXPECT_EQ(refusal(path, true), "");
   own.empty() ? ::unsetenv("BIRDSEYE_IDENTITY") : ::setenv("BIRDSEYE_IDENTITY", own.c_str(), 1);
+}
+
+TEST(Replay, NoBitOfASignatureMakesARecordingOneThatNobodySigned) {
+  const Scratch scratch;
+  const std::string text = recording_text(scratch / "r");
+  const std::size_t payload = text.rfind("{\"key\":");
+  ASSERT_NE(payload, std::string::npos);
+  ASSERT_EQ(refusal(scratch.file("whole.berec", text)), "");
+  constexpr std::size_t kHead = 12;
+  for (std::size_t at = payload - kHead; at < text.size(); ++at) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      std::string changed = text;
+      changed[at] = static_cast<char>(static_cast<unsigned char>(changed[at]) ^ 1U << bit);
+      const std::string why = refusal(scratch.file("changed.berec", changed), true);
+      EXPECT_NE(why.find("damaged"), std::string::npos) << at - payload << " " << bit << why;
+    }
+  }
+  // What was cut in its signature, as by a crash, is good up to there.
+  for (std::size_t at = payload - kHead; at < text.size(); ++at)
+    EXPECT_EQ(refusal(scratch.file("cut.berec", text.substr(0, at)), true), "") << at - payload;
 }
 
 TEST(Replay, AnEventThatIsAnHourLaterIsDamaged) {

@@ -123,6 +123,9 @@ TEST(VerifyCommand, OfAnApplianceRecordingSeesEachByte) {
     changed[at] = static_cast<char>(changed[at] ^ 1);
     expect(scratch.file("changed.berec", changed), 3, {": appliance recording: "});
   }
+  std::string changed = text;
+  changed[text.rfind("{\"key\":") - 12] ^= 1;  // so that its block is of another kind
+  expect(scratch.file("changed.berec", changed), 3, {"damaged in its signature; take a copy"});
   expect(scratch.file("longer.berec", text + "x"), 3, {"added: bytes behind the signature"});
   expect(scratch.file("cut.berec", text.substr(0, text.size() - 1)), 3, {"not signed", "cut short"});
 }
