@@ -75,7 +75,8 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
   RecordingSeal out;
   out.sha256 = sheet_sha256(sheet);
   out.ended = sheet.value("ended", nlohmann::json()) == true;
-  if (!sheet.contains(kSigned)) return out;
+  // Sums and signature are written together: with one alone, the other's name is damaged, and it was signed.
+  if (!sheet.contains(kSigned) && !sheet.contains(kSums)) return out;
   const auto there = files_in(folder);
   if (!there) return there.error();
   try {
@@ -91,8 +92,8 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
     }
     std::ranges::copy_if(*there, std::back_inserter(out.added), [&](const auto& name) { return !sums.contains(name); });
   } catch (const nlohmann::json::exception&) {
-    return Error{Errc::bad_format,
-                 fmt::format("{}: what it says of its signature makes no sense", (folder / kRecordingSheet).string())};
+    return Error{Errc::bad_format, fmt::format("{}: is damaged in its signature; take a copy that is as it was written",
+                                               (folder / kRecordingSheet).string())};
   }
   return out;
 }

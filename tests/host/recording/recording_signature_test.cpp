@@ -65,6 +65,23 @@ TEST(RecordingSignature, OfThisMachineIsAdmittedAndCoversEachOfItsFiles) {
   }
 }
 
+TEST(RecordingSignature, NoBitOfASheetMakesARecordingOneThatNobodySigned) {
+  const Scratch scratch;
+  const Authors own = Authors::for_once();
+  record(scratch / "r", own);
+  const std::string text = contents_of(scratch / "r" / kRecordingSheet);
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    for (const int bit : {1, 32}) {
+      std::string changed = text;
+      changed[at] = static_cast<char>(changed[at] ^ bit);
+      (void)scratch.file("r/recording.json", changed);
+      // A hexadecimal digit's case is no part of what a signature says.
+      const auto admitted = admit_recording(scratch / "r", {own.machine, true});
+      EXPECT_TRUE(!admitted || admitted->doubt.empty()) << at << " " << changed.substr(at, 20);
+    }
+  }
+}
+
 TEST(RecordingSignature, NamesWhatWasChangedTakenAwayAndAdded) {
   const Scratch scratch;
   const Authors own = Authors::for_once();
