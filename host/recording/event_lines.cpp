@@ -86,12 +86,19 @@ std::string event_line(const wire::Event& event, const FramePlace& place) {
 }
 
 Result<EventOfLine> parse_event_line(const std::string& line) {
+  const auto damaged = [](const std::string& why) {
+    return Error{Errc::bad_format,
+                 fmt::format("is no event: {}; take a copy of the recording that is as it was written", why)};
+  };
+  const json in = json::parse(line, nullptr, false);
+  if (in.is_discarded()) return damaged("it is not JSON");
+  if (!in.is_object() || in.size() != 1) return damaged("it does not name one event");
   try {
-    const json in = json::parse(line);
-    if (!in.is_object() || in.size() != 1) return Error{Errc::bad_format, "is no event"};
     return event_of(in.begin().key(), in.begin().value());
+  } catch (const json::exception&) {  // whose words are for programmers
+    return damaged("a part of it is missing, or is not of the kind that it should be");
   } catch (const std::exception& fault) {
-    return Error{Errc::bad_format, fmt::format("is no event: {}", fault.what())};
+    return damaged(fault.what());
   }
 }
 

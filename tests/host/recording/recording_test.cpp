@@ -305,6 +305,11 @@ TEST(Recording, DamageIsNamed) {
       EXPECT_NE(played.ending.what.find(word), std::string::npos) << word << "\n" << played.ending.what;
   };
   const auto put = [&](const std::string& text) { std::ofstream(scratch / "r/events.jsonl") << text; };
+  for (const char* damaged : {"{\"Pedal", "{\"Birds\":{}}", "{\"Birds\":7}", "{\"Status\":{\"ok\":1,\"text\":2}}"}) {
+    put(damaged + ("\n" + lines));
+    expect({"events.jsonl: line 1: is no event: ", "; take a copy of the recording"});
+    EXPECT_EQ(play(scratch / "r").ending.what.find("exception"), std::string::npos) << "the parser's own words";
+  }
   put("{}\n" + lines);
   expect({"events.jsonl", "line 1"});
   put("{\"Sound\":{}}\n" + lines);
