@@ -41,14 +41,19 @@ void bound_memory(std::uintmax_t allowed_bytes) {
   lower_limit(RLIMIT_AS, pages * page + std::min<rlim_t>(half, allowed_bytes));
 }
 
-/// From now on, in whole seconds, as the limit is: at least what is allowed.
+/// From now on, up to a whole second, as the limit is: at least what is allowed.
 void bound_processor_time(Duration allowed) {
   rusage used{};
   if (::getrusage(RUSAGE_SELF, &used) != 0) return;
-  const auto spent_s = static_cast<rlim_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec) + 2;  // both cut off
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  // The limit counts whole ticks of the kernel's clock, and over many files they come to more than what was used.
+  constexpr double kByTicks = 1.1;
+  const double until_s = kByTicks * (seconds(used.ru_utime) + seconds(used.ru_stime)) + allowed.seconds();
   rlimit limit{};
   if (::getrlimit(RLIMIT_CPU, &limit) != 0) return;
-  limit.rlim_cur = std::min(limit.rlim_max, spent_s + static_cast<rlim_t>(std::ceil(allowed.seconds())));
+  limit.rlim_cur = std::min(limit.rlim_max, static_cast<rlim_t>(std::ceil(until_s)));
   ::setrlimit(RLIMIT_CPU, &limit);
 }
 

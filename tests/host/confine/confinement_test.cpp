@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -150,6 +151,24 @@ void work_for(double seconds) {
 
 TEST_F(Confined, HasTheProcessorForAsLongAsItsInputJustifies) {
   EXPECT_THAT(error_of(input(), [] { work_for(60); }).what, HasSubstr("signal 24 (CPU time limit exceeded)"));
+}
+
+TEST_F(Confined, HasLessThanASecondOfTheProcessorBeyondThat) {
+  double left_s = 0;
+  const auto ran = run_isolated(
+      [&](const Send& send) {
+        work_for(0.3);
+        confine_to(input());
+        rlimit limit{};
+        (void)::getrlimit(RLIMIT_CPU, &limit);
+        const double left = static_cast<double>(limit.rlim_cur) - processor_s();
+        send(&left, sizeof left);
+      },
+      [&](const Receive& receive) { (void)receive(&left_s, sizeof left_s); }, kLong);
+  ASSERT_TRUE(ran) << ran.error().what;
+  const double allowed_s = allowance_of(readable_for(input()).bytes).processor_time.seconds();
+  EXPECT_GT(left_s, allowed_s - 0.5) << "what it took to confine itself is off it already";
+  EXPECT_LT(left_s, allowed_s + 1);
 }
 
 TEST_F(Confined, HasTimeForEachOfItsFiles) {
