@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -14,6 +13,7 @@
 
 #include "calibration/base/nesting.hpp"
 #include "calibration/base/parser_words.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "hw-sim/base/hashed.hpp"
 #include "hw-sim/faults/fault_table.hpp"
 
@@ -219,19 +219,17 @@ const std::vector<Fault>& FaultScript::of(FaultTarget target) const {
 }
 
 Result<FaultScript> read_fault_script(const std::filesystem::path& path, Instruments instruments, std::uint64_t seed) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    return Error{Errc::not_found, fmt::format("{}: no such file of faults", path.string())};
-  }
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  if (nests_too_deeply(text.str(), Notation::toml)) {
+  constexpr std::size_t kMostBytes = 4U << 20U;
+  const auto text = read_whole_file(path, kMostBytes);
+  if (!text) return text.error();
+  if (nests_too_deeply(*text, Notation::toml)) {
     return Error{Errc::bad_format,
                  fmt::format("{}: nests lists, tables or keys deeper than any script; write it anew", path.string())};
   }
   try {
     Reader reader(instruments, seed);
-    reader.read(toml::parse(text, path.string()));
+    std::istringstream stream(*text);
+    reader.read(toml::parse(stream, path.string()));
     if (const std::string problems = reader.problems(); !problems.empty()) {
       return Error{Errc::bad_value, fmt::format("{}: {}", path.string(), problems)};
     }

@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/system/whole_file.hpp"
 #include "hw-sim/phantom/body.hpp"
 
 namespace birdseye::hw_sim {
@@ -188,6 +189,11 @@ Field field_of(const Image::Pointer& image, const Grid& grid) {
 }  // namespace
 
 Result<Body> body_from_ct(const std::filesystem::path& ct, const std::filesystem::path& labels, int liver_label) {
+  for (const std::filesystem::path& path : {ct, labels}) {
+    std::error_code ignored;
+    if (path.empty() || std::filesystem::is_directory(path, ignored)) continue;
+    if (const auto file = open_file(path); !file) return file.error();  // the library would wait for a pipe
+  }
   std::filesystem::path at_work = ct;
   try {
     itk::NiftiImageIOFactory::RegisterOneFactory();

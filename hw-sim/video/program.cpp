@@ -6,12 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 
 #include "drivers/system/clock.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "hw-sim/faults/announce.hpp"
 #include "hw-sim/video/frame_sink.hpp"
 #include "hw-sim/video/post_view.hpp"
@@ -41,8 +41,9 @@ struct Round {
 };
 
 Result<Round> read_round(const std::filesystem::path& truth) {
-  std::ifstream file(truth);
-  const auto said = nlohmann::json::parse(file, nullptr, false);
+  const auto text = read_whole_file(truth, kMostTextBytes);
+  if (!text && text.error().code != Errc::not_found) return text.error().with_context("--post");
+  const auto said = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   const auto number = [&said](const char* key) {
     return said.is_object() && said.contains(key) && said[key].is_number() ? said[key].get<double>() : 0.0;
   };

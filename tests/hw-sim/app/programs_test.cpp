@@ -1,5 +1,6 @@
 // birdseye-sim minibird and camera from the outside.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <cstdio>
@@ -86,6 +87,17 @@ TEST(Programs, ACameraSaysWhereItIsAndWhatItSent) {
   EXPECT_NE(result.output.find("\"ready\""), std::string::npos);
   EXPECT_NE(result.output.find("\"frames_sent\":0"), std::string::npos) << result.output;
   EXPECT_NEAR(read_json(truth)["rate_hz"].get<double>(), 60 * (1 - 50e-6), 1e-9);
+}
+
+TEST(Programs, APipeInPlaceOfAFileIsRefusedAndNotWaitedFor) {
+  const Scratch scratch;
+  const std::string pipe = (scratch / "pipe").string(), out = " --out " + (scratch / "out").string();
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string camera = "camera --socket " + (scratch / "frames").string();
+  for (const std::string& arguments :
+       {"minibird --tcp 0 --faults " + pipe, camera + " --faults " + pipe, camera + " --post " + pipe,
+        "case --ct " + pipe + out, "phantom --ct " + pipe + out, "operation --script " + pipe})
+    expect_refused("birdseye-sim", arguments, {pipe + ": is no file but a pipe"});
 }
 
 TEST(Programs, WrongOptionsAreNamed) {

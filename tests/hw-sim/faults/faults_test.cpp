@@ -84,6 +84,7 @@ TEST(FaultScript, RefusesWhatIsNoScript) {
   EXPECT_NE(problem(camera_fault, Instruments::tracker).find("no instrument"), std::string::npos);
   EXPECT_EQ(problem(camera_fault, Instruments::camera), "");
   EXPECT_EQ(read_fault_script("/nonexistent", Instruments::both, 1).error().code, Errc::not_found);
+  EXPECT_NE(problem(std::string(5U << 20U, '#')).find("larger than"), std::string::npos);
 }
 
 TEST(FaultScript, GivesTheOperationWhatBefallsItOnlyInACart) {
