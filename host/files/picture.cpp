@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calibration/picture/picture_mat.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/read_mat.hpp"
 
 namespace birdseye::host {
@@ -32,8 +33,7 @@ cv::Point point_of(const Eigen::Vector2d& p) {
 }  // namespace
 
 Result<Picture> read_picture(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) return Error{Errc::not_found, path.string() + ": no such file"};
+  if (const auto file = open_file(path); !file) return file.error();
   const auto read = read_bgr_mat(path);
   if (!read && read.error().code == Errc::bad_format)
     return Error{Errc::bad_format, path.string() + ": is no picture; give a PNG or JPEG"};

@@ -6,7 +6,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <string_view>
-#include <system_error>
 
 #include "drivers/system/whole_file.hpp"
 #include "host/confine/run_confined.hpp"
@@ -53,10 +52,8 @@ bool is_cut_png(std::string_view file) {
 /// By what the confined process sends, which is not to be trusted.
 Result<cv::Mat> read_mat(const std::filesystem::path& path, ConfinedWork decode, int type) {
   const auto wrong = [](const char* why) { return Error{Errc::bad_format, why}; };
-  std::error_code ignored;
-  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
-    return wrong("it is no file but a folder, a pipe or a device");
   const auto file = read_whole_file(path, kMostFileBytes);
+  if (!file && file.error().code == Errc::bad_value) return wrong("it is no file but a folder, a pipe or a device");
   if (!file && file.error().code == Errc::unsupported) return wrong("the file is larger than any picture");
   if (!file) return wrong("the file cannot be opened");
   if (file->empty()) return wrong("the file is empty");

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "drivers/system/durable.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/next_line.hpp"
 #include "host/simulated/simulated_truth.hpp"
 #include "host/texts/texts.hpp"
@@ -155,13 +156,11 @@ Result<void> DecisionLog::close() {
 
 Result<std::vector<LoggedDecision>> read_decisions(const std::filesystem::path& path) {
   const std::filesystem::path file = std::filesystem::is_directory(path) ? path / kFile : path;
-  std::error_code ignored;
-  std::ifstream in;
-  if (std::filesystem::is_regular_file(file, ignored)) in.open(file);  // a pipe would be waited for
+  if (const auto there = open_file(file); !there && there.error().code != Errc::not_found) return there.error();
+  std::ifstream in(file);
+  if (!in) return Error{Errc::not_found, file.string() + ": no such file; give the folder that live --out wrote"};
   std::string line;
-  if (!in.is_open() || !next_line(in, line, kLongestLine))
-    return Error{Errc::unreadable, file.string() + ": cannot be read; give the folder that live --out wrote"};
-  if (line != kHeader)
+  if (!next_line(in, line, kLongestLine) || line != kHeader)
     return Error{Errc::bad_format,
                  file.string() + ": is no table of a live window's decisions; give the folder that live --out wrote"};
   std::vector<LoggedDecision> out;

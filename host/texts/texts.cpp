@@ -1,12 +1,13 @@
 #include "host/texts/texts.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 #include <vector>
+
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -48,15 +49,10 @@ const std::string& pattern_of(std::size_t index) {
 }
 
 Result<void> speak(const std::filesystem::path& file) {
-  constexpr std::uintmax_t kMostBytes = 1'000'000;
-  std::error_code failed;
-  const bool is_file = std::filesystem::is_regular_file(file, failed);  // a pipe would be waited for
-  std::ifstream in;
-  if (is_file) in.open(file);
-  if (!in.is_open())
-    return Error{Errc::not_found, fmt::format("{}: cannot be read; give a language's file", file.string())};
-  const bool is_small = std::filesystem::file_size(file, failed) <= kMostBytes;
-  const auto json = is_small ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
+  constexpr std::size_t kMostBytes = 1'000'000;
+  const auto written = read_whole_file(file, kMostBytes);
+  if (!written) return written.error();
+  const auto json = nlohmann::json::parse(*written, nullptr, false);
   const auto wrong = [&file](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", file.string(), why)};
   };

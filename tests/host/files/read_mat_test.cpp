@@ -1,6 +1,7 @@
 #include "host/files/read_mat.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -10,6 +11,7 @@
 
 #include "host/confine/run_confined.hpp"
 #include "host/files/camera_files.hpp"
+#include "host/files/picture.hpp"
 #include "tests/support/scratch.hpp"
 
 namespace birdseye::host {
@@ -67,6 +69,15 @@ TEST(ReadMat, SaysWhyThereIsNoPicture) {
   EXPECT_EQ(why(scratch.file("no.png", "text")), "the file is damaged, or no picture");
   EXPECT_EQ(why(scratch.path()), "it is no file but a folder, a pipe or a device");
   EXPECT_EQ(why(scratch / "nowhere.png"), "the file cannot be opened");
+}
+
+TEST(ReadMat, APipeInPlaceOfAPictureIsNamedAndNotWaitedFor) {
+  const Scratch scratch;
+  const auto pipe = scratch / "pipe.png";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(read_grey_mat(pipe).error().what, "it is no file but a folder, a pipe or a device");
+  EXPECT_EQ(read_picture(pipe).error().what.find(pipe.string() + ": is no file but a pipe"), 0U);
+  EXPECT_EQ(read_picture(scratch / "none.png").error().code, Errc::not_found);
 }
 
 TEST(CameraFiles, AreParsedInTheDecodersProcess) {
