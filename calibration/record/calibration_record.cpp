@@ -252,7 +252,9 @@ Result<CalibrationRecord> parse_record(const std::string& text) {
 }
 
 Result<SignedRecord> parse_signed_record(const std::string& text) {
-  const Json json = nests_too_deeply(text, Notation::json) ? Json() : Json::parse(text, nullptr, false);
+  Json json = strict_json<Json>(text);
+  const bool is_strict = !json.is_discarded();
+  if (!is_strict && !nests_too_deeply(text, Notation::json)) json = Json::parse(text, nullptr, false);  // to say why
   if (json.is_discarded() || !json.is_object() || json.value("format", Json()) != kRecordFormat)
     return Error{Errc::bad_format, "is no calibration record, or one that was cut: calibrate again"};
   if (json.value("version", Json()) != CalibrationRecord::kVersion) {
@@ -266,7 +268,7 @@ Result<SignedRecord> parse_signed_record(const std::string& text) {
     return Error{Errc::bad_format,
                  "the calibration record's checksum does not fit: it was damaged or changed by hand; calibrate again"};
   }
-  if (!is_strict_json(text)) {
+  if (!is_strict) {
     return Error{Errc::bad_format,
                  "the calibration record was changed by hand: it says something twice, or goes on behind its end; "
                  "calibrate again"};

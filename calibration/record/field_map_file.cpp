@@ -70,7 +70,9 @@ std::string field_map_text(const FieldMap& map, const FieldMapNotes& notes) {
 Result<FieldMapFile> parse_field_map(const std::string& text) {
   if (nests_too_deeply(text, Notation::json)) return no_map("it nests lists deeper than any");
   try {
-    auto json = nlohmann::json::parse(text);
+    auto json = strict_json<nlohmann::json>(text);
+    const bool is_strict = !json.is_discarded();
+    if (!is_strict) json = nlohmann::json::parse(text);  // to say why
     if (!json.is_object() || json.value("format", "") != kFieldMapFormat)
       return no_map("it does not say that it is one");
     if (json.at("version").get<int>() != kVersion)
@@ -79,7 +81,7 @@ Result<FieldMapFile> parse_field_map(const std::string& text) {
     json.erase("checksum");
     if (!has_checksum(json.dump(), checksum))
       return no_map("or was changed since it was made: its checksum does not fit");
-    if (!is_strict_json(text))
+    if (!is_strict)
       return no_map("or was changed since it was made: it says something twice, or goes on behind its end");
     return map_of(json);
   } catch (const std::exception&) {  // of the parser's many kinds, and a map's own

@@ -8,18 +8,24 @@
 
 namespace birdseye::calibration {
 
-bool is_strict_json(const std::string& text) {
-  if (text.find('\0') != std::string::npos || nests_too_deeply(text, Notation::json)) return false;
-  using Json = nlohmann::json;
+template <typename Json>
+Json strict_json(const std::string& text) {
+  const Json none(Json::value_t::discarded);
+  if (text.find('\0') != std::string::npos || nests_too_deeply(text, Notation::json)) return none;
   std::vector<std::set<std::string>> names;  // of the objects that are open
   bool twice = false;
-  const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
+  const auto watch = [&](int, typename Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start) names.emplace_back();
     if (event == Json::parse_event_t::object_end) names.pop_back();
-    if (event == Json::parse_event_t::key) twice = !names.back().insert(parsed.get<std::string>()).second || twice;
+    if (event == Json::parse_event_t::key)
+      twice = !names.back().insert(parsed.template get<std::string>()).second || twice;
     return true;
   };
-  return !Json::parse(text, watch, false).is_discarded() && !twice;
+  Json json = Json::parse(text, watch, false);
+  return twice ? none : json;
 }
+
+template nlohmann::json strict_json(const std::string& text);
+template nlohmann::ordered_json strict_json(const std::string& text);
 
 }  // namespace birdseye::calibration

@@ -1,12 +1,14 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace birdseye::calibration {
 
-/// Whether a text is JSON that says the same to whoever reads it, as one that is signed must. False where it has a name
-/// twice in an object (readers take the first or the last), a zero byte (readers may end there), or lists that nest
-/// deeper than any.
-[[nodiscard]] bool is_strict_json(const std::string& text);
+/// A text as JSON, where it says the same to whoever reads it, as one that is signed must. Discarded, as nlohmann has
+/// it, where it is none, has a name twice in an object (readers take the first or the last), a zero byte (readers may
+/// end there), or lists that nest deeper than any. Of json, and of ordered_json.
+template <typename Json>
+[[nodiscard]] Json strict_json(const std::string& text);
 
 }  // namespace birdseye::calibration

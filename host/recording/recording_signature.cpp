@@ -66,8 +66,7 @@ Result<RecordingSeal> read_recording_seal(const fs::path& folder) {
   const auto text = read_whole_file(folder / kRecordingSheet, kMostTextBytes);
   if (!text && text.error().code != Errc::not_found) return text.error();
   // Its sum is of its text made anew, which goes into lists as deep as they are.
-  const auto sheet =
-      text && calibration::is_strict_json(*text) ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
+  const auto sheet = text ? calibration::strict_json<nlohmann::json>(*text) : nlohmann::json();
   if (!sheet.is_object() || !sheet.contains("birdseye_recording")) {
     return Error{Errc::bad_format, fmt::format("{}: is missing or damaged; take a copy of the recording that is whole",
                                                (folder / kRecordingSheet).string())};
