@@ -10,8 +10,7 @@ namespace birdseye::calibration {
 
 template <typename Json>
 Json strict_json(const std::string& text) {
-  const Json none(Json::value_t::discarded);
-  if (text.find('\0') != std::string::npos || nests_too_deeply(text, Notation::json)) return none;
+  if (text.find('\0') != std::string::npos || nests_too_deeply(text, Notation::json)) return Json::value_t::discarded;
   std::vector<std::set<std::string>> names;  // of the objects that are open
   bool twice = false;
   const auto watch = [&](int, typename Json::parse_event_t event, Json& parsed) {
@@ -22,7 +21,8 @@ Json strict_json(const std::string& text) {
     return true;
   };
   Json json = Json::parse(text, watch, false);
-  return twice ? none : json;
+  if (twice) return Json::value_t::discarded;
+  return json;
 }
 
 template nlohmann::json strict_json(const std::string& text);
