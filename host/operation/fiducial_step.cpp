@@ -24,7 +24,10 @@ bool FiducialStep::add(const Touch& touch, std::size_t wanted, const Instruments
     confirmed_ = true;
   }
   if (wanted != 0 && touches_.size() >= wanted && !may_add_) return false;
-  if (touches_.empty()) found_with_ = found_with;
+  if (touches_.empty()) {
+    found_with_ = found_with;
+    suspected_ = false;
+  }
   touches_.push_back({touch.tip_in_tracker_mm, touch.rms_mm, std::nullopt});
   return true;
 }

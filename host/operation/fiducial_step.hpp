@@ -31,7 +31,13 @@ class FiducialStep {
   /// moved meanwhile. Not where fiducials were touched anew; false then. Touches too few for a fit are dropped.
   bool take_up(const std::optional<RegisteredPatient>& kept, const std::string& when);
   /// Somebody has looked, and the registration holds.
-  void confirm() { confirmed_ = true; }
+  void confirm() {
+    confirmed_ = true;
+    suspected_ = false;
+  }
+  /// Something may have moved since the first touch, or since it was confirmed.
+  void suspect() { suspected_ = registered_ || !touches_.empty(); }
+  [[nodiscard]] bool suspected() const { return suspected_; }
   /// Whether the registration holds, and what was touched towards one, is to be looked at anew.
   void doubt();
   /// Holds back, touches and all, what was found with another tracker, and gives it back where that has come again.
@@ -61,7 +67,7 @@ class FiducialStep {
   std::vector<TouchedFiducial> touches_;
   std::optional<RegisteredPatient> registered_;
   Instruments found_with_;  ///< all touches, or what was taken up
-  bool confirmed_ = true, held_back_ = false, person_may_say_ = false;
+  bool confirmed_ = true, suspected_ = false, held_back_ = false, person_may_say_ = false;
   std::string fault_, line_;                    ///< line_: of what is held back, as it was found
   bool done_ = false;                           ///< and whether the step was done by it
   bool fits_poorly_ = false, may_add_ = false;  ///< may_add_: one more than wanted, which the fit asks for

@@ -276,6 +276,7 @@ void LiveWorkflow::go_to(LiveStep step) {
   step_ = step;
   asked_to_take_back_.reset();
   if (step != LiveStep::views) strokes_.end();
+  if (step == LiveStep::fiducials) pointer_ = {};  // where it rests by now, as on a landmark, is no touch of this step
   // What is held back may come back by itself; by the large button the scope is calibrated anew.
   const bool open = !calibration_.note().done && !calibration_.held_back();
   if (step == LiveStep::calibrate && open) calibration_.begin(settings_.scope, settings_.pattern);

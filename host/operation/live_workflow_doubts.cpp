@@ -44,6 +44,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   if (!fiducials_.registered_or_held_back() && fiducials_.touches().empty()) return;
   why_doubted_ = why;
   fiducials_.doubt();
+  pointer_ = {};  // where it was before tells nothing of what has moved since
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
   checked_.reset();
@@ -74,7 +75,10 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (news.field) update_setup();
   if (!settings_.video_must_agree) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
-  if (news.contradicted && fiducials_.registered_or_held_back()) return doubt_registration(words("why_video_differs"));
+  if (news.contradicted) doubt_registration(words("why_video_differs"));
+  // To ask at each picture would let nobody register. Once they agree it tells whether it is done since.
+  if (news.again) fiducials_.suspect();
+  if (news.motion && video_.motion() == VideoAgreement::agrees && fiducials_.suspected()) doubt_registration("");
   if (news.motion) update_setup();
 }
 
@@ -116,24 +120,33 @@ void LiveWorkflow::doubt_steps(OperationView& out) const {
   doubt(LiveStep::run, picture_.setup() ? picture_.decision().reason : picture_.why_no_setup());
 }
 
-/// Somebody has looked. What the pointer says then is kept: of a landmark that was not fitted it tells how far the
-/// registration is off, and where that is too far nothing is confirmed.
+/// Of a landmark that was not fitted the pointer tells how far the registration is off; where that is too far the
+/// registration is in doubt. One in doubt is confirmed by a place that fits, or not at all: a fitted one tells as much
+/// of what moved since, and the farther the pointer is from any the more may have moved.
 void LiveWorkflow::confirm_by_landmark() {
-  constexpr double kPointedAt_mm = 30;  // further away another place is meant
+  constexpr double kPointedAt_mm = 100;  // further away it is laid aside
   const auto reading = check_reading();
-  const bool pointed = reading && !reading->nearest.empty() && reading->distance_mm <= kPointedAt_mm;
-  if (pointed && !reading->fitted) {
-    if (reading->distance_mm > kMostCheckedOff_mm) {
-      check_ = {false, words("note_check_off", reading->distance_mm, reading->nearest)};
-      return;
-    }
-    checked_ = {reading->nearest, reading->distance_mm};
-    check_ = {false, words("note_checked", reading->distance_mm, reading->nearest)};
+  const bool in_doubt = !fiducials_.confirmed() || fiducials_.suspected(), any = reading && !reading->nearest.empty();
+  if (in_doubt && !any) {
+    check_ = {false, words("note_check_no_pointer")};
+    return;
   }
+  const bool counts = any && (in_doubt || (!reading->fitted && reading->distance_mm <= kPointedAt_mm));
+  if (counts && reading->distance_mm > kMostCheckedOff_mm) {
+    why_doubted_ = words("note_check_off", reading->distance_mm, reading->nearest);
+    check_ = {false, why_doubted_};
+    checked_.reset();
+    fiducials_.doubt();
+    return update_setup();
+  }
+  if (counts && !reading->fitted) checked_ = {reading->nearest, reading->distance_mm};
+  check_ = {true, counts     ? words("note_checked", reading->distance_mm, reading->nearest)
+                  : checked_ ? check_.line
+                             : words("note_unchecked")};
   fiducials_.confirm();
   why_doubted_.clear();
   update_setup();
-  go_on();
+  go_to(LiveStep::run);
 }
 
 }  // namespace birdseye::host

@@ -14,11 +14,12 @@ constexpr std::size_t kFewest = 5;
 std::optional<Touch> PointerTip::take(const wire::Birds& birds, const std::string& pointer,
                                       const Eigen::Vector3d& tip_in_pointer_mm) {
   std::optional<Touch> rested;
+  // Where it was when it was last seen is not where it is.
+  while (!newest_.empty() && birds.acquired - newest_.front().first > kWindow) newest_.pop_front();
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != pointer) continue;
     const Eigen::Vector3d tip_in_tracker_mm = bird.tracker_from_sensor * tip_in_pointer_mm;
     newest_.emplace_back(birds.acquired, tip_in_tracker_mm);
-    while (birds.acquired - newest_.front().first > kWindow) newest_.pop_front();
     if (auto touch = detector_.push(birds.acquired, tip_in_tracker_mm)) rested = touch;
   }
   return rested;

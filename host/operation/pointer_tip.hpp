@@ -19,7 +19,7 @@ class PointerTip {
                             const Eigen::Vector3d& tip_in_pointer_mm);
   /// The tip's mean of the last quarter of a second: a touch at once, by key or pedal. Empty where too little was seen.
   [[nodiscard]] std::optional<Touch> held() const;
-  /// The newest place; empty before the pointer was seen.
+  /// The newest place; empty where the pointer was not seen within the last quarter of a second of the birds' records.
   [[nodiscard]] std::optional<Eigen::Vector3d> in_tracker_mm() const;
 
  private:

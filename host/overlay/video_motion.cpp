@@ -350,7 +350,7 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
     const bool swung = 3 * key_->left < 2 * key_->agreed;
     const bool moved = *off_px_ > kPlainly * allowed_px || few_agree(places, motion, allowed_px / camera.fx_px) ||
                        go_as_one(places, kFollowedPx * scale / std::sqrt(2) / camera.fx_px);
-    contradicted_ = state_ != VideoAgreement::differs && (swung || moved);
+    contradicted_ = swung || moved;
     told_ = {};
     if (swung || !moved) {
       if (state_ != VideoAgreement::differs) state_ = VideoAgreement::untold;

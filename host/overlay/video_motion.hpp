@@ -41,7 +41,7 @@ class VideoMotion {
 
   [[nodiscard]] VideoAgreement state() const { return state_; }
   /// Whether by the last frame taken something has moved other than the poses say; where state() does not say so, it
-  /// may be that places were followed wrongly.
+  /// may be that places were followed wrongly. Where state() has said so before, something may have moved again.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
   /// Of the last picture that could tell, the median of how far the places lie off their lines; empty before one could.
   [[nodiscard]] const std::optional<double>& off_px() const { return off_px_; }

@@ -20,7 +20,8 @@ class VideoWatch {
   }
   struct News {
     bool motion = false, field = false;  ///< that it says something else now
-    bool contradicted = false;           ///< VideoMotion::contradicted()
+    bool contradicted = false;           ///< VideoMotion::contradicted(), where it had not differed before
+    bool again = false;                  ///< where it had
     [[nodiscard]] bool any() const { return motion || field; }
   };
   /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, the poses
@@ -36,7 +37,9 @@ class VideoWatch {
     const PictureToFollow picture = fits ? picture_to_follow(frame) : PictureToFollow{};
     motion_.take(frame, picture, scope);
     if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
-    return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted()};
+    const bool differed = before == VideoAgreement::differs;
+    return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted() && !differed,
+            motion_.contradicted() && differed};
   }
 
   /// The poses are in another frame from now on: from one to the next they would leap.

@@ -121,7 +121,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"do_match", "match the CT with the views"},
     {"do_wait_for_match", "matching: wait"},
     {"do_wait_for_touches", "wait for the touches"},
-    {"do_landmarks_fit", "the landmarks fit: go on"},
+    {"do_landmarks_fit", "confirm: the tip is on it"},
     {"do_hide", "hide the overlay"},
     {"do_show", "show the overlay"},
     {"do_let_go", "let the picture go"},
@@ -255,13 +255,16 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
 
     // Check
     {"point_at_landmark", "Point at a landmark, and hold the pointer's tip to it. The distance should be near 0."},
-    {"point_simulated", "Nobody points at anything over the simulated cart: go on."},
+    {"point_simulated",
+     "Nobody points at anything over the simulated cart: go on. Where the registration is in doubt, start the cart "
+     "again, and go to fiducials: it touches them anew."},
     {"no_pointer", "No pointer is seen, or the patient is not registered."},
     {"tip_at", "The tip is at ({:.1f}, {:.1f}, {:.1f}) mm of the CT."},
     {"from_nearest", "{:.1f} mm from {}"},
     {"from_fitted", "{:.1f} mm from {}, which the registration was fitted to: point at one that was not touched."},
     {"note_checked", "{:.1f} mm from {}"},
     {"note_unchecked", "gone on without a landmark"},
+    {"note_check_no_pointer", "not confirmed: the pointer is not seen. Hold its tip to a landmark, or register anew"},
     {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 
     // Run, and how the overlay is drawn

@@ -43,6 +43,8 @@ OperationResult result_of(const SimulatedOperation& operation, const OperationOu
   result.beyond = laws.beyond;
   result.registrations = out.registrations;
   result.checks = out.checks;
+  result.moved = laws.moved;
+  result.moved_unwatched = laws.moved_unwatched;
   result.worst_pose = laws.worst_pose;
   result.worst_age_ms = laws.worst_age_ms;
   result.worst_circles = laws.worst_circles;

@@ -14,17 +14,20 @@ namespace {
 using Count = std::uint64_t OperationResult::*;
 using Worst = double OperationResult::*;
 
-constexpr std::array<std::pair<const char*, Count>, 11> kCounts{{{"laws_broken", &OperationResult::laws_broken},
-                                                                 {"faults", &OperationResult::faults},
-                                                                 {"faults_alone", &OperationResult::faults_alone},
-                                                                 {"poses", &OperationResult::poses},
-                                                                 {"frames", &OperationResult::frames},
-                                                                 {"shown", &OperationResult::shown},
-                                                                 {"overlaid", &OperationResult::overlaid},
-                                                                 {"green", &OperationResult::green},
-                                                                 {"beyond", &OperationResult::beyond},
-                                                                 {"registrations", &OperationResult::registrations},
-                                                                 {"checks", &OperationResult::checks}}};
+constexpr std::array<std::pair<const char*, Count>, 13> kCounts{
+    {{"laws_broken", &OperationResult::laws_broken},
+     {"faults", &OperationResult::faults},
+     {"faults_alone", &OperationResult::faults_alone},
+     {"poses", &OperationResult::poses},
+     {"frames", &OperationResult::frames},
+     {"shown", &OperationResult::shown},
+     {"overlaid", &OperationResult::overlaid},
+     {"green", &OperationResult::green},
+     {"beyond", &OperationResult::beyond},
+     {"registrations", &OperationResult::registrations},
+     {"checks", &OperationResult::checks},
+     {"moved", &OperationResult::moved},
+     {"moved_unwatched", &OperationResult::moved_unwatched}}};
 constexpr std::array<std::pair<const char*, Worst>, 5> kWorst{{{"worst_pose", &OperationResult::worst_pose},
                                                                {"worst_age_ms", &OperationResult::worst_age_ms},
                                                                {"worst_circles", &OperationResult::worst_circles},

@@ -374,6 +374,7 @@ Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
     if (operation.disk_fails)
       std::ranges::move(draw_disk_faults(operation.seed, kFaultsFrom_s, until_s),
                         std::back_inserter(out.faults.programs));
+    if (operation.pictures && !reference) draw_bumps_in_view(operation.seed, kFaultsFrom_s, until_s, out.faults);
   }
   const bool at_board = operation.pictures && hashed_uniform(hashed_word(operation.seed, 8), 0) < kAtBoard;
   const VideoSize size = at_board ? kOfBoard : operation.pictures ? kPictures : kGrey;

@@ -59,6 +59,9 @@ constexpr DrawnFault kDrawn[] = {
     {FaultKind::patient_moved, kWorld, 5, 60, "mm", 2, 20},
 };
 
+/// The patient that moves along the line of sight, with the scope in his wall, the video does not surely show.
+constexpr DrawnFault kDrawnInView[] = {{FaultKind::transmitter_bumped, kWorld, 20, 90, "mm", 15, 40}};
+
 constexpr DrawnFault kDrawnOfPrograms[] = {
     {FaultKind::link_cut, kProgram, 0, 0},
     {FaultKind::appliance_restart, kProgram, 1, 10},
@@ -184,6 +187,21 @@ FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool 
     script.of(drawn.of).push_back(std::move(fault));
   });
   return script;
+}
+
+void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls) {
+  constexpr double kApart_s = 6;  // the video is back after another fault, and has shown that it goes with the poses
+  const auto hides = [](const Fault& other, double at_s) {
+    return at_s > other.at_s - kApart_s && at_s < other.at_s + other.for_s.value_or(0) + kApart_s;
+  };
+  const auto is_seen = [&](double at_s) {
+    return std::ranges::none_of(kFaultTargets, [&](FaultTarget target) {
+      return std::ranges::any_of(befalls.of(target), [&](const Fault& other) { return hides(other, at_s); });
+    });
+  };
+  draw(kDrawnInView, hashed_word(seed, 11), 60, from_s, until_s, [&](const DrawnFault& drawn, Fault fault) {
+    if (is_seen(fault.at_s) && is_seen(fault.at_s + *fault.for_s)) befalls.of(drawn.of).push_back(std::move(fault));
+  });
 }
 
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s) {

@@ -31,6 +31,9 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target);
 /// Faults of every kind that the instruments know, alone and together, at random times from from_s on until until_s;
 /// with a reference bird also the transmitter is bumped and the patient moved. All of it follows from the seed.
 FaultScript draw_faults(std::uint64_t seed, double from_s, double until_s, bool reference);
+/// Without a reference the video alone sees it where the transmitter is bumped: adds bumps, large enough to be seen, to
+/// what befalls from from_s on until until_s, where nothing else hides their begin or their end.
+void draw_bumps_in_view(std::uint64_t seed, double from_s, double until_s, FaultScript& befalls);
 /// What befalls the programs: the network is cut, the appliance or the window ends and is started again.
 std::vector<Fault> draw_program_faults(std::uint64_t seed, double from_s, double until_s);
 /// What befalls the machine of the window: its disk is late, or full, or its power is cut.

@@ -69,6 +69,13 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
     }
   }
   figures_.faults = spans_.size();
+  constexpr std::size_t kWithReference = 3;
+  for (const Fault& fault : faults.of(FaultTarget::world)) {
+    if (truth.birds() >= kWithReference) break;
+    moves_s_.push_back(fault.at_s);
+    if (fault.for_s) moves_s_.push_back(fault.at_s + *fault.for_s);
+  }
+  std::ranges::sort(moves_s_);
 }
 
 void OperationLaws::break_law(double at_s, const char* law, std::string what) {
@@ -176,12 +183,18 @@ void OperationLaws::opened(bool registered, std::size_t checks) {
 
 void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {
   using host::LiveStep;
-  if (checks_when_opened_ && checks > *checks_when_opened_) checks_when_opened_.reset();
+  // Or the patient is registered anew: what was touched is never taken up.
+  const double now_s = at_s(now.ns);
+  // The calibration's doubt: what is over the picture may be another reason that speaks against the overlay too.
+  if (const host::StepNote& calibrated = view.note(LiveStep::calibrate); calibrated.done)
+    judge_accusation(calibrated.doubt == host::words("why_video_differs"), now_s);
+  if (unwatched_to_s_ && now_s > *unwatched_to_s_ && view.unconfirmed) unwatched_to_s_.reset();
+  if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   if (!to_take_up_) return;
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
   const bool ready = !asks && view.note(LiveStep::connect).done && view.note(LiveStep::calibrate).done;
   if (!ready) return ready_since_s_.reset();
-  const double now_s = at_s(now.ns), since_s = ready_since_s_.value_or(now_s);
+  const double since_s = ready_since_s_.value_or(now_s);
   ready_since_s_ = since_s;
   to_take_up_ = !view.note(LiveStep::fiducials).done;
   if (!to_take_up_ || now_s - since_s < kTakesUpWithin_s) return;
@@ -200,6 +213,17 @@ void OperationLaws::take_failed(std::uint64_t syncs, const host::OperationView& 
   break_law(now_s, "kept", "what was found could not be kept, and the window does not say so");
 }
 
+void OperationLaws::note_motion(bool whole, double now_s) {
+  constexpr double kWatched_s = 0.5, kMoves_s = 2;
+  for (; !moves_s_.empty() && moves_s_.front() <= now_s; moves_s_.pop_front()) {
+    ++figures_.moved;
+    if (whole_s_ && moves_s_.front() - *whole_s_ < kWatched_s) continue;
+    ++figures_.moved_unwatched;
+    unwatched_to_s_ = moves_s_.front() + kMoves_s;
+  }
+  if (whole) whole_s_ = now_s;
+}
+
 /// What the video shows is true: where no fault has touched its times or the poses, nobody may say that they differ.
 void OperationLaws::judge_accusation(bool accused, double now_s) {
   const bool begins = accused && !accused_;
@@ -214,7 +238,7 @@ void OperationLaws::judge_accusation(bool accused, double now_s) {
 void OperationLaws::take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now) {
   const double now_s = at_s(now.ns);
   ++figures_.shown;
-  judge_accusation(shown.reason == host::words("why_video_differs"), now_s);
+  note_motion(is_whole(shown), now_s);
   if (!shown.overlaid || shown.strength <= 0 || !picture.frame()) return;
   ++figures_.overlaid;
   if (checks_when_opened_)
@@ -237,7 +261,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const auto& budget = picture.decision().expected;
   if (!is_whole(shown) || !drawn_from || !budget) return;
   ++figures_.green;
-  if (lies) return;
+  if (lies || unwatched_to_s_) return;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();
   const auto true_px = project(truth_.lens(), true_mm);
   const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));

@@ -27,7 +27,9 @@ struct BrokenLaw {
 ///
 /// pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
 /// age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
-/// circle: no overlay is shown as whole that is off by more than three circles.
+/// circle: no overlay is shown as whole that is off by more than three circles. Where transmitter or patient are moved
+/// while no overlay is whole, and there is no reference, nothing is watched that could show it: then not before the
+/// window asks for a landmark.
 /// named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
 /// accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
@@ -61,6 +63,7 @@ class OperationLaws {
     double worst_age_ms = 0;   ///< of an overlay
     double worst_circles = 0;  ///< of a green overlay
     std::uint64_t faults = 0, faults_judged = 0;
+    std::uint64_t moved = 0, moved_unwatched = 0;  ///< how often transmitter or patient were, without a reference
     double slowest_named_s = 0, slowest_over_s = 0;
   };
   [[nodiscard]] const Figures& figures() const { return figures_; }
@@ -85,6 +88,7 @@ class OperationLaws {
   void name(double now_s, const std::string& words);
   void judge(const Span& span, double until_s);
   void judge_accusation(bool accused, double now_s);
+  void note_motion(bool whole, double now_s);
 
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
@@ -92,7 +96,11 @@ class OperationLaws {
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
-  bool accused_ = false;  ///< the window says that video and poses do not agree
+  bool accused_ = false;           ///< the window says that video and poses do not agree
+  std::deque<double> moves_s_;     ///< of transmitter or patient, when each begins or ends; those to come
+  std::optional<double> whole_s_;  ///< when an overlay was last whole
+  std::optional<double>
+      unwatched_to_s_;  ///< a motion that nothing could show is over then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;
   std::optional<double> unsaid_since_s_;           ///< a sync failed then, and the window has not said so
   bool to_take_up_ = false;                        ///< the window has still to say what it took up

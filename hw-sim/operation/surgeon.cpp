@@ -29,7 +29,7 @@ Surgeon::Surgeon(OperationTruth& truth, std::uint64_t seed, SurgeonDoes does)
 
 void Surgeon::stand_at(host::LiveWorkflow& workflow, double at_s) {
   workflow_ = &workflow;
-  next_fiducial_ = touches_ = 0;
+  next_fiducial_ = 0;
   guided_since_s_ = at_s;
   at_landmark_ = matching_ = false;
   bare_since_s_ = views_since_s_ = at_s;
@@ -45,11 +45,14 @@ void Surgeon::go_to(const Eigen::Vector3d& place_in_patient_mm, double at_s, dou
   busy_until_s_ = truth_.hand().rests_from_s() + rest_s;
 }
 
-/// One after the other, and round again, as long as the window wants more.
+/// One after the other, and round again, as long as the window wants more; a touch counts once the tip has left.
+/// Where all are touched and do not fit, one was missed and another touched twice: takes all back.
 void Surgeon::touch(const host::OperationView& view, double at_s) {
-  if (view.touches.size() < touches_) next_fiducial_ = 0;  // they are all to be touched anew
-  touches_ = view.touches.size();
   const auto& places = truth_.fiducials_mm();
+  if (view.markers_seen && !view.unconfirmed && view.touches.size() >= places.size()) {
+    for (std::size_t i = 0; i < 2 * places.size() && !workflow_->view().touches.empty(); ++i) workflow_->undo();
+    next_fiducial_ = 0;
+  }
   go_to(places[next_fiducial_++ % places.size()] + drawn(kTouch_mm), at_s, kTouchRests_s);
 }
 
@@ -88,14 +91,28 @@ void Surgeon::deform(const host::OperationView& view, HostTime now) {
   workflow_->go_to(LiveStep::check);
 }
 
-void Surgeon::check(double at_s, HostTime now) {
+/// Whether the pointer is at a place that the window may be shown, as it knows no others.
+bool Surgeon::points_at_one(double at_s) const {
+  constexpr double kAt_mm = 8;
+  const Eigen::Vector3d tip_mm = truth_.hand().at(at_s).tip_in_patient_mm;
+  const auto is_there = [&](const Eigen::Vector3d& place_mm) { return (place_mm - tip_mm).norm() < kAt_mm; };
+  return is_there(truth_.target_mm()) || std::ranges::any_of(truth_.fiducials_mm(), is_there);
+}
+
+/// In haste: where a landmark is asked for, the large button is pressed before anything is pointed at, which may not be
+/// taken for a look. Where the landmark does not fit, the patient is registered anew.
+void Surgeon::check(const host::OperationView& view, double at_s, HostTime now) {
   if (!at_landmark_) {
-    at_landmark_ = true;
-    return go_to(truth_.target_mm(), at_s, kCheckRests_s);
+    if (view.unconfirmed) workflow_->primary(now);
+    at_landmark_ = workflow_->view().step == LiveStep::check;
+    if (at_landmark_) return go_to(truth_.target_mm(), at_s, kCheckRests_s);
+    checks_ += points_at_one(at_s) ? 1 : 0;
+    return;
   }
   workflow_->primary(now);
   ++checks_;
   at_landmark_ = false;
+  if (workflow_->view().unconfirmed) workflow_->go_to(LiveStep::fiducials);
   bare_since_s_ = at_s;
   go_to(kAside_mm, at_s, 0);
 }
@@ -122,7 +139,7 @@ void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
   }
   if (view.step == LiveStep::views) return keep_view(view, at_s, now);
   if (view.step == LiveStep::deform) return deform(view, now);
-  if (view.step == LiveStep::check) return check(at_s, now);
+  if (view.step == LiveStep::check) return check(view, at_s, now);
   if (at_s - bare_since_s_ > kPatience_s) {
     bare_since_s_ = at_s;
     workflow_->go_to(view.note(LiveStep::fiducials).done ? LiveStep::check : LiveStep::fiducials);

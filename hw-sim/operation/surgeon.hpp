@@ -38,7 +38,8 @@ class Surgeon {
   void calibrate(const host::OperationView& view, double at_s, HostTime now);
   void keep_view(const host::OperationView& view, double at_s, HostTime now);
   void deform(const host::OperationView& view, HostTime now);
-  void check(double at_s, HostTime now);
+  void check(const host::OperationView& view, double at_s, HostTime now);
+  [[nodiscard]] bool points_at_one(double at_s) const;
   void go_to(const Eigen::Vector3d& place_in_patient_mm, double at_s, double rest_s);
   [[nodiscard]] Eigen::Vector3d drawn(double sigma);
 
@@ -46,7 +47,7 @@ class Surgeon {
   OperationTruth& truth_;
   SurgeonDoes does_;
   std::uint64_t seed_, key_ = 0;
-  std::size_t next_fiducial_ = 0, touches_ = 0, checks_ = 0, registrations_ = 0, deformations_ = 0;
+  std::size_t next_fiducial_ = 0, checks_ = 0, registrations_ = 0, deformations_ = 0;
   double busy_until_s_ = 0, bare_since_s_ = 0, hurries_until_s_ = 0;
   double guided_since_s_ = 0, views_since_s_ = 0;
   bool at_landmark_ = false, matching_ = false;

@@ -80,6 +80,14 @@ class Hand {
   std::int64_t time_ms_ = 1000;
 };
 
+inline const Eigen::Vector3d kTumour(30, 30, 20);
+
+/// Somebody points at the tumour, or at another place of the patient, and presses Space.
+inline void check_at(LiveWorkflow& workflow, const Eigen::Vector3d& in_patient_mm = kTumour) {
+  Hand(workflow).rest_at(in_patient_mm, 5);
+  workflow.primary(HostTime{0});
+}
+
 /// The appliance sends the scope's calibration record.
 inline void give_record(LiveWorkflow& workflow,
                         const calibration::CalibrationRecord& record = straight_scope_record()) {

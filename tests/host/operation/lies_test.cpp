@@ -142,6 +142,29 @@ TEST(Lies, WithoutOneTheCheckedLandmarkStandsOnTheScreen) {
   EXPECT_FALSE(operation.workflow().view().checked) << "what has moved is to be checked anew";
 }
 
+/// The patient is registered anew while video and poses do not agree, and is moved again before they do.
+TEST(Lies, WhatMovesAgainBeforeTheVideoAgreesIsAskedForOnceItDoes) {
+  Rehearsal operation(1);
+  ASSERT_TRUE(operation.begin() && operation.register_patient() && operation.check());
+  operation.watch(8);
+  move_patient(operation);
+  operation.watch(0.5);
+  ASSERT_TRUE(operation.workflow().view().unconfirmed);
+  operation.workflow().go_to(host::LiveStep::fiducials);
+  ASSERT_TRUE(operation.register_patient());
+  EXPECT_FALSE(operation.workflow().view().unconfirmed);
+  operation.watch(0.2);
+  move_patient(operation);
+  for (int i = 0; i < 4; ++i) operation.look_about();
+  EXPECT_TRUE(operation.workflow().view().unconfirmed);
+  EXPECT_TRUE(operation.watch(2).green.empty());
+  EXPECT_FALSE(operation.check()) << "the landmark lies elsewhere now";
+  operation.workflow().go_to(host::LiveStep::fiducials);
+  ASSERT_TRUE(operation.register_patient() && operation.check());
+  const Watched seen = operation.watch(2);
+  EXPECT_FALSE(seen.green.empty()) << ::testing::PrintToString(seen.reasons);
+}
+
 TEST(Lies, OfTheRegistration) {
   settle("registration", of_registration());
 }

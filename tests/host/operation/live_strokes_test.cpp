@@ -98,7 +98,6 @@ TEST_F(LiveStrokes, AreForgottenWithTheRegistrationThatTheyAreOf) {
   EXPECT_EQ(workflow_.view().touched_places, 0U);
   EXPECT_EQ(note(), "the fiducials were touched anew: keep views again");
   workflow_.go_to(LiveStep::views);
-  hand_.rest_at(kFiducials.back(), 0);
   workflow_.go_to(LiveStep::fiducials);
   hand_.rest_at(kFiducials.back(), 80);
   hand_.rest_at({0, 0, 20}, 1);

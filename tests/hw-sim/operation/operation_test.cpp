@@ -222,6 +222,20 @@ TEST(OperationWithPictures, MendedSeed33AccusesNobody) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
+/// Pressed in haste with the pointer away from any landmark, Space once brought the overlay back, 30 mm off.
+TEST(OperationWithPictures, ABumpThatWasSeenBringsNothingBackUnlooked) {
+  FaultScript script;
+  script.world = {{FaultKind::transmitter_bumped, 60, std::nullopt, {{"mm", 15}, {"deg", 5}, {"over_s", 0.2}}}};
+  const OperationOutcome out = operate({.seed = 5, .minutes = 2.5, .faults = script, .pictures = true});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+  EXPECT_EQ(out.laws.moved, 1U) << out.log;
+  EXPECT_EQ(out.laws.moved_unwatched, 0U) << out.log;
+  EXPECT_NE(out.log.find("not confirmed: the pointer is"), std::string::npos) << out.log;
+  EXPECT_EQ(out.registrations, 1U) << "anew\n" << out.log;
+  EXPECT_NE(out.log.rfind("the overlay is whole"), std::string::npos);
+  EXPECT_GT(out.log.rfind("the overlay is whole"), out.log.rfind("the patient is not registered yet")) << out.log;
+}
+
 TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
   const OperationOutcome first = operate({.seed = 5, .minutes = 1.5}), again = operate({.seed = 5, .minutes = 1.5});
   EXPECT_EQ(first.log, again.log);

@@ -1,0 +1,129 @@
+// What brings a registration back that something has spoken against.
+#include <gtest/gtest.h>
+
+#include "tests/support/live_operation.hpp"
+
+namespace birdseye::host {
+namespace {
+
+using birdseye::testing::check_at;
+using birdseye::testing::Hand;
+using birdseye::testing::kFiducials;
+using birdseye::testing::kTumour;
+using birdseye::testing::Scratch;
+
+/// Registered, and before the check.
+class Doubted : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    birdseye::testing::load(workflow_);
+    birdseye::testing::connect_and_calibrate(workflow_);
+    Hand hand(workflow_);
+    for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+    hand.rest_at({0, 0, 200}, 1);
+    workflow_.go_to(LiveStep::check);
+    ASSERT_TRUE(drawn());
+  }
+  /// Without video for a while nobody knows what was moved.
+  void pause() {
+    wire::VideoFrame frame;
+    for (const std::int64_t ms : {0, 20'000}) {
+      frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
+      workflow_.take(frame, HostTime{frame.info.acquired.ns}, std::nullopt);
+    }
+    ASSERT_FALSE(drawn());
+    ASSERT_EQ(workflow_.view().step, LiveStep::check);
+  }
+  bool drawn() { return workflow_.picture().setup().has_value(); }
+  std::string said() { return workflow_.view().note(LiveStep::check).line; }
+
+  const Scratch scratch_;
+  LiveWorkflow workflow_{birdseye::testing::operation_settings(scratch_)};
+};
+
+TEST_F(Doubted, IsNotConfirmedByWhatThePointerDidBefore) {
+  Hand(workflow_).rest_at(kTumour, 5);
+  pause();
+  workflow_.primary(HostTime{0});
+  EXPECT_FALSE(drawn());
+  EXPECT_NE(said().find("the pointer is not seen"), std::string::npos) << said();
+}
+
+TEST_F(Doubted, IsNotConfirmedAwayFromEveryLandmarkHoweverFar) {
+  for (const double beside_mm : {9.0, 15.0, 31.0, 200.0}) {
+    pause();
+    check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, beside_mm));
+    EXPECT_FALSE(drawn()) << beside_mm;
+    EXPECT_NE(said().find("not confirmed"), std::string::npos) << said();
+    workflow_.go_on();
+    EXPECT_FALSE(drawn()) << "nor by going on";
+    workflow_.go_to(LiveStep::run);
+    EXPECT_FALSE(drawn());
+    workflow_.go_to(LiveStep::check);
+  }
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 7));
+  EXPECT_TRUE(drawn()) << said();
+}
+
+TEST_F(Doubted, IsConfirmedByAFiducialThatStillFitsAndNotByOneThatDoesNot) {
+  pause();
+  check_at(workflow_, kFiducials[1] + Eigen::Vector3d(0, 12, 0));
+  EXPECT_FALSE(drawn());
+  check_at(workflow_, kFiducials[1] + Eigen::Vector3d(0, 1, 0));
+  EXPECT_TRUE(drawn());
+  EXPECT_FALSE(workflow_.view().checked) << "the registration was fitted to it";
+  EXPECT_NE(said().find("1.0 mm from fiducial 2"), std::string::npos) << said();
+}
+
+TEST_F(Doubted, IsMadeAnewByTouches) {
+  pause();
+  workflow_.go_to(LiveStep::fiducials);
+  Hand hand(workflow_);
+  for (const Eigen::Vector3d& fiducial : kFiducials) hand.rest_at(fiducial, 80);
+  hand.rest_at({0, 0, 200}, 1);
+  EXPECT_TRUE(drawn());
+}
+
+TEST_F(Doubted, IsNotTouchedAnewWhereThePointerRestedToCheck) {
+  pause();
+  Hand hand(workflow_);
+  hand.rest_at(kTumour + Eigen::Vector3d(0, 0, 12), 80);
+  workflow_.primary(HostTime{0});
+  ASSERT_FALSE(drawn());
+  workflow_.go_to(LiveStep::fiducials);
+  hand.rest_at(kFiducials[0], 80);
+  hand.rest_at(kFiducials[1], 1);
+  EXPECT_EQ(workflow_.view().touches.size(), 1U);
+}
+
+/// A first check that shows the target beside its place speaks against the registration, whatever is pressed then.
+TEST_F(Doubted, IsARegistrationWhoseFirstLandmarkDoesNotFit) {
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 12));
+  EXPECT_FALSE(drawn());
+  EXPECT_NE(said().find("12 mm from tumour"), std::string::npos) << said();
+  check_at(workflow_, {0, 0, 200});
+  EXPECT_FALSE(drawn());
+  check_at(workflow_, kTumour);
+  EXPECT_TRUE(drawn()) << said();
+  EXPECT_TRUE(workflow_.view().checked);
+}
+
+TEST_F(Doubted, IsALaterLandmarkThatDoesNotFitAndTheFormerCountsNoMore) {
+  check_at(workflow_, kTumour);
+  ASSERT_TRUE(workflow_.view().checked);
+  workflow_.go_to(LiveStep::check);
+  check_at(workflow_, kTumour + Eigen::Vector3d(0, 0, 12));
+  EXPECT_FALSE(drawn());
+  EXPECT_FALSE(workflow_.view().checked);
+}
+
+/// Of a registration that nothing speaks against nobody has to look.
+TEST_F(Doubted, IsNotARegistrationOfWhichNobodyLooked) {
+  check_at(workflow_, {0, 0, 200});
+  EXPECT_TRUE(drawn());
+  EXPECT_EQ(workflow_.view().step, LiveStep::run);
+  EXPECT_EQ(said(), "gone on without a landmark");
+}
+
+}  // namespace
+}  // namespace birdseye::host
