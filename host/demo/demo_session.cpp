@@ -219,7 +219,7 @@ void DemoSession::take(const wire::Health& health) {
 
 /// Asks of the frame what the window asks of each: whether video and poses agree, and the round field with the lens.
 void DemoSession::watch(const wire::VideoFrame& frame) {
-  if (video_.take(frame, *scope_, painter_.target_distance_mm(frame)).any()) judge();
+  if (video_.take(frame, *scope_, painter_.target_in_camera_mm(frame)).any()) judge();
 }
 
 /// Has the overlay drawn by the setup only as long as what tells of it agrees.

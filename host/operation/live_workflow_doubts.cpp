@@ -71,7 +71,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   // The board's squares look alike, one after the other.
   const auto scope = step_ == LiveStep::calibrate ? std::nullopt : scope_as_it_is();
   if (!scope) return;
-  const VideoWatch::News news = video_.take(frame, *scope, picture_.target_distance_mm(frame));
+  const VideoWatch::News news = video_.take(frame, *scope, picture_.target_in_camera_mm(frame));
   if (news.field) update_setup();
   if (!settings_.video_must_agree) return;
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.

@@ -63,7 +63,7 @@ void ReplayPlayer::take(const wire::Birds& birds) {
 /// The video is asked as in the window, with one difference: before the video has shown anything, the overlay is drawn.
 /// Nobody operates by a replay, and the replay's verdict says where the video never showed anything.
 void ReplayPlayer::watch(const wire::VideoFrame& frame) {
-  if (!video_.take(frame, scope_, painter_.target_distance_mm(frame)).any()) return;
+  if (!video_.take(frame, scope_, painter_.target_in_camera_mm(frame)).any()) return;
   done_.video_told = done_.video_told || video_.motion() != VideoAgreement::untold;
   TrustFigures figures = painter_.figures();
   video_.enter(figures);

@@ -68,11 +68,11 @@ std::optional<TargetMark> FramePainter::target(const wire::VideoFrame& frame,
   return from ? target_mark(setup_->camera(), pose_of(frame, *from), figures_) : std::nullopt;
 }
 
-std::optional<double> FramePainter::target_distance_mm(const wire::VideoFrame& frame) const {
+std::optional<Eigen::Vector3d> FramePainter::target_in_camera_mm(const wire::VideoFrame& frame) const {
   const auto& pose = frame.info.pose.tracker_from_sensor;
   const auto& target_mm = figures_.target_in_patient_mm;
   if (!setup_ || !target_mm || !pose) return std::nullopt;
-  return (setup_->camera_from_patient(*pose) * *target_mm).norm();
+  return setup_->camera_from_patient(*pose) * *target_mm;
 }
 
 OverlayGate::Decision FramePainter::decide(const wire::VideoFrame& frame) {

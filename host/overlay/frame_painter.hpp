@@ -55,8 +55,8 @@ class FramePainter {
   /// come, the frames' poses have to do.
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   [[nodiscard]] const TargetJitter& jitter() const { return jitter_; }
-  /// From the camera, by the frame's pose. Empty: nothing is drawn by a setup, or it has no target, or no pose.
-  [[nodiscard]] std::optional<double> target_distance_mm(const wire::VideoFrame& frame) const;
+  /// By the frame's pose. Empty: nothing is drawn by a setup, or it has no target, or no pose.
+  [[nodiscard]] std::optional<Eigen::Vector3d> target_in_camera_mm(const wire::VideoFrame& frame) const;
   /// Whether the frame may bear an overlay. Of every frame, in their order; a clock that goes back is another clock.
   OverlayGate::Decision decide(const wire::VideoFrame& frame);
   /// Where the overlay has the target in a frame of that decision. Empty: nothing is drawn, the target is out of view,

@@ -84,8 +84,8 @@ class LivePicture {
     painter_.take(acquired, tracker_from_sensor);
   }
   [[nodiscard]] const TargetJitter& jitter() const { return painter_.jitter(); }
-  [[nodiscard]] std::optional<double> target_distance_mm(const wire::VideoFrame& frame) const {
-    return painter_.target_distance_mm(frame);
+  [[nodiscard]] std::optional<Eigen::Vector3d> target_in_camera_mm(const wire::VideoFrame& frame) const {
+    return painter_.target_in_camera_mm(frame);
   }
   /// A frame that has come; one that came before and was not drawn yet is skipped.
   void take(const wire::VideoFrame& frame, const Exposure& exposed);

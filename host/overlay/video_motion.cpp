@@ -40,8 +40,8 @@ PoseHistory averaged_poses() {
 }
 
 /// Of places that are followed wrongly one in five and more lie by chance where the poses say.
-bool few_agree(const std::vector<FollowedPlace>& places, const Relative& motion, double allowed) {
-  const auto off = off_line(places, motion);
+bool few_agree(const std::vector<FollowedPlace>& places, const Relative& motion, double allowed, double farthest_mm) {
+  const auto off = off_line(places, motion, farthest_mm);
   return 5 * std::ranges::count_if(off, [allowed](double one) { return one <= allowed; }) < std::ssize(places);
 }
 
@@ -49,6 +49,7 @@ bool few_agree(const std::vector<FollowedPlace>& places, const Relative& motion,
 
 struct VideoMotion::Waiting {
   DeviceTime at;
+  double farthest_mm = kFarthestSeen_mm;
   double times_apart_s = 0;         ///< of the frame and the poses
   std::vector<cv::Point2f> then{};  ///< the key's places; empty: this is the key's picture
   std::vector<cv::Point2f> now{};   ///< where they are in this one
@@ -58,16 +59,17 @@ struct VideoMotion::Waiting {
 
 struct VideoMotion::Key {
   DeviceTime at;
-  std::optional<SeenFrom> from;         ///< empty: the poses after it have not come yet
-  std::vector<cv::Point2f> places;      ///< in the key's picture
-  PictureToFollow looked_at;            ///< the last picture that was looked at
-  std::optional<SeenFrom> looked_from;  ///< the last picture that was judged, or the key's
-  std::vector<cv::Point2f> looked;      ///< where they were in the last picture that was looked at
-  std::size_t kept = 0;                 ///< so many
-  std::size_t agreed = 0;               ///< so many were left when they last agreed, and the scope was calm
-  std::size_t left = 0;                 ///< and so many in the first picture after since that did not agree
-  PictureToFollow newest;               ///< the last frame in which most of them were found
-  std::vector<cv::Point2f> now;         ///< and about where they are in it
+  double farthest_mm = kFarthestSeen_mm;  ///< half of the places lie no farther
+  std::optional<SeenFrom> from;           ///< empty: the poses after it have not come yet
+  std::vector<cv::Point2f> places;        ///< in the key's picture
+  PictureToFollow looked_at;              ///< the last picture that was looked at
+  std::optional<SeenFrom> looked_from;    ///< the last picture that was judged, or the key's
+  std::vector<cv::Point2f> looked;        ///< where they were in the last picture that was looked at
+  std::size_t kept = 0;                   ///< so many
+  std::size_t agreed = 0;                 ///< so many were left when they last agreed, and the scope was calm
+  std::size_t left = 0;                   ///< and so many in the first picture after since that did not agree
+  PictureToFollow newest;                 ///< the last frame in which most of them were found
+  std::vector<cv::Point2f> now;           ///< and about where they are in it
   DeviceTime newest_at;
   double farthest_step_px = 0;  ///< since a picture last waited, as it has it
   Duration longest_step{0};
@@ -142,7 +144,8 @@ double VideoMotion::noise_of_average_px(const CameraModel& camera) const {
   return camera.fx_px / kAhead_mm * *rms_mm / std::sqrt(2 * averaged);
 }
 
-bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope) {
+bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope,
+                       double farthest_mm) {
   const VideoAgreement before = state_;
   contradicted_ = false;
   if (of_ && !of_->sees_as(scope)) reset();
@@ -164,20 +167,21 @@ bool VideoMotion::take(const wire::VideoFrame& frame, const PictureToFollow& pic
     const bool due = !looked_at_ || at - *looked_at_ >= kEvery || at < *looked_at_;
     if (!waiting_ && due) {
       looked_at_ = at;
-      wait(frame, picture);
+      wait(frame, picture, farthest_mm);
     }
   }
   return state_ != before;
 }
 
 /// Until the poses after the frame have come.
-void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& picture) {
+void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& picture, double farthest_mm) {
   waiting_ = std::make_unique<Waiting>();
   waiting_->at = frame.info.acquired;
+  waiting_->farthest_mm = farthest_mm;
   waiting_->times_apart_s = times_apart_s(
       Duration::from_seconds(std::hypot(frame.info.acquired_sigma.seconds(), frame.info.pose.time_sigma.seconds())),
       frame.info.latency.has_value());
-  if (!key_) return begin_key(waiting_->at, picture, std::nullopt);
+  if (!key_) return begin_key(*waiting_, picture, std::nullopt);
   // What is followed from frame to frame drifts with each: they only tell where to look, from the last that was looked
   // at.
   const std::size_t kept = keep(follow_places(key_->looked_at, picture, key_->looked, &key_->now));
@@ -196,9 +200,11 @@ void VideoMotion::wait(const wire::VideoFrame& frame, const PictureToFollow& pic
   waiting_->longest_step = std::exchange(key_->longest_step, Duration{0});
 }
 
-void VideoMotion::begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from) {
+void VideoMotion::begin_key(const Waiting& waiting, const PictureToFollow& picture,
+                            const std::optional<SeenFrom>& from) {
   auto key = std::make_unique<Key>();
-  key->at = key->newest_at = at;
+  key->at = key->newest_at = waiting.at;
+  key->farthest_mm = waiting.farthest_mm;
   key->from = key->looked_from = from;
   key->places = key->looked = key->now = distinct_places_to_follow(picture.grey);
   key->kept = key->places.size();
@@ -260,14 +266,14 @@ void VideoMotion::look(const Waiting& waiting, const ScopeSetup& scope) {
   const bool lost = hasty || waiting.then.size() < kFewest;
   const Judged judged = lost ? Judged::not_odd : judge(waiting, *from, scope);
   const bool calmer = key_->from->unsure_px > std::max(2 * from->unsure_px, kHastePx * small_px);
-  const bool renew = judged == Judged::odd
-                         ? odd_ >= kOddInRow
-                         : judged == Judged::of_what_is_left || calmer || waiting.at - key_->at >= kLongest;
+  // Not while the poses leave much open: what leaps then would lie between two keys.
+  const bool old = waiting.at - key_->at >= kLongest && from->unsure_px <= kHastePx * small_px;
+  const bool renew = judged == Judged::odd ? odd_ >= kOddInRow : judged == Judged::of_what_is_left || calmer || old;
   if (!lost && !renew) return;
   // From the picture that was judged, so that no motion lies between two keys.
   const PictureToFollow newest = key_->newest;
   const DeviceTime newest_at = key_->newest_at;
-  begin_key(waiting.at, PictureToFollow(key_->looked_at), from);
+  begin_key(waiting, PictureToFollow(key_->looked_at), from);
   if (newest.grey.data != key_->looked_at.grey.data) {
     keep(follow_places(key_->looked_at, newest, key_->places));
     key_->newest = newest;
@@ -323,7 +329,7 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
   }
   if (places.size() < kFewest) return Judged::not_odd;
   const Relative motion = now.camera_from_tracker * key_->from->camera_from_tracker.inverse();
-  const auto median_off = median_off_line(places, motion);
+  const auto median_off = median_off_line(places, motion, key_->farthest_mm);
   if (!median_off) return Judged::not_odd;
   off_px_ = *median_off * camera.fx_px;
   std::array<double, 3> otherwise_px{};  // by axis, how far off they would be with a hand-eye that is turned about it
@@ -348,7 +354,8 @@ VideoMotion::Judged VideoMotion::judge(const Waiting& waiting, const SeenFrom& n
       return Judged::odd;
     }
     const bool swung = 3 * key_->left < 2 * key_->agreed;
-    const bool moved = *off_px_ > kPlainly * allowed_px || few_agree(places, motion, allowed_px / camera.fx_px) ||
+    const bool moved = *off_px_ > kPlainly * allowed_px ||
+                       few_agree(places, motion, allowed_px / camera.fx_px, key_->farthest_mm) ||
                        go_as_one(places, kFollowedPx * scale / std::sqrt(2) / camera.fx_px);
     contradicted_ = swung || moved;
     told_ = {};

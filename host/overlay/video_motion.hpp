@@ -16,7 +16,7 @@ namespace birdseye::host {
 
 /// Whether the video moves as the scope's poses, by its calibration, say that it must. Places of the tissue are
 /// followed from a picture to later ones; where a place may lie in the later picture, at whatever depth, the poses
-/// tell: on a line (the epipolar line). Needs no registration.
+/// tell: on a line (the epipolar line). Needs no registration; how far what is seen may lie it can tell.
 ///
 /// A picture that agrees tells only of what would have been seen otherwise: agreement is said once, about each axis, a
 /// hand-eye that is turned by 15 degrees would have had the places off their lines. After a picture that did not agree,
@@ -32,8 +32,8 @@ class VideoMotion {
   void take(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   /// A frame, as they come, that frame small and grey, and the scope that took it; of another than before all is
   /// forgotten. In each the places are followed; ten a second are looked at, each once the poses after it have come.
-  /// True: state() is another now.
-  bool take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope);
+  /// farthest_mm: half of what the frame shows lies no farther from the camera. True: state() is another now.
+  bool take(const wire::VideoFrame& frame, const PictureToFollow& picture, const ScopeSetup& scope, double farthest_mm);
 
   /// Something else speaks against a frame of that time: what agreed is in doubt until a picture that was taken then or
   /// later agrees. True: state() is another now.
@@ -59,12 +59,12 @@ class VideoMotion {
   };
 
   [[nodiscard]] std::optional<SeenFrom> seen_from(const Waiting& waiting, const ScopeSetup& scope) const;
-  void wait(const wire::VideoFrame& frame, const PictureToFollow& picture);
+  void wait(const wire::VideoFrame& frame, const PictureToFollow& picture, double farthest_mm);
   void look(const Waiting& waiting, const ScopeSetup& scope);
   void note_noise(DeviceTime acquired, const Transform<Tracker, Sensor>& tracker_from_sensor);
   [[nodiscard]] double noise_of_average_px(const CameraModel& camera) const;
   static double fastest_px_s(const SeenFrom& then, const SeenFrom& now, const CameraModel& camera);
-  void begin_key(DeviceTime at, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
+  void begin_key(const Waiting& waiting, const PictureToFollow& picture, const std::optional<SeenFrom>& from);
   void follow(DeviceTime at, const PictureToFollow& picture);
   std::size_t keep(const std::vector<std::optional<cv::Point2f>>& found);
   enum class Judged { not_odd, odd, of_what_is_left };

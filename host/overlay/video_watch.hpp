@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "host/overlay/field_watch.hpp"
 #include "host/overlay/scope_setup.hpp"
 #include "host/overlay/sudden_motion.hpp"
@@ -25,8 +27,9 @@ class VideoWatch {
     [[nodiscard]] bool any() const { return motion || field; }
   };
   /// A frame, as they come, and the scope that took it. Where no single poses come, as in a sequence of PLUS, the poses
-  /// of the frames take their place. target_mm: how far from the camera the target is drawn; empty: it is not.
-  News take(const wire::VideoFrame& frame, const ScopeSetup& scope, std::optional<double> target_mm) {
+  /// of the frames take their place. target_in_camera_mm: where the target is drawn; empty: it is not.
+  News take(const wire::VideoFrame& frame, const ScopeSetup& scope,
+            const std::optional<Eigen::Vector3d>& target_in_camera_mm) {
     if (const auto& pose = frame.info.pose.tracker_from_sensor; !single_poses_ && pose) {
       motion_.take(frame.info.acquired, *pose);
       sudden_.take(frame.info.acquired, *pose);
@@ -35,7 +38,8 @@ class VideoWatch {
     // Of another size it is not looked at, and may be as flat as a line.
     const bool fits = frame.width_px == scope.camera().width_px && frame.height_px == scope.camera().height_px;
     const PictureToFollow picture = fits ? picture_to_follow(frame) : PictureToFollow{};
-    motion_.take(frame, picture, scope);
+    const auto target_mm = target_in_camera_mm ? std::optional(target_in_camera_mm->norm()) : std::nullopt;
+    motion_.take(frame, picture, scope, farthest_mm(target_in_camera_mm));
     if (sudden_.take(frame, picture, scope, target_mm)) motion_.doubt(frame.info.acquired);
     const bool differed = before == VideoAgreement::differs;
     return {motion_.state() != before, field_.take(frame, scope), motion_.contradicted() && !differed,
@@ -56,6 +60,15 @@ class VideoWatch {
   }
 
  private:
+  /// Half of what is seen lies no farther. A scope that has the target ahead is in the patient, or before him.
+  static double farthest_mm(const std::optional<Eigen::Vector3d>& target_in_camera_mm) {
+    constexpr double kAhead = 0.7;      // the cosine of the angle to the line of sight
+    constexpr double kCavity_mm = 150;  // also where the target is near, the wall behind it need not be
+    if (!target_in_camera_mm || target_in_camera_mm->z() < kAhead * target_in_camera_mm->norm())
+      return kFarthestSeen_mm;
+    return std::clamp(2 * target_in_camera_mm->norm(), kCavity_mm, kFarthestSeen_mm);
+  }
+
   bool single_poses_ = false;
   VideoMotion motion_;
   SuddenMotion sudden_;

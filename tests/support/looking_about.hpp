@@ -64,6 +64,7 @@ struct LookingAbout {
   bool latency_measured = true;
   std::function<Eigen::Vector3d(double t_s)> scene_moves{};  ///< against the tracker
   Eigen::Vector3d bumped_mm{0, 0, 0};                        ///< by which the tracker has every pose elsewhere
+  double bumped_from_s = -1, bumped_over_s = 0.1;            ///< from then on, and after so long by all of it
   Transform<Camera, Camera> turned{};  ///< of the scope in its holder: pictures turn, the sensor does not
   CameraModel lens = kLookingScope;    ///< as it is; the scope's record has kLookingScope
   bool pattern = true;
@@ -87,8 +88,10 @@ struct LookingAbout {
       const Transform<Camera, Patient> view(
           turn, Eigen::Vector3d(8 * std::sin(s), 9 * std::cos(1.3 * s), 100 + 15 * std::sin(0.9 * s)));
       const auto sensor = view.inverse() * camera_from_sensor;
-      const Transform<Tracker, Sensor> noisy(rotation_exp(normal3(angle_rad)) * sensor.rotation(),
-                                             Eigen::Vector3d(sensor.translation() + bumped_mm + normal3(position_mm)));
+      const double bumped = std::clamp((t_s - bumped_from_s) / bumped_over_s, 0.0, 1.0);
+      const Transform<Tracker, Sensor> noisy(
+          rotation_exp(normal3(angle_rad)) * sensor.rotation(),
+          Eigen::Vector3d(sensor.translation() + bumped * bumped_mm + normal3(position_mm)));
       motion.take(DeviceTime{std::llround(t_s * 1e9)}, noisy);
       if (i % 4 != 0) continue;
       wire::VideoFrame frame;

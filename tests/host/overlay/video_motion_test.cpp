@@ -19,11 +19,12 @@ using Vector = Eigen::Vector3d;
 struct Watcher : VideoMotion {
   using VideoMotion::take;
   bool take(const wire::VideoFrame& frame, const ScopeSetup& scope) {
-    const bool another = VideoMotion::take(frame, picture_to_follow(frame), scope);
+    const bool another = VideoMotion::take(frame, picture_to_follow(frame), scope, farthest_mm);
     contradictions += contradicted() ? 1 : 0;
     return another;
   }
   int contradictions = 0;
+  double farthest_mm = kFarthestSeen_mm;
 };
 using LookingAbout = testing::LookingAbout<Watcher>;
 
@@ -200,6 +201,37 @@ TEST(VideoMotion, PosesThatLeapWhileTheScopeIsFastAreSeen) {
       EXPECT_TRUE(differs) << haste << ", " << at_s;
       EXPECT_GE(about.motion.contradictions, 1) << haste << ", " << at_s;
     }
+}
+
+/// Also as the picture that is followed is renewed, at the latest each three seconds: no motion may lie between two.
+TEST(VideoMotion, ABumpIsSeenWheneverItComes) {
+  for (int i = 0; i < 16; ++i) {
+    LookingAbout about;
+    about.haste = 0.3;
+    about.latency_measured = false;
+    const double at_s = 4.5 + 0.1 * i;
+    about.look(0, at_s);
+    about.bumped_mm = Vector(20, -20, 10);
+    about.bumped_from_s = at_s;
+    about.bumped_over_s = 0.2;
+    about.look(at_s, 2);
+    EXPECT_GE(about.motion.contradictions, 1) << at_s;
+  }
+}
+
+/// Places before which nothing moves may be far away, where nobody says that they are not.
+TEST(VideoMotion, ABumpAcrossTheViewIsNoFarScene) {
+  for (const Vector& bump_mm : {Vector(15, 0, 0), Vector(0, 15, 0), Vector(20, -20, 0)}) {
+    LookingAbout about;
+    about.motion.farthest_mm = 200;
+    about.haste = 0.3;
+    about.look(0, 6);
+    EXPECT_EQ(about.motion.contradictions, 0);
+    about.bumped_mm = bump_mm;
+    about.bumped_from_s = 6;
+    about.look(6, 2);
+    EXPECT_GE(about.motion.contradictions, 1) << bump_mm.transpose();
+  }
 }
 
 /// A flash between two pictures that are looked at.
