@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
@@ -27,15 +26,15 @@ struct BrokenLaw {
 ///
 /// pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
 /// age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
-/// circle: no overlay is shown as whole that is off by more than three circles. Where transmitter or patient are moved
-/// while no overlay is whole, and there is no reference, nothing is watched that could show it: then not before the
-/// window asks for a landmark.
-/// named: a fault that befalls alone is named within 2 s, where anybody can see it.
-/// over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
-/// accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
-/// kept: a window that is opened again takes up the registration that there was, and draws nothing before a landmark
-/// has been checked. registered: what the window had as it was last neither writing nor said that something was not
-/// kept. A window that cannot keep something says so within 2 s.
+/// circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not asked
+/// of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no overlay
+/// is whole, nothing is watched that could show it: then it is not asked before the window asks for a landmark. named:
+/// a fault that befalls alone is named within 2 s, where anybody can see it. over: within 2 s of the end of a fault
+/// that befalls alone, poses and frames with poses are there again. accused: later than 10 s after the last fault's end
+/// the window does not begin to say that video and poses differ. kept: a window that is opened again takes up the
+/// registration that there was, and draws nothing before a landmark has been checked. registered: what the window had
+/// as it was last neither writing nor said that something was not kept. A window that cannot keep something says so
+/// within 2 s.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -78,6 +77,9 @@ class OperationLaws {
     bool alone = true;
     std::optional<double> named_s, poses_again_s, frames_again_s;
   };
+  struct Move {
+    double begins_s = 0, ends_s = 0;
+  };
   [[nodiscard]] double at_s(std::int64_t ns) const { return static_cast<double>(ns - zero_ns_) * 1e-9; }
   void break_law(double at_s, const char* law, std::string what);
   void judge_pose(const char* of, std::size_t bird, const Transform<Tracker, Sensor>& told, double true_s, double now_s,
@@ -89,6 +91,7 @@ class OperationLaws {
   void judge(const Span& span, double until_s);
   void judge_accusation(bool accused, double now_s);
   void note_motion(bool whole, double now_s);
+  [[nodiscard]] bool moves_at(double exposed_s) const;
 
   const OperationTruth& truth_;
   ExposedNs exposed_ns_;
@@ -96,11 +99,11 @@ class OperationLaws {
   std::vector<Span> spans_;
   std::optional<wire::Health> before_;
   std::optional<double> ready_since_s_;
-  bool accused_ = false;           ///< the window says that video and poses do not agree
-  std::deque<double> moves_s_;     ///< of transmitter or patient, when each begins or ends; those to come
-  std::optional<double> whole_s_;  ///< when an overlay was last whole
-  std::optional<double>
-      unwatched_to_s_;  ///< a motion that nothing could show is over then, and the window has not asked
+  bool accused_ = false;                  ///< the window says that video and poses do not agree
+  std::vector<Move> moves_;               ///< of transmitter or patient, without a reference, in their order
+  std::size_t next_move_ = 0;             ///< that has not begun yet
+  std::optional<double> whole_s_;         ///< when an overlay was last whole
+  std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;
   std::optional<double> unsaid_since_s_;           ///< a sync failed then, and the window has not said so
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
