@@ -368,7 +368,7 @@ void add_calibrate_hand_eye(CLI::App& calibrate, CommandStatus& status) {
       ->type_name("[NAME@]HOST:PORT");
   command->add_option("--bird", plan.guide.bird,
                       "with --live or --recording: the scope's bird, by its name (default: scope)");
-  command->add_option("--keep", plan.guide.keep, "likewise: a folder for the stations' pictures and poses")
+  command->add_option("--keep", plan.guide.keep, "likewise: a folder for the views, pictures and poses of the stations")
       ->type_name("FOLDER");
   command->add_option("--stations", plan.guide.fewest_stations, "with --live: the fewest (default 12)")
       ->check(CLI::Range(6, 100));
