@@ -96,17 +96,27 @@ Check calibration_check(const wire::Calibration& calibration) {
 
 std::vector<Check> ask_appliance(const std::string& address) {
   const auto client = connect_appliance(address);
-  if (!client) {
-    const char* remedy = client.error().code == Errc::bad_value
-                             ? "give it as 192.168.1.20:18944"
-                             : "see its power, the cable, the address and the firewall; at the appliance: \"systemctl "
-                               "status birdseyed\"";
-    return {{kAppliance, "connection", CheckState::bad, client.error().what, remedy}};
-  }
+  if (!client) return {connection_fault(client.error())};
   return appliance_checks(address, listen_to(**client));
 }
 
 }  // namespace
+
+Check connection_fault(const Error& error) {
+  Check check{kAppliance, "connection", CheckState::bad, error.what,
+              "see its power, the cable, the address and the firewall; at the appliance: \"systemctl status "
+              "birdseyed\""};
+  if (error.code != Errc::bad_value) return check;
+  // The machine was reached, and keys or names are not as they should be: the error itself ends with the remedy.
+  const std::size_t end = error.what.rfind("; ");
+  if (end == std::string::npos) {
+    check.remedy = "give it as 192.168.1.20:18944";
+  } else {
+    check.found = error.what.substr(0, end);
+    check.remedy = error.what.substr(end + 2);
+  }
+  return check;
+}
 
 std::vector<Check> appliance_checks(const std::string& address, const ApplianceTold& told) {
   std::vector<Check> checks{{kAppliance, "connection", CheckState::good, address + " answers", ""}};

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/base/result.hpp"
 #include "calibration/record/calibration_record.hpp"
 #include "device/wire/messages.hpp"
 #include "host/doctor/question.hpp"
@@ -22,6 +23,9 @@ struct ApplianceTold {
 
 /// What it comes to. address: as it was named.
 std::vector<Check> appliance_checks(const std::string& address, const ApplianceTold& told);
+
+/// Why it could not be connected to, and what to do. error: of connect_appliance.
+Check connection_fault(const Error& error);
 
 /// Connects to the server, listens for some seconds without asking for video, and leaves.
 Question appliance_question(const std::string& address);

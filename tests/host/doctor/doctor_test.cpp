@@ -361,6 +361,17 @@ TEST(DoctorAppliance, SaysWhoAnswersAndWhetherOthersMayReadAndChangeWhatComes) {
   EXPECT_THAT(plain.remedy, HasSubstr("birdseye pair"));
 }
 
+TEST(DoctorAppliance, AMachineThatIsNotPairedIsToBePairedAndOneThatDoesNotAnswerIsToBeLookedFor) {
+  const Check stranger = connection_fault(
+      {Errc::bad_value, "cart:18944: its key is not known here; pair the two machines: birdseye pair cart"});
+  EXPECT_EQ(stranger.found, "cart:18944: its key is not known here");
+  EXPECT_EQ(stranger.remedy, "pair the two machines: birdseye pair cart");
+  EXPECT_THAT(connection_fault({Errc::bad_value, "\"::\" is no address of an appliance"}).remedy,
+              HasSubstr("192.168.1.20:18944"));
+  EXPECT_THAT(connection_fault({Errc::timeout, "cart:18944: nobody answers; does birdseyed run there"}).remedy,
+              HasSubstr("cable"));
+}
+
 TEST(DoctorAppliance, WhatSaysNothingOfBirdseyedIsNone) {
   EXPECT_EQ(only(appliance_checks("a", {})).state, CheckState::bad);
   ApplianceTold other;
