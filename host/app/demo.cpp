@@ -8,6 +8,7 @@
 
 #include "drivers/system/clock.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/program.hpp"
 #include "host/app/commands.hpp"
 #include "host/app/ct_options.hpp"
 #include "host/demo/demo_session.hpp"
@@ -27,6 +28,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostDemoFramesWaiting = 256;
+constexpr const char* kNoFrame =
+    "no frame of the liver came; if this machine was busy, run the demo again by itself, else see birdseyed.log";
 
 struct Places {
   Eigen::Vector2d true_px, rigid_px, overlaid_px;
@@ -167,7 +170,7 @@ Result<ExitCode> demo(const DemoOptions& options) {
   if (const std::string words = session.figures.drops.words(); !words.empty()) progress.keep(words);
   if (!ran) return ran.error();
   if (auto ended = (*cart)->finish(Deadline::after(Duration::from_ms(10'000))); !ended) return ended.error();
-  if (!session.setup) return Error{Errc::timeout, "no frame of the liver came; see birdseyed.log"};
+  if (!session.setup) return Error{Errc::timeout, kNoFrame};
   if (auto filmed = session.finish(); !filmed) return filmed.error();
   const auto places = compare(out, session, *patient);
   if (!places) return places.error();
@@ -183,8 +186,9 @@ Result<ExitCode> demo(const DemoOptions& options) {
   session.figures.drops.tell(session.figures.verdict);
   session.figures.wall_s = progress.seconds();
   if (auto written = write_demo_report(out, session.figures); !written) return written.error();
-  progress.keep(fmt::format("{}: {}", (out / "report.html").string(), session.figures.verdict.reasons.front()));
+  progress.keep((out / "report.html").string());
   fmt::print("verdict: {}\n", name_of(session.figures.verdict.grade));
+  for (const std::string& reason : session.figures.verdict.reasons) print_line(reason);
   return session.figures.verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

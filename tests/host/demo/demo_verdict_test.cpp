@@ -28,7 +28,7 @@ bool says(const Verdict& verdict, const std::string& words) {
 TEST(DemoVerdict, PassesWhereTheTumourIsWithinThreeMillimetresAndSaysSo) {
   const Verdict verdict = demo_verdict(overlaid(20, 2.9));
   EXPECT_EQ(verdict.grade, Grade::pass);
-  EXPECT_TRUE(says(verdict, "within 2.90 mm in 95 % of the frames; 3 mm pass")) << verdict.reasons.front();
+  EXPECT_TRUE(says(verdict, "within 2.90 mm in 95 % of the frames; up to 3 mm pass")) << verdict.reasons.front();
 }
 
 TEST(DemoVerdict, FollowsWhatNinetyFivePercentOfTheFramesAreOff) {
@@ -40,7 +40,7 @@ TEST(DemoVerdict, FollowsWhatNinetyFivePercentOfTheFramesAreOff) {
 TEST(DemoVerdict, FollowsTheWorstFrame) {
   const Verdict verdict = demo_verdict(overlaid(1, 6.1));
   EXPECT_EQ(verdict.grade, Grade::marginal);
-  EXPECT_TRUE(says(verdict, "off by 6.10 mm in the worst frame; 6 pass"));
+  EXPECT_TRUE(says(verdict, "off by 6.10 mm in the worst frame; up to 6 mm pass"));
   EXPECT_EQ(demo_verdict(overlaid(1, 10.1)).grade, Grade::fail);
 }
 
@@ -56,6 +56,24 @@ TEST(DemoVerdict, FailsWhereNothingIsOverlaidAndWhereNoDeformationWasFound) {
   not_found.deforming->words = "too few views";
   EXPECT_EQ(demo_verdict(not_found).grade, Grade::fail);
   EXPECT_TRUE(says(demo_verdict(not_found), "the CT was not deformed: too few views"));
+}
+
+TEST(DemoVerdict, EachReasonBeginsWithItsGrade) {
+  DemoFigures busy = overlaid(0, 0, 60);
+  busy.frames_dropped = 10;
+  const Verdict verdict = demo_verdict(busy);
+  ASSERT_EQ(verdict.reasons.size(), 3U);
+  EXPECT_EQ(verdict.reasons[0], "pass: the tumour's centre is within 1.00 mm in 95 % of the frames; up to 3 mm pass");
+  EXPECT_EQ(verdict.reasons[1], "fail: 60 % of the frames carry no overlay; up to 10 % pass");
+  EXPECT_EQ(verdict.reasons[2].find("marginal: 9 % of the frames were dropped"), 0U) << verdict.reasons[2];
+}
+
+TEST(DemoVerdict, WhereNothingIsOverlaidItSaysWhatElseWasWrong) {
+  DemoFigures busy = overlaid(0, 0, 100);
+  EXPECT_TRUE(says(demo_verdict(busy), "see birdseyed.log"));
+  busy.frames_dropped = 100;
+  EXPECT_TRUE(says(demo_verdict(busy), "fail: 50 % of the frames were dropped"));
+  EXPECT_FALSE(says(demo_verdict(busy), "see birdseyed.log"));
 }
 
 TEST(DemoVerdict, CountsFramesWithoutOverlayAndDroppedOnes) {
