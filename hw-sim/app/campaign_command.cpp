@@ -49,9 +49,8 @@ void print(const SeedRun& settings, const OperationResult& sum) {
   fmt::print(
       "overlay whole on {:.1f} % of pictures, {:.4f} % of those beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
       share(sum.green, sum.shown), share(sum.beyond, sum.green), sum.worst_circles, sum.worst_age_ms);
-  fmt::print("worst pose {:.2f} of what it may be off; faults named within {:.2f} s, over within {:.2f} s\n",
-             sum.worst_pose, sum.slowest_named_s, sum.slowest_over_s);
-  fmt::print("{} laws broken\n", sum.laws_broken);
+  fmt::print("worst pose {:.2f} of what it may be off; {}\n", sum.worst_pose, words_of_faults(sum));
+  fmt::print("{}\n", words_of_laws(sum));
 }
 
 /// A line, at once.

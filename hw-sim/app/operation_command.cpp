@@ -29,6 +29,7 @@ OperationResult result_of(const SimulatedOperation& operation, const OperationOu
   result.seed = operation.seed;
   result.minutes = operation.minutes;
   result.laws_broken = out.broken.size();
+  result.laws_untold = result.laws_broken >= kMostLawsTold;
   for (const BrokenLaw& law : out.broken)
     result.broken += fmt::format("{}{:.3f} s {}: {}", result.broken.empty() ? "" : "; ", law.at_s, law.law, law.what);
   result.hash = fmt::format("{:016x}", out.hash);
@@ -85,9 +86,8 @@ void print(const OperationOutcome& out, const OperationResult& result) {
       result.registrations, out.deformations, result.checks);
   fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
              100 * share, result.beyond, result.green, result.worst_circles, result.worst_age_ms);
-  fmt::print("worst pose {:.2f} of what it may be off; faults named within {:.2f} s, over within {:.2f} s\n",
-             result.worst_pose, result.slowest_named_s, result.slowest_over_s);
-  fmt::print("{} laws broken; hash {}\n", result.laws_broken, result.hash);
+  fmt::print("worst pose {:.2f} of what it may be off; {}\n", result.worst_pose, words_of_faults(result));
+  fmt::print("{}; hash {}\n", words_of_laws(result), result.hash);
 }
 
 Result<void> run(const OperationOptions& options, bool& broken) {

@@ -54,6 +54,7 @@ Result<OperationResult> result_of(const std::string& line) {
     json.at("broken").get_to(out.broken);
     for (const auto& [name, count] : kCounts) json.at(name).get_to(out.*count);
     for (const auto& [name, worst] : kWorst) json.at(name).get_to(out.*worst);
+    out.laws_untold = out.laws_broken >= kMostLawsTold;
     return out;
   } catch (const nlohmann::json::exception& wrong) {
     return Error{Errc::bad_format, fmt::format("is no result of an operation ({}): {}", wrong.what(), line)};
@@ -68,11 +69,23 @@ Result<OperationResult> sum_of(const SeedResults& results, std::uint64_t first, 
     out.minutes += one->minutes;
     for (const auto& [name, count] : kCounts) out.*count += (*one).*count;
     for (const auto& [name, worst] : kWorst) out.*worst = std::max(out.*worst, (*one).*worst);
+    out.laws_untold = out.laws_untold || one->laws_untold;
     if (!one->broken.empty()) out.broken += fmt::format("seed {}: {}\n", one->seed, one->broken);
     return {};
   });
   if (!summed) return summed.error();
   return out;
+}
+
+std::string words_of_faults(const OperationResult& result) {
+  const auto within = [](double slowest_s) {
+    return slowest_s > 0 ? fmt::format("within {:.2f} s", slowest_s) : std::string("(none judged)");
+  };
+  return fmt::format("faults named {}, over {}", within(result.slowest_named_s), within(result.slowest_over_s));
+}
+
+std::string words_of_laws(const OperationResult& result) {
+  return fmt::format("{}{} laws broken", result.laws_broken, result.laws_untold ? " or more" : "");
 }
 
 }  // namespace birdseye::hw_sim

@@ -15,13 +15,21 @@ struct OperationResult {
   std::uint64_t laws_broken = 0, faults = 0, faults_alone = 0, poses = 0, frames = 0, shown = 0, overlaid = 0,
                 green = 0, beyond = 0, registrations = 0, checks = 0, moved = 0, moved_unwatched = 0;
   double worst_pose = 0, worst_age_ms = 0, worst_circles = 0, slowest_named_s = 0, slowest_over_s = 0;
-  std::string broken;  ///< in words, a line for each
+  std::string broken;        ///< in words, a line for each
+  bool laws_untold = false;  ///< laws_broken is the least: an operation may have broken more laws than it tells
   std::string hash;
 };
+/// An operation tells of no more broken laws than so many.
+constexpr std::uint64_t kMostLawsTold = 100;
+
 std::string line_of(const OperationResult& result);
 /// Refuses what is no such line.
 Result<OperationResult> result_of(const std::string& line);
 /// Of the seeds from first to last: figures added up, the worst of what is worst, and what was broken.
 Result<OperationResult> sum_of(const SeedResults& results, std::uint64_t first, std::uint64_t last);
+
+/// For people: how soon faults were named and over, where any was judged, and how many laws were broken.
+std::string words_of_faults(const OperationResult& result);
+std::string words_of_laws(const OperationResult& result);
 
 }  // namespace birdseye::hw_sim

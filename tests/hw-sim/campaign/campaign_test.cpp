@@ -65,6 +65,21 @@ TEST(OperationResults, ALineIsReadBackAndAnythingElseRefused) {
   for (const char* const line : {"", "{}", "no JSON", "{\"seed\": \"seven\"}"}) EXPECT_FALSE(result_of(line)) << line;
 }
 
+TEST(OperationResults, WordsSayWhereNothingWasJudgedAndWhereMoreLawsMayBeBroken) {
+  OperationResult result;
+  EXPECT_EQ(words_of_faults(result), "faults named (none judged), over (none judged)");
+  EXPECT_EQ(words_of_laws(result), "0 laws broken");
+  result.slowest_named_s = 0.5;
+  result.slowest_over_s = 1.25;
+  EXPECT_EQ(words_of_faults(result), "faults named within 0.50 s, over within 1.25 s");
+  result.laws_broken = kMostLawsTold;
+  const auto back = result_of(line_of(result));
+  ASSERT_TRUE(back) << back.error().what;
+  EXPECT_EQ(words_of_laws(*back), "100 or more laws broken");
+  result.laws_broken = 99;
+  EXPECT_EQ(words_of_laws(*result_of(line_of(result))), "99 laws broken");
+}
+
 constexpr double kMinutes = 0.5;
 
 /// The seeds from 1 on.
