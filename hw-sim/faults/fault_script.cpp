@@ -5,11 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <toml.hpp>
+#include <utility>
+#include <vector>
 
 #include "calibration/base/nesting.hpp"
 #include "calibration/base/parser_words.hpp"
@@ -28,6 +32,34 @@ std::optional<double> number_of(const toml::value& value) {
   if (value.is_floating()) return value.as_floating();
   if (value.is_integer()) return static_cast<double>(value.as_integer());
   return std::nullopt;
+}
+
+/// How many pairs of neighbouring letters two names share, of all that they have: 0 to 1.
+double likeness(std::string_view a, std::string_view b) {
+  const auto pairs_of = [](std::string_view name) {
+    std::multiset<std::string_view> pairs;
+    for (std::size_t i = 0; i + 1 < name.size(); ++i) pairs.insert(name.substr(i, 2));
+    return pairs;
+  };
+  const auto in_a = pairs_of(a), in_b = pairs_of(b);
+  std::vector<std::string_view> shared;
+  std::ranges::set_intersection(in_a, in_b, std::back_inserter(shared));
+  return 2 * static_cast<double>(shared.size()) / std::max(1.0, static_cast<double>(in_a.size() + in_b.size()));
+}
+
+/// The faults that somebody may have meant by that name, at most three, the likeliest first.
+std::vector<std::string_view> names_like(std::string_view name) {
+  constexpr double kLike = 0.3;
+  constexpr std::size_t kMost = 3;
+  std::vector<std::pair<double, std::string_view>> found;
+  for (const FaultSpec& each : fault_table()) {
+    const double like = likeness(name, fault_name(each.kind));
+    if (like >= kLike) found.emplace_back(-like, fault_name(each.kind));
+  }
+  std::ranges::sort(found);
+  std::vector<std::string_view> names;
+  for (std::size_t i = 0; i < std::min(kMost, found.size()); ++i) names.push_back(found[i].second);
+  return names;
 }
 
 /// Reads the faults of one file and gathers what is wrong with it.
@@ -90,9 +122,10 @@ class Reader {
     const toml::value& name = entry.at("name");
     const FaultSpec* const spec = fault_spec(name.as_string().str);
     if (spec != nullptr) return spec;
-    std::vector<std::string_view> names;
-    for (const FaultSpec& each : fault_table()) names.push_back(fault_name(each.kind));
-    fail(name, fmt::format("\"{}\": no such fault; there are {}", name.as_string().str, fmt::join(names, ", ")));
+    const auto alike = names_like(name.as_string().str);
+    fail(name,
+         fmt::format("\"{}\": no such fault; {}all are in docs/manual/simulated-minibird.md and simulator.md",
+                     name.as_string().str, alike.empty() ? "" : fmt::format("alike are {}; ", fmt::join(alike, ", "))));
     return nullptr;
   }
 

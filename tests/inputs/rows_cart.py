@@ -118,8 +118,8 @@ ROWS = [
 
     Row("birdseye-sim", "good", "a script with one fault", "it runs and ends", SIM, 0,
         script('[[fault]]\nname = "drop_byte"\nat_s = 0.1\nfor_s = 0.2\nchance = 0.1\n'), says=["ready"]),
-    Row("birdseye-sim", "wrong", "a fault that there is not", "refused: those that there are, and the line", SIM, 2,
-        script('[[fault]]\nname = "earthquake"\nat_s = 1\n'), says=["earthquake", "drop_byte", "line 2|:2"]),
+    Row("birdseye-sim", "wrong", "a fault that there is not", "refused: the line, and which page names those that there are", SIM, 2,
+        script('[[fault]]\nname = "earthquake"\nat_s = 1\n'), says=["earthquake", "simulated-minibird.md", "line 2|:2"]),
     Row("birdseye-sim", "wrong", "a fault without its time", "refused: at_s", SIM, 2, script('[[fault]]\nname = "drop_byte"\n'), says=["at_s"]),
     Row("birdseye-sim", "wrong", "a chance of 3", "refused: the key", SIM, 2,
         script('[[fault]]\nname = "drop_byte"\nat_s = 1\nchance = 3\n'), says=["chance"]),

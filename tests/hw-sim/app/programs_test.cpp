@@ -112,7 +112,7 @@ TEST(Programs, WrongOptionsAreNamed) {
   expect_refused("birdseye-sim", "minibird " + tty + " --faults /nonexistent", {"/nonexistent"});
   expect_refused("birdseye-sim", "minibird " + tty + " --truth /nonexistent/t.json", {"/nonexistent/t.json"});
   expect_refused("birdseye-sim", "minibird " + tty + " --faults " + scratch.file("f", "[[fault]]\nname = \"fire\"\n"),
-                 {"line 2", "fire", "drop_byte"});
+                 {"line 2", "fire", "no such fault; all are in docs/manual/simulated-minibird.md"});
   expect_refused("birdseye-sim", "cart --phantom p --socket s --tty t --out o --deformation melt",
                  {"--deformation melt", "elastic", "pneumoperitoneum"});
   const std::string socket = "--socket " + (scratch / "frames").string();

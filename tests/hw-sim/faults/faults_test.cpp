@@ -75,6 +75,12 @@ at_s = 1
   }
 }
 
+TEST(FaultScript, OfANameThatThereIsNotItNamesThoseThatAreAlike) {
+  const std::string why = problem("[[fault]]\nname = \"transmiter_bump\"\nat_s = 1\n");
+  EXPECT_NE(why.find("no such fault; alike are transmitter_bumped"), std::string::npos) << why;
+  EXPECT_LT(why.size(), 250U) << why;
+}
+
 TEST(FaultScript, RefusesWhatIsNoScript) {
   EXPECT_NE(problem("[[fault]\n").find("line 1"), std::string::npos);
   EXPECT_NE(problem("rate = 1\n").find("line 1: rate"), std::string::npos);
