@@ -16,7 +16,9 @@ Error missing(const std::string& what, const std::string& remedy) {
 }  // namespace
 
 Result<GLFWwindow*> open_glfw_window(const std::string& title, int width_px, int height_px, const std::string& rival) {
-  if (glfwInit() == GLFW_FALSE) return missing("there is no display", "set DISPLAY" + rival);
+  if (glfwInit() == GLFW_FALSE)
+    return missing("there is no display",
+                   "set DISPLAY, or where there is no screen begin the command with xvfb-run -a" + rival);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);

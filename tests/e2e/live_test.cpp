@@ -139,8 +139,8 @@ TEST(Live, SaysWhatIsMissing) {
                           {"holds an operation already", "--resume"});
   testing::expect_refused("birdseye", "live --simulate --size 3x4", {"--size: \"3x4\""});
   testing::expect_refused("birdseye", "live --simulate --script " + (scratch / "none").string(), {"none"});
-  testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(), {"there is no display"}, "",
-                          nowhere);
+  testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(),
+                          {"there is no display", "xvfb-run -a"}, "", nowhere);
   const testing::Display display;
   testing::expect_refused("birdseye", "live --simulate --out " + (scratch / "l").string(),
                           {"OpenGL 4.5", "libgl1-mesa-dri"}, "", display.env() + " MESA_GL_VERSION_OVERRIDE=3.3");
