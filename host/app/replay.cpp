@@ -85,13 +85,13 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Rep
                          {"frames_overlaid_whole", done.whole},
                          {"frames_of_other_size", done.other_size},
                          {"frames_of_other_hardware", done.other_hardware},
-                         {"reasons_of_frames", done.reasons},
+                         {"reasons_of_frames", alike_reasons(done.reasons)},
                          {"pictures_crc32", fmt::format("{:08x}", done.checksum)},
                          {"engine", engine},
-                         {"touches", setup.touches},
                          {"notes", notes},
                          {"verdict", name_of(verdict.grade)},
                          {"reasons", verdict.reasons}};
+  if (setup.by_touches && setup.touches > 0) json["touches"] = setup.touches;
   const TrustFigures& figures = trust.figures;
   const auto enter = [&](const char* name, const std::optional<double>& figure) {
     if (figure && std::ranges::count(trust.vouched_for, name) == 0) json[name] = *figure;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <regex>
 #include <utility>
 #include <vector>
 
@@ -22,7 +23,25 @@ OverlayGate::Decision refused_for(const std::string& reason) {
   return out;
 }
 
+/// The reason with ".." in place of each number. What holds a letter beside its digits, as a name, is none.
+std::string without_figures(const std::string& reason) {
+  static const std::regex kFigure(R"((^|[\s(])-?\d+(\.\d+)?(?=$|[\s,;:)]))");
+  return std::regex_replace(reason, kFigure, "$1..");
+}
+
 }  // namespace
+
+std::map<std::string, std::size_t> alike_reasons(const std::map<std::string, std::size_t>& reasons) {
+  std::map<std::string, std::map<std::string, std::size_t>> alike;
+  for (const auto& [reason, frames] : reasons) alike[without_figures(reason)][reason] = frames;
+  std::map<std::string, std::size_t> out;
+  for (const auto& [shared, each] : alike) {
+    std::size_t all = 0;
+    for (const auto& [reason, frames] : each) all += frames;
+    out[each.size() == 1 ? each.begin()->first : shared] += all;
+  }
+  return out;
+}
 
 /// Of the table: a frame, why it carries the overlay that it does, and from where it was drawn.
 std::string ReplayPlayer::row_of(const wire::VideoFrame& frame, const OverlayGate::Decision& decision,

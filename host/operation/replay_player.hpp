@@ -41,6 +41,10 @@ struct Replayed {
       "patient\n";
 };
 
+/// How many frames there are for each reason, whatever figures it gives: reasons that differ in figures alone are one,
+/// with ".." in the place of each.
+std::map<std::string, std::size_t> alike_reasons(const std::map<std::string, std::size_t>& reasons);
+
 /// Draws every frame of a recording, writes some as pictures and, where asked, all as a film.
 class ReplayPlayer {
  public:

@@ -109,5 +109,19 @@ TEST(ReplayPlayer, SaysThatAPictureWithoutAPatternTellsNothing) {
   EXPECT_FALSE(done.video_told);
 }
 
+TEST(ReplayPlayer, ReasonsThatDifferInFiguresAloneAreOne) {
+  const std::map<std::string, std::size_t> reasons{{"the target may be off by 9 mm, by all that is counted", 3},
+                                                   {"the target may be off by 48211 mm, by all that is counted", 2},
+                                                   {"the tracker scatters by 0.8 mm", 1},
+                                                   {"the tracker scatters by -1.2 mm", 1},
+                                                   {"the reference \"bird 2\" was lost", 4},
+                                                   {"the video is 64 x 48", 5}};
+  const std::map<std::string, std::size_t> alike{{"the target may be off by .. mm, by all that is counted", 5},
+                                                 {"the tracker scatters by .. mm", 2},
+                                                 {"the reference \"bird 2\" was lost", 4},
+                                                 {"the video is 64 x 48", 5}};
+  EXPECT_EQ(alike_reasons(reasons), alike);
+}
+
 }  // namespace
 }  // namespace birdseye::host
