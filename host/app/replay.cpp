@@ -102,6 +102,19 @@ nlohmann::json json_of(const Replayed& done, const ReplaySetup& setup, const Rep
   return json;
 }
 
+/// For people: by what it was registered, and what was written where.
+void print_results(const ReplayOptions& options, const ReplaySetup& setup, const Replayed& done) {
+  const std::string by = setup.touches > 0 ? fmt::format(", by {} touches", setup.touches) : "";
+  print_line("fiducial registration error (FRE): " +
+             (setup.fre_mm ? fmt::format("{:.2f} mm{}", *setup.fre_mm, by) : "not known"));
+  const auto in_out = [&options](const char* name) { return (options.out / name).string(); };
+  std::string written =
+      fmt::format("wrote {}, {}, {}", in_out("frames.csv"), in_out("replay.json"), in_out("patient_from_tracker.txt"));
+  if (options.film_hz > 0) written += ", " + in_out("overlay.mp4");
+  print_line(fmt::format("{}; {} picture{} {}", written, done.pictures, done.pictures == 1 ? "" : "s",
+                         in_out("overlay-*.png")));
+}
+
 /// All of the recording through the overlay. remedies: for why no overlay was drawn, what to do about it.
 Result<void> play(RecordingReader& reader, const ReplayOptions& options, ReplayHardware& hardware, ReplayPlayer& player,
                   std::map<std::string, std::string>& remedies, Progress& progress) {
@@ -223,6 +236,7 @@ Result<ExitCode> run(ReplayOptions& options) {
   progress.keep(fmt::format("{} frames, {} with an overlay, pictures {:08x}: {}", player.done().frames,
                             player.done().overlaid, player.done().checksum, name_of(verdict.grade)));
   for (const std::string& reason : verdict.reasons) print_line(reason);
+  print_results(options, *setup, player.done());
   return verdict.grade == Grade::fail ? ExitCode::verdict_fail : ExitCode::success;
 }
 

@@ -124,6 +124,7 @@ Result<void> ReplayPlayer::take(const wire::VideoFrame& frame, const std::string
   if ((done_.frames - 1) % static_cast<std::size_t>(output_.every) == 0) {
     const std::filesystem::path file = output_.folder / fmt::format("overlay-{:06}.png", frame.info.sequence);
     if (auto put = write_file(file, png_of(RgbView{rgb, frame.width_px, frame.height_px})); !put) return put;
+    ++done_.pictures;
   }
   if (output_.film_hz <= 0) return {};
   if (!film_) {

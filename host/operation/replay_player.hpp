@@ -32,6 +32,7 @@ struct ReplayOutput {
 /// What became of the frames so far.
 struct Replayed {
   std::size_t frames = 0, overlaid = 0, whole = 0, other_size = 0;
+  std::size_t pictures = 0;        ///< that were written
   std::size_t other_hardware = 0;  ///< of which the setup does not hold with the instruments
   std::map<std::string, std::size_t> reasons;
   bool video_told = false;     ///< whether the video has shown anything of whether it moves as the poses say

@@ -97,6 +97,9 @@ TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
   for (const char* name : {"a", "b"}) {
     const auto result = run("birdseye", arguments + (scratch / name).string());
     ASSERT_EQ(result.code, 0) << result.output;
+    EXPECT_NE(result.output.find("fiducial registration error (FRE): not known\n"), std::string::npos);
+    EXPECT_NE(result.output.find("wrote " + (scratch / name / "frames.csv").string()), std::string::npos);
+    EXPECT_NE(result.output.find("; 6 pictures " + (scratch / name / "overlay-*.png").string()), std::string::npos);
   }
   const auto a = contents(scratch / "a"), b = contents(scratch / "b");
   EXPECT_EQ(a.size(), 6U + 3U);  // pictures; frames.csv, replay.json, patient_from_tracker.txt
