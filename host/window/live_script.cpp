@@ -33,8 +33,24 @@ bool came(const OperationView& operation, const std::string& awaited) {
   return awaited == kOverlay ? operation.target.has_value() : operation.note(*step_of(awaited)).done;
 }
 
-std::string why_not(const OperationView& operation, const std::string& awaited) {
-  return awaited == kOverlay ? "no frame bore an overlay" : operation.note(*step_of(awaited)).line;
+std::string late(const OperationView& operation, const std::string& awaited, double seconds) {
+  if (awaited == kOverlay) {
+    return fmt::format(
+        "no frame bore an overlay within {:g} s; give the line more seconds, or have the steps done "
+        "before it and the target in view",
+        seconds);
+  }
+  const std::string& says = operation.note(*step_of(awaited)).line;
+  return fmt::format(
+      "the step {} was not done within {:g} s{}{}; give the line more seconds, or do before it what the "
+      "step asks for (docs/manual/live.md, The steps)",
+      awaited, seconds, says.empty() ? "" : ": ", says);
+}
+
+std::string names_of_steps() {
+  std::string names;
+  for (std::size_t i = 0; i < kLiveSteps; ++i) names += fmt::format("{}, ", name_of(static_cast<LiveStep>(i)));
+  return names + kOverlay;
 }
 
 }  // namespace
@@ -63,6 +79,10 @@ Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
     std::string more;
     sound = sound && !(words >> more) && line.seconds >= 0 && line.every_s >= 0 &&
             (line.step.empty() || line.step == kOverlay || step_of(line.step));
+    if (line.seconds > 0 && !line.step.empty() && line.step != kOverlay && !step_of(line.step)) {
+      return Error{Errc::bad_format, fmt::format("{}:{}: there is no step {}: give one of {}", path.string(), number,
+                                                 line.step, names_of_steps())};
+    }
     if (sound && (line.verb == "key" || line.verb == "press") && !is_key(line.what)) {
       return Error{Errc::bad_format,
                    fmt::format("{}:{}: there is no key {}: give space, enter, backspace, escape, pageup, pagedown, a "
@@ -88,8 +108,8 @@ Result<LiveScript::Act> LiveScript::next(const OperationView& operation, HostTim
   if (!line.step.empty()) {
     const bool done = came(operation, line.step);
     if (!done && waited_s >= line.seconds) {
-      return Error{Errc::timeout, fmt::format("{}:{}: {} was not done within {:g} s: {}", name_, line.number, line.step,
-                                              line.seconds, why_not(operation, line.step))};
+      return Error{Errc::timeout,
+                   fmt::format("{}:{}: {}", name_, line.number, late(operation, line.step, line.seconds))};
     }
     const bool due = line.verb == "press" && (!pressed_ || Duration{now.ns - pressed_->ns}.seconds() >= line.every_s);
     if (!done && due) {

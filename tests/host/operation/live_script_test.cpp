@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+
 #include "host/window/live_script.hpp"
 #include "tests/support/live_operation.hpp"
 
@@ -22,7 +25,9 @@ TEST(LiveScript, IsFollowedLineByLine) {
   EXPECT_FALSE(script->next(workflow.view(), HostTime{700 * kMs})->end);
   const auto late = script->next(workflow.view(), HostTime{2800 * kMs});
   ASSERT_FALSE(late);
-  EXPECT_NE(late.error().what.find("s.txt:5: connect was not done within 2 s"), std::string::npos) << late.error().what;
+  EXPECT_NE(late.error().what.find("s.txt:5: the step connect was not done within 2 s; give the line more seconds"),
+            std::string::npos)
+      << late.error().what;
 }
 
 TEST(LiveScript, PressesAKeyUntilAStepIsDone) {
@@ -54,12 +59,27 @@ TEST(LiveScript, WaitsForAnOverlay) {
   auto other = *script;
   const auto late = other.next(operation, HostTime{2000 * kMs});
   ASSERT_FALSE(late);
-  EXPECT_NE(late.error().what.find("s.txt:1: overlay was not done within 2 s: no frame bore an overlay"),
+  EXPECT_NE(late.error().what.find("s.txt:1: no frame bore an overlay within 2 s; give the line more seconds"),
             std::string::npos)
       << late.error().what;
   operation.target.emplace();
   EXPECT_EQ(script->next(operation, HostTime{1000 * kMs})->key, "");
   EXPECT_EQ(script->next(operation, HostTime{1001 * kMs})->key, "s");
+}
+
+TEST(LiveScript, TheManualsExampleIsOne) {
+  const char* const source = std::getenv("BIRDSEYE_SOURCE_DIR");
+  const std::filesystem::path folder = source != nullptr ? source : ".";
+  const auto script = LiveScript::read(folder / "docs/manual/examples/live-script.txt");
+  EXPECT_TRUE(script) << script.error().what;
+}
+
+TEST(LiveScript, NamesTheStepsWhereALineNamesNone) {
+  const Scratch scratch;
+  const auto script = LiveScript::read(scratch.file("s.txt", "wait overly 3\n"));
+  ASSERT_FALSE(script);
+  EXPECT_NE(script.error().what.find("no step overly: give one of connect, "), std::string::npos)
+      << script.error().what;
 }
 
 TEST(LiveScript, NamesALineThatIsNone) {
