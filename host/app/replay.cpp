@@ -46,6 +46,15 @@ struct ReplayOptions {
   bool motion_check = true, accept_unsigned = false;
 };
 
+constexpr double kMostHiddenToPass = 10;  // % of the frames
+
+/// Why most frames are as they are: "most often, in 40 frames: the tracker is silent". Empty where nothing was wrong.
+std::string most_often(const Replayed& done) {
+  const auto reasons = alike_reasons(done.reasons);
+  const auto most = std::ranges::max_element(reasons, {}, [](const auto& reason) { return reason.second; });
+  return most == reasons.end() ? "" : fmt::format("most often, in {} frames: {}", most->second, most->first);
+}
+
 Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplaySetup& setup, const ReplayTrust& trust,
               const std::map<std::string, std::string>& remedies, bool motion_check) {
   Verdict verdict;
@@ -57,9 +66,11 @@ Verdict judge(const Replayed& done, const RecordingReader& reader, const ReplayS
   }
   if (done.overlaid == 0) {
     verdict.add(Grade::fail, done.frames == 0 ? "the recording has no frames" : "no frame carries an overlay");
+    verdict.add(Grade::fail, most_often(done));
   } else {
     const double hidden = 100 * (1 - static_cast<double>(done.overlaid) / static_cast<double>(done.frames));
-    verdict.judge("frames without an overlay", hidden, "%", 10, 50, "see frames.csv for the reasons");
+    verdict.judge("frames without an overlay", hidden, "%", kMostHiddenToPass, 50, "see frames.csv for the reasons");
+    if (hidden > kMostHiddenToPass) verdict.add(Grade::marginal, most_often(done));
   }
   if (done.other_size > 0) {
     verdict.add(Grade::fail, fmt::format("{} of {} frames are of another size than the camera was calibrated at; give "

@@ -109,6 +109,7 @@ TEST(ReplayCommand, TwoReplaysAreTheSameToTheBit) {
   EXPECT_EQ(json["frames_overlaid"], kLost);
   EXPECT_EQ(json["reasons_of_frames"]["the tracker is silent"], kFrames - kLost);
   EXPECT_EQ(json["verdict"], "marginal");
+  EXPECT_NE(json["reasons"].dump().find("the tracker is silent"), std::string::npos) << json["reasons"];
   // Without a pose there is the video and nothing else; with one there is the ball.
   const auto row = [&](int n) {
     std::istringstream table(a.at("frames.csv"));
