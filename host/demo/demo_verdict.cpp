@@ -50,16 +50,16 @@ Verdict demo_verdict(const DemoFigures& figures) {
          fmt::format("the tumour's centre is within {:.2f} mm in 95 % of the frames", p95_mm), "mm"},
         {worst_mm, 6, 10, fmt::format("the tumour's centre is off by {:.2f} mm in the worst frame", worst_mm), "mm"},
         {hidden_percent, 10, 50,
-         fmt::format("{:.0f} % of the frames carry no overlay{}", hidden_percent, mostly_because(figures)), "%"}};
+         fmt::format("{:.1f} % of the frames carry no overlay{}", hidden_percent, mostly_because(figures)), "%"}};
   }
   limits.push_back(
       {unproven_percent, 60, 80,
-       fmt::format("{:.0f} % of the frames had to go by before the video had shown that it goes with the poses",
+       fmt::format("{:.1f} % of the frames had to go by before the video had shown that it goes with the poses",
                    unproven_percent),
        "%"});
   limits.push_back(
       {dropped_percent, 5, 20,
-       fmt::format("{:.0f} % of the frames were dropped, for this machine is slow or busy", dropped_percent), "%"});
+       fmt::format("{:.1f} % of the frames were dropped, for this machine is slow or busy", dropped_percent), "%"});
   for (const Limit& limit : limits) {
     const Grade grade = limit.grade();
     const bool headline = !mm.empty() && &limit == &limits.front();  // is said in any case

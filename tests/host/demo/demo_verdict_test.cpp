@@ -64,15 +64,15 @@ TEST(DemoVerdict, EachReasonBeginsWithItsGrade) {
   const Verdict verdict = demo_verdict(busy);
   ASSERT_EQ(verdict.reasons.size(), 3U);
   EXPECT_EQ(verdict.reasons[0], "pass: the tumour's centre is within 1.00 mm in 95 % of the frames; up to 3 mm pass");
-  EXPECT_EQ(verdict.reasons[1], "fail: 60 % of the frames carry no overlay; up to 10 % pass");
-  EXPECT_EQ(verdict.reasons[2].find("marginal: 9 % of the frames were dropped"), 0U) << verdict.reasons[2];
+  EXPECT_EQ(verdict.reasons[1], "fail: 60.0 % of the frames carry no overlay; up to 10 % pass");
+  EXPECT_EQ(verdict.reasons[2].find("marginal: 9.1 % of the frames were dropped"), 0U) << verdict.reasons[2];
 }
 
 TEST(DemoVerdict, WhereNothingIsOverlaidItSaysWhatElseWasWrong) {
   DemoFigures busy = overlaid(0, 0, 100);
   EXPECT_TRUE(says(demo_verdict(busy), "see birdseyed.log"));
   busy.frames_dropped = 100;
-  EXPECT_TRUE(says(demo_verdict(busy), "fail: 50 % of the frames were dropped"));
+  EXPECT_TRUE(says(demo_verdict(busy), "fail: 50.0 % of the frames were dropped"));
   EXPECT_FALSE(says(demo_verdict(busy), "see birdseyed.log"));
 }
 
