@@ -91,6 +91,8 @@ ShownPicture LivePicture::at(HostTime now) {
     out.reason = decision_.reason;
     out.overlaid = !overlaid_.empty();
     out.strength = out.overlaid ? decision_.strength : 0;
+    // What it is drawn by has changed since.
+    if (!out.overlaid && out.reason.empty()) out.reason = words("why_next_picture");
   }
   if (out.stale && stopped_.empty()) stopped_ = greyed(*frame_->rgb, frozen_);
   const int kind = out.overlaid ? 2 : out.stale ? 1 : 0;

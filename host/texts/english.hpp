@@ -435,6 +435,7 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_old_pose", "the newest pose is {:.0f} ms old"},
     {"why_stamp_ahead", "the frames' stamps lie {:.0f} ms ahead of the clock: how old they are is not known"},
     {"why_no_video", "no video has come yet"},
+    {"why_next_picture", "the next picture is awaited"},
     {"why_no_ct", "the CT is not ready"},
     {"why_hidden", "it is switched off"},
     {"why_calibration_held", "the calibration is not used: {}"},

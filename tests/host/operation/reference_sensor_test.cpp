@@ -271,6 +271,7 @@ class Referenced : public ::testing::Test {
   }
   void check_at_tumour() {
     touch(birdseye::testing::kTumour, 5);
+    show_frame();
     workflow_->primary(HostTime{room_.time_ms * kMs});
   }
   void measure() {
@@ -355,6 +356,7 @@ TEST_F(Referenced, OneThatComesOffTakesTheOverlayAwayWithin150msUntilSomebodyHas
   workflow_->primary(HostTime{room_.time_ms * kMs});
   EXPECT_FALSE(overlaid()) << "nor by a press with the pointer away from any landmark";
   check_at_tumour();
+  EXPECT_EQ(reason(), "the next picture is awaited");
   pass(1000);
   EXPECT_TRUE(overlaid()) << reason();
   EXPECT_TRUE(workflow_->view().note(LiveStep::fiducials).holds()) << "somebody has looked";
