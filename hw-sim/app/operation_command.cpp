@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "host/files/write_files.hpp"
 #include "hw-sim/campaign/operation_results.hpp"
@@ -21,6 +22,7 @@ namespace {
 struct OperationOptions {
   SimulatedOperation operation;
   std::filesystem::path script, log, faults;
+  std::string reference;
   bool line = false, shortest = false;
 };
 
@@ -84,6 +86,11 @@ void print(const OperationOutcome& out, const OperationResult& result) {
       "checks\n",
       result.seed, result.minutes, result.faults, result.faults_alone, result.poses, result.frames,
       result.registrations, out.deformations, result.checks);
+  fmt::print("reference: {}{}\n", out.reference ? "patient" : "none",
+             out.laws.moved == 0
+                 ? ""
+                 : fmt::format("; transmitter or patient moved {} times, {} of them while no overlay was whole",
+                               out.laws.moved, out.laws.moved_unwatched));
   fmt::print("overlay whole on {:.1f} % of pictures, {} of {} beyond 1.5 circles, worst {:.2f}; oldest {:.0f} ms\n",
              100 * share, result.beyond, result.green, result.worst_circles, result.worst_age_ms);
   fmt::print("worst pose {:.2f} of what it may be off; {}\n", result.worst_pose, words_of_faults(result));
@@ -92,6 +99,7 @@ void print(const OperationOutcome& out, const OperationResult& result) {
 
 Result<void> run(const OperationOptions& options, bool& broken) {
   SimulatedOperation operation = options.operation;
+  if (!options.reference.empty()) operation.reference = options.reference == "patient";
   if (!options.script.empty()) {
     auto script = read_fault_script(options.script, Instruments::with_programs, operation.seed);
     if (!script) return script.error();
@@ -118,6 +126,10 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
   command.add_option("--minutes", options->operation.minutes, "how long it is")->check(CLI::Range(0.5, 600.0));
   command.add_flag("--pictures", options->operation.pictures,
                    "the video shows what the scope sees, and the window watches how it moves");
+  command
+      .add_option("--reference", options->reference,
+                  "patient: a reference bird is fixed on him; none: there is none; else the seed decides")
+      ->check(CLI::IsMember({"patient", "none"}));
   command.add_option("--script", options->script, "these faults (TOML) in place of random ones");
   command.add_option("--log", options->log, "write what happened to this file");
   command.add_option("--faults", options->faults, "write the faults that befell to this file, as --script takes them");

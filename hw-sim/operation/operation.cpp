@@ -363,7 +363,8 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
 
 Result<OperationOutcome> run_operation(const SimulatedOperation& operation) {
   OperationOutcome out;
-  const bool reference = hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5;
+  const bool reference = operation.reference.value_or(hashed_uniform(hashed_word(operation.seed, 5), 0) < 0.5);
+  out.reference = reference;
   const double ends_s = operation.minutes * 60;
   if (operation.faults) {
     out.faults = *operation.faults;

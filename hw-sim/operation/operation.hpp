@@ -19,6 +19,7 @@ struct SimulatedOperation {
   std::optional<FaultScript> faults{};  ///< what befalls; none: drawn by the seed
   bool programs_end = true;             ///< drawn faults also cut the network, and end programs and start them again
   bool disk_fails = true;               ///< and the disk of the window's machine is late, is full, or loses power
+  std::optional<bool> reference{};      ///< a reference bird is fixed on the patient; none: the seed decides
   bool pictures = false;                ///< the video shows what the scope sees; else it is grey all over, and small
 };
 
@@ -27,6 +28,7 @@ struct OperationOutcome {
   std::vector<BrokenLaw> broken;
   OperationLaws::Figures laws;
   VirtualTimeFigures time;
+  bool reference = false;  ///< there was a reference bird
   std::size_t registrations = 0, deformations = 0, checks = 0;
   FaultScript faults;      ///< that befell
   std::string log;         ///< what happened, a line each

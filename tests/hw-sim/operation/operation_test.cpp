@@ -78,7 +78,15 @@ TEST(Operation, FaultsAtRandomBreakNoLaw) {
     EXPECT_TRUE(out.broken.empty()) << "seed " << seed << "\n" << told(out);
     EXPECT_GT(out.laws.faults, 3U);
     EXPECT_GT(out.laws.green, 0U) << out.log;
+    EXPECT_EQ(out.log.find("there is no overlay: \n"), std::string::npos) << "it says why, always";
   }
+}
+
+TEST(Operation, TheReferenceIsTheOneAskedForOrElseTheSeeds) {
+  for (const bool reference : {false, true})
+    EXPECT_EQ(operate({.seed = 1, .minutes = 0.5, .reference = reference}).reference, reference);
+  EXPECT_FALSE(operate({.seed = 1, .minutes = 0.5}).reference);
+  EXPECT_TRUE(operate({.seed = 3, .minutes = 0.5}).reference);
 }
 
 /// Seeds of operations that broke a law once:
