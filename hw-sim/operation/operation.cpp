@@ -296,7 +296,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
   Journal journal(zero_ns, operation.pictures);
   Announcer announcer(out.faults);
   std::string said, step, screen;
-  bool registered = false, had_power = true;
+  bool had_power = true;
   double acts_at_s = 0;
   const HostTime end = host_now() + Duration::from_seconds(operation.minutes * 60);
   while (host_now() < end) {
@@ -321,7 +321,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     host::LiveSource& source = window.source();
     if (*opened) {
       surgeon.stand_at(workflow, journal.at_s(host_now()));
-      laws.opened(registered, surgeon.checks());
+      laws.opened(surgeon.checks());
     }
     take_events(source, workflow, laws, journal);
     workflow.set_link(source.connected(), source.words(), source.may_retry());
@@ -338,11 +338,7 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     surgeon.act(journal.at_s(now), now, shown);
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
-    laws.take_failed(disk.failed(), view, now);
-    const bool done = view.note(host::LiveStep::fiducials).done;
-    const bool kept = !view.writing && view.fault.empty() && !disk.powerless();
-    // What a window has not taken up yet is there all the same.
-    if (!laws.waits_for_what_was_kept()) registered = done && (registered || kept);
+    laws.take_kept(view, disk.failed(), disk.powerless(), now);
     const host::StepNote& note = view.note(view.step);
     journal.follow(now, step,
                    fmt::format("step {}: {}", host::name_of(view.step),

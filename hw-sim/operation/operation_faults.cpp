@@ -125,11 +125,10 @@ FaultSigns of_program(const Fault& fault) {
 FaultSigns signs_of(const Fault& fault, FaultTarget target) {
   if (target == FaultTarget::camera) return of_camera(fault);
   if (target == FaultTarget::program) return of_program(fault);
-  constexpr double kUnseenByte_mm = 30;  // a predicted pose makes three times of what a moving hand may have done
   switch (fault.kind) {
     case FaultKind::line_noise:
     case FaultKind::corrupt_byte:
-      return {.counters = {"doubted", "phase_errors"}, .extra_mm = kUnseenByte_mm};
+      return {.counters = {"doubted", "phase_errors"}, .extra_mm = kUnseenChange_mm};
     case FaultKind::lost_record:
       return {.counters = {"clock_events", "measurements_lost"}};
     case FaultKind::zero_matrix:
@@ -152,7 +151,7 @@ FaultSigns signs_of(const Fault& fault, FaultTarget target) {
     case FaultKind::power_cycle:
       return {.words = {"silent"}, .own_s = fault.value("boot_s") + kFlockStarts_s};
     default:
-      return {.counters = {"phase_errors"}};
+      return {.counters = {"phase_errors"}, .shifts_bytes = true};
   }
 }
 

@@ -19,11 +19,16 @@ struct FaultSigns {
   bool half_size = false;               ///< frames of another size come
   bool lies = false;                    ///< poses are off, and nobody can see it
   double extra_mm = 0;                  ///< poses may be off by so much more
+  bool shifts_bytes = false;            ///< two of these together make one record of pieces of two: a changed reading
   double extra_s = 0;                   ///< and by as much as things move in this time
   double own_s = 0;                     ///< from its end on the instrument is not itself, as while it boots
   bool aside = false;                   ///< neither instruments nor programs are touched by it, nor how long they take
   double strikes_within_s = 0;          ///< after its begin: a fault that comes by chance has then surely come once
 };
+
+/// A reading that was changed by no more than a moving hand does is not told from one, and a predicted pose makes three
+/// times of that.
+inline constexpr double kUnseenChange_mm = 30;
 
 /// Of a fault of the tracker, the camera or a program. Nothing to be seen: both lists are empty.
 FaultSigns signs_of(const Fault& fault, FaultTarget target);

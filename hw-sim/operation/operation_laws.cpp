@@ -65,6 +65,8 @@ OperationLaws::OperationLaws(const OperationTruth& truth, const FaultScript& fau
   for (Span& span : spans_) {
     for (const Span& other : spans_) {
       if (&other == &span || other.signs.aside) continue;
+      const bool together = other.begins_s < span.ends_s && other.ends_s > span.begins_s;
+      if (together && span.signs.shifts_bytes && other.signs.shifts_bytes) span.signs.extra_mm = kUnseenChange_mm;
       if (other.begins_s < span.ends_s + kAlone_s && other.ends_s > span.begins_s - kAlone_s) span.alone = false;
     }
   }
@@ -175,11 +177,11 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
   }
 }
 
-void OperationLaws::opened(bool registered, std::size_t checks) {
-  to_take_up_ = registered;
+void OperationLaws::opened(std::size_t checks) {
+  to_take_up_ = !kept_fre_mm_.empty();
   ready_since_s_.reset();
   unsaid_since_s_.reset();
-  checks_when_opened_ = registered ? std::optional(checks) : std::nullopt;
+  checks_when_opened_ = to_take_up_ ? std::optional(checks) : std::nullopt;
 }
 
 void OperationLaws::take(const host::OperationView& view, std::size_t checks, HostTime now) {
@@ -197,15 +199,33 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   if (!ready) return ready_since_s_.reset();
   const double since_s = ready_since_s_.value_or(now_s);
   ready_since_s_ = since_s;
-  to_take_up_ = !view.note(LiveStep::fiducials).done;
-  if (!to_take_up_ || now_s - since_s < kTakesUpWithin_s) return;
+  if (view.note(LiveStep::fiducials).done) {
+    to_take_up_ = false;
+    if (!view.touches.empty() || is_kept(view.fre_mm)) return;
+    return break_law(now_s, "kept", "the window was opened again, and has another registration than was kept");
+  }
+  if (now_s - since_s < kTakesUpWithin_s) return;
   to_take_up_ = false;
   break_law(now_s, "kept", "the window was opened again, and the patient is not registered any more");
 }
 
-void OperationLaws::take_failed(std::uint64_t syncs, const host::OperationView& view, HostTime now) {
+bool OperationLaws::is_kept(const std::optional<double>& fre_mm) const {
+  constexpr double kSame_mm = 1e-6;
+  return fre_mm && std::ranges::any_of(kept_fre_mm_, [&](double one) { return std::abs(one - *fre_mm) < kSame_mm; });
+}
+
+void OperationLaws::take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless,
+                              HostTime now) {
   const double now_s = at_s(now.ns);
-  if (std::exchange(failed_syncs_, syncs) < syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
+  // What a window has not taken up yet is there all the same.
+  if (!to_take_up_) {
+    const bool registered = view.note(host::LiveStep::fiducials).done && view.fre_mm;
+    const bool all_kept = !view.writing && view.fault.empty() && !powerless;
+    if (all_kept || !registered) kept_fre_mm_.clear();
+    if (registered && !is_kept(view.fre_mm) && (all_kept || !kept_fre_mm_.empty()))
+      kept_fre_mm_.push_back(*view.fre_mm);
+  }
+  if (std::exchange(failed_syncs_, failed_syncs) < failed_syncs && !unsaid_since_s_) unsaid_since_s_ = now_s;
   const bool said = view.fault.starts_with(host::words("note_not_kept", ""));
   const bool kept_after_all = view.fault.empty() && !view.writing;
   if (said || kept_after_all) unsaid_since_s_.reset();

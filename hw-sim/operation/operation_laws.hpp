@@ -24,17 +24,17 @@ struct BrokenLaw {
 
 /// What must hold of an operation at any moment, whatever befalls it.
 ///
-/// pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
-/// age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
-/// circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not asked
-/// of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no overlay
-/// is whole, nothing is watched that could show it: then it is not asked before the window asks for a landmark. named:
-/// a fault that befalls alone is named within 2 s, where anybody can see it. over: within 2 s of the end of a fault
-/// that befalls alone, poses and frames with poses are there again. accused: later than 10 s after the last fault's end
-/// the window does not begin to say that video and poses differ. kept: a window that is opened again takes up the
-/// registration that there was, and draws nothing before a landmark has been checked. registered: what the window had
-/// as it was last neither writing nor said that something was not kept. A window that cannot keep something says so
-/// within 2 s.
+/// - pose: no pose is given as good that is off by more than 6 sigma of what it says of itself.
+/// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
+/// - circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not
+///   asked of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no
+///   overlay is whole, nothing is watched that could show it: not before the window asks for a landmark.
+/// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
+/// - over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
+/// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
+/// - kept: a window that is opened again takes up the registration that the one before had as it was last neither
+///   writing nor said that something was not kept, or a later one of it, and draws nothing before a landmark has been
+///   checked. A window that cannot keep something says so within 2 s.
 class OperationLaws {
  public:
   /// exposed_ns: of a frame by its number, as the camera knows it. zero_ns: when the operation's time begins.
@@ -43,14 +43,12 @@ class OperationLaws {
 
   /// An event as it reached the host.
   void take(const wire::Event& event, HostTime now);
-  /// The window was opened. registered: the patient was, when it was closed.
-  void opened(bool registered, std::size_t checks);
-  /// It has not yet taken up what there was.
-  [[nodiscard]] bool waits_for_what_was_kept() const { return to_take_up_; }
+  /// The window was opened.
+  void opened(std::size_t checks);
   /// What the window says. checks: how often a landmark has been checked.
   void take(const host::OperationView& view, std::size_t checks, HostTime now);
-  /// The same, of a disk on which so many syncs have failed so far.
-  void take_failed(std::uint64_t syncs, const host::OperationView& view, HostTime now);
+  /// The same, of a disk on which so many syncs have failed so far. powerless: it keeps nothing more.
+  void take_kept(const host::OperationView& view, std::uint64_t failed_syncs, bool powerless, HostTime now);
   /// What is on the screen.
   void take(const host::ShownPicture& shown, const host::LivePicture& picture, HostTime now);
   /// At the end: until_s is when the operation ended.
@@ -91,6 +89,7 @@ class OperationLaws {
   void judge(const Span& span, double until_s);
   void judge_accusation(bool accused, double now_s);
   void note_motion(bool whole, double now_s);
+  [[nodiscard]] bool is_kept(const std::optional<double>& fre_mm) const;
   [[nodiscard]] bool moves_at(double exposed_s) const;
 
   const OperationTruth& truth_;
@@ -105,7 +104,10 @@ class OperationLaws {
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;
-  std::optional<double> unsaid_since_s_;           ///< a sync failed then, and the window has not said so
+  std::optional<double> unsaid_since_s_;  ///< a sync failed then, and the window has not said so
+  /// Fiducial registration errors, by which registrations are told apart: of the one that was kept last, and of those
+  /// since. Empty: none was kept, or it may have been taken back.
+  std::vector<double> kept_fre_mm_;
   bool to_take_up_ = false;                        ///< the window has still to say what it took up
   std::optional<std::size_t> checks_when_opened_;  ///< of a window that takes up; empty: one was checked since
   Figures figures_;
