@@ -86,7 +86,10 @@ bool FiducialStep::take_up(const std::optional<RegisteredPatient>& kept, const s
 }
 
 void FiducialStep::doubt() {
-  if (registered_ || !touches_.empty()) confirmed_ = false;
+  if (registered_) confirmed_ = false;
+  if (registered_ || touches_.empty()) return;
+  touches_.clear();
+  note_ = {false, words("note_touch_anew")};
 }
 
 bool FiducialStep::judge(const ConnectedInstruments& connected) {

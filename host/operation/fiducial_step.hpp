@@ -38,7 +38,7 @@ class FiducialStep {
   /// Something may have moved since the first touch, or since it was confirmed.
   void suspect() { suspected_ = registered_ || !touches_.empty(); }
   [[nodiscard]] bool suspected() const { return suspected_; }
-  /// Whether the registration holds, and what was touched towards one, is to be looked at anew.
+  /// Whether the registration holds is to be looked at anew; touches that gave none yet are dropped.
   void doubt();
   /// Holds back, touches and all, what was found with another tracker, and gives it back where that has come again.
   /// True: what is registered is no more what it was.

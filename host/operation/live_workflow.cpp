@@ -66,6 +66,7 @@ void LiveWorkflow::set_link(bool connected, const std::string& words, bool may_r
     if (!connected && calibration_.withdraw_record(host::words("held_no_link"))) follow_held_back();
     if (!connected) record_tip_in_pointer_mm_.reset();
     if (!connected) reference_.lose();
+    if (!connected) pointer_ = {};
     judge_instruments();
   }
   connection_.set_link(connected, words, picture_.frame().has_value(), may_retry);
@@ -81,6 +82,7 @@ void LiveWorkflow::set_sheet(const calibration::Pattern& pattern, const Eigen::V
 }
 
 void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optional<ClockGap>& clock) {
+  heard_ = now;
   if (reference_.in_use()) {
     const ReferenceSensor::Relative relative = reference_.take(event);
     take(relative.news);
@@ -93,7 +95,11 @@ void LiveWorkflow::take(const wire::Event& event, HostTime now, const std::optio
 }
 
 void LiveWorkflow::use_reference(const std::string& name) {
-  if (name != reference_.name()) video_.forget_motion();
+  // What the former one saw it does not tell any more, nor this one what was before.
+  if (name != reference_.name()) {
+    video_.forget_motion();
+    doubt_registration("");
+  }
   reference_.use(name, settings_.scope);
   instruments_.set_reference(name);
 }
@@ -139,6 +145,8 @@ void LiveWorkflow::take(const wire::Birds& birds) {
   const auto& tip_mm = settings_.tip_in_pointer_mm ? settings_.tip_in_pointer_mm : record_tip_in_pointer_mm_;
   if (!tip_mm) return;
   const auto rested = pointer_.take(birds, settings_.pointer, *tip_mm);
+  for (const wire::Bird& bird : birds.birds)
+    if (bird.name == settings_.pointer) pointer_heard_ = heard_;
   const auto registered = fiducials_.registered();
   for (const wire::Bird& bird : birds.birds) {
     if (bird.name != settings_.pointer || !strokes_.stroking() || !registered) continue;
@@ -273,10 +281,11 @@ void LiveWorkflow::turn_rod(double by_deg) {
 }
 
 void LiveWorkflow::go_to(LiveStep step) {
-  step_ = step;
   asked_to_take_back_.reset();
   if (step != LiveStep::views) strokes_.end();
-  if (step == LiveStep::fiducials) pointer_ = {};  // where it rests by now, as on a landmark, is no touch of this step
+  // Where it rests by now, as on a landmark, is no touch of this step.
+  if (step == LiveStep::fiducials && step_ > LiveStep::fiducials) pointer_ = {};
+  step_ = step;
   // What is held back may come back by itself; by the large button the scope is calibrated anew.
   const bool open = !calibration_.note().done && !calibration_.held_back();
   if (step == LiveStep::calibrate && open) calibration_.begin(settings_.scope, settings_.pattern);
@@ -294,6 +303,7 @@ void LiveWorkflow::go_on() {
 }
 
 void LiveWorkflow::primary(HostTime now) {
+  heard_ = now;
   constexpr Duration kSettle = Duration::from_ms(1000);  // a hand that presses twice, a pedal that bounces
   if (frozen_) return freeze_or_let_go();
   if (asks_for_instruments() || asks_for_patient()) {
@@ -306,7 +316,8 @@ void LiveWorkflow::primary(HostTime now) {
   const bool works = step_ == LiveStep::calibrate || step_ == LiveStep::fiducials || step_ == LiveStep::views ||
                      step_ == LiveStep::deform;
   const bool outdated = step_ == LiveStep::deform && motion_.moved_mm();
-  if (works && !outdated && view().note(step_).done) return go_on();
+  const bool anew = step_ == LiveStep::fiducials && !fiducials_.confirmed();
+  if (works && !outdated && !anew && view().note(step_).done) return go_on();
   switch (step_) {
     case LiveStep::connect:
       break;
@@ -314,7 +325,7 @@ void LiveWorkflow::primary(HostTime now) {
       return calibration_.guiding() ? calibration_.end() : calibration_.begin(settings_.scope, settings_.pattern);
     case LiveStep::fiducials:
       if (simulated_) break;  // its operator touches them
-      if (const auto held = pointer_.held(); held && fiducials_.add(*held, settings_.fiducials, instruments_.now())) {
+      if (const auto held = pointer_held(); held && fiducials_.add(*held, settings_.fiducials, instruments_.now())) {
         fit();
         keep();
       }

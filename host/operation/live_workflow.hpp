@@ -98,7 +98,10 @@ class LiveWorkflow {
   /// Draws the newest frame, if that is still to be done.
   void draw() { picture_.draw(); }
   /// What of it may be shown at this moment.
-  ShownPicture shown_at(HostTime now) { return picture_.at(now); }
+  ShownPicture shown_at(HostTime now) {
+    heard_ = now;
+    return picture_.at(now);
+  }
   [[nodiscard]] const LivePicture& picture() const { return picture_; }
   /// What the frame that is shown was taken with.
   [[nodiscard]] const PictureHardware& taken_with() const { return taken_with_; }
@@ -135,6 +138,8 @@ class LiveWorkflow {
   void update_setup();
   /// As it is calibrated, with its rod as it is turned now. Empty: it is not.
   [[nodiscard]] std::optional<ScopeSetup> scope_as_it_is() const;
+  [[nodiscard]] bool pointer_is_seen() const;
+  [[nodiscard]] std::optional<Touch> pointer_held() const;
   [[nodiscard]] std::optional<CheckReading> check_reading() const;
   void confirm_by_landmark();
   void watch_surface(HostTime now);
@@ -166,6 +171,9 @@ class LiveWorkflow {
   PlacePicks picks_;
   std::string pick_line_;
   PointerTip pointer_;
+  HostTime heard_{};                        ///< now, as it was last told
+  std::optional<HostTime> pointer_heard_;   ///< when the pointer was
+  std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;
   ViewStep views_;

@@ -37,7 +37,7 @@ void LiveWorkflow::take(ReferenceSensor::News news) {
 void LiveWorkflow::note_pause(HostTime now) {
   const bool paused = video_came_ && now - *video_came_ > kPause;
   video_came_ = now;
-  if (paused && !reference_.in_use() && fiducials_.registered_or_held_back()) doubt_registration("");
+  if (paused && !reference_.in_use()) doubt_registration("");
 }
 
 void LiveWorkflow::doubt_registration(const std::string& why) {
@@ -45,6 +45,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   why_doubted_ = why;
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
+  landmarks_before_doubt_ = patient_.landmarks().size();
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
   checked_.reset();
@@ -77,7 +78,10 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   // What has moved was the scope on its sensor, or patient or transmitter: of these only a landmark tells.
   if (news.contradicted) doubt_registration(words("why_video_differs"));
   // To ask at each picture would let nobody register. Once they agree it tells whether it is done since.
-  if (news.again) fiducials_.suspect();
+  if (news.again && !fiducials_.suspected()) {
+    fiducials_.suspect();
+    if (fiducials_.suspected()) pointer_ = {};
+  }
   if (news.motion && video_.motion() == VideoAgreement::agrees && fiducials_.suspected()) doubt_registration("");
   if (news.motion) update_setup();
 }
@@ -131,11 +135,14 @@ void LiveWorkflow::confirm_by_landmark() {
     check_ = {false, words("note_check_no_pointer")};
     return;
   }
-  const bool counts = any && (in_doubt || (!reading->fitted && reading->distance_mm <= kPointedAt_mm));
-  if (counts && reading->distance_mm > kMostCheckedOff_mm) {
+  const bool off = any && reading->distance_mm > kMostCheckedOff_mm;
+  // At a fitted one it tells nothing of how good the registration is, but beside it.
+  const bool counts = any && (in_doubt || ((off || !reading->fitted) && reading->distance_mm <= kPointedAt_mm));
+  if (counts && off) {
     why_doubted_ = words("note_check_off", reading->distance_mm, reading->nearest);
     check_ = {false, why_doubted_};
     checked_.reset();
+    if (!in_doubt) landmarks_before_doubt_ = patient_.landmarks().size();
     fiducials_.doubt();
     return update_setup();
   }

@@ -60,6 +60,7 @@ void LiveWorkflow::take_up() {
   const auto& kept = *operation;
   if (!kept) return;
   operation_doubt_ = kept->doubt;
+  landmarks_before_doubt_ = patient_.landmarks().size();
   const std::string when = words("note_taken_up", kept->made_utc);
   if (record_sha256_.empty()) record_sha256_ = kept->record_sha256;
   // The calibration that is in force may be newer: a deformation then means nothing.

@@ -25,9 +25,9 @@ std::string LiveWorkflow::why_primary_refused() const {
   std::string no_setup = picture_.why_no_setup();
   switch (step_) {
     case LiveStep::fiducials:
-      if (fiducials_.note().done) return {};
+      if (fiducials_.note().done && fiducials_.confirmed()) return {};
       if (simulated_) return words("touch_simulated");
-      return pointer_.held() ? std::string() : words("why_no_pointer");
+      return pointer_held() ? std::string() : words("why_no_pointer");
     case LiveStep::views:
       return views_.note().done ? std::string()
                                 : views_.why_refused(picture_.frame(), picture_.seen_from(), picture_.setup());
@@ -126,13 +126,26 @@ OperationView LiveWorkflow::view() const {
   return out;
 }
 
+/// Empty where it has not been seen for a moment, also because nothing comes any more.
+std::optional<Touch> LiveWorkflow::pointer_held() const {
+  return pointer_is_seen() ? pointer_.held() : std::nullopt;
+}
+
+bool LiveWorkflow::pointer_is_seen() const {
+  constexpr Duration kMoment = Duration::from_ms(500);
+  return pointer_heard_ && heard_ - *pointer_heard_ < kMoment;
+}
+
+/// In doubt only places count that were known before: one that is picked where the tip is shown proves nothing.
 std::optional<CheckReading> LiveWorkflow::check_reading() const {
-  const auto tip_mm = pointer_.in_tracker_mm();
+  const auto tip_mm = pointer_is_seen() ? pointer_.in_tracker_mm() : std::nullopt;
   const auto registered = fiducials_.registered();
   if (!tip_mm || !registered || !patient_.plan()) return std::nullopt;
   const auto& markers = patient_.markers_in_patient_mm();
-  return check_by_landmarks(*tip_mm, *registered, patient_.landmarks(),
-                            markers ? *markers : std::vector<Eigen::Vector3d>(), deformation_.found().get());
+  std::span<const NamedPoint> landmarks = patient_.landmarks();
+  if (!fiducials_.confirmed()) landmarks = landmarks.first(std::min(landmarks.size(), landmarks_before_doubt_));
+  return check_by_landmarks(*tip_mm, *registered, landmarks, markers ? *markers : registered->fiducials_in_patient_mm,
+                            deformation_.found().get());
 }
 
 std::optional<ImageRgba> LiveWorkflow::ct_seen_from(const CameraModel& camera,

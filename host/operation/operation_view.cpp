@@ -24,7 +24,7 @@ std::string primary_words(const OperationView& operation) {
       if (done) return words("do_go_on");
       return operation.guiding ? words("do_end_stations") : words("do_begin");
     case LiveStep::fiducials:
-      if (done) return words("do_go_on");
+      if (done && !operation.unconfirmed) return words("do_go_on");
       return operation.simulated ? words("do_wait_for_touches") : words("do_take_point");
     case LiveStep::views:
       return done ? words("do_go_on") : words("do_keep_view");

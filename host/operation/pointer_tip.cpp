@@ -14,6 +14,7 @@ constexpr std::size_t kFewest = 5;
 std::optional<Touch> PointerTip::take(const wire::Birds& birds, const std::string& pointer,
                                       const Eigen::Vector3d& tip_in_pointer_mm) {
   std::optional<Touch> rested;
+  if (!newest_.empty() && birds.acquired < newest_.back().first) *this = {};  // of another clock
   // Where it was when it was last seen is not where it is.
   while (!newest_.empty() && birds.acquired - newest_.front().first > kWindow) newest_.pop_front();
   for (const wire::Bird& bird : birds.birds) {

@@ -256,14 +256,15 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     // Check
     {"point_at_landmark", "Point at a landmark, and hold the pointer's tip to it. The distance should be near 0."},
     {"point_simulated",
-     "Nobody points at anything over the simulated cart: go on. Where the registration is in doubt, start the cart "
-     "again, and go to fiducials: it touches them anew."},
+     "Nobody points at anything over the simulated cart: go on. Where the registration is in doubt, close the window "
+     "and begin anew."},
     {"no_pointer", "No pointer is seen, or the patient is not registered."},
     {"tip_at", "The tip is at ({:.1f}, {:.1f}, {:.1f}) mm of the CT."},
     {"from_nearest", "{:.1f} mm from {}"},
     {"from_fitted", "{:.1f} mm from {}, which the registration was fitted to: point at one that was not touched."},
     {"note_checked", "{:.1f} mm from {}"},
     {"note_unchecked", "gone on without a landmark"},
+    {"note_touch_anew", "patient or transmitter may have been moved: touch all fiducials anew"},
     {"note_check_no_pointer", "not confirmed: the pointer is not seen. Hold its tip to a landmark, or register anew"},
     {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 

@@ -178,6 +178,7 @@ void OperationLaws::take(const wire::Event& event, HostTime now) {
 }
 
 void OperationLaws::opened(std::size_t checks) {
+  accused_ = false;
   to_take_up_ = !kept_fre_mm_.empty();
   ready_since_s_.reset();
   unsaid_since_s_.reset();
@@ -191,7 +192,8 @@ void OperationLaws::take(const host::OperationView& view, std::size_t checks, Ho
   // The calibration's doubt: what is over the picture may be another reason that speaks against the overlay too.
   if (const host::StepNote& calibrated = view.note(LiveStep::calibrate); calibrated.done)
     judge_accusation(calibrated.doubt == host::words("why_video_differs"), now_s);
-  if (unwatched_to_s_ && now_s > *unwatched_to_s_ && view.unconfirmed) unwatched_to_s_.reset();
+  registered_ = view.note(LiveStep::fiducials).done;
+  if (unwatched_to_s_ && now_s > *unwatched_to_s_ && (view.unconfirmed || !registered_)) unwatched_to_s_.reset();
   if (checks_when_opened_ && (checks > *checks_when_opened_ || !view.touches.empty())) checks_when_opened_.reset();
   if (!to_take_up_) return;
   const bool asks = view.asks_for_instruments || view.asks_for_patient;
@@ -238,7 +240,7 @@ void OperationLaws::note_motion(bool whole, double now_s) {
   constexpr double kWatched_s = 0.5;
   for (; next_move_ < moves_.size() && moves_[next_move_].begins_s <= now_s; ++next_move_) {
     ++figures_.moved;
-    if (whole_s_ && moves_[next_move_].begins_s - *whole_s_ < kWatched_s) continue;
+    if (!registered_ || (whole_s_ && moves_[next_move_].begins_s - *whole_s_ < kWatched_s)) continue;
     ++figures_.moved_unwatched;
     unwatched_to_s_ = moves_[next_move_].ends_s;
   }
@@ -290,7 +292,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const auto& budget = picture.decision().expected;
   if (!is_whole(shown) || !drawn_from || !budget) return;
   ++figures_.green;
-  if (lies || unwatched_to_s_) return;
+  if (lies || unwatched_to_s_ || moves_at(exposed_s)) return;
   const Eigen::Vector3d true_mm = truth_.camera_from_patient(exposed_s) * truth_.target_mm();
   const auto true_px = project(truth_.lens(), true_mm);
   const auto drawn_px = project(picture.setup()->camera(), Eigen::Vector3d(*drawn_from * truth_.target_mm()));
@@ -299,7 +301,7 @@ void OperationLaws::take(const host::ShownPicture& shown, const host::LivePictur
   const double circles = off_mm / budget->radius95_mm();
   figures_.worst_circles = std::max(figures_.worst_circles, circles);
   if (circles > kPromisedCircles) ++figures_.beyond;
-  if (circles > kMostCircles && !moves_at(exposed_s)) {
+  if (circles > kMostCircles) {
     break_law(now_s, "circle",
               fmt::format("a whole overlay is {:.1f} mm off, its circle {:.1f} mm", off_mm, budget->radius95_mm()));
   }

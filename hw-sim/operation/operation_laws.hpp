@@ -28,7 +28,8 @@ struct BrokenLaw {
 /// - age: no overlay is on the screen whose frame was exposed more than 150 ms ago.
 /// - circle: no overlay is shown as whole that is off by more than three circles. Without a reference, this is not
 ///   asked of frames that are exposed while transmitter or patient move and 0.1 s after; and where they move while no
-///   overlay is whole, nothing is watched that could show it: not before the window asks for a landmark.
+///   overlay of a registered patient is whole, nothing is watched that could show it: not before the window asks for a
+///   landmark, or the patient is registered anew.
 /// - named: a fault that befalls alone is named within 2 s, where anybody can see it.
 /// - over: within 2 s of the end of a fault that befalls alone, poses and frames with poses are there again.
 /// - accused: later than 10 s after the last fault's end the window does not begin to say that video and poses differ.
@@ -101,6 +102,7 @@ class OperationLaws {
   bool accused_ = false;                  ///< the window says that video and poses do not agree
   std::vector<Move> moves_;               ///< of transmitter or patient, without a reference, in their order
   std::size_t next_move_ = 0;             ///< that has not begun yet
+  bool registered_ = false;               ///< the window says that the patient is
   std::optional<double> whole_s_;         ///< when an overlay was last whole
   std::optional<double> unwatched_to_s_;  ///< nothing could show a motion that ended then, and the window has not asked
   std::uint64_t failed_syncs_ = 0;

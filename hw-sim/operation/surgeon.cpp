@@ -110,16 +110,21 @@ void Surgeon::check(const host::OperationView& view, double at_s, HostTime now) 
     return;
   }
   workflow_->primary(now);
-  ++checks_;
   at_landmark_ = false;
-  if (workflow_->view().unconfirmed) workflow_->go_to(LiveStep::fiducials);
+  if (workflow_->view().unconfirmed) {
+    workflow_->go_to(LiveStep::fiducials);
+  } else {
+    ++checks_;
+  }
   bare_since_s_ = at_s;
   go_to(kAside_mm, at_s, 0);
 }
 
 void Surgeon::act(double at_s, HostTime now, const host::ShownPicture& shown) {
   if (is_whole(shown)) bare_since_s_ = at_s;
-  if (shown.reason == host::words("why_video_untold") && at_s >= hurries_until_s_) {
+  const bool asks_to_move =
+      shown.reason == host::words("why_video_untold") || shown.reason == host::words("why_video_differs");
+  if (asks_to_move && at_s >= hurries_until_s_) {
     truth_.hurry(at_s);
     hurries_until_s_ = at_s + OperationTruth::kHurry_s;
   }

@@ -75,6 +75,31 @@ TEST_F(Doubted, IsConfirmedByAFiducialThatStillFitsAndNotByOneThatDoesNot) {
   EXPECT_NE(said().find("1.0 mm from fiducial 2"), std::string::npos) << said();
 }
 
+/// The tracker has fallen silent, and the video goes on.
+TEST_F(Doubted, IsNotConfirmedByAPointerThatIsNotSeenAnyMore) {
+  pause();
+  Hand(workflow_).rest_at(kTumour, 5);
+  workflow_.primary(HostTime{60'000 * birdseye::testing::kMs});
+  EXPECT_FALSE(drawn());
+  EXPECT_NE(said().find("the pointer is not seen"), std::string::npos) << said();
+}
+
+TEST_F(Doubted, IsBegunAnewByThePedalInTheStepOfFiducials) {
+  pause();
+  workflow_.go_to(LiveStep::fiducials);
+  Hand(workflow_).rest_at(kFiducials[0], 10);
+  workflow_.primary(HostTime{0});
+  EXPECT_EQ(workflow_.view().step, LiveStep::fiducials);
+  EXPECT_EQ(workflow_.view().touches.size(), 1U);
+}
+
+/// A fitted fiducial that is nearer than the landmark hides nothing.
+TEST_F(Doubted, IsARegistrationWhoseTouchedFiducialDoesNotFit) {
+  check_at(workflow_, kFiducials[3] + Eigen::Vector3d(0, 0, 13));
+  EXPECT_FALSE(drawn());
+  EXPECT_NE(said().find("13 mm from fiducial 4"), std::string::npos) << said();
+}
+
 TEST_F(Doubted, IsMadeAnewByTouches) {
   pause();
   workflow_.go_to(LiveStep::fiducials);
@@ -94,6 +119,19 @@ TEST_F(Doubted, IsNotTouchedAnewWhereThePointerRestedToCheck) {
   hand.rest_at(kFiducials[0], 80);
   hand.rest_at(kFiducials[1], 1);
   EXPECT_EQ(workflow_.view().touches.size(), 1U);
+}
+
+TEST_F(Doubted, AreTouchesThatGaveNoRegistrationYet) {
+  workflow_.go_to(LiveStep::fiducials);
+  while (workflow_.view().touches.size() > 2) workflow_.undo();
+  ASSERT_EQ(workflow_.view().touches.size(), 2U);
+  wire::VideoFrame frame;
+  for (const std::int64_t ms : {0, 20'000}) {
+    frame.info.acquired = DeviceTime{ms * birdseye::testing::kMs};
+    workflow_.take(frame, HostTime{frame.info.acquired.ns}, std::nullopt);
+  }
+  EXPECT_TRUE(workflow_.view().touches.empty());
+  EXPECT_NE(workflow_.view().note(LiveStep::fiducials).line.find("touch all fiducials anew"), std::string::npos);
 }
 
 /// A first check that shows the target beside its place speaks against the registration, whatever is pressed then.

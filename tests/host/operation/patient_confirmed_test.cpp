@@ -49,16 +49,17 @@ TEST(PatientConfirmed, APressTooManyTakesNoPoint) {
   Hand hand(workflow);
   hand.rest_at(kFiducials[0], 30);  // so short that a point is taken by a press alone
   const auto press_after = [&workflow](std::int64_t ms) { workflow.primary(HostTime{ms * birdseye::testing::kMs}); };
-  press_after(5000);
+  press_after(1600);
   ASSERT_TRUE(workflow.view().patient_confirmed);
-  press_after(5000);
-  press_after(5900);
+  press_after(1600);
+  press_after(2500);
   EXPECT_TRUE(workflow.view().touches.empty());
   wire::Pedal pedal;
   pedal.pressed = true;
-  workflow.take(pedal, HostTime{5950 * birdseye::testing::kMs}, std::nullopt);
+  workflow.take(pedal, HostTime{2550 * birdseye::testing::kMs}, std::nullopt);
   EXPECT_TRUE(workflow.view().touches.empty()) << "nor by the pedal";
-  press_after(6000);
+  hand.rest_at(kFiducials[0], 30);
+  press_after(2600);
   EXPECT_EQ(workflow.view().touches.size(), 1U);
 }
 

@@ -424,6 +424,10 @@ TEST_F(Referenced, TheRegistrationHoldsOnlyWithTheSameReference) {
   EXPECT_NE(reason().find("and \"pointer\" is used now"), std::string::npos) << reason();
   tell_reference("reference");
   pass(1000);
+  EXPECT_FALSE(overlaid()) << "what it did meanwhile nobody knows";
+  workflow_->go_to(LiveStep::check);
+  check_at_tumour();
+  pass(1000);
   EXPECT_TRUE(overlaid()) << reason();
 }
 

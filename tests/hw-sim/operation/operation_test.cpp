@@ -383,6 +383,21 @@ TEST(OperationLaws, AWindowThatForgetsTheRegistrationOrHasAnotherIsFound) {
   EXPECT_EQ(broken_after(0.7), 0U) << "it may have been written whole";
 }
 
+TEST(OperationFaults, BumpsInViewAreDrawnWhereNothingElseHidesThem) {
+  std::size_t bumps = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    FaultScript script = draw_faults(seed, 20, 590, false);
+    EXPECT_TRUE(script.world.empty());
+    draw_bumps_in_view(seed, 20, 590, script);
+    bumps += script.world.size();
+    for (const Fault& bump : script.world)
+      for (const Fault& other : script.camera)
+        for (const double moves_s : {bump.at_s, bump.at_s + *bump.for_s})
+          EXPECT_TRUE(moves_s < other.at_s - 5 || moves_s > other.at_s + *other.for_s + 5) << seed << ": " << moves_s;
+  }
+  EXPECT_GE(bumps, 8U);
+}
+
 TEST(OperationFaults, EveryFaultOfAnInstrumentCanBefall) {
   std::vector<std::string> drawn;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
