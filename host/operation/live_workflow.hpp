@@ -171,9 +171,10 @@ class LiveWorkflow {
   PlacePicks picks_;
   std::string pick_line_;
   PointerTip pointer_;
-  HostTime heard_{};                        ///< now, as it was last told
-  std::optional<HostTime> pointer_heard_;   ///< when the pointer was
-  std::size_t landmarks_before_doubt_ = 0;  ///< that were known as the registration came into doubt
+  HostTime heard_{};                           ///< now, as it was last told
+  std::optional<HostTime> pointer_heard_;      ///< when the pointer was
+  std::optional<Eigen::Vector3d> fits_at_mm_;  ///< in doubt, the first place at which it fits; patient frame
+  std::size_t landmarks_before_doubt_ = 0;     ///< that were known as the registration came into doubt
   FiducialStep fiducials_;
   std::optional<std::size_t> asked_to_take_back_;
   ViewStep views_;

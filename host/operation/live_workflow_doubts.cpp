@@ -45,6 +45,7 @@ void LiveWorkflow::doubt_registration(const std::string& why) {
   why_doubted_ = why;
   fiducials_.doubt();
   pointer_ = {};  // where it was before tells nothing of what has moved since
+  fits_at_mm_.reset();
   landmarks_before_doubt_ = patient_.landmarks().size();
   if (!fiducials_.registered_or_held_back()) return update_setup();
   run_ = {};
@@ -81,6 +82,7 @@ void LiveWorkflow::watch_motion(const wire::VideoFrame& frame) {
   if (news.again && !fiducials_.suspected()) {
     fiducials_.suspect();
     if (fiducials_.suspected()) pointer_ = {};
+    fits_at_mm_.reset();
   }
   if (news.motion && video_.motion() == VideoAgreement::agrees && fiducials_.suspected()) doubt_registration("");
   if (news.motion) update_setup();
@@ -125,10 +127,12 @@ void LiveWorkflow::doubt_steps(OperationView& out) const {
 }
 
 /// Of a landmark that was not fitted the pointer tells how far the registration is off; where that is too far the
-/// registration is in doubt. One in doubt is confirmed by a place that fits, or not at all: a fitted one tells as much
-/// of what moved since, and the farther the pointer is from any the more may have moved.
+/// registration is in doubt. One in doubt is confirmed by two places that fit, or not at all: what has moved may have
+/// another place where the one was. A fitted place tells as much of that as another, and the farther the pointer is
+/// from any the more may have moved.
 void LiveWorkflow::confirm_by_landmark() {
   constexpr double kPointedAt_mm = 100;  // further away it is laid aside
+  constexpr double kApart_mm = 30;       // the two places
   const auto reading = check_reading();
   const bool in_doubt = !fiducials_.confirmed() || fiducials_.suspected(), any = reading && !reading->nearest.empty();
   if (in_doubt && !any) {
@@ -143,14 +147,21 @@ void LiveWorkflow::confirm_by_landmark() {
     check_ = {false, why_doubted_};
     checked_.reset();
     if (!in_doubt) landmarks_before_doubt_ = patient_.landmarks().size();
+    fits_at_mm_.reset();
     fiducials_.doubt();
     return update_setup();
   }
   if (counts && !reading->fitted) checked_ = {reading->nearest, reading->distance_mm};
+  if (in_doubt && !(fits_at_mm_ && (*fits_at_mm_ - reading->nearest_mm).norm() >= kApart_mm)) {
+    if (!fits_at_mm_) fits_at_mm_ = reading->nearest_mm;
+    check_ = {false, words("note_check_second", reading->distance_mm, reading->nearest)};
+    return;
+  }
   check_ = {true, counts     ? words("note_checked", reading->distance_mm, reading->nearest)
                   : checked_ ? check_.line
                              : words("note_unchecked")};
   fiducials_.confirm();
+  fits_at_mm_.reset();
   why_doubted_.clear();
   update_setup();
   go_to(LiveStep::run);

@@ -94,6 +94,7 @@ OperationView LiveWorkflow::view() const {
   if (registered) out.fre_mm = registered->fre_mm;
   out.registration_fault = fiducials_.fault();
   out.unconfirmed = !fiducials_.confirmed();
+  out.fits_at_one = fits_at_mm_.has_value();
   out.deforming = deformation_.running();
   if (step_ == LiveStep::deform) out.deform_progress = deformation_.progress();
   out.deformed = deformation_.found();

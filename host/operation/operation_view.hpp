@@ -30,6 +30,7 @@ struct OperationView {
   bool has_rod = false;               ///< the scope's rod turns: its angle has to be known
   bool board_named = false;           ///< there is a board to calibrate with
   bool guiding = false;
+  bool fits_at_one = false;  ///< in doubt, it fits at one place: another is asked for
   bool unconfirmed = false;  ///< the registration is an earlier window's, and nobody has looked whether it holds
   bool deforming = false;
   bool stroking = false;            ///< the pointer, over the organ

@@ -31,7 +31,8 @@ struct TouchedFiducial {
 /// What the pointer's tip is near to, in the CT as it is shown.
 struct CheckReading {
   Eigen::Vector3d tip_in_patient_mm;
-  std::string nearest;  ///< landmark or fiducial; empty: there is none
+  std::string nearest;                                   ///< landmark or fiducial; empty: there is none
+  Eigen::Vector3d nearest_mm = Eigen::Vector3d::Zero();  ///< in the CT, patient frame
   double distance_mm = 0;
   bool fitted = false;  ///< it is a fiducial that the registration was fitted to, which says nothing of it
 };

@@ -266,6 +266,8 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"note_unchecked", "gone on without a landmark"},
     {"note_touch_anew", "patient or transmitter may have been moved: touch all fiducials anew"},
     {"note_check_no_pointer", "not confirmed: the pointer is not seen. Hold its tip to a landmark, or register anew"},
+    {"note_check_second",
+     "{:.1f} mm from {}: it fits there. Now hold the pointer to another place, at least 30 mm away, and press Space"},
     {"note_check_off", "not confirmed: the pointer is {:.0f} mm from {}. Point at it again, or register anew"},
 
     // Run, and how the overlay is drawn

@@ -109,7 +109,9 @@ void Surgeon::check(const host::OperationView& view, double at_s, HostTime now) 
     checks_ += points_at_one(at_s) ? 1 : 0;
     return;
   }
+  const bool first = !view.fits_at_one;
   workflow_->primary(now);
+  if (first && workflow_->view().fits_at_one) return go_to(truth_.fiducials_mm().front(), at_s, kCheckRests_s);
   at_landmark_ = false;
   if (workflow_->view().unconfirmed) {
     workflow_->go_to(LiveStep::fiducials);

@@ -64,6 +64,23 @@ Eigen::Vector3d ball_in_camera_mm(double circle_s) {
   return camera_from_sensor() * tracker_from_sensor.inverse() * kBallInTracker_mm;
 }
 
+/// A tip in the scope's sensor that goes about the middle of the circle, 20 mm away from it.
+constexpr const char* kTipInSensor_mm = "-180 0 0\n";
+
+/// The ball, and places all along the way of that tip, in the patient's frame.
+std::string landmarks_on_its_way() {
+  constexpr int kPlaces = 16;
+  constexpr double kRadius_mm = 20;
+  std::string text = "name,x,y,z\nball,0,0,0\n";
+  const Eigen::Vector3d middle_mm = hw_sim::Circle{}.centre_mm - kBallInTracker_mm;
+  for (int i = 0; i < kPlaces; ++i) {
+    const double angle_rad = 2 * M_PI * i / kPlaces;
+    text += fmt::format("place {},{:.3f},{:.3f},{:.3f}\n", i, middle_mm.x() + kRadius_mm * std::cos(angle_rad),
+                        middle_mm.y() + kRadius_mm * std::sin(angle_rad), middle_mm.z());
+  }
+  return text;
+}
+
 void write_registered(const std::filesystem::path& folder, const std::string& ct) {
   const auto volume = host::import_volume(ct);
   ASSERT_TRUE(volume) << volume.error().what;
@@ -191,18 +208,24 @@ WindowRig::WindowRig(const Scratch& scratch, const std::string& tracker_faults, 
   const std::string magenta = scratch.file("magenta.json",
                                            R"({"points": [{"hu": -500, "rgb": [1, 0, 1], "extinction_per_mm": 0},
                        {"hu": 0, "rgb": [1, 0, 1], "extinction_per_mm": 5}]})");
+  // The scope's own bird stands for the pointer: wherever the tip is there is a landmark, so that somebody may say that
+  // the registration holds.
+  const std::string tip = scratch.file("tip.txt", kTipInSensor_mm);
+  const std::string landmarks = scratch.file("landmarks.csv", landmarks_on_its_way());
   // The operation does not say with which instruments it was found: a person says that they are these. The pattern of
   // the camera does not move as the scope does, which a check of its motion would see.
   const std::string script = scratch.file("script.txt",
                                           "wait connect 30\nsleep 3\nkey space\nsleep 1.2\nkey 6\nkey space\nsleep "
-                                          "1.2\nkey space\nwait run 5\nsleep 3600\nend\n");
+                                          "1.2\nkey space\nsleep 0.9\nkey space\nwait run 5\nsleep 3600\nend\n");
   const int port = *free_port();
   std::vector<std::string> words;
   std::istringstream in(fmt::format(
       "{} {}/birdseye live --server 127.0.0.1:{} --ct {} --fiducials {} --fiducial-count 4 --transfer {} --resume {} "
-      "--out {} --script {} --publish {} --size {}x{} --scale 1 --no-motion-check",
+      "--out {} --script {} --publish {} --size {}x{} --scale 1 --no-motion-check --pointer scope --tip {} --landmarks "
+      "{}",
       display_.env(), testing::programs_folder(), appliance_->port(), ct, fiducials, magenta,
-      (scratch / "operation").string(), (scratch / "out").string(), script, port, kWindowWidth, kWindowHeight));
+      (scratch / "operation").string(), (scratch / "out").string(), script, port, kWindowWidth, kWindowHeight, tip,
+      landmarks));
   for (std::string word; in >> word;) words.push_back(word);
   first_frame_ns_ = appliance_->first_frame_ns();
   window_ = std::make_unique<Child>(words);

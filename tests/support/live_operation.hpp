@@ -82,10 +82,16 @@ class Hand {
 
 inline const Eigen::Vector3d kTumour(30, 30, 20);
 
-/// Somebody points at the tumour, or at another place of the patient, and presses Space.
-inline void check_at(LiveWorkflow& workflow, const Eigen::Vector3d& in_patient_mm = kTumour) {
+/// Somebody points at a place of the patient, and presses Space.
+inline void check_at(LiveWorkflow& workflow, const Eigen::Vector3d& in_patient_mm) {
   Hand(workflow).rest_at(in_patient_mm, 5);
   workflow.primary(HostTime{0});
+}
+
+/// At a fiducial and at the tumour, as one does where the registration is in doubt; both have moved by so much.
+inline void confirm(LiveWorkflow& workflow, const Eigen::Vector3d& moved_mm = {0, 0, 0}) {
+  check_at(workflow, kFiducials[0] + moved_mm);
+  check_at(workflow, kTumour + moved_mm);
 }
 
 /// The appliance sends the scope's calibration record.

@@ -256,6 +256,10 @@ bool Rehearsal::register_patient() {
 bool Rehearsal::check() {
   rest_at(truth.target_mm, 60);
   workflow_->primary(HostTime{time_ms_ * kNsPerMs});
+  if (workflow_->view().fits_at_one) {
+    rest_at(truth.fiducials_mm[touched.front()], 60);
+    workflow_->primary(HostTime{time_ms_ * kNsPerMs});
+  }
   rest_at({0, 0, 200}, 1);
   return workflow_->view().step == host::LiveStep::run;
 }

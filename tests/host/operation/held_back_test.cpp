@@ -212,7 +212,7 @@ TEST_F(HeldBack, AfterAPauseSomebodyLooksWhetherTheRegistrationHolds) {
   EXPECT_FALSE(overlaid());
   EXPECT_TRUE(workflow_.view().unconfirmed);
   EXPECT_EQ(workflow_.view().step, LiveStep::check);
-  birdseye::testing::check_at(workflow_);
+  birdseye::testing::confirm(workflow_);
   show_frame();
   EXPECT_TRUE(overlaid()) << reason();
 }
@@ -246,7 +246,7 @@ TEST(HeldBackOnResume, AnotherCameraTakesUpNoCalibrationByTheBoard) {
   EXPECT_TRUE(workflow.view().note(LiveStep::calibrate).done);
   EXPECT_EQ(workflow.view().step, LiveStep::check) << "and somebody has to look first";
   EXPECT_FALSE(workflow.picture().setup().has_value());
-  birdseye::testing::check_at(workflow);
+  birdseye::testing::confirm(workflow);
   EXPECT_TRUE(workflow.picture().setup().has_value());
 }
 

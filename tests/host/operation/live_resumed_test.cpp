@@ -115,7 +115,7 @@ TEST(LiveWorkflow, TargetAndLandmarksAreWhereTheDeformedCtHasThem) {
   load(workflow);
   ASSERT_EQ(workflow.view().fault, "");
   give_record(workflow);
-  birdseye::testing::check_at(workflow, {34, 30, 20});
+  birdseye::testing::confirm(workflow, {4, 0, 0});
   EXPECT_NEAR(workflow.view().checked.value().off_mm, 0, 1e-3);
   ASSERT_TRUE(workflow.picture().setup().has_value());
   workflow.take(looking_at(workflow, {34, 30, 20}, 100, 0), HostTime{0}, ClockGap{});
@@ -210,7 +210,7 @@ TEST(LiveWorkflow, IsTakenUpWhereAnotherWindowWasClosed) {
   workflow.go_on();
   EXPECT_FALSE(workflow.picture().setup().has_value()) << "to skip the look is not to have looked";
   workflow.go_to(LiveStep::check);
-  birdseye::testing::check_at(workflow);
+  birdseye::testing::confirm(workflow);
   ASSERT_TRUE(workflow.picture().setup().has_value());
   const auto& found = workflow.picture().setup()->tracker_from_patient();
   EXPECT_LT((found.translation() - kTrackerFromPatient.translation()).norm(), 0.1);
@@ -283,7 +283,7 @@ TEST(LiveWorkflow, OfTwoCalibrationsTheNewerCounts) {
     load(workflow);
     ASSERT_EQ(workflow.view().fault, "");
     give_record(workflow);
-    birdseye::testing::check_at(workflow);
+    birdseye::testing::confirm(workflow);
     ASSERT_TRUE(workflow.picture().setup().has_value());
     EXPECT_EQ(workflow.picture().setup()->camera().fx_px == 500, !record_is_newer);
   }

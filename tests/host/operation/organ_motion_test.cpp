@@ -118,7 +118,7 @@ class DeformedOperation : public ::testing::Test {
     load(*workflow_);
     ASSERT_EQ(workflow_->view().fault, "");
     give_record(*workflow_);
-    birdseye::testing::check_at(*workflow_);
+    birdseye::testing::confirm(*workflow_);
     ASSERT_TRUE(workflow_->picture().setup().has_value());
   }
 

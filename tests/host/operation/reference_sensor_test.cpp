@@ -270,6 +270,8 @@ class Referenced : public ::testing::Test {
     for (int i = 0; i < samples; ++i) measure();
   }
   void check_at_tumour() {
+    touch(kFiducials[0], 5);
+    workflow_->primary(HostTime{room_.time_ms * kMs});
     touch(birdseye::testing::kTumour, 5);
     show_frame();
     workflow_->primary(HostTime{room_.time_ms * kMs});
