@@ -200,7 +200,7 @@ MUTANTS = (
            "Of frames that wait for a slow client the newest is shed.",
            r"^ClientLink\.ASlowClientGetsTheFrameThatHasBegunAndThenTheNewest", ("device_wire_test",), False),
     Mutant("doubt", "host/operation/live_workflow_doubts.cpp",
-           "  fiducials_.doubt();\n", "",
+           "  fiducials_.doubt();\n  pointer_ = {};", "  pointer_ = {};",
            "What speaks against a registration is told, and the overlay goes on.", r"^Referenced\.",
            ("host_operation_test",), False),
 )
