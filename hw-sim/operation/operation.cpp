@@ -328,6 +328,8 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     workflow.tick();
     workflow.draw();
     const HostTime now = host_now();
+    // Each time: what is taken back just before the power goes was not lost.
+    laws.take_kept(workflow.view(), disk.failed(), disk.powerless(), now);
     const host::ShownPicture shown = workflow.shown_at(now);
     laws.take(shown, workflow.picture(), now);
     journal.enter(shown.strength);
@@ -338,7 +340,6 @@ void operate(const SimulatedOperation& operation, OperationTruth& truth, Operati
     surgeon.act(journal.at_s(now), now, shown);
     const host::OperationView view = workflow.view();
     laws.take(view, surgeon.checks(), now);
-    laws.take_kept(view, disk.failed(), disk.powerless(), now);
     const host::StepNote& note = view.note(view.step);
     journal.follow(now, step,
                    fmt::format("step {}: {}", host::name_of(view.step),

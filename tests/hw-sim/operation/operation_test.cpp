@@ -140,6 +140,13 @@ TEST(Operation, MendedSeed2021HasARecordOfPiecesOfTwo) {
   EXPECT_TRUE(out.broken.empty()) << told(out);
 }
 
+/// A law was wrong: it looked ten times a second, and took for lost what a first touch anew had dropped just before the
+/// power went.
+TEST(Operation, MendedSeed108797437DroppedItsRegistrationItself) {
+  const OperationOutcome out = operate({.seed = 108797437, .minutes = 10});
+  EXPECT_TRUE(out.broken.empty()) << told(out);
+}
+
 /// The window keeps what it has after each touch from the third on; the power goes after any of the syncs of that, or
 /// while nothing is written.
 TEST(Operation, APowerCutAfterAnySyncLosesNothingThatWasKept) {
