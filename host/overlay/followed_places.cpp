@@ -53,6 +53,12 @@ bool repeats(const cv::Mat& half, const cv::Point2f& place) {
   return most >= kAlike;
 }
 
+bool is_flat(const cv::Mat& grey) {
+  double least = 0, most = 0;
+  cv::minMaxLoc(grey, &least, &most);
+  return least == most;
+}
+
 }  // namespace
 
 PictureToFollow picture_to_follow(const wire::VideoFrame& frame) {
@@ -62,14 +68,12 @@ PictureToFollow picture_to_follow(const wire::VideoFrame& frame) {
   cv::Mat grey;
   cv::cvtColor(rgb, grey, cv::COLOR_RGB2GRAY);
   cv::resize(grey, out.grey, {}, 1 / scale, 1 / scale, cv::INTER_AREA);
-  cv::buildOpticalFlowPyramid(out.grey, out.pyramid, kWindow, kLevels);
+  if (!is_flat(out.grey)) cv::buildOpticalFlowPyramid(out.grey, out.pyramid, kWindow, kLevels);
   return out;
 }
 
 std::vector<cv::Point2f> places_to_follow(const cv::Mat& grey, int at_most) {
-  double least = 0, most = 0;
-  cv::minMaxLoc(grey, &least, &most);
-  if (least == most) return {};  // no signal, or grey all over: to look for them takes longest where there are none
+  if (is_flat(grey)) return {};  // to look for them takes longest where there are none
   cv::Mat mask = field_mask(grey.size());
   cv::Mat glare = grey > 240;
   cv::dilate(glare, glare, cv::Mat(), {-1, -1}, 3);
@@ -96,7 +100,7 @@ std::vector<std::optional<cv::Point2f>> follow_places(const PictureToFollow& fro
                                                       const std::vector<cv::Point2f>& places,
                                                       const std::vector<cv::Point2f>* about) {
   std::vector<std::optional<cv::Point2f>> out(places.size());
-  if (places.empty() || from.grey.size() != to.grey.size()) return out;
+  if (places.empty() || from.grey.size() != to.grey.size() || from.pyramid.empty() || to.pyramid.empty()) return out;
   std::vector<cv::Point2f> there, back;
   int levels = kLevels, flags = 0;
   if (about != nullptr) {

@@ -20,7 +20,9 @@ inline constexpr double kNearestSeen_mm = 15, kFarthestSeen_mm = 600;
 /// A frame in grey and small: more tells no more of the motion, and takes longer.
 struct PictureToFollow {
   cv::Mat grey;
-  std::vector<cv::Mat> pyramid;  ///< of grey, with gradients; OpenCV would make it anew for each use
+  /// Of grey, with gradients; OpenCV would make it anew for each use. Empty where grey is the same all over, as without
+  /// a signal: nothing is followed from there, nor to there.
+  std::vector<cv::Mat> pyramid;
 };
 PictureToFollow picture_to_follow(const wire::VideoFrame& frame);
 

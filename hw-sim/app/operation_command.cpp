@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -23,6 +25,7 @@ struct OperationOptions {
   SimulatedOperation operation;
   std::filesystem::path script, log, faults;
   std::string reference;
+  int cores = 0;  ///< none given: all for pictures, else one
   bool line = false, shortest = false;
 };
 
@@ -99,6 +102,9 @@ void print(const OperationOutcome& out, const OperationResult& result) {
 
 Result<void> run(const OperationOptions& options, bool& broken) {
   SimulatedOperation operation = options.operation;
+  // Without pictures other cores would only wait for work: a third of all processor time.
+  const int cores = options.cores > 0 ? options.cores : operation.pictures ? tbb::info::default_concurrency() : 1;
+  const tbb::global_control at_most(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(cores));
   if (!options.reference.empty()) operation.reference = options.reference == "patient";
   if (!options.script.empty()) {
     auto script = read_fault_script(options.script, Instruments::with_programs, operation.seed);
@@ -130,6 +136,10 @@ void add_operation_command(CLI::App& app, const Take& take, bool& broken) {
       .add_option("--reference", options->reference,
                   "patient: a reference bird is fixed on him; none: there is none; else the seed decides")
       ->check(CLI::IsMember({"patient", "none"}));
+  command
+      .add_option("--cores", options->cores,
+                  "it uses so many at most (default: one, with --pictures all); what comes of it is the same")
+      ->check(CLI::Range(1, 1024));
   command.add_option("--script", options->script, "these faults (TOML) in place of random ones");
   command.add_option("--log", options->log, "write what happened to this file");
   command.add_option("--faults", options->faults, "write the faults that befell to this file, as --script takes them");

@@ -13,7 +13,8 @@ SeedStudy study_of_operations(const StudiedOperations& operations, const std::st
   out.command = {program,     "--end-with-stdin",
                  "operation", "--line",
                  "--seed",    "{}",
-                 "--minutes", fmt::format("{}", operations.minutes)};
+                 "--minutes", fmt::format("{}", operations.minutes),
+                 "--cores",   "1"};
   if (operations.pictures) out.command.emplace_back("--pictures");
   out.what = fmt::format("operations of {} minutes{}", operations.minutes, operations.pictures ? " with pictures" : "");
   out.file = "operations.sqlite";

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <random>
 #include <vector>
 
@@ -105,6 +108,35 @@ TEST(MedianOffLine, IsNothingWhereThePosesAreRight) {
 TEST(MedianOffLine, IsEmptyWhereMostPlacesWouldBeBehindTheCamera) {
   EXPECT_FALSE(
       median_off_line(places_seen(40, kMotion, {}, 1), Relative(rotation_exp(Vector(0, M_PI, 0)), Vector::Zero())));
+}
+
+wire::VideoFrame video_of(const std::function<std::uint8_t(int, int)>& grey_at) {
+  wire::VideoFrame frame;
+  frame.width_px = 160;
+  frame.height_px = 120;
+  auto rgb = std::make_shared<std::vector<std::uint8_t>>();
+  for (int y = 0; y < frame.height_px; ++y)
+    for (int x = 0; x < frame.width_px; ++x) rgb->insert(rgb->end(), 3, grey_at(x, y));
+  frame.rgb = rgb;
+  return frame;
+}
+
+TEST(FollowPlaces, FindsNoneWhereThereIsNoSignalAndNoneFromThere) {
+  const auto blobs = [](int x, int y) {
+    return static_cast<std::uint8_t>(std::lround(120 + 60 * std::sin(0.31 * x + 0.002 * y * y) * std::cos(0.27 * y)));
+  };
+  const PictureToFollow seen = picture_to_follow(video_of(blobs));
+  const PictureToFollow none = picture_to_follow(video_of([](int, int) { return std::uint8_t{16}; }));
+  const auto places = places_to_follow(seen.grey);
+  ASSERT_GT(places.size(), 20U);
+  EXPECT_TRUE(places_to_follow(none.grey).empty());
+  const auto found = [&](const PictureToFollow& from, const PictureToFollow& to) {
+    return std::ranges::count_if(follow_places(from, to, places), [](const auto& place) { return place.has_value(); });
+  };
+  EXPECT_EQ(found(seen, seen), std::ssize(places));
+  EXPECT_EQ(found(seen, none), 0);
+  EXPECT_EQ(found(none, seen), 0);
+  EXPECT_EQ(found(none, none), 0);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "hw-sim/operation/operation.hpp"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <functional>
@@ -267,6 +268,13 @@ TEST(Operation, TheSameSeedIsTheSameOperationToTheBit) {
   EXPECT_EQ(first.hash, again.hash);
   EXPECT_EQ(first.time.order_hash, again.time.order_hash);
   EXPECT_NE(operate({.seed = 6, .minutes = 1.5}).hash, first.hash);
+}
+
+TEST(Operation, OneCoreOrManyMakeTheSameOfIt) {
+  const SimulatedOperation operation{.seed = 5, .minutes = 0.5, .pictures = true};
+  const OperationOutcome many = operate(operation);
+  const tbb::global_control one_core(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(operate(operation).hash, many.hash);
 }
 
 TEST(Operation, ItsFaultsAreReadBackFromTheScriptThatItWrites) {
