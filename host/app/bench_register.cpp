@@ -176,9 +176,8 @@ Result<ExitCode> table_of_lines(const BenchRegisterOptions& options) {
         known->trials.push_back(trial);
       }
     }
-  } catch (const nlohmann::json::exception& wrong) {
-    return Error{Errc::bad_format,
-                 fmt::format("{}: these are no lines that --seed prints ({})", options.lines.string(), wrong.what())};
+  } catch (const nlohmann::json::exception&) {
+    return Error{Errc::bad_format, fmt::format("{}: these are no lines that --seed prints", options.lines.string())};
   }
   if (kinds.empty()) return Error{Errc::bad_format, options.lines.string() + ": has no trial"};
   nlohmann::json rows = nlohmann::json::array();

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "calibration/base/units.hpp"
 #include "calibration/geometry/rotations.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {
@@ -98,8 +99,9 @@ nlohmann::json group_json(const RodGroup& group) {
 }  // namespace
 
 Result<RodAngles> read_rod_angles(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file) return Error{Errc::unreadable, path.string() + ": cannot be read; lines of name,angle_deg are expected"};
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return Error{text.error().code, text.error().what + " (lines of name,angle_deg are expected)"};
+  std::istringstream file(*text);
   RodAngles angles;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <sstream>
 #include <string_view>
 
+#include "drivers/system/whole_file.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {
@@ -60,10 +60,11 @@ Result<std::vector<double>> numbers_of(std::vector<std::string> fields, std::siz
 }  // namespace
 
 Result<PointRows> read_point_rows(const std::filesystem::path& path) {
-  std::ifstream in(path);
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return text.error();
+  std::istringstream in(*text);
   std::string line;
-  if (!std::getline(in, line))
-    return Error{Errc::unreadable, fmt::format("{}: cannot be read, or is empty", path.string())};
+  if (!std::getline(in, line)) return Error{Errc::unreadable, fmt::format("{}: is empty", path.string())};
   const std::vector<std::string> header = fields_of(line);
   if (header != fields_of(std::string(kSurfaceHeader)) && header != fields_of(std::string(kMatchedHeader))) {
     return Error{Errc::bad_format,

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
@@ -15,6 +14,7 @@
 
 #include "calibration/base/nesting.hpp"
 #include "calibration/base/parser_words.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/case/named_landmarks.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/read_mat.hpp"
@@ -398,17 +398,13 @@ Result<void> read_further(const fs::path& file, const toml::value& all, Registra
 }  // namespace
 
 Result<RegistrationCase> read_case(const fs::path& path) {
-  std::error_code no_file;
-  constexpr std::uintmax_t kMostBytes = 64U << 20U;
-  if (!fs::is_regular_file(path, no_file) || fs::file_size(path, no_file) > kMostBytes) {
-    return Error{
-        Errc::unreadable,
-        fmt::format("{}: is no file, or larger than 64 MB; name the case's TOML file, as birdseye-sim case writes it",
-                    path.string())};
+  const auto whole = read_whole_file(path, kMostTextBytes);
+  if (!whole) {
+    return Error{whole.error().code,
+                 whole.error().what + " (name the case's TOML file, as birdseye-sim case writes it)"};
   }
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  if (nests_too_deeply(text.str(), Notation::toml)) {
+  std::stringstream text(*whole);
+  if (nests_too_deeply(*whole, Notation::toml)) {
     return Error{Errc::bad_format,
                  fmt::format("{}: nests lists, tables or keys deeper than any case; write it anew", path.string())};
   }

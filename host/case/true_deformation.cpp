@@ -4,15 +4,19 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "drivers/system/json_file.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
 Result<std::vector<Landmark>> read_landmarks(const std::filesystem::path& path) {
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return text.error();
   std::vector<Landmark> landmarks;
-  std::ifstream in(path);
+  std::istringstream in(*text);
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
     if (number == 1 && line.rfind("name", 0) == 0) continue;
@@ -41,8 +45,9 @@ Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path)
                  fmt::format("{}: {}; name the control_points.json of birdseye-sim case", path.string(), why)};
   };
   try {
-    std::ifstream in(path);
-    const nlohmann::json json = nlohmann::json::parse(in);
+    const auto read = read_json_file(path);
+    if (!read) return read.error();
+    const nlohmann::json& json = *read;
     const auto low = json.at("box_low_mm").get<std::array<double, 3>>();
     const auto high = json.at("box_high_mm").get<std::array<double, 3>>();
     auto patch = BezierPatch::create(json.at("degree").get<std::array<int, 3>>());
@@ -61,8 +66,8 @@ Result<TrueDeformation> read_true_deformation(const std::filesystem::path& path)
     }
     out.patch.set_displacements(moves);
     return out;
-  } catch (const nlohmann::json::exception& problem) {
-    return wrong(problem.what());
+  } catch (const nlohmann::json::exception&) {
+    return wrong(kPartMissing);
   }
 }
 

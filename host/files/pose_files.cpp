@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <fstream>
 #include <optional>
+#include <sstream>
 #include <string_view>
 
 #include "calibration/base/units.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/files/body_points.hpp"
 #include "host/files/name_order.hpp"
 #include "host/files/name_pattern.hpp"
@@ -40,7 +42,9 @@ struct FilePose {
 
 /// The pose of a file: a 4x4 matrix, or a table of one row.
 FilePose pose_of_file(const fs::path& file, const PoseReading& how) {
-  std::ifstream in(file);
+  const auto whole = read_whole_file(file, kMostTextBytes);
+  if (!whole) return {{{}, whole.error().what}, std::nullopt};
+  std::istringstream in(*whole);
   std::string text, line;
   while (std::getline(in, line)) {
     if (!line.starts_with('#')) text += line + "\n";

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "host/files/name_order.hpp"
+#include "host/files/next_line.hpp"
 #include "host/files/pose_collector.hpp"
 
 namespace birdseye::host {
@@ -12,6 +13,17 @@ namespace birdseye::host {
 namespace {
 
 constexpr std::uintmax_t kMostBytes = 1'000'000'000;
+constexpr std::size_t kLongestRow = std::size_t{1} << 20U;
+
+/// The first line that has more bytes than a line of a table may have, from 1.
+std::optional<std::size_t> too_long_a_line(std::istream& in) {
+  std::string line;
+  for (std::size_t number = 1;; ++number) {
+    if (next_line(in, line, kLongestRow)) continue;
+    if (in.eof()) return std::nullopt;
+    return number;
+  }
+}
 
 /// Whether text is a number with a comma in the place of its point, as 1,5 or -3,7E+02.
 bool has_decimal_comma(std::string_view text) {
@@ -47,6 +59,15 @@ Result<TextRows> TextRows::open(const std::filesystem::path& path) {
   if (!file) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   if (std::filesystem::file_size(path, ignored) > kMostBytes)
     return Error{Errc::unsupported, fmt::format("{}: is larger than 1 GB; give a part of it", path.string())};
+  // One line without an end would take all of a file into memory, several times.
+  if (std::filesystem::file_size(path, ignored) > kLongestRow) {
+    if (const auto line = too_long_a_line(file)) {
+      return Error{Errc::bad_format,
+                   fmt::format("{}: line {} is longer than any line of a table; is it a text?", path.string(), *line)};
+    }
+    file.clear();
+    file.seekg(0);
+  }
   std::string mark(3, '\0');
   file.read(mark.data(), 3);
   if (mark.starts_with("\xFF\xFE") || mark.starts_with("\xFE\xFF"))

@@ -6,6 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/camera_files.hpp"
 #include "host/files/registration_file.hpp"
@@ -184,8 +185,8 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
     auto operation = operation_of(*sheet);
     if (!operation) return operation.error().with_context(path.string());
     return SignedOperation{*std::move(operation), sealed_by(*text)};
-  } catch (const std::exception& wrong) {
-    return refused(fmt::format("makes no sense ({}); register anew", wrong.what()));
+  } catch (const std::exception&) {
+    return refused(fmt::format("{}; register anew", kPartMissing));
   }
 }
 

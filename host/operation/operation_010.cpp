@@ -7,6 +7,7 @@
 
 #include "calibration/base/nesting.hpp"
 #include "device/wire/igtl_bytes.hpp"
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/text_files.hpp"
 #include "host/overlay/ct_sha256.hpp"
@@ -124,8 +125,8 @@ Result<Operation> read_operation_010(const fs::path& folder, const Volume& ct) {
                  fmt::format("{}: is not of 0.1.0, or is damaged: there is nothing to convert", path.string())};
   try {
     return operation_of_010(folder, Json::parse(*text), ct);
-  } catch (const Json::exception& wrong) {
-    return Error{Errc::bad_format, fmt::format("{}: is damaged ({}); register anew", path.string(), wrong.what())};
+  } catch (const Json::exception&) {
+    return Error{Errc::bad_format, fmt::format("{}: is damaged: {}; register anew", path.string(), kPartMissing)};
   }
 }
 

@@ -1,11 +1,11 @@
 #include "host/operation/snapshot.hpp"
+#include "drivers/system/json_file.hpp"
 #include "host/files/camera_files.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -109,15 +109,15 @@ Result<PictureHardware> read_taken_with(const fs::path& picture) {
   const fs::path path = picture.parent_path() / kSheet;
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return out;
-  std::ifstream in(path);
+  const auto sheet = read_json_file(path);
+  if (!sheet) return sheet.error();
   try {
-    const nlohmann::json sheet = nlohmann::json::parse(in);
-    out.tracker = sheet.value("tracker", out.tracker);
-    out.camera = sheet.value("camera", out.camera);
-    out.scope = sheet.value("scope", out.scope);
-  } catch (const nlohmann::json::exception& wrong) {
-    return Error{Errc::bad_format, fmt::format("{}: makes no sense ({}); give the snapshot as the window wrote it",
-                                               path.string(), wrong.what())};
+    out.tracker = sheet->value("tracker", out.tracker);
+    out.camera = sheet->value("camera", out.camera);
+    out.scope = sheet->value("scope", out.scope);
+  } catch (const nlohmann::json::exception&) {
+    return Error{Errc::bad_format,
+                 fmt::format("{}: {}; give the snapshot as the window wrote it", path.string(), kPartMissing)};
   }
   return out;
 }

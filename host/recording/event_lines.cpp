@@ -6,6 +6,7 @@
 
 #include "calibration/geometry/rigid_matrix.hpp"
 #include "device/wire/json.hpp"
+#include "drivers/system/json_file.hpp"
 
 namespace birdseye::host {
 
@@ -95,8 +96,8 @@ Result<EventOfLine> parse_event_line(const std::string& line) {
   if (!in.is_object() || in.size() != 1) return damaged("it does not name one event");
   try {
     return event_of(in.begin().key(), in.begin().value());
-  } catch (const json::exception&) {  // whose words are for programmers
-    return damaged("a part of it is missing, or is not of the kind that it should be");
+  } catch (const json::exception&) {
+    return damaged(kPartMissing);
   } catch (const std::exception& fault) {
     return damaged(fault.what());
   }

@@ -10,6 +10,7 @@
 
 #include "drivers/system/wait.hpp"
 #include "drivers/system/whole_file.hpp"
+#include "host/files/next_line.hpp"
 #include "host/files/pose_collector.hpp"
 #include "host/recording/recording_writer.hpp"
 
@@ -18,6 +19,8 @@ namespace birdseye::host {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
 
 /// "StylusToTracker" -> "stylus".
 std::string bird_name(std::string transform) {
@@ -106,9 +109,15 @@ Result<void> RecordingReader::check_events() {
 
 Result<std::optional<EventOfLine>> RecordingReader::take_line() {
   std::string line;
-  const bool there = static_cast<bool>(std::getline(lines_, line));
+  const bool there = next_line(lines_, line, kLongestLine);
   // What was cut lacks its end.
   const bool cut = lines_.eof();
+  if (!there && !cut) {
+    return Error{
+        Errc::bad_format,
+        fmt::format("{}: line {} is longer than any event; take a copy of the recording that is as it was written",
+                    (path_ / kRecordingEvents).string(), line_ + 1)};
+  }
   if (there) add(lines_sum_, cut ? line : line + '\n');
   if (!there || cut) {
     if (auto same = check_events(); !same) return same.error();

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/system/interrupt.hpp"
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/local_programs.hpp"
 #include "host/files/write_files.hpp"
 
@@ -17,19 +18,19 @@ namespace {
 constexpr Duration kLook = Duration::from_ms(100);  // how soon a stop is seen
 
 Result<CartSheet> read_sheet(const std::filesystem::path& path) {
-  std::ifstream in(path);
-  const nlohmann::json json = nlohmann::json::parse(in, nullptr, false);
+  const auto json = read_json_file(path);
+  if (!json) return json.error();
   try {
     CartSheet sheet;
-    sheet.board = json.at("board").get<std::string>();
-    const auto tip = json.at("tip_in_sensor_mm").get<std::vector<double>>();
+    sheet.board = json->at("board").get<std::string>();
+    const auto tip = json->at("tip_in_sensor_mm").get<std::vector<double>>();
     if (tip.size() != 3)
       return Error{Errc::bad_format, fmt::format("{}: tip_in_sensor_mm needs 3 numbers", path.string())};
     sheet.tip_in_pointer_mm = {tip[0], tip[1], tip[2]};
-    sheet.fiducials = json.at("fiducials").get<int>();
+    sheet.fiducials = json->at("fiducials").get<int>();
     return sheet;
-  } catch (const nlohmann::json::exception& error) {
-    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), error.what())};
+  } catch (const nlohmann::json::exception&) {
+    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), kPartMissing)};
   }
 }
 

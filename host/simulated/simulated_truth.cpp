@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+
+#include "drivers/system/json_file.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
 
@@ -48,11 +50,11 @@ Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder)
   };
   SimulatedTruth::Frame first;
   try {
-    std::ifstream in(folder / "truth.json");
-    const nlohmann::json json = nlohmann::json::parse(in);
-    const auto centre = json.at("tumour_centre_moved_to_mm").get<std::array<double, 3>>();
+    const auto json = read_json_file(folder / "truth.json");
+    if (!json) return json.error();
+    const auto centre = json->at("tumour_centre_moved_to_mm").get<std::array<double, 3>>();
     first.tumour_centre_in_patient_mm = {centre[0], centre[1], centre[2]};
-    const nlohmann::json& c = json.at("camera");
+    const nlohmann::json& c = json->at("camera");
     CameraModel& camera = first.camera;
     c.at("width_px").get_to(camera.width_px);
     c.at("height_px").get_to(camera.height_px);
@@ -67,11 +69,13 @@ Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder)
                                       {"k3", &camera.k3}}) {
       c.at(name).get_to(*value);
     }
-  } catch (const nlohmann::json::exception& problem) {
-    return wrong("truth.json", problem.what());
+  } catch (const nlohmann::json::exception&) {
+    return wrong("truth.json", kPartMissing);
   }
   SimulatedTruth truth;
-  std::ifstream in(folder / "frames.csv");
+  const auto frames = read_whole_file(folder / "frames.csv", kMostTextBytes);
+  if (!frames) return frames.error();
+  std::istringstream in(*frames);
   std::string line;
   std::getline(in, line);
   while (std::getline(in, line)) {
@@ -86,7 +90,9 @@ Result<SimulatedTruth> read_simulated_truth(const std::filesystem::path& folder)
     truth.frames.emplace(sequence, first);
   }
   if (truth.frames.empty()) return wrong("frames.csv", "holds no frames");
-  std::ifstream scene(folder / "scene.csv");
+  const auto scenes = read_whole_file(folder / "scene.csv", kMostTextBytes);
+  if (!scenes) return scenes.error();
+  std::istringstream scene(*scenes);
   std::getline(scene, line);
   std::size_t told = 0;
   for (; std::getline(scene, line); ++told) {

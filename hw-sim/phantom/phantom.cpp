@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/thread.hpp"
 #include "hw-sim/phantom/body.hpp"
 #include "hw-sim/phantom/dicom_series.hpp"
@@ -115,28 +115,28 @@ Result<void> write_phantom(const PhantomSettings& settings) {
 
 Result<PhantomTruth> read_phantom_truth(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / "truth.json";
-  std::ifstream in(path);
-  if (!in) {
+  const auto json = read_json_file(path);
+  if (!json && json.error().code == Errc::not_found) {
     return Error{Errc::not_found,
                  fmt::format("{}: no phantom here; make one with `birdseye-sim phantom`", path.string())};
   }
+  if (!json) return json.error();
   try {
-    const nlohmann::json json = nlohmann::json::parse(in);
     PhantomTruth truth;
-    const auto liver = vector_of(json.at("liver_centre_mm"));
-    const auto tumour = vector_of(json.at("tumour_centre_mm"));
+    const auto liver = vector_of(json->at("liver_centre_mm"));
+    const auto tumour = vector_of(json->at("tumour_centre_mm"));
     if (!liver || !tumour)
       return Error{Errc::bad_format, fmt::format("{}: a point needs three numbers", path.string())};
     truth.liver_centre_mm = *liver;
     truth.tumour_centre_mm = *tumour;
-    for (const auto& item : json.at("fiducials_mm")) {
+    for (const auto& item : json->at("fiducials_mm")) {
       const auto point = vector_of(item);
       if (!point) return Error{Errc::bad_format, fmt::format("{}: a point needs three numbers", path.string())};
       truth.fiducials_mm.push_back(*point);
     }
     return truth;
-  } catch (const nlohmann::json::exception& problem) {
-    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), problem.what())};
+  } catch (const nlohmann::json::exception&) {
+    return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), kPartMissing)};
   }
 }
 

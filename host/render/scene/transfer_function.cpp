@@ -6,9 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+
+#include "drivers/system/json_file.hpp"
 
 namespace birdseye::host {
 
@@ -96,18 +97,16 @@ std::vector<std::string> transfer_presets() {
 
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path) {
   if (const auto found = presets().find(name_or_path); found != presets().end()) return TransferFunction(found->second);
-  std::error_code ignored;
-  std::ifstream in;
-  if (std::filesystem::is_regular_file(name_or_path, ignored)) in.open(name_or_path);  // a pipe would be waited for
-  if (!in.is_open()) {
+  const auto json = read_json_file(name_or_path);
+  if (!json && json.error().code == Errc::not_found) {
     return Error{Errc::not_found, fmt::format("transfer function \"{}\": neither a file nor one of {}", name_or_path,
                                               fmt::join(transfer_presets(), ", "))};
   }
+  if (!json) return json.error();
   const auto wrong = [&](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}; see docs/manual/volumes.md", name_or_path, why)};
   };
   try {
-    const nlohmann::json json = nlohmann::json::parse(in);
     Points points;
     constexpr auto kUnknown = [](const nlohmann::json& object, std::initializer_list<const char*> known) {
       for (const auto& [key, value] : object.items()) {
@@ -115,8 +114,8 @@ Result<TransferFunction> load_transfer_function(const std::string& name_or_path)
       }
       return std::string();
     };
-    if (const std::string key = kUnknown(json, {"points"}); !key.empty()) return wrong(key + ": unknown key");
-    for (const auto& item : json.at("points")) {
+    if (const std::string key = kUnknown(*json, {"points"}); !key.empty()) return wrong(key + ": unknown key");
+    for (const auto& item : json->at("points")) {
       if (const std::string key = kUnknown(item, {"hu", "rgb", "extinction_per_mm"}); !key.empty())
         return wrong(key + ": unknown key");
       const auto rgb = item.at("rgb").get<std::vector<double>>();

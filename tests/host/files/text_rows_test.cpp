@@ -84,5 +84,22 @@ TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {
   EXPECT_FALSE(TextRows::open(scratch.path()));
 }
 
+TEST(TextRows, RefusesALineWithoutEndByItsNumberAndNoLongTable) {
+  const Scratch scratch;
+  const std::string megabyte(std::size_t{1} << 20U, '1');
+  const auto endless = TextRows::open(scratch.file("e.csv", "a,b\n1,2\n" + megabyte + "1"));
+  ASSERT_FALSE(endless);
+  EXPECT_NE(endless.error().what.find("e.csv: line 3 is longer"), std::string::npos) << endless.error().what;
+
+  std::string table = "\xEF\xBB\xBF# a,b\n";
+  std::size_t count = 0;
+  for (; table.size() < 3 * megabyte.size(); ++count) table += "1,2\n";
+  auto rows = TextRows::open(scratch.file("t.csv", table));
+  ASSERT_TRUE(rows) << rows.error().what;
+  ASSERT_TRUE(rows->next()->remark);
+  while (rows->next()) --count;
+  EXPECT_EQ(count, 0U);
+}
+
 }  // namespace
 }  // namespace birdseye::host

@@ -312,6 +312,8 @@ TEST(Recording, DamageIsNamed) {
   }
   put("{}\n" + lines);
   expect({"events.jsonl", "line 1"});
+  put(std::string((std::size_t{1} << 20U) + 1, '{') + lines);
+  expect({"events.jsonl: line 1 is longer than any event"});
   put("{\"Sound\":{}}\n" + lines);
   expect({"line 1", "Sound"});
   put("{\"Birds\":{\"acquired_ns\":1,\"birds\":[{\"name\":\"scope\",\"tracker_from_sensor\":[2,0,0,0,0,1,0,0,0,0,1,0,0,"

@@ -1,0 +1,21 @@
+#include "drivers/system/json_file.hpp"
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "calibration/base/nesting.hpp"
+#include "drivers/system/whole_file.hpp"
+
+namespace birdseye {
+
+Result<nlohmann::json> read_json_file(const std::filesystem::path& path) {
+  const auto text = read_whole_file(path, kMostTextBytes);
+  if (!text) return text.error();
+  auto json = nests_too_deeply(*text, Notation::json) ? nlohmann::json(nlohmann::json::value_t::discarded)
+                                                      : nlohmann::json::parse(*text, nullptr, false);
+  if (json.is_discarded())
+    return Error{Errc::bad_format, path.string() + ": is not JSON; take a copy that is as it was written"};
+  return json;
+}
+
+}  // namespace birdseye
