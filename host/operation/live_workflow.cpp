@@ -342,7 +342,7 @@ void LiveWorkflow::primary(HostTime now) {
       }
       break;
     case LiveStep::check:
-      return confirm_by_landmark();
+      return check_registration();
     case LiveStep::run:
       return hide_or_show_overlay();
   }

@@ -141,7 +141,12 @@ class LiveWorkflow {
   [[nodiscard]] bool pointer_is_seen() const;
   [[nodiscard]] std::optional<Touch> pointer_held() const;
   [[nodiscard]] std::optional<CheckReading> check_reading() const;
-  void confirm_by_landmark();
+  /// By a landmark that the pointer is held to.
+  void check_registration();
+  void check_undoubted(const std::optional<CheckReading>& reading);
+  void check_in_doubt(const CheckReading& reading);
+  void refuse_registration(const CheckReading& by);
+  void confirm_registration(const std::optional<CheckReading>& by);
   void watch_surface(HostTime now);
   void watch_motion(const wire::VideoFrame& frame);
   void take_up();

@@ -126,40 +126,52 @@ void LiveWorkflow::doubt_steps(OperationView& out) const {
   doubt(LiveStep::run, picture_.setup() ? picture_.decision().reason : picture_.why_no_setup());
 }
 
-/// Of a landmark that was not fitted the pointer tells how far the registration is off; where that is too far the
-/// registration is in doubt. One in doubt is confirmed by two places that fit, or not at all: what has moved may have
-/// another place where the one was. A fitted place tells as much of that as another, and the farther the pointer is
-/// from any the more may have moved.
-void LiveWorkflow::confirm_by_landmark() {
-  constexpr double kPointedAt_mm = 100;  // further away it is laid aside
-  constexpr double kApart_mm = 30;       // the two places
-  const auto reading = check_reading();
-  const bool in_doubt = !fiducials_.confirmed() || fiducials_.suspected(), any = reading && !reading->nearest.empty();
-  if (in_doubt && !any) {
-    check_ = {false, words("note_check_no_pointer")};
-    return;
+void LiveWorkflow::check_registration() {
+  auto reading = check_reading();
+  if (reading && reading->nearest.empty()) reading.reset();
+  if (fiducials_.confirmed() && !fiducials_.suspected()) return check_undoubted(reading);
+  if (reading) return check_in_doubt(*reading);
+  check_ = {false, words("note_check_no_pointer")};
+}
+
+/// Nothing speaks against it: only a landmark that is off does from now on. That a fiducial fits, which it was fitted
+/// to, tells nothing of how good it is.
+void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
+  constexpr double kPointedAt_mm = 100;  // further away the pointer is laid aside
+  const bool pointed_at = reading && reading->distance_mm <= kPointedAt_mm;
+  if (pointed_at && reading->distance_mm > kMostCheckedOff_mm) {
+    landmarks_before_doubt_ = patient_.landmarks().size();
+    return refuse_registration(*reading);
   }
-  const bool off = any && reading->distance_mm > kMostCheckedOff_mm;
-  // At a fitted one it tells nothing of how good the registration is, but beside it.
-  const bool counts = any && (in_doubt || ((off || !reading->fitted) && reading->distance_mm <= kPointedAt_mm));
-  if (counts && off) {
-    why_doubted_ = words("note_check_off", reading->distance_mm, reading->nearest);
-    check_ = {false, why_doubted_};
-    checked_.reset();
-    if (!in_doubt) landmarks_before_doubt_ = patient_.landmarks().size();
-    fits_at_mm_.reset();
-    fiducials_.doubt();
-    return update_setup();
-  }
-  if (counts && !reading->fitted) checked_ = {reading->nearest, reading->distance_mm};
-  if (in_doubt && !(fits_at_mm_ && (*fits_at_mm_ - reading->nearest_mm).norm() >= kApart_mm)) {
-    if (!fits_at_mm_) fits_at_mm_ = reading->nearest_mm;
-    check_ = {false, words("note_check_second", reading->distance_mm, reading->nearest)};
-    return;
-  }
-  check_ = {true, counts     ? words("note_checked", reading->distance_mm, reading->nearest)
-                  : checked_ ? check_.line
-                             : words("note_unchecked")};
+  if (pointed_at && !reading->fitted) return confirm_registration(*reading);
+  if (!checked_) check_.line = words("note_unchecked");
+  confirm_registration(std::nullopt);
+}
+
+/// Two places that fit confirm it, or nothing does: what has moved may have another place where the one was. A fitted
+/// place tells as much of that as another, and the farther the pointer is from any the more may have moved.
+void LiveWorkflow::check_in_doubt(const CheckReading& reading) {
+  constexpr double kApart_mm = 30;  // the two places
+  if (reading.distance_mm > kMostCheckedOff_mm) return refuse_registration(reading);
+  if (fits_at_mm_ && (*fits_at_mm_ - reading.nearest_mm).norm() >= kApart_mm) return confirm_registration(reading);
+  if (!reading.fitted) checked_ = {reading.nearest, reading.distance_mm};
+  if (!fits_at_mm_) fits_at_mm_ = reading.nearest_mm;
+  check_ = {false, words("note_check_second", reading.distance_mm, reading.nearest)};
+}
+
+void LiveWorkflow::refuse_registration(const CheckReading& by) {
+  why_doubted_ = words("note_check_off", by.distance_mm, by.nearest);
+  check_ = {false, why_doubted_};
+  checked_.reset();
+  fits_at_mm_.reset();
+  fiducials_.doubt();
+  update_setup();
+}
+
+/// by: where the pointer was; none: check_ says what there is to say.
+void LiveWorkflow::confirm_registration(const std::optional<CheckReading>& by) {
+  if (by && !by->fitted) checked_ = {by->nearest, by->distance_mm};
+  check_ = {true, by ? words("note_checked", by->distance_mm, by->nearest) : check_.line};
   fiducials_.confirm();
   fits_at_mm_.reset();
   why_doubted_.clear();

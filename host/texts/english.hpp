@@ -455,17 +455,20 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"why_no_pointer", "the pointer is not seen: hold its tip to a fiducial"},
     {"why_unregistered", "the patient is not registered yet"},
     {"why_unconfirmed",
-     "nobody has looked whether the registration still holds: point at landmarks in step 6, then press Space"},
+     "nobody has looked whether the registration still holds: hold the pointer to two landmarks or fiducials in step "
+     "6, "
+     "and press Space at each"},
 
     // The bird that is fixed on patient or table
     {"reference_absent", "the reference \"{}\" is not seen"},
     {"why_reference_lost",
-     "the reference \"{}\" was not seen for a moment: point at landmarks in step 6, then press Space; or register "
-     "anew"},
+     "the reference \"{}\" was not seen for a moment: hold the pointer to two landmarks or fiducials in step 6, and "
+     "press "
+     "Space at each; or register anew"},
     {"why_reference_moved",
-     "the reference \"{}\" came off or was pushed: fix it, point at landmarks in step 6, and press Space if they fit; "
-     "else "
-     "register anew"},
+     "the reference \"{}\" came off or was pushed: fix it, hold the pointer to two landmarks or fiducials in step 6, "
+     "and "
+     "press Space at each; or register anew"},
 
     // What is held back, for other instruments are connected than those that it was found with
     {"instrument_tracker", "tracker"},

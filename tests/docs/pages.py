@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Tells what is wrong with the pages: links that lead nowhere, pages that the manual's index does not name once, decisions
-that are not numbered from 1 on or lack a part. usage: pages.py [SOURCE_DIR]"""
+that are not numbered from 1 on or lack a part, pages of the service's package that link to one that it lacks. usage: pages.py [SOURCE_DIR]"""
 import pathlib
 import re
 import sys
@@ -50,8 +50,18 @@ def decisions(root):
                 yield f"docs/decisions/{page.name}: has no {part}"
 
 
+def packaged(root):
+    listed = re.search(r"foreach\(page ([^)]*)\)", (root / "packaging/birdseyed.cmake").read_text()).group(1)
+    pages = [(root / "docs" / name).resolve() for name in listed.split()]
+    for page in (page for page in pages if page.suffix == ".md"):
+        for target in LINK.findall(page.read_text()):
+            path = target.partition("#")[0]
+            if path and not re.match(r"\w+:", target) and (page.parent / path).resolve() not in pages:
+                yield f"{page.relative_to(root)}: {target}: not in the package birdseyed, which has this page"
+
+
 def faults(root):
-    return [*links(root), *index(root), *decisions(root)]
+    return [*links(root), *index(root), *decisions(root), *packaged(root)]
 
 
 if __name__ == "__main__":

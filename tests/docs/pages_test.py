@@ -13,6 +13,7 @@ TREE = {
     "README.md": "[the manual](docs/manual/index.md), [a part of a page](docs/manual/page.md#its-part), <https://a.example>\n",
     "docs/manual/index.md": "[page](page.md)\n",
     "docs/manual/page.md": "# Page\n\n## Its `part`\n\n[above](#page)\n",
+    "packaging/birdseyed.cmake": "foreach(page manual/page.md\n    images/a.jpg)\n",
     "docs/decisions/0001-first.md": "# 1. First\n\n**Context.** a\n\n**Decision.** b\n\n**Consequences.** c\n",
 }
 
@@ -37,6 +38,8 @@ class Pages(unittest.TestCase):
             ({"docs/manual/other.md": "# Other\n"}, "docs/manual/index.md: names docs/manual/other.md 0 times, not once"),
             ({"docs/manual/index.md": "[page](page.md) [page](page.md)\n"},
              "docs/manual/index.md: names docs/manual/page.md 2 times, not once"),
+            ({"docs/manual/page.md": TREE["docs/manual/page.md"] + "[the manual](index.md)\n"},
+             "docs/manual/page.md: index.md: not in the package birdseyed, which has this page"),
             ({"docs/decisions/0003-third.md": first.replace("1. First", "3. Third")},
              "docs/decisions/0003-third.md: is not number 2"),
             ({"docs/decisions/0001-first.md": first.replace("1. First", "2. First")},

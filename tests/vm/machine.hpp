@@ -16,7 +16,8 @@ struct Answer {
 /// The one virtual machine of a run (hw-sim/vm), with the tracker's adapter plugged in from outside.
 class Machine {
  public:
-  /// Boots it; out: the folder that the guest has as /run/out. Fails the test where it does not come up.
+  /// Boots it, three times at most; out: the folder that the guest has as /run/out. Fails the test where it does not
+  /// come up.
   explicit Machine(const std::filesystem::path& out);
   ~Machine();
   Machine(const Machine&) = delete;
@@ -37,6 +38,7 @@ class Machine {
   static constexpr const char* kAdapterSerial = "CART0001";
 
  private:
+  bool boots();
   bool read_until(std::size_t size, Deadline deadline);
   std::string read_line(Deadline deadline);
 

@@ -58,7 +58,7 @@ std::vector<Row> of_files() {
        }},
       {"an operation taken up with last week's CT of the patient", Must::refuse, "another CT", "",
        [] { return taken_up({}, [](Rehearsal& o) { o.markers_mm[0].x() += 2; }); }},
-      {"an operation taken up, and the patient has moved since", Must::refuse, "point at",
+      {"an operation taken up, and the patient has moved since", Must::refuse, "two landmarks",
        "a landmark is asked for first", [] { return taken_up({}, move_patient); }},
       {"a calibration record of which one figure was edited", Must::refuse, "checksum does not fit", "",
        [] {
