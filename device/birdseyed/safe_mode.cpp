@@ -31,6 +31,8 @@ bool is_part(const std::string& name) {
 bool write_whole(const fs::path& path, const std::string& text) {
   fs::path written = path;
   written += ".new";
+  std::error_code ignored;
+  fs::remove(written, ignored);  // a link that lies there leads to another file
   std::ofstream out(written, std::ios::binary);
   out << text;
   out.close();

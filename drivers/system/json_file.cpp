@@ -4,12 +4,11 @@
 #include <string>
 
 #include "calibration/base/nesting.hpp"
-#include "drivers/system/whole_file.hpp"
 
 namespace birdseye {
 
-Result<nlohmann::json> read_json_file(const std::filesystem::path& path) {
-  const auto text = read_whole_file(path, kMostTextBytes);
+Result<nlohmann::json> read_json_file(const std::filesystem::path& path, std::size_t most_bytes) {
+  const auto text = read_whole_file(path, most_bytes);
   if (!text) return text.error();
   auto json = nests_too_deeply(*text, Notation::json) ? nlohmann::json(nlohmann::json::value_t::discarded)
                                                       : nlohmann::json::parse(*text, nullptr, false);

@@ -28,8 +28,14 @@ Result<void> write_field(const std::filesystem::path& path, const DisplacementFi
 }
 
 Result<void> check_sound(const DisplacementField& field) {
+  constexpr float kFarthest_mm = 1000;  // farther than anything in a patient moves
   for (const Eigen::Vector3f& u : field.displacement_mm) {
     if (!u.allFinite()) return Error{Errc::bad_value, "has displacements that are not finite numbers"};
+    if (u.norm() > kFarthest_mm) {
+      return Error{
+          Errc::bad_value,
+          fmt::format("has a displacement of {:.3g} mm; give displacements in mm, as an organ moves", u.norm())};
+    }
   }
   if (std::min({field.size[0], field.size[1], field.size[2]}) < 2)
     return Error{Errc::bad_value, "is no volume of displacements: every axis needs at least two points"};

@@ -50,4 +50,8 @@ Result<void> note_author(const std::string& path, std::string_view kind, std::st
   return {};
 }
 
+void note_resting_on(const std::string& path, const std::string& doubt) {
+  if (!doubt.empty()) fmt::print(stderr, "birdseye: {}: rests on what no known machine signed ({})\n", path, doubt);
+}
+
 }  // namespace birdseye::host

@@ -34,4 +34,7 @@ struct Authors {
 Result<void> note_author(const std::string& path, std::string_view kind, std::string_view sha256,
                          const std::optional<calibration::FileSignature>& signature);
 
+/// The same of what such a file rests on; doubt: empty where all of it is signed by somebody known.
+void note_resting_on(const std::string& path, const std::string& doubt);
+
 }  // namespace birdseye::host

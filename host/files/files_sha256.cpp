@@ -7,13 +7,13 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <system_error>
 #include <vector>
 
 #include "calibration/record/sha256.hpp"
+#include "drivers/system/json_file.hpp"
 #include "drivers/system/whole_file.hpp"
 
 namespace birdseye::host {
@@ -60,15 +60,17 @@ Result<std::string> files_sha256(const fs::path& path) {
 }
 
 Result<void> check_against_sheet(const fs::path& path) {
+  constexpr std::size_t kMostSheetBytes = 1U << 20U;
   const fs::path sheet = path.parent_path() / "result.json";
-  std::ifstream in(sheet);
-  const nlohmann::json json = in ? nlohmann::json::parse(in, nullptr, false) : nlohmann::json();
+  auto json = read_json_file(sheet, kMostSheetBytes);
+  if (!json && json.error().code == Errc::not_found) return {};
+  if (!json) return json.error();
   const std::string name = path.filename().string();
-  if (!json.is_object() || !json.contains("sha256") || !json["sha256"].is_object() || !json["sha256"].contains(name))
-    return {};
+  const nlohmann::json sums = json->is_object() ? json->value("sha256", nlohmann::json()) : nlohmann::json();
+  if (!sums.contains(name)) return {};
   const auto sum = files_sha256(path);
   if (!sum) return sum.error();
-  if (json["sha256"][name] == *sum) return {};
+  if (sums[name] == *sum) return {};
   return Error{Errc::bad_format, fmt::format("{}: is not the file of which {} tells: it was changed since, or is of "
                                              "another registration; register again",
                                              path.string(), sheet.string())};

@@ -7,8 +7,8 @@
 #include <optional>
 #include <string_view>
 
-#include "calibration/base/nesting.hpp"
 #include "calibration/record/sha256.hpp"
+#include "calibration/record/strict_json.hpp"
 
 namespace birdseye::host {
 
@@ -140,14 +140,14 @@ Result<nlohmann::json> unseal(const std::string& text) {
   const std::size_t end = text.rfind(fmt::format("\n\"{}\": ", kWhole));
   if (end == std::string::npos || text.substr(end + 1) != end_of(text.substr(0, end + 1)))
     return Error{Errc::bad_format, damage(text)};
-  if (nests_too_deeply(text, Notation::json)) return Error{Errc::bad_format, "nests lists deeper than any"};
   const auto line = find_line(text, kSigned);
   // What stands behind a signature it does not hold for: there are the sums of what stands before, and nothing else.
   if (line && text != signed_text_of(before(text, *line), *line))
     return Error{Errc::bad_format, "holds more than was signed: something was put in behind its signature"};
   const std::string read = line ? without_comma(before(text, *line)) + "\n}\n" : text;
-  nlohmann::json json = nlohmann::json::parse(read, nullptr, false);
-  if (!json.is_object()) return Error{Errc::bad_format, "is no object of JSON"};
+  auto json = calibration::strict_json<nlohmann::json>(read);
+  if (!json.is_object())
+    return Error{Errc::bad_format, "is no object of JSON, says something twice, or nests lists deeper than any"};
   json.erase(std::string(kSums));
   json.erase(std::string(kWhole));
   return json;

@@ -1,13 +1,16 @@
 #include "host/files/write_files.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
-#include <fstream>
+#include <cerrno>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <system_error>
 
 #include "drivers/system/durable.hpp"
+#include "drivers/system/unique_fd.hpp"
 
 namespace birdseye::host {
 
@@ -19,14 +22,31 @@ fs::path part_of(const fs::path& path) {
   return path.string() + ".part";
 }
 
-Result<void> put(const fs::path& path, const std::string& text, const fs::path& named) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out << text;
-  out.flush();
-  if (out) return {};
+/// flags: O_EXCL for a file that is made here, and nothing for a device or a pipe that is there, which is not waited
+/// for: one that nobody reads is refused.
+Result<void> put(const fs::path& path, const std::string& text, int flags, const fs::path& named) {
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666));
+  bool written = static_cast<bool>(fd);
+  if (written && ::fcntl(fd.get(), F_SETFL, 0) != 0) written = false;
+  for (std::size_t at = 0; written && at < text.size();) {
+    const ssize_t wrote = ::write(fd.get(), text.data() + at, text.size() - at);
+    if (wrote < 0 && errno == EINTR) continue;
+    written = wrote > 0;
+    if (written) at += static_cast<std::size_t>(wrote);
+  }
+  if (written) return {};
   return Error{Errc::unreadable,
                fmt::format("{}: cannot be written; check the folder, its permissions, and whether the disk is full",
                            named.string())};
+}
+
+/// Beside the file, in a file of its own: whatever lay there under that name, as a link to another file, is not written
+/// to.
+Result<void> put_part(const FileText& file) {
+  const fs::path part = part_of(file.path);
+  if (::unlink(part.c_str()) != 0 && errno != ENOENT)
+    return Error{Errc::unreadable, fmt::format("{}: is in the way; remove it", part.string())};
+  return put(part, file.text, O_EXCL | O_NOFOLLOW, file.path);
 }
 
 }  // namespace
@@ -51,7 +71,7 @@ Result<void> write_files(const std::vector<FileText>& files) {
       return give_up({Errc::unreadable, fmt::format("{}: is a folder; give a file", file.path.string())});
     }
     replaced.push_back(&file);
-    if (auto written = put(part_of(file.path), file.text, file.path); !written) return give_up(written.error());
+    if (auto written = put_part(file); !written) return give_up(written.error());
     if (auto synced = sync_file(part_of(file.path)); !synced) return give_up(synced.error());
   }
   std::set<fs::path> folders;
@@ -66,7 +86,7 @@ Result<void> write_files(const std::vector<FileText>& files) {
   }
   for (const FileText& file : files) {
     if (file.path.empty() || !fs::is_other(file.path, ignored)) continue;
-    if (auto written = put(file.path, file.text, file.path); !written) return written;
+    if (auto written = put(file.path, file.text, 0, file.path); !written) return written;
   }
   return {};
 }

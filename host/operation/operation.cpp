@@ -155,6 +155,7 @@ Result<Operation> read_operation(const fs::path& given) {
   if (!read) return read.error();
   if (auto noted = note_author(sheet_of(given).string(), kOperationFormat, read->by.sha256, read->by.signature); !noted)
     return noted.error();
+  note_resting_on(sheet_of(given).string(), read->operation.doubt);
   return std::move(read->operation);
 }
 
@@ -163,7 +164,8 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
   const auto refused = [&path](const std::string& why) {
     return Error{Errc::bad_format, fmt::format("{}: {}", path.string(), why)};
   };
-  const auto text = read_whole_file(path, kMostTextBytes);
+  constexpr std::size_t kMostBytes = 16U << 20U;  // a hundred times what one has
+  const auto text = read_whole_file(path, kMostBytes);
   if (!text && text.error().code == Errc::not_found) {
     return Error{Errc::not_found,
                  fmt::format("{}: is not there; give the --out folder of an earlier live", path.string())};
@@ -183,7 +185,7 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
     if (const nlohmann::json& version = sheet->at("format").at("version"); version != kVersion)
       return refused(fmt::format("is of version {}; this program reads version {}", version.dump(), kVersion));
     auto operation = operation_of(*sheet);
-    if (!operation) return operation.error().with_context(path.string());
+    if (!operation) return refused(operation.error().what + "; register anew");
     return SignedOperation{*std::move(operation), sealed_by(*text)};
   } catch (const std::exception&) {
     return refused(fmt::format("{}; register anew", kPartMissing));

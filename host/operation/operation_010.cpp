@@ -10,6 +10,7 @@
 #include "drivers/system/json_file.hpp"
 #include "drivers/system/whole_file.hpp"
 #include "host/files/text_files.hpp"
+#include "host/operation/finding_checks.hpp"
 #include "host/overlay/ct_sha256.hpp"
 
 namespace birdseye::host {
@@ -49,7 +50,9 @@ Result<CalibratedScope> calibrated_of_010(const fs::path& folder, const Json& js
       folder / "camera.yaml", folder / "camera_from_sensor.txt",
       {figure_of_010(json, "camera_rms_px"), figure_of_010(json, "held_out_px"), figure_of_010(json, "hand_eye_mm")});
   if (!scope) return scope.error();
-  return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(), true, instruments_of_010(json), ""};
+  CalibratedScope out{*std::move(scope), json.at("made_utc").get<std::string>(), true, instruments_of_010(json), ""};
+  if (auto sound = check_figures(out); !sound) return sound.error().with_context((folder / "operation.json").string());
+  return out;
 }
 
 Result<RegisteredPatient> registered_of_010(const fs::path& folder, const Json& json, const std::string& made_utc) {
@@ -64,9 +67,7 @@ Result<RegisteredPatient> registered_of_010(const fs::path& folder, const Json& 
   for (const Json& place : json.at("fiducials_in_patient_mm"))
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
-  if (out.fiducials_in_patient_mm.size() < 3)
-    return Error{Errc::bad_format, fmt::format("{}: names fewer than three fiducials; register anew",
-                                               (folder / "operation.json").string())};
+  if (auto sound = check_figures(out); !sound) return sound.error().with_context((folder / "operation.json").string());
   return out;
 }
 
@@ -99,6 +100,8 @@ Result<Operation> operation_of_010(const fs::path& folder, const Json& sheet, co
     const auto radius95_mm = figure_of_010(sheet, "deformed_target_radius95_mm");
     if (rms_mm && radius95_mm) deformed.target = {*rms_mm, *radius95_mm};
     deformed.made_utc = out.made_utc;
+    if (auto sound = check_figures(deformed); !sound)
+      return sound.error().with_context((folder / "operation.json").string());
     out.deformed = std::make_shared<const DeformedOrgan>(std::move(deformed));
   }
   return out;

@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <stdexcept>
 
 #include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/record/round_field_json.hpp"
 #include "host/files/packed_floats.hpp"
 #include "host/files/text_files.hpp"
+#include "host/operation/finding_checks.hpp"
 
 namespace birdseye::host {
 
@@ -16,8 +20,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Of a lattice: more than any, and few enough that their product is what it is.
-constexpr std::size_t kMostPoints = 1U << 26U;
+/// Of a lattice: thirty times as many as any that was found has.
+constexpr std::size_t kMostPoints = 1U << 20U;
 
 Json rows_of(const Eigen::MatrixXd& matrix) {
   Json rows = Json::array();
@@ -36,6 +40,15 @@ Matrix matrix_of(const Json& rows) {
       matrix(r, c) = rows.at(static_cast<std::size_t>(r)).at(static_cast<std::size_t>(c)).get<double>();
   }
   return matrix;
+}
+
+/// Throws, as the library's own accessors do, where it is no whole number that an int holds: else it would be another.
+int whole_number_of(const Json& json) {
+  if (!json.is_number_integer()) throw std::range_error("no whole number");
+  const bool fits = json.is_number_unsigned() ? json.get<std::uint64_t>() <= std::numeric_limits<int>::max()
+                                              : json.get<std::int64_t>() >= std::numeric_limits<int>::min();
+  if (!fits) throw std::range_error("no whole number");
+  return json.get<int>();
 }
 
 std::optional<double> figure_of(const Json& json, const char* name) {
@@ -113,8 +126,8 @@ Json json_of(const DeformedOrgan& found) {
 Result<CalibratedScope> calibrated_of(const Json& json) {
   const Json& lens = json.at("lens");
   CameraModel camera;
-  lens.at("width_px").get_to(camera.width_px);
-  lens.at("height_px").get_to(camera.height_px);
+  camera.width_px = whole_number_of(lens.at("width_px"));
+  camera.height_px = whole_number_of(lens.at("height_px"));
   const auto parameters = lens.at("fx_fy_cx_cy_k1_k2_p1_p2_k3").get<std::array<double, CameraModel::kParameters>>();
   set_parameters(camera, parameters.data());
   std::optional<CameraMatrix> covariance;
@@ -125,14 +138,16 @@ Result<CalibratedScope> calibrated_of(const Json& json) {
                        figure_of(json, "held_out_mm")};
   if (json.contains("hand_eye_covariance"))
     figures.hand_eye_covariance = matrix_of<Eigen::Matrix<double, 6, 6>>(json.at("hand_eye_covariance"));
-  if (json.contains("hand_eye_stations")) figures.hand_eye_stations = json.at("hand_eye_stations").get<int>();
+  if (json.contains("hand_eye_stations")) figures.hand_eye_stations = whole_number_of(json.at("hand_eye_stations"));
   auto scope = ScopeSetup::of_values(camera, covariance, Transform<Camera, Sensor>::from_matrix(hand_eye), figures);
   if (!scope) return scope.error();
   if (lens.contains("round_field"))
     scope = scope->with_round_field(calibration::round_field_of_json(lens.at("round_field")));
-  return CalibratedScope{*std::move(scope), json.at("made_utc").get<std::string>(),
-                         json.at("made_from").get<std::string>() == "board", instruments_of(json),
-                         json.value("scope", "")};
+  CalibratedScope out{*std::move(scope), json.at("made_utc").get<std::string>(),
+                      json.at("made_from").get<std::string>() == "board", instruments_of(json),
+                      json.value("scope", "")};
+  if (auto sound = check_figures(out); !sound) return sound.error();
+  return out;
 }
 
 Result<RegisteredPatient> registered_of(const Json& json) {
@@ -148,8 +163,7 @@ Result<RegisteredPatient> registered_of(const Json& json) {
   for (const Json& place : places)
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
-  if (out.fiducials_in_patient_mm.size() < 3)
-    return Error{Errc::bad_format, "names fewer than three fiducials; register anew"};
+  if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }
 
@@ -157,7 +171,8 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
   DeformedOrgan out;
   json.at("made_utc").get_to(out.made_utc);
   DisplacementField& field = out.field;
-  json.at("size").get_to(field.size);
+  for (std::size_t axis = 0; axis < field.size.size(); ++axis)
+    field.size[axis] = whole_number_of(json.at("size").at(axis));
   std::size_t points = 1;
   for (const int count : field.size) {
     if (count < 2 || static_cast<std::size_t>(count) > kMostPoints / points)
@@ -176,6 +191,7 @@ Result<DeformedOrgan> deformed_of(const Json& json) {
     const Json& target = json.at("target");
     out.target = {target.at("rms_mm").get<double>(), target.at("radius95_mm").get<double>()};
   }
+  if (auto sound = check_figures(out); !sound) return sound.error();
   return out;
 }
 

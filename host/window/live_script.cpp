@@ -56,7 +56,8 @@ std::string names_of_steps() {
 }  // namespace
 
 Result<LiveScript> LiveScript::read(const std::filesystem::path& path) {
-  const auto whole = read_whole_file(path, kMostTextBytes);
+  constexpr std::size_t kMostBytes = 1U << 20U;
+  const auto whole = read_whole_file(path, kMostBytes);
   if (!whole) return whole.error();
   std::istringstream file(*whole);
   LiveScript script;

@@ -97,7 +97,8 @@ std::vector<std::string> transfer_presets() {
 
 Result<TransferFunction> load_transfer_function(const std::string& name_or_path) {
   if (const auto found = presets().find(name_or_path); found != presets().end()) return TransferFunction(found->second);
-  const auto json = read_json_file(name_or_path);
+  constexpr std::size_t kMostBytes = 1U << 20U;
+  const auto json = read_json_file(name_or_path, kMostBytes);
   if (!json && json.error().code == Errc::not_found) {
     return Error{Errc::not_found, fmt::format("transfer function \"{}\": neither a file nor one of {}", name_or_path,
                                               fmt::join(transfer_presets(), ", "))};

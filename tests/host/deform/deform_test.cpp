@@ -184,6 +184,11 @@ TEST(DisplacementField, RefusesWhatIsNoSoundField) {
   tree.set_displacements({Vector3d(NAN, 0, 0)});
   ASSERT_TRUE(write_field(scratch / "nan.mha", field_of(tree, oblique_box())));
   EXPECT_NE(read_field(scratch / "nan.mha").error().what.find("not finite"), std::string::npos);
+  DisplacementField far = field_of(*PatchOctree::uniform(1), oblique_box());
+  for (Eigen::Vector3f& displacement : far.displacement_mm)
+    displacement.setConstant(1e30F);  // as one, so nothing folds
+  ASSERT_TRUE(write_field(scratch / "far.mha", far));
+  EXPECT_NE(read_field(scratch / "far.mha").error().what.find("as an organ moves"), std::string::npos);
   EXPECT_FALSE(write_field(scratch / "field.txt", field_of(tree, oblique_box())));
 }
 

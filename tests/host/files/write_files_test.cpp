@@ -1,7 +1,9 @@
 #include "host/files/write_files.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "calibration/record/sha256.hpp"
@@ -60,6 +62,37 @@ TEST(FilesSha256, AFileIsAsTheSheetBesideItSaysOrRefused) {
   const auto edited = check_against_sheet(field);
   ASSERT_FALSE(edited);
   EXPECT_NE(edited.error().what.find("field.mha: is not the file of which"), std::string::npos) << edited.error().what;
+}
+
+TEST(FilesSha256, ASheetThatIsThereAndCannotBeReadIsRefused) {
+  const birdseye::testing::Scratch scratch;
+  const std::string field = scratch.file("field.mha", "displacements");
+  const std::string sheet =
+      scratch.file("result.json", R"({"sha256": {"field.mha": ")" + calibration::sha256_of("others") + R"("}})");
+  EXPECT_FALSE(check_against_sheet(field));
+  std::filesystem::resize_file(sheet, std::filesystem::file_size(sheet) - 3);
+  EXPECT_NE(check_against_sheet(field).error().what.find("result.json: is not JSON"), std::string::npos);
+  std::filesystem::remove(sheet);
+  ASSERT_EQ(::mkfifo(sheet.c_str(), 0600), 0);
+  EXPECT_NE(check_against_sheet(field).error().what.find("result.json: is no file"), std::string::npos);
+}
+
+TEST(WriteFiles, NothingIsWrittenThroughALinkNorWaitedFor) {
+  const birdseye::testing::Scratch scratch;
+  const std::string other = scratch.file("other.txt", "another's"), path = scratch / "j.json";
+  std::filesystem::create_symlink(other, path + ".part");
+  EXPECT_TRUE(write_file(path, "ours"));
+  EXPECT_EQ(birdseye::testing::contents_of(other), "another's");
+  EXPECT_EQ(birdseye::testing::contents_of(path), "ours");
+  EXPECT_FALSE(std::filesystem::is_symlink(path));
+  ASSERT_EQ(::mkfifo((path + ".part").c_str(), 0600), 0);
+  EXPECT_TRUE(write_file(path, "again"));
+  EXPECT_EQ(birdseye::testing::contents_of(path), "again");
+
+  const std::string pipe = scratch / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_FALSE(write_file(pipe, "nobody reads it"));
+  EXPECT_TRUE(write_file("/dev/null", "anything"));
 }
 
 TEST(FilesSha256, OfAFolderNamesAndContentsCount) {

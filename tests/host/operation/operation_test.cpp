@@ -245,6 +245,56 @@ TEST(Operation, ALatticeOfAnotherSizeThanItsNumbersIsRefused) {
   }
 }
 
+/// Whoever signed it: with a negative error the circle would be too small.
+TEST(Operation, FiguresThatNobodyCanHaveMeasuredAreRefusedByTheirName) {
+  const Scratch scratch;
+  ASSERT_TRUE(write_operation(scratch.path(), whole_operation(), *testing::authors().machine));
+  const nlohmann::json sheet = *unseal(contents_of(scratch / "operation.json"));
+  const auto refusal = [&](const char* part, const char* figure, const nlohmann::json& value) {
+    nlohmann::json changed = sheet;
+    changed.at(part)[nlohmann::json::json_pointer(figure)] = value;
+    std::vector<SealedPart> parts;
+    for (const auto& [name, of_part] : changed.items()) parts.emplace_back(name, of_part);
+    const auto read = read_operation(scratch.file("other.json", sealed_text(parts)));
+    return read ? std::string("is taken up") : read.error().what;
+  };
+  const auto square = [](int side, double value) {
+    return nlohmann::json(std::vector<std::vector<double>>(static_cast<std::size_t>(side),
+                                                           std::vector<double>(static_cast<std::size_t>(side), value)));
+  };
+  nlohmann::json points = sheet.at("registered").at("fiducials_in_patient_mm");
+  for (nlohmann::json& point : points) point = {1, 2, 3};
+  const std::int64_t wraps = (std::int64_t{1} << 32) + 512;
+  for (const auto& [part, figure, value, told] :
+       {std::tuple<const char*, const char*, nlohmann::json, const char*>{"calibrated", "/held_out_mm", -1,
+                                                                          "held_out_mm is -1"},
+        {"calibrated", "/camera_rms_px", 1e300, "camera_rms_px"},
+        {"calibrated", "/hand_eye_stations", -5, "hand_eye_stations"},
+        {"calibrated", "/hand_eye_stations", 1e30, "is missing, or is not of the kind"},
+        {"calibrated", "/lens/width_px", wraps, "is missing, or is not of the kind"},
+        {"calibrated", "/lens/covariance", square(9, -1), "the lens's covariance is no covariance"},
+        {"calibrated", "/lens/covariance", square(9, 1e308), "the lens's covariance is no covariance"},
+        {"calibrated", "/hand_eye_covariance", square(6, -1), "hand_eye_covariance is no covariance"},
+        {"registered", "/fre_mm", -1, "fre_mm is -1"},
+        {"registered", "/fiducials_in_patient_mm", points, "at one place"},
+        {"registered", "/fiducials_in_patient_mm/0/0", 1e300, "m away"},
+        {"deformed", "/seen_rms_mm", -5, "seen_rms_mm is -5"},
+        {"deformed", "/target/radius95_mm", 0.001, "do not go together"},
+        {"deformed", "/target/radius95_mm", -1, "radius95_mm is -1"}}) {
+    const std::string said = refusal(part, figure, value);
+    EXPECT_NE(said.find(told), std::string::npos) << part << figure << ": " << said;
+    EXPECT_NE(said.find("register anew"), std::string::npos) << said;
+  }
+  EXPECT_EQ(refusal("registered", "/fre_mm", 0.31), "is taken up") << "else nothing above is told";
+}
+
+TEST(Operation, APartThatStandsTwiceIsRefused) {
+  const Scratch scratch;
+  const nlohmann::json part{{"a", 1}};
+  ASSERT_TRUE(unseal(sealed_text({{"one", part}, {"two", part}})));
+  EXPECT_FALSE(unseal(sealed_text({{"one", part}, {"one", part}})));
+}
+
 void wait_for(const OperationKeeper& keeper) {
   for (int i = 0; i < 1000 && keeper.writing(); ++i) sleep_for(Duration::from_ms(10));
   ASSERT_FALSE(keeper.writing());

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "calibration/base/result.hpp"
+#include "host/operation/findings.hpp"
+
+/// Whether what was read from a file can have been found at all, whoever signed it: the circle about a target is made
+/// of these figures, and a negative variance makes it smaller. Errc::bad_value names the figure.
+namespace birdseye::host {
+
+Result<void> check_figures(const CalibratedScope& found);
+Result<void> check_figures(const RegisteredPatient& found);
+Result<void> check_figures(const DeformedOrgan& found);
+
+}  // namespace birdseye::host
