@@ -60,11 +60,12 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
       if (known) running();  // its exposure is known now, or no longer
     }
     if (const Duration early = pace.free_at() - device_now(); early > Duration{}) sleep_for(early, stop);
-    auto frame = camera.next(device_now() + kPatience);
+    const DeviceTime until = device_now() + kPatience;
+    auto frame = camera.next(until);
     if (!frame) return frame.error();
-    const bool came = frame->has_value();
+    const bool came = frame->has_value(), damaged = !came && device_now() < until;
+    if (came || damaged) pace.passed(device_now());
     if (came) {
-      pace.passed(device_now());
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();
       // One frame over and over is no stream.
       if (std::exchange(newest, (*frame)->sequence) != (*frame)->sequence) heard = device_now();

@@ -20,10 +20,13 @@ Result<std::string> probe_tracker(const TrackerConfig& config, const std::stop_t
 Result<std::string> probe_camera(const drivers::CameraSettings& settings) {
   const auto camera = drivers::open_camera(settings);
   if (!camera) return camera.error();
-  const auto frame = (*camera)->next(device_now() + Duration::from_ms(2000));
-  if (!frame) return frame.error();
-  if (!*frame) return Error{Errc::timeout, fmt::format("{}: the camera sends no frames", (*camera)->name())};
-  return (*camera)->describe();
+  const Deadline deadline = Deadline::after(Duration::from_ms(2000));
+  while (!deadline.passed()) {
+    const auto frame = (*camera)->next(deadline);
+    if (!frame) return frame.error();
+    if (*frame) return (*camera)->describe();
+  }
+  return Error{Errc::timeout, fmt::format("{}: the camera sends no whole frames", (*camera)->name())};
 }
 
 Result<std::string> probe_gpio(const drivers::GpioSettings& settings) {

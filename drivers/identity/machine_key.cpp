@@ -20,6 +20,7 @@
 
 #include "drivers/system/durable.hpp"
 #include "drivers/system/unique_fd.hpp"
+#include "drivers/system/whole_file.hpp"
 
 namespace birdseye {
 
@@ -107,9 +108,10 @@ int no_password(char* /*to*/, int /*size*/, int /*writing*/, void* /*user*/) {
 }
 
 Result<std::shared_ptr<EVP_PKEY>> read_key(const fs::path& file) {
-  const UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  const auto fd = open_file(file);
+  if (!fd) return fd.error();
   struct stat status {};
-  if (!fd || ::fstat(fd.get(), &status) != 0) return cannot(file, "cannot be read");
+  if (::fstat(fd->get(), &status) != 0) return cannot(file, "cannot be read");
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
     return Error{
         Errc::bad_value,
@@ -118,7 +120,7 @@ Result<std::shared_ptr<EVP_PKEY>> read_key(const fs::path& file) {
                     file.string(), file.string())};
   }
   std::array<char, kMostBytes> bytes{};
-  const auto size = ::read(fd.get(), bytes.data(), bytes.size());
+  const auto size = ::read(fd->get(), bytes.data(), bytes.size());
   if (size < 0) return cannot(file, "cannot be read");
   const Bio text(BIO_new_mem_buf(bytes.data(), static_cast<int>(size)), &BIO_free);
   auto key = owned(text ? PEM_read_bio_PrivateKey(text.get(), nullptr, &no_password, nullptr) : nullptr);

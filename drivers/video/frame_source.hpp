@@ -61,7 +61,8 @@ struct ControlReport {
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// The next frame; empty at the deadline; Errc::disconnected when the camera is gone: open it again.
+  /// The next frame; empty at the deadline, and earlier where one was damaged; Errc::disconnected when the camera is
+  /// gone: open it again.
   virtual Result<std::optional<Frame>> next(Deadline deadline) = 0;
   [[nodiscard]] virtual const std::string& name() const = 0;
   /// One line: device, driver, format, size, rate, stamps.

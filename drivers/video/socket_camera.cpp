@@ -69,20 +69,16 @@ Result<bool> SocketCamera::fill(std::vector<std::uint8_t>& buffer, std::size_t& 
 }
 
 Result<std::optional<Frame>> SocketCamera::next(Deadline deadline) {
-  for (;;) {
-    if (!payload_) {
-      header_.resize(kHeaderBytes);
-      const auto whole = fill(header_, header_have_, deadline);
-      if (!whole) return whole.error();
-      if (!*whole) return std::optional<Frame>();
-      if (auto read = read_header(); !read) return read.error();
-    }
-    const auto whole = fill(*payload_, payload_have_, deadline);
+  if (!payload_) {
+    header_.resize(kHeaderBytes);
+    const auto whole = fill(header_, header_have_, deadline);
     if (!whole) return whole.error();
     if (!*whole) return std::optional<Frame>();
-    if (auto frame = finish()) return frame;
-    if (deadline.passed()) return std::optional<Frame>();
+    if (auto read = read_header(); !read) return read.error();
   }
+  const auto whole = fill(*payload_, payload_have_, deadline);
+  if (!whole) return whole.error();
+  return *whole ? finish() : std::optional<Frame>();
 }
 
 /// Nothing of it is believed before all of it makes sense.

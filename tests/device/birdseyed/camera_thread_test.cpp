@@ -42,6 +42,9 @@ class Program {
   }
   std::atomic<bool> sticks = false;  ///< the same frame over and over
   std::atomic<bool> floods = false;  ///< as fast as the socket takes them
+  /// Of so many frames all but one are damaged.
+  static constexpr std::uint64_t kOneWholeOf = 50;
+  std::atomic<bool> damages = false;
 
  private:
   bool send(int client) {
@@ -53,7 +56,7 @@ class Program {
     std::memcpy(bytes.data(), "BEFRAME1", 8);
     std::memcpy(bytes.data() + 8, &width, sizeof width);
     std::memcpy(bytes.data() + 12, &height, sizeof height);
-    std::memcpy(bytes.data() + 16, "RGB3", 4);
+    std::memcpy(bytes.data() + 16, damages && sequence_ % kOneWholeOf != 0 ? "MJPG" : "RGB3", 4);
     std::memcpy(bytes.data() + 24, &sequence_, sizeof sequence_);
     std::memcpy(bytes.data() + 32, &acquired_ns, sizeof acquired_ns);
     std::memcpy(bytes.data() + 40, &sigma_ns, sizeof sigma_ns);
@@ -131,6 +134,25 @@ TEST_F(ACamera, ThatSendsAsFastAsItCanIsReadAtFourTimesItsRate) {
   }
   // What the queue dropped came in between, and only makes it longer.
   EXPECT_GE((*last - *first).seconds(), (kFrames - 1 - kAtOnce) / 400.0);
+}
+
+/// They cost as much to read as whole ones.
+TEST_F(ACamera, ThatSendsDamagedFramesAsFastAsItCanIsReadNoFaster) {
+  program_.damages = true;
+  program_.floods = true;
+  next(InstrumentState::running);
+  constexpr int kWhole = 4, kAtOnce = 9;
+  std::optional<DeviceTime> first, last;
+  for (int came = 0; came < kWhole;) {
+    const auto event = queue_.pop(device_now() + Duration::from_ms(20'000), {});
+    ASSERT_TRUE(event);
+    const auto* const frame = std::get_if<FrameCame>(&*event);
+    if (frame == nullptr || frame->frame.sequence % Program::kOneWholeOf != 0) continue;
+    ++came;
+    if (!first) first = frame->frame.arrived;
+    last = frame->frame.arrived;
+  }
+  EXPECT_GE((*last - *first).seconds(), ((kWhole - 1) * static_cast<int>(Program::kOneWholeOf) - kAtOnce) / 400.0);
 }
 
 TEST_F(ACamera, IsHeldOnceAndLetGoOnceAsIsWanted) {

@@ -138,6 +138,13 @@ TEST(MachineKey, RefusesAFileThatIsNoKeyOfItsKind) {
   }
 }
 
+TEST(MachineKey, APipeInItsPlaceIsNotWaitedFor) {
+  const Scratch folder;
+  ASSERT_EQ(::mkfifo((folder / "key.pem").c_str(), 0600), 0);
+  EXPECT_NE(error_of(folder.path()).find("key.pem: is no file but a pipe"), std::string::npos)
+      << error_of(folder.path());
+}
+
 TEST(MachineKey, NamesAFolderThatCannotBe) {
   const Scratch scratch;
   EXPECT_NE(error_of(scratch.file("file", "") + "/identity").find("/file/identity: "), std::string::npos);
