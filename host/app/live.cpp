@@ -268,6 +268,8 @@ Result<ExitCode> run(LiveOptions& options) {
   nlohmann::json json = json_of(app.figures(), app.operation());
   Verdict verdict;
   if (!ran) verdict.add(Grade::fail, ran.error().what);
+  // What the window said to the last of what it could not take up, or keep.
+  if (const std::string& fault = app.operation().fault; !fault.empty()) verdict.add(Grade::marginal, fault);
   if (app.log()) {
     if (auto closed = app.log()->close(); !closed) return closed.error();
     if (options.simulate) {

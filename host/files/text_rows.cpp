@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "drivers/system/whole_file.hpp"
 #include "host/files/name_order.hpp"
 #include "host/files/next_line.hpp"
 #include "host/files/pose_collector.hpp"
@@ -15,14 +16,18 @@ namespace {
 constexpr std::uintmax_t kMostBytes = 1'000'000'000;
 constexpr std::size_t kLongestRow = std::size_t{1} << 20U;
 
-/// The first line that has more bytes than a line of a table may have, from 1.
-std::optional<std::size_t> too_long_a_line(std::istream& in) {
+/// Whoever reads a table keeps its rows: a file of gigabytes without ends of lines, or of nothing but these, would take
+/// several times as much memory.
+Result<void> check_lines(std::istream& in) {
+  constexpr std::size_t kMostLines = 4'000'000;  // eleven hours of a tracker
   std::string line;
-  for (std::size_t number = 1;; ++number) {
-    if (next_line(in, line, kLongestRow)) continue;
-    if (in.eof()) return std::nullopt;
-    return number;
+  std::size_t number = 1;
+  for (; next_line(in, line, kLongestRow); ++number) {
+    if (number > kMostLines)
+      return Error{Errc::unsupported, fmt::format("has more than {} lines; give a part of it", kMostLines)};
   }
+  if (in.eof()) return {};
+  return Error{Errc::bad_format, fmt::format("line {} is longer than any line of a table; is it a text?", number)};
 }
 
 /// Whether text is a number with a comma in the place of its point, as 1,5 or -3,7E+02.
@@ -52,19 +57,14 @@ void drop_empty_ends(std::vector<std::string>& fields, std::size_t count) {
 }
 
 Result<TextRows> TextRows::open(const std::filesystem::path& path) {
+  if (const auto opened = open_file(path); !opened) return opened.error();
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored))
-    return Error{Errc::not_found, fmt::format("{}: no such file", path.string())};
   std::ifstream file(path, std::ios::binary);
   if (!file) return Error{Errc::unreadable, fmt::format("{}: cannot be opened; check its permissions", path.string())};
   if (std::filesystem::file_size(path, ignored) > kMostBytes)
     return Error{Errc::unsupported, fmt::format("{}: is larger than 1 GB; give a part of it", path.string())};
-  // One line without an end would take all of a file into memory, several times.
   if (std::filesystem::file_size(path, ignored) > kLongestRow) {
-    if (const auto line = too_long_a_line(file)) {
-      return Error{Errc::bad_format,
-                   fmt::format("{}: line {} is longer than any line of a table; is it a text?", path.string(), *line)};
-    }
+    if (auto checked = check_lines(file); !checked) return checked.error().with_context(path.string());
     file.clear();
     file.seekg(0);
   }

@@ -84,12 +84,18 @@ TEST(TextRows, RefusesUtf16AndWhatIsNotThere) {
   EXPECT_FALSE(TextRows::open(scratch.path()));
 }
 
-TEST(TextRows, RefusesALineWithoutEndByItsNumberAndNoLongTable) {
+TEST(TextRows, RefusesALineWithoutEndAndATableWithoutEnd) {
   const Scratch scratch;
   const std::string megabyte(std::size_t{1} << 20U, '1');
   const auto endless = TextRows::open(scratch.file("e.csv", "a,b\n1,2\n" + megabyte + "1"));
   ASSERT_FALSE(endless);
   EXPECT_NE(endless.error().what.find("e.csv: line 3 is longer"), std::string::npos) << endless.error().what;
+
+  const std::string ends(4'000'001, '\n');
+  const auto long_table = TextRows::open(scratch.file("l.csv", ends));
+  ASSERT_FALSE(long_table);
+  EXPECT_NE(long_table.error().what.find("l.csv: has more than 4000000 lines"), std::string::npos)
+      << long_table.error().what;
 
   std::string table = "\xEF\xBB\xBF# a,b\n";
   std::size_t count = 0;
