@@ -92,8 +92,14 @@ std::string read_pixels(DcmDataset& dataset, int frames, LabelPixels& pixels) {
 /// Places, segments, spacing and axes; empty, or what is wrong.
 std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, std::vector<LabelFrame>& frames) {
   DcmItem* const shared = item_of(dataset, DCM_SharedFunctionalGroupsSequence);
+  const auto groups = items_of(dataset, DCM_PerFrameFunctionalGroupsSequence);
+  if (groups.empty()) return "has no frames with a place; export it again";
+  const auto said = integer_of(dataset, DCM_NumberOfFrames);
+  if (!said) return "does not say how many frames it has (0028,0008); export it again";
+  if (*said < 1 || static_cast<std::size_t>(*said) != groups.size())
+    return fmt::format("says it has {} frames, and has the places of {}; export it again", *said, groups.size());
   std::vector<double> axes, spacing, thickness;
-  for (DcmItem* own : items_of(dataset, DCM_PerFrameFunctionalGroupsSequence)) {
+  for (DcmItem* own : groups) {
     const FrameElements elements(dataset, own, shared);
     const auto place = elements.numbers(DCM_ImagePositionPatient);
     if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
@@ -110,7 +116,6 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     }
     frames.push_back({{place[0], place[1], place[2]}, by_pixels ? 0 : static_cast<int>(number[0])});
   }
-  if (frames.empty()) return "has no frames with a place; export it again";
   if (axes.size() != 6 || spacing.size() != 2 || !(spacing[0] > 0) || !(spacing[1] > 0))
     return "has no sound orientation and spacing; export it again";
   const Eigen::Vector3d row(axes[0], axes[1], axes[2]), column(axes[3], axes[4], axes[5]);
