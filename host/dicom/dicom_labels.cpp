@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "host/dicom/dicom_dataset.hpp"
@@ -44,11 +45,20 @@ struct LabelPixels {
   }
 };
 
-std::vector<NamedLabel> read_names(DcmDataset& dataset) {
-  std::vector<NamedLabel> names;
+/// The segments that the file has; empty, or what is wrong. by_pixels: one may be the background, as 0.
+std::string read_names(DcmDataset& dataset, bool by_pixels, std::vector<NamedLabel>& names) {
+  constexpr int kHighestSegment = 65535;
+  std::set<int> numbers;
   for (DcmItem* segment : items_of(dataset, DCM_SegmentSequence)) {
+    const auto number = integer_of(*segment, DCM_SegmentNumber);
+    if (!number || *number < (by_pixels ? 0 : 1) || *number > kHighestSegment) {
+      return fmt::format("has a segment of the number '{}', which is none from 1 to {} (0062,0004); export it again",
+                         words_of(dataset, text_of(*segment, DCM_SegmentNumber).substr(0, 16)), kHighestSegment);
+    }
+    if (!numbers.insert(*number).second)
+      return fmt::format("has two segments of the number {} (0062,0004); export it again", *number);
     NamedLabel label;
-    label.number = integer_of(*segment, DCM_SegmentNumber).value_or(0);
+    label.number = *number;
     label.name = words_of(dataset, text_of(*segment, DCM_SegmentLabel));
     if (DcmItem* const type = item_of(*segment, DCM_SegmentedPropertyTypeCodeSequence);
         label.name.empty() && type != nullptr) {
@@ -56,7 +66,21 @@ std::vector<NamedLabel> read_names(DcmDataset& dataset) {
     }
     names.push_back(std::move(label));
   }
-  return names;
+  return {};
+}
+
+/// What a frame's groups, or those that the frames share, say of its segment; 0 where it is no number of one.
+int segment_of(DcmItem* own, DcmItem* shared, const FrameElements& elements) {
+  std::vector<double> number = elements.numbers(DCM_ReferencedSegmentNumber);
+  // An image that the segmentation was made from may be a segmentation, whose segments are not this one's.
+  for (DcmItem* group : {shared, own}) {
+    DcmItem* const segment = group == nullptr ? nullptr : item_of(*group, DCM_SegmentIdentificationSequence);
+    const std::string text = segment == nullptr ? std::string() : text_of(*segment, DCM_ReferencedSegmentNumber);
+    if (!text.empty()) number = numbers_in(text);
+  }
+  const bool sound =
+      number.size() == 1 && number[0] >= 1 && number[0] <= kHighestLabel && number[0] == std::floor(number[0]);
+  return sound ? static_cast<int>(number[0]) : 0;
 }
 
 /// The pixels of all frames as they are stored; empty, or why not.
@@ -103,9 +127,8 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     const FrameElements elements(dataset, own, shared);
     const auto place = elements.numbers(DCM_ImagePositionPatient);
     if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
-    const auto number = elements.numbers(DCM_ReferencedSegmentNumber);
-    if (!by_pixels && (number.size() != 1 || number[0] < 1 || number[0] > kHighestLabel))
-      return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
+    const int segment = by_pixels ? 0 : segment_of(own, shared, elements);
+    if (!by_pixels && segment == 0) return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
     if (frames.empty()) {
       axes = elements.numbers(DCM_ImageOrientationPatient);
       spacing = elements.numbers(DCM_PixelSpacing);
@@ -114,7 +137,7 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     } else if (elements.numbers(DCM_ImageOrientationPatient) != axes) {
       return "has frames that are turned against one another; export it on the grid of the CT";
     }
-    frames.push_back({{place[0], place[1], place[2]}, by_pixels ? 0 : static_cast<int>(number[0])});
+    frames.push_back({{place[0], place[1], place[2]}, segment});
   }
   if (axes.size() != 6 || spacing.size() != 2 || !(spacing[0] > 0) || !(spacing[1] > 0))
     return "has no sound orientation and spacing; export it again";
@@ -212,11 +235,12 @@ Result<DicomLabels> read_dicom_labels(const fs::path& path) {
                    fmt::format("is a segmentation of type '{}'; export it as a binary one", words_of(dataset, type)));
   }
   DicomLabels out;
-  out.names = read_names(dataset);
   std::vector<LabelFrame> frames;
   std::vector<int> slice_of;
   LabelPixels pixels;
-  std::string wrong = read_frames(dataset, type == "LABELMAP", out, frames);
+  const bool by_pixels = type == "LABELMAP";
+  std::string wrong = read_names(dataset, by_pixels, out.names);
+  if (wrong.empty()) wrong = read_frames(dataset, by_pixels, out, frames);
   if (wrong.empty()) wrong = stack_frames(frames, out, slice_of);
   if (wrong.empty()) wrong = read_pixels(dataset, static_cast<int>(frames.size()), pixels);
   if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);

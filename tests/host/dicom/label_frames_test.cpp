@@ -48,5 +48,70 @@ TEST(DicomSegFrames, AreAsManyAsTheFileSays) {
               "does not say how many frames it has (0028,0008)");
 }
 
+/// Sets the number of the second of the segments that a file names.
+testing::Elements second_segment(const std::string& number) {
+  return [number](DcmDataset& dataset) {
+    DcmItem* segment = nullptr;
+    ASSERT_TRUE(dataset.findAndGetSequenceItem(DCM_SegmentSequence, segment, 1).good());
+    ASSERT_TRUE(segment->findAndDeleteElement(DCM_SegmentNumber).good());
+    // As a text, whatever it says.
+    auto* const text = new DcmIntegerString(DcmTag(DCM_SegmentNumber, EVR_IS));
+    ASSERT_TRUE(text->putString(number.c_str()).good());
+    ASSERT_TRUE(segment->insert(text).good());
+  };
+}
+
+TEST(DicomSegFrames, SegmentsHaveWholeNumbersFromOneOnEachItsOwn) {
+  const Segmentation seg = stack_of({0, 2});
+  EXPECT_EQ(said_of(seg, second_segment("4002")), "") << "numbers may be left out";
+  for (const char* number : {"0", "-7", "1.5", "65536", "2147483647", ""}) {
+    expect_said(said_of(seg, second_segment(number)),
+                fmt::format("has a segment of the number '{}', which is none from 1 to 65535", number));
+  }
+  expect_said(said_of(seg, second_segment("1")), "has two segments of the number 1 ");
+}
+
+TEST(DicomSegFrames, OfALabelMapTheBackgroundMayBeASegment) {
+  Segmentation seg = stack_of({0, 2});
+  seg.type = "LABELMAP";
+  for (auto& frame : seg.frames) frame.segment = 0;
+  EXPECT_EQ(said_of(seg, second_segment("0")), "");
+  expect_said(said_of(seg, second_segment("-1")), "has a segment of the number '-1'");
+}
+
+/// Says of the first frame, in its groups or in those of all frames, which segment it is of.
+testing::Elements frames_are_of(const std::string& segment, const DcmTagKey& groups) {
+  return [segment, groups](DcmDataset& dataset) {
+    DcmItem *own = nullptr, *group = nullptr, *identification = nullptr;
+    ASSERT_TRUE(dataset.findAndGetSequenceItem(DCM_PerFrameFunctionalGroupsSequence, own, 0).good());
+    ASSERT_TRUE(own->findAndDeleteElement(DCM_SegmentIdentificationSequence).good());
+    ASSERT_TRUE(dataset.findAndGetSequenceItem(groups, group, 0).good());
+    ASSERT_TRUE(group->findOrCreateSequenceItem(DCM_SegmentIdentificationSequence, identification, -2).good());
+    auto* const text = new DcmDecimalString(DcmTag(DCM_ReferencedSegmentNumber, EVR_DS));
+    ASSERT_TRUE(text->putString(segment.c_str()).good());
+    ASSERT_TRUE(identification->insert(text).good());
+  };
+}
+
+TEST(DicomSegFrames, AreOfASegmentWithAWholeNumber) {
+  const Segmentation seg = stack_of({0, 2});
+  for (const DcmTagKey& groups : {DCM_PerFrameFunctionalGroupsSequence, DCM_SharedFunctionalGroupsSequence}) {
+    EXPECT_EQ(said_of(seg, frames_are_of("2", groups)), "");
+    for (const char* number : {"1.5", "0", "-1", "1\\2", "65536", ""})
+      expect_said(said_of(seg, frames_are_of(number, groups)), "frame 1 is of no segment; export it again");
+  }
+}
+
+TEST(DicomSegFrames, TheSegmentsOfImagesThatTheyWereMadeFromAreNotTheirs) {
+  EXPECT_EQ(said_of(stack_of({0, 2}),
+                    [](DcmDataset& dataset) {
+                      DcmItem* own = nullptr;
+                      ASSERT_TRUE(dataset.findAndGetSequenceItem(DCM_PerFrameFunctionalGroupsSequence, own, 0).good());
+                      DcmItem& derivation = testing::add_item(*own, DCM_DerivationImageSequence);
+                      put(testing::add_item(derivation, DCM_SourceImageSequence), DCM_ReferencedSegmentNumber, 9);
+                    }),
+            "");
+}
+
 }  // namespace
 }  // namespace birdseye::host
