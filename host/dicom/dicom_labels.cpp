@@ -113,7 +113,7 @@ std::string read_pixels(DcmDataset& dataset, int frames, LabelPixels& pixels) {
   return {};
 }
 
-/// Places, segments, spacing and axes; empty, or what is wrong.
+/// Places, segments, spacing and axes, out.names being known; empty, or what is wrong.
 std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, std::vector<LabelFrame>& frames) {
   DcmItem* const shared = item_of(dataset, DCM_SharedFunctionalGroupsSequence);
   const auto groups = items_of(dataset, DCM_PerFrameFunctionalGroupsSequence);
@@ -122,6 +122,8 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
   if (!said) return "does not say how many frames it has (0028,0008); export it again";
   if (*said < 1 || static_cast<std::size_t>(*said) != groups.size())
     return fmt::format("says it has {} frames, and has the places of {}; export it again", *said, groups.size());
+  std::set<int> numbers;
+  for (const NamedLabel& label : out.names) numbers.insert(label.number);
   std::vector<double> axes, spacing, thickness;
   for (DcmItem* own : groups) {
     const FrameElements elements(dataset, own, shared);
@@ -129,6 +131,10 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
     const int segment = by_pixels ? 0 : segment_of(own, shared, elements);
     if (!by_pixels && segment == 0) return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
+    if (!by_pixels && !numbers.contains(segment)) {
+      return fmt::format("frame {} is of segment {}, which is none of its segments (0062,0002); export it again",
+                         frames.size() + 1, segment);
+    }
     if (frames.empty()) {
       axes = elements.numbers(DCM_ImageOrientationPatient);
       spacing = elements.numbers(DCM_PixelSpacing);

@@ -113,5 +113,14 @@ TEST(DicomSegFrames, TheSegmentsOfImagesThatTheyWereMadeFromAreNotTheirs) {
             "");
 }
 
+TEST(DicomSegFrames, AreOfASegmentThatTheFileHas) {
+  Segmentation seg = stack_of({0, 2, 4});
+  seg.frames[1].segment = 7;
+  expect_said(said_of(seg), "frame 2 is of segment 7, which is none of its segments (0062,0002); export it again");
+  seg = stack_of({0});
+  seg.names.clear();
+  expect_said(said_of(seg), "frame 1 is of segment 1, which is none of its segments");
+}
+
 }  // namespace
 }  // namespace birdseye::host
