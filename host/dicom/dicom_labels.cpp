@@ -167,8 +167,19 @@ double least_step_mm(const std::vector<double>& along) {
   return least;
 }
 
+/// A frame that gets the slice of another one of its segment, where slices lie a step apart; null where none does.
+const LabelFrame* doubled_frame(const std::vector<LabelFrame>& frames, const std::vector<double>& along, double step) {
+  const double low = *std::min_element(along.begin(), along.end());
+  std::set<std::pair<int, double>> taken;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!taken.emplace(frames[i].segment, std::round((along[i] - low) / step)).second) return &frames[i];
+  }
+  return nullptr;
+}
+
 /// The slice of each frame, from 0, in a stack from the first place to the last; empty, or what is wrong.
 std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out, std::vector<int>& slice_of) {
+  constexpr double kLeastStep_mm = 0.1;  // of a CT; places that differ by less differ by rounding
   const Eigen::Vector3d normal = out.axes.col(2);
   std::vector<double> along;
   along.reserve(frames.size());
@@ -183,7 +194,9 @@ std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out
              return std::abs(slices - std::round(slices)) < 0.2;
            });
   };
-  const double step = fits(said) ? said : fits(least) ? least : 0;
+  double step = fits(said) ? said : fits(least) ? least : 0;
+  // Two slices much thicker than they lie apart seem to be one.
+  if (step > 0 && least >= kLeastStep_mm && fits(least) && doubled_frame(frames, along, step) != nullptr) step = least;
   if (step == 0 && *high - *low > 0.01) return "has frames at uneven distances; export it on the grid of the CT";
   out.spacing_mm.z() = step > 0 ? step : 1;
   const Eigen::Vector3d first = frames[static_cast<std::size_t>(low - along.begin())].place_mm;
@@ -196,6 +209,12 @@ std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out
     const Eigen::Vector3d aside = frames[i].place_mm - first - (along[i] - *low) * normal;
     if (aside.norm() > 0.2 * out.spacing_mm.head<2>().minCoeff())
       return "has frames that lie beside one another; export it on the grid of the CT";
+  }
+  if (const LabelFrame* const frame = doubled_frame(frames, along, out.spacing_mm.z()); frame != nullptr) {
+    return fmt::format(
+        "has several frames{} at {:.6g}, {:.6g}, {:.6g} mm, of which only one can be meant; export it again",
+        frame->segment == 0 ? "" : fmt::format(" of segment {}", frame->segment), frame->place_mm.x(),
+        frame->place_mm.y(), frame->place_mm.z());
   }
   out.origin_mm = first;
   out.size[2] = last + 1;

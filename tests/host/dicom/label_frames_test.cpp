@@ -122,5 +122,32 @@ TEST(DicomSegFrames, AreOfASegmentThatTheFileHas) {
   expect_said(said_of(seg), "frame 1 is of segment 1, which is none of its segments");
 }
 
+TEST(DicomSegFrames, OfOneSegmentHaveEachAPlaceOfTheirOwn) {
+  Segmentation seg = stack_of({0, 2, 4, 2});
+  expect_said(said_of(seg), "has several frames of segment 1 at 0, 0, 2 mm, of which only one can be meant");
+  seg.frames[3].segment = 2;
+  EXPECT_EQ(said_of(seg), "") << "segments may share places";
+  expect_said(said_of(stack_of({0, 0, 0})), "has several frames of segment 1 at 0, 0, 0 mm");
+  expect_said(said_of(stack_of({0, 2, 4, 4.02})), "has several frames of segment 1 at 0, 0, 4.02 mm");
+  Segmentation map = stack_of({0, 2, 2});
+  map.type = "LABELMAP";
+  expect_said(said_of(map), "has several frames at 0, 0, 2 mm");
+}
+
+TEST(DicomSegFrames, ThickerThanTheyLieApartAreTwo) {
+  const Scratch scratch;
+  write_segmentation(scratch / "seg.dcm", stack_of({0, 0.8}), [](DcmDataset& dataset) {
+    DcmItem *shared = nullptr, *measures = nullptr;
+    ASSERT_TRUE(dataset.findAndGetSequenceItem(DCM_SharedFunctionalGroupsSequence, shared).good());
+    ASSERT_TRUE(shared->findAndGetSequenceItem(DCM_PixelMeasuresSequence, measures).good());
+    ASSERT_TRUE(measures->findAndDeleteElement(DCM_SpacingBetweenSlices).good());
+    put(*measures, DCM_SliceThickness, "5");
+  });
+  const auto labels = read_labels_file(scratch / "seg.dcm");
+  ASSERT_TRUE(labels) << labels.error().what;
+  EXPECT_EQ(labels->size[2], 2);
+  EXPECT_NEAR(labels->spacing_mm.z(), 0.8, 1e-9);
+}
+
 }  // namespace
 }  // namespace birdseye::host
