@@ -83,6 +83,20 @@ int segment_of(DcmItem* own, DcmItem* shared, const FrameElements& elements) {
   return sound ? static_cast<int>(number[0]) : 0;
 }
 
+/// The series of the images that the file refers to, in its own study and in others.
+std::vector<std::string> series_referred_to(DcmDataset& dataset) {
+  std::vector<DcmItem*> studies = items_of(dataset, DCM_StudiesContainingOtherReferencedInstancesSequence);
+  studies.insert(studies.begin(), &dataset);
+  std::vector<std::string> uids;
+  for (DcmItem* study : studies) {
+    for (DcmItem* series : items_of(*study, DCM_ReferencedSeriesSequence)) {
+      std::string uid = words_of(dataset, text_of(*series, DCM_SeriesInstanceUID));
+      if (!uid.empty()) uids.push_back(std::move(uid));
+    }
+  }
+  return uids;
+}
+
 /// The pixels of all frames as they are stored; empty, or why not.
 std::string read_pixels(DcmDataset& dataset, int frames, LabelPixels& pixels) {
   pixels.columns = integer_of(dataset, DCM_Columns).value_or(0);
@@ -263,6 +277,7 @@ Result<DicomLabels> read_dicom_labels(const fs::path& path) {
   std::vector<LabelFrame> frames;
   std::vector<int> slice_of;
   LabelPixels pixels;
+  out.series_uids = series_referred_to(dataset);
   const bool by_pixels = type == "LABELMAP";
   std::string wrong = read_names(dataset, by_pixels, out.names);
   if (wrong.empty()) wrong = read_frames(dataset, by_pixels, out, frames);

@@ -19,7 +19,8 @@ struct PatientIdentity {
 /// Whose coordinates the places of an image are, as its DICOM files say; empty where they do not say, or are none.
 struct PatientFrame {
   std::string patient_id;
-  std::string uid;  ///< of the frame of reference, which all images of one position of the patient share
+  std::string uid;              ///< of the frame of reference, which all images of one position of the patient share
+  std::string series_uid = {};  ///< of the images
 };
 
 /// A person's name (DICOM PS3.5, value representation PN) as people write it: "Family, Prefix Given Middle Suffix", of

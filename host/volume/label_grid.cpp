@@ -80,6 +80,17 @@ Result<void> check_same_patient(const PatientFrame& ct, const ImageFile& labels,
                                "segmentation of this CT",
                                uid, ct.uid));
   }
+  // Of two phases of one examination even the frame of reference is the same, and the patient has breathed between
+  // them.
+  const auto& series = labels.series_labelled;
+  if (!series.empty() && !ct.series_uid.empty() &&
+      std::find(series.begin(), series.end(), ct.series_uid) == series.end()) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("is of another series than the CT: it says it is of {}{}, and the CT is {}; give the "
+                               "segmentation of this CT, or the CT of that series",
+                               series.front(), series.size() > 1 ? fmt::format(" and {} more", series.size() - 1) : "",
+                               ct.series_uid));
+  }
   return {};
 }
 

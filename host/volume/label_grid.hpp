@@ -16,7 +16,7 @@ struct LabelsOnGrid {
 
 /// Labels as their file has them, on the grid of the CT. path: for errors, which are Errc::bad_value: their voxels are
 /// not the CT's, or most of those with a label lie outside of it; or both say whose they are, and labels are of
-/// another patient or another frame of reference.
+/// another patient, another frame of reference or another series.
 Result<LabelsOnGrid> labels_on_grid(const Volume& ct, const ImageFile& labels, const std::filesystem::path& path);
 
 }  // namespace birdseye::host
