@@ -68,5 +68,37 @@ TEST(DicomSegOwner, WhereTheCtHasNoSeriesOnlyTheRestIsCompared) {
   EXPECT_TRUE(labels) << labels.error().what;
 }
 
+testing::Elements patient(const std::optional<std::string>& id, const std::optional<std::string>& name) {
+  return [id, name](DcmDataset& dataset) {
+    if (id) put(dataset, DCM_PatientID, *id);
+    if (name) put(dataset, DCM_PatientName, *name);
+  };
+}
+
+TEST(DicomSegOwner, WithoutAnIdOnEachSideNamesTell) {
+  for (const auto& [ct_id, id] :
+       {std::pair<std::optional<std::string>, std::optional<std::string>>{"A1", ""}, {"", "A1"}, {"", ""}, {{}, {}}}) {
+    const auto other = labels_of(patient(ct_id, "Doe^Jane"), patient(id, "Roe^Mary"));
+    ASSERT_FALSE(other);
+    EXPECT_THAT(other.error().what,
+                HasSubstr("seg.dcm: is of patient Roe, Mary, and the CT of patient Doe, Jane; give"));
+    for (const char* name : {"DOE^Jane^^", "doe^jane ", "Doe, Jane", "", "^^"}) {
+      const auto same = labels_of(patient(ct_id, "Doe^Jane"), patient(id, name));
+      ASSERT_TRUE(same) << name << ": " << same.error().what;
+      EXPECT_THAT(same->notes, Not(Contains(HasSubstr("patient"))));
+    }
+  }
+}
+
+TEST(DicomSegOwner, AnotherNameWithTheSameIdIsNotedWithoutIt) {
+  const auto married = labels_of(patient("A1", "Doe^Jane"), patient("A1", "Roe^Jane"));
+  ASSERT_TRUE(married) << married.error().what;
+  EXPECT_THAT(married->notes, Contains(HasSubstr("seg.dcm: has the CT's patient ID, and another patient name; see")));
+  EXPECT_THAT(married->notes, Not(Contains(HasSubstr("Jane"))));
+  const auto same = labels_of(patient("A1", "Doe^Jane"), patient("A1", "DOE^JANE"));
+  ASSERT_TRUE(same) << same.error().what;
+  EXPECT_THAT(same->notes, Not(Contains(HasSubstr("patient"))));
+}
+
 }  // namespace
 }  // namespace birdseye::host
