@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "host/dicom/dicom_dataset.hpp"
@@ -44,11 +45,20 @@ struct LabelPixels {
   }
 };
 
-std::vector<NamedLabel> read_names(DcmDataset& dataset) {
-  std::vector<NamedLabel> names;
+/// The segments that the file has; empty, or what is wrong. by_pixels: one may be the background, as 0.
+std::string read_names(DcmDataset& dataset, bool by_pixels, std::vector<NamedLabel>& names) {
+  constexpr int kHighestSegment = 65535;
+  std::set<int> numbers;
   for (DcmItem* segment : items_of(dataset, DCM_SegmentSequence)) {
+    const auto number = integer_of(*segment, DCM_SegmentNumber);
+    if (!number || *number < (by_pixels ? 0 : 1) || *number > kHighestSegment) {
+      return fmt::format("has a segment of the number '{}', which is none from 1 to {} (0062,0004); export it again",
+                         words_of(dataset, text_of(*segment, DCM_SegmentNumber).substr(0, 16)), kHighestSegment);
+    }
+    if (!numbers.insert(*number).second)
+      return fmt::format("has two segments of the number {} (0062,0004); export it again", *number);
     NamedLabel label;
-    label.number = integer_of(*segment, DCM_SegmentNumber).value_or(0);
+    label.number = *number;
     label.name = words_of(dataset, text_of(*segment, DCM_SegmentLabel));
     if (DcmItem* const type = item_of(*segment, DCM_SegmentedPropertyTypeCodeSequence);
         label.name.empty() && type != nullptr) {
@@ -56,7 +66,35 @@ std::vector<NamedLabel> read_names(DcmDataset& dataset) {
     }
     names.push_back(std::move(label));
   }
-  return names;
+  return {};
+}
+
+/// What a frame's groups, or those that the frames share, say of its segment; 0 where it is no number of one.
+int segment_of(DcmItem* own, DcmItem* shared, const FrameElements& elements) {
+  std::vector<double> number = elements.numbers(DCM_ReferencedSegmentNumber);
+  // An image that the segmentation was made from may be a segmentation, whose segments are not this one's.
+  for (DcmItem* group : {shared, own}) {
+    DcmItem* const segment = group == nullptr ? nullptr : item_of(*group, DCM_SegmentIdentificationSequence);
+    const std::string text = segment == nullptr ? std::string() : text_of(*segment, DCM_ReferencedSegmentNumber);
+    if (!text.empty()) number = numbers_in(text);
+  }
+  const bool sound =
+      number.size() == 1 && number[0] >= 1 && number[0] <= kHighestLabel && number[0] == std::floor(number[0]);
+  return sound ? static_cast<int>(number[0]) : 0;
+}
+
+/// The series of the images that the file refers to, in its own study and in others.
+std::vector<std::string> series_referred_to(DcmDataset& dataset) {
+  std::vector<DcmItem*> studies = items_of(dataset, DCM_StudiesContainingOtherReferencedInstancesSequence);
+  studies.insert(studies.begin(), &dataset);
+  std::vector<std::string> uids;
+  for (DcmItem* study : studies) {
+    for (DcmItem* series : items_of(*study, DCM_ReferencedSeriesSequence)) {
+      std::string uid = words_of(dataset, text_of(*series, DCM_SeriesInstanceUID));
+      if (!uid.empty()) uids.push_back(std::move(uid));
+    }
+  }
+  return uids;
 }
 
 /// The pixels of all frames as they are stored; empty, or why not.
@@ -89,17 +127,28 @@ std::string read_pixels(DcmDataset& dataset, int frames, LabelPixels& pixels) {
   return {};
 }
 
-/// Places, segments, spacing and axes; empty, or what is wrong.
+/// Places, segments, spacing and axes, out.names being known; empty, or what is wrong.
 std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, std::vector<LabelFrame>& frames) {
   DcmItem* const shared = item_of(dataset, DCM_SharedFunctionalGroupsSequence);
+  const auto groups = items_of(dataset, DCM_PerFrameFunctionalGroupsSequence);
+  if (groups.empty()) return "has no frames with a place; export it again";
+  const auto said = integer_of(dataset, DCM_NumberOfFrames);
+  if (!said) return "does not say how many frames it has (0028,0008); export it again";
+  if (*said < 1 || static_cast<std::size_t>(*said) != groups.size())
+    return fmt::format("says it has {} frames, and has the places of {}; export it again", *said, groups.size());
+  std::set<int> numbers;
+  for (const NamedLabel& label : out.names) numbers.insert(label.number);
   std::vector<double> axes, spacing, thickness;
-  for (DcmItem* own : items_of(dataset, DCM_PerFrameFunctionalGroupsSequence)) {
+  for (DcmItem* own : groups) {
     const FrameElements elements(dataset, own, shared);
     const auto place = elements.numbers(DCM_ImagePositionPatient);
     if (place.size() != 3) return fmt::format("frame {} has no sound place; export it again", frames.size() + 1);
-    const auto number = elements.numbers(DCM_ReferencedSegmentNumber);
-    if (!by_pixels && (number.size() != 1 || number[0] < 1 || number[0] > kHighestLabel))
-      return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
+    const int segment = by_pixels ? 0 : segment_of(own, shared, elements);
+    if (!by_pixels && segment == 0) return fmt::format("frame {} is of no segment; export it again", frames.size() + 1);
+    if (!by_pixels && !numbers.contains(segment)) {
+      return fmt::format("frame {} is of segment {}, which is none of its segments (0062,0002); export it again",
+                         frames.size() + 1, segment);
+    }
     if (frames.empty()) {
       axes = elements.numbers(DCM_ImageOrientationPatient);
       spacing = elements.numbers(DCM_PixelSpacing);
@@ -108,9 +157,8 @@ std::string read_frames(DcmDataset& dataset, bool by_pixels, DicomLabels& out, s
     } else if (elements.numbers(DCM_ImageOrientationPatient) != axes) {
       return "has frames that are turned against one another; export it on the grid of the CT";
     }
-    frames.push_back({{place[0], place[1], place[2]}, by_pixels ? 0 : static_cast<int>(number[0])});
+    frames.push_back({{place[0], place[1], place[2]}, segment});
   }
-  if (frames.empty()) return "has no frames with a place; export it again";
   if (axes.size() != 6 || spacing.size() != 2 || !(spacing[0] > 0) || !(spacing[1] > 0))
     return "has no sound orientation and spacing; export it again";
   const Eigen::Vector3d row(axes[0], axes[1], axes[2]), column(axes[3], axes[4], axes[5]);
@@ -133,8 +181,19 @@ double least_step_mm(const std::vector<double>& along) {
   return least;
 }
 
+/// A frame that gets the slice of another one of its segment, where slices lie a step apart; null where none does.
+const LabelFrame* doubled_frame(const std::vector<LabelFrame>& frames, const std::vector<double>& along, double step) {
+  const double low = *std::min_element(along.begin(), along.end());
+  std::set<std::pair<int, double>> taken;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (!taken.emplace(frames[i].segment, std::round((along[i] - low) / step)).second) return &frames[i];
+  }
+  return nullptr;
+}
+
 /// The slice of each frame, from 0, in a stack from the first place to the last; empty, or what is wrong.
 std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out, std::vector<int>& slice_of) {
+  constexpr double kLeastStep_mm = 0.1;  // of a CT; places that differ by less differ by rounding
   const Eigen::Vector3d normal = out.axes.col(2);
   std::vector<double> along;
   along.reserve(frames.size());
@@ -149,7 +208,9 @@ std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out
              return std::abs(slices - std::round(slices)) < 0.2;
            });
   };
-  const double step = fits(said) ? said : fits(least) ? least : 0;
+  double step = fits(said) ? said : fits(least) ? least : 0;
+  // Two slices much thicker than they lie apart seem to be one.
+  if (step > 0 && least >= kLeastStep_mm && fits(least) && doubled_frame(frames, along, step) != nullptr) step = least;
   if (step == 0 && *high - *low > 0.01) return "has frames at uneven distances; export it on the grid of the CT";
   out.spacing_mm.z() = step > 0 ? step : 1;
   const Eigen::Vector3d first = frames[static_cast<std::size_t>(low - along.begin())].place_mm;
@@ -162,6 +223,12 @@ std::string stack_frames(const std::vector<LabelFrame>& frames, DicomLabels& out
     const Eigen::Vector3d aside = frames[i].place_mm - first - (along[i] - *low) * normal;
     if (aside.norm() > 0.2 * out.spacing_mm.head<2>().minCoeff())
       return "has frames that lie beside one another; export it on the grid of the CT";
+  }
+  if (const LabelFrame* const frame = doubled_frame(frames, along, out.spacing_mm.z()); frame != nullptr) {
+    return fmt::format(
+        "has several frames{} at {:.6g}, {:.6g}, {:.6g} mm, of which only one can be meant; export it again",
+        frame->segment == 0 ? "" : fmt::format(" of segment {}", frame->segment), frame->place_mm.x(),
+        frame->place_mm.y(), frame->place_mm.z());
   }
   out.origin_mm = first;
   out.size[2] = last + 1;
@@ -207,11 +274,13 @@ Result<DicomLabels> read_dicom_labels(const fs::path& path) {
                    fmt::format("is a segmentation of type '{}'; export it as a binary one", words_of(dataset, type)));
   }
   DicomLabels out;
-  out.names = read_names(dataset);
   std::vector<LabelFrame> frames;
   std::vector<int> slice_of;
   LabelPixels pixels;
-  std::string wrong = read_frames(dataset, type == "LABELMAP", out, frames);
+  out.series_uids = series_referred_to(dataset);
+  const bool by_pixels = type == "LABELMAP";
+  std::string wrong = read_names(dataset, by_pixels, out.names);
+  if (wrong.empty()) wrong = read_frames(dataset, by_pixels, out, frames);
   if (wrong.empty()) wrong = stack_frames(frames, out, slice_of);
   if (wrong.empty()) wrong = read_pixels(dataset, static_cast<int>(frames.size()), pixels);
   if (!wrong.empty()) return refused(Errc::bad_format, path, wrong);

@@ -25,6 +25,7 @@ struct DicomLabels {
   Eigen::Matrix3d axes;  ///< columns: of columns, rows and slices
   std::vector<std::int16_t> labels;
   std::vector<NamedLabel> names;
+  std::vector<std::string> series_uids;  ///< of the images that it names as those it is of; may be none
 };
 
 /// Reads a segmentation: binary; fractional, of which a voxel belongs where it is at least half full or half sure; or a

@@ -6,6 +6,8 @@
 #include <array>
 #include <sstream>
 
+#include "calibration/base/lower_case.hpp"
+
 namespace birdseye::host {
 
 std::string person_name(const std::string& dicom_name) {
@@ -26,6 +28,15 @@ std::string person_name(const std::string& dicom_name) {
     before = " ";
   }
   return out;
+}
+
+bool same_name(const std::string& one, const std::string& other) {
+  const auto letters = [](const std::string& name) {
+    std::string left = lower_case(name);
+    std::erase_if(left, [](char c) { return c == ' ' || c == ','; });
+    return left;
+  };
+  return letters(one) == letters(other);
 }
 
 std::string dashed_date(const std::string& dicom_date) {

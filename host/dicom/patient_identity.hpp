@@ -19,12 +19,16 @@ struct PatientIdentity {
 /// Whose coordinates the places of an image are, as its DICOM files say; empty where they do not say, or are none.
 struct PatientFrame {
   std::string patient_id;
-  std::string uid;  ///< of the frame of reference, which all images of one position of the patient share
+  std::string uid;              ///< of the frame of reference, which all images of one position of the patient share
+  std::string series_uid = {};  ///< of the images
+  std::string patient_name = {};
 };
 
 /// A person's name (DICOM PS3.5, value representation PN) as people write it: "Family, Prefix Given Middle Suffix", of
 /// the first of its spellings.
 std::string person_name(const std::string& dicom_name);
+/// Whether two names that people write are of one person, whatever their capitals, blanks and commas.
+bool same_name(const std::string& one, const std::string& other);
 /// A date (value representation DA) with dashes; empty where it is none.
 std::string dashed_date(const std::string& dicom_date);
 

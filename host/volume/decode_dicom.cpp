@@ -152,6 +152,7 @@ Result<ImageFile> decode_dicom(const VolumeSource& source, const Announce& annou
   image.hu = *std::move(hu);
   image.patient = patient;
   image.frame_of_reference_uid = scan->tree.files[slices.front().file].frame_of_reference_uid;
+  image.series_uid = scan->tree.files[slices.front().file].series_uid;
   image.notes = notes_of(*scan, *chosen);
   if (source.untilt && series.stack.tilt_deg > 0) {
     const UntiltCost cost = untilt(series.stack, image);

@@ -19,6 +19,7 @@ Result<ImageFile> image_of_labels(const DicomFile& file) {
   image.axes = labels->axes;
   image.hu = std::move(labels->labels);
   image.label_names = std::move(labels->names);
+  image.series_labelled = std::move(labels->series_uids);
   image.patient = file.patient;
   image.frame_of_reference_uid = file.frame_of_reference_uid;
   if (file.frame_of_reference_uid.empty())

@@ -36,9 +36,10 @@ void send_image(const Send& send, const ImageFile& image) {
   send(image.hu.data(), image.hu.size() * sizeof image.hu[0]);
   send(image.values.data(), image.values.size() * sizeof image.values[0]);
   const PatientIdentity& patient = image.patient;
-  for (const std::string* text :
-       {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date, &image.frame_of_reference_uid})
+  for (const std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date,
+                                  &image.frame_of_reference_uid, &image.series_uid})
     send_long_text(send, *text);
+  send_texts(send, image.series_labelled);
   send_texts(send, image.notes);
   const std::size_t labels = image.label_names.size();
   send(&labels, sizeof labels);
@@ -126,13 +127,15 @@ std::optional<ImageFile> receive_image(const Receive& receive, int components) {
     image.values = *std::move(values);
   }
   PatientIdentity& patient = image.patient;
-  for (std::string* text :
-       {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date, &image.frame_of_reference_uid}) {
+  for (std::string* text : {&patient.name, &patient.id, &patient.birth_date, &patient.ct_date,
+                            &image.frame_of_reference_uid, &image.series_uid}) {
     auto received = receive_long_text(receive);
     if (!received) return std::nullopt;
     *text = *std::move(received);
   }
-  if (!receive_texts(receive, image.notes) || !receive_label_names(receive, image.label_names)) return std::nullopt;
+  if (!receive_texts(receive, image.series_labelled) || !receive_texts(receive, image.notes) ||
+      !receive_label_names(receive, image.label_names))
+    return std::nullopt;
   return image;
 }
 

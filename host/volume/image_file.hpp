@@ -25,8 +25,10 @@ struct ImageFile {
   Eigen::Matrix3d axes;                   ///< columns: which way the voxel axes point, unit length
   std::vector<NamedLabel> label_names;    ///< of a segmentation
   PatientIdentity patient;
-  std::string frame_of_reference_uid;  ///< empty where no DICOM file says it
-  std::vector<std::string> notes;      ///< what was passed over, and what resampling cost, a line each
+  std::string frame_of_reference_uid;        ///< empty where no DICOM file says it
+  std::string series_uid;                    ///< of a DICOM series
+  std::vector<std::string> series_labelled;  ///< of a segmentation: the series that it says it is of
+  std::vector<std::string> notes;            ///< what was passed over, and what resampling cost, a line each
 };
 
 /// Reads one of the series of a folder of DICOM files and of those below it, a DICOM file, or a NIfTI, NRRD, MHA or MHD

@@ -46,7 +46,8 @@ Result<ImportedVolume> import_with_notes(const VolumeSource& source, const std::
   volume.spacing_mm = image->spacing_mm;
   volume.patient_from_voxel.linear() = image->axes * image->spacing_mm.asDiagonal();
   volume.patient_from_voxel.translation() = image->origin_mm;
-  volume.frame = {image->patient.id, std::move(image->frame_of_reference_uid)};
+  volume.frame = {image->patient.id, std::move(image->frame_of_reference_uid), std::move(image->series_uid),
+                  image->patient.name};
   volume.hu = std::move(image->hu);
   imported.patient = std::move(image->patient);
   imported.notes = std::move(image->notes);

@@ -65,13 +65,19 @@ std::pair<Volume, double> laid_into(const Volume& ct, const ImageFile& labels, c
   return {std::move(out), static_cast<double>(outside) / all};
 }
 
+/// Whether both say a name, and not the same.
+bool named_apart(const PatientFrame& ct, const ImageFile& labels) {
+  return !ct.patient_name.empty() && !labels.patient.name.empty() && !same_name(ct.patient_name, labels.patient.name);
+}
+
 /// Labels that say whose they are must be the CT's: two patients' CTs of one size may lie on one grid.
 Result<void> check_same_patient(const PatientFrame& ct, const ImageFile& labels, const std::filesystem::path& path) {
   const std::string& id = labels.patient.id;
-  if (!id.empty() && !ct.patient_id.empty() && id != ct.patient_id) {
-    return refused(
-        Errc::bad_value, path,
-        fmt::format("is of patient {}, and the CT of patient {}; give the segmentation of this CT", id, ct.patient_id));
+  const bool by_id = !id.empty() && !ct.patient_id.empty();
+  if (by_id ? id != ct.patient_id : named_apart(ct, labels)) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("is of patient {}, and the CT of patient {}; give the segmentation of this CT",
+                               by_id ? id : labels.patient.name, by_id ? ct.patient_id : ct.patient_name));
   }
   const std::string& uid = labels.frame_of_reference_uid;
   if (!uid.empty() && !ct.uid.empty() && uid != ct.uid) {
@@ -79,6 +85,17 @@ Result<void> check_same_patient(const PatientFrame& ct, const ImageFile& labels,
                    fmt::format("is of another scan than the CT: its frame of reference is {}, the CT's {}; give the "
                                "segmentation of this CT",
                                uid, ct.uid));
+  }
+  // Of two phases of one examination even the frame of reference is the same, and the patient has breathed between
+  // them.
+  const auto& series = labels.series_labelled;
+  if (!series.empty() && !ct.series_uid.empty() &&
+      std::find(series.begin(), series.end(), ct.series_uid) == series.end()) {
+    return refused(Errc::bad_value, path,
+                   fmt::format("is of another series than the CT: it says it is of {}{}, and the CT is {}; give the "
+                               "segmentation of this CT, or the CT of that series",
+                               series.front(), series.size() > 1 ? fmt::format(" and {} more", series.size() - 1) : "",
+                               ct.series_uid));
   }
   return {};
 }
@@ -93,12 +110,21 @@ Result<LabelsOnGrid> labels_on_grid(const Volume& ct, const ImageFile& labels, c
     return refused(Errc::bad_value, path, "is not on the grid of the CT; resample the labels to it");
   }
   auto [volume, outside] = laid_into(ct, labels, *way);
-  if (outside == 0) return LabelsOnGrid{std::move(volume), {}};
-  const std::string share =
-      fmt::format("{:.1f} % of its voxels that have a label lie outside of the CT", 100 * outside);
-  if (outside > kMostOutside) return refused(Errc::bad_value, path, share + "; is it of this CT?");
-  return LabelsOnGrid{std::move(volume), fmt::format("{}: {}, and are left out: what it labels ends where the CT ends",
-                                                     path.string(), share)};
+  LabelsOnGrid out{std::move(volume), {}};
+  if (outside > 0) {
+    const std::string share =
+        fmt::format("{:.1f} % of its voxels that have a label lie outside of the CT", 100 * outside);
+    if (outside > kMostOutside) return refused(Errc::bad_value, path, share + "; is it of this CT?");
+    out.notes.push_back(
+        fmt::format("{}: {}, and are left out: what it labels ends where the CT ends", path.string(), share));
+  }
+  // Hospitals correct names, and people marry: with the same ID it is no reason to refuse. The note may be written
+  // where the patient is not to be named.
+  if (named_apart(ct.frame, labels)) {
+    out.notes.push_back(fmt::format(
+        "{}: has the CT's patient ID, and another patient name; see that both are of one patient", path.string()));
+  }
+  return out;
 }
 
 }  // namespace birdseye::host

@@ -43,9 +43,7 @@ Result<LabelVolume> import_named_labels(const std::filesystem::path& path, const
   if (!image) return image.error();
   auto laid = labels_on_grid(ct, *image, path);
   if (!laid) return laid.error();
-  LabelVolume labels{std::move(laid->volume), std::move(image->label_names), {}};
-  labels.notes.reserve(image->notes.size() + 2);
-  if (!laid->note.empty()) labels.notes.push_back(std::move(laid->note));
+  LabelVolume labels{std::move(laid->volume), std::move(image->label_names), std::move(laid->notes)};
   for (const std::string& note : image->notes) labels.notes.push_back(fmt::format("{}: {}", path.string(), note));
   if (!image->frame_of_reference_uid.empty() && ct.frame.uid.empty()) {
     labels.notes.push_back(fmt::format(

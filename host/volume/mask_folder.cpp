@@ -91,7 +91,7 @@ Result<LabelVolume> import_masks(const fs::path& folder, const Volume& ct, std::
     if (!image) return image.error();
     auto mask = labels_on_grid(ct, *image, path);
     if (!mask) return mask.error();
-    if (!mask->note.empty()) out.notes.push_back(std::move(mask->note));
+    out.notes.insert(out.notes.end(), mask->notes.begin(), mask->notes.end());
     if (!add_mask(mask->volume, label.number, values, out.volume)) {
       return Error{Errc::unsupported,
                    fmt::format("{}: too many masks share voxels; name fewer of them", folder.string())};
