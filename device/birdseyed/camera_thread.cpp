@@ -60,10 +60,10 @@ Error stream(drivers::FrameSource& camera, const drivers::CameraSettings& settin
       if (known) running();  // its exposure is known now, or no longer
     }
     if (const Duration early = pace.free_at() - device_now(); early > Duration{}) sleep_for(early, stop);
-    const DeviceTime until = device_now() + kPatience;
-    auto frame = camera.next(until);
+    const std::uint64_t incomplete = camera.counters().incomplete;
+    auto frame = camera.next(device_now() + kPatience);
     if (!frame) return frame.error();
-    const bool came = frame->has_value(), damaged = !came && device_now() < until;
+    const bool came = frame->has_value(), damaged = camera.counters().incomplete != incomplete;
     if (came || damaged) pace.passed(device_now());
     if (came) {
       if (std::exchange(restarts, 0) > 0 || !std::exchange(known, true)) running();

@@ -26,7 +26,8 @@ Result<std::string> probe_camera(const drivers::CameraSettings& settings) {
     if (!frame) return frame.error();
     if (*frame) return (*camera)->describe();
   }
-  return Error{Errc::timeout, fmt::format("{}: the camera sends no whole frames", (*camera)->name())};
+  return Error{Errc::timeout, fmt::format("{}: the camera sends no {}frames", (*camera)->name(),
+                                          (*camera)->counters().incomplete > 0 ? "whole " : "")};
 }
 
 Result<std::string> probe_gpio(const drivers::GpioSettings& settings) {

@@ -5,15 +5,16 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "drivers/system/progress.hpp"
+#include "drivers/system/whole_file.hpp"
 #include "host/app/commands.hpp"
 #include "host/bench/bench_machine.hpp"
 #include "host/bench/factor_study.hpp"
@@ -158,7 +159,9 @@ Result<void> print_line(BenchRegisterOptions options) {
 
 /// The table of lines that print_line() printed.
 Result<ExitCode> table_of_lines(const BenchRegisterOptions& options) {
-  std::ifstream in(options.lines);
+  const auto whole = read_whole_file(options.lines, kMostTextBytes);
+  if (!whole) return whole.error();
+  std::istringstream in(*whole);
   struct Kind {
     nlohmann::json name;
     std::vector<Trial> trials;

@@ -64,7 +64,13 @@ Result<void> check_against_sheet(const fs::path& path) {
   const fs::path sheet = path.parent_path() / "result.json";
   auto json = read_json_file(sheet, kMostSheetBytes);
   if (!json && json.error().code == Errc::not_found) return {};
-  if (!json) return json.error();
+  if (!json) {
+    return Error{
+        json.error().code,
+        fmt::format("{}: whether it is as it was written cannot be told: {}, or move that away if it is not of "
+                    "this file",
+                    path.string(), json.error().what)};
+  }
   const std::string name = path.filename().string();
   const nlohmann::json sums = json->is_object() ? json->value("sha256", nlohmann::json()) : nlohmann::json();
   if (!sums.contains(name)) return {};

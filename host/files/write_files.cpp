@@ -26,6 +26,10 @@ fs::path part_of(const fs::path& path) {
 /// for: one that nobody reads is refused.
 Result<void> put(const fs::path& path, const std::string& text, int flags, const fs::path& named) {
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666));
+  if (!fd && errno == ENXIO)
+    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start who does before", named.string())};
+  if (!fd && errno == EEXIST)
+    return Error{Errc::unreadable, fmt::format("{}: is in the way; remove it", path.string())};
   bool written = static_cast<bool>(fd);
   if (written && ::fcntl(fd.get(), F_SETFL, 0) != 0) written = false;
   for (std::size_t at = 0; written && at < text.size();) {
@@ -44,8 +48,7 @@ Result<void> put(const fs::path& path, const std::string& text, int flags, const
 /// to.
 Result<void> put_part(const FileText& file) {
   const fs::path part = part_of(file.path);
-  if (::unlink(part.c_str()) != 0 && errno != ENOENT)
-    return Error{Errc::unreadable, fmt::format("{}: is in the way; remove it", part.string())};
+  (void)::unlink(part.c_str());  // what that may not, O_EXCL refuses
   return put(part, file.text, O_EXCL | O_NOFOLLOW, file.path);
 }
 

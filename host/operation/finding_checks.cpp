@@ -29,7 +29,10 @@ Result<void> check_covariance(const char* name, const std::optional<Matrix>& cov
     const auto scale = covariance->diagonal().cwiseMax(0).cwiseSqrt().eval();
     const auto inverse = scale.unaryExpr([](double sigma) { return sigma > 0 ? 1 / sigma : 0; }).eval();
     const Matrix correlation = inverse.asDiagonal() * *covariance * inverse.asDiagonal();
-    const bool positive = covariance->diagonal().minCoeff() >= 0 &&
+    // What has no variance, as a parameter that was held, goes with nothing either.
+    const auto held = (scale.array() == 0).template cast<double>().matrix().eval();
+    const bool alone = (held.asDiagonal() * *covariance).isZero(0);
+    const bool positive = covariance->diagonal().minCoeff() >= 0 && alone &&
                           Eigen::SelfAdjointEigenSolver<Matrix>(correlation).eigenvalues().minCoeff() >= -kRounded;
     if (positive) return {};
   }

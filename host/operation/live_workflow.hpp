@@ -141,7 +141,7 @@ class LiveWorkflow {
   [[nodiscard]] bool pointer_is_seen() const;
   [[nodiscard]] std::optional<Touch> pointer_held() const;
   [[nodiscard]] std::optional<CheckReading> check_reading() const;
-  /// By a landmark that the pointer is held to.
+  /// By the landmark or fiducial that the pointer is held to, where it is held to one.
   void check_registration();
   void check_undoubted(const std::optional<CheckReading>& reading);
   void check_in_doubt(const CheckReading& reading);

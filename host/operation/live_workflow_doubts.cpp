@@ -134,8 +134,8 @@ void LiveWorkflow::check_registration() {
   check_ = {false, words("note_check_no_pointer")};
 }
 
-/// Nothing speaks against it: only a landmark that is off does from now on. That a fiducial fits, which it was fitted
-/// to, tells nothing of how good it is.
+/// Nothing speaks against it: only a place that is off does from now on. That a fiducial fits, which it was fitted to,
+/// tells nothing of how good it is, and a landmark need not be pointed at.
 void LiveWorkflow::check_undoubted(const std::optional<CheckReading>& reading) {
   constexpr double kPointedAt_mm = 100;  // further away the pointer is laid aside
   const bool pointed_at = reading && reading->distance_mm <= kPointedAt_mm;

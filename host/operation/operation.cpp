@@ -185,7 +185,9 @@ Result<SignedOperation> read_signed_operation(const fs::path& given) {
     if (const nlohmann::json& version = sheet->at("format").at("version"); version != kVersion)
       return refused(fmt::format("is of version {}; this program reads version {}", version.dump(), kVersion));
     auto operation = operation_of(*sheet);
-    if (!operation) return refused(operation.error().what + "; register anew");
+    if (!operation) {
+      return Error{operation.error().code, fmt::format("{}: {}; register anew", path.string(), operation.error().what)};
+    }
     return SignedOperation{*std::move(operation), sealed_by(*text)};
   } catch (const std::exception&) {
     return refused(fmt::format("{}; register anew", kPartMissing));

@@ -45,13 +45,17 @@ Instruments instruments_of_010(const Json& found) {
   return out;
 }
 
+Error register_anew(const fs::path& folder, const Error& why) {
+  return {why.code, fmt::format("{}: {}; register anew", (folder / "operation.json").string(), why.what)};
+}
+
 Result<CalibratedScope> calibrated_of_010(const fs::path& folder, const Json& json) {
   auto scope = ScopeSetup::of_files(
       folder / "camera.yaml", folder / "camera_from_sensor.txt",
       {figure_of_010(json, "camera_rms_px"), figure_of_010(json, "held_out_px"), figure_of_010(json, "hand_eye_mm")});
   if (!scope) return scope.error();
   CalibratedScope out{*std::move(scope), json.at("made_utc").get<std::string>(), true, instruments_of_010(json), ""};
-  if (auto sound = check_figures(out); !sound) return sound.error().with_context((folder / "operation.json").string());
+  if (auto sound = check_figures(out); !sound) return register_anew(folder, sound.error());
   return out;
 }
 
@@ -67,7 +71,7 @@ Result<RegisteredPatient> registered_of_010(const fs::path& folder, const Json& 
   for (const Json& place : json.at("fiducials_in_patient_mm"))
     out.fiducials_in_patient_mm.emplace_back(place.at(0).get<double>(), place.at(1).get<double>(),
                                              place.at(2).get<double>());
-  if (auto sound = check_figures(out); !sound) return sound.error().with_context((folder / "operation.json").string());
+  if (auto sound = check_figures(out); !sound) return register_anew(folder, sound.error());
   return out;
 }
 
@@ -100,8 +104,7 @@ Result<Operation> operation_of_010(const fs::path& folder, const Json& sheet, co
     const auto radius95_mm = figure_of_010(sheet, "deformed_target_radius95_mm");
     if (rms_mm && radius95_mm) deformed.target = {*rms_mm, *radius95_mm};
     deformed.made_utc = out.made_utc;
-    if (auto sound = check_figures(deformed); !sound)
-      return sound.error().with_context((folder / "operation.json").string());
+    if (auto sound = check_figures(deformed); !sound) return register_anew(folder, sound.error());
     out.deformed = std::make_shared<const DeformedOrgan>(std::move(deformed));
   }
   return out;

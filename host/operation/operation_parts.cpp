@@ -6,7 +6,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <span>
-#include <stdexcept>
 
 #include "calibration/geometry/camera_parameters.hpp"
 #include "calibration/record/round_field_json.hpp"
@@ -44,10 +43,11 @@ Matrix matrix_of(const Json& rows) {
 
 /// Throws, as the library's own accessors do, where it is no whole number that an int holds: else it would be another.
 int whole_number_of(const Json& json) {
-  if (!json.is_number_integer()) throw std::range_error("no whole number");
+  const auto refuse = [&json] { throw Json::other_error::create(501, "no whole number of an int", &json); };
+  if (!json.is_number_integer()) refuse();
   const bool fits = json.is_number_unsigned() ? json.get<std::uint64_t>() <= std::numeric_limits<int>::max()
                                               : json.get<std::int64_t>() >= std::numeric_limits<int>::min();
-  if (!fits) throw std::range_error("no whole number");
+  if (!fits) refuse();
   return json.get<int>();
 }
 

@@ -109,7 +109,8 @@ Result<PictureHardware> read_taken_with(const fs::path& picture) {
   const fs::path path = picture.parent_path() / kSheet;
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return out;
-  const auto sheet = read_json_file(path);
+  constexpr std::size_t kMostBytes = 1U << 20U;
+  const auto sheet = read_json_file(path, kMostBytes);
   if (!sheet) return sheet.error();
   try {
     out.tracker = sheet->value("tracker", out.tracker);

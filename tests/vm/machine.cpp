@@ -65,7 +65,10 @@ Machine::Machine(const std::filesystem::path& out) : out_(out), port_(*free_port
   constexpr int kBoots = 3;
   for (int boot = 1; boot <= kBoots; ++boot) {
     if (boots()) return;
-    fmt::print("vm: boot {} of {} did not come up; see {}/*.log\n", boot, kBoots, out_.string());
+    const std::filesystem::path kept = fmt::format("{}-boot-{}", out_.string(), boot);
+    std::filesystem::remove_all(kept);
+    std::filesystem::copy(out_, kept, std::filesystem::copy_options::skip_symlinks);
+    fmt::print("booted again: the virtual machine did not come up; see {}/*.log\n", kept.string());
   }
   ADD_FAILURE() << "the virtual machine does not come up; see " << out_ << "/*.log";
 }

@@ -262,6 +262,13 @@ TEST(Operation, FiguresThatNobodyCanHaveMeasuredAreRefusedByTheirName) {
     return nlohmann::json(std::vector<std::vector<double>>(static_cast<std::size_t>(side),
                                                            std::vector<double>(static_cast<std::size_t>(side), value)));
   };
+  nlohmann::json correlated = square(6, 0), lopsided = square(6, 0), without_variance = square(6, -1e6);
+  for (std::size_t i = 0; i < 6; ++i) {
+    correlated[i][i] = lopsided[i][i] = 1;
+    without_variance[i][i] = 0;
+  }
+  correlated[0][1] = correlated[1][0] = 2;
+  lopsided[0][1] = 0.5;
   nlohmann::json points = sheet.at("registered").at("fiducials_in_patient_mm");
   for (nlohmann::json& point : points) point = {1, 2, 3};
   const std::int64_t wraps = (std::int64_t{1} << 32) + 512;
@@ -275,6 +282,9 @@ TEST(Operation, FiguresThatNobodyCanHaveMeasuredAreRefusedByTheirName) {
         {"calibrated", "/lens/covariance", square(9, -1), "the lens's covariance is no covariance"},
         {"calibrated", "/lens/covariance", square(9, 1e308), "the lens's covariance is no covariance"},
         {"calibrated", "/hand_eye_covariance", square(6, -1), "hand_eye_covariance is no covariance"},
+        {"calibrated", "/hand_eye_covariance", correlated, "hand_eye_covariance is no covariance"},
+        {"calibrated", "/hand_eye_covariance", lopsided, "hand_eye_covariance is no covariance"},
+        {"calibrated", "/hand_eye_covariance", without_variance, "hand_eye_covariance is no covariance"},
         {"registered", "/fre_mm", -1, "fre_mm is -1"},
         {"registered", "/fiducials_in_patient_mm", points, "at one place"},
         {"registered", "/fiducials_in_patient_mm/0/0", 1e300, "m away"},
