@@ -15,7 +15,8 @@ class SolidNoise {
  private:
   static constexpr int kPeriod = 32;
   /// Values at the corners of a cell of the lattice, of 0 to 255: those at the near and at the far end along X, each
-  /// four in the order of Y, then Z. Eight lie together, for they are asked for together, millions of times: a megabyte.
+  /// four in the order of Y, then Z. Eight lie together, for they are asked for together, millions of times: a
+  /// megabyte.
   struct Cell {
     Eigen::Array4f near, far;
   };
