@@ -27,7 +27,7 @@ fs::path part_of(const fs::path& path) {
 Result<void> put(const fs::path& path, const std::string& text, int flags, const fs::path& named) {
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK | flags, 0666));
   if (!fd && errno == ENXIO)
-    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start who does before", named.string())};
+    return Error{Errc::unreadable, fmt::format("{}: nobody reads this pipe; start its reader first", named.string())};
   if (!fd && errno == EEXIST)
     return Error{Errc::unreadable, fmt::format("{}: is in the way; remove it", path.string())};
   bool written = static_cast<bool>(fd);
@@ -48,7 +48,7 @@ Result<void> put(const fs::path& path, const std::string& text, int flags, const
 /// to.
 Result<void> put_part(const FileText& file) {
   const fs::path part = part_of(file.path);
-  (void)::unlink(part.c_str());  // what that may not, O_EXCL refuses
+  (void)::unlink(part.c_str());  // where it cannot be removed, O_EXCL refuses it
   return put(part, file.text, O_EXCL | O_NOFOLLOW, file.path);
 }
 

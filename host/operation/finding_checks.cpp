@@ -25,7 +25,7 @@ Result<void> check_covariance(const char* name, const std::optional<Matrix>& cov
   const bool finite = covariance->allFinite() && covariance->cwiseAbs().maxCoeff() < kLargest;
   const bool symmetric = finite && covariance->isApprox(covariance->transpose(), 1e-6);
   if (symmetric) {
-    // Its axes differ by their units, so each is measured by its own sigma.
+    // The covariance's axes differ by their units, so each is measured by its own sigma.
     const auto scale = covariance->diagonal().cwiseMax(0).cwiseSqrt().eval();
     const auto inverse = scale.unaryExpr([](double sigma) { return sigma > 0 ? 1 / sigma : 0; }).eval();
     const Matrix correlation = inverse.asDiagonal() * *covariance * inverse.asDiagonal();

@@ -454,21 +454,16 @@ inline constexpr auto kEnglish = std::to_array<EnglishText>({
     {"doubt_fit", "the touches fit poorly"},
     {"why_no_pointer", "the pointer is not seen: hold its tip to a fiducial"},
     {"why_unregistered", "the patient is not registered yet"},
-    {"why_unconfirmed",
-     "nobody has looked whether the registration still holds: hold the pointer to two landmarks or fiducials in step "
-     "6, "
-     "and press Space at each"},
+    {"why_unconfirmed", "the registration is unchecked: point at two landmarks or fiducials in step 6, Space at each"},
 
     // The bird that is fixed on patient or table
     {"reference_absent", "the reference \"{}\" is not seen"},
     {"why_reference_lost",
-     "the reference \"{}\" was not seen for a moment: hold the pointer to two landmarks or fiducials in step 6, and "
-     "press "
-     "Space at each; or register anew"},
+     "the reference \"{}\" was not seen for a moment: point at two landmarks or fiducials"
+     " in step 6, Space at each; or register anew"},
     {"why_reference_moved",
-     "the reference \"{}\" came off or was pushed: fix it, hold the pointer to two landmarks or fiducials in step 6, "
-     "and "
-     "press Space at each; or register anew"},
+     "the reference \"{}\" came off or was pushed: fix it, point at two landmarks or fiducials"
+     " in step 6, Space at each; or register anew"},
 
     // What is held back, for other instruments are connected than those that it was found with
     {"instrument_tracker", "tracker"},

@@ -218,7 +218,9 @@ void draw_check(PanelContext& context) {
   const Eigen::Vector3d& tip = reading->tip_in_patient_mm;
   if (context.facts.details) say(theme.quiet, words("tip_at", tip.x(), tip.y(), tip.z()));
   if (reading->nearest.empty()) return;
-  if (reading->fitted) return say(theme.warn, words("from_fitted", reading->distance_mm, reading->nearest));
+  // In doubt a fitted place tells as much as another.
+  if (reading->fitted && !context.operation.unconfirmed)
+    return say(theme.warn, words("from_fitted", reading->distance_mm, reading->nearest));
   say(reading->distance_mm < 3 ? theme.good : theme.text,
       words("from_nearest", reading->distance_mm, reading->nearest));
 }

@@ -43,7 +43,7 @@ class Program {
   std::atomic<bool> sticks = false;  ///< the same frame over and over
   std::atomic<bool> floods = false;  ///< as fast as the socket takes them
   /// Of so many frames all but one are damaged.
-  static constexpr std::uint64_t kOneWholeOf = 50;
+  static constexpr int kOneWholeOf = 50;
   std::atomic<bool> damages = false;
 
  private:
@@ -91,6 +91,26 @@ class ACamera : public ::testing::Test {
     return {};
   }
 
+  /// From the first to the last of so many frames whose number is a multiple. What the queue dropped came in between,
+  /// and only makes it longer.
+  double between_frames_s(int frames, std::uint64_t multiple) {
+    std::optional<DeviceTime> first, last;
+    for (int came = 0; came < frames;) {
+      const auto event = queue_.pop(device_now() + Duration::from_ms(20'000), {});
+      if (!event) {
+        ADD_FAILURE() << "the frames did not come";
+        return 0;
+      }
+      const auto* const frame = std::get_if<FrameCame>(&*event);
+      if (frame == nullptr || frame->frame.sequence % multiple != 0) continue;
+      ++came;
+      if (!first) first = frame->frame.arrived;
+      last = frame->frame.arrived;
+    }
+    return (*last - *first).seconds();
+  }
+  static constexpr int kAtOnce = 9;  ///< are read after a halt, whatever the rate
+
   testing::Scratch scratch_;
   Program program_;
   std::atomic<bool> lock_wanted_ = false;
@@ -121,19 +141,8 @@ TEST_F(ACamera, ThatRepeatsAFrameIsSilent) {
 TEST_F(ACamera, ThatSendsAsFastAsItCanIsReadAtFourTimesItsRate) {
   program_.floods = true;
   next(InstrumentState::running);
-  constexpr int kFrames = 100, kAtOnce = 9;
-  std::optional<DeviceTime> first, last;
-  for (int came = 0; came < kFrames;) {
-    const auto event = queue_.pop(device_now() + Duration::from_ms(20'000), {});
-    ASSERT_TRUE(event);
-    const auto* const frame = std::get_if<FrameCame>(&*event);
-    if (frame == nullptr) continue;
-    ++came;
-    if (!first) first = frame->frame.arrived;
-    last = frame->frame.arrived;
-  }
-  // What the queue dropped came in between, and only makes it longer.
-  EXPECT_GE((*last - *first).seconds(), (kFrames - 1 - kAtOnce) / 400.0);
+  constexpr int kFrames = 100;
+  EXPECT_GE(between_frames_s(kFrames, 1), (kFrames - 1 - kAtOnce) / 400.0);
 }
 
 /// They cost as much to read as whole ones.
@@ -141,18 +150,8 @@ TEST_F(ACamera, ThatSendsDamagedFramesAsFastAsItCanIsReadNoFaster) {
   program_.damages = true;
   program_.floods = true;
   next(InstrumentState::running);
-  constexpr int kWhole = 4, kAtOnce = 9;
-  std::optional<DeviceTime> first, last;
-  for (int came = 0; came < kWhole;) {
-    const auto event = queue_.pop(device_now() + Duration::from_ms(20'000), {});
-    ASSERT_TRUE(event);
-    const auto* const frame = std::get_if<FrameCame>(&*event);
-    if (frame == nullptr || frame->frame.sequence % Program::kOneWholeOf != 0) continue;
-    ++came;
-    if (!first) first = frame->frame.arrived;
-    last = frame->frame.arrived;
-  }
-  EXPECT_GE((*last - *first).seconds(), ((kWhole - 1) * static_cast<int>(Program::kOneWholeOf) - kAtOnce) / 400.0);
+  constexpr int kWhole = 4, kOneOf = Program::kOneWholeOf;
+  EXPECT_GE(between_frames_s(kWhole, kOneOf), ((kWhole - 1) * kOneOf - kAtOnce) / 400.0);
 }
 
 TEST_F(ACamera, IsHeldOnceAndLetGoOnceAsIsWanted) {
